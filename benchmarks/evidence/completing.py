@@ -17,8 +17,7 @@ from phyblock.datasets import AssemblyTask, read_builtin, read_official
 from phyblock.domain.scene import Scene
 from phyblock.errors import DataError
 from phyblock.making.scenes.candidate_sets import make_candidates
-from phyblock.making.scenes.completing import derived
-from phyblock.making.scenes.given_scenes import GivenScene
+from phyblock.making.scenes.completing import GivenScene, derived
 from phyblock.resources import bundled
 from phyblock.sim.support import find_gaps, find_overlaps
 

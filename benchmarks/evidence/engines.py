@@ -24,7 +24,7 @@ import numpy as np
 
 from phyblock.datasets import read_builtin, read_questions
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.rederiving import problem_of
+from phyblock.making.questions.question_production import problem_of
 from phyblock.resources import bundled
 from phyblock.sim.registry import PHYSICS_VARIABLE, installed_engines, told_engine
 from phyblock.sim.site import settle

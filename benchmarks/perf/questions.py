@@ -18,8 +18,7 @@ from typing import Any
 from phyblock.datasets import read_builtin
 from phyblock.domain import SUBTASKS, Question, Scene
 from phyblock.errors import DataError
-from phyblock.making.questions.question_production import make_questions
-from phyblock.making.questions.rederiving import problem_of
+from phyblock.making.questions.question_production import make_questions, problem_of
 from phyblock.making.workers import open_workers
 from phyblock.resources import bundled
 from phyblock.sim import PictureStyle, goal_png

@@ -22,12 +22,11 @@ import psutil
 
 from phyblock.datasets import read_builtin
 from phyblock.domain import Scene
-from phyblock.making.checks.scene_audit import audit_scene
-from phyblock.making.checks.set_verification import verify_scene
 from phyblock.making.scenes.candidate_sets import make_candidates
 from phyblock.making.scenes.compositions import beside
 from phyblock.making.scenes.scene_production import Order, produce, shares
 from phyblock.making.scenes.sketch import make_scene
+from phyblock.making.verification import audit_scene, verify_scene
 from phyblock.making.workers import Workers, open_workers
 from phyblock.resources import bundled
 from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png

@@ -5,9 +5,7 @@ from __future__ import annotations
 from phyblock.domain import KIT_PALETTE, Scene
 from phyblock.domain.scene import Kind
 from phyblock.errors import DataError, Problem
-from phyblock.making.checks.acceptance import FORM, PHYSICS
-from phyblock.making.checks.scene_checks import findings_of
-from phyblock.making.checks.scene_facts import SceneFacts
+from phyblock.making.checks import FORM, PHYSICS, SceneFacts, findings_of
 
 
 def accept(scene: Scene, palette: tuple[Kind, ...] = KIT_PALETTE) -> None:

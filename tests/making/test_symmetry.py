@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from phyblock.domain import BLOCK_TYPES, SHAPES, Block, orientation_class
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, canonical_form
-from phyblock.making.poses import POSES
-from phyblock.making.symmetry import transformed
+from phyblock.making.poses import POSES, transformed
 from phyblock.sim import find_overlaps, support_graph
 from phyblock.sim.render import DrawnBlock
 from tests.designs.scenes import designed_scenes

@@ -18,7 +18,7 @@ from phyblock.config.suite import Variant, load_suite
 from phyblock.datasets import AssemblyTask
 from phyblock.domain.symmetry import Symmetry, canonical_form
 from phyblock.errors import SpecError
-from phyblock.making.symmetry import transformed
+from phyblock.making.poses import transformed
 from phyblock.models.base import Image
 from phyblock.resources import bundled
 from phyblock.run.data import open_dataset

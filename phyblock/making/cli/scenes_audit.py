@@ -13,11 +13,9 @@ from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.datasets.named import read_data_set
 from phyblock.domain import Scene
 from phyblock.files import OutFolder, check_free, make_folder, write_named
-from phyblock.making.checks.finding import CheckName, Finding
-from phyblock.making.checks.scene_audit import AUDITED, SceneAudit, audit_scenes, findings_csv
-from phyblock.making.checks.set_checks import find_duplicates
-from phyblock.making.checks.tolerances import FOREIGN
+from phyblock.making.checks import FOREIGN, CheckName, Finding, find_duplicates
 from phyblock.making.cli.working import jobs_option, tracked
+from phyblock.making.verification import AUDITED, SceneAudit, audit_scenes, findings_csv
 from phyblock.sim import PictureStyle
 from phyblock.sim.marked import marked_png
 from phyblock.text import counted

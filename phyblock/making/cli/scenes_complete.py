@@ -10,12 +10,10 @@ import click
 from phyblock.cli.console import shown_path
 from phyblock.cli.paths import UserPath
 from phyblock.errors import DataError, Problem
-from phyblock.making.checks.set_checks import find_duplicates, find_orphans
+from phyblock.making.checks import find_duplicates, find_orphans
 from phyblock.making.cli.working import jobs_option, tracked
-from phyblock.making.scenes.completing import Completed, complete, palette_of
-from phyblock.making.scenes.given_scenes import ReadScene, read_given
-from phyblock.making.scenes.scene_card import completed_card
-from phyblock.making.scenes.scene_files import check_folder, open_writer
+from phyblock.making.scenes.completing import Completed, ReadScene, complete, palette_of, read_given
+from phyblock.making.scenes.scene_files import check_folder, completed_card, open_writer
 from phyblock.making.workers import open_workers
 from phyblock.text import counted
 

@@ -12,14 +12,14 @@ from phyblock.cli.paths import NAME_OR_PATH
 from phyblock.datasets import SCENES_FILE, AssemblyTask, read_builtin
 from phyblock.datasets.named import find_data_set
 from phyblock.errors import DataError, Problem
-from phyblock.making.checks.set_checks import find_duplicates, find_orphans
-from phyblock.making.checks.set_verification import (
+from phyblock.making.checks import find_duplicates, find_orphans
+from phyblock.making.cli.working import jobs_option, ray_option, tracked
+from phyblock.making.verification import (
     LAWS,
     check_looks,
     check_sums,
     verify_scenes,
 )
-from phyblock.making.cli.working import jobs_option, ray_option, tracked
 from phyblock.making.workers import open_workers
 from phyblock.text import counted
 

@@ -8,10 +8,10 @@ import click
 
 from phyblock.cli.console import make_console, plain_table
 from phyblock.domain import SUBTASK_NAMES, SUBTASKS
-from phyblock.making.checks.set_verification import check_sums
 from phyblock.making.cli.question_sets import data_option, questions_argument, read_question_set
 from phyblock.making.cli.working import jobs_option, ray_option, tracked
-from phyblock.making.questions.rederiving import verify_questions
+from phyblock.making.questions.question_production import verify_questions
+from phyblock.making.verification import check_sums
 from phyblock.making.workers import open_workers
 from phyblock.text import counted
 

@@ -19,7 +19,7 @@ from phyblock.files import check_free, make_folder, write_named
 from phyblock.making.cli.question_sets import data_option, questions_option, read_question_set
 from phyblock.making.cli.subtasks_option import subtasks_option
 from phyblock.making.cli.working import seed_option
-from phyblock.making.questions.paraphrases import Paraphrase, stems_of, write_wordings
+from phyblock.making.questions.rewording import Paraphrase, stems_of, write_wordings
 from phyblock.models import Breakers, Gate, ModelConfig, RetryPolicy, SharedCache, build_model
 from phyblock.resources import bundled, reply_cache_file
 from phyblock.run.finding import find_models_file

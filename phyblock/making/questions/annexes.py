@@ -15,7 +15,7 @@ import numpy as np
 
 from phyblock.domain.blocks import COLORS, SHAPES, BlockType, Euler
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.choices import pick, shuffled
+from phyblock.making.questions.selection import pick, shuffled
 from phyblock.sim.balance import MARGIN_M
 from phyblock.sim.geometry import corners_m
 from phyblock.sim.support import bounds_m, find_gaps, find_overlaps

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from phyblock.domain.question import LETTERS, SUBTASKS, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block
-from phyblock.making.questions.letters import BALANCE
 from phyblock.making.questions.picture_view import shares
 from phyblock.making.questions.question_draft import UnfairError
 from phyblock.making.questions.referring import resolve
+from phyblock.making.questions.selection import BALANCE
 from phyblock.models.guesses import FOLDS, Folds, Guesses
 from phyblock.sim.render import COLOR_RGB, Shot
 from phyblock.sim.seeing import changed_pixels, seen

@@ -8,39 +8,48 @@ on nothing else: a plank may need each of two supports.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+import functools
+import itertools
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from phyblock.domain.blocks import Color
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions.annexes import with_annex
-from phyblock.making.questions.choices import shuffled
-from phyblock.making.questions.colored_outcomes import colored_options, colored_orders
-from phyblock.making.questions.margins import group_of, resting_on, sure_removal
-from phyblock.making.questions.marked_blocks import TAKEN, marked_order
 from phyblock.making.questions.picture_view import (
     COUNTED,
     NAMED,
     are_seen,
+    center_m,
     drawn_view,
     require_seen,
+    shares,
 )
 from phyblock.making.questions.pictured_drafts import (
+    LEAST_PIXELS,
+    are_told_apart,
     draft,
+    four_alike,
     of_kind,
     only_index,
     option_pictures,
     picture_of,
 )
 from phyblock.making.questions.question_draft import Draft, UnfairError
+from phyblock.making.questions.referring import TAKEN, marked_order
+from phyblock.making.questions.selection import pick, shuffled
 from phyblock.making.questions.wording import slots_of
-from phyblock.sim.balance import is_balanced
+from phyblock.sim.balance import is_balanced, surely_falls, surely_stands
+from phyblock.sim.outcomes import Outcome, after_removal
+from phyblock.sim.render import Shot
 from phyblock.sim.seeing import block_mark, seen
-
-__all__ = ["OUTCOME_TEXTS", "CounterfactualMaker"]
+from phyblock.sim.steps import groups
+from phyblock.sim.support import support_graph
 
 OUTCOME_TEXTS = (
     "No other block moves or falls.",
@@ -168,3 +177,170 @@ def _drafts_of(
     others = [text for text in OUTCOME_TEXTS if text != OUTCOME_TEXTS[number]]
     options = [OUTCOME_TEXTS[number], *shuffled(rng, others)]
     yield draft(scene, rng, "cf-count", options, shown, str(number), {}, facts)
+
+
+Lot = frozenset[int]
+"""Orders of blocks that move."""
+
+_MOST_POOL = 40
+_MOST_TOGETHER = 3
+_AREA, _ROW = 0, 2
+"""Places of two of the measures of `_looks`."""
+_COLORS: tuple[tuple[Color, Color, Color], ...] = (
+    ("red", "yellow", "blue"),
+    ("orange", "blue", "green"),
+    ("yellow", "blue", "red"),
+    ("blue", "orange", "green"),
+    ("green", "orange", "blue"),
+    ("red", "blue", "yellow"),
+)
+"""The colors of what moves, of what stays, and of the block that is taken away."""
+
+
+def colored_options(
+    plain: QuestionPicture, taken: int, moved: Collection[int], rng: np.random.Generator
+) -> tuple[list[QuestionPicture], dict[str, str], str]:
+    """Four pictures, the right one first, and the slots of the text; none where they are too few.
+
+    With whether the right one has more colored than most, and lower.
+
+    `plain` has no marks; `moved` are the orders of the blocks that move when `taken` is gone.
+    """
+    lots = [frozenset(moved), *_other_lots(plain, taken, frozenset(moved), rng)]
+    shot = seen(plain)
+    pixels = dict(zip((b.order for b in plain.blocks), _pixels(plain, shot), strict=True))
+    unlike = np.array([[sum(pixels[o] for o in a ^ b) for b in lots] for a in lots], dtype=float)
+    measures = np.array([_looks(plain, shot, taken, lot) for lot in lots])
+    four = four_alike(measures, unlike >= LEAST_PIXELS, rng, unlike=unlike)
+    colors = pick(rng, _COLORS)
+    options = [_colored(plain, taken, lots[place], colors) for place in four.chosen]
+    slots: dict[str, str] = dict(zip(("color", "other", "taken"), colors, strict=True))
+    if not options or not are_told_apart(options):
+        return [], {}, ""
+    return options, slots, four.halves(_AREA, _ROW)
+
+
+def colored_orders(
+    picture: QuestionPicture, shown: QuestionPicture, taken: int, slots: Mapping[str, str]
+) -> Lot:
+    """Orders of the blocks that a picture says move; UnfairError when it says something else."""
+    start = {block.order: replace(block, color="red") for block in shown.blocks}
+    same = {block.order: replace(block, color="red") for block in picture.blocks}
+    color_of = {block.order: block.color for block in picture.blocks}
+    rest = {color for order, color in color_of.items() if order != taken}
+    if start != same or color_of.get(taken) != slots["taken"]:
+        raise UnfairError(f"picture {picture.label} does not show the same structure")
+    if not rest <= {slots["color"], slots["other"]}:
+        raise UnfairError(f"picture {picture.label} shows other colors than the text names")
+    return frozenset(order for order, color in color_of.items() if color == slots["color"])
+
+
+def _other_lots(
+    plain: QuestionPicture, taken: int, moved: Lot, rng: np.random.Generator
+) -> list[Lot]:
+    """Lots that could move together and do not: some blocks, with all that rests on them."""
+    share = shares(plain)
+    left = [block for block in plain.blocks if block.order != taken]
+    single = [frozenset({b.order}) | resting_on(left, b.order) for b in left]
+    found = {frozenset[int]()}
+    for number in range(1, _MOST_TOGETHER + 1):
+        found |= {frozenset().union(*some) for some in itertools.combinations(single, number)}
+        if len(found) > _MOST_POOL:
+            break
+    fair = [lot for lot in found if lot != moved and all(share[o] >= COUNTED for o in lot)]
+    return shuffled(rng, sorted(fair, key=sorted))[:_MOST_POOL]
+
+
+def _looks(plain: QuestionPicture, shot: Shot, taken: int, lot: Lot) -> tuple[float, ...]:
+    """How much is colored, where, how high, how far from the block that is taken; how naive it is.
+
+    A lot of no blocks is where the block is that is taken.
+    """
+    block_of = {block.order: block for block in plain.blocks}
+    about = sorted(lot or {taken})
+    shown = np.isin(shot.block, [i for i, b in enumerate(plain.blocks) if b.order in about])
+    rows, columns = np.nonzero(shown)
+    side = len(shot.block)
+    middle = center_m(block_of[taken])
+    far_m = [float(np.linalg.norm(center_m(block_of[o]) - middle)) for o in about]
+    low = min(float(center_m(block_of[o])[2]) for o in about)
+    resting = resting_on(plain.blocks, taken)
+    only = resting_on(plain.blocks, taken, only=True)
+    area = len(rows) if lot else 0
+    return (
+        20 * area / max(int((shot.block >= 0).sum()), 1),
+        float(len(lot)),
+        20 * float(rows.mean()) / side,
+        20 * float(columns.mean()) / side,
+        20 * float(rows.min()) / side,
+        20 * float(rows.max()) / side,
+        10 * low,
+        10 * min(far_m),
+        10 * float(np.mean(far_m)),
+        float(len(lot ^ resting)),
+        float(len(lot ^ only)),
+    )
+
+
+def _pixels(plain: QuestionPicture, shot: Shot) -> NDArray[np.int64]:
+    """How many pixels show each block."""
+    return np.bincount(shot.block[shot.block >= 0], minlength=len(plain.blocks))
+
+
+def _colored(
+    plain: QuestionPicture, taken: int, moved: Lot, colors: Sequence[Color]
+) -> QuestionPicture:
+    def of(block: Block) -> Color:
+        return colors[2] if block.order == taken else colors[block.order not in moved]
+
+    return replace(plain, blocks=tuple(replace(b, color=of(b)) for b in plain.blocks))
+
+
+def resting_on(blocks: Sequence[Block], order: int, *, only: bool = False) -> frozenset[int]:
+    """Orders of the blocks that rest on one, directly or not; not its own.
+
+    With `only` they rest on nothing but it and others that do. The naive rule says that these, or
+    those, fall when it is taken away, and nothing else.
+    """
+    below = _below(tuple(blocks))
+    found: frozenset[int] = frozenset({order})
+    for _ in blocks:
+        found |= {
+            one for one, under in below.items() if under & found and (not only or under <= found)
+        }
+    return found - {order}
+
+
+@functools.lru_cache(maxsize=64)
+def _below(blocks: tuple[Block, ...]) -> Mapping[int, frozenset[int]]:
+    """The support graph, which is asked again for every block of a structure."""
+    return support_graph(blocks)
+
+
+def group_of(blocks: Sequence[Block], order: int) -> tuple[Block, ...]:
+    """The blocks in reach of one, itself among them."""
+    return next(group for group in groups(blocks) if any(b.order == order for b in group))
+
+
+def is_sure(left: Sequence[Block], moved: Collection[int]) -> bool:
+    """Whether blocks just left to themselves surely do what a simulation says.
+
+    Those that stay stand without those that go, and each lot of those that go cannot be borne
+    by those that stay: with every weight 5 mm off to any side, other masses, and friction to spare.
+    """
+    still = [block for block in left if block.order not in moved]
+    falling = groups([block for block in left if block.order in moved])
+    return all(surely_stands(group) for group in groups(still)) and all(
+        surely_falls([*still, *lot]) for lot in falling
+    )
+
+
+def sure_removal(blocks: Sequence[Block], order: int) -> Outcome | None:
+    """What surely follows a removal; None where settings or statics leave a doubt."""
+    group = group_of(blocks, order)
+    if not surely_stands(group):
+        return None
+    outcome = after_removal(blocks, order)
+    near = [block for block in group if block.order != order]
+    is_near = set(outcome.moved) <= {block.order for block in near}
+    return outcome if outcome.is_clear and is_near and is_sure(near, outcome.moved) else None

@@ -10,9 +10,7 @@ import numpy as np
 
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.choices import pick, shuffled
-from phyblock.making.questions.coloring import recolored
-from phyblock.making.questions.lengths import (
+from phyblock.making.questions.measures import (
     LENGTHS,
     PAIRED,
     along_and_across_m,
@@ -26,14 +24,11 @@ from phyblock.making.questions.picture_view import (
     require_seen,
     shown_picture,
 )
+from phyblock.making.questions.properties import recolored
 from phyblock.making.questions.question_draft import Draft, UnfairError
 from phyblock.making.questions.referring import Feature, names, resolve_one
-from phyblock.making.questions.static_drafts import (
-    StaticMaker,
-    draft,
-    index_of,
-    seen_blocks,
-)
+from phyblock.making.questions.selection import pick, shuffled
+from phyblock.making.questions.static_drafts import StaticMaker, draft, index_of, seen_blocks
 from phyblock.making.questions.wording import slots_of, stem_of
 
 __all__ = ["DistanceMaker"]

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from phyblock.domain.blocks import Color
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Scene
-from phyblock.making.questions.choices import pick
 from phyblock.making.questions.picture_view import COUNTED, are_seen, drawn_view, require_seen
 from phyblock.making.questions.pictured_drafts import (
     are_told_apart,
@@ -30,6 +29,7 @@ from phyblock.making.questions.pictured_drafts import (
     state,
 )
 from phyblock.making.questions.question_draft import Draft, UnfairError
+from phyblock.making.questions.selection import pick
 from phyblock.making.questions.wording import slots_of
 from phyblock.sim.seeing import seen
 

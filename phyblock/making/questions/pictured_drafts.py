@@ -2,35 +2,24 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from phyblock.domain.question import LETTERS, Question, QuestionPicture
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.choices import pick
 from phyblock.making.questions.question_draft import Draft, Option, UnfairError
+from phyblock.making.questions.selection import pick
 from phyblock.making.questions.wording import fill, wording_ids
 from phyblock.sim.outcomes import DEFAULT_LIMITS
-from phyblock.sim.seeing import is_inside, least_difference, seen
+from phyblock.sim.render import Shot
+from phyblock.sim.seeing import changed_pixels, differing_pixels, is_inside, least_difference, seen
 from phyblock.sim.support import whole_bounds_m
 from phyblock.sim.world import Pose
-
-__all__ = [
-    "LEAST_PIXELS",
-    "are_alike",
-    "are_told_apart",
-    "draft",
-    "moved_between",
-    "of_kind",
-    "only_index",
-    "option_pictures",
-    "picture_of",
-    "same_blocks",
-    "state",
-    "story_of",
-    "with_room",
-]
 
 LEAST_PIXELS = 220
 """In so many pixels of 256 by 256 any two pictures that are compared differ, at the least."""
@@ -182,3 +171,177 @@ def only_index(right: Sequence[bool]) -> tuple[int]:
     if len(found) != 1:
         raise UnfairError(f"{len(found)} of {len(right)} options are right")
     return (found[0],)
+
+
+_WRONG = 3
+_MOST_POOL = 11
+_MOST_OFF = 1.0
+"""How many ranks the right option may be off, on average over the measures."""
+_EQUAL = 0.02
+AREA = 0
+"""Place of the measure how much is colored."""
+_HELD_OFF = 0.5
+
+
+def alike_wrong(
+    first: QuestionPicture,
+    right: QuestionPicture,
+    pool: Sequence[QuestionPicture],
+    rng: np.random.Generator,
+    held: Mapping[int, int] = MappingProxyType({}),
+) -> list[QuestionPicture]:
+    """Three of the pool, told apart from one another and the rest, or none.
+
+    `held` gives ranks that hold exactly, by measure: `AREA`.
+    """
+    whole = [one for one in (right, *pool) if is_inside(one)][: 1 + _MOST_POOL]
+    if not whole or whole[0] is not right:
+        return []
+    start, shots = seen(first), [seen(one) for one in whole]
+    together = [start, *shots]
+    apart = np.zeros((len(together), len(together)), dtype=np.bool_)
+    for (i, one), (j, other) in itertools.combinations(enumerate(together), 2):
+        # A picture like the first one is none that could be chosen.
+        is_worth_it = i == 0 or (apart[0, i] and apart[0, j])
+        apart[i, j] = apart[j, i] = is_worth_it and differing_pixels(one, other) >= LEAST_PIXELS
+        if (i, j) == (0, 1) and not apart[i, j]:
+            return []
+    measures = np.array([looks(start, shot) for shot in shots])
+    chosen = ranked_as_drawn(measures, apart[1:, 1:], rng, held)
+    return [whole[i] for i in chosen]
+
+
+def ranked_as_drawn(
+    measures: NDArray[np.float64],
+    apart: NDArray[np.bool_],
+    rng: np.random.Generator,
+    held: Mapping[int, int] = MappingProxyType({}),
+) -> tuple[int, ...]:
+    """Three rows after the first, all apart, among which the first has about the ranks drawn.
+
+    `measures` has shape (n, k), `apart` (n, n). `held` gives ranks that hold exactly for some of
+    the k measures. Empty where no three come near enough.
+    """
+    wanted = np.array(rng.integers(_WRONG + 1, size=measures.shape[1]), dtype=np.int64)
+    fixed = sorted(held)
+    for one in fixed:
+        wanted[one] = held[one]
+    best: tuple[float, tuple[int, ...]] = (_MOST_OFF, ())
+    for chosen in itertools.combinations(range(1, len(measures)), _WRONG):
+        if all(apart[a, b] for a, b in itertools.combinations((0, *chosen), 2)):
+            off = np.abs(_rank(measures, chosen) - wanted)
+            if (off[fixed] <= _HELD_OFF).all():
+                best = min(best, (float(off.mean()), chosen))
+    return best[1]
+
+
+def _rank(measures: NDArray[np.float64], chosen: Sequence[int]) -> NDArray[np.float64]:
+    """How many of those chosen are below the first in each measure; equal ones count half."""
+    step = measures[list(chosen)] - measures[0]
+    is_equal = np.abs(step) <= _EQUAL
+    below: NDArray[np.float64] = (step < -_EQUAL).sum(axis=0) + is_equal.sum(axis=0) / 2
+    return below
+
+
+def looks(first: Shot, shot: Shot) -> tuple[float, ...]:
+    """Eight measures of a picture, most of them shares of its side or of what is colored.
+
+    What is colored: how much, its middle across and down, its width and its top. What changed
+    against the first picture: how much, and its middle across and down.
+    """
+    rows, columns = np.nonzero(shot.block >= 0)
+    side, area = len(shot.block), max(int((first.block >= 0).sum()), 1)
+    changed_rows, changed_columns = np.nonzero(changed_pixels(first, shot))
+    if not len(changed_rows):
+        changed_rows, changed_columns = rows, columns
+    return (
+        5 * len(rows) / area,
+        10 * float(columns.mean()) / side,
+        10 * float(rows.mean()) / side,
+        5 * float(np.ptp(columns)) / side,
+        5 * float(rows.min()) / side,
+        2 * len(changed_rows) / area,
+        2 * float(changed_columns.mean()) / side,
+        2 * float(changed_rows.mean()) / side,
+    )
+
+
+"""How many ranks the right option may be off, on average over the measures."""
+_UNLIKE_STEPS = 5.0
+
+
+class Four(NamedTuple):
+    """Rows of a right option and three wrong ones, and the right one's ranks by the measures.
+
+    `chosen` is empty where there are no four.
+    """
+
+    chosen: tuple[int, ...] = ()
+    ranks: tuple[float, ...] = ()
+
+    def halves(self, *measures: int) -> str:
+        """Whether the right one is of the lesser or the greater half by each of some measures."""
+        return "-".join("less" if self.ranks[i] < _WRONG / 2 else "more" for i in measures)
+
+
+def four_alike(
+    measures: NDArray[np.float64],
+    apart: NDArray[np.bool_],
+    rng: np.random.Generator,
+    *,
+    rights: int = 1,
+    unlike: NDArray[np.float64] | None = None,
+) -> Four:
+    """A right row and three wrong ones, all apart, among which it has about the ranks drawn.
+
+    `measures` has shape (n, k), its first `rights` rows are of options that are right. `apart` and
+    `unlike` have shape (n, n); where `unlike` is given, the sum over the other three is one more
+    measure. No four where none come near.
+    """
+    if not 0 < rights <= len(measures) - _WRONG:
+        return Four()
+    wanted = _drawn_ranks(measures, rng, unlike)
+    threes = np.array(list(itertools.combinations(range(rights, len(measures)), _WRONG)))
+    for i, j in itertools.combinations(range(_WRONG), 2):
+        threes = threes[apart[threes[:, i], threes[:, j]]]
+    best, nearest = Four(), _MOST_OFF
+    for right in range(rights):
+        fitting = threes[apart[right][threes].all(axis=1)]
+        if not len(fitting):
+            continue
+        ranks = _ranks(measures, right, fitting, unlike)
+        off = np.abs(ranks - wanted).mean(axis=1)
+        place = int(off.argmin())
+        if off[place] < nearest:
+            nearest = float(off[place])
+            best = Four((right, *fitting[place].tolist()), tuple(ranks[place].tolist()))
+    return best
+
+
+def _drawn_ranks(
+    measures: NDArray[np.float64], rng: np.random.Generator, unlike: NDArray[np.float64] | None
+) -> NDArray[np.float64]:
+    """The ranks of any one among any four: each rank as likely, by all measures together."""
+    one, *others = rng.choice(len(measures), size=_WRONG + 1, replace=False).tolist()
+    drawn: NDArray[np.float64] = _ranks(measures, one, np.array([others]), unlike)[0]
+    return drawn
+
+
+def _ranks(
+    measures: NDArray[np.float64],
+    right: int,
+    threes: NDArray[np.int64],
+    unlike: NDArray[np.float64] | None,
+) -> NDArray[np.float64]:
+    """How many of each three are below the right one, by measure; equal ones count half."""
+    steps = measures[threes] - measures[right]
+    if unlike is not None:
+        four = np.column_stack([np.full(len(threes), right), threes])
+        sums = unlike[four[:, :, None], four[:, None, :]].sum(axis=2)
+        scale = max(float(unlike.max()), 1.0) / _UNLIKE_STEPS
+        odd = (sums[:, 1:] - sums[:, :1]) / scale
+        steps = np.concatenate([steps, odd[:, :, None]], axis=2)
+    below: NDArray[np.float64] = (steps < -_EQUAL).sum(axis=1) + (np.abs(steps) <= _EQUAL).sum(
+        axis=1
+    ) / 2
+    return below

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from phyblock.domain.blocks import COLORS
 from phyblock.domain.question import Question, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.block_measures import height_m
-from phyblock.making.questions.choices import shuffled
-from phyblock.making.questions.coloring import recolored
+from phyblock.making.questions.measures import height_m
 from phyblock.making.questions.picture_view import (
     NAMED,
     STUDIED,
@@ -23,6 +22,7 @@ from phyblock.making.questions.picture_view import (
 )
 from phyblock.making.questions.question_draft import Draft, UnfairError
 from phyblock.making.questions.referring import SHAPE_WORDS, Feature, resolve_one, shape_word
+from phyblock.making.questions.selection import shuffled
 from phyblock.making.questions.static_drafts import (
     StaticMaker,
     draft,
@@ -32,8 +32,6 @@ from phyblock.making.questions.static_drafts import (
     wrong_options,
 )
 from phyblock.making.questions.wording import slots_of
-
-__all__ = ["ColorMaker", "ShapeMaker"]
 
 _BY_LOOKS: tuple[Feature, ...] = ("color", "side", "layer", "support")
 _BY_SHAPE: tuple[Feature, ...] = ("type", "side", "layer", "support")
@@ -102,3 +100,30 @@ def _hides_its_shape(block: Block, blocks: Sequence[Block]) -> bool:
     """Whether it is a standing half cylinder with something on its half disc."""
     is_standing = block.type == "semi_cylinder" and height_m(block) > _LYING_M
     return is_standing and any(block.order in other.depend for other in blocks)
+
+
+def recolored(scene: Scene, rng: np.random.Generator) -> Scene:
+    """The scene with a color drawn for every block."""
+    drawn = rng.integers(len(COLORS), size=len(scene))
+    blocks = [
+        replace(block, color=COLORS[int(i)]) for block, i in zip(scene.blocks, drawn, strict=True)
+    ]
+    return replace(scene, blocks=tuple(blocks))
+
+
+def with_own_colors(scene: Scene, orders: Sequence[int], rng: np.random.Generator) -> Scene:
+    """The scene with a color for each of up to four blocks that no other block has.
+
+    The other blocks share the colors that are left. Raises ValueError for more than four blocks
+    when there are others.
+    """
+    colors = [COLORS[int(i)] for i in rng.permutation(len(COLORS))]
+    own = dict(zip(orders, colors, strict=False))
+    left = colors[len(orders) :]
+    if len(orders) > len(colors) or (not left and len(orders) < len(scene)):
+        raise ValueError(f"there are {len(colors)} colors for {len(orders)} blocks and the rest")
+    blocks = []
+    for block in scene.blocks:
+        color = own.get(block.order) or left[int(rng.integers(len(left)))]
+        blocks.append(replace(block, color=color))
+    return replace(scene, blocks=tuple(blocks))

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from phyblock.datasets.version import VERSION_FILE
-from phyblock.domain.question import Question
+from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
 from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write, check_free, writing
-from phyblock.making.questions.question_card import question_card
 from phyblock.records.question import StoredQuestion
+from phyblock.sim.registry import other_simulators
 from phyblock.stable import hex_digest
 
 QUESTIONS_FILE = "questions.jsonl"
@@ -56,3 +57,54 @@ def write_questions(
         folder.mkdir(parents=True, exist_ok=True)
         for name, data in {**files, _SUMS_FILE: sums.encode()}.items():
             atomic_write(folder / name, data)
+
+
+_TEXT = """# {name}
+
+{count} multiple-choice questions about {scenes} scenes of `{scenes_name}`, in {subtasks} subtasks
+(paper, section 3.3 and appendix A.4), each with an answer that is derived from geometry, from the
+dependency graph or from physics, and derived again by `phyblock questions verify`. Made{simulators} by
+
+    {made_by}
+
+which gives the same bytes with any number of processes. No picture is stored: each is a recipe
+(its differences from the scene, and the viewpoint) that is drawn when it is needed. The version of
+the set stands in `VERSION`: results on different versions are never mixed.
+
+| subtask | | questions | scenes | wordings | A | B | C | D | most frequent answer |
+|---|---|---|---|---|---|---|---|---|---|
+{rows}
+
+A to D: share of questions whose right option has that letter (ordering: that comes first). The
+last column is the share of the most frequent right option text.
+
+`questions.jsonl` holds one question a line; docs/vqa.md describes the fields and the rules by which
+questions are made, and `phyblock questions audit` shows what can be guessed.
+"""  # noqa: E501
+
+
+def question_card(name: str, scenes_name: str, questions: Sequence[Question], made_by: str) -> str:
+    """Return the Markdown card of a set of questions called `name` about those scenes."""
+    by_subtask = {s: [q for q in questions if q.subtask == s] for s in SUBTASKS}
+    return _TEXT.format(
+        name=name,
+        scenes_name=scenes_name,
+        count=len(questions),
+        scenes=len({question.scene.id for question in questions}),
+        subtasks=sum(bool(asked) for asked in by_subtask.values()),
+        made_by=made_by,
+        simulators="".join(f", with {one}," for one in other_simulators()),
+        rows="\n".join(_row(asked) for asked in by_subtask.values() if asked),
+    )
+
+
+def _row(questions: Sequence[Question]) -> str:
+    subtask, count = questions[0].subtask, len(questions)
+    letters = Counter(question.answer[0] for question in questions)
+    texts = Counter(question.options[question.answer[0]] for question in questions)
+    scenes = {question.scene.id for question in questions}
+    wordings = {question.wording for question in questions}
+    shares = [f"{letters[i] / count:.0%}" for i in range(len(LETTERS))]
+    most = "" if "<img1>" in texts or "place A" in texts else f"{max(texts.values()) / count:.0%}"
+    cells = [subtask, SUBTASK_NAMES[subtask], count, len(scenes), len(wordings), *shares, most]
+    return f"| {' | '.join(map(str, cells))} |"

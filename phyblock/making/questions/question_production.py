@@ -1,10 +1,10 @@
-"""Questions from one seed: drafts of all scenes, a choice of them, letters and backgrounds."""
+"""The makers of questions, one a subtask."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import islice
+from itertools import chain, islice
 
 import numpy as np
 
@@ -17,16 +17,46 @@ from phyblock.domain.question import (
     Subtask,
 )
 from phyblock.domain.scene import Block, Scene
-from phyblock.errors import DataError, Problem
-from phyblock.making.questions.choices import pick, shuffled
-from phyblock.making.questions.letters import even_letters
-from phyblock.making.questions.makers import MAKERS
-from phyblock.making.questions.question_draft import Draft, Option
-from phyblock.making.questions.selection import Pooled, select
+from phyblock.errors import DataError, PhyblockError, Problem
+from phyblock.making.questions.affordance import AffordanceMaker
+from phyblock.making.questions.counterfactual import CounterfactualMaker
+from phyblock.making.questions.counting import NumberMaker, TallyMaker
+from phyblock.making.questions.dependencies import DependencyMaker
+from phyblock.making.questions.distances import DistanceMaker
+from phyblock.making.questions.ordering import OrderingMaker
+from phyblock.making.questions.positions import PositionMaker
+from phyblock.making.questions.predictive import PredictiveMaker
+from phyblock.making.questions.properties import ColorMaker, ShapeMaker
+from phyblock.making.questions.question_draft import Draft, Maker, Option, UnfairError
+from phyblock.making.questions.rotations import RotationMaker
+from phyblock.making.questions.selection import Pooled, even_letters, pick, select, shuffled
+from phyblock.making.questions.sizes import SizeMaker
+from phyblock.making.questions.viewpoint import ViewpointMaker
 from phyblock.making.workers import Workers
 from phyblock.types import BACKGROUNDS, Background
 
-__all__ = ["PER_SUBTASK", "as_question", "make_questions", "scene_drafts", "tidy_picture"]
+_MAKERS: tuple[Maker, ...] = (
+    ShapeMaker(),
+    ColorMaker(),
+    SizeMaker(),
+    NumberMaker(),
+    PositionMaker(),
+    DistanceMaker(),
+    DependencyMaker(),
+    RotationMaker(),
+    TallyMaker("OC"),
+    TallyMaker("LC"),
+    TallyMaker("TC"),
+    ViewpointMaker(),
+    CounterfactualMaker(),
+    PredictiveMaker(),
+    OrderingMaker(),
+    AffordanceMaker(),
+)
+
+MAKERS: Mapping[Subtask, Maker] = {maker.subtask: maker for maker in _MAKERS}
+"""By subtask."""
+
 
 PER_SUBTASK: Mapping[Subtask, int] = {
     subtask: 50 if subtask in ("OR", "AD") else 150 for subtask in SUBTASKS
@@ -183,3 +213,40 @@ def _tidy_block(block: Block) -> Block:
 def _round(vector: tuple[float, float, float]) -> tuple[float, float, float]:
     x, y, z = (round(float(number), _DIGITS) + 0.0 for number in vector)
     return (x, y, z)
+
+
+_BATCH = 8
+
+
+def problem_of(question: Question) -> str | None:
+    """What is wrong with a question, in one sentence; None when its answer was found again."""
+    maker = MAKERS.get(question.subtask)
+    if maker is None:
+        return "its subtask is made by no rule"
+    try:
+        derived = maker.rederive(question)
+    except UnfairError as error:
+        return str(error)
+    except PhyblockError as error:
+        return f"could not be derived: {error}"
+    if derived != question.answer:
+        return f"the answer is {_letters(derived)}, not {question.answer_letters}"
+    return None
+
+
+def verify_questions(
+    questions: Sequence[Question], workers: Workers
+) -> Iterator[tuple[Question, str | None]]:
+    """Each question with what is wrong with it, scene by scene, so that pictures are shared."""
+    by_scene = sorted(questions, key=lambda question: question.scene.id)
+    batches = [by_scene[i : i + _BATCH] for i in range(0, len(by_scene), _BATCH)]
+    answers = chain.from_iterable(workers.map(_problems, batches))
+    yield from zip(by_scene, answers, strict=True)
+
+
+def _problems(questions: Sequence[Question]) -> list[str | None]:
+    return [problem_of(question) for question in questions]
+
+
+def _letters(answer: tuple[int, ...]) -> str:
+    return "".join(LETTERS[index] for index in answer)

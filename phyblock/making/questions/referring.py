@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from phyblock.domain.blocks import COLORS, BlockType, Color
@@ -17,9 +17,8 @@ from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block
 from phyblock.making.questions.picture_view import outermost, shows_profile
 from phyblock.making.questions.question_draft import UnfairError
+from phyblock.sim.seeing import seen, seen_order
 from phyblock.sim.support import bounds_m
-
-__all__ = ["SHAPE_WORDS", "Feature", "names", "resolve", "resolve_one", "shape_word"]
 
 Feature = Literal["color", "type", "size", "layer", "side", "support"]
 """What an expression may speak of; `size` tells rectangular prisms apart by their length."""
@@ -196,3 +195,17 @@ def _outermost(fitting: list[Block], picture: QuestionPicture, side: str) -> lis
         return ranked[:1] if is_clear else []
     order = outermost([b.order for b in fitting], picture, to_left=side == "leftmost")
     return [block for block in fitting if block.order == order]
+
+
+TAKEN = "X"
+"""The letter of the block that is taken away or pushed."""
+
+
+def marked_order(picture: QuestionPicture, letter: str) -> int:
+    """Order of the block that shows at a mark; UnfairError when there is none."""
+    for mark in picture.marks:
+        if mark.letter == letter:
+            order = seen_order(picture, seen(replace(picture, marks=())), mark.position_m)
+            if order is not None:
+                return order
+    raise UnfairError(f"no block is marked {letter}")

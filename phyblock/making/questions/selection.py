@@ -11,16 +11,18 @@ questions rare in the others.
 
 from __future__ import annotations
 
+import math
 from collections import Counter, defaultdict
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from phyblock.making.questions.answer_odds import Texts, keeping_odds
+from phyblock.domain.question import LETTERS
 from phyblock.making.questions.question_draft import Draft
-
-__all__ = ["Pooled", "select"]
+from phyblock.models.guess_features import text_features
 
 _LOOKED_AT = 100
 _SPREAD = 20
@@ -136,3 +138,159 @@ def _even(one: Pooled) -> Iterator[tuple[Hashable, Hashable, float]]:
 def _slots(draft: Draft) -> Mapping[str, object]:
     slots: Mapping[str, object] = draft.evidence.get("slots", {})
     return slots
+
+
+BALANCE = (0.22, 0.28)
+"""Shares of right answers that every letter is to stay within."""
+
+
+def even_letters(count: int, rng: np.random.Generator) -> list[int]:
+    """Indices of the letters that are right in so many questions, each share within `BALANCE`.
+
+    Of few questions the share that is nearest to it. Exactly equal shares would give the letters
+    of some questions away by those of the others.
+    """
+    # Rounded, as 0.28 of 150 is a little more than 42 in floating point.
+    low, high = (round(share * count, 6) for share in BALANCE)
+    low, high = math.floor(low), math.ceil(high)
+    while True:
+        drawn = rng.integers(len(LETTERS), size=count)
+        shares = np.bincount(drawn, minlength=len(LETTERS))
+        if low <= shares.min() and shares.max() <= high:
+            return [int(letter) for letter in drawn]
+
+
+T = TypeVar("T")
+
+
+def pick(rng: np.random.Generator, options: Sequence[T]) -> T:
+    """One of the options."""
+    return options[int(rng.integers(len(options)))]
+
+
+def shuffled(rng: np.random.Generator, items: Sequence[T]) -> list[T]:
+    """The items in an order drawn with `rng`."""
+    return [items[int(i)] for i in rng.permutation(len(items))]
+
+
+_STEPS = 60
+_RATE = 0.3
+_PENALTY = 2.0
+_FITTED = 2000
+"""So many drafts are learned from at most, spread over the pool."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Texts:
+    """What a reader without pictures sees of a draft; the right option stands first.
+
+    `group` is equal for drafts about scenes that share parts, `kind` for those that ask the same.
+    `looks` are measures of options that are no texts, as many of each.
+    """
+
+    group: str
+    kind: str
+    question: str
+    options: tuple[str, ...]
+    looks: tuple[tuple[float, ...], ...] = ()
+
+    @property
+    def tells(self) -> bool:
+        """Whether there is anything to go by."""
+        return bool(self.options or self.looks)
+
+
+@dataclass(frozen=True)
+class _Table:
+    """Features of options as a sparse matrix: entry `values[i]` at `rows[i]`, `columns[i]`."""
+
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    values: Floats
+    starts: NDArray[np.int64]
+    """Where the options of each draft begin, the right one first."""
+
+    def chances(self, weights: Floats) -> Floats:
+        """Probability of each option, one after the other."""
+        size = int(self.rows[-1]) + 1
+        scores = np.bincount(self.rows, self.values * weights[self.columns], size)
+        per_draft = np.diff(np.append(self.starts, size))
+        raised = np.exp(scores - np.repeat(np.maximum.reduceat(scores, self.starts), per_draft))
+        chances: Floats = raised / np.repeat(np.add.reduceat(raised, self.starts), per_draft)
+        return chances
+
+
+def keeping_odds(texts: Sequence[Texts]) -> list[float]:
+    """For each draft, with which probability it is kept; 1 where there is nothing to go by."""
+    groups = sorted({one.group for one in texts if one.tells})
+    half_of = {group: place % 2 for place, group in enumerate(groups)}
+    odds = [1.0] * len(texts)
+    for half in (0, 1):
+        known = [one for one in texts if one.tells and half_of[one.group] != half]
+        mine = [i for i, one in enumerate(texts) if one.tells and half_of[one.group] == half]
+        if known and mine:
+            for i, kept in zip(mine, _judged(known, [texts[i] for i in mine]), strict=True):
+                odds[i] = kept
+    return odds
+
+
+def _judged(known: Sequence[Texts], asked: Sequence[Texts]) -> list[float]:
+    names: dict[str, int] = {}
+    step = -(-len(known) // _FITTED)
+    learned = _table(known[::step], names, grows=True)
+    weights = _fit(learned, len(names))
+    table = _table(asked, names, grows=False)
+    chances = table.chances(weights)
+    return [float(of_one.min() / of_one[0]) for of_one in np.split(chances, table.starts[1:])]
+
+
+def _table(texts: Sequence[Texts], names: dict[str, int], grows: bool) -> _Table:
+    """The features of all options; unknown ones are added to `names`, or left out."""
+    rows, columns, values, starts = [], [], [], []
+    row = 0
+    for one in texts:
+        starts.append(row)
+        for features in _features(one):
+            for name, value in features.items():
+                if not (grows or name in names):
+                    continue
+                rows.append(row)
+                columns.append(names.setdefault(name, len(names)))
+                values.append(value)
+            row += 1
+    return _Table(np.array(rows), np.array(columns), np.array(values), np.array(starts))
+
+
+def _features(one: Texts) -> Iterator[Mapping[str, float]]:
+    """Of each option, as they are and for its kind, with the others it stands beside.
+
+    Of looks, how far each measure is from the mean of the options, in standard deviations.
+    """
+    if one.looks:
+        values = np.array(one.looks)
+        spread = values.std(axis=0)
+        for steps in (values - values.mean(axis=0)) / np.where(spread > 0, spread, 1.0):
+            yield {f"{one.kind}: {i}": step for i, step in enumerate(steps)} | {
+                f"{one.kind}: off {i}": abs(step) for i, step in enumerate(steps)
+            }
+        return
+    together = " / ".join(sorted(one.options))
+    for option, features in zip(one.options, text_features(one.question, one.options), strict=True):
+        own = {f"{one.kind}: {name}": value for name, value in features.items()}
+        yield {"": 1.0, **features, **own, f"{one.kind}: {option} of {together}": 1.0}
+
+
+def _fit(table: _Table, size: int) -> Floats:
+    """Weights of greatest penalized likelihood, by steps of AdaGrad (Duchi et al. 2011)."""
+    is_right = np.zeros(int(table.rows[-1]) + 1)
+    is_right[table.starts] = 1.0
+    weights, squares = np.zeros(size), np.full(size, 1e-9)
+    for _ in range(_STEPS):
+        missed = is_right - table.chances(weights)
+        gain = np.bincount(table.columns, table.values * missed[table.rows], size)
+        slope = gain - _PENALTY * weights
+        squares += slope**2
+        weights += _RATE * slope / np.sqrt(squares)
+    return weights

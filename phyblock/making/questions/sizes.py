@@ -9,9 +9,7 @@ import numpy as np
 
 from phyblock.domain.question import Question, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.block_measures import height_m, length_m, volume_m3
-from phyblock.making.questions.choices import pick, shuffled
-from phyblock.making.questions.coloring import with_own_colors
+from phyblock.making.questions.measures import height_m, length_m, volume_m3
 from phyblock.making.questions.picture_view import (
     STUDIED,
     View,
@@ -19,14 +17,11 @@ from phyblock.making.questions.picture_view import (
     require_seen,
     shown_picture,
 )
+from phyblock.making.questions.properties import with_own_colors
 from phyblock.making.questions.question_draft import Draft, UnfairError
 from phyblock.making.questions.referring import resolve_one
-from phyblock.making.questions.static_drafts import (
-    StaticMaker,
-    draft,
-    index_of,
-    seen_blocks,
-)
+from phyblock.making.questions.selection import pick, shuffled
+from phyblock.making.questions.static_drafts import StaticMaker, draft, index_of, seen_blocks
 from phyblock.making.questions.wording import slots_of
 
 __all__ = ["SizeMaker"]

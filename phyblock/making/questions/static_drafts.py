@@ -11,10 +11,10 @@ import numpy as np
 
 from phyblock.domain.question import Question, QuestionPicture
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.choices import pick, shuffled
 from phyblock.making.questions.picture_view import View, drawn_view, shares
 from phyblock.making.questions.question_draft import Draft, UnfairError
 from phyblock.making.questions.referring import Feature, names
+from phyblock.making.questions.selection import pick, shuffled
 from phyblock.making.questions.wording import fill, wording_ids
 
 __all__ = [

@@ -21,8 +21,8 @@ from phyblock.domain.blocks import COLORS
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import Symmetry, turned_form
-from phyblock.making.questions.choices import pick, shuffled
-from phyblock.making.questions.coloring import recolored
+from phyblock.making.poses import transformed
+from phyblock.making.questions.affordance import shifted
 from phyblock.making.questions.picture_view import View, drawn_view
 from phyblock.making.questions.pictured_drafts import (
     are_told_apart,
@@ -33,10 +33,10 @@ from phyblock.making.questions.pictured_drafts import (
     picture_of,
     same_blocks,
 )
+from phyblock.making.questions.properties import recolored
 from phyblock.making.questions.question_draft import Draft, UnfairError
-from phyblock.making.questions.shifts import shifted
+from phyblock.making.questions.selection import pick, shuffled
 from phyblock.making.questions.wording import slots_of
-from phyblock.making.symmetry import transformed
 from phyblock.sim.seeing import least_difference, seen, shown_pixels
 
 __all__ = ["ViewpointMaker"]

@@ -1,46 +1,51 @@
-"""Filling templates of questions, and telling whether a text is a template filled as claimed."""
+"""Wordings of questions: templates with named slots, in `wordings.yaml`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import yaml
 
 from phyblock.domain.question import Question
-from phyblock.making.questions.dynamic_templates import DYNAMIC_TEMPLATES
 from phyblock.making.questions.question_draft import UnfairError
-from phyblock.making.questions.static_templates import TEMPLATES
 
-__all__ = ["WORDINGS", "fill", "fill_template", "slots_of", "stem_of", "wording_ids"]
+_FILE = Path(__file__).with_name("wordings.yaml")
 
-WORDINGS: Mapping[str, str] = {**TEMPLATES, **DYNAMIC_TEMPLATES}
-"""All templates by id."""
+WORDINGS: Mapping[str, str] = {
+    f"{stem}-{number}": text
+    for stem, texts in yaml.safe_load(_FILE.read_text(encoding="utf-8")).items()
+    for number, text in enumerate(texts, 1)
+}
+"""All templates by id: subtask, kind where there are several, and number (`rp-corner-2`)."""
 
 
 def wording_ids(stem: str) -> Sequence[str]:
-    """The ids `stem-1`, `stem-2` and so on, in that order."""
+    """Return the ids `stem-1`, `stem-2` and so on, in that order."""
     return [name for name in WORDINGS if stem_of(name) == stem]
 
 
 def stem_of(wording: str) -> str:
-    """What all wordings of one kind of question share: `rp-corner` of `rp-corner-2`."""
+    """Return the part that all wordings of a kind share: `rp-corner` of `rp-corner-2`."""
     return wording.rsplit("-", 1)[0]
 
 
 def fill(wording: str, **slots: str) -> str:
-    """The template of a known wording with its slots filled, first letter large."""
+    """Return the template of a known wording with its slots filled, capitalized."""
     return fill_template(WORDINGS[wording], slots)
 
 
 def fill_template(template: str, slots: Mapping[str, str]) -> str:
-    """A template with its slots filled, first letter large."""
+    """Return a template with its slots filled, capitalized."""
     text = template.format(**slots)
     return text[:1].upper() + text[1:]
 
 
 def slots_of(question: Question) -> Mapping[str, str]:
-    """The slots of a question's text, from its evidence; UnfairError unless the text holds them.
+    """Return the slots of a question's text, from its evidence.
 
     The text of a wording that is known must be its template filled with exactly these; of any
-    other wording, each slot must stand in the text.
+    other wording, each slot must stand in the text; UnfairError otherwise.
     """
     slots = question.evidence.get("slots", {})
     if question.wording in WORDINGS:

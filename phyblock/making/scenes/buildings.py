@@ -16,7 +16,7 @@ from phyblock.making.scenes.motifs import (
     piers,
     topping,
 )
-from phyblock.making.scenes.scene_draft import Draft, Theme
+from phyblock.making.scenes.sketch import Draft, Theme
 
 __all__ = ["BUILDINGS"]
 

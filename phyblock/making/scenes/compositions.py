@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from phyblock.domain.scene import Block
 from phyblock.domain.symmetry import Symmetry
+from phyblock.making.poses import transformed
 from phyblock.making.scenes.buildings import BUILDINGS
 from phyblock.making.scenes.creatures import CREATURES
-from phyblock.making.scenes.scene_draft import Draft, Theme
-from phyblock.making.scenes.sketch import UNIT_M
-from phyblock.making.symmetry import transformed
+from phyblock.making.scenes.sketch import UNIT_M, Draft, Theme
 from phyblock.sim.support import whole_bounds_m
 
 __all__ = ["COMPOSITIONS", "Axis", "beside"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from phyblock.domain.blocks import BlockType
 from phyblock.making.scenes.motifs import EDGES, OUT, topping
-from phyblock.making.scenes.scene_draft import Draft, Theme
+from phyblock.making.scenes.sketch import Draft, Theme
 
 __all__ = ["CREATURES"]
 

@@ -7,7 +7,7 @@ high, a cylinder 4 high.
 
 from __future__ import annotations
 
-from phyblock.making.scenes.scene_draft import Draft
+from phyblock.making.scenes.sketch import Draft
 
 __all__ = ["EDGES", "OUT", "column", "crown", "deck", "flank", "gable", "piers", "topping"]
 

@@ -10,17 +10,15 @@ from hypothesis import strategies as st
 
 from phyblock.datasets import read_official
 from phyblock.domain import CandidateSet, Scene
-from phyblock.making.checks.finding import CheckName
-from phyblock.making.checks.scene_audit import (
+from phyblock.making.checks import FOREIGN, CheckName, find_duplicates
+from phyblock.making.scenes.candidate_sets import make_candidates
+from phyblock.making.verification import (
     AUDITED,
     SceneAudit,
     audit_scene,
     audit_scenes,
     findings_csv,
 )
-from phyblock.making.checks.set_checks import find_duplicates
-from phyblock.making.checks.tolerances import FOREIGN
-from phyblock.making.scenes.candidate_sets import make_candidates
 from phyblock.sim import Physics, Trial
 from tests.designs.scenes import designed_scenes
 from tests.sim.structures import counterweighted_beam, scene_of

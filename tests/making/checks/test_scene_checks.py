@@ -6,14 +6,10 @@ import pytest
 
 from phyblock.domain import CandidateSet, Scene
 from phyblock.errors import Problem
-from phyblock.making.checks.finding import Finding
-from phyblock.making.checks.scene_audit import AUDITED, audit_scene
-from phyblock.making.checks.scene_checks import CHECKS, findings_of
-from phyblock.making.checks.scene_facts import SceneFacts
-from phyblock.making.checks.set_verification import LAWS, verify_scene
-from phyblock.making.checks.tolerances import FOREIGN, OURS
+from phyblock.making.checks import CHECKS, FOREIGN, OURS, Finding, SceneFacts, findings_of
 from phyblock.making.scenes.candidate_sets import make_candidates
 from phyblock.making.scenes.sketch import make_scene
+from phyblock.making.verification import AUDITED, LAWS, audit_scene, verify_scene
 from phyblock.sim import Physics, Trial
 from phyblock.sim.support import GROUND
 from tests.designs.acceptance import form_problems, physics_problems

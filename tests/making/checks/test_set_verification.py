@@ -10,17 +10,17 @@ import pytest
 from phyblock.datasets import read_builtin
 from phyblock.domain import CandidateSet, Scene
 from phyblock.domain.symmetry import Symmetry
-from phyblock.making.checks.set_checks import find_duplicates, find_orphans
-from phyblock.making.checks.set_verification import (
+from phyblock.making.checks import find_duplicates, find_orphans
+from phyblock.making.poses import transformed
+from phyblock.making.scenes.candidate_sets import make_candidates
+from phyblock.making.scenes.scene_files import SUMS_FILE, sums_text
+from phyblock.making.scenes.sketch import make_scene
+from phyblock.making.verification import (
     LAWS,
     check_looks,
     check_sums,
     verify_scenes,
 )
-from phyblock.making.scenes.candidate_sets import make_candidates
-from phyblock.making.scenes.scene_files import SUMS_FILE, sums_text
-from phyblock.making.scenes.sketch import make_scene
-from phyblock.making.symmetry import transformed
 from phyblock.making.workers import open_workers
 from tests.designs.pad import Pad
 from tests.designs.scenes import designed_scene, designed_scenes

@@ -16,9 +16,8 @@ from benchmarks.evidence.completing import stripped
 from phyblock.datasets import read_builtin
 from phyblock.domain import Scene
 from phyblock.errors import DataError
-from phyblock.making.checks.set_verification import check_sums, verify_scene
-from phyblock.making.scenes.completing import complete, derived
-from phyblock.making.scenes.given_scenes import GivenScene, ReadScene, read_given
+from phyblock.making.scenes.completing import GivenScene, ReadScene, complete, derived, read_given
+from phyblock.making.verification import check_sums, verify_scene
 from phyblock.resources import bundled
 from tests.workspace import SCENES, Workspace
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from phyblock.making.questions.paraphrases import fault_of_form, texts_in
+from phyblock.making.questions.rewording import fault_of_form, texts_in
 from tests.fork_server import Done
 from tests.servers.chassis import Running, Seen
 from tests.servers.openai_chat import OpenAIChat

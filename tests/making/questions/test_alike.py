@@ -6,8 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.making.questions.alike import ranked_as_drawn
-from phyblock.making.questions.four_alike import four_alike
+from phyblock.making.questions.pictured_drafts import four_alike, ranked_as_drawn
 
 seeds = st.integers(0, 2**32 - 1)
 

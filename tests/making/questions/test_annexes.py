@@ -7,7 +7,7 @@ import numpy as np
 from phyblock.datasets import read_builtin
 from phyblock.domain import Block, Scene
 from phyblock.making.questions.annexes import with_annex
-from phyblock.making.questions.margins import is_sure, resting_on
+from phyblock.making.questions.counterfactual import is_sure, resting_on
 from phyblock.resources import bundled
 from phyblock.sim.support import find_gaps, find_overlaps
 

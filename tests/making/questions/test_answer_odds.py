@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from phyblock.making.questions.answer_odds import Texts, keeping_odds
+from phyblock.making.questions.selection import Texts, keeping_odds
 
 SHAPES = ("cube", "arch", "cylinder", "prism", "half cylinder")
 

@@ -13,8 +13,7 @@ from phyblock.domain.blocks import COLORS
 from phyblock.domain.scene import Scene
 from phyblock.making.questions.counterfactual import OUTCOME_TEXTS
 from phyblock.making.questions.pictured_drafts import LEAST_PIXELS
-from phyblock.making.questions.question_production import make_questions
-from phyblock.making.questions.rederiving import problem_of
+from phyblock.making.questions.question_production import make_questions, problem_of
 from phyblock.making.workers import open_workers
 from phyblock.records.question import StoredQuestion
 from phyblock.resources import bundled

@@ -8,9 +8,15 @@ import pytest
 
 from phyblock.domain import QuestionPicture
 from phyblock.domain.question import Mark
-from phyblock.making.questions.affordance_places import is_on_face, sort_of, stays_at
+from phyblock.making.questions.affordance import (
+    is_on_face,
+    lowered,
+    lowered_round,
+    sort_of,
+    stays_at,
+    stays_round,
+)
 from phyblock.making.questions.picture_view import shows_solid
-from phyblock.making.questions.placing import lowered, lowered_round, stays_round
 from phyblock.sim.seeing import Top
 from phyblock.sim.support import bounds_m
 from tests.sim.structures import block, tower

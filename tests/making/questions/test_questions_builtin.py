@@ -13,14 +13,14 @@ import pytest
 from phyblock.datasets import QuestionSet, read_builtin, read_questions
 from phyblock.domain import LETTERS, SUBTASKS, Subtask
 from phyblock.making.questions.audit import duplicates_of
-from phyblock.making.questions.question_card import question_card
+from phyblock.making.questions.question_files import question_card
 from phyblock.making.questions.question_production import (
     PER_SUBTASK,
     as_question,
     make_questions,
+    problem_of,
     scene_drafts,
 )
-from phyblock.making.questions.rederiving import problem_of
 from phyblock.making.workers import open_workers
 from phyblock.records.question import StoredQuestion
 from phyblock.resources import bundled

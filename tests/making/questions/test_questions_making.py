@@ -16,12 +16,15 @@ from phyblock.datasets import read_builtin, read_questions
 from phyblock.domain import LETTERS, Question, Scene, Subtask
 from phyblock.errors import DataError, StoreError
 from phyblock.making.questions.audit import referents
-from phyblock.making.questions.letters import BALANCE, even_letters
-from phyblock.making.questions.makers import MAKERS
 from phyblock.making.questions.picture_view import ELEVATIONS_DEG, NAMED
 from phyblock.making.questions.question_files import check_place, write_questions
-from phyblock.making.questions.question_production import PER_SUBTASK, make_questions
-from phyblock.making.questions.rederiving import problem_of
+from phyblock.making.questions.question_production import (
+    MAKERS,
+    PER_SUBTASK,
+    make_questions,
+    problem_of,
+)
+from phyblock.making.questions.selection import BALANCE, even_letters
 from phyblock.making.questions.wording import WORDINGS
 from phyblock.making.workers import open_workers
 from phyblock.records.question import StoredQuestion

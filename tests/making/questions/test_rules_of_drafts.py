@@ -14,16 +14,19 @@ from phyblock.datasets import read_builtin
 from phyblock.domain import Block, BlockType, Color, QuestionPicture, Scene
 from phyblock.domain.blocks import SHAPES, Euler
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, turned_form
-from phyblock.making.poses import POSES
-from phyblock.making.questions.axis_turns import AXIS_TURNS, axis_turns, tipped_over
-from phyblock.making.questions.hidden import sure_blocks
-from phyblock.making.questions.layers import layers_of
-from phyblock.making.questions.lengths import LENGTHS, along_and_across_m, grid_cm
-from phyblock.making.questions.loose_blocks import put_beside
+from phyblock.making.poses import POSES, transformed
+from phyblock.making.questions.affordance import shifted
+from phyblock.making.questions.measures import (
+    LENGTHS,
+    along_and_across_m,
+    grid_cm,
+    layers_of,
+    put_beside,
+    sure_blocks,
+)
 from phyblock.making.questions.question_draft import Draft, UnfairError
-from phyblock.making.questions.shifts import shifted
+from phyblock.making.questions.rotations import AXIS_TURNS, axis_turns, tipped_over
 from phyblock.making.questions.viewpoint import ViewpointMaker
-from phyblock.making.symmetry import transformed
 from phyblock.resources import bundled
 from phyblock.sim.seeing import least_difference, seen
 from phyblock.sim.support import find_overlaps, support_graph

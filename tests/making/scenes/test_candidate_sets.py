@@ -16,8 +16,7 @@ from phyblock.domain import KIT_PALETTE, MAX_CANDIDATES, Block, Candidate, Candi
 from phyblock.errors import DataError
 from phyblock.making.poses import POSES
 from phyblock.making.scenes.candidate_sets import NEEDED, make_candidates
-from phyblock.making.scenes.grammar import Group, Request, draw
-from phyblock.making.scenes.scene_production import shares
+from phyblock.making.scenes.scene_production import Group, Request, draw, shares
 from phyblock.scoring.counts import micro
 from phyblock.scoring.plan import Goal, match_plan
 from phyblock.tracks.goal_blind.learning import CONSTANT, FREQUENCIES, goal_blind_plans

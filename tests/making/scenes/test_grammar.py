@@ -14,8 +14,8 @@ from phyblock.domain.symmetry import canonical_form
 from phyblock.making.scenes.buildings import BUILDINGS
 from phyblock.making.scenes.compositions import COMPOSITIONS, beside
 from phyblock.making.scenes.creatures import CREATURES
-from phyblock.making.scenes.grammar import GROUP_LEVELS, Request, draw
-from phyblock.making.scenes.scene_draft import PALETTES, Draft
+from phyblock.making.scenes.scene_production import GROUP_LEVELS, Request, draw
+from phyblock.making.scenes.sketch import PALETTES, Draft
 from phyblock.sim import find_gaps, find_overlaps
 from phyblock.sim.support import bounds_m
 from tests.designs.acceptance import form_problems

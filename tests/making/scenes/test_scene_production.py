@@ -12,8 +12,7 @@ from phyblock.datasets import read_builtin
 from phyblock.domain import Scene
 from phyblock.domain.symmetry import canonical_form
 from phyblock.errors import DataError, StoreError
-from phyblock.making.scenes.scene_card import card
-from phyblock.making.scenes.scene_files import SetWriter, open_writer, sums_text
+from phyblock.making.scenes.scene_files import SetWriter, card, open_writer, sums_text
 from phyblock.making.scenes.scene_production import Order, Share, produce, shares
 from phyblock.making.workers import open_workers
 from phyblock.sim.registry import REFERENCE_ENGINE, other_simulators, physics_engine

@@ -1,24 +1,235 @@
-"""The one list of checks of a scene: each takes its facts and yields what is wrong with it.
-
-Accepting new scenes, verifying stored ones and auditing foreign ones choose from this list.
-"""
+"""What a check finds wrong."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
 
-from phyblock.domain.blocks import BlockType, orientation_class
-from phyblock.domain.candidates import MAX_CANDIDATES
-from phyblock.domain.scene import Block
-from phyblock.making.checks.finding import CheckName, Finding
-from phyblock.making.checks.scene_facts import SceneFacts
-from phyblock.making.checks.tolerances import LEVEL_LIMITS
-from phyblock.making.poses import POSES
-from phyblock.sim.stability import Stability, Trial
-from phyblock.sim.support import GROUND
+from phyblock.domain.aov import AOVGraph, CycleError
+from phyblock.domain.blocks import KIT_PALETTE, BlockType, orientation_class
+from phyblock.domain.candidates import MAX_CANDIDATES, CandidateSet
+from phyblock.domain.scene import Block, Kind, Scene
+from phyblock.errors import Problem
+from phyblock.making.poses import POSES, find_twins
+from phyblock.sim.pictures import PictureStyle
+from phyblock.sim.stability import DEFAULT_TRIAL, Stability, Trial, check
+from phyblock.sim.steps import Rest, check_at_rest, check_steps
+from phyblock.sim.support import (
+    FIT_TOLERANCE_M,
+    GROUND,
+    Gap,
+    Overlap,
+    find_gaps,
+    find_overlaps,
+    support_graph,
+)
+from phyblock.sim.visibility import LEAST_SHOWN, hidden_blocks, visible_shares
 
-__all__ = ["CHECKS", "Check", "findings_of"]
+CheckName = Literal[
+    "size",
+    "palette",
+    "overlap",
+    "floating",
+    "undeclared dependency",
+    "dependency without contact",
+    "layer",
+    "order",
+    "unstable",
+    "unstable step",
+    "hidden",
+    "duplicate",
+    "parents",
+    "candidates",
+    "too many candidates",
+    "distractor",
+]
+Declared = str | int | tuple[int, ...]
+"""A value of the file, or what it should be: a text, a number, or orders of blocks."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is wrong with a scene, and the one sentence that says so.
+
+    `blocks` are orders of blocks, 0 the ground. `value` was measured and `tolerance` would have
+    passed, both in `unit`. `field` is where the file says `declared`; `derived` is what geometry,
+    physics or a limit says instead.
+    """
+
+    scene: str
+    check: CheckName
+    message: str
+    blocks: tuple[int, ...] = ()
+    value: float | None = None
+    tolerance: float | None = None
+    unit: str = ""
+    field: str = ""
+    declared: Declared = ""
+    derived: Declared = ""
+
+    @property
+    def problem(self) -> Problem:
+        """The finding as an error says it."""
+        declared, derived = _shown(self.declared), _shown(self.derived)
+        return Problem(self.scene, self.message, self.field, declared, derived)
+
+    def __str__(self) -> str:
+        return str(self.problem)
+
+
+def _shown(value: Declared) -> str:
+    """Orders as a list of the file; an empty list says nothing."""
+    if isinstance(value, tuple):
+        return str(list(value)) if value else ""
+    return str(value)
+
+
+VIEW = PictureStyle(size_px=256)
+"""How the goal picture is drawn to see which blocks show in it."""
+
+STEP_TRIAL = replace(DEFAULT_TRIAL, physics=DEFAULT_TRIAL.physics[:1])
+"""Every step is tried at the first of the two time steps, for two seconds or until at rest."""
+
+FINISHED_REST = Rest(quiet_s=0.5)
+"""When the generator takes a finished structure to be at rest."""
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """What passes: overlaps and gaps up to `fit_m` [m], movement within the limits of the trials.
+
+    `trial` is that of the finished structure, which is watched to its end, or until it is at rest
+    as `rest` says; `step_trial` that of every step, `last_step` whether of the last step, too.
+    Of every block at least the share `shown` of its outline shows in the goal picture.
+    """
+
+    fit_m: float = FIT_TOLERANCE_M
+    trial: Trial = DEFAULT_TRIAL
+    step_trial: Trial = STEP_TRIAL
+    rest: Rest | None = None
+    last_step: bool = True
+    shown: float = LEAST_SHOWN
+
+
+OURS = Tolerances()
+"""For scenes made here."""
+
+OURS_IN_HASTE = Tolerances(rest=FINISHED_REST)
+"""For scenes that are being made: the same, but a trial ends once all is at rest."""
+
+# The last step of a foreign scene is left to the trial of the finished structure: what falls there
+# shall be told once. 2 mm cannot be seen in a picture.
+FOREIGN = Tolerances(fit_m=0.002, last_step=False)
+"""For scenes made elsewhere, whose positions are written by hand in rounded millimeters."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How many blocks and layers a level allows (paper section 3.1)."""
+
+    least_blocks: int
+    most_blocks: int
+    most_layers: int
+
+
+LEVEL_LIMITS: dict[int, Limits] = {
+    1: Limits(1, 4, 4),
+    2: Limits(2, 5, 3),
+    3: Limits(6, 12, 8),
+    4: Limits(13, 22, 8),
+}
+
+
+class SceneFacts:
+    """A scene whose orders are unique, and facts about it; each is worked out once, when asked for.
+
+    The scene's dependencies need not be sound. Facts raise SimulationError as the simulator does.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        candidates: CandidateSet | None = None,
+        tolerances: Tolerances = OURS,
+        palette: tuple[Kind, ...] = KIT_PALETTE,
+    ) -> None:
+        """Without `candidates` checks of them find nothing."""
+        self.scene = scene
+        self.candidates = candidates
+        self.tolerances = tolerances
+        self.palette = palette
+
+    @cached_property
+    def overlaps(self) -> tuple[Overlap, ...]:
+        """Blocks that share space, with one another or with the ground."""
+        return find_overlaps(self.scene.blocks, self.tolerances.fit_m)
+
+    @cached_property
+    def gaps(self) -> tuple[Gap, ...]:
+        """Blocks that hang above what is below them."""
+        return find_gaps(self.scene.blocks, self.tolerances.fit_m)
+
+    @cached_property
+    def contacts(self) -> Mapping[int, frozenset[int]]:
+        """For each block, by its order, the orders that it rests on; the ground only alone.
+
+        Empty for a block that touches nothing below it.
+        """
+        graph = support_graph(self.scene.blocks)
+        return {order: (below - {GROUND}) or below for order, below in graph.items()}
+
+    @cached_property
+    def declared(self) -> Mapping[int, frozenset[int]]:
+        """The same as the file declares it."""
+        return {block.order: declared_orders(block) for block in self.scene.blocks}
+
+    @cached_property
+    def graph(self) -> AOVGraph | None:
+        """The graph of the declared dependencies; None when they are unsound."""
+        return graph_of(self.declared)
+
+    @cached_property
+    def finished(self) -> Stability:
+        """What becomes of the finished structure, watched to the end or until it is at rest."""
+        blocks, trial, rest = self.scene.blocks, self.tolerances.trial, self.tolerances.rest
+        return check(blocks, trial) if rest is None else check_at_rest(blocks, trial, rest)
+
+    @cached_property
+    def steps(self) -> tuple[Stability, ...]:
+        """What becomes of the structure after each step of the stored order."""
+        blocks = self.scene.blocks if self.tolerances.last_step else self.scene.blocks[:-1]
+        return check_steps(blocks, self.tolerances.step_trial)
+
+    @cached_property
+    def shown(self) -> Mapping[int, float]:
+        """For each block, by its order, the share of its outline that shows in the goal picture."""
+        return visible_shares(self.scene, VIEW)
+
+    @cached_property
+    def hidden(self) -> tuple[int, ...]:
+        """Orders of the blocks that do not show in the goal picture."""
+        return hidden_blocks(self.scene)
+
+
+def declared_orders(block: Block) -> frozenset[int]:
+    """The orders that a block is declared to rest on; the ground alone is {0}."""
+    return frozenset(block.depend) or frozenset({GROUND})
+
+
+def graph_of(rests_on: Mapping[int, frozenset[int]]) -> AOVGraph | None:
+    """The graph over blocks in the order given; None for unknown blocks or a cycle."""
+    vertex_of = {order: vertex for vertex, order in enumerate(rests_on)}
+    if any(order not in vertex_of for orders in rests_on.values() for order in orders - {GROUND}):
+        return None
+    edges = [
+        frozenset(vertex_of[order] for order in orders - {GROUND}) for orders in rests_on.values()
+    ]
+    try:
+        return AOVGraph(tuple(edges))
+    except CycleError:
+        return None
 
 
 @dataclass(frozen=True)
@@ -276,3 +487,46 @@ CHECKS: Mapping[CheckName, Check] = {
     )
 }
 """The checks of a scene by itself."""
+
+
+def find_duplicates(scenes: Iterable[Scene]) -> tuple[Finding, ...]:
+    """Scenes that equal an earlier one up to quarter turns, mirroring and shifting."""
+    return tuple(
+        Finding(
+            name, "duplicate", f"is scene {twin}, turned, mirrored or shifted at most", derived=twin
+        )
+        for name, twin in find_twins(scenes).items()
+    )
+
+
+def find_orphans(scenes: Sequence[Scene]) -> Iterator[Finding]:
+    """Scenes whose parents are not base scenes of the same set."""
+    bases = {scene.id for scene in scenes if scene.parents == (scene.id,)}
+    for scene in scenes:
+        strange = [parent for parent in scene.parents if parent not in bases]
+        if strange or not scene.parents:
+            message = "name no base scene of the set"
+            yield Finding(scene.id, "parents", message, field="parents", declared=str(strange))
+
+
+FORM: tuple[CheckName, ...] = ("size", "palette", "layer", "order")
+"""Checks without physics."""
+# Cheap ones first.
+PHYSICS: tuple[CheckName, ...] = (
+    "overlap",
+    "floating",
+    "undeclared dependency",
+    "dependency without contact",
+    "unstable step",
+    "unstable",
+)
+"""Overlaps, floating blocks, wrong dependencies, and what does not stand."""
+
+
+def is_acceptable(scene: Scene, palette: tuple[Kind, ...]) -> bool:
+    """Whether a scene could enter a data set, each of its blocks to be seen in the goal picture.
+
+    It ends at the first fault, and a trial ends once all is at rest, at both time steps.
+    """
+    facts = SceneFacts(scene, tolerances=OURS_IN_HASTE, palette=palette)
+    return next(findings_of(facts, (*FORM, "hidden", *PHYSICS)), None) is None

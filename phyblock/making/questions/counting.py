@@ -1,4 +1,4 @@
-"""Counting over a whole scene: blocks, layers and types, each in several ways."""
+"""Number: how many blocks of a color, a shape or both there are; every one can be seen."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from phyblock.domain.blocks import BLOCK_TYPES
+from phyblock.domain.blocks import BLOCK_TYPES, COLORS
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.choices import pick, shuffled
-from phyblock.making.questions.coloring import recolored
-from phyblock.making.questions.hidden import sure_blocks
-from phyblock.making.questions.layers import layers_of
+from phyblock.making.questions.measures import layers_of, sure_blocks
 from phyblock.making.questions.picture_view import (
     COUNTED,
     NAMED,
     View,
+    are_seen,
     goal_picture,
     require_seen,
     require_shapes_seen,
     shown_picture,
 )
+from phyblock.making.questions.properties import recolored
 from phyblock.making.questions.question_draft import Draft, UnfairError
 from phyblock.making.questions.referring import SHAPE_WORDS, names, resolve_one, shape_word
+from phyblock.making.questions.selection import pick, shuffled
 from phyblock.making.questions.static_drafts import (
     StaticMaker,
     draft,
@@ -36,7 +36,73 @@ from phyblock.making.questions.static_drafts import (
 from phyblock.making.questions.wording import slots_of, stem_of
 from phyblock.sim.support import GROUND, support_graph
 
-__all__ = ["TALLIES", "TallyMaker"]
+_PLURALS = {word: f"{word}es" if word == "arch" else f"{word}s" for word in SHAPE_WORDS}
+_TYPES_OF = {_PLURALS[word]: types for word, types in SHAPE_WORDS.items()}
+
+_MOST = 13
+
+
+def _orders(blocks: Sequence[Block]) -> list[int]:
+    return [block.order for block in blocks]
+
+
+class NumberMaker(StaticMaker):
+    """NU: how many blocks there are of a color, a shape, or both."""
+
+    subtask: Subtask = "NU"
+    views_a_scene = 2
+
+    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+        """Of all that can be counted in a scene whose blocks all show enough."""
+        picture = goal_picture(scene, view)
+        if not are_seen(picture, _orders(scene.blocks), COUNTED):
+            return
+        colors = [color for color in COLORS if any(b.color == color for b in scene.blocks)]
+        kinds = [(f"{color} blocks", "color") for color in colors]
+        kinds += [(word, "shape") for word in _TYPES_OF]
+        kinds += [(f"{color} {word}", "both") for color in colors for word in _TYPES_OF]
+        if not _shapes_are_seen(picture):
+            kinds = [(what, kind) for what, kind in kinds if kind == "color"]
+        for what, kind in shuffled(rng, kinds):
+            counted = _fitting(what, scene.blocks)
+            values = window(rng, range(1, _MOST), len(counted))
+            if values is not None:
+                options = [str(value) for value in values]
+                evidence = {"counted": _orders(counted)}
+                slots = {"what": what}
+                yield draft(scene, picture, rng, "nu", slots, options, options[0], kind, **evidence)
+
+    def rederive(self, question: Question) -> tuple[int, ...]:
+        """Counts the blocks that fit the words."""
+        picture = shown_picture(question)
+        require_seen(picture, _orders(picture.blocks), COUNTED)
+        what = slots_of(question)["what"]
+        if not what.endswith(" blocks"):
+            require_shapes_seen(picture)
+        return index_of(question, str(len(_fitting(what, picture.blocks))))
+
+
+def _shapes_are_seen(picture: QuestionPicture) -> bool:
+    try:
+        require_shapes_seen(picture)
+    except UnfairError:
+        return False
+    return True
+
+
+def _fitting(what: str, blocks: Sequence[Block]) -> list[Block]:
+    """The blocks that `red blocks`, `cubes` or `red cubes` speaks of."""
+    first, _, rest = what.partition(" ")
+    color, noun = (first, rest) if first in COLORS else ("", what)
+    if noun not in (*_TYPES_OF, "blocks"):
+        raise UnfairError(f"{what!r} cannot be counted")
+    types = _TYPES_OF.get(noun)
+    return [
+        block
+        for block in blocks
+        if color in ("", block.color) and (types is None or block.type in types)
+    ]
+
 
 Slots = Mapping[str, str]
 _MOST_BLOCKS = 22
@@ -106,7 +172,7 @@ def _one(
     evidence: dict[str, object] = {"count": right}
     kind = stem
     if stem == "oc-hidden":
-        evidence["inferred"] = sorted(set(_orders(picture)) - set(_in_sight(picture)))
+        evidence["inferred"] = sorted(set(_orders_tallies(picture)) - set(_in_sight(picture)))
         kind = f"{stem}-{len(evidence['inferred'])}"  # type: ignore[arg-type]
     return draft(scene, picture, rng, stem, slots, options, options[0], kind, **evidence)
 
@@ -115,12 +181,12 @@ def _in_sight(picture: QuestionPicture) -> list[int]:
     return [block.order for block in seen_blocks(picture, COUNTED)]
 
 
-def _orders(picture: QuestionPicture) -> list[int]:
+def _orders_tallies(picture: QuestionPicture) -> list[int]:
     return [block.order for block in picture.blocks]
 
 
 def _all_seen(picture: QuestionPicture) -> Sequence[Block]:
-    require_seen(picture, _orders(picture), COUNTED)
+    require_seen(picture, _orders_tallies(picture), COUNTED)
     return picture.blocks
 
 
@@ -149,7 +215,7 @@ def _in_layers(picture: QuestionPicture, numbers: Callable[[int], bool]) -> int:
 def _layer_of_block(picture: QuestionPicture, slots: Slots) -> int:
     block = resolve_one(slots["block"], picture)
     layers = layers_of(picture.blocks)
-    under = [o for o in _orders(picture) if layers[o] < layers[block.order]]
+    under = [o for o in _orders_tallies(picture) if layers[o] < layers[block.order]]
     require_seen(picture, [block.order], NAMED)
     require_seen(picture, under, COUNTED)
     return layers[block.order]
