@@ -1,4 +1,4 @@
-"""Running a command as a whole process tree: wall time, CPU time and peak memory."""
+"""Running a command as a whole process tree: wall time, CPU time and peak memory; local servers."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ import sys
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
+from pathlib import Path
 
 import psutil
 
-__all__ = ["Cost", "run_measured"]
-
+ROOT = Path(__file__).parents[2]
 _EVERY_S = 0.05
 
 
@@ -26,7 +27,7 @@ class Cost:
 
 
 def run_measured(command: Sequence[str], env: Mapping[str, str]) -> Cost:
-    """Run a command to its end; exits with its output when it fails."""
+    """Run a command to its end; exit with its output when it fails."""
     # Into a file: nobody reads a pipe meanwhile, and a full one would hold the command up.
     with tempfile.TemporaryFile("w+") as output:
         start = time.perf_counter()
@@ -45,7 +46,22 @@ def run_measured(command: Sequence[str], env: Mapping[str, str]) -> Cost:
     return Cost(wall_s, sum(cpu.values()), peak / 1e6)
 
 
+def served(stack: ExitStack, module: str, *options: str) -> str:
+    """Return the address of a new server of `tests.servers`, which ends with the stack."""
+    server = subprocess.Popen(
+        [sys.executable, "-m", f"tests.servers.{module}", *options],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    stack.callback(server.wait)
+    stack.callback(server.terminate)
+    assert server.stdout is not None
+    return f"http://127.0.0.1:{int(server.stdout.readline())}/v1"
+
+
 def _sample(root: psutil.Process, cpu: dict[int, float]) -> int:
+    """Return the resident memory of the tree [bytes]; note the CPU time of each process."""
     resident = 0
     try:
         tree = [root, *root.children(recursive=True)]

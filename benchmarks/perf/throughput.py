@@ -20,8 +20,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import yaml
-from local_servers import served
-from measure import Cost, run_measured
+from measure import Cost, run_measured, served
 
 SIZE_PX = 1100
 """Edge at which the rendered composites weigh about 150 KB."""

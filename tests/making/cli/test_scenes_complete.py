@@ -12,7 +12,6 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.evidence.completing import stripped
 from phyblock.datasets import read_builtin
 from phyblock.domain import Scene
 from phyblock.errors import DataError
@@ -29,6 +28,22 @@ GABLES = [
     {"type": "triangle", "color": "orange", "position": [0, -0.0375, 0.075]},
     {"type": "triangle", "color": "orange", "position": [0, 0.0375, 0.075]},
 ]
+
+
+def stripped(scene: Scene) -> GivenScene:
+    """Return a scene as a person would write it: no more than where its blocks are."""
+    blocks = [
+        {
+            "order": block.order,
+            "type": block.type,
+            "color": block.color,
+            "position": list(block.position_m),
+            "euler": list(block.euler_deg),
+        }
+        for block in scene.blocks
+    ]
+    about = {"levels": list(scene.levels), "parents": list(scene.parents)}
+    return GivenScene.model_validate({"id": scene.id, **about, "blocks": blocks})
 
 
 def of(*blocks: Any, **fields: Any) -> GivenScene:
