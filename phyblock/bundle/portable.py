@@ -11,7 +11,7 @@ from phyblock.bundle.about import BundledData, data_of
 from phyblock.bundle.texts import Cleaner, model_name, without_paths
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.records import Manifest, Record
-from phyblock.records.reply import StoredReply
+from phyblock.records.reply import Reply
 from phyblock.resources import bundled
 from phyblock.run.data import asked_about, open_dataset, recorded_dataset
 from phyblock.run.reopen import reopen_tracks
@@ -66,7 +66,7 @@ def portable_records(
         yield record.model_copy(update=changed)
 
 
-def _portable_reply(reply: StoredReply) -> StoredReply:
+def _portable_reply(reply: Reply) -> Reply:
     if (name := model_name(reply.provider_model)) == reply.provider_model:
         return reply
     return reply.model_copy(update={"provider_model": name})

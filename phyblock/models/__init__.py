@@ -3,16 +3,7 @@
 Importing this package imports neither litellm nor aiohttp: the first call through one of them does.
 """
 
-from phyblock.models.base import (
-    AskLaterError,
-    GatheringModel,
-    Image,
-    Message,
-    Model,
-    Reply,
-    Request,
-    Usage,
-)
+from phyblock.models.base import AskLaterError, GatheringModel, Image, Message, Model, Request
 from phyblock.models.batches import BatchFiles, remove_unfinished, under_way, waiting_keys
 from phyblock.models.breaker import Breakers
 from phyblock.models.build import build_model
@@ -38,6 +29,7 @@ from phyblock.models.raw_replies import RawReply, read_raw_reply
 from phyblock.models.retirement import ends_on, is_unlisted
 from phyblock.models.retry import RetryPolicy
 from phyblock.models.shared_cache import SharedCache
+from phyblock.records.reply import Reply, Usage
 
 __all__ = [
     "AskLaterError",

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 from phyblock.errors import PhyblockError
+from phyblock.records.reply import Reply
 from phyblock.stable import hex_digest
-from phyblock.types import Finish, Role
+from phyblock.types import Role
 
 __all__ = [
     "AskLaterError",
@@ -17,9 +18,7 @@ __all__ = [
     "Image",
     "Message",
     "Model",
-    "Reply",
     "Request",
-    "Usage",
 ]
 
 
@@ -68,46 +67,6 @@ class Request:
     response_format: Mapping[str, object] | None = None
     track: str = ""
     examples: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Usage:
-    """Tokens as the provider counted them; None where it did not say.
-
-    `cached_tokens` are those of `prompt_tokens` that it had in its cache, `cache_write_tokens`
-    those that it put there and bills as such; `reasoning_tokens` are among `completion_tokens`.
-    """
-
-    prompt_tokens: int | None = None
-    completion_tokens: int | None = None
-    reasoning_tokens: int | None = None
-    cached_tokens: int | None = None
-    cache_write_tokens: int | None = None
-
-
-@dataclass(frozen=True)
-class Reply:
-    """An answer that was read.
-
-    `cost_usd` is None when the price is unknown (never 0 for that); `billed_usd` is what a run's
-    cost limit counts for it, failed attempts included, None where there is no limit; `attempts`
-    counts requests sent for it, 0 when `cached`; `seed_sent` is False where the provider takes no
-    seed, so that seeds are independent repeats; `latency_s` is the time of the successful request
-    alone, 0 where it came in a batch: `batched` replies cost less.
-    """
-
-    text: str
-    reasoning: str = ""
-    finish: Finish = "stop"
-    usage: Usage = Usage()
-    cost_usd: float | None = None
-    billed_usd: float | None = None
-    latency_s: float = 0.0
-    provider_model: str = ""
-    attempts: int = 1
-    cached: bool = False
-    seed_sent: bool = True
-    batched: bool = False
 
 
 class Model(Protocol):

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from phyblock.errors import Problem, SpecError
-from phyblock.models.base import Reply, Request, Usage
+from phyblock.models.base import Request
 from phyblock.models.config import ModelConfig
+from phyblock.records.reply import Reply, Usage
 from phyblock.registry import baseline_names, baseline_rules
 from phyblock.stable import drawn_bytes
 
@@ -44,7 +45,13 @@ class BaselineModel:
         digest = drawn_bytes(seed_text)
         rng = np.random.default_rng(int.from_bytes(digest, "big"))
         text = rule(request.subject, rng)
-        return Reply(text, usage=Usage(0, 0), cost_usd=0.0, provider_model=self._id, attempts=0)
+        return Reply(
+            text=text,
+            usage=Usage(prompt_tokens=0, completion_tokens=0),
+            cost_usd=0.0,
+            provider_model=self._id,
+            attempts=0,
+        )
 
     async def aclose(self) -> None:
         """Nothing is held open."""

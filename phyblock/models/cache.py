@@ -14,19 +14,19 @@ import re
 import sqlite3
 import time
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from phyblock.errors import Problem, StoreError
-from phyblock.models.base import Image, Message, Reply, Request, Usage
+from phyblock.models.base import Image, Message, Request
 from phyblock.models.config import ModelConfig
 from phyblock.models.events import Tell, ignore_text
 from phyblock.models.leases import Leases
 from phyblock.models.payload import wire_params
 from phyblock.models.raw_replies import token_count
+from phyblock.records.reply import Reply
 from phyblock.stable import hex_digest
-from phyblock.types import Finish
 
 __all__ = ["CacheBusyError", "CacheStats", "ReplyCache", "reply_key"]
 
@@ -146,7 +146,7 @@ class ReplyCache:
         if reply.finish in ("length", "refusal") or not reply.text.strip():
             return False
         # What this run paid is no part of what another finds.
-        reply = replace(reply, billed_usd=None)
+        reply = reply.model_copy(update={"billed_usd": None})
         text = json.dumps(_fields(reply), ensure_ascii=True, separators=(",", ":"))
         with self._explained():
             self._db.execute(
@@ -241,7 +241,7 @@ def _fields(reply: Reply) -> dict[str, Any]:
     """What is kept of a reply, without later fields that say nothing: earlier versions share the
     file, and take a reply with a field that they do not know for broken.
     """
-    fields = asdict(reply)
+    fields = reply.model_dump()
     for place in (fields, fields["usage"]):
         for name in _LATER_FIELDS & place.keys():
             if place[name] is None or place[name] is False:
@@ -251,13 +251,6 @@ def _fields(reply: Reply) -> dict[str, Any]:
 
 def _reply(stored: dict[str, Any]) -> Reply:
     # Older files may hold counts that a server made up.
-    usage = Usage(**{name: token_count(number) for name, number in stored["usage"].items()})
-    reply = Reply(**{**stored, "usage": usage})
-    texts = (reply.text, reply.reasoning, reply.provider_model)
-    if not all(isinstance(text, str) for text in texts):
-        raise TypeError("its text is no text")
-    if reply.finish not in get_args(Finish):
-        raise ValueError("it ended for no reason that is known")
-    if not isinstance(reply.latency_s, int | float):
-        raise TypeError("its latency is no number")
-    return replace(reply, cached=True, attempts=0)
+    usage = {name: token_count(number) for name, number in stored["usage"].items()}
+    found = {**stored, "usage": usage, "cached": True, "attempts": 0}
+    return Reply.model_validate(found, strict=True)

@@ -15,7 +15,7 @@ from phyblock.errors import (
     RetryableError,
     UnavailableError,
 )
-from phyblock.models.base import AskLaterError, Reply, Request
+from phyblock.models.base import AskLaterError, Request
 from phyblock.models.cache import reply_key
 from phyblock.models.config import ModelConfig
 from phyblock.models.cost import Budget, estimate
@@ -29,6 +29,7 @@ from phyblock.models.replicas import Replica, Replicas
 from phyblock.models.retry import RetryPolicy, with_retries
 from phyblock.models.sender import Outlay, Sender
 from phyblock.models.shared_cache import SharedCache, Turn
+from phyblock.records.reply import Reply
 
 __all__ = ["ChatModel", "ChatParts"]
 
@@ -94,7 +95,9 @@ class ChatModel:
             with self._parts.halt.giving_up():
                 known = await cache.look(key)
             if known.reply is not None:
-                return replace(known.reply, cost_usd=self._sender.cost_usd(known.reply))
+                return known.reply.model_copy(
+                    update={"cost_usd": self._sender.cost_usd(known.reply)}
+                )
             is_free = not known.is_asked
             if known.is_batched:
                 self._put_off_once(key, request)
@@ -247,22 +250,24 @@ class ChatModel:
 
     def _found(self, kept: Reply, question: _Question) -> Reply:
         """A reply that another brought, with what attempts of our own had cost before."""
-        return replace(
-            kept,
-            cost_usd=self._sender.cost_usd(kept),
-            billed_usd=question.outlay.billed_usd,
-            attempts=question.outlay.sent,
+        return kept.model_copy(
+            update={
+                "cost_usd": self._sender.cost_usd(kept),
+                "billed_usd": question.outlay.billed_usd,
+                "attempts": question.outlay.sent,
+            }
         )
 
     def _finished(self, reply: Reply, question: _Question) -> Reply:
         secrets = self._parts.secrets
-        return replace(
-            reply,
-            text=hidden(reply.text, secrets, guess=False),
-            reasoning=hidden(reply.reasoning, secrets, guess=False),
-            cost_usd=self._sender.cost_usd(reply),
-            billed_usd=question.outlay.billed_usd,
-            attempts=question.outlay.sent,
+        return reply.model_copy(
+            update={
+                "text": hidden(reply.text, secrets, guess=False),
+                "reasoning": hidden(reply.reasoning, secrets, guess=False),
+                "cost_usd": self._sender.cost_usd(reply),
+                "billed_usd": question.outlay.billed_usd,
+                "attempts": question.outlay.sent,
+            }
         )
 
     def _on_retry(self, error: RetryableError, wait_s: float) -> None:

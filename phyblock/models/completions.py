@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import replace
 
 from phyblock.errors import ModelError, RetryableError
-from phyblock.models.base import Reply, Usage
 from phyblock.models.raw_replies import read_chat_completion
+from phyblock.records.reply import Reply, Usage
 
 __all__ = ["read_completion"]
 
@@ -41,7 +40,14 @@ def _read(body: object, latency_s: float, status: int) -> Reply:
     if not reasoning and (match := _THINKING.match(text)):
         reasoning, text = match[2], match[3]
     usage = _believed(raw.usage, text, reasoning)
-    return Reply(text, reasoning, raw.finish, usage, latency_s=latency_s, provider_model=raw.model)
+    return Reply(
+        text=text,
+        reasoning=reasoning,
+        finish=raw.finish,
+        usage=usage,
+        latency_s=latency_s,
+        provider_model=raw.model,
+    )
 
 
 def _believed(usage: Usage, text: str, reasoning: str) -> Usage:
@@ -56,11 +62,12 @@ def _believed(usage: Usage, text: str, reasoning: str) -> Usage:
     )
     if completion == 0 and (prompt is None or text or reasoning):
         completion = None
-    return replace(
-        usage,
-        prompt_tokens=prompt,
-        completion_tokens=completion,
-        reasoning_tokens=None if thoughts == 0 and reasoning else thoughts,
+    return usage.model_copy(
+        update={
+            "prompt_tokens": prompt,
+            "completion_tokens": completion,
+            "reasoning_tokens": None if thoughts == 0 and reasoning else thoughts,
+        }
     )
 
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import date, timedelta
 
 from phyblock.config.models import host_of
 from phyblock.errors import BudgetReachedError, ModelError, Problem, SpecError
-from phyblock.models.base import Image, Reply, Request, Usage
+from phyblock.models.base import Image, Request
 from phyblock.models.config import ModelConfig
 from phyblock.models.keys import KEYLESS
 from phyblock.models.payload import wire_params
@@ -23,6 +23,7 @@ from phyblock.models.price_map import map_entry, mapped_prices
 from phyblock.models.prices import FREE, Prices, today
 from phyblock.models.retry import is_success
 from phyblock.models.text_tokens import text_tokens
+from phyblock.records.reply import Reply, Usage
 
 __all__ = [
     "Budget",
@@ -72,7 +73,7 @@ class Estimate:
     @property
     def usage(self) -> Usage:
         """The usual case."""
-        return Usage(self.prompt_tokens, self.completion_tokens)
+        return Usage(prompt_tokens=self.prompt_tokens, completion_tokens=self.completion_tokens)
 
 
 def prices_of(config: ModelConfig) -> Prices | None:
@@ -140,7 +141,9 @@ def may_be_billed(error: ModelError) -> bool:
 def counted(reply: Reply, expected: Estimate) -> Reply:
     """The reply with the counts alone that can be true."""
     said_something = bool(reply.text or reply.reasoning)
-    return replace(reply, usage=plausible(reply.usage, expected, said_something=said_something))
+    return reply.model_copy(
+        update={"usage": plausible(reply.usage, expected, said_something=said_something)}
+    )
 
 
 def most_usd(
@@ -194,7 +197,13 @@ def plausible(usage: Usage, expected: Estimate, *, said_something: bool) -> Usag
     written = _plausible(usage.cache_write_tokens, 0, expected.prompt_tokens)
     if (cached or 0) + (written or 0) > (prompt or 0):
         cached = written = None
-    return Usage(prompt, completion, reasoning, cached, written)
+    return Usage(
+        prompt_tokens=prompt,
+        completion_tokens=completion,
+        reasoning_tokens=reasoning,
+        cached_tokens=cached,
+        cache_write_tokens=written,
+    )
 
 
 def _plausible(count: int | None, least: int, expected: int) -> int | None:

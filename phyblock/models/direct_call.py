@@ -9,7 +9,6 @@ import time
 from collections.abc import Sequence
 
 from phyblock.errors import Problem, SpecError
-from phyblock.models.base import Reply
 from phyblock.models.completions import read_completion
 from phyblock.models.config import ModelConfig
 from phyblock.models.http_client import Client
@@ -17,6 +16,7 @@ from phyblock.models.keys import api_key
 from phyblock.models.payload import json_body
 from phyblock.models.refusals import read_body, refusal, refuses_seed
 from phyblock.models.transport import Call, GuardedTransport, SeedRefusedError
+from phyblock.records.reply import Reply
 
 __all__ = ["DirectTransport"]
 

@@ -14,7 +14,6 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from phyblock.errors import ModelError, RetryableError, UnavailableError
-from phyblock.models.base import Reply
 from phyblock.models.completions import read_completion
 from phyblock.models.keys import api_key
 from phyblock.models.litellm_extras import leave_out, unlogged
@@ -27,6 +26,7 @@ from phyblock.models.refusals import (
     unreadable,
 )
 from phyblock.models.transport import Call, GuardedTransport, SeedRefusedError
+from phyblock.records.reply import Reply
 
 if TYPE_CHECKING:
     import types

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from datetime import date, datetime, timezone
 
-from phyblock.models.base import Usage
+from phyblock.records.reply import Usage
 
 __all__ = ["FREE", "Price", "Prices", "Rate", "Tariff", "today"]
 

@@ -7,11 +7,11 @@ six shapes of the official outputs and their near relatives.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from phyblock.errors import DataError, Problem
-from phyblock.models.base import Usage
+from phyblock.records.reply import Usage
 from phyblock.text import well_formed
 from phyblock.types import Finish
 
@@ -151,10 +151,14 @@ def _gemini(raw: object) -> RawReply | None:
     text, thoughts = _parts(parts if isinstance(parts, list) else [])
     finish = finish_of(_get(candidate, "finishReason", "finish_reason"))
     usage = Usage(
-        token_count(_get(counts, "promptTokenCount", "prompt_token_count")),
-        token_count(_get(counts, "candidatesTokenCount", "candidates_token_count")),
-        token_count(_get(counts, "thoughtsTokenCount", "thoughts_token_count")),
-        token_count(_get(counts, "cachedContentTokenCount", "cached_content_token_count")),
+        prompt_tokens=token_count(_get(counts, "promptTokenCount", "prompt_token_count")),
+        completion_tokens=token_count(
+            _get(counts, "candidatesTokenCount", "candidates_token_count")
+        ),
+        reasoning_tokens=token_count(_get(counts, "thoughtsTokenCount", "thoughts_token_count")),
+        cached_tokens=token_count(
+            _get(counts, "cachedContentTokenCount", "cached_content_token_count")
+        ),
     )
     model = _text(_get(raw, "modelVersion", "model_version"))
     return RawReply("Gemini", text, thoughts, "refusal" if blocked else finish, usage, model)
@@ -233,11 +237,11 @@ def _usage(counts: object, prompt: str, completion: str) -> Usage:
     if cached is None:
         cached = _get(counts, "cached_tokens", "prompt_cache_hit_tokens")
     return Usage(
-        token_count(_get(counts, prompt)),
-        token_count(_get(counts, completion)),
-        token_count(_get(details, "reasoning_tokens")),
-        token_count(cached),
-        token_count(_get(kept, "cache_write_tokens", "cache_creation_tokens")),
+        prompt_tokens=token_count(_get(counts, prompt)),
+        completion_tokens=token_count(_get(counts, completion)),
+        reasoning_tokens=token_count(_get(details, "reasoning_tokens")),
+        cached_tokens=token_count(cached),
+        cache_write_tokens=token_count(_get(kept, "cache_write_tokens", "cache_creation_tokens")),
     )
 
 
@@ -249,7 +253,9 @@ def _anthropic_usage(counts: object) -> Usage:
     if usage.prompt_tokens is None:
         return usage
     prompt = usage.prompt_tokens + (cached or 0) + (written or 0)
-    return replace(usage, prompt_tokens=prompt, cached_tokens=cached, cache_write_tokens=written)
+    return usage.model_copy(
+        update={"prompt_tokens": prompt, "cached_tokens": cached, "cache_write_tokens": written}
+    )
 
 
 def token_count(value: object) -> int | None:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from phyblock.errors import DataError, Problem, RefusedError, SampleError, reason_of
 from phyblock.files import load_json, read_text
-from phyblock.models.base import Reply, Request
+from phyblock.models.base import Request
 from phyblock.models.config import ModelConfig
 from phyblock.models.raw_replies import RawReply, read_raw_reply
-from phyblock.models.stored import reply_of
 from phyblock.records import RECORDS, Recorded, RecordedLines
+from phyblock.records.reply import Reply
 
 __all__ = ["ReplayModel", "open_replay"]
 
@@ -75,7 +74,7 @@ class RunReplayModel:
             raise cls(error.message, status=error.status)
         if record.reply is None:
             return None
-        return replace(reply_of(record.reply), cost_usd=0.0, attempts=0, cached=False)
+        return record.reply.model_copy(update={"cost_usd": 0.0, "attempts": 0, "cached": False})
 
     async def aclose(self) -> None:
         """Nothing is held open."""
@@ -103,10 +102,10 @@ def open_replay(config: ModelConfig) -> ReplayModel | RunReplayModel:
 
 def _replayed(raw: RawReply) -> Reply:
     return Reply(
-        raw.text,
-        raw.reasoning,
-        raw.finish,
-        raw.usage,
+        text=raw.text,
+        reasoning=raw.reasoning,
+        finish=raw.finish,
+        usage=raw.usage,
         cost_usd=0.0,
         provider_model=raw.model,
         attempts=0,

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from phyblock.errors import ModelError, UnavailableError
-from phyblock.models.base import Reply, Request
+from phyblock.models.base import Request
 from phyblock.models.config import ModelConfig
 from phyblock.models.cost import Budget, Estimate, counted, may_be_billed, reply_cost_usd
 from phyblock.models.formats import FORMAT_HINT, refuses_format
@@ -16,6 +16,7 @@ from phyblock.models.halt import Halt
 from phyblock.models.payload import wire_params
 from phyblock.models.prices import Prices, today
 from phyblock.models.transport import Call, SeedRefusedError, Transport
+from phyblock.records.reply import Reply
 
 __all__ = ["Outlay", "Sender"]
 
@@ -76,7 +77,7 @@ class Sender:
             if self._takes_seed:
                 self._takes_seed = False
                 self._say_seedless()
-        return replace(reply, seed_sent=call.seed is not None)
+        return reply.model_copy(update={"seed_sent": call.seed is not None})
 
     async def _send_formed(self, call: Call, outlay: Outlay, transport: Transport) -> Reply:
         """Send; a provider that refuses the format of the answer would refuse it every time.

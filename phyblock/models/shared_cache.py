@@ -19,12 +19,12 @@ from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 from phyblock.errors import StoreError
-from phyblock.models.base import Reply
 from phyblock.models.cache import CacheBusyError, ReplyCache
 from phyblock.models.events import Tell, ignore_text
 from phyblock.models.leases import LEASE_S, Lease, LeaseGroup
 from phyblock.models.limits import Clock
 from phyblock.models.worker import Worker
+from phyblock.records.reply import Reply
 
 __all__ = ["Known", "SharedCache", "Turn"]
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from phyblock.errors import ModelError, PhyblockError, RetryableError
-from phyblock.models.base import Message, Reply
+from phyblock.models.base import Message
 from phyblock.models.config import ModelConfig
 from phyblock.models.http_client import Client, HttpClient
 from phyblock.models.keys import hidden
+from phyblock.records.reply import Reply
 from phyblock.text import well_formed
 
 __all__ = ["Call", "GuardedTransport", "SeedRefusedError", "Transport"]
@@ -91,11 +92,12 @@ class GuardedTransport(ABC):
         def clean(text: str) -> str:
             return hidden(well_formed(text), self._secrets, guess=False)
 
-        return replace(
-            reply,
-            text=clean(reply.text),
-            reasoning=clean(reply.reasoning),
-            provider_model=clean(reply.provider_model),
+        return reply.model_copy(
+            update={
+                "text": clean(reply.text),
+                "reasoning": clean(reply.reasoning),
+                "provider_model": clean(reply.provider_model),
+            }
         )
 
     def _shown(self, text: str) -> str:

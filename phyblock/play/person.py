@@ -114,7 +114,11 @@ class PersonModel:
         given = await self._answer(request, picking)
         text = picking.reply(given.picks)
         return Reply(
-            text, usage=Usage(0, 0), cost_usd=0.0, latency_s=given.took_s, provider_model=self.name
+            text=text,
+            usage=Usage(prompt_tokens=0, completion_tokens=0),
+            cost_usd=0.0,
+            latency_s=given.took_s,
+            provider_model=self.name,
         )
 
     async def aclose(self) -> None:

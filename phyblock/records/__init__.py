@@ -29,7 +29,7 @@ from phyblock.records.record import (
     ShownScene,
 )
 from phyblock.records.record_lines import RecordedLines
-from phyblock.records.reply import StoredError, StoredReply
+from phyblock.records.reply import Reply, StoredError, Usage
 from phyblock.records.scene import StoredScene
 from phyblock.records.stopped import STOPPED, Stopped, read_stopped
 
@@ -56,6 +56,7 @@ __all__ = [
     "Record",
     "Recorded",
     "RecordedLines",
+    "Reply",
     "Score",
     "SentImage",
     "SentPrompt",
@@ -63,10 +64,10 @@ __all__ = [
     "Stopped",
     "StoredError",
     "StoredQuestion",
-    "StoredReply",
     "StoredScene",
     "Turn",
     "TurnLines",
+    "Usage",
     "read_manifest",
     "read_stopped",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from phyblock.records.line import Line, Usd, Whole
-from phyblock.records.reply import StoredReply
+from phyblock.records.reply import Reply
 from phyblock.types import Role
 
 __all__ = ["BatchEvent", "BatchLine", "PictureMark", "Prompt", "PromptMessage", "Turn"]
@@ -20,7 +20,7 @@ class Turn(Line):
     """The sample that it is a turn of."""
     turn: Whole
     """Its place in the episode, from 0."""
-    reply: StoredReply
+    reply: Reply
     """The reply, as in a record."""
     run: str = ""
     """Digest of the run that it belongs to; older turns have none."""

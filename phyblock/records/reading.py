@@ -13,7 +13,7 @@ from phyblock.records.manifest import Manifest, read_manifest
 from phyblock.records.others import Turn
 from phyblock.records.record import Record
 from phyblock.records.record_lines import RecordLines
-from phyblock.records.reply import StoredReply
+from phyblock.records.reply import Reply
 
 __all__ = ["any_records", "collect_turns", "newest_starts", "read_records", "run_records"]
 
@@ -58,12 +58,12 @@ def read_records(folder: Path, manifest: Manifest | None = None) -> Iterable[Rec
 
 def collect_turns(
     lines: Iterable[tuple[str, Turn]], without: Container[str] = ()
-) -> dict[str, list[StoredReply]]:
+) -> dict[str, list[Reply]]:
     """The replies of every episode that has begun, by sample id, in the order of its turns.
 
     Samples `without` are left out. Raises StoreError where a turn is missing.
     """
-    by_sample: dict[str, dict[int, StoredReply]] = {}
+    by_sample: dict[str, dict[int, Reply]] = {}
     for where, line in lines:
         if line.sample in without:
             continue

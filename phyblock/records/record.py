@@ -13,7 +13,7 @@ from pydantic import Field
 
 from phyblock.config.suite import Variant
 from phyblock.records.line import Amount, Line, Whole
-from phyblock.records.reply import StoredError, StoredReply
+from phyblock.records.reply import Reply, StoredError
 from phyblock.stable import plain_sum
 from phyblock.types import AskedAs, Outcome
 
@@ -101,7 +101,7 @@ class AskedTurn(Line):
 
     n: Whole
     """Its place in the episode, from 1."""
-    reply: StoredReply
+    reply: Reply
     """The reply."""
     prompt: SentPrompt | None = None
     """What was sent."""
@@ -139,7 +139,7 @@ class Record(Line):
     """The repeat."""
     outcome: Outcome
     """What became of the request."""
-    reply: StoredReply | None
+    reply: Reply | None
     """The reply, null when there is none; of an episode, all its replies together."""
     error: StoredError | None
     """The error, null when there is none."""
@@ -243,7 +243,7 @@ class Record(Line):
         return self.error is None or self.error.kind in ("refused", "sample", "unjudged")
 
     @property
-    def replies(self) -> tuple[StoredReply, ...]:
+    def replies(self) -> tuple[Reply, ...]:
         """Every single reply in it."""
         return () if self.reply is None else (self.reply,)
 
@@ -283,7 +283,7 @@ class Recorded(Line):
     """The repeat."""
     track: str = ""
     """The track that asked; records of older versions may not say it."""
-    reply: StoredReply | None = None
+    reply: Reply | None = None
     """The reply."""
     error: StoredError | None = None
     """The error."""

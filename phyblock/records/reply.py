@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Literal, TypeVar
+from typing import Literal, TypeVar
 
 from typing_extensions import Self
 
 from phyblock.records.line import LARGEST_WHOLE, Amount, Line, Usd, Whole, encodable
 from phyblock.types import Finish
 
-__all__ = ["ErrorKind", "StoredError", "StoredReply", "StoredUsage"]
+__all__ = ["ErrorKind", "Reply", "StoredError", "Usage"]
 
 ErrorKind = Literal["retryable", "sample", "refused", "unavailable", "unjudged"]
 
@@ -21,12 +20,12 @@ def _within(number: _NumberT | None, least: int) -> _NumberT | None:
     return number if number is not None and least <= number <= LARGEST_WHOLE else None
 
 
-class StoredUsage(Line):
+class Usage(Line):
     """Tokens of a reply as the provider counted them; null where it did not say."""
 
-    prompt_tokens: Whole | None
+    prompt_tokens: Whole | None = None
     """Tokens of the prompt, pictures included."""
-    completion_tokens: Whole | None
+    completion_tokens: Whole | None = None
     """Tokens of the reply."""
     reasoning_tokens: Whole | None = None
     """Those of `completion_tokens` that were spent on reasoning."""
@@ -36,7 +35,7 @@ class StoredUsage(Line):
     """Those of `prompt_tokens` that it put into its prompt cache and bills as such."""
 
 
-class StoredReply(Line):
+class Reply(Line):
     """An answer that was read."""
 
     text: str
@@ -45,9 +44,9 @@ class StoredReply(Line):
     """The reasoning that the provider showed beside it."""
     finish: Finish = "stop"
     """Why it ended: by itself, at the token limit, by a content filter, or not said."""
-    usage: StoredUsage
+    usage: Usage = Usage()
     """Its tokens."""
-    cost_usd: Usd | None
+    cost_usd: Usd | None = None
     """Its price [US dollars]; null: not known."""
     billed_usd: Usd | None = None
     """What `max_cost_usd` counted [US dollars], failed attempts included, a reply without token
@@ -58,27 +57,28 @@ class StoredReply(Line):
     """The model that the provider says it used."""
     attempts: Whole = 1
     """Requests sent for it, 0 from the cache."""
-    cached: bool
+    cached: bool = False
     """Whether it came from the cache."""
     seed_sent: bool = True
     """Whether the provider takes a seed; where not, seeds are independent repeats."""
     batched: bool = False
     """Whether it came in a batch, at the price of one."""
 
-    @classmethod
-    def of(cls, reply: Mapping[str, Any]) -> Self:
-        """Store a reply, given by its fields, without what no file could hold.
+    def storable(self) -> Self:
+        """Return the reply with all its fields, as it is written.
 
-        It is paid for: an absurd number in it is one that is not known.
+        It is paid for: an absurd number in it is one that is not known, and characters that no
+        file could hold become "?".
         """
-        texts = {name: encodable(text) for name, text in reply.items() if isinstance(text, str)}
-        usage = reply["usage"].items()
+        fields = self.model_dump()
+        texts = {name: encodable(text) for name, text in fields.items() if isinstance(text, str)}
+        usage = fields["usage"].items()
         counts = {name: _within(count, -LARGEST_WHOLE) for name, count in usage}
-        money = {name: _within(reply.get(name), 0) for name in ("cost_usd", "billed_usd")}
-        fields = {**reply, **texts, **money, "usage": counts}
-        if not reply.get("batched"):
-            fields.pop("batched", None)
-        return cls.model_validate(fields)
+        money = {name: _within(fields[name], 0) for name in ("cost_usd", "billed_usd")}
+        fields |= {**texts, **money, "usage": counts}
+        if not self.batched:
+            del fields["batched"]
+        return self.model_validate(fields)
 
     @property
     def tokens(self) -> int:

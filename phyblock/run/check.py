@@ -44,4 +44,4 @@ async def check_model(config: ModelConfig) -> Reply:
         reply = await model.ask(request)
     finally:
         await model.aclose()
-    return reply or Reply("")
+    return reply or Reply(text="")

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from phyblock.config.suite import Suite
-from phyblock.models.base import Reply
 from phyblock.records import MANIFEST, Manifest, Record
 from phyblock.records.manifest import ManifestModel
+from phyblock.records.reply import Reply
 from phyblock.run.floor_orders import floor_orders, floor_seeds
 from phyblock.run.records import begun, judged
 from phyblock.tables.design import read_design
@@ -82,7 +82,9 @@ def _answered(
             for floor in floors:
                 text = rules[floor](request.subject, np.random.default_rng(seed))
                 sample = f"{track.name}/{floor}/{item.key}/s{seed}/{order}"
-                fields = begun(sample, track.name, floor, shown, seed, Reply(text, cost_usd=0.0))
+                fields = begun(
+                    sample, track.name, floor, shown, seed, Reply(text=text, cost_usd=0.0)
+                )
                 record = judged({**fields, **track.about(shown)}, shown, track.judge(shown, text))
                 yield from (
                     record.model_copy(update={"sample": f"{sample}/{n}"}) for n in range(copies)

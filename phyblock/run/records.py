@@ -7,16 +7,15 @@ from datetime import datetime, timezone
 from typing import Any
 
 from phyblock.errors import ModelError, RefusedError, RetryableError, SampleError
-from phyblock.models.base import Image, Message, Reply, Request
-from phyblock.models.stored import stored
+from phyblock.models.base import Image, Message, Request
 from phyblock.records import (
     Record,
     SentImage,
     SentPrompt,
     StoredError,
-    StoredReply,
 )
 from phyblock.records.known import known_records
+from phyblock.records.reply import Reply
 from phyblock.tracks import Episode, Item, Judgement
 from phyblock.tracks.counting import count_sample
 from phyblock.types import Outcome
@@ -40,7 +39,7 @@ def begun(
         "key": item.key,
         **about_item(item),
         "seed": seed,
-        "reply": stored(answer) if isinstance(answer, Reply) else None,
+        "reply": answer.storable() if isinstance(answer, Reply) else None,
         "error": _error(answer) if isinstance(answer, ModelError) else None,
         "prompt": None,
         "parse": None,
@@ -92,7 +91,7 @@ def about_prompt(request: Request, template: str, digest: str) -> SentPrompt:
     )
 
 
-def _outcome(reply: StoredReply | None, error: StoredError | None, readable: bool) -> Outcome:
+def _outcome(reply: Reply | None, error: StoredError | None, readable: bool) -> Outcome:
     if error is not None:
         return "refusal" if error.kind == "refused" else "api_error"
     if reply is None:

@@ -7,7 +7,6 @@ from itertools import takewhile
 from typing import Any
 
 from phyblock.errors import Problem, StoreError
-from phyblock.models.stored import reply_of
 from phyblock.records import Record
 from phyblock.run.records import judged
 from phyblock.tracks import Episode, EpisodeTrack, Item
@@ -103,7 +102,7 @@ async def _played(track: EpisodeTrack[Item], item: Item, record: Record) -> Epis
         request = await episode.request()
         if request is None:
             return episode
-        episode.take(request, reply_of(turn.reply))
+        episode.take(request, turn.reply)
     # What the last reply comes to shows when the next is asked for: blocks are let go.
     await episode.request()
     return episode

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 from phyblock.config.suite import Variant
 from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
-from phyblock.models import AskLaterError, Halt, Model, ModelConfig, Reply, Request, Usage
-from phyblock.models.stored import reply_of, stored
-from phyblock.records import Record, SentPrompt, StoredReply, Turn
+from phyblock.models import AskLaterError, Halt, Model, ModelConfig, Request
+from phyblock.records import Record, Reply, SentPrompt, Turn, Usage
 from phyblock.run.judging import judged_apart
 from phyblock.run.prompts import PromptFile
 from phyblock.run.records import about_prompt, begun, judged
@@ -76,7 +75,7 @@ class SampleRunner:
         turns: RecordWriter,
         prompts: PromptFile,
         halt: Halt,
-        earlier: Mapping[str, Sequence[StoredReply]],
+        earlier: Mapping[str, Sequence[Reply]],
         run: str,
     ) -> None:
         self._turns = turns
@@ -143,7 +142,7 @@ class SampleRunner:
             sample.item, sample.seed, config.params, with_messages=model.needs_messages
         )
         asked: dict[str, AskedAs] = {}
-        earlier = [reply_of(line) for line in self._earlier.get(sample.id, ())]
+        earlier = self._earlier.get(sample.id, ())
         turns: list[dict[str, Any]] = []
         replies: list[Reply] = []
         answer: Reply | ModelError | None = None
@@ -156,13 +155,13 @@ class SampleRunner:
             else:
                 answer = await _answer(_ask_now(model, request))
                 if isinstance(answer, Reply):
-                    number, reply = len(replies), stored(answer)
+                    number, reply = len(replies), answer.storable()
                     await self._turns.put(
                         Turn(sample=sample.id, turn=number, reply=reply, run=self._run)
                     )
             if not isinstance(answer, Reply):
                 break
-            turns.append({"reply": stored(answer), **turn})
+            turns.append({"reply": answer.storable(), **turn})
             replies.append(answer)
             episode.take(request, answer)
         failed = answer if isinstance(answer, ModelError) else None
@@ -178,7 +177,7 @@ class SampleRunner:
         replies: Sequence[Reply],
     ) -> Record:
         fields = dict(begun)
-        fields["reply"] = stored(_pooled(replies)) if replies else None
+        fields["reply"] = _pooled(replies).storable() if replies else None
         fields["prompt"] = turns[0]["prompt"] if turns else None
         both = zip(turns, episode.fields()["turns"], strict=True)
         whole = [{"n": n, **turn, **more} for n, (turn, more) in enumerate(both, 1)]
@@ -231,14 +230,15 @@ def _pooled(replies: Sequence[Reply]) -> Reply:
 
     It is cut off or refused where every one of them is.
     """
-    names = [field.name for field in fields(Usage)]
-    usage = Usage(*(_sum(getattr(reply.usage, name) for reply in replies) for name in names))
+    counts = {
+        name: _sum(getattr(reply.usage, name) for reply in replies) for name in Usage.model_fields
+    }
     billed = [reply.billed_usd for reply in replies if reply.billed_usd is not None]
     ends = {reply.finish for reply in replies}
     return Reply(
-        replies[-1].text,
+        text=replies[-1].text,
         finish=ends.pop() if len(ends) == 1 else "stop",
-        usage=usage,
+        usage=Usage(**counts),
         cost_usd=_sum(reply.cost_usd for reply in replies),
         billed_usd=plain_sum(billed) if billed else None,
         latency_s=plain_sum(reply.latency_s for reply in replies),

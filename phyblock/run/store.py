@@ -26,8 +26,8 @@ from phyblock.records import (
     Manifest,
     PromptLines,
     Record,
+    Reply,
     Stopped,
-    StoredReply,
     TurnLines,
     read_manifest,
     read_stopped,
@@ -125,7 +125,7 @@ class RunStore:
         else:
             folder.remove([STOPPED])
 
-    def begun_turns(self, done: Container[str]) -> dict[str, list[StoredReply]]:
+    def begun_turns(self, done: Container[str]) -> dict[str, list[Reply]]:
         """The replies of episodes that have begun and are not `done`, by sample id."""
         return collect_turns(TurnLines(self._folder, self._belonging), done)
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from phyblock.parsing import READER_VERSION
-from phyblock.records import Line, Manifest, Record, StoredReply, Turn
+from phyblock.records import Line, Manifest, Record, Reply, Turn
 from phyblock.run.appending import AppendFile
 from phyblock.run.judged_again import (
     Tell,
@@ -142,7 +142,7 @@ async def _read_again(plan: RunPlan, folder: Path, begun: Manifest, store: RunSt
     unfinished = store.begun_turns(final)
     run = plan.manifest.run
 
-    def go_on(sample: str, replies: Sequence[StoredReply]) -> None:
+    def go_on(sample: str, replies: Sequence[Reply]) -> None:
         turns.put(
             [
                 Turn(sample=sample, turn=number, reply=reply, run=run, read_again=True)

@@ -9,8 +9,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from phyblock.domain import Scene
-from phyblock.models.base import Reply, Request
+from phyblock.models.base import Request
 from phyblock.records import Record
+from phyblock.records.reply import Reply
 from phyblock.sim.registry import REFERENCE_ENGINE, physics_engine
 
 __all__ = [

@@ -62,7 +62,7 @@ class Outage:
             self.failed += 1
             raise RetryableError(str(self.error), status=self.error.status, sent=self.error.sent)
         self.answered += 1
-        return Reply("Step1: Move block with index 1")
+        return Reply(text="Step1: Move block with index 1")
 
     async def aclose(self) -> None:
         pass

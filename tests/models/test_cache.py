@@ -32,7 +32,12 @@ from phyblock.models import (
 from tests.models.factory import make_request, picture
 
 CONFIG = ModelConfig("m", "litellm", "openai/m", api_base="http://localhost:1/v1")
-REPLY = Reply("Step1: Move block with index 3", "red", usage=Usage(10, 5, 2), latency_s=1.5)
+REPLY = Reply(
+    text="Step1: Move block with index 3",
+    reasoning="red",
+    usage=Usage(prompt_tokens=10, completion_tokens=5, reasoning_tokens=2),
+    latency_s=1.5,
+)
 
 values = st.none() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text()
 params = st.dictionaries(st.text(min_size=1), values, max_size=4)
@@ -204,27 +209,33 @@ def test_a_reply_comes_back_whole_and_marked(tmp_path: Path) -> None:
     with ReplyCache(tmp_path / "deep" / "replies.sqlite") as cache:
         assert cache.get("k") is None
         assert "k" not in cache
-        assert cache.put("k", "openai/m", replace(REPLY, seed_sent=False, text="å\ud800 \x00"))
+        assert cache.put(
+            "k", "openai/m", REPLY.model_copy(update={"seed_sent": False, "text": "å\ud800 \x00"})
+        )
         assert "k" in cache
-        expected = replace(REPLY, seed_sent=False, text="å\ud800 \x00", cached=True, attempts=0)
+        expected = REPLY.model_copy(
+            update={"seed_sent": False, "text": "å\ud800 \x00", "cached": True, "attempts": 0}
+        )
         assert cache.get("k") == expected
 
 
 def test_counts_that_cannot_be_true_are_not_known(tmp_path: Path) -> None:
+    counts = {"prompt_tokens": -1, "completion_tokens": 10**30, "reasoning_tokens": 2}
+    usage = Usage().model_copy(update=counts)
     with ReplyCache(tmp_path / "c.sqlite") as cache:
-        cache.put("k", "openai/m", replace(REPLY, usage=Usage(-1, 10**30, 2)))
+        cache.put("k", "openai/m", REPLY.model_copy(update={"usage": usage}))
         found = cache.get("k")
     assert found is not None
-    assert found.usage == Usage(None, None, 2)
+    assert found.usage == Usage(prompt_tokens=None, completion_tokens=None, reasoning_tokens=2)
 
 
 @pytest.mark.parametrize(
     "reply",
     [
-        replace(REPLY, text=""),
-        replace(REPLY, text=" \n"),
-        replace(REPLY, finish="length"),
-        replace(REPLY, finish="refusal"),
+        REPLY.model_copy(update={"text": ""}),
+        REPLY.model_copy(update={"text": " \n"}),
+        REPLY.model_copy(update={"finish": "length"}),
+        REPLY.model_copy(update={"finish": "refusal"}),
     ],
 )
 def test_replies_that_are_not_whole_are_not_kept(tmp_path: Path, reply: Reply) -> None:
@@ -289,7 +300,7 @@ def test_a_page_overwritten_in_the_middle_is_an_error_not_a_reply(tmp_path: Path
     path = tmp_path / "c.sqlite"
     with ReplyCache(path) as cache:
         for number in range(200):
-            cache.put(f"{number:064}", "openai/m", replace(REPLY, text="x" * 500))
+            cache.put(f"{number:064}", "openai/m", REPLY.model_copy(update={"text": "x" * 500}))
     whole = path.read_bytes()
     path.write_bytes(whole[:4096] + b"\xff" * (len(whole) - 4096))
     with pytest.raises(StoreError, match="cannot be used"), ReplyCache(path) as cache:
@@ -350,7 +361,7 @@ from pathlib import Path
 from phyblock.models import Reply, ReplyCache
 with ReplyCache(Path(sys.argv[1])) as cache:
     for number in range(int(sys.argv[3])):
-        cache.put(f"{sys.argv[2]}-{number}", "openai/m", Reply(f"reply {number}"))
+        cache.put(f"{sys.argv[2]}-{number}", "openai/m", Reply(text=f"reply {number}"))
         print(number, flush=True)
 """
 
@@ -377,9 +388,11 @@ def test_earlier_versions_can_read_what_is_kept_where_nothing_new_is_said(tmp_pa
     path = tmp_path / "replies.sqlite"
     with ReplyCache(path) as cache:
         cache.put("old", "openai/m", REPLY)
-        told = replace(REPLY, usage=replace(REPLY.usage, cached_tokens=0))
+        told = REPLY.model_copy(
+            update={"usage": REPLY.usage.model_copy(update={"cached_tokens": 0})}
+        )
         cache.put("new", "openai/m", told)
-        assert cache.get("new") == replace(told, cached=True, attempts=0)
+        assert cache.get("new") == told.model_copy(update={"cached": True, "attempts": 0})
     with contextlib.closing(sqlite3.connect(path)) as file:
         (text,) = file.execute("SELECT reply FROM replies WHERE key = 'old'").fetchone()
     fields = json.loads(text)

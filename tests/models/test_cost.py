@@ -90,14 +90,23 @@ def test_recordings_and_baselines_cost_nothing(kind: str) -> None:
 
 @given(st.integers(0, 10**7), st.integers(0, 10**6))
 def test_cost_is_linear_in_tokens(prompt: int, completion: int) -> None:
-    cost = cost_usd(Prices.flat(2.0, 8.0), Usage(prompt, completion), DAY)
+    cost = cost_usd(
+        Prices.flat(2.0, 8.0), Usage(prompt_tokens=prompt, completion_tokens=completion), DAY
+    )
     assert cost == pytest.approx((2 * prompt + 8 * completion) / 1e6)
 
 
-@pytest.mark.parametrize("usage", [Usage(), Usage(5, None), Usage(None, 5)])
+@pytest.mark.parametrize(
+    "usage",
+    [
+        Usage(),
+        Usage(prompt_tokens=5, completion_tokens=None),
+        Usage(prompt_tokens=None, completion_tokens=5),
+    ],
+)
 def test_what_is_not_known_is_not_nothing(usage: Usage) -> None:
     assert cost_usd(Prices.flat(1, 1), usage, DAY) is None
-    assert cost_usd(None, Usage(1, 1), DAY) is None
+    assert cost_usd(None, Usage(prompt_tokens=1, completion_tokens=1), DAY) is None
     assert cost_usd(Prices.flat(0, 0), usage, DAY) == 0.0
 
 
@@ -287,7 +296,7 @@ def test_a_call_that_waits_reserves_what_was_learned_meanwhile() -> None:
             budget.reserve(lambda: budget.most_usd("m", price, expected, DAY))
         )
         await asyncio.sleep(0)
-        budget.learn("m", expected, Usage(8000, 1))
+        budget.learn("m", expected, Usage(prompt_tokens=8000, completion_tokens=1))
         budget.settle(first, 0.8)
         with pytest.raises(BudgetReachedError, match=r"can cost 1\.2"):
             await second
@@ -299,7 +308,7 @@ def test_a_provider_that_counts_pictures_higher_is_reserved_for() -> None:
     budget, price = Budget(1.0), Prices.flat(1.0, 1.0)
     expected = Estimate(1000, 100, 100)
     before = budget.most_usd("m", price, expected, DAY)
-    budget.learn("m", expected, Usage(20_000, 10))
+    budget.learn("m", expected, Usage(prompt_tokens=20_000, completion_tokens=10))
     assert budget.most_usd("m", price, expected, DAY) > 10 * before
     assert budget.most_usd("n", price, expected, DAY) == before
 
@@ -318,8 +327,14 @@ strange = st.one_of(
 def test_only_counts_that_can_be_true_are_known(
     prompt: Any, completion: Any, reasoning: Any, asked: int, most: int, said: bool
 ) -> None:
-    given_usage = Usage(prompt, completion, reasoning)
-    usage = plausible(given_usage, Estimate(asked, 1, most), said_something=said)
+    counts = {
+        "prompt_tokens": prompt,
+        "completion_tokens": completion,
+        "reasoning_tokens": reasoning,
+    }
+    usage = plausible(
+        Usage().model_copy(update=counts), Estimate(asked, 1, most), said_something=said
+    )
     for was, now in zip(
         (prompt, completion, reasoning),
         (usage.prompt_tokens, usage.completion_tokens, usage.reasoning_tokens),
@@ -364,7 +379,7 @@ def test_what_is_learned_stays_within_bounds(counts: list[tuple[int, Any]]) -> N
     plain = budget.most_usd("m", price, expected, DAY)
     last = plain
     for asked, told in counts:
-        budget.learn("m", Estimate(asked, 1, 1), Usage(told, 1))
+        budget.learn("m", Estimate(asked, 1, 1), Usage().model_copy(update={"prompt_tokens": told}))
         most = budget.most_usd("m", price, expected, DAY)
         assert last <= most <= 100 * plain
         last = most

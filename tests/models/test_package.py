@@ -22,7 +22,7 @@ from phyblock.models import build_model, reply_key
 from tests.models.factory import make_request
 config = ModelConfig("m", "litellm", "anthropic/claude")
 with ReplyCache(Path(sys.argv[1])) as cache:
-    cache.put(reply_key(config, make_request()), config.id, Reply("kept"))
+    cache.put(reply_key(config, make_request()), config.id, Reply(text="kept"))
 async def main():
     async with SharedCache(Path(sys.argv[1])) as cache:
         model = build_model(config, cache=cache, overall=Gate(1))

@@ -29,8 +29,6 @@ from phyblock.models import (
 )
 from phyblock.models.cost import plausible
 from phyblock.models.price_map import map_entry
-from phyblock.models.stored import reply_of as reply_of_line
-from phyblock.models.stored import stored
 from phyblock.run.models import to_config
 from tests.models.factory import make_model, make_request, reply_of
 from tests.models.routes import KEY_VARIABLE, ROUTES
@@ -56,11 +54,23 @@ def read(tmp_path: Path, text: str) -> ModelConfig:
     return to_config("m", load_models(path)["m"], SUITE)
 
 
-@given(prices, st.integers(0, 10**6), st.integers(0, 10**6), st.integers(0, 10**6), st.integers(0))
+@given(
+    prices,
+    st.integers(0, 10**6),
+    st.integers(0, 10**6),
+    st.integers(0, 10**6),
+    st.integers(0, 10**9),
+)
 def test_each_prompt_token_is_paid_once(
     price: Price, fresh: int, cached: int, written: int, out: int
 ) -> None:
-    usage = Usage(fresh + cached + written, out, None, cached, written)
+    usage = Usage(
+        prompt_tokens=fresh + cached + written,
+        completion_tokens=out,
+        reasoning_tokens=None,
+        cached_tokens=cached,
+        cache_write_tokens=written,
+    )
     read_usd = price.input_usd if price.cached_usd is None else price.cached_usd
     write_usd = price.input_usd if price.cache_write_usd is None else price.cache_write_usd
     paid = fresh * price.input_usd + cached * read_usd + written * write_usd
@@ -148,7 +158,13 @@ def test_no_call_costs_more_than_the_most(
     both = Prices((Tariff((Rate(price),)), dearer))
     most = most_usd(both, Estimate(prompt, 1, completion), DAY, batched=batched)
     written = data.draw(st.integers(0, prompt))
-    usage = Usage(prompt, completion, None, 0, written)
+    usage = Usage(
+        prompt_tokens=prompt,
+        completion_tokens=completion,
+        reasoning_tokens=None,
+        cached_tokens=0,
+        cache_write_tokens=written,
+    )
     for day in days:
         cost = cost_usd(both, usage, day, batched=batched)
         assert cost is not None
@@ -307,7 +323,7 @@ def test_what_a_prompt_cache_held_is_recorded_and_priced(
     assert (usage.cached_tokens, usage.cache_write_tokens or 0) == (600, written)
     paid = 600 * 1 + written * 12 + (400 - written) * 10 + 40 * 100
     assert reply.cost_usd == pytest.approx(paid / 1e6)
-    assert reply_of_line(stored(reply)) == reply
+    assert reply.storable() == reply
 
 
 @given(st.integers(-5, 2000), st.none() | st.integers(-5, 2000), st.none() | st.integers(-5, 2000))
@@ -315,7 +331,13 @@ def test_no_more_is_cached_than_the_prompt_holds(
     prompt: int, cached: int | None, written: int | None
 ) -> None:
     expected = Estimate(1000, 100, 100)
-    usage = Usage(prompt, 5, None, cached, written)
+    usage = Usage(
+        prompt_tokens=prompt,
+        completion_tokens=5,
+        reasoning_tokens=None,
+        cached_tokens=cached,
+        cache_write_tokens=written,
+    )
     read = plausible(usage, expected, said_something=True)
     assert (read.cached_tokens or 0) >= 0
     assert (read.cache_write_tokens or 0) >= 0

@@ -32,7 +32,14 @@ SHAPES: dict[str, tuple[object, RawReply]] = {
                 "completion_tokens_details": {"reasoning_tokens": 2},
             },
         },
-        RawReply("chat completion", STEPS, "", "stop", Usage(7, 5, 2), "gpt"),
+        RawReply(
+            "chat completion",
+            STEPS,
+            "",
+            "stop",
+            Usage(prompt_tokens=7, completion_tokens=5, reasoning_tokens=2),
+            "gpt",
+        ),
     ),
     "openai refusal": (
         choice({"role": "assistant", "content": None, "refusal": "I will not"}),
@@ -59,11 +66,11 @@ SHAPES: dict[str, tuple[object, RawReply]] = {
             "output": choice({"content": [{"text": STEPS}]}),
             "usage": {"input_tokens": 7, "output_tokens": 5},
         },
-        RawReply("DashScope", STEPS, "", "stop", Usage(7, 5)),
+        RawReply("DashScope", STEPS, "", "stop", Usage(prompt_tokens=7, completion_tokens=5)),
     ),
     "dashscope text": (
         {"output": {"text": STEPS, "finish_reason": "stop"}, "usage": {"input_tokens": 7}},
-        RawReply("DashScope", STEPS, "", "stop", Usage(7, None)),
+        RawReply("DashScope", STEPS, "", "stop", Usage(prompt_tokens=7, completion_tokens=None)),
     ),
     "anthropic": (
         {
@@ -73,7 +80,14 @@ SHAPES: dict[str, tuple[object, RawReply]] = {
             "stop_reason": "end_turn",
             "usage": {"input_tokens": 7, "output_tokens": 5},
         },
-        RawReply("Anthropic message", STEPS, "", "stop", Usage(7, 5), "claude"),
+        RawReply(
+            "Anthropic message",
+            STEPS,
+            "",
+            "stop",
+            Usage(prompt_tokens=7, completion_tokens=5),
+            "claude",
+        ),
     ),
     "anthropic thinking": (
         {
@@ -93,7 +107,9 @@ SHAPES: dict[str, tuple[object, RawReply]] = {
             "model_version": "gemini",
             "usage_metadata": {"prompt_token_count": 7, "candidates_token_count": 5},
         },
-        RawReply("Gemini", STEPS, "", "stop", Usage(7, 5), "gemini"),
+        RawReply(
+            "Gemini", STEPS, "", "stop", Usage(prompt_tokens=7, completion_tokens=5), "gemini"
+        ),
     ),
     "gemini of the wire": (
         {
@@ -105,7 +121,13 @@ SHAPES: dict[str, tuple[object, RawReply]] = {
             ],
             "usageMetadata": {"promptTokenCount": 7, "thoughtsTokenCount": 3},
         },
-        RawReply("Gemini", STEPS, "red", "length", Usage(7, None, 3)),
+        RawReply(
+            "Gemini",
+            STEPS,
+            "red",
+            "length",
+            Usage(prompt_tokens=7, completion_tokens=None, reasoning_tokens=3),
+        ),
     ),
     "gemini with an enum's name": (
         {"candidates": [{"content": {"parts": []}, "finish_reason": "FinishReason.SAFETY"}]},
@@ -121,7 +143,7 @@ SHAPES: dict[str, tuple[object, RawReply]] = {
     ),
     "gemini without candidates": (
         {"candidates": None, "usage_metadata": {"prompt_token_count": 7}},
-        RawReply("Gemini", "", "", "unknown", Usage(7)),
+        RawReply("Gemini", "", "", "unknown", Usage(prompt_tokens=7)),
     ),
     "internvl": (
         {"instruction": "i", "input": "", "output": "gold", "image": ["a"], "predict": STEPS},

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -30,7 +30,7 @@ def test_a_reply_is_found_by_key_whatever_the_seed(tmp_path: Path) -> None:
     model = replay(tmp_path)
     assert not model.needs_messages
     replies = [answer(model, "007", seed) for seed in (0, 1)]
-    assert replies == [Reply(STEPS, finish="unknown", cost_usd=0.0, attempts=0)] * 2
+    assert replies == [Reply(text=STEPS, finish="unknown", cost_usd=0.0, attempts=0)] * 2
 
 
 def test_a_missing_reply_is_none(tmp_path: Path) -> None:
@@ -75,7 +75,13 @@ def test_a_folder_that_is_missing_or_empty_is_an_error_at_the_start(tmp_path: Pa
 
 
 def record(model: str, scene: str, seed: int, **fields: object) -> str:
-    reply = {**asdict(Reply(STEPS, "red", usage=Usage(7, 5), cost_usd=0.5, seed_sent=False))}
+    reply = Reply(
+        text=STEPS,
+        reasoning="red",
+        usage=Usage(prompt_tokens=7, completion_tokens=5),
+        cost_usd=0.5,
+        seed_sent=False,
+    ).model_dump()
     whole = {"model": model, "key": scene, "seed": seed, "reply": reply, "error": None}
     return json.dumps({**whole, **fields}) + "\n"
 
@@ -83,15 +89,22 @@ def record(model: str, scene: str, seed: int, **fields: object) -> str:
 def test_a_run_of_our_own_is_matched_by_model_key_and_seed(tmp_path: Path) -> None:
     (tmp_path / "records.jsonl").write_text(
         record("m", "007", 1)
-        + record("n", "007", 1, reply=asdict(Reply("other")))
-        + record("m", "007", 2, reply=asdict(Reply("first")))
-        + record("m", "007", 2, reply=asdict(Reply("last")))
+        + record("n", "007", 1, reply=Reply(text="other").model_dump())
+        + record("m", "007", 2, reply=Reply(text="first").model_dump())
+        + record("m", "007", 2, reply=Reply(text="last").model_dump())
         + record("m", "008", 1, reply=None)
         + '{"model": "m", "key": "009"'
     )
     model = replay(tmp_path)
     assert not model.needs_messages
-    expected = Reply(STEPS, "red", usage=Usage(7, 5), cost_usd=0.0, attempts=0, seed_sent=False)
+    expected = Reply(
+        text=STEPS,
+        reasoning="red",
+        usage=Usage(prompt_tokens=7, completion_tokens=5),
+        cost_usd=0.0,
+        attempts=0,
+        seed_sent=False,
+    )
     assert answer(model, "007", 1) == expected
     last = answer(model, "007", 2)
     assert last is not None
@@ -103,8 +116,8 @@ def test_a_run_of_our_own_is_matched_by_model_key_and_seed(tmp_path: Path) -> No
 
 def test_a_run_of_several_tracks_answers_each_with_its_own(tmp_path: Path) -> None:
     (tmp_path / "records.jsonl").write_text(
-        record("m", "007", 1, track="full_planning", reply=asdict(Reply("a plan")))
-        + record("m", "007", 1, track="step_planning", reply=asdict(Reply("a move")))
+        record("m", "007", 1, track="full_planning", reply=Reply(text="a plan").model_dump())
+        + record("m", "007", 1, track="step_planning", reply=Reply(text="a move").model_dump())
     )
     asked = [replace(make_request("007", 1), track=name) for name in ("full_planning", "other")]
     plan, nothing = ask(replay(tmp_path), *asked)
@@ -115,8 +128,8 @@ def test_a_run_of_several_tracks_answers_each_with_its_own(tmp_path: Path) -> No
 def test_of_a_varied_run_the_reference_answers(tmp_path: Path) -> None:
     varied = {"candidate_order": "shuffled", "repeats": "2"}
     (tmp_path / "records.jsonl").write_text(
-        record("m", "007", 1, reply=asdict(Reply("asked plainly")))
-        + record("m", "007", 1, variant=varied, reply=asdict(Reply("asked otherwise")))
+        record("m", "007", 1, reply=Reply(text="asked plainly").model_dump())
+        + record("m", "007", 1, variant=varied, reply=Reply(text="asked otherwise").model_dump())
     )
     found = answer(replay(tmp_path), "007", 1)
     assert found is not None

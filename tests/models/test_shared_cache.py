@@ -33,7 +33,7 @@ from tests.models.factory import make_model, make_request, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Faults, Running
 
-REPLY = Reply("Step1: Move block with index 3")
+REPLY = Reply(text="Step1: Move block with index 3")
 
 
 @pytest.fixture(autouse=True)

@@ -14,9 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.errors import StoreError
-from phyblock.models import Reply, Usage
-from phyblock.models.stored import reply_of, stored
-from phyblock.records import StoredReply, lines
+from phyblock.records import Reply, Usage, lines
 from phyblock.records.known import known_records
 from phyblock.records.reading import any_records, newest_starts
 from phyblock.report import load_run
@@ -141,11 +139,11 @@ def test_a_sample_is_taken_from_its_last_line(tmp_path: Path) -> None:
 def test_whatever_was_paid_for_is_stored_and_read(
     text: str, sent: int | None, said: int | None, cost: float | None, billed: float | None
 ) -> None:
-    reply = Reply(text, usage=Usage(sent, said), cost_usd=cost, billed_usd=billed)
-    line = stored(reply)
-    again = StoredReply.model_validate_json(json.dumps(line.fields()), strict=True)
-    assert again == line
-    kept = reply_of(line)
+    usage = Usage().model_copy(update={"prompt_tokens": sent, "completion_tokens": said})
+    paid = {"text": text, "usage": usage, "cost_usd": cost, "billed_usd": billed}
+    kept = Reply(text="").model_copy(update=paid).storable()
+    again = Reply.model_validate_json(json.dumps(kept.fields()), strict=True)
+    assert again == kept
     assert kept.text == text.encode("utf-8", "replace").decode()
     assert kept.usage.completion_tokens in (said, None)
     assert kept.cost_usd in (cost, None)

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from phyblock.datasets import AssemblyTask, read_builtin, read_official
 from phyblock.domain import Plan
 from phyblock.errors import DataError, SpecError
-from phyblock.models.base import Image, Reply, Usage
+from phyblock.models.base import Image
+from phyblock.records.reply import Reply, Usage
 from phyblock.sim import PictureStyle, candidates_png, goal_png
 from phyblock.tracks import PicturePolicy, Pictures
 from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
@@ -96,7 +97,13 @@ def test_an_episode_goes_the_same_in_either_numbering(
         for step in steps:
             if (request := await episode.request()) is None:
                 break
-            episode.take(request, Reply(f"Next plan: Move({step})", usage=Usage(0, 0)))
+            episode.take(
+                request,
+                Reply(
+                    text=f"Next plan: Move({step})",
+                    usage=Usage(prompt_tokens=0, completion_tokens=0),
+                ),
+            )
         return episode.fields()
 
     here = asyncio.run(play(shown, moves))

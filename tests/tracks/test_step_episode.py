@@ -17,8 +17,9 @@ from hypothesis import strategies as st
 
 from phyblock.datasets import AssemblyTask, read_builtin, read_official
 from phyblock.domain import Block, Candidate, CandidateSet, Scene
-from phyblock.models.base import Reply, Request, Usage
+from phyblock.models.base import Request
 from phyblock.parsing import MOVE_PROBLEMS, parse_move
+from phyblock.records.reply import Reply, Usage
 from phyblock.scoring.steps import MOVE_OUTCOMES
 from phyblock.tracks.step_planning.baselines import STEP_RULES, StepSubject
 from phyblock.tracks.step_planning.episode import StepEpisode
@@ -76,7 +77,7 @@ async def _play(episode: StepEpisode, agent: Agent) -> list[Request]:
     while (request := await episode.request()) is not None:
         requests.append(request)
         reply = agent(request)
-        episode.take(request, reply if isinstance(reply, Reply) else Reply(reply))
+        episode.take(request, reply if isinstance(reply, Reply) else Reply(text=reply))
         assert len(requests) < 500, "the episode does not end"
     return requests
 
@@ -165,7 +166,11 @@ def test_no_reply_at_all_is_an_episode_without_steps() -> None:
 
 
 def usage(text: str, tokens: int | None, usd: float | None) -> Agent:
-    return lambda _: Reply(text, usage=Usage(tokens, 10 if tokens else None), cost_usd=usd)
+    return lambda _: Reply(
+        text=text,
+        usage=Usage(prompt_tokens=tokens, completion_tokens=10 if tokens else None),
+        cost_usd=usd,
+    )
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from phyblock.datasets import read_builtin
 from phyblock.errors import PromptError
-from phyblock.models.base import Image, Message, Reply
+from phyblock.models.base import Image, Message
+from phyblock.records.reply import Reply
 from phyblock.resources import bundled
 from phyblock.scoring.steps import MOVE_OUTCOMES
 from phyblock.sim import PictureStyle
@@ -171,7 +172,7 @@ def test_pictures_of_states_are_drawn_and_kept(tmp_path: Path) -> None:
         while (request := await episode.request()) is not None:
             seen.append(pictures(request.messages[1]))
             move = request.subject.valid[0]  # type: ignore[union-attr]
-            episode.take(request, Reply(f"Move({move})"))
+            episode.take(request, Reply(text=f"Move({move})"))
         return seen
 
     found = []

@@ -5,10 +5,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from phyblock.errors import ModelError, RetryableError, UnavailableError
-from phyblock.models.base import AskLaterError, Reply, Request
+from phyblock.models.base import AskLaterError, Request
 from phyblock.models.batches.claims import Claims
 from phyblock.models.batches.following import Follower
 from phyblock.models.batches.ledger import Batch, BatchFiles, Ledger
@@ -26,6 +26,7 @@ from phyblock.models.prices import Prices, today
 from phyblock.models.retry import RetryPolicy
 from phyblock.models.shared_cache import SharedCache
 from phyblock.models.transport import Transport
+from phyblock.records.reply import Reply
 
 __all__ = ["BatchModel", "BatchParts"]
 
@@ -167,7 +168,9 @@ class BatchModel:
             kept = await self._kept(request)
             if kept is None:
                 raise AskLaterError
-            return replace(kept, cost_usd=reply_cost_usd(self._parts.prices, kept, today()))
+            return kept.model_copy(
+                update={"cost_usd": reply_cost_usd(self._parts.prices, kept, today())}
+            )
         try:
             with self._parts.halt.giving_up():
                 await asyncio.shield(self._following(batch))
@@ -313,14 +316,18 @@ class BatchModel:
 
     async def _finished(self, key: str, request: Request, batch: Batch, reply: Reply) -> Reply:
         """The reply with its cost, in the cache; to a second sample that asks the same a copy."""
-        reply = replace(reply, cost_usd=reply_cost_usd(self._parts.prices, reply, batch.day))
+        reply = reply.model_copy(
+            update={"cost_usd": reply_cost_usd(self._parts.prices, reply, batch.day)}
+        )
         if key in self._given:
-            return replace(reply, cached=True, attempts=0)
+            return reply.model_copy(update={"cached": True, "attempts": 0})
         self._given.add(key)
         self._purse.settle(key, batch, reply.cost_usd)
         self._purse.learn(request, reply)
         attempts = self._failures.get(key, 0) + 1
-        reply = replace(reply, billed_usd=self._purse.billed_usd(key), attempts=attempts)
+        reply = reply.model_copy(
+            update={"billed_usd": self._purse.billed_usd(key), "attempts": attempts}
+        )
         if self._parts.cache is not None:
             await self._parts.cache.keep(key, self._config.id, reply)
         return reply

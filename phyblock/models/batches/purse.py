@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from phyblock.models.base import Reply, Request
+from phyblock.models.base import Request
 from phyblock.models.batches.ledger import Batch
 from phyblock.models.config import ModelConfig
 from phyblock.models.cost import Budget, estimate, most_usd
 from phyblock.models.halt import Halt
 from phyblock.models.prices import Prices, today
+from phyblock.records.reply import Reply
 
 __all__ = ["Purse"]
 

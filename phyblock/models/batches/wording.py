@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from phyblock.errors import ModelError, RetryableError, UnavailableError
-from phyblock.models.base import Reply, Request
+from phyblock.models.base import Request
 from phyblock.models.batches.capture import AnsweringClient, CapturingClient
 from phyblock.models.batches.ledger import Batch
 from phyblock.models.batches.protocol import BatchProtocol
@@ -17,6 +17,7 @@ from phyblock.models.formats import FORMAT_HINT, refuses_format
 from phyblock.models.http_client import Answer, Client
 from phyblock.models.payload import wire_params
 from phyblock.models.transport import Call, SeedRefusedError, Transport
+from phyblock.records.reply import Reply
 
 __all__ = ["Wording", "Written"]
 
@@ -84,7 +85,9 @@ class Wording:
                 raise UnavailableError(why, status=error.status, sent=error.sent) from None
             raise
         reply = counted(reply, estimate(self._config, request))
-        return replace(reply, seed_sent=call.seed is not None, latency_s=0.0, batched=True)
+        return reply.model_copy(
+            update={"seed_sent": call.seed is not None, "latency_s": 0.0, "batched": True}
+        )
 
     async def _answer(self, key: str, batch: Batch) -> Answer:
         assert batch.results is not None, "the batch has ended"

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from phyblock.records import PromptMessage, Record, StoredReply
+from phyblock.records import PromptMessage, Record, Reply
 from phyblock.records import Score as StoredScore
 from phyblock.report.export.rows import newest_records, prompt_text
 from phyblock.resources import needs
@@ -138,7 +138,7 @@ def _sample(
     )
 
 
-def _usage(reply: StoredReply) -> Any:
+def _usage(reply: Reply) -> Any:
     from inspect_ai.model import ModelUsage
 
     sent, said = reply.usage.prompt_tokens or 0, reply.usage.completion_tokens or 0

@@ -9,7 +9,8 @@ from typing import Any, get_args
 from phyblock import parsing
 from phyblock.datasets import AssemblyTask
 from phyblock.domain import Block, Plan
-from phyblock.models.base import Image, Message, Reply, Request
+from phyblock.models.base import Image, Message, Request
+from phyblock.records.reply import Reply
 from phyblock.scoring.counts import Counts
 from phyblock.scoring.plan import ERROR_TYPES, ErrorType
 from phyblock.scoring.steps import Assembly, attempted_counts, placed_counts

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
-from phyblock.records import AskedTurn, Course, Line, Record, StoredReply
+from phyblock.records import AskedTurn, Course, Line, Record, Reply
 from phyblock.records.line import Whole
 from phyblock.tracks.plans import PLAN_COLUMNS, PlanParse, plan_row
 from phyblock.tracks.step_planning.prompt import StepOutcome
@@ -105,7 +105,7 @@ class EpisodeRecord(Record):
         return self.turns
 
     @property
-    def replies(self) -> tuple[StoredReply, ...]:
+    def replies(self) -> tuple[Reply, ...]:
         """Those of all turns."""
         return tuple(turn.reply for turn in self.turns) or super().replies
 
