@@ -28,7 +28,6 @@ from phyblock.models.providers import known_providers
 from phyblock.models.raw_replies import RawReply, read_raw_reply
 from phyblock.models.retirement import ends_on, is_unlisted
 from phyblock.models.retry import RetryPolicy
-from phyblock.models.shared_cache import SharedCache
 from phyblock.records.reply import Reply, Usage
 
 __all__ = [
@@ -58,7 +57,6 @@ __all__ = [
     "ReplyCache",
     "Request",
     "RetryPolicy",
-    "SharedCache",
     "Tariff",
     "Tell",
     "Usage",

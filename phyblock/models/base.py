@@ -88,8 +88,8 @@ class Model(Protocol):
         """Answer, or None when a recording holds no reply for the request.
 
         Raises RetryableError when all attempts failed, SampleError or RefusedError when this
-        request cannot succeed, UnavailableError when the model cannot answer at all, AskLaterError
-        where others should be asked before.
+        request cannot succeed, UnavailableError when the model cannot answer at all; a model that
+        gathers requests AskLaterError.
         """
 
     async def aclose(self) -> None:
@@ -97,9 +97,7 @@ class Model(Protocol):
 
 
 class AskLaterError(PhyblockError):
-    """The request has to be gathered once more: its answer failed, or it was not sent yet. Or, from
-    a model that gathers none, it is better asked after the others, as its answer takes long.
-    """
+    """The request has to be gathered once more: its answer failed, or it was not sent yet."""
 
 
 @runtime_checkable

@@ -7,6 +7,7 @@ from phyblock.models.base import Model
 from phyblock.models.baselines import BaselineModel
 from phyblock.models.batches import BatchFiles, BatchModel, BatchParts, batch_protocol
 from phyblock.models.breaker import Breakers
+from phyblock.models.cache import ReplyCache
 from phyblock.models.chat import ChatModel, ChatParts
 from phyblock.models.config import ModelConfig
 from phyblock.models.cost import Budget, prices_of, require_prices
@@ -20,7 +21,6 @@ from phyblock.models.litellm_call import LitellmTransport
 from phyblock.models.replay import open_replay
 from phyblock.models.replicas import Replicas
 from phyblock.models.retry import RetryPolicy
-from phyblock.models.shared_cache import SharedCache
 from phyblock.models.transport import Transport
 
 __all__ = ["build_model"]
@@ -29,7 +29,7 @@ __all__ = ["build_model"]
 def build_model(
     config: ModelConfig,
     *,
-    cache: SharedCache | None,
+    cache: ReplyCache | None,
     overall: Gate,
     budget: Budget | None = None,
     observer: Observer = ignore_event,

@@ -8,27 +8,27 @@ empty, truncated or refused reply, no picture, no key.
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import json
 import re
 import sqlite3
 import time
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from phyblock.errors import Problem, StoreError
+from phyblock.errors import Problem, StoreError, reason_of
 from phyblock.models.base import Image, Message, Request
 from phyblock.models.config import ModelConfig
-from phyblock.models.events import Tell, ignore_text
-from phyblock.models.leases import Leases
+from phyblock.models.events import Tell
 from phyblock.models.payload import wire_params
 from phyblock.models.raw_replies import token_count
 from phyblock.records.reply import Reply
 from phyblock.stable import hex_digest
 
-__all__ = ["CacheBusyError", "CacheStats", "ReplyCache", "reply_key"]
+__all__ = ["CacheStats", "ReplyCache", "reply_key"]
 
 SCHEMA = 1
 """Version of the file's layout and of what enters a key."""
@@ -36,7 +36,7 @@ SCHEMA = 1
 _LATER_FIELDS = frozenset({"batched", "cached_tokens", "cache_write_tokens"})
 """Fields of a reply and its usage that came after the first files."""
 
-_BUSY_TIMEOUT_S = 5.0
+_BUSY_TIMEOUT_S = 2.0
 _BUSY = re.compile(r"\b(locked|busy)\b")
 _FOREIGN = "belongs to another version of phyblock, or is no reply cache"
 _HINT = (
@@ -52,10 +52,6 @@ CREATE TABLE IF NOT EXISTS replies (
     reply TEXT NOT NULL
 ) WITHOUT ROWID
 """
-
-
-class CacheBusyError(StoreError):
-    """Another process holds the file: it may be free in a moment."""
 
 
 @dataclass(frozen=True)
@@ -89,31 +85,34 @@ def _message(message: Message) -> list[object]:
 
 
 class ReplyCache:
-    """Replies by key, and the questions that are being asked.
+    """Replies by key, in one SQLite file that several processes may have open.
 
-    Every method raises StoreError when the file is broken or cannot be used, CacheBusyError when
-    another process held it for `busy_timeout_s`. A single row that cannot be read is as good as
-    missing; `tell` hears of the first. To be used in the thread that made it.
+    Two processes that ask the same at the same time may both pay for it: the later reply stays.
+    Within a process `asking` prevents that. Raises StoreError for a file that is broken, foreign or
+    cannot be used. With `tell`, which is for runs, what fails after the opening is reported once,
+    and the run goes on without the cache: replies are in its records too. A single row that cannot
+    be read is missing.
     """
 
-    def __init__(
-        self, path: Path, busy_timeout_s: float = _BUSY_TIMEOUT_S, tell: Tell = ignore_text
-    ) -> None:
+    def __init__(self, path: Path, tell: Tell | None = None) -> None:
         self.path = path
         self._tell = tell
+        self._is_off = False
         self._is_told = False
-        self._leases: Leases | None = None
-        with self._explained():
-            try:
-                path.parent.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise self._problem(f"cannot be made: {error.strerror}", hint=_ELSEWHERE) from error
-            self._db = sqlite3.connect(path, timeout=busy_timeout_s, isolation_level=None)
+        self._asked: dict[str, asyncio.Future[None]] = {}
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise self._problem(f"cannot be made: {reason_of(error)}", hint=_ELSEWHERE) from error
+        try:
+            self._db = sqlite3.connect(path, timeout=_BUSY_TIMEOUT_S, isolation_level=None)
             try:
                 self._prepare()
             except BaseException:
                 self._db.close()
                 raise
+        except sqlite3.Error as error:
+            raise self._unusable(error) from error
 
     def __enter__(self) -> ReplyCache:
         return self
@@ -122,50 +121,55 @@ class ReplyCache:
         self.close()
 
     def get(self, key: str) -> Reply | None:
-        """The reply kept under `key`, marked as cached, or None."""
+        """Return the reply kept under `key`, marked as cached, or None."""
         # As bytes: SQLite calls the whole file unusable where a text is no UTF-8.
         sql = "SELECT CAST(reply AS BLOB) FROM replies WHERE key = ?"
-        with self._explained():
-            row = self._db.execute(sql, (key,)).fetchone()
+        row = None
+        with self._using():
+            row = self._db.execute(sql, (key,)).fetchone() if not self._is_off else None
         if row is None:
             return None
         try:
             return _reply(json.loads(row[0]))
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-            if not self._is_told:
+            if self._tell is not None and not self._is_told:
                 self._is_told = True
                 why = f"{type(error).__name__}: {error}"
-                self._tell(f"reply cache {self.path}: holds a broken reply, asked anew ({why})")
+                self._tell(f"reply cache {self.path}: holds a broken reply, asked again ({why})")
             return None
 
     def __contains__(self, key: object) -> bool:
         return isinstance(key, str) and self.get(key) is not None
 
     def put(self, key: str, model_id: str, reply: Reply) -> bool:
-        """Keep a reply, unless it is empty, truncated or refused; whether it was kept."""
-        if reply.finish in ("length", "refusal") or not reply.text.strip():
+        """Keep a reply, unless it is empty, truncated or refused; True if it was kept."""
+        if self._is_off or reply.finish in ("length", "refusal") or not reply.text.strip():
             return False
         # What this run paid is no part of what another finds.
         reply = reply.model_copy(update={"billed_usd": None})
         text = json.dumps(_fields(reply), ensure_ascii=True, separators=(",", ":"))
-        with self._explained():
-            self._db.execute(
-                "INSERT OR REPLACE INTO replies VALUES (?, ?, ?, ?)",
-                (key, model_id, time.time(), text),
-            )
-        return True
+        row = (key, model_id, time.time(), text)
+        with self._using():
+            self._db.execute("INSERT OR REPLACE INTO replies VALUES (?, ?, ?, ?)", row)
+            return True
+        return False
 
-    @contextlib.contextmanager
-    def leases(self) -> Iterator[Leases]:
-        """What is being asked now, by all who share the file."""
-        with self._explained():
-            if self._leases is None:
-                self._leases = Leases(self._db)
-            yield self._leases
+    @contextlib.asynccontextmanager
+    async def asking(self, key: str) -> AsyncIterator[bool]:
+        """Wait until nobody else of this process asks the same; True if somebody did."""
+        was_asked = False
+        while (other := self._asked.get(key)) is not None:
+            was_asked = True
+            await asyncio.wait((other,))
+        self._asked[key] = asyncio.get_running_loop().create_future()
+        try:
+            yield was_asked
+        finally:
+            self._asked.pop(key).set_result(None)
 
     def stats(self) -> CacheStats:
-        """What the cache holds."""
-        with self._explained():
+        """Count what the cache holds."""
+        with self._using():
             rows = self._db.execute(
                 "SELECT model, count(*), min(stored_at), max(stored_at) FROM replies "
                 "GROUP BY model ORDER BY model"
@@ -182,7 +186,7 @@ class ReplyCache:
 
     def clear(self, model_id: str | None = None) -> int:
         """Drop all replies, or those of one model id; returns how many."""
-        with self._explained():
+        with self._using():
             if model_id is None:
                 dropped = self._db.execute("DELETE FROM replies").rowcount
             else:
@@ -216,25 +220,28 @@ class ReplyCache:
             self._db.execute("COMMIT")
 
     @contextlib.contextmanager
-    def _explained(self) -> Iterator[None]:
+    def _using(self) -> Iterator[None]:
+        """Explain what SQLite raises, or go on without the cache."""
         try:
             yield
-        except sqlite3.OperationalError as error:
-            if _BUSY.search(str(error)):
-                raise CacheBusyError(self._said(f"cannot be used: {error}", hint=_WAIT)) from error
-            # The disk or the place, not the content: to delete paid replies would be no help.
-            raise self._problem(f"cannot be used: {error}", hint=_ELSEWHERE) from error
         except sqlite3.Error as error:
-            raise self._problem(f"cannot be used: {error}") from error
+            if self._tell is None:
+                raise self._unusable(error) from error
+            self._is_off = True
+            self._tell(f"reply cache {self.path}: cannot be used: {error}; going on without it")
+
+    def _unusable(self, error: sqlite3.Error) -> StoreError:
+        hint = _HINT
+        if isinstance(error, sqlite3.OperationalError):
+            # The disk or the place, not the content: to delete paid replies would be no help.
+            hint = _WAIT if _BUSY.search(str(error)) else _ELSEWHERE
+        return self._problem(f"cannot be used: {error}", hint=hint)
 
     def _problem(
         self, message: str, found: str = "", allowed: str = "", hint: str = _HINT
     ) -> StoreError:
-        return StoreError(self._said(message, found, allowed, hint))
-
-    def _said(self, message: str, found: str = "", allowed: str = "", hint: str = _HINT) -> Problem:
         where = f"reply cache {self.path}"
-        return Problem(where, message, found=found, allowed=allowed, hint=hint)
+        return StoreError(Problem(where, message, found=found, allowed=allowed, hint=hint))
 
 
 def _fields(reply: Reply) -> dict[str, Any]:

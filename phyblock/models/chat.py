@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from contextlib import AbstractAsyncContextManager, AsyncExitStack, nullcontext
+from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from dataclasses import dataclass, replace
 
 from phyblock.errors import (
@@ -15,8 +15,8 @@ from phyblock.errors import (
     RetryableError,
     UnavailableError,
 )
-from phyblock.models.base import AskLaterError, Request
-from phyblock.models.cache import reply_key
+from phyblock.models.base import Request
+from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.config import ModelConfig
 from phyblock.models.cost import Budget, estimate
 from phyblock.models.events import EventKind, ModelEvent, Observer
@@ -28,7 +28,6 @@ from phyblock.models.prices import Prices
 from phyblock.models.replicas import Replica, Replicas
 from phyblock.models.retry import RetryPolicy, with_retries
 from phyblock.models.sender import Outlay, Sender
-from phyblock.models.shared_cache import SharedCache, Turn
 from phyblock.records.reply import Reply
 
 __all__ = ["ChatModel", "ChatParts"]
@@ -40,7 +39,7 @@ class ChatParts:
 
     replicas: Replicas
     limiter: ModelLimiter
-    cache: SharedCache | None
+    cache: ReplyCache | None
     budget: Budget | None
     prices: Prices | None
     policy: RetryPolicy
@@ -52,8 +51,7 @@ class ChatParts:
 @dataclass
 class _Question:
     """A request with its key in the cache and its outlay, its last failure and the server that
-    failed, its reply. `is_free`: the cache has just said that nobody asks the same; `by_force`:
-    another does and takes too long.
+    failed, its reply.
     """
 
     request: Request
@@ -62,8 +60,6 @@ class _Question:
     failure: RetryableError | None = None
     failed_at: Replica | None = None
     reply: Reply | None = None
-    is_free: bool = False
-    by_force: bool = False
 
 
 class ChatModel:
@@ -76,42 +72,24 @@ class ChatModel:
         self._config = config
         self._parts = parts
         self._sender = Sender(config, parts.budget, parts.prices, parts.halt, self._say_seedless)
-        self._put_off: set[tuple[str, int]] = set()
-        self._is_batched_told = False
         self._unavailable: UnavailableError | None = None
 
     async def ask(self, request: Request) -> Reply:
         """The cached reply, or a new one, which is then cached if it is whole.
 
         `cost_usd` of a cached reply is what it would cost today. Raises what the model seam
-        says, AskLaterError where another run asks the same in a batch, which is waited for the
-        second time, BudgetReachedError when the call does not fit, HaltedError when the run ends
-        before it is sent.
+        says, BudgetReachedError when the call does not fit, HaltedError when the run ends before it
+        is sent.
         """
         cache = self._parts.cache
-        key, is_free = "", False
+        key = ""
         if cache is not None:
             key = reply_key(self._config, request)
-            with self._parts.halt.giving_up():
-                known = await cache.look(key)
-            if known.reply is not None:
-                return known.reply.model_copy(
-                    update={"cost_usd": self._sender.cost_usd(known.reply)}
-                )
-            is_free = not known.is_asked
-            if known.is_batched:
-                self._put_off_once(key, request)
-                self._say_batched()
+            kept = cache.get(key)
+            if kept is not None:
+                return kept.model_copy(update={"cost_usd": self._sender.cost_usd(kept)})
         outlay = Outlay(estimate(self._config, request))
-        return await self._ask_new(_Question(request, key, outlay, is_free=is_free))
-
-    def _put_off_once(self, key: str, request: Request) -> None:
-        """A batch may take a day, in which other requests could be asked."""
-        # Requests of several seeds have one key where seeds are not sent.
-        which = key, request.seed
-        if which not in self._put_off:
-            self._put_off.add(which)
-            raise AskLaterError
+        return await self._ask_new(_Question(request, key, outlay))
 
     async def aclose(self) -> None:
         """Release connections."""
@@ -148,19 +126,18 @@ class ChatModel:
     async def _attempt(self, question: _Question) -> Reply:
         """Send once, when it is this question's turn, or find the reply to it meanwhile."""
         while True:
-            kept = await self._from_others(question)
-            if kept is not None:
-                return self._found(kept, question)
             async with AsyncExitStack() as stack:
+                cache = self._parts.cache
                 with self._parts.halt.giving_up():
+                    if cache is not None and await stack.enter_async_context(
+                        cache.asking(question.key)
+                    ):
+                        kept = cache.get(question.key)
+                        if kept is not None:
+                            return self._found(kept, question)
                     probed = await stack.enter_async_context(self._parts.replicas.passing())
                     self._fit_width()
                     slot = await stack.enter_async_context(self._slot(question))
-                    turn = await stack.enter_async_context(self._asking(question))
-                if turn.reply is not None:
-                    return self._found(turn.reply, question)
-                if not turn.is_ours:
-                    continue
                 if self._unavailable is not None:
                     raise UnavailableError(str(self._unavailable), status=self._unavailable.status)
                 replica = self._parts.replicas.choose(probed, question.failed_at)
@@ -171,31 +148,13 @@ class ChatModel:
                     continue
                 question.reply = reply
                 slot.settle(_total(reply))
-                if self._parts.cache is not None:
-                    await self._parts.cache.keep(question.key, self._config.id, reply, turn.lease)
+                if cache is not None:
+                    cache.put(question.key, self._config.id, reply)
                 return reply
-
-    async def _from_others(self, question: _Question) -> Reply | None:
-        """Wait for others that ask the same, no longer than a request of our own would take, or
-        than their batch may.
-        """
-        cache = self._parts.cache
-        is_free, question.is_free = question.is_free, False
-        if cache is None or question.by_force or is_free:
-            return None
-        with self._parts.halt.giving_up():
-            kept, question.by_force = await cache.await_others(question.key, self._config.timeout_s)
-        return kept
 
     def _slot(self, question: _Question) -> AbstractAsyncContextManager[Slot]:
         expected = question.outlay.expected
         return self._parts.limiter.slot(expected.prompt_tokens + expected.completion_tokens)
-
-    def _asking(self, question: _Question) -> AbstractAsyncContextManager[Turn]:
-        cache = self._parts.cache
-        if cache is None:
-            return nullcontext(Turn(is_ours=True))
-        return cache.asking(question.key, by_force=question.by_force)
 
     async def _send_watched(
         self, question: _Question, replica: Replica, *, is_probe: bool
@@ -275,15 +234,6 @@ class ChatModel:
 
     def _say_seedless(self) -> None:
         self._tell("seed_unsupported", "takes no seed: seeds are independent repeats")
-
-    def _say_batched(self) -> None:
-        if not self._is_batched_told:
-            self._is_batched_told = True
-            self._tell(
-                "batch",
-                "waiting for what another run asks in a batch; --no-cache asks at once, "
-                "and pays again",
-            )
 
     def _stop(self, error: UnavailableError) -> None:
         if self._unavailable is None:

@@ -16,8 +16,8 @@ from phyblock.models import (
     Halt,
     Model,
     ModelEvent,
+    ReplyCache,
     RetryPolicy,
-    SharedCache,
     api_key_status,
     build_model,
     remove_unfinished,
@@ -83,7 +83,7 @@ class Session:
         self._folder = folder
         self._watch = watch
         self._use_cache = use_cache
-        self._cache: SharedCache | None = None
+        self._cache: ReplyCache | None = None
         self._store: RunStore | None = None
         self._batch_writer: RecordWriter | None = None
         self._models: dict[str, Model] = {}
@@ -100,8 +100,7 @@ class Session:
             self._check_batches(self._store)
             remove_unfinished(self._folder)
             if self._use_cache and any(m.config.kind == "litellm" for m in plan.models):
-                self._cache = SharedCache(reply_cache_file(), self._tell)
-                await self._cache.open()
+                self._cache = ReplyCache(reply_cache_file(), self._tell)
             limits = plan.suite.limits
             overall = Gate(limits.max_concurrency)
             halt = Halt()
@@ -214,6 +213,6 @@ class Session:
             await self._batch_writer.drain()
         self._plan.close()
         if self._cache is not None:
-            await self._cache.aclose()
+            self._cache.close()
         if self._store is not None:
             self._store.close()

@@ -20,9 +20,9 @@ from phyblock.models import (
     ModelConfig,
     ModelEvent,
     Reply,
+    ReplyCache,
     Request,
     RetryPolicy,
-    SharedCache,
     build_model,
     remove_unfinished,
 )
@@ -69,9 +69,7 @@ async def command(
     anew: bool = False,
 ) -> list[Reply | Exception]:
     """Ask as one command does, in rounds; what stops the model stands where it was met."""
-    cache = None if disk.cache is None else SharedCache(disk.cache)
-    if cache is not None:
-        await cache.open()
+    cache = None if disk.cache is None else ReplyCache(disk.cache)
     remove_unfinished(disk.folder)
     model = build_model(
         config,
@@ -111,7 +109,7 @@ async def command(
     finally:
         await model.aclose()
         if cache is not None:
-            await cache.aclose()
+            cache.close()
     return [ended[n] for n in range(len(requests))]
 
 

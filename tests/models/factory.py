@@ -22,7 +22,6 @@ from phyblock.models import (
     ReplyCache,
     Request,
     RetryPolicy,
-    SharedCache,
     build_model,
 )
 from phyblock.tracks.full_planning.baselines import PlanSubject
@@ -77,7 +76,7 @@ def make_request(
 def make_model(
     config: ModelConfig,
     *,
-    cache: ReplyCache | SharedCache | None = None,
+    cache: ReplyCache | None = None,
     overall: Gate | None = None,
     budget: Budget | None = None,
     events: list[ModelEvent] | None = None,
@@ -86,8 +85,6 @@ def make_model(
     halt: Halt | None = None,
 ) -> Model:
     """A model with quick retries; its events go into the list."""
-    if isinstance(cache, ReplyCache):
-        cache = SharedCache(cache.path)
     return build_model(
         config,
         cache=cache,

@@ -29,7 +29,9 @@ from phyblock.models import (
     Usage,
     reply_key,
 )
-from tests.models.factory import make_request, picture
+from tests.models.factory import ask, make_model, make_request, picture
+from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.servers.chassis import Faults, Running
 
 CONFIG = ModelConfig("m", "litellm", "openai/m", api_base="http://localhost:1/v1")
 REPLY = Reply(
@@ -412,3 +414,26 @@ def test_what_was_kept_survives_a_kill(tmp_path: Path) -> None:
     with ReplyCache(path) as cache:
         assert all(f"a-{n}" in cache for n in range(last + 1))
         assert cache.put("after", "openai/m", REPLY)
+
+
+def test_what_two_samples_ask_at_the_same_time_is_asked_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+    server = ROUTES["direct"].server(Faults(latency_s=0.05))
+    with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
+        config = ROUTES["direct"].config(running.url)
+        answers = ask(make_model(config, cache=cache), *[make_request()] * 5)
+    assert server.requests == 1
+    assert [answer.cached for answer in answers if isinstance(answer, Reply)].count(True) == 4
+
+
+@pytest.mark.parametrize("mode", ["length", "400"])
+def test_what_is_no_whole_reply_is_asked_by_each(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: str
+) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+    server = ROUTES["direct"].server(Faults(mode=mode, latency_s=0.01))
+    with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
+        ask(make_model(ROUTES["direct"].config(running.url), cache=cache), *[make_request()] * 3)
+    assert server.requests == 3

@@ -18,7 +18,6 @@ from phyblock.models import (
     Reply,
     ReplyCache,
     RetryPolicy,
-    SharedCache,
 )
 from tests.models.factory import QUICK, ask, make_model, make_request, reply_of, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
@@ -91,9 +90,8 @@ def test_a_cache_that_takes_no_more_is_said_once_and_every_reply_comes(tmp_path:
     requests = [make_request(f"{n:03}") for n in range(20)]
     with Running(server) as running:
         config = ROUTES["direct"].config(running.url, max_concurrency=4)
-        cache = SharedCache(tmp_path / "c.sqlite", said.append)
-        answers = ask(make_model(config, cache=cache), *requests)
-        run(cache.aclose)
+        with ReplyCache(tmp_path / "c.sqlite", said.append) as cache:
+            answers = ask(make_model(config, cache=cache), *requests)
     assert {type(answer) for answer in answers} == {Reply}
     assert server.ended == {"ok": 20}
     (text,) = said

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import sqlite3
-from pathlib import Path
 
 import pytest
 
@@ -14,14 +12,10 @@ from phyblock.models import (
     Halt,
     HaltedError,
     Prices,
-    Reply,
-    ReplyCache,
-    SharedCache,
-    reply_key,
 )
 from tests.models.factory import make_model, make_request, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
-from tests.servers.chassis import Faults, Running
+from tests.servers.chassis import Running
 
 
 @pytest.fixture(autouse=True)
@@ -83,37 +77,3 @@ def test_a_run_that_ends_while_money_is_reserved_sends_nothing_and_holds_none() 
     assert server.requests == 0
     assert budget.spent_usd == 0.0
     run(lambda: budget.reserve(lambda: 100.0))
-
-
-@pytest.mark.parametrize("cancels", [1, 2])
-def test_a_reply_in_hand_is_not_lost_to_a_second_interrupt(tmp_path: Path, cancels: int) -> None:
-    """While the cache is locked, and the reply waits to be kept in it."""
-    path = tmp_path / "c.sqlite"
-    server = ROUTES["direct"].server(Faults(latency_s=0.05))
-
-    async def main(url: str) -> tuple[object, str]:
-        config = ROUTES["direct"].config(url)
-        async with SharedCache(path, patience_s=5.0) as cache:
-            model = make_model(config, cache=cache)
-            asked = asyncio.create_task(model.ask(make_request()))
-            while not server.requests:
-                await asyncio.sleep(0)
-            with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as db:
-                db.execute("BEGIN IMMEDIATE")
-                while not server.answered_by_sample:
-                    await asyncio.sleep(0)
-                await asyncio.sleep(0.3)
-                for _ in range(cancels):
-                    asked.cancel()
-                    await asyncio.sleep(0.05)
-                db.execute("ROLLBACK")
-            (answer,) = await asyncio.gather(asked, return_exceptions=True)
-            await model.aclose()
-        return answer, reply_key(config, make_request())
-
-    with Running(server) as running:
-        answer, key = run(lambda: main(running.url))
-    assert isinstance(answer, Reply), answer
-    assert not answer.cached
-    with ReplyCache(path) as cache:
-        assert key in cache

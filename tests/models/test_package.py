@@ -17,14 +17,14 @@ ROOT = Path(__file__).parents[2]
 CACHED = """
 import asyncio, sys
 from pathlib import Path
-from phyblock.models import Gate, ModelConfig, Reply, ReplyCache, SharedCache
+from phyblock.models import Gate, ModelConfig, Reply, ReplyCache
 from phyblock.models import build_model, reply_key
 from tests.models.factory import make_request
 config = ModelConfig("m", "litellm", "anthropic/claude")
 with ReplyCache(Path(sys.argv[1])) as cache:
     cache.put(reply_key(config, make_request()), config.id, Reply(text="kept"))
 async def main():
-    async with SharedCache(Path(sys.argv[1])) as cache:
+    with ReplyCache(Path(sys.argv[1])) as cache:
         model = build_model(config, cache=cache, overall=Gate(1))
         assert (await model.ask(make_request())).text == "kept"
         await model.aclose()

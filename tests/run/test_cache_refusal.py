@@ -136,15 +136,3 @@ def test_a_run_with_a_locked_cache_ends_as_without_one(workspace: Workspace) -> 
         assert (done.code, done.err) == (0, "")
         assert done.out.count("database is locked") == 1
         assert running.server.requests == SAMPLES
-
-
-@pytest.mark.slow
-def test_two_runs_at_the_same_time_ask_nothing_twice(workspace: Workspace) -> None:
-    with Running(OpenAIChat(Faults(latency_s=0.5))) as running:
-        prepare(workspace, running.url, AT_ONCE)
-        with workspace.start() as first:
-            workspace.out = workspace.root / "second"
-            second = workspace.run()
-            _, err = first.communicate()
-        assert (first.returncode, err, second.code, second.err) == (0, "", 0, "")
-        assert running.server.requests == SAMPLES

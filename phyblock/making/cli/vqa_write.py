@@ -20,7 +20,7 @@ from phyblock.making.cli.question_sets import data_option, questions_option, rea
 from phyblock.making.cli.subtasks_option import subtasks_option
 from phyblock.making.cli.working import seed_option
 from phyblock.making.questions.rewording import Paraphrase, stems_of, write_wordings
-from phyblock.models import Breakers, Gate, ModelConfig, RetryPolicy, SharedCache, build_model
+from phyblock.models import Breakers, Gate, ModelConfig, ReplyCache, RetryPolicy, build_model
 from phyblock.resources import bundled, reply_cache_file
 from phyblock.run.finding import find_models_file
 from phyblock.run.models import to_config
@@ -122,7 +122,7 @@ async def _ask(
     async with AsyncExitStack() as stack:
         cache = None
         if use_cache:
-            cache = await stack.enter_async_context(SharedCache(reply_cache_file(), tell))
+            cache = stack.enter_context(ReplyCache(reply_cache_file(), tell))
         breakers = Breakers(RetryPolicy(), tell)
         model = build_model(config, cache=cache, overall=Gate(_AT_ONCE), breakers=breakers)
         stack.push_async_callback(model.aclose)

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
-from collections.abc import AsyncIterator, Callable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.models.base import AskLaterError, Request
-from phyblock.models.batches.claims import Claims
 from phyblock.models.batches.following import Follower
 from phyblock.models.batches.ledger import Batch, BatchFiles, Ledger
 from phyblock.models.batches.protocol import BatchProtocol
 from phyblock.models.batches.purse import Purse
 from phyblock.models.batches.sending import Draft, Sender, UnsureError
 from phyblock.models.batches.wording import Wording, Written
-from phyblock.models.cache import reply_key
+from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.config import ModelConfig
 from phyblock.models.cost import Budget, may_be_billed, reply_cost_usd
 from phyblock.models.events import EventKind, ModelEvent, Observer
@@ -24,7 +22,6 @@ from phyblock.models.halt import Halt
 from phyblock.models.http_client import Client
 from phyblock.models.prices import Prices, today
 from phyblock.models.retry import RetryPolicy
-from phyblock.models.shared_cache import SharedCache
 from phyblock.models.transport import Transport
 from phyblock.records.reply import Reply
 
@@ -40,7 +37,7 @@ class BatchParts:
     protocol: BatchProtocol
     transport: Callable[[Client], Transport]
     files: BatchFiles
-    cache: SharedCache | None
+    cache: ReplyCache | None
     budget: Budget | None
     prices: Prices | None
     policy: RetryPolicy
@@ -52,8 +49,7 @@ class BatchModel:
     """A GatheringModel over a provider's batches.
 
     A request is in a draft, or in the newest batch that the ledger has it in. `_again` are those
-    whose answer there failed; `_given` those whose answer a sample of this command has; `_asking`
-    those whose answer one waits for.
+    whose answer there failed; `_given` those whose answer a sample of this command has.
     """
 
     needs_messages = True
@@ -68,70 +64,30 @@ class BatchModel:
         self._follower = Follower(protocol, self._ledger, files, self._sender, policy, self._tell)
         self._wording = Wording(config, protocol, parts.transport, self._say_seedless)
         self._purse = Purse(config, parts.budget, parts.prices)
-        self._claims = Claims(parts.cache, config.timeout_s, parts.halt, self._tell)
         self._earlier = frozenset(self._ledger.batches)
         self._draft: Draft | None = None
         self._drafting = asyncio.Lock()
         self._failures: dict[str, int] = {}
         self._again: set[str] = set()
         self._given: set[str] = set()
-        self._asking: set[str] = set()
         self._refusal: UnavailableError | None = None
         self._has_begun = False
-        self._has_stopped = False
 
     async def begin(self) -> None:
-        """See GatheringModel; the first round takes up the batches of earlier commands, others
-        begin when nobody else asks what was left to them.
-        """
-        async with self._releasing():
-            if self._refusal is not None:
-                raise self._refusal
-            if not self._has_begun:
-                self._has_begun = True
-                batches = tuple(self._ledger.batches.values())
-                await self._claims.begin(
-                    {k for b in batches if b.event != "ended" for k in b.places}
-                )
-                for batch in batches:
-                    await self._take_up(batch)
-            if self._claims.must_wait:
-                # With these under way, two runs could wait for each other.
-                await self._end_of_batches()
-                await self._claims.wait_for_others()
-
-    @contextlib.asynccontextmanager
-    async def _releasing(self) -> AsyncIterator[None]:
-        """What stops the model has it ask no more: others may, but for what is waited for here."""
-        try:
-            yield
-        except UnavailableError:
-            self._has_stopped = True
-            await self._claims.release_all(but=self._asking)
-            raise
+        """See GatheringModel; the first round takes up the batches of earlier commands."""
+        if self._refusal is not None:
+            raise self._refusal
+        if not self._has_begun:
+            self._has_begun = True
+            for batch in tuple(self._ledger.batches.values()):
+                await self._take_up(batch)
 
     async def gather(self, request: Request, *, anew: bool = False) -> bool:
         """See GatheringModel."""
-        async with self._releasing():
-            return await self._gather(reply_key(self._config, request), request, anew=anew)
-
-    async def _gather(self, key: str, request: Request, *, anew: bool) -> bool:
+        key = reply_key(self._config, request)
         if self._is_drafted(key) or await self._is_answered(key, request, anew=anew):
             return True
-        if self._refusal is not None:
-            return False
-        if not await self._claims.take(key):
-            return True
-        is_taken = False
-        try:
-            # With the claim in hand, as its answer may have come to the cache meanwhile.
-            if await self._kept(request) is not None:
-                return True
-            is_taken = await self._take_in(key, request)
-            return is_taken
-        finally:
-            if not is_taken or self._has_stopped:
-                await self._claims.release(key)
+        return self._refusal is None and await self._take_in(key, request)
 
     async def _take_in(self, key: str, request: Request) -> bool:
         written = await self._wording.write(request)
@@ -154,18 +110,9 @@ class BatchModel:
         HaltedError when the run ends before the batch does.
         """
         key = reply_key(self._config, request)
-        self._asking.add(key)
-        try:
-            async with self._releasing():
-                return await self._ask(key, request)
-        finally:
-            self._asking.discard(key)
-            await self._claims.release(key)
-
-    async def _ask(self, key: str, request: Request) -> Reply:
         batch = self._ledger.newest(key)
         if batch is None or batch.event == "intended" or key in self._again:
-            kept = await self._kept(request)
+            kept = self._kept(key)
             if kept is None:
                 raise AskLaterError
             return kept.model_copy(
@@ -198,7 +145,6 @@ class BatchModel:
         await asyncio.gather(*followings, return_exceptions=True)
         if self._draft is not None:
             self._draft.drop()
-        await self._claims.aclose()
         await self._parts.protocol.wire.aclose()
 
     async def _take_up(self, batch: Batch) -> None:
@@ -210,13 +156,6 @@ class BatchModel:
                     return
         if batch.event == "created":
             self._following(batch)
-
-    async def _end_of_batches(self) -> None:
-        """Wait until none is under way."""
-        with self._parts.halt.giving_up():
-            for batch in tuple(self._ledger.batches.values()):
-                if batch.event == "created":
-                    await asyncio.shield(self._following(batch))
 
     def _following(self, batch: Batch) -> asyncio.Future[None]:
         if batch.following is None:
@@ -257,15 +196,11 @@ class BatchModel:
                 self._again.add(key)
             else:
                 return True
-        return await self._kept(request) is not None
+        return self._kept(key) is not None
 
-    async def _kept(self, request: Request) -> Reply | None:
-        """The reply in the cache."""
+    def _kept(self, key: str) -> Reply | None:
         cache = self._parts.cache
-        if cache is None:
-            return None
-        with self._parts.halt.giving_up():
-            return (await cache.look(reply_key(self._config, request))).reply
+        return None if cache is None else cache.get(key)
 
     async def _add(self, key: str, request: Request, written: Written) -> bool:
         """Put a request into the draft, or into a new one where it is full; whether there was
@@ -329,7 +264,7 @@ class BatchModel:
             update={"billed_usd": self._purse.billed_usd(key), "attempts": attempts}
         )
         if self._parts.cache is not None:
-            await self._parts.cache.keep(key, self._config.id, reply)
+            self._parts.cache.put(key, self._config.id, reply)
         return reply
 
     def _give_up(self) -> None:
