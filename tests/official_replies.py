@@ -7,7 +7,7 @@ import functools
 import json
 from pathlib import Path
 
-from phyblock.datasets import recorded_models
+from phyblock.data import recorded_models
 from phyblock.models.raw_replies import read_raw_reply
 
 __all__ = ["GOLD", "gold_readings", "reply_texts"]

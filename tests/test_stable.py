@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.datasets import read_builtin, read_questions
+from phyblock.data import read_builtin, read_questions
 from phyblock.domain import euler_deg_to_matrix
 from phyblock.models.guess_features import option_features
 from phyblock.resources import bundled

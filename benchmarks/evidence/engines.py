@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from phyblock.datasets import read_builtin, read_questions
+from phyblock.data import read_builtin, read_questions
 from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions.question_production import problem_of
 from phyblock.resources import bundled

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from phyblock.datasets import AssemblyTask, read_official, recorded_models
+from phyblock.data import AssemblyTask, read_official, recorded_models
 from phyblock.domain import Plan
 from phyblock.models.raw_replies import read_raw_reply
 from phyblock.parsing import parse_plan

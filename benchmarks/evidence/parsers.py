@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from phyblock.datasets import AssemblyTask, read_official, recorded_models
+from phyblock.data import AssemblyTask, read_official, recorded_models
 from phyblock.domain import Plan
 from phyblock.models.raw_replies import read_raw_reply
 from phyblock.parsing import ParsedPlan, parse_plan

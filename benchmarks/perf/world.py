@@ -20,7 +20,7 @@ from typing import Any
 
 import psutil
 
-from phyblock.datasets import read_builtin
+from phyblock.data import read_builtin
 from phyblock.domain import Scene
 from phyblock.making.scenes.candidate_sets import make_candidates
 from phyblock.making.scenes.compositions import beside

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from phyblock.api.given import expect
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.files import write_named
 from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png, goal_style

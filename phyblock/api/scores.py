@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from html import escape
 
 from phyblock.api.given import expect
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.parsing import parse_plan
 from phyblock.scoring.plan import AssemblyScorer, ErrorType

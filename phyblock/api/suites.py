@@ -12,7 +12,7 @@ from phyblock.api.given import expect
 from phyblock.api.pictures import render
 from phyblock.config.suite import Suite as ConfigSuite
 from phyblock.config.suite import load_suite as read_suite
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.resources import bundled
 from phyblock.run.data import open_dataset

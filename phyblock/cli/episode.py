@@ -9,7 +9,7 @@ import click
 
 from phyblock.cli.console import make_console, print_view, shown_path
 from phyblock.cli.paths import UserPath
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.errors import DataError, Problem, StoreError
 from phyblock.files import write_named
 from phyblock.records import MANIFEST, RECORDS, Record, read_manifest

@@ -13,7 +13,7 @@ from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath, models_file_option
 from phyblock.config.models import RECORDED, ModelSpec, load_models
 from phyblock.config.suite import load_suite, suite_model
-from phyblock.datasets import SCENES_FILE, Dataset, read_builtin, read_official
+from phyblock.data import SCENES_FILE, Dataset, read_builtin, read_official
 from phyblock.errors import InputError, Problem, SpecError
 from phyblock.files import read_bytes
 from phyblock.resources import bundled

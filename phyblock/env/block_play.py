@@ -7,7 +7,7 @@ from typing import Any
 from gymnasium import spaces
 from PIL import Image
 
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.domain import MAX_CANDIDATES, Block
 from phyblock.env.play import DONE, Acted, Play, picture_of
 from phyblock.scoring.steps import Assembly

@@ -18,7 +18,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from PIL import Image
 
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.domain import MAX_CANDIDATES, Block
 from phyblock.env.block_play import BlockPlay
 from phyblock.env.play import Play

@@ -9,7 +9,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from PIL import Image
 
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.domain import Block, CandidateSet
 
 __all__ = ["DONE", "Acted", "Play", "picture_of"]

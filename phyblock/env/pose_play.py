@@ -11,7 +11,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from PIL import Image
 
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.domain import MAX_CANDIDATES, Block, CandidateSet, PoseStep
 from phyblock.env.play import DONE, Acted, Play, picture_of
 from phyblock.env.state import MOST_BLOCKS, block_rows, rows_space

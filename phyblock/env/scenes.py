@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from phyblock.datasets import AssemblyTask
-from phyblock.datasets.named import read_data_set
+from phyblock.data import AssemblyTask
+from phyblock.data.named import read_data_set
 
 __all__ = ["read_tasks"]
 

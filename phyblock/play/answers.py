@@ -8,7 +8,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from phyblock.datasets.raw import parse_json
+from phyblock.data.raw import parse_json
 from phyblock.errors import DataError, Problem, reason_of
 from phyblock.files import load_json, read_bytes, read_text
 from phyblock.models import HaltedError, Request

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from phyblock.config.models import RECORDED
 from phyblock.config.suite import Suite
-from phyblock.datasets import recorded_models
+from phyblock.data import recorded_models
 from phyblock.errors import DataError
 from phyblock.records import Manifest
 from phyblock.run.plan import RunPlan

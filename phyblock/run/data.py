@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from phyblock.datasets import SCENES_FILE, Dataset, read_builtin, read_official
+from phyblock.data import SCENES_FILE, Dataset, read_builtin, read_official
 from phyblock.errors import DataError, Problem
 from phyblock.records import MANIFEST, Manifest
 from phyblock.resources import bundled_sets

@@ -9,8 +9,8 @@ from itertools import product
 from typing import Any
 
 from phyblock.config.suite import Suite, Variant
-from phyblock.datasets import Dataset
-from phyblock.datasets.version import UNNUMBERED
+from phyblock.data import Dataset
+from phyblock.data.version import UNNUMBERED
 from phyblock.parsing import READER_VERSION
 from phyblock.records import FORMAT
 from phyblock.run.models import PlannedModel

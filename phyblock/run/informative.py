@@ -7,8 +7,8 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from phyblock.datasets import Dataset
-from phyblock.datasets.version import read_version
+from phyblock.data import Dataset
+from phyblock.data.version import read_version
 from phyblock.errors import Problem, SpecError
 from phyblock.records.manifest import Manifest, ManifestChoice
 from phyblock.run.data import CHANGED, asked_about

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from pydantic import TypeAdapter
 
 from phyblock.config.suite import Suite
-from phyblock.datasets import Dataset
+from phyblock.data import Dataset
 from phyblock.files import atomic_write, read_bytes
 from phyblock.records import Manifest
 from phyblock.resources import learned_dir

@@ -10,8 +10,8 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from phyblock.config.suite import Suite, Variant
-from phyblock.datasets import Dataset
-from phyblock.datasets.version import read_version
+from phyblock.data import Dataset
+from phyblock.data.version import read_version
 from phyblock.parsing import READER_VERSION
 from phyblock.records import Manifest
 from phyblock.records.manifest import ManifestChoice

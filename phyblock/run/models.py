@@ -17,8 +17,8 @@ from phyblock.config.models import (
     with_members,
 )
 from phyblock.config.suite import Suite, resolve_models
-from phyblock.datasets import recorded_models
-from phyblock.datasets.published_names import match_published
+from phyblock.data import recorded_models
+from phyblock.data.published_names import match_published
 from phyblock.errors import Problem, SpecError
 from phyblock.models import (
     ModelConfig,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from phyblock.config.models import RECORDED, ModelSpec, with_members
 from phyblock.config.suite import Suite, Variant
-from phyblock.datasets import Dataset
+from phyblock.data import Dataset
 from phyblock.errors import Problem, SpecError
 from phyblock.models import ModelConfig
 from phyblock.records import MANIFEST, Manifest, read_manifest

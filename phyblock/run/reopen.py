@@ -7,7 +7,7 @@ from pathlib import Path
 
 from phyblock.config.suite import Suite, SuiteFiles
 from phyblock.config.yaml import YamlSource
-from phyblock.datasets import Dataset
+from phyblock.data import Dataset
 from phyblock.errors import DataError, Problem
 from phyblock.records import MANIFEST, Manifest
 from phyblock.run.data import CHANGED

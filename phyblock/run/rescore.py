@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from pydantic import ValidationError
 
 from phyblock.config.suite import Suite, suite_model
-from phyblock.datasets import AssemblyTask, Dataset
+from phyblock.data import AssemblyTask, Dataset
 from phyblock.errors import DataError, Problem, SpecError, StoreError
 from phyblock.parsing import READER_VERSION, reader_version
 from phyblock.records import MANIFEST, Manifest, Record, read_manifest

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from phyblock.datasets import AssemblyTask, Dataset
+    from phyblock.data import AssemblyTask, Dataset
     from phyblock.models import Image
     from phyblock.records import Record
     from phyblock.sim import PictureStyle

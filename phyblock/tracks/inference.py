@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image
 
 from phyblock.config.suite import ImagesSpec
-from phyblock.datasets import AssemblyTask, Dataset
+from phyblock.data import AssemblyTask, Dataset
 from phyblock.errors import Problem, SpecError
 from phyblock.records import Record
 from phyblock.records.reading import read_records

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from phyblock.config.suite import Suite
-from phyblock.datasets import Dataset
+from phyblock.data import Dataset
 from phyblock.records import Manifest, Record
 from phyblock.registry import known_tracks
 from phyblock.tables.measures import SampleCounts

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from phyblock.config.suite import ImagesSpec, Suite
 from phyblock.config.validation import PictureControls
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.resources import cache_dir
 from phyblock.sim import PictureStyle

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.errors import DataError, Problem
 from phyblock.files import decode_picture, read_picture
 from phyblock.models.base import Image

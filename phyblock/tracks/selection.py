@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Collection, Sequence
 from fractions import Fraction
 
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 
 __all__ = ["evenly", "highest", "select_tasks", "spread", "stratified"]
 

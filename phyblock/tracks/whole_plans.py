@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any, Generic, Protocol, TypeVar
 
 from phyblock import parsing
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.models.base import Image
 from phyblock.tracks.asked_once import AskedOnce, PicturesT
 from phyblock.tracks.examples import Examples

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import yaml
 from PIL import Image as PillowImage
 
-from tests.datasets.broken import sound_scene, with_value, write_checkout
+from tests.data.broken import sound_scene, with_value, write_checkout
 from tests.workspace import Raw, Workspace, tower
 
 Prepare = Callable[[Workspace], list[str]]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from phyblock.datasets import read_builtin
+from phyblock.data import read_builtin
 from phyblock.records.reading import read_records
 from phyblock.tracks.step_planning.episode_views import OUTCOME_NAMES
 from phyblock.tracks.step_planning.film import episode_film, episode_table

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from phyblock.datasets import read_official
+from phyblock.data import read_official
 from phyblock.domain import (
     BLOCK_TYPES,
     COLORS,

@@ -13,7 +13,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import phyblock.env
-from phyblock.datasets import AssemblyTask, read_builtin
+from phyblock.data import AssemblyTask, read_builtin
 from phyblock.domain import BLOCK_TYPES, COLORS, Block, Candidate, CandidateSet, PoseStep, Scene
 from phyblock.env import DONE, PhyBlockEnv, read_tasks
 from phyblock.errors import DataError

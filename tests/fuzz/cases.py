@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 from hypothesis import strategies as st
 
-from tests.datasets.broken import sound_scene
+from tests.data.broken import sound_scene
 from tests.fuzz.bench import Case, Fifo, Link
 from tests.fuzz.strategies import (
     CANDIDATES,

@@ -10,13 +10,13 @@ import jsonschema
 import pytest
 from hypothesis import given
 
-from phyblock.datasets import Dataset, QuestionSet, read_builtin, read_questions
+from phyblock.data import Dataset, QuestionSet, read_builtin, read_questions
 from phyblock.errors import DataError
 from phyblock.records import Line, StoredQuestion, StoredScene
 from phyblock.records.faults import validated
 from phyblock.resources import bundled
-from tests.datasets.broken import Raw, sound_scene, with_value, without
-from tests.datasets.test_builtin_laws import as_json, tasks
+from tests.data.broken import Raw, sound_scene, with_value, without
+from tests.data.test_builtin_laws import as_json, tasks
 from tests.fuzz.strategies import sound_question
 from tests.records.test_documents import ROOT
 

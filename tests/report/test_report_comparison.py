@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from phyblock.datasets.published_names import PUBLISHED_NAMES, match_published
+from phyblock.data.published_names import PUBLISHED_NAMES, match_published
 from phyblock.report import NO_VALUE, published_table
 from phyblock.tracks.full_planning.published import (
     comparison_notes,

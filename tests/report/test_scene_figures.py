@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import phyblock
-from phyblock.datasets import AssemblyTask, Dataset
+from phyblock.data import AssemblyTask, Dataset
 from phyblock.domain import Plan
 from phyblock.errors import SpecError
 from phyblock.report.figures import Wanted, write_paper_figures

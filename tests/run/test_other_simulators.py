@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from phyblock.cli.main import phyblock
-from phyblock.datasets import read_builtin
+from phyblock.data import read_builtin
 from phyblock.errors import SpecError
 from phyblock.report.compare import compare_runs
 from phyblock.run.rescore import rescore

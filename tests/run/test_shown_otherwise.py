@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import yaml
 
-from phyblock.datasets import AssemblyTask, read_builtin
+from phyblock.data import AssemblyTask, read_builtin
 from phyblock.sim import PictureStyle, candidates_png, goal_png
 from phyblock.tracks.showing import Showing, TaskShowing, shown_order
 from tests.servers.chassis import Running, Seen

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from PIL import Image as PillowImage
 
-from phyblock.datasets import read_builtin, read_questions
+from phyblock.data import read_builtin, read_questions
 from phyblock.domain import LETTERS, SUBTASKS, Question
 from phyblock.report import published_table
 from phyblock.sim import PictureStyle

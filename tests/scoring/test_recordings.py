@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from phyblock.datasets import AssemblyTask, read_official
+from phyblock.data import AssemblyTask, read_official
 from phyblock.domain import Plan
 from phyblock.parsing import parse_plan
 from phyblock.scoring.plan import AssemblyScorer, Goal, match_plan

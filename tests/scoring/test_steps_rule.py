@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.datasets import AssemblyTask, read_builtin, read_official
+from phyblock.data import AssemblyTask, read_builtin, read_official
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring.plan import ERROR_TYPES, Goal, match_plan
 from phyblock.scoring.steps import MOVE_OUTCOMES, Assembly, attempted_counts, gated, placed_counts

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy import stats
 
-from phyblock.datasets import read_official
+from phyblock.data import read_official
 from phyblock.scoring.counts import Floats, f1_of, precision_of, ratio_of, recall_of
 from phyblock.scoring.statistics import (
     POWER,

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from phyblock.datasets import AssemblyTask, read_builtin, read_official
+from phyblock.data import AssemblyTask, read_builtin, read_official
 from phyblock.domain import Plan
 from phyblock.scoring.plan import Goal, match_plan
 from phyblock.types import SETTINGS

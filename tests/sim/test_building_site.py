@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from phyblock.datasets import read_builtin
+from phyblock.data import read_builtin
 from phyblock.domain import Block, Scene
 from phyblock.sim import PictureStyle, check, goal_png
 from phyblock.sim.question_pictures import question_key, question_png

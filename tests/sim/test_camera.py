@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from phyblock.datasets import read_official
+from phyblock.data import read_official
 from phyblock.domain import Scene
 from phyblock.sim.camera import VIEWS, Window, frame, view_axes
 from phyblock.sim.pictures import PictureStyle, drawn, goal_camera

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from phyblock.datasets import read_builtin
+from phyblock.data import read_builtin
 from phyblock.sim import PictureStyle, goal_png
 from phyblock.sim.film import FilmStep, episode_gif, episode_images, episode_sheet
 

@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from phyblock.datasets import read_builtin
-from phyblock.datasets.questions import read_questions
+from phyblock.data import read_builtin
+from phyblock.data.questions import read_questions
 from phyblock.domain import BLOCK_TYPES, Color
 from phyblock.domain.question import QuestionPicture
 from phyblock.making.poses import POSES

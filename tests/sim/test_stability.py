@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from phyblock.datasets import read_official
+from phyblock.data import read_official
 from phyblock.sim import Physics, Trial, check
 from tests.sim.structures import block, counterweighted_beam, tower
 from tests.sim.test_support import FLOATING

@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from phyblock.datasets import read_official
+from phyblock.data import read_official
 from phyblock.domain import Block, euler_deg_to_quat_xyzw, quat_xyzw_to_matrix
 from phyblock.sim.convex import drop_m, moved, separating_axes
 from phyblock.sim.geometry import ConvexPiece, collision_pieces

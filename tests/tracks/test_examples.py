@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.config.suite import Variant, load_suite
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.domain.symmetry import Symmetry, canonical_form
 from phyblock.errors import SpecError
 from phyblock.making.poses import transformed

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.datasets import AssemblyTask, read_builtin
+from phyblock.data import AssemblyTask, read_builtin
 from phyblock.sim import PictureStyle
 from phyblock.tracks import PicturePolicy, Pictures, TemplatePrompt
 from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
-from tests.datasets.broken import write_scenes
+from tests.data.broken import write_scenes
 from tests.workspace import SCENES
 
 RULES = PlanningRules("steps", ("A", "B"), ("optimal", "paper"), "selection")

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from phyblock.cli.main import phyblock
-from phyblock.datasets import AssemblyTask, read_builtin
+from phyblock.data import AssemblyTask, read_builtin
 from phyblock.domain import Block, Candidate, CandidateSet, PoseStep
 from phyblock.errors import InputError, StoreError
 from phyblock.models.base import Image as SentPicture
@@ -42,7 +42,7 @@ from phyblock.tracks.pose_planning.track import PosePlanning
 from phyblock.tracks.prompts import TemplatePrompt
 from phyblock.tracks.showing import ShownTask
 from phyblock.types import REFUSED_ENDS, STEP_ENDS, StepEnd
-from tests.datasets.broken import write_scenes
+from tests.data.broken import write_scenes
 from tests.servers.chassis import Faults, Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 from tests.sim.structures import block_types, eulers

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from phyblock.datasets import official_prompt, read_builtin, recorded_models
+from phyblock.data import official_prompt, read_builtin, recorded_models
 from phyblock.errors import PromptError
 from phyblock.models.base import Image, Message
 from phyblock.parsing import (

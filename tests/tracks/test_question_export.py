@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from phyblock.datasets import QuestionSet, read_builtin, read_questions
+from phyblock.data import QuestionSet, read_builtin, read_questions
 from phyblock.domain import LETTERS, is_picture_option
 from phyblock.errors import SpecError, StoreError
 from phyblock.sim import PictureStyle

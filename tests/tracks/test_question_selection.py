@@ -7,7 +7,7 @@ from collections import Counter
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.datasets import QuestionTask
+from phyblock.data import QuestionTask
 from phyblock.domain import SUBTASKS, Question, Scene, Subtask
 from phyblock.tracks.vqa.opening import select_questions
 

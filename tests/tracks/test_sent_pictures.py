@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 from PIL import Image as PillowImage
 
-from phyblock.datasets import AssemblyTask, read_builtin
+from phyblock.data import AssemblyTask, read_builtin
 from phyblock.errors import DataError, StoreError
 from phyblock.models.base import Image
 from phyblock.sim import PictureStyle
 from phyblock.tracks import PicturePolicy, Pictures
-from tests.datasets.broken import write_scenes
+from tests.data.broken import write_scenes
 from tests.fuzz.strategies import png_header
 from tests.workspace import SCENES
 

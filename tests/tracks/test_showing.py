@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.datasets import AssemblyTask, read_builtin, read_official
+from phyblock.data import AssemblyTask, read_builtin, read_official
 from phyblock.domain import Plan
 from phyblock.errors import DataError, SpecError
 from phyblock.models.base import Image
@@ -31,7 +31,7 @@ from phyblock.tracks.showing import (
 )
 from phyblock.tracks.step_planning.rules import StepRules
 from phyblock.tracks.step_planning.track import StepPlanning
-from tests.datasets.broken import write_scenes
+from tests.data.broken import write_scenes
 from tests.workspace import SCENES
 
 RULES = PlanningRules("steps", ("A", "B"), ("optimal", "paper"), "selection")

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.datasets import AssemblyTask, read_builtin, read_official
+from phyblock.data import AssemblyTask, read_builtin, read_official
 from phyblock.domain import Block, Candidate, CandidateSet, Scene
 from phyblock.models.base import Request
 from phyblock.parsing import MOVE_PROBLEMS, parse_move

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.datasets import read_builtin
+from phyblock.data import read_builtin
 from phyblock.errors import PromptError
 from phyblock.models.base import Image, Message
 from phyblock.records.reply import Reply

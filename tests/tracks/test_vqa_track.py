@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image as PillowImage
 
-from phyblock.datasets import QuestionSet, QuestionTask, read_builtin, read_questions
+from phyblock.data import QuestionSet, QuestionTask, read_builtin, read_questions
 from phyblock.domain import LETTERS, Question
 from phyblock.domain.rotation import rotated
 from phyblock.errors import DataError, SpecError

@@ -5,8 +5,8 @@ from __future__ import annotations
 import click
 
 from phyblock.cli.paths import NAME_OR_PATH
-from phyblock.datasets import QuestionSet, read_questions
-from phyblock.datasets.named import find_questions, read_data_set
+from phyblock.data import QuestionSet, read_questions
+from phyblock.data.named import find_questions, read_data_set
 
 _QUESTIONS = "phyblock-vqa"
 _SCENES = "phyblock-400"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from phyblock.datasets import AssemblyTask, Dataset
+from phyblock.data import AssemblyTask, Dataset
 from phyblock.errors import DataError, Problem
 from phyblock.text import did_you_mean
 

@@ -10,8 +10,8 @@ import click
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import NAME_OR_PATH, UserPath
-from phyblock.datasets import AssemblyTask
-from phyblock.datasets.named import read_data_set
+from phyblock.data import AssemblyTask
+from phyblock.data.named import read_data_set
 from phyblock.files import OutFolder
 from phyblock.making.cli.scene_sets import find_scenes
 from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png

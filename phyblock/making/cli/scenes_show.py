@@ -6,8 +6,8 @@ import click
 
 from phyblock.cli.console import make_console, plain_table
 from phyblock.cli.paths import NAME_OR_PATH
-from phyblock.datasets import AssemblyTask
-from phyblock.datasets.named import read_data_set
+from phyblock.data import AssemblyTask
+from phyblock.data.named import read_data_set
 from phyblock.domain import Block
 from phyblock.making.cli.scene_sets import find_scenes
 from phyblock.sim import PictureStyle

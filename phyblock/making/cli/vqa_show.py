@@ -11,7 +11,7 @@ from PIL import Image
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
-from phyblock.datasets import QuestionSet
+from phyblock.data import QuestionSet
 from phyblock.domain import LETTERS, SUBTASK_NAMES, Question
 from phyblock.errors import DataError, Problem
 from phyblock.files import write_named

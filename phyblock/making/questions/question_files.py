@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from phyblock.datasets.version import VERSION_FILE
+from phyblock.data.version import VERSION_FILE
 from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
 from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError

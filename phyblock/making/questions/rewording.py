@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import StrictBool
 
-from phyblock.datasets.raw import lines_of, parse_json
+from phyblock.data.raw import lines_of, parse_json
 from phyblock.domain import LETTERS, Question, Subtask, is_picture_option
 from phyblock.errors import DataError, Problem
 from phyblock.files import load_json

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from phyblock.config.yaml import YamlSource, read_yaml
-from phyblock.datasets.raw import lines_of, parse_json, read_json
+from phyblock.data.raw import lines_of, parse_json, read_json
 from phyblock.domain.aov import CycleError
 from phyblock.domain.blocks import KIT_PALETTE, BlockType, Color
 from phyblock.domain.candidates import CandidateSet

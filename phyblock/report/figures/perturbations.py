@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image
 
 from phyblock.config.suite import FACTORS, ImagesSpec, with_values
-from phyblock.datasets import AssemblyTask, Dataset
+from phyblock.data import AssemblyTask, Dataset
 from phyblock.errors import Problem, SpecError
 from phyblock.report.sensitivity_view import factor_name
 from phyblock.sim import candidates_key, candidates_png, goal_key, goal_png

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.records import PromptLines, Record, Score, SentPrompt
 from phyblock.records.reading import any_records
 from phyblock.report.html.index import Item, Place, SampleIndex

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from phyblock.datasets import AssemblyTask, Dataset
+from phyblock.data import AssemblyTask, Dataset
 from phyblock.errors import DataError
 from phyblock.run.data import recorded_dataset
 from phyblock.tables.load import Run

@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.files import OutFolder, writing
 from phyblock.records import MANIFEST, PROMPTS, RECORDS, STOPPED
 from phyblock.report.figures import figure_titles, write_figures

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from phyblock.config.suite import Suite
-from phyblock.datasets import AssemblyTask, Dataset, official_prompt
+from phyblock.data import AssemblyTask, Dataset, official_prompt
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.tracks.examples import examples_of
 from phyblock.tracks.full_planning.spec import PlanningSpec

@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 from phyblock import parsing
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.domain import Plan
 from phyblock.models.base import Image
 from phyblock.scoring.plan import AssemblyScorer, Score

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from phyblock import parsing
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.domain import Scene
 from phyblock.stable import drawn_bytes
 from phyblock.tracks.full_planning.baselines import plan_text

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.domain import Plan
 from phyblock.tracks.goal_blind.kept_plans import kept_plans
 from phyblock.tracks.showing import Showing, ShownTask, TaskShowing

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.domain import Block, PoseStep
 from phyblock.scoring.pose import PoseError
 from phyblock.sim.carry import CarryLimits, carry_out

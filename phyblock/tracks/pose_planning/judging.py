@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from phyblock import parsing
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.domain import (
     Block,
     Candidate,

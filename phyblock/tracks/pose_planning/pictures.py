@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.models.base import Image
 from phyblock.sim import PictureStyle, goal_style
 from phyblock.sim.camera import VIEWS

@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.domain import PoseStep
 from phyblock.models.base import Image, Request
 from phyblock.parsing import POSE_READER_VERSION

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, get_args
 
 from phyblock import parsing
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.domain import Block, Plan
 from phyblock.models.base import Image, Message, Request
 from phyblock.records.reply import Reply

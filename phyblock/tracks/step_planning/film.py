@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.domain import Block
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.registry import REFERENCE_ENGINE, told_engine

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from phyblock.datasets import AssemblyTask
+from phyblock.data import AssemblyTask
 from phyblock.sim import PictureStyle, goal_style
 from phyblock.sim.question_pictures import question_key
 from phyblock.sim.site import state_picture

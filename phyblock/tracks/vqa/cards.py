@@ -12,7 +12,7 @@ import numpy as np
 from PIL import Image
 
 from phyblock.config.suite import ImagesSpec
-from phyblock.datasets import Dataset
+from phyblock.data import Dataset
 from phyblock.domain import (
     CATEGORIES,
     LETTERS,

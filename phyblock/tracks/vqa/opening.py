@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from phyblock.datasets import (
+from phyblock.data import (
     QUESTIONS_FILE,
     Dataset,
     QuestionSet,

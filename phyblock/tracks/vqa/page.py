@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from phyblock.datasets import Dataset, QuestionTask
+from phyblock.data import Dataset, QuestionTask
 from phyblock.domain import Question, QuestionPicture
 from phyblock.errors import DataError, Problem
 from phyblock.records import MANIFEST, Record

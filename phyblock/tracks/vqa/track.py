@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from phyblock import parsing
-from phyblock.datasets import QuestionSet, QuestionTask
+from phyblock.data import QuestionSet, QuestionTask
 from phyblock.domain import LETTERS, Question, Scene, is_picture_option
 from phyblock.domain.rotation import rotated, rotated_label
 from phyblock.models.base import Image

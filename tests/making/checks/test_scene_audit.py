@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from hypothesis import strategies as st
 
-from phyblock.datasets import read_official
+from phyblock.data import read_official
 from phyblock.domain import CandidateSet, Scene
 from phyblock.making.checks import FOREIGN, CheckName, find_duplicates
 from phyblock.making.scenes.candidate_sets import make_candidates

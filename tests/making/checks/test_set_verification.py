@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from phyblock.datasets import read_builtin
+from phyblock.data import read_builtin
 from phyblock.domain import CandidateSet, Scene
 from phyblock.domain.symmetry import Symmetry
 from phyblock.making.checks import find_duplicates, find_orphans

@@ -12,7 +12,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.datasets import read_builtin
+from phyblock.data import read_builtin
 from phyblock.domain import Scene
 from phyblock.errors import DataError
 from phyblock.making.scenes.completing import GivenScene, ReadScene, complete, derived, read_given

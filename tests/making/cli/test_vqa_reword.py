@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from phyblock.cli.main import phyblock
-from phyblock.datasets import read_builtin, read_questions
+from phyblock.data import read_builtin, read_questions
 from phyblock.errors import DataError
 from phyblock.making.questions.rewording import read_wordings, reword
 from tests.making.cli.test_vqa_write import GOOD, QUESTION, SCENE, Writer, sees_negations

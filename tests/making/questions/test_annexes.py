@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from phyblock.datasets import read_builtin
+from phyblock.data import read_builtin
 from phyblock.domain import Block, Scene
 from phyblock.making.questions.annexes import with_annex
 from phyblock.making.questions.counterfactual import is_sure, resting_on

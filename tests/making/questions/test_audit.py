@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from phyblock.datasets import read_builtin, read_questions
+from phyblock.data import read_builtin, read_questions
 from phyblock.domain import LETTERS, Question
 from phyblock.domain.rotation import rotated
 from phyblock.making.questions.audit import audit_questions, duplicates_of, referents

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from phyblock.datasets import read_builtin
+from phyblock.data import read_builtin
 from phyblock.domain import LETTERS, Question, Subtask
 from phyblock.domain.blocks import COLORS
 from phyblock.domain.scene import Scene

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from phyblock.datasets import QuestionSet, read_builtin, read_questions
+from phyblock.data import QuestionSet, read_builtin, read_questions
 from phyblock.domain import LETTERS, SUBTASKS, Subtask
 from phyblock.making.questions.audit import duplicates_of
 from phyblock.making.questions.question_files import question_card

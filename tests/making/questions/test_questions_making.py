@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.datasets import read_builtin, read_questions
+from phyblock.data import read_builtin, read_questions
 from phyblock.domain import LETTERS, Question, Scene, Subtask
 from phyblock.errors import DataError, StoreError
 from phyblock.making.questions.audit import referents

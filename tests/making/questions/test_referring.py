@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.datasets import read_builtin
+from phyblock.data import read_builtin
 from phyblock.domain import BLOCK_TYPES, Block, BlockType, Color, QuestionPicture, Scene
 from phyblock.making.questions.question_draft import UnfairError
 from phyblock.making.questions.referring import (

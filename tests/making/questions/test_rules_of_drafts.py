@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.datasets import read_builtin
+from phyblock.data import read_builtin
 from phyblock.domain import Block, BlockType, Color, QuestionPicture, Scene
 from phyblock.domain.blocks import SHAPES, Euler
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, turned_form

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.datasets import read_builtin
+from phyblock.data import read_builtin
 from phyblock.domain import KIT_PALETTE, MAX_CANDIDATES, Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.errors import DataError
 from phyblock.making.poses import POSES

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.datasets import read_builtin
+from phyblock.data import read_builtin
 from phyblock.domain import Scene
 from phyblock.domain.symmetry import canonical_form
 from phyblock.errors import DataError, StoreError

@@ -9,10 +9,10 @@ from typing import Any
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from phyblock.datasets import AssemblyTask, read_builtin
+from phyblock.data import AssemblyTask, read_builtin
 from phyblock.domain import BLOCK_TYPES, COLORS, Block, Candidate, CandidateSet, Scene
 from phyblock.errors import DataError, Problem
-from tests.datasets.broken import with_value, write_scenes
+from tests.data.broken import with_value, write_scenes
 
 LENGTHS = st.floats(-10, 10).map(lambda x: x + 0.0)
 ANGLES = st.sampled_from([0.0, 45.0, 90.0, 180.0, 270.0, -90.0, 12.5])

@@ -9,8 +9,8 @@ import functools
 from pathlib import Path
 from typing import Any
 
-from phyblock.datasets.base import AssemblyTask, Dataset
-from phyblock.datasets.raw import read_lines, read_text
+from phyblock.data.base import AssemblyTask, Dataset
+from phyblock.data.raw import read_lines, read_text
 from phyblock.records.faults import refuse, validated
 from phyblock.records.scene import StoredScene, candidate_set, missing_faults
 

@@ -12,11 +12,11 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 
-from phyblock.datasets import read_builtin, read_official, read_official_questions, read_questions
-from phyblock.datasets.official import read_candidates
+from phyblock.data import read_builtin, read_official, read_official_questions, read_questions
+from phyblock.data.official import read_candidates
 from phyblock.domain import MAX_CANDIDATES
 from phyblock.errors import DataError, Problem
-from tests.datasets.broken import sound_scene, with_value, write_checkout
+from tests.data.broken import sound_scene, with_value, write_checkout
 from tests.fuzz.strategies import CANDIDATES, QUESTIONS, SCENES, sound_question
 from tests.workspace import tower
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from phyblock.datasets import Dataset, QuestionTask, read_builtin, read_questions
+from phyblock.data import Dataset, QuestionTask, read_builtin, read_questions
 from phyblock.domain import Block, Mark, QuestionPicture
 from phyblock.errors import DataError, Problem
-from tests.datasets.broken import sound_scene, with_value, without, write_scenes
+from tests.data.broken import sound_scene, with_value, without, write_scenes
 
 QUESTION: dict[str, Any] = {
     "id": "co-001",

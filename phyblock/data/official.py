@@ -19,8 +19,8 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import Field
 
-from phyblock.datasets.base import AssemblyTask, Dataset
-from phyblock.datasets.raw import gather, read_json
+from phyblock.data.base import AssemblyTask, Dataset
+from phyblock.data.raw import gather, read_json
 from phyblock.domain import MAX_CANDIDATES, CandidateSet, Scene
 from phyblock.errors import DataError, Problem
 from phyblock.records.data_values import NAME_ALLOWED, Filled, Position, is_name, triple

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from phyblock.datasets import official_prompt, read_builtin, read_official, recorded_models
+from phyblock.data import official_prompt, read_builtin, read_official, recorded_models
 from phyblock.errors import DataError, Problem
-from tests.datasets.broken import sound_scene, with_value, without, write_checkout, write_scenes
+from tests.data.broken import sound_scene, with_value, without, write_checkout, write_scenes
 
 SCENE = {**sound_scene(), "levels": [3], "parents": ["s1"]}
 

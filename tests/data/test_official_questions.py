@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from PIL import Image
 
-from phyblock.datasets import Dataset, read_builtin, read_official_questions
+from phyblock.data import Dataset, read_builtin, read_official_questions
 from phyblock.errors import DataError
 from tests.workspace import Raw, Workspace
 

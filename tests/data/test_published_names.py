@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.datasets.published_names import PUBLISHED_NAMES, TABLE2_NAMES, match_published
+from phyblock.data.published_names import PUBLISHED_NAMES, TABLE2_NAMES, match_published
 from phyblock.report import published_table
 
 SPELLINGS = {

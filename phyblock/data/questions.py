@@ -8,8 +8,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from phyblock.datasets.base import Dataset, QuestionSet, QuestionTask
-from phyblock.datasets.raw import read_lines, read_text
+from phyblock.data.base import Dataset, QuestionSet, QuestionTask
+from phyblock.data.raw import read_lines, read_text
 from phyblock.errors import DataError, Problem
 from phyblock.records.faults import validated
 from phyblock.records.picture import About

@@ -26,8 +26,8 @@ from typing import Annotated, Any, NamedTuple, cast
 
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, ValidationInfo
 
-from phyblock.datasets.base import Dataset, QuestionSet, QuestionTask
-from phyblock.datasets.raw import gather, lines_of, parse_json, read_text, used_already
+from phyblock.data.base import Dataset, QuestionSet, QuestionTask
+from phyblock.data.raw import gather, lines_of, parse_json, read_text, used_already
 from phyblock.domain import (
     LETTERS,
     SUBTASK_NAMES,

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from phyblock.datasets import read_builtin
+from phyblock.data import read_builtin
 from phyblock.domain import Block, Candidate, Scene
 from phyblock.errors import DataError, Problem
-from tests.datasets.broken import Raw, sound_scene, with_value, without, write_scenes
+from tests.data.broken import Raw, sound_scene, with_value, without, write_scenes
 
 SCENE = sound_scene()
 CUBE, ARCH = SCENE["blocks"]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from phyblock.datasets.base import Dataset
-from phyblock.datasets.builtin import SCENES_FILE, read_builtin
-from phyblock.datasets.official import read_official
-from phyblock.datasets.questions import QUESTIONS_FILE
+from phyblock.data.base import Dataset
+from phyblock.data.builtin import SCENES_FILE, read_builtin
+from phyblock.data.official import read_official
+from phyblock.data.questions import QUESTIONS_FILE
 from phyblock.errors import DataError, Problem
 from phyblock.resources import bundled, bundled_sets
 
