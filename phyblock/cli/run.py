@@ -21,7 +21,7 @@ from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
 from phyblock.report.made import names_to_write
 from phyblock.resources import bundled
-from phyblock.run.asking import asking_remarks, choice_remarks, moved_remarks, reader_remarks
+from phyblock.run.asking import asking_remarks, moved_remarks, reader_remarks
 from phyblock.run.consent import spending_refused, unlimited_spending
 from phyblock.run.estimate import estimate
 from phyblock.run.execute import Cause, RunResult
@@ -57,12 +57,6 @@ _INTERRUPTED = 130
     "--limit", type=click.IntRange(min=1), metavar="N", help="Run N scenes, spread over levels."
 )
 @click.option(
-    "--informative",
-    type=UserPath(),
-    metavar="RUN",
-    help="With --limit: choose the scenes that best tell apart the models of the folder RUN.",
-)
-@click.option(
     "--out",
     type=UserPath(),
     help="Folder of the run. [default: results/SUITE-DIGEST]",
@@ -80,7 +74,6 @@ def command(
     sets: tuple[str, ...],
     models: str | None,
     limit: int | None,
-    informative: Path | None,
     out: Path | None,
     models_file: str | None,
     no_cache: bool,
@@ -100,7 +93,7 @@ def command(
     loaded = load_suite(path, sets, data_dir=data, prompt_dirs=prompts)
     known_in = find_models_file(models_file, path)
     only, known = split_names(models), load_models(known_in)
-    plan = make_plan(loaded, known, only=only, limit=limit, informative=informative)
+    plan = make_plan(loaded, known, only=only, limit=limit)
     folder = out or plan.folder_in(Path("results"))
     asks = {"use_cache": not no_cache, "retry_failed": retry_failed}
     moved: list[str] = []
@@ -112,7 +105,7 @@ def command(
         run_folder(folder).check(names)
     if dry_run:
         show_estimate(console, plan, estimate(plan, folder, **asks))
-    for remark in (*moved, *choice_remarks(plan), *asking_remarks(loaded, plan)):
+    for remark in (*moved, *asking_remarks(loaded, plan)):
         console.print(remark, style="dim", markup=False, soft_wrap=True)
     if dry_run:
         return 0

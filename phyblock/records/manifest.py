@@ -20,7 +20,6 @@ __all__ = [
     "FORMAT",
     "MANIFEST",
     "Manifest",
-    "ManifestChoice",
     "ManifestDataset",
     "ManifestModel",
     "ManifestQuestions",
@@ -97,28 +96,6 @@ class ManifestQuestions(Line):
     """Its version; results on different versions are never mixed."""
 
 
-class ManifestChoice(Line):
-    """Scenes that were chosen because they tell the models of another run apart."""
-
-    run: Text
-    """That run, as its records name it."""
-    track: Text
-    """Its track whose scores chose."""
-    measure: Text
-    """The measure of the scores."""
-    models: tuple[Text, ...]
-    """Its models."""
-    of: int
-    """Number of scenes that these were chosen of."""
-    tau: float
-    """Kendall's tau-a of the models' ranks on such scenes and on all, cross-validated: each pair of
-    models stands on scenes that the others choose."""
-    tau_even: float
-    """The same of as many evenly spread scenes."""
-    scenes: tuple[Text, ...]
-    """Their ids."""
-
-
 class Manifest(Line):
     """What a run is: written before anything is asked, and changed by later readers alone."""
 
@@ -143,8 +120,6 @@ class Manifest(Line):
     """The same digests by way of asking, as records name it, and track; empty: there is one."""
     limit: int | None = None
     """Items at most of each track."""
-    chosen: ManifestChoice | None = None
-    """The scenes that a limit keeps, where they are not evenly spread."""
     questions: ManifestQuestions | None = None
     """The question set, where one is asked."""
     items: dict[str, int] = Field(default_factory=dict)
@@ -161,11 +136,6 @@ class Manifest(Line):
     depends on one, and in runs from before there was a choice (PyBullet)."""
     versions: dict[str, str] = Field(default_factory=dict)
     """Versions of Python, of libraries, and of the readers that read the replies."""
-
-    @property
-    def scenes_chosen(self) -> frozenset[str] | None:
-        """Ids of the scenes that were chosen; None where scenes are evenly spread."""
-        return None if self.chosen is None else frozenset(self.chosen.scenes)
 
     @property
     def run(self) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from phyblock.tracks import kind_of
 from phyblock.tracks.opening import template_prompt
 from phyblock.tracks.prompts import FORM_FACTS
 
-__all__ = ["asking_remarks", "choice_remarks", "moved_remarks"]
+__all__ = ["asking_remarks", "moved_remarks", "reader_remarks"]
 
 
 def asking_remarks(suite: Suite, plan: RunPlan) -> list[str]:
@@ -59,21 +58,6 @@ def moved_remarks(begun: Manifest, plan: RunPlan) -> list[str]:
         for model in plan.models
         if before.get(model.name) and model.config.addresses
         if set(before[model.name]).isdisjoint(model.config.addresses)
-    ]
-
-
-def choice_remarks(plan: RunPlan) -> list[str]:
-    """How scenes were chosen that are not evenly spread, and which ranks of models they keep."""
-    chosen = plan.manifest.chosen
-    if chosen is None:
-        return []
-    pairs = math.comb(len(chosen.models), 2)
-    return [
-        f"{len(chosen.scenes)} of {chosen.of} scenes, those that tell the {len(chosen.models)} "
-        f"models of run {chosen.run} apart best ({chosen.measure} of {chosen.track}); cross-"
-        f"validated over its {pairs} pairs of models, such scenes rank them as all do with "
-        f"Kendall's tau {chosen.tau:.2f} (evenly spread scenes: {chosen.tau_even:.2f}). Values are "
-        "of these scenes alone and estimate no others"
     ]
 
 

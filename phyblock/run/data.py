@@ -52,5 +52,5 @@ def recorded_dataset(
 
 def asked_about(manifest: Manifest, levels: Sequence[int], dataset: Dataset) -> Dataset:
     """What of a data set a run asks about, whose suite has these levels."""
-    tasks = select_tasks(dataset.tasks, levels, manifest.limit, manifest.scenes_chosen)
+    tasks = select_tasks(dataset.tasks, levels, manifest.limit)
     return replace(dataset, tasks=tasks)

@@ -14,7 +14,6 @@ from phyblock.data import Dataset
 from phyblock.data.version import read_version
 from phyblock.parsing import READER_VERSION
 from phyblock.records import Manifest
-from phyblock.records.manifest import ManifestChoice
 from phyblock.run.identity import earlier_identities, identity_of, inputs_of
 from phyblock.run.models import PlannedModel
 from phyblock.sim.registry import ENGINES, told_engine
@@ -34,14 +33,12 @@ def make_manifest(
     dataset: Dataset,
     variants: Mapping[Variant, Sequence[AnyTrack]],
     limit: int | None,
-    chosen: ManifestChoice | None = None,
 ) -> tuple[Manifest, tuple[str, ...]]:
     """The manifest, and its identities under earlier readers.
 
     `identity` digests what decides the results, so that only the same run goes on in a folder.
     Limits, prices, labels, tables, paths, and where and in which order models are named and served
-    are no part of it; nor is how scenes were chosen, only which. `variants` has the tracks of every
-    way of asking.
+    are no part of it. `variants` has the tracks of every way of asking.
     """
     data_version = read_version(dataset.root)
     inputs = inputs_of(suite, models, dataset, data_version, variants, limit)
@@ -50,7 +47,6 @@ def make_manifest(
         "identity": identity_of(inputs, READER_VERSION),
         "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         **inputs,
-        **({} if chosen is None else {"chosen": chosen.fields()}),
         "suite": suite.model_dump(mode="json"),
         "models": [
             {**decisive, "published": m.published, "size_b": m.size_b, **_place(m)}

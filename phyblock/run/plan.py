@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
@@ -15,7 +15,6 @@ from phyblock.data import Dataset
 from phyblock.errors import Problem, SpecError
 from phyblock.models import ModelConfig
 from phyblock.records import MANIFEST, Manifest, read_manifest
-from phyblock.records.manifest import ManifestChoice
 from phyblock.run.data import open_dataset
 from phyblock.run.kept_floors import kept_floors
 from phyblock.run.manifest import make_manifest
@@ -109,40 +108,34 @@ def make_plan(
     *,
     only: Sequence[str] = (),
     limit: int | None = None,
-    informative: Path | None = None,
     people: Sequence[PlannedModel] = (),
 ) -> RunPlan:
     """Resolve a suite against the known models.
 
     `only` names models to run in place of the suite's, `people` are asked in their place; `limit`,
     else that of the suite, keeps that many items of each track: scenes spread over levels,
-    questions over subtasks; of `informative`, the folder of a run, the scenes that tell its models
-    apart best. Raises
-    SpecError, DataError, StoreError or PromptError with all that is wrong.
+    questions over subtasks. Raises SpecError, DataError, StoreError or PromptError with all that is
+    wrong.
     """
     dataset = open_dataset(suite.dataset.format, suite.files.dataset)
     models = tuple(people) or plan_models(suite, known, only)
     suite = _with_plain_names(suite, known)
     limit = suite.limit if limit is None else limit
     asks = any(model.config.kind != "replay" for model in models)
-    chosen = None if informative is None else _informative(informative, suite, dataset, limit)
-    named = None if chosen is None else frozenset(chosen.scenes)
-    variants = _variants(Opening(suite, dataset, limit, asks, named))
+    variants = _variants(Opening(suite, dataset, limit, asks))
     tracks = variants[Variant()]
     _check_models(models, tracks, suite)
-    if named is not None:
-        _check_named(tracks, named)
-    tasks = select_tasks(dataset.tasks, suite.levels, limit, named)
+    tasks = select_tasks(dataset.tasks, suite.levels, limit)
     selected = replace(dataset, tasks=tasks)
     if not any(track.items for track in tracks):
         raise SpecError(_nothing(suite, dataset, limit))
     if asks:
         for of_variant in variants.values():
             _check_prompts(of_variant)
-    manifest, earlier = make_manifest(suite, models, selected, variants, limit, chosen)
+    manifest, earlier = make_manifest(suite, models, selected, variants, limit)
 
     def reopened(name: str, one: Suite) -> AnyTrack:
-        opening = Opening(one, dataset, limit, False, named)
+        opening = Opening(one, dataset, limit, False)
         return kind_of(name).open(opening)
 
     floors = partial(kept_floors, manifest, suite, reopened, dataset)
@@ -173,21 +166,6 @@ def _check_prompts(tracks: Sequence[AnyTrack]) -> None:
     for track in tracks:
         for item in track.items[:1]:
             next(iter(track.outlines(item)), None)
-
-
-def _informative(folder: Path, suite: Suite, dataset: Dataset, limit: int | None) -> ManifestChoice:
-    # Tables are made of pandas, which other runs do without until something was asked.
-    from phyblock.run.informative import choose_informative
-
-    return choose_informative(folder, dataset, suite.levels, limit)
-
-
-def _check_named(tracks: Sequence[AnyTrack], named: Collection[str]) -> None:
-    """Raise SpecError for tracks whose items are not scenes."""
-    others = [t.name for t in tracks if any(item.key not in named for item in t.items)]
-    if others:
-        message, hint = "asks about no whole scenes, which alone can be chosen", "leave it out"
-        raise SpecError(Problem("--informative", message, "tracks", ", ".join(others), hint=hint))
 
 
 def _nothing(suite: Suite, dataset: Dataset, limit: int | None) -> Problem:

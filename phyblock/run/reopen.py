@@ -37,8 +37,7 @@ def reopen_tracks(
     }
     source = YamlSource(str(path))
     suite = suite.with_files(SuiteFiles(path, dataset.root, source, folders))
-    named = manifest.scenes_chosen
-    opening = Opening(suite, dataset, manifest.limit, with_prompts=False, named=named)
+    opening = Opening(suite, dataset, manifest.limit, with_prompts=False)
     tracks = {track.name: track for track in open_tracks(opening, tuple(names))}
     for name, track in tracks.items():
         _check_alike(name, track, manifest, folders.get(name, dataset.root))

@@ -28,7 +28,7 @@ Test Scores*, 1968).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -461,35 +461,3 @@ def explained(values: ArrayLike, groups: Sequence[object]) -> float:
         return float("nan")
     means = np.bincount(places, weights=apart, minlength=len(names)) / sizes
     return float((sizes * means**2).sum() / total)
-
-
-def pairs_kept(counts: Floats, value: Metric, chosen: Sequence[int], rest: bool = False) -> Floats:
-    """Agreement of the order of each pair of models on the chosen items with that on all items.
-
-    `counts` has shape (models, items, columns), `value` makes a value of their sums. 1: in the same
-    order, -1: in the other, 0: even in one of them; their mean is Kendall's tau-a. With `rest` the
-    items that were not chosen stand in the place of all. In the order of `combinations`.
-    """
-    pairs = np.array(list(combinations(range(len(counts)), 2)), dtype=np.intp).reshape(-1, 2)
-    subset = value(counts[:, list(chosen)].sum(axis=1))
-    held = np.delete(counts, list(chosen), axis=1) if rest else counts
-    whole = value(held.sum(axis=1))
-    signs = [np.sign(values[pairs[:, 0]] - values[pairs[:, 1]]) for values in (subset, whole)]
-    return np.asarray(signs[0] * signs[1], dtype=np.float64)
-
-
-def pairs_kept_by_choice(
-    counts: Floats,
-    value: Metric,
-    choose: Callable[[Floats], Sequence[int]],
-    rest: bool = False,
-) -> Floats:
-    """`pairs_kept`, each pair on items that were chosen without its two models.
-
-    `choose` gives the items for the counts of some models.
-    """
-    kept = []
-    for pair in combinations(range(len(counts)), 2):
-        chosen = choose(np.delete(counts, pair, axis=0))
-        kept.append(pairs_kept(counts[list(pair)], value, chosen, rest)[0])
-    return np.array(kept)

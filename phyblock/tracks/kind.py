@@ -26,15 +26,14 @@ __all__ = ["Opening", "TrackKind", "kind_of", "kinds", "kinds_with_physics"]
 class Opening:
     """What a track is opened with; without `with_prompts` nothing is asked of anyone.
 
-    `limit` is how many items the user wants at most, None for all; `named` are the scenes that it
-    keeps, where they are not evenly spread. `shop` is where pictures of all tracks are drawn.
+    `limit` is how many items the user wants at most, None for all; `shop` is where pictures of all
+    tracks are drawn.
     """
 
     suite: Suite
     dataset: Dataset
     limit: int | None
     with_prompts: bool
-    named: frozenset[str] | None = None
     shop: Workshop = field(default_factory=lambda: Workshop(render_workers()))
 
 

@@ -153,6 +153,5 @@ def _notes(table: pd.DataFrame) -> list[str]:
         "Of the variance of scenes' means, "
         + ", ".join(f"{word} explains {number(parts[name])} %" for name, word in _GROUPS.items())
         + ".",
-        "The CSV file has all scenes; phyblock run --limit N --informative RUN takes those that "
-        "discriminate best.",
+        "The CSV file has all scenes.",
     ]

@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 
 from phyblock.data import AssemblyTask
 
-__all__ = ["evenly", "highest", "select_tasks", "spread", "stratified"]
+__all__ = ["evenly", "select_tasks", "spread", "stratified"]
 
 
 def select_tasks(
     tasks: Sequence[AssemblyTask],
     levels: Sequence[int],
     limit: int | None,
-    named: Collection[str] | None = None,
 ) -> tuple[AssemblyTask, ...]:
     """The tasks counted in any of `levels`, at most `limit` of them, in their order.
 
-    They are evenly spread, and a higher limit keeps all that a lower one keeps; where scenes are
-    `named`, it is these instead.
+    They are evenly spread, and a higher limit keeps all that a lower one keeps.
     """
     chosen = [task for task in tasks if set(task.scene.levels) & set(levels)]
-    if named is not None:
-        return tuple(task for task in chosen if task.key in named)
     if limit is None or limit >= len(chosen):
         return tuple(chosen)
     kept = set(evenly([task.scene.level for task in chosen], limit))
@@ -33,35 +28,15 @@ def select_tasks(
 
 def evenly(strata: Sequence[int], limit: int) -> list[int]:
     """`limit` positions, shared among the strata and evenly spread in each; see `stratified`."""
-    return _shared(strata, limit, lambda members: [members[i] for i in _spread_out(len(members))])
-
-
-def highest(strata: Sequence[int], values: Sequence[float], limit: int) -> list[int]:
-    """`limit` positions, shared among the strata, in each those of the highest values.
-
-    NaN comes last; of equal values the earlier position comes first.
-    """
-
-    def worth(position: int) -> tuple[bool, float]:
-        value = values[position]
-        return (True, 0.0) if math.isnan(value) else (False, -value)
-
-    return _shared(strata, limit, lambda members: sorted(members, key=worth))
-
-
-def _shared(
-    strata: Sequence[int], limit: int, ordered: Callable[[list[int]], Sequence[int]]
-) -> list[int]:
-    """The first positions of each stratum as they are `ordered`, as many as its share."""
     members: dict[int, list[int]] = {}
     for position, stratum in enumerate(strata):
         members.setdefault(stratum, []).append(position)
     names = sorted(members)
     shares = stratified([len(members[name]) for name in names], limit)
     return sorted(
-        position
+        members[name][place]
         for name, share in zip(names, shares, strict=True)
-        for position in ordered(members[name])[:share]
+        for place in spread(len(members[name]), share)
     )
 
 

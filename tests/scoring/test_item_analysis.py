@@ -11,13 +11,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
 
-from phyblock.scoring.counts import Floats, ratio_of
+from phyblock.scoring.counts import Floats
 from phyblock.scoring.statistics import (
     discrimination,
     explained,
     least_correlation,
-    pairs_kept,
-    pairs_kept_by_choice,
 )
 
 SCORES = arrays(
@@ -64,37 +62,3 @@ def test_a_correlation_at_the_bound_has_a_p_of_5_percent(models: int) -> None:
     r = least_correlation(models)
     t = r * math.sqrt((models - 2) / (1 - r * r))
     assert 2 * stats.t.sf(t, models - 2) == pytest.approx(0.05)
-
-
-@given(arrays(np.float64, (5, 7, 2), elements=st.integers(0, 9)), st.data())
-def test_kept_pairs_are_kendalls_tau_a(counts: Floats, data: st.DataObject) -> None:
-    counts[..., 1] += counts[..., 0] + 1
-    chosen = data.draw(st.lists(st.integers(0, 6), min_size=1, max_size=6, unique=True))
-    for rest in (False, True):
-        others = [i for i in range(7) if i not in chosen] if rest else list(range(7))
-        subset, whole = (ratio_of(counts[:, of].sum(axis=1)) for of in (chosen, others))
-        signs = [
-            np.sign((subset[a] - subset[b]) * (whole[a] - whole[b]))
-            for a in range(5)
-            for b in range(a + 1, 5)
-        ]
-        assert pairs_kept(counts, ratio_of, chosen, rest).tolist() == signs
-
-
-def test_no_pair_of_models_has_a_say_in_the_scenes_that_it_is_judged_on() -> None:
-    counts = np.random.default_rng(0).integers(1, 9, (5, 6, 2)).astype(float)
-    counts[..., 1] += counts[..., 0]
-    asked: list[set[float]] = []
-
-    def choose(some: Floats) -> list[int]:
-        asked.append({float(model.sum()) for model in some})
-        return list(range(len(asked) % 5 + 1))
-
-    kept = pairs_kept_by_choice(counts, ratio_of, choose)
-    totals = [float(model.sum()) for model in counts]
-    pairs = [(a, b) for a in range(5) for b in range(a + 1, 5)]
-    assert len(set(totals)) == 5
-    assert asked == [{t for i, t in enumerate(totals) if i not in pair} for pair in pairs]
-    for place, (pair, one) in enumerate(zip(pairs, kept, strict=True)):
-        chosen = list(range((place + 1) % 5 + 1))
-        assert pairs_kept(counts[list(pair)], ratio_of, chosen).tolist() == [one]

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from itertools import pairwise
 
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.tracks.selection import evenly, highest, spread, stratified
+from phyblock.tracks.selection import spread, stratified
 
 SIZES = st.lists(st.integers(1, 200), min_size=1, max_size=4)
 
@@ -51,24 +50,3 @@ def test_positions_are_spread_and_nest(size: int, data: st.DataObject) -> None:
     assert set(kept) <= set(spread(size, min(size, share + 1)))
     gaps = [b - a for a, b in pairwise([*kept, size])]
     assert max(gaps) <= 4 * size / share
-
-
-@given(
-    st.lists(
-        st.tuples(st.integers(1, 3), st.one_of(st.just(float("nan")), st.floats(-1, 1))),
-        min_size=1,
-        max_size=40,
-    ),
-    st.integers(1, 40),
-)
-def test_the_highest_of_each_level_are_kept_and_nest(
-    scenes: list[tuple[int, float]], limit: int
-) -> None:
-    levels, values = [level for level, _ in scenes], [value for _, value in scenes]
-    kept = highest(levels, values, limit)
-    assert set(kept) <= set(highest(levels, values, limit + 1))
-    assert Counter(levels[i] for i in kept) == Counter(levels[i] for i in evenly(levels, limit))
-    for taken in kept:
-        for left in set(range(len(levels))) - set(kept):
-            if levels[taken] == levels[left] and values[left] == values[left]:
-                assert values[taken] >= values[left]

@@ -114,7 +114,7 @@ def _short(message: str) -> str:
 
 def _limits(run: Run) -> list[str]:
     """What a limit kept, where it cut anything off."""
-    limit, chosen = run.manifest.limit, run.manifest.chosen
+    limit = run.manifest.limit
     items = run.design.items
     cut = [track for track in run.design.suite.tracks if limit and items.get(track, 0) >= limit]
     if not cut:
@@ -122,5 +122,4 @@ def _limits(run: Run) -> list[str]:
     counts = ", ".join(
         f"{items[track]:,} {kind_of(track).item}s of {kind_of(track).title}" for track in cut
     )
-    why = " The scenes were chosen because they tell models apart." if chosen is not None else ""
-    return [f"A limit was set: {counts} were asked about, not all of the suite.{why}"]
+    return [f"A limit was set: {counts} were asked about, not all of the suite."]

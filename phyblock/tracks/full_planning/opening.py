@@ -24,7 +24,7 @@ __all__ = ["open_full_planning"]
 def open_full_planning(opening: Opening) -> FullPlanning:
     """The track; SpecError, DataError or PromptError with what is wrong."""
     suite = opening.suite
-    tasks = select_tasks(opening.dataset.tasks, suite.levels, opening.limit, opening.named)
+    tasks = select_tasks(opening.dataset.tasks, suite.levels, opening.limit)
     pool = opening.dataset.tasks
     showing = task_showing(suite, PlanningSpec, FullPlanning.name, tasks, pool)
     if not opening.with_prompts:

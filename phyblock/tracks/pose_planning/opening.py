@@ -26,7 +26,7 @@ def open_pose_planning(opening: Opening) -> PosePlanning:
     """The track; SpecError, DataError or PromptError with what is wrong."""
     suite = opening.suite
     poses = suite.section(PoseSpec)
-    tasks = select_tasks(opening.dataset.tasks, suite.levels, opening.limit, opening.named)
+    tasks = select_tasks(opening.dataset.tasks, suite.levels, opening.limit)
     showing = task_showing(suite, PoseSpec, "pose", tasks, opening.dataset.tasks)
     rules = _rules(suite, poses)
     if not opening.with_prompts:

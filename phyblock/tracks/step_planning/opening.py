@@ -17,7 +17,7 @@ __all__ = ["open_step_planning"]
 def open_step_planning(opening: Opening) -> StepPlanning:
     """The track; SpecError, DataError or PromptError with what is wrong."""
     suite = opening.suite
-    tasks = select_tasks(opening.dataset.tasks, suite.levels, opening.limit, opening.named)
+    tasks = select_tasks(opening.dataset.tasks, suite.levels, opening.limit)
     rules = _rules(suite)
     pool = opening.dataset.tasks
     showing = task_showing(suite, StepsSpec, "steps", tasks, pool)
