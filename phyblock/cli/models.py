@@ -13,11 +13,17 @@ from rich.console import Console
 
 from phyblock.cli.console import make_console, plain_table, shown_path
 from phyblock.cli.paths import models_file_option
-from phyblock.config.models import GROUP, ModelSpec, group_names, host_of, load_models, with_members
+from phyblock.config.models import (
+    GROUP,
+    ModelConfig,
+    group_names,
+    host_of,
+    load_models,
+    with_members,
+)
 from phyblock.config.suite import Suite
 from phyblock.errors import ModelError, Problem, SpecError
 from phyblock.models import (
-    ModelConfig,
     Reply,
     api_key_status,
     ends_on,
@@ -70,7 +76,7 @@ def list_models(ctx: click.Context, retiring: bool) -> None:
     _list(path, ctx.obj, is_retiring=retiring or given["retiring"])
 
 
-def _list(path: Path, known: dict[str, ModelSpec], *, is_retiring: bool) -> None:
+def _list(path: Path, known: dict[str, ModelConfig], *, is_retiring: bool) -> None:
     console = make_console()
     if is_retiring:
         _show_retiring(console, [_config(name, known) for name in known])
@@ -90,7 +96,7 @@ def _list(path: Path, known: dict[str, ModelSpec], *, is_retiring: bool) -> None
         console.print(f"a{_TIERS}b: a for short prompts, b for the longest.", soft_wrap=True)
 
 
-def _by_group(known: dict[str, ModelSpec]) -> Iterator[tuple[str, Sequence[str]]]:
+def _by_group(known: dict[str, ModelConfig]) -> Iterator[tuple[str, Sequence[str]]]:
     """Baselines, then the models of each group, then those of none; one of several groups stands in
     each.
     """
@@ -113,7 +119,7 @@ def _show(console: Console, title: str, rows: Sequence[tuple[str, ...]]) -> None
 @command.command("check")
 @click.argument("name")
 @click.pass_obj
-def check(known: dict[str, ModelSpec], name: str) -> int:
+def check(known: dict[str, ModelConfig], name: str) -> int:
     """Make one tiny call to the model NAME, to each of its servers, and say what came back."""
     names = [*baseline_names(), *known]
     if name not in names:
@@ -174,7 +180,7 @@ def _show_retiring(console: Console, configs: Sequence[ModelConfig]) -> None:
     )
 
 
-def _config(name: str, known: dict[str, ModelSpec]) -> ModelConfig:
+def _config(name: str, known: dict[str, ModelConfig]) -> ModelConfig:
     return to_config(name, known.get(name), Suite(name="models", models=(name,)))
 
 

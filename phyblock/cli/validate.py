@@ -11,7 +11,7 @@ import click
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath, models_file_option
-from phyblock.config.models import RECORDED, ModelSpec, load_models
+from phyblock.config.models import RECORDED, ModelConfig, load_models
 from phyblock.config.suite import load_suite, suite_model
 from phyblock.data import SCENES_FILE, Dataset, read_builtin, read_official
 from phyblock.errors import InputError, Problem, SpecError
@@ -101,7 +101,7 @@ def _check_written(path: Path, sets: tuple[str, ...], models_file: str | None) -
     return [summary, *asking_remarks(suite, plan)]
 
 
-def _check_models(path: Path, known: Mapping[str, ModelSpec], names: Collection[str]) -> None:
+def _check_models(path: Path, known: Mapping[str, ModelConfig], names: Collection[str]) -> None:
     if problems := list(model_problems(path, known, names)):
         raise SpecError(problems)
 

@@ -1,10 +1,10 @@
-"""Models files: the models that suites may name, with addresses, prices and groups."""
+"""Models files: how models are called, what they cost, and which groups they belong to."""
 
 from __future__ import annotations
 
-import contextlib
 import ipaddress
 import math
+import os
 import re
 import urllib.parse
 from collections.abc import Mapping, Sequence
@@ -20,12 +20,12 @@ from pydantic import (
     Discriminator,
     Field,
     JsonValue,
-    PrivateAttr,
     Tag,
     TypeAdapter,
     ValidationError,
     model_validator,
 )
+from typing_extensions import Self
 
 from phyblock.config.validation import (
     MOST_HINTS,
@@ -38,8 +38,8 @@ from phyblock.config.validation import (
     TimeoutS,
     TopP,
     Unique,
-    UniqueSome,
     check,
+    check_unique,
     find_secrets,
     merge_problems,
     refuse,
@@ -49,14 +49,43 @@ from phyblock.errors import Problem, SpecError
 from phyblock.registry import baseline_names
 from phyblock.types import BATCH_PROVIDERS, ImageDetail, SendMode, TransportName
 
-_LONGEST = 1_000
-_EXAMPLE = "for example http://localhost:8000/v1"
-_BY_VARIABLE = "put the key alone into an environment variable and name that in api_key_env"
+Kind = Literal["litellm", "replay", "baseline", "human"]
+Effort = Literal["none", "minimal", "low", "medium", "high", "xhigh", "max"]
+
+RECORDED = "recorded"
+"""The word that stands for every folder of recorded replies."""
+GROUP = "group:"
+"""The prefix of a group's name where models are named."""
+HUMAN = "human:"
+"""The prefix of a person's name where models are named."""
+DIRECT_PROVIDERS = ("openai", "hosted_vllm", "lm_studio")
+"""Provider prefixes that mean the plain OpenAI protocol: litellm has nothing to translate."""
+OWN_SERVER = "a server of one's own"
+"""Stands for an address where it decides nothing but that it is no provider's."""
+LARGEST_REPLY_BYTES = 32 * 1024 * 1024
+"""Default limit of a reply's body [bytes]: a hundred times what the longest thoughts take."""
+
+_SELF_HOSTED = ("hosted_vllm", "lm_studio", "llamafile")
+"""Providers that are nowhere unless `api_base`, or the variable PROVIDER_API_BASE, says where."""
+_RENAMES_PARAMETERS = re.compile(r"o\d|gpt-5")
+_OWNERS = (("gpt", "openai"), ("o1", "openai"), ("o3", "openai"), ("claude", "anthropic"),
+           ("gemini", "gemini"), ("qwen-vl", "dashscope"))  # fmt: skip
+_OPENAI_DETAILS = ("auto", "low", "high", "original")
+_DETAILS: Mapping[str, tuple[str, ...]] = {
+    "openai": _OPENAI_DETAILS,
+    "azure": _OPENAI_DETAILS,
+    "gemini": ("low", "medium", "high", "ultra_high"),
+    "anthropic": (),
+}
+"""Values of `image_detail` by provider; of all others nothing is known."""
+_WITH_REPLAY = {"name", "groups", "replay", "published", "size_b"}
+_OWN_BODY = ("model", "messages", "n", "stream", "max_tokens", "max_completion_tokens")
+"""Fields of a request's body that phyblock writes: others in their place would cost unforeseen."""
 
 
 @dataclass(frozen=True)
 class AddressFault:
-    """Why an address is refused, what to do about it, and whether a secret may stand in it."""
+    """Why an address is refused, a way out, and whether a secret may stand in it."""
 
     message: str
     hint: str
@@ -64,40 +93,33 @@ class AddressFault:
 
 
 def address_fault(url: str) -> AddressFault | None:
-    """Why this is no address that a model can be called at; None when it is one."""
+    """Return why a model cannot be called at this address; None where it can.
+
+    An address stands in run folders, in the reply cache and in messages. So it may hold nothing
+    that is worth hiding, and no fault of one is described by showing it.
+    """
     scheme, mark, rest = url.partition("://")
     host = re.split(r"[/?#\\]", rest if mark else url, maxsplit=1)[0]
+    by_variable = "put the key alone into an environment variable and name that in api_key_env"
     if "@" in host:
-        return AddressFault("holds a user name or a password", _BY_VARIABLE, may_hold_secret=True)
+        return AddressFault("holds a user name or a password", by_variable, may_hold_secret=True)
     if "?" in url or "#" in url:
         message = "holds a query or a fragment, where keys are often written"
-        return AddressFault(message, _BY_VARIABLE, may_hold_secret=True)
+        return AddressFault(message, by_variable, may_hold_secret=True)
     if not mark or scheme.lower() not in ("http", "https"):
         message = "is not the address of a server"
-    elif len(url) > _LONGEST or "\\" in url or any(not "!" <= c <= "~" for c in rest[len(host) :]):
+    elif len(url) > 1_000 or "\\" in url or any(not "!" <= c <= "~" for c in rest[len(host) :]):
         message = "is too long, or holds characters that must be escaped in an address"
     elif not _is_host(host):
         message = "names no host, or one that cannot be read"
     else:
         return None
-    return AddressFault(message, _EXAMPLE, may_hold_secret="@" in url)
-
-
-def host_of(url: str) -> str:
-    """Host and port alone; "an unreadable address" where there are none."""
-    try:
-        parts = urllib.parse.urlsplit(url)
-        host, port = parts.hostname or "", parts.port
-    except ValueError:
-        return "an unreadable address"
-    if not host:
-        return "an unreadable address"
-    shown = f"[{host}]" if ":" in host else host
-    return shown if port is None else f"{shown}:{port}"
+    example = "for example http://localhost:8000/v1"
+    return AddressFault(message, example, may_hold_secret="@" in url)
 
 
 def _is_host(host: str) -> bool:
-    """Whether `host` is a name or an IP address, with or without a port."""
+    """True if `host` is a name or an IP address, with or without a port."""
     if any(character.isspace() or not character.isprintable() for character in host):
         return False
     try:
@@ -112,13 +134,30 @@ def _is_host(host: str) -> bool:
         return False
 
 
+def host_of(url: str) -> str:
+    """Return host and port alone; "an unreadable address" where there are none."""
+    try:
+        parts = urllib.parse.urlsplit(url)
+        host, port = parts.hostname or "", parts.port
+    except ValueError:
+        host, port = "", None
+    if not host:
+        return "an unreadable address"
+    shown = f"[{host}]" if ":" in host else host
+    return shown if port is None else f"{shown}:{port}"
+
+
 UsdPerMillion = Annotated[float, Field(strict=True, ge=0, le=1e9, allow_inf_nan=False)]
 
 
 def _read_day(value: object) -> date:
-    if isinstance(value, str) and re.fullmatch(r"\d{4}-\d\d-\d\d", value):
-        with contextlib.suppress(ValueError):
+    if isinstance(value, date):
+        return value
+    try:
+        if isinstance(value, str) and re.fullmatch(r"\d{4}-\d\d-\d\d", value):
             return date.fromisoformat(value)
+    except ValueError:
+        pass
     raise refuse("is no day", allowed="a day such as 2026-12-01")
 
 
@@ -175,23 +214,6 @@ class PriceSpec(RateSpec):
     tiers: Annotated[tuple[TierSpec, ...], AfterValidator(_check_rising)] = Field(
         default=(), description="Other prices of calls with long prompts, by rising `above`."
     )
-    _place: str = PrivateAttr(default="")
-
-    def __eq__(self, other: object) -> bool:
-        # Where a price is written is no part of it.
-        return isinstance(other, PriceSpec) and self.__dict__ == other.__dict__
-
-    def __hash__(self) -> int:
-        return hash(tuple(self.__dict__.values()))
-
-    @property
-    def place(self) -> str:
-        """The file and line that say so, "" where none is known."""
-        return self._place
-
-    def stands_at(self, place: str) -> None:
-        """Note the file and line that say so."""
-        self._place = place
 
 
 def _check_days(prices: tuple[PriceSpec, ...]) -> tuple[PriceSpec, ...]:
@@ -215,25 +237,6 @@ PriceSpecs = Annotated[
 """One price, or several that follow on one another."""
 
 
-Effort = Literal["none", "minimal", "low", "medium", "high", "xhigh", "max"]
-GroupName = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]{0,39}$")]
-
-_ID_PATTERN = r"^[A-Za-z0-9_.-]+/\S+$"
-_OWNERS = (("gpt", "openai"), ("o1", "openai"), ("o3", "openai"), ("claude", "anthropic"),
-           ("gemini", "gemini"), ("qwen-vl", "dashscope"))  # fmt: skip
-_OPENAI_DETAILS = ("auto", "low", "high", "original")
-_GEMINI_DETAILS = ("low", "medium", "high", "ultra_high")
-_DETAILS: Mapping[str, tuple[str, ...]] = {
-    "openai": _OPENAI_DETAILS,
-    "azure": _OPENAI_DETAILS,
-    "gemini": _GEMINI_DETAILS,
-    "anthropic": (),
-}
-"""What providers know of `image_detail`; of all others nothing is known."""
-_LARGEST_INTEGER = 2**64 - 1
-_WITH_REPLAY = {"groups", "replay", "published", "size_b"}
-
-
 def _check_id(model_id: str) -> str:
     provider, slash, rest = model_id.partition("/")
     if slash and provider and rest and " " not in model_id:
@@ -245,35 +248,46 @@ def _check_id(model_id: str) -> str:
     raise refuse("is not a litellm id", allowed="provider/model", hint=hint)
 
 
-def _check_api_base(url: str) -> str:
+def _check_address(url: str) -> str:
     fault = address_fault(url)
     if fault is None:
         return url
-    raise refuse(
-        fault.message,
-        allowed="http://... or https://..., without user, password, query and fragment",
-        hint=fault.hint,
-        hides=fault.may_hold_secret,
-    )
+    allowed = "http://... or https://..., without user, password, query and fragment"
+    raise refuse(fault.message, allowed=allowed, hint=fault.hint, hides=fault.may_hold_secret)
 
 
-Address = Annotated[
-    str, AfterValidator(_check_api_base), Field(json_schema_extra={"pattern": "^https?://"})
-]
-Addresses = Annotated[
-    Annotated[Address, Tag("one")] | Annotated[UniqueSome[Address], Tag("list")],
-    Discriminator(lambda value: "list" if isinstance(value, list | tuple) else "one"),
-]
-"""One address, or several of servers that all serve the same model."""
+def _as_list(value: object) -> object:
+    if value == []:
+        raise refuse("is empty", allowed="at least one address")
+    if value is None or isinstance(value, str):
+        return () if value is None else (value,)
+    if isinstance(value, list | tuple):
+        return value
+    raise refuse("has the wrong type", allowed="text, the address of a server, or a list of them")
 
 
-def _check_finite(body: dict[str, JsonValue]) -> dict[str, JsonValue]:
+Address = Annotated[str, AfterValidator(_check_address)]
+
+
+def _either(schema: dict[str, Any]) -> None:
+    """Say in the schema that one address may stand without brackets."""
+    one = {"type": "string", "pattern": "^https?://"}
+    several = {"type": schema.pop("type"), "items": one, "minItems": 1, "uniqueItems": True}
+    schema |= {"anyOf": [one, several, {"type": "null"}]}
+    del schema["items"], schema["default"]
+
+
+def _check_body(body: dict[str, JsonValue]) -> dict[str, JsonValue]:
+    for key in body:
+        if key in _OWN_BODY:
+            hint = "set max_tokens beside extra_body" if "tokens" in key else "take it out"
+            raise refuse("is not for extra_body to say", at=(key,), key=True, hint=hint)
     stack: list[tuple[tuple[str | int, ...], JsonValue]] = [((), body)]
     while stack:
         path, value = stack.pop()
         if isinstance(value, float) and not math.isfinite(value):
             raise refuse("is not a number that JSON can carry", at=path)
-        if isinstance(value, int) and abs(value) > _LARGEST_INTEGER:
+        if isinstance(value, int) and abs(value) >= 2**64:
             allowed = "whole numbers of 64 bits"
             raise refuse("is larger than servers can read", at=path, allowed=allowed, hides=True)
         if isinstance(value, dict):
@@ -281,10 +295,6 @@ def _check_finite(body: dict[str, JsonValue]) -> dict[str, JsonValue]:
         elif isinstance(value, list):
             stack.extend(((*path, index), item) for index, item in enumerate(value))
     return body
-
-
-RECORDED = "recorded"
-"""The word that stands for every folder of recorded replies."""
 
 
 class SamplingSpec(Section):
@@ -297,22 +307,30 @@ class SamplingSpec(Section):
     )
 
 
-class ModelSpec(Section):
+class ModelConfig(Section):
     """One model: where it is and how it is asked.
 
-    Exactly one of `id` and `replay` is given. A sampling parameter that is left out takes the
-    suite's value; one that is written as null is not sent (`params` tells the two apart).
+    Exactly one of `id` and `replay` is given; a built-in baseline and a person have a name alone.
+    A field that is left out takes the suite's value (`with_defaults`); a sampling parameter that is
+    null is not sent.
     """
 
-    id: (
-        Annotated[str, AfterValidator(_check_id), Field(json_schema_extra={"pattern": _ID_PATTERN})]
-        | None
-    ) = Field(default=None, description="litellm id with its provider: openai/gpt-4o-2024-08-06.")
-    api_base: Addresses | None = Field(
-        default=None,
+    name: str = Field(default="", exclude=True)
+    most_body_bytes: int = Field(default=LARGEST_REPLY_BYTES, exclude=True)
+    id: Annotated[
+        str,
+        AfterValidator(_check_id),
+        Field(json_schema_extra={"pattern": r"^[A-Za-z0-9_.-]+/\S+$"}),
+    ] = Field(default="", description="litellm id with its provider: openai/gpt-4o-2024-08-06.")
+    addresses: Annotated[
+        tuple[Address, ...], AfterValidator(check_unique), BeforeValidator(_as_list)
+    ] = Field(
+        default=(),
+        alias="api_base",
         description="Address of an OpenAI-compatible server (vLLM, Ollama, LM Studio), such as "
         "http://localhost:8000/v1; a list where several serve the same model. The one with the "
         "least to do is asked, one that is gone is left out and tried again.",
+        json_schema_extra=_either,
     )
     revision: Annotated[str, Field(min_length=1, max_length=100)] | None = Field(
         default=None,
@@ -335,9 +353,8 @@ class ModelSpec(Section):
         "and /batches, Anthropic, Gemini): slower, by up to a day, and cheaper. How a "
         "model is asked is no part of a run: it may change when the run goes on.",
     )
-    max_concurrency: Count | None = Field(
-        default=None,
-        description="Calls to this model under way at once; null: the suite's limit.",
+    max_concurrency: Count = Field(
+        default=64, description="Calls to this model under way at once. Left out: the suite's."
     )
     rpm: Count | None = Field(default=None, description="Requests a minute at most.")
     tpm: Count | None = Field(default=None, description="Tokens a minute at most.")
@@ -360,8 +377,10 @@ class ModelSpec(Section):
         "servers (auto, low, high, original), the media resolution of Gemini (low, medium, high, "
         "ultra_high); null: as the provider does where nothing is said.",
     )
-    extra_body: Annotated[dict[str, JsonValue], AfterValidator(_check_finite)] = Field(
-        default_factory=dict, description="Further fields of the request body, sent as they are."
+    extra_body: Annotated[dict[str, JsonValue], AfterValidator(_check_body)] = Field(
+        default_factory=dict,
+        description=f"Further fields of the request body, sent as they are; not "
+        f"{', '.join(_OWN_BODY)}.",
     )
     price: PriceSpecs | None = Field(
         default=None,
@@ -379,8 +398,10 @@ class ModelSpec(Section):
         "litellm knows the model to take one, and to OpenAI-compatible servers named by api_base. "
         "always, never: whatever is known. The prompt says the form all the same.",
     )
-    timeout_s: TimeoutS | None = Field(
-        default=None, description="Longest wait for one reply [s]; null: the suite's."
+    timeout_s: TimeoutS = Field(
+        default=300.0,
+        description="Longest wait for one reply, to the last of its bytes [s]. Left out: the "
+        "suite's.",
     )
     published: Annotated[str, Field(min_length=1)] | None = Field(
         default=None, description="Name of its row in the paper's tables."
@@ -388,7 +409,7 @@ class ModelSpec(Section):
     size_b: Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)] | None = Field(
         default=None, description="Parameters [billions], where known."
     )
-    groups: Unique[GroupName] = Field(
+    groups: Unique[Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]{0,39}$")]] = Field(
         default=(),
         description="Groups that it belongs to: group:NAME in a suite or after --models stands for "
         "all of a group, in the order of this file.",
@@ -400,56 +421,29 @@ class ModelSpec(Section):
     )
 
     @model_validator(mode="after")
-    def _check_kind(self) -> ModelSpec:
-        if self.replay is None:
-            if self.id is None:
-                raise refuse(
-                    "needs an id (or a replay folder)", hint="for example id: openai/gpt-4o"
-                )
-            self._check_direct(self.id)
-            self._check_detail(self.id)
-            if self.batch:
-                self._check_batch(self.id)
+    def _check_fields(self) -> Self:
+        provider = self.provider
+        if self.replay is not None:
+            for key in sorted(self.model_fields_set - _WITH_REPLAY):
+                allowed = ", ".join(sorted(_WITH_REPLAY - {"name"}))
+                at = (type(self).model_fields[key].alias or key,)
+                message, hint = "has no meaning for a replay", "keep either id or replay"
+                raise refuse(message, at=at, key=True, allowed=allowed, hint=hint)
             return self
-        for key in sorted(self.model_fields_set - _WITH_REPLAY):
-            raise refuse(
-                "has no meaning for a replay",
-                at=(key,),
-                key=True,
-                allowed=", ".join(sorted(_WITH_REPLAY)),
-                hint="keep either id or replay",
-            )
-        return self
-
-    @property
-    def has_address(self) -> bool:
-        """Whether it says where the model is served."""
-        return self.api_base is not None
-
-    def _check_detail(self, model_id: str) -> None:
-        """A word that a provider does not know would be ignored, or refused with every request."""
-        known = _DETAILS.get(model_id.partition("/")[0])
-        if self.image_detail is None or known is None or self.image_detail in known:
-            return
-        provider = model_id.partition("/")[0]
-        allowed = ", ".join(known) or f"none: {provider} has no such choice"
-        raise refuse(f"is not known to {provider}", at=("image_detail",), allowed=allowed)
-
-    def _check_direct(self, model_id: str) -> None:
-        """Without an address, a direct call would take the provider's key to OpenAI."""
-        provider = model_id.partition("/")[0]
         if self.transport == "direct" and not self.has_address and provider != "openai":
+            # A direct call would take the provider's key to OpenAI.
             raise refuse(
                 f"needs the address of the server that speaks for {provider}",
                 at=("transport",),
                 allowed="direct with an api_base, else auto or litellm",
                 hint="add api_base, or take the line out",
             )
-
-    def _check_batch(self, model_id: str) -> None:
-        """A batch lies at one server, which must be known to speak one of three protocols."""
-        provider = model_id.partition("/")[0]
-        if provider not in BATCH_PROVIDERS:
+        known = _DETAILS.get(provider)
+        if self.image_detail is not None and known is not None and self.image_detail not in known:
+            # It would be ignored, or refused with every request.
+            allowed = ", ".join(known) or f"none: {provider} has no such choice"
+            raise refuse(f"is not known to {provider}", at=("image_detail",), allowed=allowed)
+        if self.batch and provider not in BATCH_PROVIDERS:
             raise refuse(
                 f"is not possible: phyblock does not speak the batches of {provider}",
                 at=("batch",),
@@ -457,69 +451,112 @@ class ModelSpec(Section):
                 hint="where the provider has the /files and /batches of OpenAI, use openai/... "
                 "with its api_base; else take the line out",
             )
-        if self.has_address and not isinstance(self.api_base, str):
-            raise refuse(
-                "is not possible with a list of servers: a batch lies at one",
-                at=("batch",),
-                hint="give one api_base, or take the line out",
-            )
+        if self.batch and len(self.addresses) > 1:
+            message = "is not possible with a list of servers: a batch lies at one"
+            raise refuse(message, at=("batch",), hint="give one api_base, or take the line out")
+        return self
+
+    @property
+    def kind(self) -> Kind:
+        """How it answers: over the network, from a recording, by a rule, or by hand."""
+        if self.replay is not None:
+            return "replay"
+        if self.id:
+            return "litellm"
+        return "human" if self.name.startswith(HUMAN) else "baseline"
+
+    @property
+    def recording(self) -> Path | None:
+        """The folder of recorded replies."""
+        return None if self.replay is None else Path(self.replay)
+
+    @property
+    def provider(self) -> str:
+        """The part of the id before the first slash, "" when there is none."""
+        return self.id.partition("/")[0] if "/" in self.id else ""
+
+    @property
+    def provider_model(self) -> str:
+        """The id without the provider: the model's name as the provider knows it."""
+        return self.id.partition("/")[2] if "/" in self.id else self.id
+
+    @property
+    def api_base(self) -> str | None:
+        """The address where there is one alone."""
+        return self.addresses[0] if len(self.addresses) == 1 else None
+
+    @property
+    def has_address(self) -> bool:
+        """True if it is served elsewhere than at its provider's address."""
+        return bool(self.addresses)
+
+    def at(self, address: str | None) -> Self:
+        """Return the model as one server serves it; None is its provider's."""
+        return self.model_copy(update={"addresses": () if address is None else (address,)})
+
+    @property
+    def is_direct(self) -> bool:
+        """True if calls go straight to the server instead of through litellm.
+
+        With `auto`: an OpenAI-compatible server that is named by `api_base`, unless the model is
+        one of those for which litellm renames parameters.
+        """
+        if self.transport != "auto":
+            return self.transport == "direct"
+        return (
+            self.has_address
+            and self.provider in DIRECT_PROVIDERS
+            and _RENAMES_PARAMETERS.match(self.provider_model) is None
+        )
+
+    @property
+    def sends_format(self) -> bool:
+        """True if a request's `response_format` is sent; else the prompt alone says the form."""
+        return self.response_format == "always"
+
+    @property
+    def params(self) -> dict[str, Any]:
+        """Sampling parameters to send, by their OpenAI names."""
+        names = ("temperature", "top_p", "max_tokens", "reasoning_effort")
+        params = {name: value for name in names if (value := getattr(self, name)) is not None}
+        return {**params, "extra_body": self.extra_body} if self.extra_body else params
 
     @property
     def prices(self) -> tuple[PriceSpec, ...]:
         """Its own prices in the order of their days."""
         return (self.price,) if isinstance(self.price, PriceSpec) else self.price or ()
 
-    def params(self, defaults: SamplingSpec) -> dict[str, Any]:
-        """Sampling parameters to send, by their OpenAI names: its own, else the suite's."""
-        chosen = {
-            key: getattr(self if key in self.model_fields_set else defaults, key)
-            for key in ("temperature", "top_p", "max_tokens")
+    def with_defaults(self, values: Mapping[str, Any]) -> Self:
+        """Return the model with values for those fields that its entry leaves out."""
+        missing = {name: v for name, v in values.items() if name not in self.model_fields_set}
+        return self.model_copy(update=missing)
+
+    def identity(self) -> dict[str, object]:
+        """Return what changes replies, JSON-able: not the limits, the price, the transport, nor at
+        which address a custom server is. That it is no provider's does count, or the replies of a
+        stand-in would pass for the provider's. What a model has not is not said.
+        """
+        identity: dict[str, object] = {
+            "kind": self.kind,
+            "id": self.id or self.name,
+            "api_base": OWN_SERVER if self.has_address else None,
+            "params": self.params,
+            "sends_seed": self.seed != "never",
+            "recording": self.replay,
         }
-        chosen["reasoning_effort"] = self.reasoning_effort
-        return {key: value for key, value in chosen.items() if value is not None}
+        if self.revision is not None:
+            identity["revision"] = self.revision
+        if self.sends_format:
+            identity["response_format"] = True
+        if self.image_detail is not None:
+            identity["image_detail"] = self.image_detail
+        return identity
 
 
-GROUP = "group:"
-"""What stands before the name of a group where models are named."""
-HUMAN = "human:"
-"""What stands before the name of a person where models are named."""
-
-
-def group_names(known: Mapping[str, ModelSpec]) -> tuple[str, ...]:
-    """The groups that models belong to, in the order in which the file names them."""
-    return tuple(dict.fromkeys(group for spec in known.values() for group in spec.groups))
-
-
-def with_members(names: Sequence[str], known: Mapping[str, ModelSpec]) -> tuple[str, ...]:
-    """The names with the members of a group in its place, each once; an unknown group stays."""
-    groups = group_names(known)
-    members: dict[str, None] = {}
-    for name in names:
-        group = name.removeprefix(GROUP)
-        if name.startswith(GROUP) and group in groups:
-            members |= {n: None for n, spec in known.items() if group in spec.groups}
-        else:
-            members[name] = None
-    return tuple(members)
-
-
-def unknown_model(name: str) -> str:
-    """What is wrong with a name that is neither a model nor a group."""
-    if name.startswith(GROUP):
-        return "is no group of the models file"
-    if name.startswith(HUMAN):
-        return "is a person, who answers in `phyblock play`"
-    return "is neither in the models file nor a built-in baseline"
-
-
-_NAME = TypeAdapter(ModelName)
-
-
-def load_models(path: Path) -> dict[str, ModelSpec]:
+def load_models(path: Path) -> dict[str, ModelConfig]:
     """Read a models file: each name maps to a litellm id or to a mapping.
 
-    Paths of replay folders come out absolute.
-    Raises SpecError with all that is wrong.
+    Paths of replay folders come out absolute. Raises SpecError with all that is wrong.
     """
     source = read_yaml(path)
     data = {} if source.data is None else source.data
@@ -527,14 +564,14 @@ def load_models(path: Path) -> dict[str, ModelSpec]:
         wrong = Problem(source.where(()), "has the wrong type", "", show(data),
                         "a mapping: name: provider/model")  # fmt: skip
         raise SpecError([*source.problems, wrong])
-    models: dict[str, ModelSpec] = {}
+    models: dict[str, ModelConfig] = {}
     problems: list[Problem] = []
     for name, entry in data.items():
-        hints = max(0, MOST_HINTS - len(problems))
-        spec, of_entry = _read_entry(name, entry, source, hints)
+        problems += _check_name(name, source)
+        config, of_entry = _read_entry(name, entry, source, max(0, MOST_HINTS - len(problems)))
         problems += of_entry
-        if spec is not None:
-            models[name] = spec
+        if config is not None:
+            models[name] = config
     secrets = list(find_secrets(data, source))
     merged = merge_problems(source.problems, secrets, problems)
     if merged:
@@ -544,42 +581,78 @@ def load_models(path: Path) -> dict[str, ModelSpec]:
 
 def _read_entry(
     name: str, entry: Any, source: YamlSource, hints: int
-) -> tuple[ModelSpec | None, list[Problem]]:
-    problems = _check_name(name, source)
+) -> tuple[ModelConfig | None, list[Problem]]:
     if not isinstance(entry, str | dict):
         wrong = Problem(source.where((name,)), "has the wrong type", name, show(entry),
                         "a litellm id (provider/model), or a mapping")  # fmt: skip
-        return None, [*problems, wrong]
-    spec, of_entry = check(ModelSpec, {"id": entry} if isinstance(entry, str) else entry, source,
-                        (name,), hints)  # fmt: skip
-    problems += of_entry
-    if spec is None:
+        return None, [wrong]
+    fields = {"id": entry} if isinstance(entry, str) else entry
+    if unknown := [key for key in ("name", "most_body_bytes") if key in fields]:
+        where = source.where((name, unknown[0]), key=True)
+        return None, [Problem(where, "is not a known key", f"{name}.{unknown[0]}")]
+    config, problems = check(ModelConfig, fields, source, (name,), hints)
+    if config is None:
         return None, problems
-    for index, price in enumerate(spec.prices):
-        line = source.where((name, "price", index)).split(":")[-2]
-        price.stands_at(f"{Path(source.label).name} line {line}")
-    if spec.replay is not None:
-        try:
-            folder = str(expand(spec.replay, Path(source.label).parent))
-        except ValueError as error:
-            where = source.where((name, "replay"))
-            return None, [*problems, Problem(where, str(error), f"{name}.replay", spec.replay)]
-        spec = spec.model_copy(update={"replay": folder})
-    return spec, problems
+    where = source.where((name,))
+    if not config.id and config.replay is None:
+        message, hint = "needs an id (or a replay folder)", "for example id: openai/gpt-4o"
+        return None, [Problem(where, message, name, show(entry), hint=hint)]
+    variable = f"{config.provider.upper()}_API_BASE"
+    if config.provider in _SELF_HOSTED and not (config.has_address or os.environ.get(variable)):
+        message = "is behind a server of your own: it needs an address"
+        hint = f"add api_base: http://localhost:8000/v1, or set {variable}"
+        field = f"{name}.id"
+        return None, [Problem(source.where((name, "id")), message, field, config.id, hint=hint)]
+    if config.replay is None:
+        return config.model_copy(update={"name": name}), []
+    try:
+        replay = str(expand(config.replay, Path(source.label).parent))
+    except ValueError as error:
+        where = source.where((name, "replay"))
+        return None, [Problem(where, str(error), f"{name}.replay", config.replay)]
+    return config.model_copy(update={"name": name, "replay": replay}), []
 
 
 def _check_name(name: str, source: YamlSource) -> list[Problem]:
-    where = source.where((name,), key=True)
-    if name in (*baseline_names(), RECORDED):
-        taken = ", ".join((*baseline_names(), RECORDED))
-        return [Problem(where, "is a name of phyblock's own", name, allowed=f"not {taken}",
-                        hint="choose another name")]  # fmt: skip
-    if name.startswith(GROUP):
-        message, hint = f"begins with {GROUP}, which names groups", "choose another name"
-        return [Problem(where, message, name, show(name), hint=hint)]
+    where, hint = source.where((name,), key=True), "choose another name"
+    own = (*baseline_names(), RECORDED)
+    if name in own:
+        allowed = f"not {', '.join(own)}"
+        return [Problem(where, "is a name of phyblock's own", name, allowed=allowed, hint=hint)]
+    for prefix, named in ((GROUP, "groups"), (HUMAN, "people")):
+        if name.startswith(prefix):
+            message = f"begins with {prefix}, which names {named}"
+            return [Problem(where, message, name, show(name), hint=hint)]
     try:
-        _NAME.validate_python(name)
+        TypeAdapter(ModelName).validate_python(name)
     except ValidationError:
         allowed = "up to 80 letters, digits and . _ : + -, starting with a letter or digit"
         return [Problem(where, "is not a usable name", name, show(name), allowed)]
     return []
+
+
+def group_names(known: Mapping[str, ModelConfig]) -> tuple[str, ...]:
+    """Return the groups that models belong to, in the order in which the file names them."""
+    return tuple(dict.fromkeys(group for config in known.values() for group in config.groups))
+
+
+def with_members(names: Sequence[str], known: Mapping[str, ModelConfig]) -> tuple[str, ...]:
+    """Return the names with the members of a group in its place; an unknown group stays."""
+    groups = group_names(known)
+    members: dict[str, None] = {}
+    for name in names:
+        group = name.removeprefix(GROUP)
+        if name.startswith(GROUP) and group in groups:
+            members |= {n: None for n, config in known.items() if group in config.groups}
+        else:
+            members[name] = None
+    return tuple(members)
+
+
+def unknown_model(name: str) -> str:
+    """Return what is wrong with a name that is neither a model nor a group."""
+    if name.startswith(GROUP):
+        return "is no group of the models file"
+    if name.startswith(HUMAN):
+        return "is a person, who answers in `phyblock play`"
+    return "is neither in the models file nor a built-in baseline"

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from phyblock.config.models import RECORDED, ModelSpec
+from phyblock.config.models import RECORDED, ModelConfig
 from phyblock.config.suite import suite_model
 from phyblock.registry import baseline_names, known_tracks, table_names
 
@@ -31,17 +31,19 @@ def suite_schema() -> dict[str, Any]:
 
 def models_schema() -> dict[str, Any]:
     """The schema of a models file."""
-    spec = ModelSpec.model_json_schema()
+    spec = ModelConfig.model_json_schema()
     definitions = spec.pop("$defs")
+    for hidden in ("name", "most_body_bytes"):
+        del spec["properties"][hidden]
     spec["oneOf"] = [{"required": ["id"]}, {"required": ["replay"]}]
     one = {"type": "string", "pattern": r"^[A-Za-z0-9_.-]+/\S+$",
            "description": "litellm id with its provider: openai/gpt-4o-2024-08-06."}  # fmt: skip
     schema = {
-        "$defs": {**definitions, "ModelSpec": spec},
+        "$defs": {**definitions, "ModelConfig": spec},
         "type": ["object", "null"],
         "description": "Models by the name that suites use.",
         "propertyNames": {"pattern": _NAME, "not": {"enum": [*baseline_names(), RECORDED]}},
-        "additionalProperties": {"anyOf": [one, {"$ref": "#/$defs/ModelSpec"}]},
+        "additionalProperties": {"anyOf": [one, {"$ref": "#/$defs/ModelConfig"}]},
     }
     return _finish(schema, "phyblock models")
 

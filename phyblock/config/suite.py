@@ -28,7 +28,7 @@ from typing_extensions import Self
 from phyblock.config.models import (
     GROUP,
     RECORDED,
-    ModelSpec,
+    ModelConfig,
     SamplingSpec,
     group_names,
     unknown_model,
@@ -878,7 +878,7 @@ def suite_tracks(path: Path) -> tuple[str, ...]:
     return tuple(read_yaml(path).data.get("tracks", default))
 
 
-def resolve_models(suite: Suite, known: Mapping[str, ModelSpec]) -> dict[str, ModelSpec | None]:
+def resolve_models(suite: Suite, known: Mapping[str, ModelConfig]) -> dict[str, ModelConfig | None]:
     """The suite's models in its order, those of a group in its place; None stands for a built-in
     baseline.
 

@@ -8,7 +8,6 @@ from phyblock.models.batches import BatchFiles, remove_unfinished, under_way, wa
 from phyblock.models.breaker import Breakers
 from phyblock.models.build import build_model
 from phyblock.models.cache import CacheStats, ReplyCache, reply_key
-from phyblock.models.config import Kind, ModelConfig
 from phyblock.models.cost import (
     Budget,
     Estimate,
@@ -43,10 +42,8 @@ __all__ = [
     "HaltedError",
     "Image",
     "KeyStatus",
-    "Kind",
     "Message",
     "Model",
-    "ModelConfig",
     "ModelEvent",
     "Observer",
     "Price",

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import Problem, SpecError
 from phyblock.models.base import Request
-from phyblock.models.config import ModelConfig
 from phyblock.records.reply import Reply, Usage
 from phyblock.registry import baseline_names, baseline_rules
 from phyblock.stable import drawn_bytes
@@ -24,13 +24,13 @@ class BaselineModel:
     needs_messages = False
 
     def __init__(self, config: ModelConfig) -> None:
-        if config.id not in baseline_names():
+        if config.name not in baseline_names():
             allowed = ", ".join(baseline_names())
-            problem = Problem(f"model {config.name}", "is no baseline", "", config.id, allowed)
+            problem = Problem(f"model {config.name}", "is no baseline", "", config.name, allowed)
             raise SpecError(problem)
         self.name = config.name
-        self._id = config.id
-        self._rules = baseline_rules(config.id)
+        self._id = config.name
+        self._rules = baseline_rules(config.name)
 
     async def ask(self, request: Request) -> Reply:
         """The rule's answer; DataError when an oracle lacks a candidate.

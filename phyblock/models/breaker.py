@@ -15,8 +15,8 @@ import contextlib
 import re
 from collections.abc import Awaitable, Callable, Hashable, Iterator
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import ModelError, RetryableError
-from phyblock.models.config import ModelConfig
 from phyblock.models.events import Tell, ignore_text
 from phyblock.models.retry import RetryPolicy, backoff_s, is_success
 

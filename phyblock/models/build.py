@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from phyblock.errors import Problem, SpecError
+from phyblock.config.models import ModelConfig
 from phyblock.models.base import Model
 from phyblock.models.baselines import BaselineModel
 from phyblock.models.batches import BatchFiles, BatchModel, BatchParts, batch_protocol
 from phyblock.models.breaker import Breakers
 from phyblock.models.cache import ReplyCache
 from phyblock.models.chat import ChatModel, ChatParts
-from phyblock.models.config import ModelConfig
 from phyblock.models.cost import Budget, prices_of, require_prices
 from phyblock.models.direct_call import DirectTransport
 from phyblock.models.events import Observer, ignore_event
@@ -49,7 +48,6 @@ def build_model(
         return BaselineModel(config)
     if config.kind == "replay":
         return open_replay(config)
-    _check(config)
     secrets = secrets_of(config)
     policy = policy or RetryPolicy()
 
@@ -86,11 +84,3 @@ def build_model(
         halt=halt,
     )
     return ChatModel(config, parts)
-
-
-def _check(config: ModelConfig) -> None:
-    if not config.provider:
-        hint = "for example openai/gpt-4o-2024-08-06"
-        raise SpecError(
-            Problem(f"model {config.name}", "needs a provider", "id", config.id, hint=hint)
-        )

@@ -19,9 +19,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import Problem, StoreError, reason_of
 from phyblock.models.base import Image, Message, Request
-from phyblock.models.config import ModelConfig
 from phyblock.models.events import Tell
 from phyblock.models.payload import wire_params
 from phyblock.models.raw_replies import token_count

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from dataclasses import dataclass, replace
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import (
     BudgetReachedError,
     ModelError,
@@ -17,7 +18,6 @@ from phyblock.errors import (
 )
 from phyblock.models.base import Request
 from phyblock.models.cache import ReplyCache, reply_key
-from phyblock.models.config import ModelConfig
 from phyblock.models.cost import Budget, estimate
 from phyblock.models.events import EventKind, ModelEvent, Observer
 from phyblock.models.halt import Halt, HaltedError

@@ -12,15 +12,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import date, timedelta
 
-from phyblock.config.models import host_of
+from phyblock.config.models import BatchRateSpec, ModelConfig, RateSpec, host_of
 from phyblock.errors import BudgetReachedError, ModelError, Problem, SpecError
 from phyblock.models.base import Image, Request
-from phyblock.models.config import ModelConfig
 from phyblock.models.keys import KEYLESS
 from phyblock.models.payload import wire_params
 from phyblock.models.picture_tokens import picture_tokens
 from phyblock.models.price_map import map_entry, mapped_prices
-from phyblock.models.prices import FREE, Prices, today
+from phyblock.models.prices import FREE, Price, Prices, Rate, Tariff, today
 from phyblock.models.retry import is_success
 from phyblock.models.text_tokens import text_tokens
 from phyblock.records.reply import Reply, Usage
@@ -84,8 +83,30 @@ def prices_of(config: ModelConfig) -> Prices | None:
     if config.kind != "litellm":
         return FREE
     mapped = mapped_prices(config)
-    prices = mapped if config.prices is None else config.prices.after(mapped)
+    prices = _own_prices(config).after(mapped) if config.prices else mapped
     return prices.with_halves() if prices is not None and _halves_batches(config) else prices
+
+
+def _own_prices(config: ModelConfig) -> Prices:
+    """Prices that the models file says."""
+
+    def rate(spec: RateSpec, above_tokens: int = 0) -> Rate:
+        batch = None if spec.batch is None else price(spec.batch)
+        return Rate(price(spec), above_tokens, batch)
+
+    def price(spec: BatchRateSpec) -> Price:
+        return Price(spec.input, spec.output, spec.cached, spec.cache_write)
+
+    return Prices(
+        tuple(
+            Tariff(
+                (rate(spec), *(rate(tier, tier.above) for tier in spec.tiers)),
+                spec.since,
+                "the models file",
+            )
+            for spec in config.prices
+        )
+    )
 
 
 def _halves_batches(config: ModelConfig) -> bool:

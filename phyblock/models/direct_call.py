@@ -8,9 +8,9 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import Problem, SpecError
 from phyblock.models.completions import read_completion
-from phyblock.models.config import ModelConfig
 from phyblock.models.http_client import Client
 from phyblock.models.keys import api_key
 from phyblock.models.payload import json_body

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
+from phyblock.config.models import DIRECT_PROVIDERS, ModelConfig
 from phyblock.errors import ModelError, RefusedError
-from phyblock.models.config import DIRECT_PROVIDERS, ModelConfig
 from phyblock.models.price_map import map_entry
 
 __all__ = ["FORMAT_HINT", "refuses_format", "takes_format"]

@@ -15,9 +15,8 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, BinaryIO, Protocol
 
-from phyblock.config.models import host_of
+from phyblock.config.models import ModelConfig, host_of
 from phyblock.errors import RetryableError, UnreachableError
-from phyblock.models.config import ModelConfig
 from phyblock.models.unpacking import ACCEPTED_ENCODINGS, BodyReader
 
 if TYPE_CHECKING:

@@ -7,9 +7,8 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from phyblock.config.models import address_fault
+from phyblock.config.models import ModelConfig, address_fault
 from phyblock.errors import Problem, SpecError, UnavailableError
-from phyblock.models.config import ModelConfig
 from phyblock.models.masks import hidden
 
 __all__ = [

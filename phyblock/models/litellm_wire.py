@@ -20,8 +20,8 @@ from typing import Any
 import httpx
 from litellm.llms.custom_httpx.http_handler import AsyncHTTPHandler, HTTPHandler
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import ModelError, UnavailableError, UnreachableError
-from phyblock.models.config import ModelConfig
 from phyblock.models.http_client import Answer, Client
 from phyblock.models.litellm_bodies import readable_body
 from phyblock.models.refusals import read_body, refusal

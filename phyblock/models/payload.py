@@ -13,9 +13,9 @@ import secrets
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import DataError, Problem
 from phyblock.models.base import Image, Message, Request
-from phyblock.models.config import ModelConfig
 from phyblock.types import ImageDetail
 
 __all__ = ["data_uri", "json_body", "mime_type", "wire_messages", "wire_params"]

@@ -14,7 +14,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from phyblock.models.config import ModelConfig
+from phyblock.config.models import ModelConfig
 from phyblock.models.prices import Price, Prices, Rate, Tariff
 
 __all__ = ["map_entry", "mapped_prices", "mapped_providers"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 
-from phyblock.models.config import DIRECT_PROVIDERS, ModelConfig
+from phyblock.config.models import DIRECT_PROVIDERS, ModelConfig
 from phyblock.models.keys import KEYLESS
 from phyblock.models.litellm_call import litellm_providers
 from phyblock.models.price_map import map_entry, mapped_providers

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import DataError, Problem, RefusedError, SampleError, reason_of
 from phyblock.files import load_json, read_text
 from phyblock.models.base import Request
-from phyblock.models.config import ModelConfig
 from phyblock.models.raw_replies import RawReply, read_raw_reply
 from phyblock.records import RECORDS, Recorded, RecordedLines
 from phyblock.records.reply import Reply
@@ -57,7 +57,7 @@ class RunReplayModel:
 
     def __init__(self, config: ModelConfig, path: Path) -> None:
         self.name = config.name
-        self._records = _read_records(path, config.id or config.name)
+        self._records = _read_records(path, config.name)
 
     async def ask(self, request: Request) -> Reply | None:
         """The reply recorded for the request's track, key and seed, or None.

@@ -8,9 +8,9 @@ import contextlib
 from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import UnavailableError
 from phyblock.models.breaker import Breaker, Breakers
-from phyblock.models.config import ModelConfig
 from phyblock.models.pace import FixedPace, Mark, Pace
 from phyblock.models.transport import Transport
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import date
 
-from phyblock.models.config import ModelConfig
+from phyblock.config.models import ModelConfig
 from phyblock.models.keys import KEYLESS
 from phyblock.models.price_map import map_entry
 

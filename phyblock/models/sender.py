@@ -7,9 +7,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import ModelError, UnavailableError
 from phyblock.models.base import Request
-from phyblock.models.config import ModelConfig
 from phyblock.models.cost import Budget, Estimate, counted, may_be_billed, reply_cost_usd
 from phyblock.models.formats import FORMAT_HINT, refuses_format
 from phyblock.models.halt import Halt
@@ -48,7 +48,7 @@ class Sender:
         self._prices = prices
         self._halt = halt
         self._say_seedless = say_seedless
-        self._takes_seed = config.sends_seed != "never"
+        self._takes_seed = config.seed != "never"
         self._took_format = False
 
     def cost_usd(self, reply: Reply) -> float | None:
@@ -70,7 +70,7 @@ class Sender:
             reply = await self._send_formed(call, outlay, transport)
         except SeedRefusedError as refusal:
             outlay.sent -= not refusal.sent
-            if self._config.sends_seed == "always":
+            if self._config.seed == "always":
                 raise UnavailableError("the provider takes no seed, and seed is `always`") from None
             call = replace(call, seed=None)
             reply = await self._send_formed(call, outlay, transport)

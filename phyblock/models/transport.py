@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import ModelError, PhyblockError, RetryableError
 from phyblock.models.base import Message
-from phyblock.models.config import ModelConfig
 from phyblock.models.http_client import Client, HttpClient
 from phyblock.models.keys import hidden
 from phyblock.records.reply import Reply

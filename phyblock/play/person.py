@@ -7,10 +7,12 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
-from phyblock.config.models import HUMAN
+from pydantic import JsonValue
+
+from phyblock.config.models import HUMAN, ModelConfig
 from phyblock.config.suite import Suite
 from phyblock.errors import Problem, SpecError
-from phyblock.models import ModelConfig, Reply, Request, Usage
+from phyblock.models import Reply, Request, Usage
 from phyblock.play.order import arranged, row_of_name
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan, make_plan
@@ -55,9 +57,10 @@ class Person:
 
     def planned(self) -> PlannedModel:
         """The person in a plan; number and text make runs that are not the same."""
-        number = {} if self.number is None else {"number": self.number}
-        params = {**number, "consent": self.consent_sha256}
-        config = ModelConfig(self.model, "human", self.model, params=params, max_concurrency=1)
+        params: dict[str, JsonValue] = {"consent": self.consent_sha256}
+        if self.number is not None:
+            params["number"] = self.number
+        config = ModelConfig(name=self.model, extra_body=params, max_concurrency=1)
         return PlannedModel(self.model, config)
 
 

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import io
-from dataclasses import replace
 
 from PIL import Image as PillowImage
 
+from phyblock.config.models import ModelConfig
 from phyblock.models import (
     Gate,
     Image,
     Message,
-    ModelConfig,
     Reply,
     Request,
     RetryPolicy,
@@ -35,7 +34,7 @@ async def check_model(config: ModelConfig) -> Reply:
     messages = (Message("user", (picture, _QUESTION)),)
     request = Request("check", 0, messages, {}, "", None)
     model = build_model(
-        replace(config, sends_seed="never", batch=False),
+        config.model_copy(update={"seed": "never", "batch": False}),
         cache=None,
         overall=Gate(1),
         policy=RetryPolicy(attempts=1, retry_for_s=0.0),

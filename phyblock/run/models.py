@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from phyblock.config.models import (
     GROUP,
     RECORDED,
-    BatchRateSpec,
-    ModelSpec,
-    RateSpec,
+    ModelConfig,
     group_names,
     unknown_model,
     with_members,
@@ -20,15 +18,7 @@ from phyblock.config.suite import Suite, resolve_models
 from phyblock.data import recorded_models
 from phyblock.data.published_names import match_published
 from phyblock.errors import Problem, SpecError
-from phyblock.models import (
-    ModelConfig,
-    Price,
-    Prices,
-    Rate,
-    Tariff,
-    server_address,
-    takes_format,
-)
+from phyblock.models import server_address, takes_format
 from phyblock.records import RECORDS, Recorded, RecordedLines
 from phyblock.registry import baseline_names
 from phyblock.text import did_you_mean
@@ -48,7 +38,7 @@ class PlannedModel:
 
 
 def plan_models(
-    suite: Suite, known: Mapping[str, ModelSpec], only: Sequence[str]
+    suite: Suite, known: Mapping[str, ModelConfig], only: Sequence[str]
 ) -> tuple[PlannedModel, ...]:
     """The suite's models in its order, or those that `only` names, in its order.
 
@@ -104,76 +94,34 @@ def _check_known(names: Sequence[str], known: Sequence[str], message: Callable[[
         raise SpecError(problems)
 
 
-def _planned(name: str, spec: ModelSpec | None, suite: Suite) -> PlannedModel:
-    published = match_published(name) if spec is None else spec.published or match_published(name)
-    size_b = None if spec is None else spec.size_b
-    return PlannedModel(name, to_config(name, spec, suite), published, size_b)
+def _planned(name: str, known: ModelConfig | None, suite: Suite) -> PlannedModel:
+    config = to_config(name, known, suite)
+    published = config.published or match_published(name)
+    return PlannedModel(name, config, published, config.size_b)
 
 
-def to_config(name: str, spec: ModelSpec | None, suite: Suite) -> ModelConfig:
-    """How to call one model; None as spec is a built-in baseline."""
-    if spec is None:
+def to_config(name: str, known: ModelConfig | None, suite: Suite) -> ModelConfig:
+    """A model as a suite asks it; None stands for a built-in baseline."""
+    if known is None:
         assert name in baseline_names(), name
-        return ModelConfig(name=name, kind="baseline", id=name)
-    if spec.replay is not None:
-        return _replay(name, Path(spec.replay))
-    assert spec.id is not None
-    params = spec.params(suite.sampling)
-    if spec.extra_body:
-        params["extra_body"] = spec.extra_body
-    api_bases = spec.api_base if isinstance(spec.api_base, tuple) else ()
-    api_base = spec.api_base if isinstance(spec.api_base, str) else None
-    config = ModelConfig(
-        name=name,
-        kind="litellm",
-        id=spec.id,
-        api_base=api_base if spec.has_address else server_address(spec.id),
-        api_bases=api_bases,
-        api_key_env=spec.api_key_env,
-        transport=spec.transport,
-        params=params,
-        max_concurrency=spec.max_concurrency or suite.limits.max_concurrency,
-        rpm=spec.rpm,
-        tpm=spec.tpm,
-        prices=_prices(spec),
-        sends_seed=spec.seed,
-        revision=spec.revision,
-        image_detail=spec.image_detail,
-        timeout_s=spec.timeout_s or suite.limits.timeout_s,
-        batch=spec.batch,
-    )
-    return replace(config, sends_format=_sends_format(config, spec, suite))
+        return ModelConfig(name=name)
+    if known.kind != "litellm":
+        return known
+    limits = suite.limits.model_dump(include={"timeout_s", "max_concurrency"})
+    config = known.with_defaults({"name": name, **suite.sampling.model_dump(), **limits})
+    if not config.has_address:
+        config = config.at(server_address(config.id))
+    mode = "always" if _sends_format(config, suite) else "never"
+    return config.model_copy(update={"response_format": mode})
 
 
-def _prices(spec: ModelSpec) -> Prices | None:
-    tariffs = tuple(
-        Tariff(
-            (_rate(price), *(_rate(tier, tier.above) for tier in price.tiers)),
-            price.since,
-            price.place,
-        )
-        for price in spec.prices
-    )
-    return Prices(tariffs) if tariffs else None
-
-
-def _rate(spec: RateSpec, above_tokens: int = 0) -> Rate:
-    batch = None if spec.batch is None else _price(spec.batch)
-    return Rate(_price(spec), above_tokens, batch)
-
-
-def _price(spec: BatchRateSpec) -> Price:
-    return Price(spec.input, spec.output, spec.cached, spec.cache_write)
-
-
-def _sends_format(config: ModelConfig, spec: ModelSpec, suite: Suite) -> bool:
+def _sends_format(config: ModelConfig, suite: Suite) -> bool:
     """Whether the JSON schema of answers is sent; SpecError for a model that says its own."""
-    mode = spec.response_format
-    if suite.answer_format == "text" or mode == "never":
+    if suite.answer_format == "text" or config.response_format == "never":
         return False
-    if mode == "auto" and not takes_format(config):
+    if config.response_format == "auto" and not takes_format(config):
         return False
-    if "response_format" in spec.extra_body:
+    if "response_format" in config.extra_body:
         message = "says its own response_format, where the suite asks for one"
         hint = "take it out of extra_body, or set response_format: never to send it all the same"
         field = "extra_body.response_format"
@@ -182,4 +130,4 @@ def _sends_format(config: ModelConfig, spec: ModelSpec, suite: Suite) -> bool:
 
 
 def _replay(name: str, folder: Path) -> ModelConfig:
-    return ModelConfig(name=name, kind="replay", id=name, recording=folder)
+    return ModelConfig(name=name, replay=str(folder))

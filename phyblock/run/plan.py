@@ -9,11 +9,10 @@ from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from phyblock.config.models import RECORDED, ModelSpec, with_members
+from phyblock.config.models import RECORDED, ModelConfig, with_members
 from phyblock.config.suite import Suite, Variant
 from phyblock.data import Dataset
 from phyblock.errors import Problem, SpecError
-from phyblock.models import ModelConfig
 from phyblock.records import MANIFEST, Manifest, read_manifest
 from phyblock.run.data import open_dataset
 from phyblock.run.kept_floors import kept_floors
@@ -104,7 +103,7 @@ class RunPlan:
 
 def make_plan(
     suite: Suite,
-    known: Mapping[str, ModelSpec],
+    known: Mapping[str, ModelConfig],
     *,
     only: Sequence[str] = (),
     limit: int | None = None,
@@ -142,7 +141,7 @@ def make_plan(
     return RunPlan(suite, models, selected, variants, manifest, earlier, floors)
 
 
-def _with_plain_names(suite: Suite, known: Mapping[str, ModelSpec]) -> Suite:
+def _with_plain_names(suite: Suite, known: Mapping[str, ModelConfig]) -> Suite:
     """The suite with the members of groups in their place, which a run stays the same by."""
     if suite.models == RECORDED:
         return suite
@@ -207,7 +206,7 @@ def _check_models(models: Sequence[PlannedModel], tracks: Sequence[AnyTrack], su
                 hint = f"leave {track.name} out of tracks"
                 problems.append(Problem(where, message, "tracks", track.name, hint=hint))
             able = kind_of(track.name).baselines
-            if model.config.kind != "baseline" or model.config.id in able:
+            if model.config.kind != "baseline" or model.name in able:
                 continue
             message = f"has no rule for {track.name}"
             problems.append(Problem(where, message, "models", allowed=", ".join(able)))

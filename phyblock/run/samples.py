@@ -7,9 +7,10 @@ from collections.abc import Awaitable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
+from phyblock.config.models import ModelConfig
 from phyblock.config.suite import Variant
 from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
-from phyblock.models import AskLaterError, Halt, Model, ModelConfig, Request
+from phyblock.models import AskLaterError, Halt, Model, Request
 from phyblock.records import Record, Reply, SentPrompt, Turn, Usage
 from phyblock.run.judging import judged_apart
 from phyblock.run.prompts import PromptFile

@@ -33,22 +33,13 @@ from phyblock.run.store import RunStore, held_run
 from phyblock.run.taking_on import take_on
 from phyblock.run.writer import RecordWriter
 
-__all__ = ["SERVERS", "Session", "check_ready"]
-
-SERVERS = ("hosted_vllm", "lm_studio", "llamafile")
-"""Providers that are nowhere unless `api_base` or their variable says where."""
+__all__ = ["Session", "check_ready"]
 
 
 def check_ready(plan: RunPlan) -> None:
     """Raise SpecError naming every model whose key or address is not set."""
     problems: list[Problem] = []
     for model in plan.models:
-        if model.config.provider in SERVERS and not model.config.has_address:
-            message = "is behind a server of your own: it needs an address"
-            hint = "api_base: http://localhost:8000/v1 in the models file"
-            problems.append(
-                Problem(f"model {model.name}", message, "api_base", model.config.id, hint=hint)
-            )
         status = api_key_status(model.config)
         if status.fault:
             problems.append(Problem(f"model {model.name}", status.fault, "", model.config.id))

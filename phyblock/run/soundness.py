@@ -6,34 +6,30 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from phyblock.config.models import ModelSpec, with_members
+from phyblock.config.models import ModelConfig, with_members
 from phyblock.config.yaml import read_yaml
 from phyblock.errors import Problem
-from phyblock.models import ModelConfig, known_providers
+from phyblock.models import known_providers
 from phyblock.text import did_you_mean
 
 __all__ = ["model_problems", "provider_problem"]
 
 
 def model_problems(
-    path: Path, known: Mapping[str, ModelSpec], names: Iterable[str]
+    path: Path, known: Mapping[str, ModelConfig], names: Iterable[str]
 ) -> Iterator[Problem]:
     """What is wrong with the models and groups of these names in a models file: recordings that are
     not there, providers that nobody knows.
     """
     source = read_yaml(path)
     for name in (name for name in with_members(tuple(names), known) if name in known):
-        spec = known[name]
-        if spec.replay is not None and not os.path.isdir(spec.replay):
+        config = known[name]
+        if config.replay is not None and not os.path.isdir(config.replay):
             where, message = source.where((name, "replay")), "recordings not found"
             hint = "the path is taken relative to the models file"
-            yield Problem(where, message, f"{name}.replay", spec.replay, "a folder", hint)
-        if spec.id is not None:
-            # Whether there is an address matters here, and not which.
-            address = "http://localhost" if spec.has_address else None
-            config = ModelConfig(name, "litellm", spec.id, address, transport=spec.transport)
-            if (problem := provider_problem(config, source.where((name, "id")))) is not None:
-                yield problem
+            yield Problem(where, message, f"{name}.replay", config.replay, "a folder", hint)
+        if (problem := provider_problem(config, source.where((name, "id")))) is not None:
+            yield problem
 
 
 def provider_problem(config: ModelConfig, where: str) -> Problem | None:

@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 import yaml
 
-from phyblock.models import ModelConfig, known_providers, providers
+from phyblock.config.models import ModelConfig
+from phyblock.models import known_providers, providers
 from tests.workspace import Workspace
 
 
@@ -37,7 +38,7 @@ def test_missing_recordings_and_unknown_providers_are_found(workspace: Workspace
 )
 def test_a_model_at_hand_needs_no_litellm(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(providers, "litellm_providers", lambda: pytest.fail("it was imported"))
-    assert model.partition("/")[0] in known_providers(ModelConfig("m", "litellm", model))
+    assert model.partition("/")[0] in known_providers(ModelConfig(name="m", id=model))
 
 
 @pytest.mark.parametrize("keys", [{}, {"levels": [2], "candidates": []}], ids=["plain", "derived"])
@@ -69,9 +70,3 @@ def test_validate_uses_the_models_file_that_a_run_would(workspace: Workspace) ->
     assert named.code == 0, named.err
     workspace.write_yaml("models.yaml", {"delta": "openai/gpt-4o"})
     assert workspace.phyblock("validate", "suite.yaml").code == 0
-
-
-@pytest.mark.parametrize("model", ["x", "/x"])
-def test_no_name_is_no_provider(model: str) -> None:
-    """Some entries of litellm's map name none."""
-    assert "" not in known_providers(ModelConfig("m", "litellm", model))

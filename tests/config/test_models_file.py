@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.config.models import ModelSpec, SamplingSpec, load_models
+from phyblock.config.models import ModelConfig, SamplingSpec, load_models
 from phyblock.config.suite import Suite, load_suite, resolve_models
 from phyblock.errors import Problem, SpecError
 from phyblock.registry import baseline_names
 
 
-def load(folder: Path, text: str) -> dict[str, ModelSpec]:
+def load(folder: Path, text: str) -> dict[str, ModelConfig]:
     path = folder / "m.yaml"
     path.write_text(text, encoding="utf-8")
     return load_models(path)
@@ -29,7 +29,7 @@ def problems_of(folder: Path, text: str) -> list[Problem]:
 
 def test_one_line_is_enough(tmp_path: Path) -> None:
     models = load(tmp_path, "gpt-4o: openai/gpt-4o-2024-08-06\n")
-    assert models == {"gpt-4o": ModelSpec(id="openai/gpt-4o-2024-08-06")}
+    assert models == {"gpt-4o": ModelConfig(name="gpt-4o", id="openai/gpt-4o-2024-08-06")}
 
 
 def test_a_mapping_says_more(tmp_path: Path) -> None:
@@ -72,12 +72,12 @@ def test_an_empty_file_holds_no_models(tmp_path: Path) -> None:
 def test_paths_are_relative_to_the_file(tmp_path: Path) -> None:
     spec = load(tmp_path, "old: {replay: replies/old, published: GPT-4o}\n")["old"]
     assert spec.replay == str(tmp_path / "replies" / "old")
-    assert spec.id is None
+    assert spec.kind == "replay"
 
 
 def test_several_addresses_are_a_list(tmp_path: Path) -> None:
     spec = load(tmp_path, "m: {id: a/b, api_base: [http://h:1/v1, http://h:2/v1]}\n")["m"]
-    assert spec.api_base == ("http://h:1/v1", "http://h:2/v1")
+    assert spec.addresses == ("http://h:1/v1", "http://h:2/v1")
 
 
 # text, line:col, field, part of the message, part of allowed, part of the hint
@@ -191,7 +191,7 @@ def test_a_password_in_an_address_or_a_body_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "model_id", ["openai/task-abc-def", "hosted_vllm/org/risk-assessor-large", "a/disk-12345678"]
+    "model_id", ["openai/task-abc-def", "azure_ai/org/risk-assessor-large", "a/disk-12345678"]
 )
 def test_ordinary_names_are_not_taken_for_keys(tmp_path: Path, model_id: str) -> None:
     assert load(tmp_path, f"m: {model_id}\n")["m"].id == model_id
@@ -199,20 +199,24 @@ def test_ordinary_names_are_not_taken_for_keys(tmp_path: Path, model_id: str) ->
 
 def test_a_parameter_left_out_is_the_suites_and_null_is_not_sent() -> None:
     defaults = SamplingSpec(temperature=0.5, top_p=0.9, max_tokens=100)
-    assert ModelSpec(id="a/b").params(defaults) == {
+    assert ModelConfig(id="a/b").with_defaults(defaults.model_dump()).params == {
         "temperature": 0.5,
         "top_p": 0.9,
         "max_tokens": 100,
     }
-    own = ModelSpec(id="a/b", temperature=None, max_tokens=7, reasoning_effort="high")
-    assert own.params(defaults) == {"top_p": 0.9, "max_tokens": 7, "reasoning_effort": "high"}
+    own = ModelConfig(id="a/b", temperature=None, max_tokens=7, reasoning_effort="high")
+    assert own.with_defaults(defaults.model_dump()).params == {
+        "top_p": 0.9,
+        "max_tokens": 7,
+        "reasoning_effort": "high",
+    }
 
 
 def test_null_in_the_file_is_told_from_nothing(tmp_path: Path) -> None:
     models = load(tmp_path, "a: {id: x/y, temperature: null}\nb: {id: x/y}\n")
     defaults = SamplingSpec()
-    assert "temperature" not in models["a"].params(defaults)
-    assert models["b"].params(defaults)["temperature"] == 0.0
+    assert "temperature" not in models["a"].with_defaults(defaults.model_dump()).params
+    assert models["b"].with_defaults(defaults.model_dump()).params["temperature"] == 0.0
 
 
 OPTIONS = st.fixed_dictionaries(
@@ -234,14 +238,17 @@ OPTIONS = st.fixed_dictionaries(
 def test_a_dumped_file_loads_equal(
     tmp_path_factory: pytest.TempPathFactory, options: dict[str, dict[str, object]]
 ) -> None:
-    specs = {name: ModelSpec.model_validate(entry) for name, entry in options.items()}
-    dumped = {n: s.model_dump(mode="json", exclude_unset=True) for n, s in specs.items()}
+    specs = {name: ModelConfig.model_validate(entry) for name, entry in options.items()}
+    dumped = {
+        n: s.model_dump(mode="json", exclude_unset=True, by_alias=True) for n, s in specs.items()
+    }
     folder = tmp_path_factory.getbasetemp()
     loaded = load(folder, json.dumps(dumped))
-    assert loaded == specs
+    for name, spec in loaded.items():
+        assert spec == specs[name].with_defaults({"name": name})
     defaults = SamplingSpec()
-    assert [s.params(defaults) for s in loaded.values()] == [
-        s.params(defaults) for s in specs.values()
+    assert [s.with_defaults(defaults.model_dump()).params for s in loaded.values()] == [
+        s.with_defaults(defaults.model_dump()).params for s in specs.values()
     ]
 
 
@@ -253,7 +260,7 @@ def load_naming(folder: Path, models: str, *overrides: str) -> Suite:
 
 
 def test_names_resolve_in_the_suites_order(tmp_path: Path) -> None:
-    known = {"b": ModelSpec(id="x/b"), "a": ModelSpec(id="x/a"), "c": ModelSpec(id="x/c")}
+    known = {"b": ModelConfig(id="x/b"), "a": ModelConfig(id="x/a"), "c": ModelConfig(id="x/c")}
     loaded = load_naming(tmp_path, "  - oracle\n  - a\n  - b\n")
     assert list(resolve_models(loaded, known).items()) == [
         ("oracle", None),
@@ -270,7 +277,7 @@ def test_every_baseline_resolves_without_a_models_file(tmp_path: Path) -> None:
 def test_every_unknown_name_is_pointed_at(tmp_path: Path) -> None:
     loaded = load_naming(tmp_path, "  - orcale\n  - oracle\n  - gpt4o\n")
     with pytest.raises(SpecError) as caught:
-        resolve_models(loaded, {"gpt-4o": ModelSpec(id="openai/gpt-4o")})
+        resolve_models(loaded, {"gpt-4o": ModelConfig(id="openai/gpt-4o")})
     path = tmp_path / "s.yaml"
     assert [(p.where, p.hint) for p in caught.value.problems] == [
         (f"{path}:3:5", "did you mean oracle?"),

@@ -107,7 +107,7 @@ def test_full_holds_the_models_of_table_1(tmp_path: Path) -> None:
 def test_models_that_refuse_a_temperature_are_sent_none() -> None:
     models = load_models(ROOT / "models.yaml")
     for name in ("o1", "o3", "gpt-5.6", "claude-sonnet-5-5", "claude-3-7-thinking"):
-        assert "temperature" not in models[name].params(SamplingSpec())
+        assert "temperature" not in models[name].with_defaults(SamplingSpec().model_dump()).params
 
 
 LITELLM_CHECK = """
@@ -130,7 +130,7 @@ def test_litellm_takes_the_parameters_of_every_model() -> None:
     for name, spec in load_models(ROOT / "models.yaml").items():
         assert spec.id is not None
         provider, _, model = spec.id.partition("/")
-        calls[name] = (provider, model, spec.params(SamplingSpec()))
+        calls[name] = (provider, model, spec.with_defaults(SamplingSpec().model_dump()).params)
     done = subprocess.run(
         [sys.executable, "-c", LITELLM_CHECK],
         input=json.dumps(calls),

@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.errors import SampleError
-from phyblock.models import Budget, Prices, Reply
+from phyblock.models import Budget, Reply
 from tests.fuzz.sizes import fuzzed
 from tests.models.batching import Disk, Killing, command, run_command
 from tests.models.factory import QUICK, make_request
@@ -83,7 +83,7 @@ def test_batches(way: str, faults: BatchFaults, kills: list[int]) -> None:
         patch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
         server = running.server
         assert isinstance(server, BatchServer)
-        config = ROUTES[route].config(running.url, batch=True, prices=Prices.flat(1.0, 1.0))
+        config = ROUTES[route].config(running.url, batch=True, price={"input": 1.0, "output": 1.0})
         disk = Disk(Path(folder))
         for at in kills:
             killing = Killing(at)

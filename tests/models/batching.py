@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import BudgetReachedError, ModelError
 from phyblock.models import (
     AskLaterError,
@@ -17,7 +18,6 @@ from phyblock.models import (
     Budget,
     Gate,
     GatheringModel,
-    ModelConfig,
     ModelEvent,
     Reply,
     ReplyCache,

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from typing import Any, TypeVar
 
+from phyblock.config.models import ModelConfig
 from phyblock.domain import Block, Candidate, CandidateSet, Scene
 from phyblock.errors import ModelError
 from phyblock.models import (
@@ -16,7 +17,6 @@ from phyblock.models import (
     Image,
     Message,
     Model,
-    ModelConfig,
     ModelEvent,
     Reply,
     ReplyCache,
@@ -27,6 +27,14 @@ from phyblock.models import (
 from phyblock.tracks.full_planning.baselines import PlanSubject
 
 T = TypeVar("T")
+
+
+def with_fields(config: ModelConfig, **fields: Any) -> ModelConfig:
+    """The model with other values in fields of its entry."""
+    given = config.model_dump(by_alias=True, exclude_unset=True)
+    hidden = {"name": config.name, "most_body_bytes": config.most_body_bytes}
+    return ModelConfig.model_validate({**given, **hidden, **fields})
+
 
 PNG = b"\x89PNG\r\n\x1a\n"
 JPEG = b"\xff\xd8\xff\xe0"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from phyblock.models import ModelConfig
+from phyblock.config.models import ModelConfig
 from tests.servers.anthropic_messages import AnthropicMessages
 from tests.servers.chassis import LocalServer
 from tests.servers.gemini_generate import GeminiGenerate
@@ -27,7 +27,7 @@ class Route:
         """A model at the server with this address, its key in `KEY_VARIABLE`."""
         known: dict[str, Any] = {"id": self.model_id, "transport": self.transport, **fields}
         base = url + self.path
-        return ModelConfig("m", "litellm", api_base=base, api_key_env=KEY_VARIABLE, **known)
+        return ModelConfig(name="m", api_base=base, api_key_env=KEY_VARIABLE, **known)
 
 
 ROUTES = {

@@ -11,9 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from phyblock.config.models import ModelConfig
 from phyblock.domain import Candidate, CandidateSet, Plan
 from phyblock.errors import DataError, SpecError
-from phyblock.models import Gate, ModelConfig, Reply, Request, build_model
+from phyblock.models import Gate, Reply, Request, build_model
 from phyblock.tracks.full_planning.baselines import PLAN_RULES, PlanSubject
 from tests.models.factory import CANDIDATES, SCENE, make_request
 
@@ -23,7 +24,7 @@ seeds = st.integers(0, 10**6)
 
 
 def reply(name: str, request: Request) -> Reply:
-    model = build_model(ModelConfig(name, "baseline", name), cache=None, overall=Gate(1))
+    model = build_model(ModelConfig(name=name), cache=None, overall=Gate(1))
     assert not model.needs_messages
     answer = asyncio.run(model.ask(request))
     assert answer is not None

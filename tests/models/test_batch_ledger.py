@@ -10,12 +10,12 @@ from typing import Any
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from phyblock.config.models import ModelConfig
 from phyblock.models.batches.fields import joined
 from phyblock.models.batches.ledger import BatchFiles, Ledger
 from phyblock.models.batches.openai import OpenAIBatches
 from phyblock.models.batches.results import Results, custom_id
 from phyblock.models.batches.waiting import waiting_keys
-from phyblock.models.config import ModelConfig
 from phyblock.records import BatchLine
 
 TOKEN = "pb0"
@@ -59,7 +59,7 @@ def test_a_request_is_in_the_last_batch_that_was_not_lost(
             newest = ledger.newest(key)
             assert (newest and newest.token) == expected
         assert others.newest(key) is None
-        config = ModelConfig("m", "litellm", "openai/m")
+        config = ModelConfig(name="m", id="openai/m")
         assert (key in waiting_keys(config, lines, Path("nowhere"))) == bool(holding)
     assert {b.token: (b.event, b.id) for b in written.batches.values()} == {
         b.token: (b.event, b.id) for b in read.batches.values()
@@ -88,7 +88,7 @@ def test_the_first_whole_line_of_a_request_answers_it(
         text if is_whole else text[:-9] for text, (_, is_whole) in zip(whole, lines, strict=True)
     ]
     path.write_text("\n\n".join(kept), encoding="utf-8")
-    protocol = OpenAIBatches(ModelConfig("m", "litellm", "openai/m"), ())
+    protocol = OpenAIBatches(ModelConfig(name="m", id="openai/m"), ())
     results = Results(path, protocol, TOKEN, requests)
     for place in range(requests):
         name = custom_id(TOKEN, place)

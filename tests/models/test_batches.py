@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import (
     BudgetReachedError,
     RetryableError,
@@ -21,15 +22,10 @@ from phyblock.errors import (
 )
 from phyblock.models import (
     Budget,
-    ModelConfig,
     ModelEvent,
-    Price,
-    Prices,
-    Rate,
     Reply,
     ReplyCache,
     Request,
-    Tariff,
     reply_key,
     today,
     waiting_keys,
@@ -40,7 +36,7 @@ from phyblock.models.batches.protocol import BatchProtocol
 from phyblock.models.batches.sending import UnsureError
 from phyblock.models.limits import Clock
 from tests.models.batching import Disk, Killing, command, run_command
-from tests.models.factory import QUICK, ask, make_model, make_request
+from tests.models.factory import QUICK, ask, make_model, make_request, with_fields
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.anthropic_batches import AnthropicBatches
 from tests.servers.batches import BatchFaults, BatchServer, Made
@@ -55,7 +51,7 @@ SERVERS: dict[str, type[BatchServer]] = {
     "gemini": GeminiBatches,
 }
 PROTOCOLS = list(SERVERS)
-PRICES = Prices((Tariff((Rate(Price(1000.0, 1000.0), batch=Price(500.0, 500.0)),)),))
+PRICE = {"input": 1000, "output": 1000, "batch": {"input": 500, "output": 500}}
 
 
 @pytest.fixture(autouse=True)
@@ -75,7 +71,7 @@ def disk(tmp_path: Path) -> Disk:
 
 
 def config_at(route: str, url: str, **fields: Any) -> ModelConfig:
-    return ROUTES[route].config(url, batch=True, prices=PRICES, **fields)
+    return ROUTES[route].config(url, batch=True, price=PRICE, **fields)
 
 
 def requests_of(count: int) -> list[Request]:
@@ -106,7 +102,7 @@ def test_a_batch_asks_and_answers_as_single_calls_do(route: str, disk: Disk) -> 
     requests = requests_of(3)
     server, ended = served(route, disk, requests, BatchFaults(lines={0: {1: "length"}}))
     with Running(SERVERS[route]()) as running:
-        config = replace(config_at(route, running.url), batch=False)
+        config = with_fields(config_at(route, running.url), batch=False)
         single = ask(make_model(config), *requests)
         in_order = {one.sample: one.raw for one in running.server.seen}
     assert {one.sample: one.raw for one in server.seen} == in_order
@@ -358,10 +354,10 @@ def test_a_cost_limit_is_kept_by_the_dearest_case_of_what_is_sent(
 
 
 def test_an_answer_costs_what_the_day_of_its_sending_asked_for(disk: Disk) -> None:
-    dearer = Tariff((Rate(Price(9000.0, 9000.0), batch=Price(4500.0, 4500.0)),), today())
-    prices = Prices((*PRICES.tariffs, dearer))
+    dearer = {"input": 9000, "output": 9000, "batch": {"input": 4500, "output": 4500}}
+    price = [PRICE, {"from": today().isoformat(), **dearer}]
     with Running(OpenAIBatches(batch=BatchFaults(calls={"results": ("400",)}))) as running:
-        config = replace(config_at("direct", running.url), prices=prices)
+        config = with_fields(config_at("direct", running.url), price=price)
         (stopped,) = run_command(config, disk, requests_of(1))
         assert isinstance(stopped, UnavailableError)
         assert disk.lines[0].most_usd
@@ -382,7 +378,7 @@ def test_what_is_in_the_cache_is_not_asked_and_answers_go_there(route: str, tmp_
     server, (first,) = served(route, disk, requests[:1], BatchFaults())
     assert isinstance(first, Reply)
     with Running(SERVERS[route]()) as running:
-        config = replace(config_at(route, running.url), batch=False)
+        config = with_fields(config_at(route, running.url), batch=False)
         with ReplyCache(cache) as kept:
             found, single = ask(make_model(config, cache=kept), *requests)
     assert isinstance(found, Reply)
@@ -515,7 +511,7 @@ def test_a_provider_that_takes_no_seed_is_asked_again_without(disk: Disk) -> Non
         ended = run_command(config, disk, requests, told=told)
         assert {one.seed_sent for one in ended if isinstance(one, Reply)} == {False}
         assert "seed_unsupported" in [one.kind for one in told]
-        always = replace(config, sends_seed="always")
+        always = with_fields(config, seed="always")
         (refused,) = run_command(always, Disk(disk.folder / "always"), requests[:1])
         assert isinstance(refused, UnavailableError)
         assert "seed is `always`" in str(refused)
@@ -530,7 +526,7 @@ def test_a_refused_schema_stops_the_model_with_what_to_do(disk: Disk) -> None:
             return line
 
     with Running(Schemaless()) as running:
-        config = config_at("direct", running.url, sends_format=True)
+        config = config_at("direct", running.url, response_format="always")
         request = replace(make_request(), response_format={"type": "json_schema"})
         (refused,) = run_command(config, disk, [request])
     assert isinstance(refused, UnavailableError)
@@ -548,7 +544,7 @@ def test_headers_that_requests_need_go_with_their_batch(disk: Disk) -> None:
             return super().key_of(request)
 
     with Running(Noting()) as running:
-        fields = {"id": "anthropic/claude-sonnet-4-5", "sends_format": True}
+        fields = {"id": "anthropic/claude-sonnet-4-5", "response_format": "always"}
         config = config_at("anthropic", running.url, **fields)
         request = replace(make_request(), response_format=form)
         (reply,) = run_command(config, disk, [request])

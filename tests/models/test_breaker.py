@@ -10,6 +10,7 @@ from aiohttp import web
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import (
     ModelError,
     RetryableError,
@@ -18,7 +19,7 @@ from phyblock.errors import (
     UnavailableError,
     UnreachableError,
 )
-from phyblock.models import Breakers, Gate, Halt, HaltedError, ModelConfig, Reply, RetryPolicy
+from phyblock.models import Breakers, Gate, Halt, HaltedError, Reply, RetryPolicy
 from phyblock.models.breaker import FAILURES_TO_OPEN, Breaker, server_of
 from phyblock.models.chat import ChatModel, ChatParts
 from phyblock.models.limits import ModelLimiter
@@ -71,7 +72,7 @@ class Outage:
 def chat(
     time: FakeTime, transport: Outage, breakers: Breakers, width: int, halt: Halt
 ) -> ChatModel:
-    config = ModelConfig("m", "litellm", "openai/m", api_base="http://gone:1/v1")
+    config = ModelConfig(name="m", id="openai/m", api_base="http://gone:1/v1")
     parts = ChatParts(
         replicas=Replicas(config, lambda _: transport, breakers),
         limiter=ModelLimiter(width, Gate(width), clock=time.clock),
@@ -88,7 +89,7 @@ def chat(
 
 def at_a_breaker(time: FakeTime, policy: RetryPolicy) -> tuple[Breaker, Replicas]:
     """A breaker, and the one server behind it."""
-    config = ModelConfig("m", "litellm", "openai/m", api_base="http://gone:1/v1")
+    config = ModelConfig(name="m", id="openai/m", api_base="http://gone:1/v1")
     breakers = Breakers(policy)
     replicas = Replicas(config, lambda _: Outage(time, 0.0, 0.0, 0.0), breakers)
     return breakers.of(config), replicas
@@ -296,7 +297,7 @@ def test_a_connection_that_is_not_made_in_time_was_not_sent() -> None:
             other.setblocking(False)
             other.connect_ex(full.getsockname())
         url = f"http://127.0.0.1:{full.getsockname()[1]}/v1"
-        config = ModelConfig("m", "litellm", "openai/m", api_base=url, timeout_s=0.3)
+        config = ModelConfig(name="m", id="openai/m", api_base=url, timeout_s=0.3)
         (answer,) = ask(make_model(config, policy=RetryPolicy(1, 0.0)), make_request())
         for other in others:
             other.close()
@@ -395,7 +396,7 @@ def test_a_wait_at_the_breaker_is_given_up_when_the_run_ends() -> None:
 def test_models_of_one_server_share_its_breaker() -> None:
     breakers = Breakers(RetryPolicy())
     bases = ["http://a:1/v1", "http://A:1/other", "http://a:1", "http://b:1", None]
-    found = [breakers.of(ModelConfig("m", "litellm", "openai/m", api_base=base)) for base in bases]
+    found = [breakers.of(ModelConfig(name="m", id="openai/m", api_base=base)) for base in bases]
     assert found[0] is found[1] is found[2]
     assert len({id(breaker) for breaker in found}) == 3
 
@@ -410,7 +411,7 @@ def test_models_of_one_server_share_its_breaker() -> None:
     ],
 )
 def test_a_server_is_named_by_scheme_host_and_port(api_base: str | None, server: str) -> None:
-    assert server_of(ModelConfig("m", "litellm", "openai/m", api_base=api_base)) == server
+    assert server_of(ModelConfig(name="m", id="openai/m", api_base=api_base)) == server
 
 
 @pytest.mark.parametrize("route", ["direct", "openai"])

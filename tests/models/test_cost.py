@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import (
     BudgetReachedError,
     RetryableError,
@@ -25,7 +26,6 @@ from phyblock.models import (
     Gate,
     Image,
     Message,
-    ModelConfig,
     Price,
     Prices,
     Reply,
@@ -51,7 +51,7 @@ DAY = date(2026, 11, 22)
 
 
 def config(model_id: str, **fields: object) -> ModelConfig:
-    return ModelConfig("m", "litellm", model_id, **fields)  # type: ignore[arg-type]
+    return ModelConfig(name="m", id=model_id, **fields)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -79,13 +79,14 @@ def test_prices_come_from_the_map_where_the_provider_is_the_same(
 
 
 def test_a_price_of_ones_own_comes_first() -> None:
-    own = Prices.flat(1, 2)
-    assert prices_of(config("openai/o1", prices=own)) == own.with_halves()
+    known = prices_of(config("openai/o1", price={"input": 1, "output": 2}))
+    assert known is not None
+    assert known.at(DAY) == Price(1, 2)
 
 
-@pytest.mark.parametrize("kind", ["replay", "baseline"])
-def test_recordings_and_baselines_cost_nothing(kind: str) -> None:
-    assert prices_of(ModelConfig("m", kind)) == Prices.flat(0, 0)  # type: ignore[arg-type]
+@pytest.mark.parametrize("fields", [{"replay": "x"}, {}])
+def test_recordings_and_baselines_cost_nothing(fields: dict[str, str]) -> None:
+    assert prices_of(ModelConfig(name="m", **fields)) == Prices.flat(0, 0)  # type: ignore[arg-type]
 
 
 @given(st.integers(0, 10**7), st.integers(0, 10**6))
@@ -425,7 +426,7 @@ def test_a_server_that_does_not_count_stops_within_the_limit(
     budget = Budget(0.1)
     with Running(server) as running:
         config = ROUTES[route].config(
-            running.url, prices=Prices.flat(10.0, 100.0), max_concurrency=4
+            running.url, price={"input": 10.0, "output": 100.0}, max_concurrency=4
         )
         dearest = most_usd(Prices.flat(10.0, 100.0), estimate(config, make_request()), DAY)
 
@@ -457,7 +458,7 @@ def test_a_run_stops_before_its_limit_and_answers_say_what_they_cost(
     with Running(server) as running:
         model = make_model(
             ROUTES["direct"].config(
-                running.url, prices=Prices.flat(10.0, 100.0), max_concurrency=8
+                running.url, price={"input": 10.0, "output": 100.0}, max_concurrency=8
             ),
             budget=budget,
         )
@@ -494,7 +495,8 @@ def test_a_failure_that_may_have_been_billed_counts_against_the_budget(
     budget = Budget(100.0)
     with Running(ROUTES["direct"].server(Faults(mode=mode))) as running:
         model = make_model(
-            ROUTES["direct"].config(running.url, prices=Prices.flat(10.0, 100.0)), budget=budget
+            ROUTES["direct"].config(running.url, price={"input": 10.0, "output": 100.0}),
+            budget=budget,
         )
         (answer,) = ask(model, make_request())
     assert isinstance(answer, RetryableError)
@@ -509,7 +511,7 @@ def test_a_reply_says_what_the_limit_counts_for_all_its_attempts(
     server = ROUTES["direct"].server(Faults(reset=0.2, malformed=0.2, server_error=0.2))
     requests = [make_request(f"{n:03}") for n in range(30)]
     with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
-        config = ROUTES["direct"].config(running.url, prices=Prices.flat(10.0, 100.0))
+        config = ROUTES["direct"].config(running.url, price={"input": 10.0, "output": 100.0})
         budget = Budget(100.0)
         replies = ask(make_model(config, cache=cache, budget=budget), *requests)
         again = ask(make_model(config, cache=cache, budget=Budget(1.0)), *requests)
@@ -525,7 +527,7 @@ def test_a_server_to_which_nothing_could_be_sent_costs_nothing(
 ) -> None:
     monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
     budget = Budget(100.0)
-    config = ROUTES["direct"].config("http://127.0.0.1:9", prices=Prices.flat(10.0, 100.0))
+    config = ROUTES["direct"].config("http://127.0.0.1:9", price={"input": 10.0, "output": 100.0})
     (answer,) = ask(make_model(config, budget=budget), make_request())
     assert isinstance(answer, UnreachableError)
     assert budget.spent_usd == 0
@@ -534,7 +536,7 @@ def test_a_server_to_which_nothing_could_be_sent_costs_nothing(
 def test_a_model_without_its_key_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(KEY_VARIABLE, raising=False)
     budget = Budget(1.0)
-    config = ROUTES["direct"].config("http://127.0.0.1:9", prices=Prices.flat(10.0, 100.0))
+    config = ROUTES["direct"].config("http://127.0.0.1:9", price={"input": 10.0, "output": 100.0})
     (answer,) = ask(make_model(config, budget=budget), make_request())
     assert isinstance(answer, UnavailableError)
     assert budget.spent_usd == 0

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from phyblock.models import Reply, RetryPolicy
-from tests.models.factory import QUICK, ask, make_model, make_request, picture
+from tests.models.factory import QUICK, ask, make_model, make_request, picture, with_fields
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import FAULTS, ISSUE_MIX, Running
 
@@ -35,9 +35,9 @@ def finish_all(
     ]
     with ExitStack() as stack:
         urls = [stack.enter_context(Running(server)).url for server in servers]
-        config = ROUTES[route].config(urls[0], max_concurrency=64, sends_seed="never")
+        config = ROUTES[route].config(urls[0], max_concurrency=64, seed="never")
         bases = tuple(url + ROUTES[route].path for url in urls)
-        config = replace(config, api_base=None, api_bases=bases)
+        config = with_fields(config, api_base=bases)
         answers = ask(make_model(config, policy=policy), *requests)
     replies = [answer for answer in answers if isinstance(answer, Reply)]
     assert len(replies) == samples, [a for a in answers if not isinstance(a, Reply)]

@@ -5,24 +5,24 @@ from __future__ import annotations
 import asyncio
 import importlib
 import json
-from dataclasses import replace
 
 import pytest
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import DataError, ModelError, Problem, RetryableError, UnavailableError
-from phyblock.models import ModelConfig, Reply, RetryPolicy
+from phyblock.models import Reply, RetryPolicy
 from phyblock.models.http_client import Answer
 from phyblock.models.litellm_call import _litellm
 from phyblock.models.litellm_extras import leave_out
 from phyblock.models.refusals import read_body
 from phyblock.models.transport import Call, GuardedTransport, SeedRefusedError
-from tests.models.factory import ask, make_model, make_request, run
+from tests.models.factory import ask, make_model, make_request, run, with_fields
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 
 KEY = "not-4-key-anybody-has"
-CONFIG = ModelConfig("m", "litellm", "openai/m", api_base="http://127.0.0.1:9/v1")
+CONFIG = ModelConfig(name="m", id="openai/m", api_base="http://127.0.0.1:9/v1")
 CALL = Call((), {}, None)
 
 
@@ -98,19 +98,19 @@ def test_keys_leave_an_error_before_it_is_cut() -> None:
         assert KEY[:4] not in str(caught.value)
 
 
-@pytest.mark.parametrize("params", [{"tools": 5}, {"extra_headers": 7}, {"stream": "yes"}])
+@pytest.mark.parametrize("params", [{"tools": 5}, {"extra_headers": 7}])
 def test_arguments_that_litellm_chokes_on_end_a_call_and_no_run(
     params: dict[str, object], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(KEY_VARIABLE, KEY)
     with Running(OpenAIChat()) as running:
-        config = ROUTES["openai"].config(running.url, params=params)
+        config = ROUTES["openai"].config(running.url, extra_body=params)
         (answer,) = ask(make_model(config, policy=RetryPolicy(1, 0.0)), make_request())
     assert isinstance(answer, ModelError | Reply), answer
 
 
 def test_a_provider_that_litellm_would_call_past_our_client_is_refused() -> None:
-    config = ModelConfig("m", "litellm", "aiohttp_openai/m", api_base="http://127.0.0.1:9/v1")
+    config = ModelConfig(name="m", id="aiohttp_openai/m", api_base="http://127.0.0.1:9/v1")
     (answer,) = ask(make_model(config), make_request())
     assert isinstance(answer, UnavailableError), answer
 
@@ -155,7 +155,7 @@ def test_nothing_is_sent_outside_of_a_call_and_nothing_twice() -> None:
         client = httpx.AsyncClient(transport=WireTransport(True), trust_env=False)
         with pytest.raises(httpx.ReadError, match="outside of a call"):
             await client.post(url, json=body)
-        config = replace(CONFIG, api_base=url)
+        config = with_fields(CONFIG, api_base=url)
         ours = HttpClient(config)
         CURRENT.set(Exchange(ours, config))
         assert (await client.post(url, json=body)).status_code == 200

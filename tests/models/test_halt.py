@@ -11,7 +11,6 @@ from phyblock.models import (
     Budget,
     Halt,
     HaltedError,
-    Prices,
 )
 from tests.models.factory import make_model, make_request, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
@@ -66,7 +65,7 @@ def test_a_run_that_ends_while_money_is_reserved_sends_nothing_and_holds_none() 
 
     async def main() -> None:
         with Running(server) as running:
-            config = ROUTES["direct"].config(running.url, prices=Prices.flat(1.0, 1.0))
+            config = ROUTES["direct"].config(running.url, price={"input": 1.0, "output": 1.0})
             model = make_model(config, budget=Late(100.0), halt=halt)
             with pytest.raises(HaltedError):
                 await model.ask(make_request())

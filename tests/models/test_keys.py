@@ -11,8 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import UnavailableError
-from phyblock.models import KeyStatus, ModelConfig, api_key_status
+from phyblock.models import KeyStatus, api_key_status
 from phyblock.models.keys import api_key, hidden, secrets_of
 
 
@@ -23,7 +24,7 @@ def _no_keys(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def config(model_id: str, **fields: object) -> ModelConfig:
-    return ModelConfig("m", "litellm", model_id, **fields)  # type: ignore[arg-type]
+    return ModelConfig(name="m", id=model_id, **fields)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -39,7 +40,7 @@ def config(model_id: str, **fields: object) -> ModelConfig:
             config("openai/m", api_base="http://x", api_key_env="MINE_API_KEY"),
             KeyStatus(("MINE_API_KEY",), False, True),
         ),
-        (ModelConfig("oracle", "baseline", "oracle"), KeyStatus((), False, False)),
+        (ModelConfig(name="oracle"), KeyStatus((), False, False)),
     ],
 )
 def test_what_a_model_needs(model: ModelConfig, status: KeyStatus) -> None:
@@ -173,6 +174,6 @@ def test_whatever_a_provider_signs_in_with_is_a_secret_and_no_key(
     monkeypatch: pytest.MonkeyPatch, model_id: str, variable: str, api_key_env: str | None
 ) -> None:
     monkeypatch.setenv(variable, "a-long-secret-of-mine")
-    config = ModelConfig("m", "litellm", model_id, api_key_env=api_key_env)
+    config = ModelConfig(name="m", id=model_id, api_key_env=api_key_env)
     assert "a-long-secret-of-mine" in secrets_of(config)
     assert not api_key_status(config).is_set

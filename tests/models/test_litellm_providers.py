@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 from aiohttp import web
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import ModelError, RetryableError, UnavailableError, UnreachableError
-from phyblock.models import Message, ModelConfig, Reply, RetryPolicy
+from phyblock.models import Message, Reply, RetryPolicy
 from phyblock.models.http_client import Answer, HttpClient
 from phyblock.models.litellm_call import _litellm
 from tests.models.factory import ask, make_model, make_request
@@ -38,8 +39,7 @@ PROVIDERS = [
     "mistral/m",
     "text-completion-codestral/m",
 ]
-NO_PARAMS = {"temperature": None, "top_p": None, "max_tokens": None}
-TEXT = replace(make_request(), messages=(Message("user", ("Which blocks?",)),))
+TEXT = replace(make_request(), params={}, messages=(Message("user", ("Which blocks?",)),))
 
 
 class AnyPath(OpenAIChat):
@@ -103,8 +103,8 @@ def _environment(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def answer_of(model_id: str, **fields: Any) -> Reply | ModelError | None:
-    known: Mapping[str, Any] = {"params": NO_PARAMS, "sends_seed": "never", "timeout_s": 10.0}
-    config = ModelConfig("m", "litellm", model_id, **{**known, **fields})
+    known: Mapping[str, Any] = {"seed": "never", "timeout_s": 10.0}
+    config = ModelConfig(name="m", id=model_id, **{**known, **fields})
     (answer,) = ask(make_model(config, policy=RetryPolicy(1, 0.0)), TEXT)
     return answer
 

@@ -17,10 +17,11 @@ ROOT = Path(__file__).parents[2]
 CACHED = """
 import asyncio, sys
 from pathlib import Path
-from phyblock.models import Gate, ModelConfig, Reply, ReplyCache
+from phyblock.config.models import ModelConfig
+from phyblock.models import Gate, Reply, ReplyCache
 from phyblock.models import build_model, reply_key
 from tests.models.factory import make_request
-config = ModelConfig("m", "litellm", "anthropic/claude")
+config = ModelConfig(name="m", id="anthropic/claude")
 with ReplyCache(Path(sys.argv[1])) as cache:
     cache.put(reply_key(config, make_request()), config.id, Reply(text="kept"))
 async def main():
@@ -34,11 +35,12 @@ IMPORTED = "\nprint([name for name in ('litellm', 'aiohttp', 'httpx') if name in
 
 SENDING = """
 import asyncio, os, sys
-from phyblock.models import Gate, ModelConfig, RetryPolicy, build_model
+from phyblock.config.models import ModelConfig
+from phyblock.models import Gate, RetryPolicy, build_model
 from tests.models.factory import make_request
 os.chdir(sys.argv[1])
 model = build_model(
-    ModelConfig("m", "litellm", "gemini/gemini-2.5-flash", api_base=sys.argv[2]),
+    ModelConfig(name="m", id="gemini/gemini-2.5-flash", api_base=sys.argv[2]),
     cache=None, overall=Gate(1), policy=RetryPolicy(attempts=1, retry_for_s=0.0),
 )
 async def main():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from datetime import date, timedelta
 from pathlib import Path
 from typing import Any
@@ -11,13 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.config.models import load_models
+from phyblock.config.models import ModelConfig, load_models
 from phyblock.config.suite import Suite
 from phyblock.errors import SpecError
 from phyblock.models import (
     Budget,
     Estimate,
-    ModelConfig,
     Price,
     Prices,
     Rate,
@@ -30,7 +28,7 @@ from phyblock.models import (
 from phyblock.models.cost import plausible
 from phyblock.models.price_map import map_entry
 from phyblock.run.models import to_config
-from tests.models.factory import make_model, make_request, reply_of
+from tests.models.factory import make_model, make_request, reply_of, with_fields
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.anthropic_messages import AnthropicMessages
 from tests.servers.chassis import LocalServer, Running, Seen
@@ -45,7 +43,7 @@ prices = st.builds(Price, usd, usd, st.none() | usd, st.none() | usd)
 
 
 def config(model_id: str, **fields: Any) -> ModelConfig:
-    return ModelConfig("m", "litellm", model_id, **fields)
+    return ModelConfig(name="m", id=model_id, **fields)
 
 
 def read(tmp_path: Path, text: str) -> ModelConfig:
@@ -113,14 +111,15 @@ def test_batches_cost_half_only_where_that_is_known(
 ) -> None:
     whole = Price(8.0, 40.0, 1.0)
     served = config(model_id, batch=True, **fields)
-    known = prices_of(replace(served, prices=Prices((Tariff((Rate(whole),)),))))
+    known = prices_of(with_fields(served, price={"input": 8, "output": 40, "cached": 1}))
     assert known is not None
     assert known.at(DAY, batched=True) == (whole.halved() if is_half else whole)
     expected = Estimate(1000, 500, 500)
     most = [most_usd(known, expected, DAY, batched=batched) for batched in (True, False)]
     assert most[0] == pytest.approx(most[1] / (1 + is_half))
-    told = Prices((Tariff((Rate(whole, batch=Price(3.0, 4.0)),)),))
-    own = prices_of(replace(served, prices=told))
+    batch = {"input": 3, "output": 4}
+    told = {"input": 8, "output": 40, "cached": 1, "batch": batch}
+    own = prices_of(with_fields(served, price=told))
     assert own is not None
     assert own.at(DAY, batched=True) == Price(3.0, 4.0)
 
@@ -204,7 +203,7 @@ def test_a_model_that_has_tiers_alone_has_a_price() -> None:
     assert known.on(DAY).source.startswith("litellm ")  # type: ignore[union-attr]
 
 
-def test_prices_by_day_and_tier_are_read_with_the_line_that_says_them(tmp_path: Path) -> None:
+def test_prices_by_day_and_tier_are_read(tmp_path: Path) -> None:
     text = """\
 m:
   id: openai/gpt-4o-2024-08-06
@@ -221,8 +220,6 @@ m:
     assert known.at(DAY) == Price(1, 2, 0.5)
     assert known.at(december, 1000) == Price(2, 4)
     assert known.at(december, 1001) == Price(3, 5, None, 6)
-    found = [known.on(day).source for day in (DAY, december)]  # type: ignore[union-attr]
-    assert found == ["models.yaml line 4", "models.yaml line 5"]
 
 
 def test_before_the_first_day_that_is_named_the_map_holds(tmp_path: Path) -> None:
@@ -312,10 +309,9 @@ def test_what_a_prompt_cache_held_is_recorded_and_priced(
         def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
             return {**super().reply(seen, ending), **CACHED[kind]}
 
-    price = Price(10.0, 100.0, 1.0, 12.0)
-    known = Prices((Tariff((Rate(price),)),))
+    price = {"input": 10, "output": 100, "cached": 1, "cache_write": 12}
     with Running(Caching()) as running:
-        config = ROUTES[route].config(running.url, prices=known)
+        config = ROUTES[route].config(running.url, price=price)
         reply = reply_of(make_model(config), make_request())
     usage = reply.usage
     written = 0 if kind is GeminiGenerate else 300
@@ -346,11 +342,12 @@ def test_no_more_is_cached_than_the_prompt_holds(
 
 def test_a_reply_costs_what_its_day_asks_for(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
-    from_then = Tariff((Rate(Price(20.0, 200.0)),), DAY + timedelta(days=1))
-    known = Prices((Tariff((Rate(Price(10.0, 100.0)),)), from_then))
+    tomorrow = (DAY + timedelta(days=1)).isoformat()
+    later = {"from": tomorrow, "input": 20, "output": 200}
+    price = [{"input": 10, "output": 100}, later]
     paid = []
     with Running(OpenAIChat()) as running:
-        config = ROUTES["direct"].config(running.url, prices=known)
+        config = ROUTES["direct"].config(running.url, price=price)
         for days in (0, 1):
             day = DAY + timedelta(days=days)
             monkeypatch.setattr("phyblock.models.sender.today", lambda day=day: day)

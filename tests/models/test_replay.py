@@ -9,15 +9,16 @@ from pathlib import Path
 
 import pytest
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import DataError, RefusedError, SampleError
-from phyblock.models import Gate, Model, ModelConfig, Reply, Usage, build_model
+from phyblock.models import Gate, Model, Reply, Usage, build_model
 from tests.models.factory import ask, make_request
 
 STEPS = "Step1: Move block with index 3"
 
 
 def replay(folder: Path, model: str = "m") -> Model:
-    config = ModelConfig(model, "replay", model, recording=folder)
+    config = ModelConfig(name=model, replay=str(folder))
     return build_model(config, cache=None, overall=Gate(1))
 
 

@@ -11,13 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import RetryableError, UnavailableError, UnreachableError
-from phyblock.models import Breakers, Model, ModelConfig, Reply, RetryPolicy
+from phyblock.models import Breakers, Model, Reply, RetryPolicy
 from phyblock.models.breaker import FAILURES_TO_OPEN
 from phyblock.models.limits import Clock
 from phyblock.models.replicas import Replica, Replicas
 from phyblock.models.transport import Call
-from tests.models.factory import QUICK, ask, make_model, make_request, run
+from tests.models.factory import QUICK, ask, make_model, make_request, run, with_fields
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Faults, Running, kill, start
 from tests.servers.openai_chat import OpenAIChat
@@ -45,7 +46,7 @@ def at(*urls: str, route: str = "direct", **fields: object) -> ModelConfig:
     config = ROUTES[route].config(urls[0], **fields)
     path = ROUTES[route].path
     bases = tuple(url + path for url in urls)
-    return ModelConfig(**{**vars(config), "api_base": None, "api_bases": bases})
+    return with_fields(config, api_base=bases)
 
 
 async def answers_of(model: Model, *names: str) -> list[object]:

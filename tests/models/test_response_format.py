@@ -9,14 +9,14 @@ from typing import Any
 import pytest
 from aiohttp import web
 
-from phyblock.config.models import ModelSpec, load_models
+from phyblock.config.models import ModelConfig, load_models
 from phyblock.config.suite import Suite
 from phyblock.errors import ModelError, RefusedError, SampleError, UnavailableError
-from phyblock.models import ModelConfig, Reply, Request, reply_key, takes_format
+from phyblock.models import Reply, Request, reply_key, takes_format
 from phyblock.parsing import choice_form, move_form, parse_asked_plan, plan_form
 from phyblock.resources import bundled
 from phyblock.run.models import to_config
-from tests.models.factory import ask, make_model, make_request, reply_of
+from tests.models.factory import ask, make_model, make_request, reply_of, with_fields
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Running, Seen
 from tests.servers.openai_chat import OpenAIChat
@@ -66,7 +66,7 @@ class Choosy(OpenAIChat):
 def test_the_schema_arrives_as_it_is_declared_and_the_reply_is_read() -> None:
     server = Choosy()
     with Running(server) as running:
-        config = ROUTES["direct"].config(running.url, sends_format=True)
+        config = ROUTES["direct"].config(running.url, response_format="always")
         reply = reply_of(make_model(config), asking())
     assert server.seen[0].raw["response_format"] == {
         "type": "json_schema",
@@ -79,16 +79,16 @@ def test_the_schema_arrives_as_it_is_declared_and_the_reply_is_read() -> None:
 def test_nothing_but_the_field_is_sent_more_and_without_it_nothing_is_other_than_before() -> None:
     plain = arrived("direct", make_request("017", 42)).raw
     assert arrived("direct", asking()).raw == plain
-    whole = arrived("direct", asking(), sends_format=True).raw
+    whole = arrived("direct", asking(), response_format="always").raw
     assert {name: value for name, value in whole.items() if name != "response_format"} == plain
 
 
 def test_the_cache_tells_formats_apart_and_knows_texts_as_it_did() -> None:
-    config = ModelConfig("m", "litellm", "openai/m")
+    config = ModelConfig(name="m", id="openai/m")
     assert "response_format" not in config.identity()
     keys = {
-        reply_key(replace(config, sends_format=sends), request)
-        for sends in (False, True)
+        reply_key(with_fields(config, response_format=sends), request)
+        for sends in ("never", "always")
         for request in (
             asking(),
             replace(asking(), response_format=choice_form("ab", False).schema),
@@ -127,7 +127,7 @@ def test_what_else_a_server_refuses_is_the_request_s_own() -> None:
 
 def _answers(server: OpenAIChat) -> list[Reply | ModelError | None]:
     with Running(server) as running:
-        config = ROUTES["direct"].config(running.url, sends_format=True, max_concurrency=1)
+        config = ROUTES["direct"].config(running.url, response_format="always", max_concurrency=1)
         return ask(make_model(config), asking("001"), asking("002"), asking("003"))
 
 
@@ -148,7 +148,7 @@ JSON_SUITE = Suite(name="s", models=("m",), answer_format="json_schema")
     ],
 )  # fmt: skip
 def test_who_is_sent_a_schema(fields: dict[str, str], sends: bool) -> None:
-    spec = ModelSpec.model_validate(fields)
+    spec = ModelConfig.model_validate(fields)
     assert to_config("m", spec, JSON_SUITE).sends_format is sends
     assert not to_config("m", spec, Suite(name="s", models=("m",))).sends_format
 
@@ -168,11 +168,11 @@ def test_litellm_is_believed_about_every_model_of_the_models_file() -> None:
 def test_litellm_hands_every_schema_on(form: Any) -> None:
     request = replace(make_request("017", 42), response_format=form.response_format)
     for route in ("openai", "vllm"):
-        assert arrived(route, request, sends_format=True).raw == (
-            arrived("direct", request, sends_format=True).raw
+        assert arrived(route, request, response_format="always").raw == (
+            arrived("direct", request, response_format="always").raw
         )
-    gemini = arrived("gemini", request, sends_format=True).params
+    gemini = arrived("gemini", request, response_format="always").params
     assert gemini["response_mime_type"] == "application/json"
     assert form.key in json.dumps(gemini["response_json_schema"])
-    claude = arrived("anthropic", request, sends_format=True).params
+    claude = arrived("anthropic", request, response_format="always").params
     assert claude["tools"][0]["input_schema"]["properties"] == form.schema["properties"]

@@ -6,12 +6,13 @@ from datetime import date
 
 import pytest
 
-from phyblock.models import ModelConfig, ends_on, is_unlisted
+from phyblock.config.models import ModelConfig
+from phyblock.models import ends_on, is_unlisted
 from phyblock.models.cost import map_entry
 
 
 def config(model_id: str, **fields: object) -> ModelConfig:
-    return ModelConfig("m", "litellm", model_id, **fields)  # type: ignore[arg-type]
+    return ModelConfig(name="m", id=model_id, **fields)  # type: ignore[arg-type]
 
 
 def test_a_day_that_the_map_names_is_read() -> None:
@@ -27,7 +28,7 @@ def test_a_day_that_the_map_names_is_read() -> None:
         (config("openai/no-such-model"), True),
         (config("openai/no-such-model", api_base="http://localhost:1/v1"), False),
         (config("hosted_vllm/no-such-model"), False),
-        (ModelConfig("oracle", "baseline", "oracle"), False),
+        (ModelConfig(name="oracle"), False),
     ],
 )
 def test_models_that_the_map_does_not_know_have_no_day(asked: ModelConfig, unlisted: bool) -> None:

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from phyblock.config.models import ModelSpec, group_names, load_models
+from phyblock.config.models import ModelConfig, group_names, load_models
 from phyblock.config.suite import Suite
-from phyblock.models import ModelConfig, ends_on
+from phyblock.models import ends_on
 from phyblock.models.keys import KEYLESS
 from phyblock.models.price_map import map_entry
 from phyblock.run.models import to_config
@@ -33,15 +33,15 @@ MAKERS = {
 }
 
 
-def config(name: str, spec: ModelSpec) -> ModelConfig:
+def config(name: str, spec: ModelConfig) -> ModelConfig:
     return to_config(name, spec, SUITE)
 
 
-def of_group(group: str) -> dict[str, ModelSpec]:
+def of_group(group: str) -> dict[str, ModelConfig]:
     return {name: spec for name, spec in MODELS.items() if group in spec.groups}
 
 
-def faults(models: Mapping[str, ModelSpec]) -> Iterator[str]:
+def faults(models: Mapping[str, ModelConfig]) -> Iterator[str]:
     """What litellm's map has against models that their providers serve.
 
     Servers of one's own serve what they like: the map knows none of them.
@@ -65,10 +65,10 @@ def test_current_models_are_served_and_look_at_pictures() -> None:
 
 def test_models_that_are_not_are_named() -> None:
     bad = {
-        "none": ModelSpec(id="openai/gpt-0"),
-        "old": ModelSpec(id="openai/o1-2024-12-17"),
-        "blind": ModelSpec(id="dashscope/qwen3-max"),
-        "own": ModelSpec(id="hosted_vllm/a/b", api_base="http://localhost:8000/v1"),
+        "none": ModelConfig(id="openai/gpt-0"),
+        "old": ModelConfig(id="openai/o1-2024-12-17"),
+        "blind": ModelConfig(id="dashscope/qwen3-max"),
+        "own": ModelConfig(id="hosted_vllm/a/b", api_base="http://localhost:8000/v1"),
     }
     assert [fault.split()[0] for fault in faults(bad)] == ["none", "old", "blind"]
 
@@ -98,13 +98,16 @@ def test_each_is_asked_through_litellm_with_what_it_takes(
     route = ROUTES.get(shipped.provider, ROUTES["openai"])
     server = route.server()
     with Running(server) as running:
-        at = route.config(running.url, id=shipped.id, params=shipped.params)
+        given = shipped.model_dump(
+            include=shipped.model_fields_set - {"addresses", "api_key_env"}, by_alias=True
+        )
+        at = route.config(running.url, **{**given, "transport": "litellm"})
         request = replace(make_request(), params={})
-        reply_of(make_model(replace(at, transport="litellm")), request)
+        reply_of(make_model(at), request)
     (seen,) = server.seen
     limits = ("max_tokens", "max_completion_tokens", "max_output_tokens")
     assert [seen.params[key] for key in limits if key in seen.params] == [
-        MODELS[name].params(SUITE.sampling)["max_tokens"]
+        MODELS[name].with_defaults(SUITE.sampling.model_dump()).params["max_tokens"]
     ]
     if map_entry(shipped).get("supports_sampling_params") is False:
         assert not {"temperature", "top_p"} & shipped.params.keys()

@@ -10,8 +10,9 @@ from dataclasses import replace
 import pytest
 from aiohttp import web
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import RefusedError, RetryableError, SampleError, UnavailableError
-from phyblock.models import ModelConfig, ModelEvent, Reply
+from phyblock.models import ModelEvent, Reply
 from phyblock.models.http_client import Answer
 from phyblock.models.refusals import refusal
 from tests.models.factory import QUICK, ask, make_model, make_request, run
@@ -48,7 +49,7 @@ def test_a_failure_that_may_pass_is_sent_once_an_attempt(route: str, mode: str) 
     running, server = serve(route, Faults(mode=mode))
     events: list[ModelEvent] = []
     with running:
-        model = make_model(config(route, running.url, sends_seed="never"), events=events)
+        model = make_model(config(route, running.url, seed="never"), events=events)
         (answer,) = ask(model, make_request())
     assert isinstance(answer, RetryableError), answer
     assert server.requests == QUICK.attempts
@@ -61,7 +62,7 @@ def test_a_model_that_cannot_answer_is_asked_once(route: str, mode: str) -> None
     events: list[ModelEvent] = []
     with running:
         model = make_model(
-            config(route, running.url, sends_seed="never", max_concurrency=1), events=events
+            config(route, running.url, seed="never", max_concurrency=1), events=events
         )
         answers = ask(model, *(make_request(f"{n:03}") for n in range(5)))
     assert all(isinstance(answer, UnavailableError) for answer in answers), answers
@@ -187,7 +188,7 @@ def test_where_no_seed_exists_none_is_spent_on_finding_out() -> None:
 def test_a_seed_that_must_be_sent_makes_a_refusal_an_error(route: str) -> None:
     running, _ = serve(route, Faults(mode="seed"))
     with running:
-        model = make_model(config(route, running.url, sends_seed="always"))
+        model = make_model(config(route, running.url, seed="always"))
         (answer,) = ask(model, make_request())
     assert isinstance(answer, UnavailableError)
     assert "seed" in str(answer)
@@ -196,7 +197,7 @@ def test_a_seed_that_must_be_sent_makes_a_refusal_an_error(route: str) -> None:
 def test_a_seed_that_may_not_be_sent_is_not(route: str) -> None:
     running, server = serve(route, Faults())
     with running:
-        model = make_model(config(route, running.url, sends_seed="never"))
+        model = make_model(config(route, running.url, seed="never"))
         (answer,) = ask(model, make_request("001", 7))
     assert isinstance(answer, Reply)
     assert not answer.seed_sent

@@ -54,7 +54,7 @@ def answers_to(route: Route, server: LocalServer, url: str, faults: list[str]) -
 
     async def one(mode: str) -> Reply | ModelError:
         server.faults = Faults(mode=mode)
-        fields = {"sends_seed": "never", "timeout_s": 0.7 if mode == "drip" else 20.0}
+        fields = {"seed": "never", "timeout_s": 0.7 if mode == "drip" else 20.0}
         model = make_model(route.config(url, most_body_bytes=2**20, **fields), policy=ONCE)
         try:
             reply = await model.ask(make_request())
@@ -133,7 +133,7 @@ def test_a_redirect_takes_nothing_anywhere(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["direct", "openai", "vllm", "anthropic"])
 def test_a_name_that_is_not_known_is_not_called_a_lost_connection(name: str) -> None:
-    config = ROUTES[name].config("http://no-such-host.invalid", sends_seed="never")
+    config = ROUTES[name].config("http://no-such-host.invalid", seed="never")
     (answer,) = ask(make_model(config, policy=ONCE), make_request())
     assert isinstance(answer, UnreachableError), answer
     assert answer.status is None
@@ -146,7 +146,7 @@ def test_a_closed_port_is_named(name: str) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
-        config = ROUTES[name].config(f"http://127.0.0.1:{port}", sends_seed="never")
+        config = ROUTES[name].config(f"http://127.0.0.1:{port}", seed="never")
         (answer,) = ask(make_model(config, policy=ONCE), make_request())
     assert isinstance(answer, UnreachableError), answer
     assert f"no connection to 127.0.0.1:{port}" in str(answer)
@@ -156,7 +156,7 @@ def test_a_closed_port_is_named(name: str) -> None:
 def test_a_server_without_tls_is_no_lost_connection(name: str) -> None:
     with Running(OpenAIChat()) as running:
         url = running.url.replace("http://", "https://")
-        config = ROUTES[name].config(url, sends_seed="never")
+        config = ROUTES[name].config(url, seed="never")
         (answer,) = ask(make_model(config, policy=ONCE), make_request())
     assert isinstance(answer, UnreachableError), answer
     assert f"no connection to 127.0.0.1:{running.port}" in str(answer)

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.config.models import ModelSpec
+from phyblock.config.models import ModelConfig
 from phyblock.config.suite import load_suite
 from phyblock.errors import StoreError
 from phyblock.models import Image, Message
@@ -77,9 +77,9 @@ def test_a_disk_that_fails_at_any_call_leaves_what_was_written(
     assert (tmp_path / "lines.jsonl").read_text() == '{"a":1}\n{"a":3}\n'
 
 
-GROUPED: dict[str, ModelSpec] = {
-    "b": ModelSpec(id="x/b", groups=("all",), image_detail="low"),
-    "a": ModelSpec(id="x/a", groups=("all",)),
+GROUPED: dict[str, ModelConfig] = {
+    "b": ModelConfig(id="x/b", groups=("all",), image_detail="low"),
+    "a": ModelConfig(id="x/a", groups=("all",)),
 }
 
 

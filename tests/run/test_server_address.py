@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from phyblock.config.models import ModelSpec
+from phyblock.config.models import ModelConfig
 from phyblock.config.suite import Suite
-from phyblock.models import ModelConfig, reply_key
+from phyblock.models import reply_key
 from phyblock.run.models import to_config
 from tests.models.factory import ask, make_model, make_request
 from tests.servers.anthropic_messages import AnthropicMessages
@@ -38,7 +38,7 @@ WAYS: list[tuple[str, str, str, type[LocalServer]]] = [
 
 
 def config_of(model_id: str, transport: str = "auto") -> ModelConfig:
-    spec = ModelSpec(id=model_id, api_key_env="PHYBLOCK_TEST_KEY", transport=transport)  # type: ignore[arg-type]
+    spec = ModelConfig(id=model_id, api_key_env="PHYBLOCK_TEST_KEY", transport=transport)  # type: ignore[arg-type]
     return to_config("m", spec, Suite(name="s", models=("m",)))
 
 
@@ -71,7 +71,7 @@ def test_calls_go_to_the_address_and_keys_say_that_there_is_one(
 
 def test_what_the_models_file_says_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENAI_BASE_URL", "http://127.0.0.1:9/v1")
-    spec = ModelSpec(id="openai/m", api_base="http://127.0.0.1:10/v1")
+    spec = ModelConfig(id="openai/m", api_base="http://127.0.0.1:10/v1")
     config = to_config("m", spec, Suite(name="s", models=("m",)))
     assert config.api_base == "http://127.0.0.1:10/v1"
 

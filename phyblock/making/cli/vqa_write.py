@@ -11,7 +11,7 @@ import click
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath, models_file_option
-from phyblock.config.models import load_models
+from phyblock.config.models import ModelConfig, load_models
 from phyblock.config.suite import Suite
 from phyblock.domain import Question, Subtask
 from phyblock.errors import DataError, Problem, SpecError
@@ -20,7 +20,7 @@ from phyblock.making.cli.question_sets import data_option, questions_option, rea
 from phyblock.making.cli.subtasks_option import subtasks_option
 from phyblock.making.cli.working import seed_option
 from phyblock.making.questions.rewording import Paraphrase, stems_of, write_wordings
-from phyblock.models import Breakers, Gate, ModelConfig, ReplyCache, RetryPolicy, build_model
+from phyblock.models import Breakers, Gate, ReplyCache, RetryPolicy, build_model
 from phyblock.resources import bundled, reply_cache_file
 from phyblock.run.finding import find_models_file
 from phyblock.run.models import to_config

@@ -14,11 +14,11 @@ from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import UnavailableError
 from phyblock.models.batches.fields import count, error_words, joined, mapping, text, unix_s
 from phyblock.models.batches.protocol import BatchProtocol, BatchStatus, ResultLine
 from phyblock.models.batches.wire import BatchWire
-from phyblock.models.config import ModelConfig
 from phyblock.models.http_client import Answer
 
 __all__ = ["AnthropicBatches"]

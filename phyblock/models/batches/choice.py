@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import Problem, SpecError
 from phyblock.models.batches.anthropic import AnthropicBatches
 from phyblock.models.batches.gemini import GeminiBatches
 from phyblock.models.batches.openai import OpenAIBatches
 from phyblock.models.batches.protocol import BatchProtocol
-from phyblock.models.config import ModelConfig
 
 __all__ = ["batch_protocol"]
 

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.models.base import AskLaterError, Request
 from phyblock.models.batches.following import Follower
@@ -15,7 +16,6 @@ from phyblock.models.batches.purse import Purse
 from phyblock.models.batches.sending import Draft, Sender, UnsureError
 from phyblock.models.batches.wording import Wording, Written
 from phyblock.models.cache import ReplyCache, reply_key
-from phyblock.models.config import ModelConfig
 from phyblock.models.cost import Budget, may_be_billed, reply_cost_usd
 from phyblock.models.events import EventKind, ModelEvent, Observer
 from phyblock.models.halt import Halt

@@ -12,10 +12,10 @@ from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from phyblock.config.models import ModelConfig
 from phyblock.models.batches.fields import count, error_words, joined, mapping, text
 from phyblock.models.batches.protocol import BatchProtocol, BatchStatus, ResultLine
 from phyblock.models.batches.wire import BatchWire
-from phyblock.models.config import ModelConfig
 from phyblock.models.direct_call import OPENAI_API_BASE
 from phyblock.models.http_client import Answer
 

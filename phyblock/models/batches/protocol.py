@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from phyblock.config.models import ModelConfig
 from phyblock.models.batches.wire import BatchWire
-from phyblock.models.config import ModelConfig
 from phyblock.models.http_client import Answer
 
 __all__ = ["BatchProtocol", "BatchStatus", "ResultLine"]

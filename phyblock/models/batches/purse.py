@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from phyblock.config.models import ModelConfig
 from phyblock.models.base import Request
 from phyblock.models.batches.ledger import Batch
-from phyblock.models.config import ModelConfig
 from phyblock.models.cost import Budget, estimate, most_usd
 from phyblock.models.halt import Halt
 from phyblock.models.prices import Prices, today

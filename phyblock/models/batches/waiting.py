@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from phyblock.config.models import ModelConfig
 from phyblock.models.batches.choice import batch_protocol
 from phyblock.models.batches.ledger import Batch, BatchFiles, Ledger
 from phyblock.models.batches.results import Results
-from phyblock.models.config import ModelConfig
 from phyblock.models.http_client import Answer
 from phyblock.records.others import BatchLine
 

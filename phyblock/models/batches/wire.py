@@ -6,15 +6,13 @@ import asyncio
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
 from urllib.parse import urlsplit
 
-from phyblock.config.models import host_of
+from phyblock.config.models import ModelConfig, host_of
 from phyblock.errors import ModelError, UnavailableError
 from phyblock.files import writing
-from phyblock.models.config import ModelConfig
 from phyblock.models.http_client import Answer, HttpClient
 from phyblock.models.keys import api_key, hidden
 from phyblock.models.refusals import read_body, refusal
@@ -70,9 +68,11 @@ class BatchWire:
         self._config = config
         self._secrets = tuple(secrets)
         self._headers_of = headers_of
-        self._calls = HttpClient(replace(config, timeout_s=_CALL_S))
+        self._calls = HttpClient(config.model_copy(update={"timeout_s": _CALL_S}))
         self._transfers = HttpClient(
-            replace(config, timeout_s=_TRANSFER_S, most_body_bytes=_LARGEST_RESULTS_BYTES)
+            config.model_copy(
+                update={"timeout_s": _TRANSFER_S, "most_body_bytes": _LARGEST_RESULTS_BYTES}
+            )
         )
 
     async def get(self, url: str) -> Mapping[str, Any]:

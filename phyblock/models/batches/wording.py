@@ -6,12 +6,12 @@ import asyncio
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.models.base import Request
 from phyblock.models.batches.capture import AnsweringClient, CapturingClient
 from phyblock.models.batches.ledger import Batch
 from phyblock.models.batches.protocol import BatchProtocol
-from phyblock.models.config import ModelConfig
 from phyblock.models.cost import counted, estimate
 from phyblock.models.formats import FORMAT_HINT, refuses_format
 from phyblock.models.http_client import Answer, Client
@@ -48,7 +48,7 @@ class Wording:
         self._protocol = protocol
         self._transport = transport
         self._on_seedless = on_seedless
-        self._takes_seed = config.sends_seed != "never"
+        self._takes_seed = config.seed != "never"
 
     async def write(self, request: Request) -> Written:
         """The request as a direct call would send it; raises as that does before it sends."""
@@ -103,7 +103,7 @@ class Wording:
         return line.answer
 
     def _go_without_seed(self) -> None:
-        if self._config.sends_seed == "always":
+        if self._config.seed == "always":
             raise UnavailableError("the provider takes no seed, and seed is `always`")
         if self._takes_seed:
             self._takes_seed = False
