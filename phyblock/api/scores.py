@@ -8,7 +8,7 @@ from html import escape
 from phyblock.api.given import expect
 from phyblock.data import AssemblyTask
 from phyblock.errors import Problem, SpecError
-from phyblock.parsing import parse_plan
+from phyblock.parsing.plan import parse_plan
 from phyblock.scoring.plan import AssemblyScorer, ErrorType
 from phyblock.types import MATCHERS, PLAN_PARSERS, SETTINGS, Matcher, PlanParser, Setting
 

@@ -11,7 +11,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 from phyblock.bundle.archive import ABOUT, MEMBERS
 from phyblock.errors import Problem, StoreError
 from phyblock.files import read_bytes
-from phyblock.parsing import READER_VERSION
+from phyblock.parsing.text import READER_VERSION
 from phyblock.records import MANIFEST, RECORDS, Line, Manifest
 from phyblock.records.decode import decode, problem_of
 from phyblock.report.inputs import digest_of_file

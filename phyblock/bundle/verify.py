@@ -16,7 +16,7 @@ from phyblock.bundle.naming import named
 from phyblock.bundle.portable import localized
 from phyblock.bundle.tables import digests_of_tables
 from phyblock.errors import Problem, StoreError
-from phyblock.parsing import READER_VERSION
+from phyblock.parsing.text import READER_VERSION
 from phyblock.records import MANIFEST, RECORDS, Manifest, Record, read_manifest
 from phyblock.run.rescore import judged_anew
 from phyblock.run.rewritten import manifest_text, record_lines, write_run

@@ -1,193 +1,142 @@
-"""Reply text -> the option that was chosen, with the rule that matched.
+"""Reply text -> the option that was chosen, or an order of all, with the rule that matched.
 
-Strict rules come first: a reply that is nothing but an answer, an answer in tags, a box or JSON, a
-line or a sentence that says "the answer is". Then the last or the first line, a letter that the
-reply begins with, the one option that is named at all. A rule that finds a statement decides: where
-statements contradict each other and nothing says which is the last word, where one names an option
-that is not shown, or where the model says that it cannot tell, nothing is read. That is a parse
-failure, and no later rule is tried. Nothing raises on any text.
+The asked form comes first: JSON, else the last line "Answer: X" (a box or a tag is read as one).
+Where there is none, the last choice that is stated, a letter alone in the last or the first line,
+then the only option that is named. An order is the last one that names every letter once.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
-from phyblock.parsing.answer_form import FormProblem
-from phyblock.parsing.answer_hints import (
-    concluded,
-    counted,
-    first_line,
-    last_line,
-    leading,
-    only_one_named,
-    only_order,
-    only_text,
-)
-from phyblock.parsing.answer_order import OrderReader
-from phyblock.parsing.answer_patterns import (
-    CHOSEN,
-    CONFIRMED,
-    CORRECTED,
-    DENIED,
-    DENIED_BEHIND,
-    IS_RIGHT,
-    JSON,
-    LINE,
-    NOT_BUT,
-    ORDER,
-    QUOTED,
-    SENTENCE,
-    VERDICT,
-)
-from phyblock.parsing.answer_statements import (
-    Reader,
-    forward,
-    is_conditional,
-    settle,
-    statements,
-    turned,
-)
-from phyblock.parsing.answer_value import CONTRADICTION, ChoiceReader
-from phyblock.parsing.slips import without_letter_slips
-from phyblock.parsing.speech import CONDITIONAL, TAKES_BACK, words
-from phyblock.parsing.text_forms import BOX, TAG, answer_of
+from phyblock.parsing.structured import AnswerForm
+from phyblock.parsing.text import answer_of, plain_lines
 
-__all__ = ["ParsedAnswer", "parse_answer"]
+AnswerProblem = Literal["empty", "thoughts_only", "no_answer"]
+LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 
 @dataclass(frozen=True)
 class ParsedAnswer:
-    """What was read out of a reply: one letter, or for ordering all letters in order.
-
-    `rule` names the rule that matched; both are None where nothing could be read. `problem` says
-    why where JSON was asked for and what came is none, or another.
-    """
+    """One letter, or for ordering all letters in order; `problem` says why there is none."""
 
     letters: str | None
     rule: str | None
-    problem: FormProblem | None = None
+    problem: AnswerProblem | None = None
+
+
+def choice_form(options: Sequence[str], is_ordering: bool) -> AnswerForm[str]:
+    """Return the JSON form of one of the `options` by its letter, or of an order of all."""
+    letters = LETTERS[: len(options)]
+    letter = {"type": "string", "enum": list(letters)}
+    if not is_ordering:
+        return AnswerForm("answer", letter, lambda value: _named(str(value), options), '"X"')
+    places = ", ".join(f'"{name}"' for name in "WXYZ"[: len(options)])
+    value = {"type": "array", "items": letter}
+    return AnswerForm("answer", value, lambda value: _json_order(value, letters), f"[{places}]")
 
 
 def parse_answer(text: str, options: Sequence[str], is_ordering: bool) -> ParsedAnswer:
     """Read the answer out of a reply to a question that shows `options`, the first one as A."""
-    answer = without_letter_slips(QUOTED.sub(" ", answer_of(text) or ""))
-    answer = NOT_BUT.sub(r"\g<value>", answer).strip()
-    reader = OrderReader(len(options)) if is_ordering else ChoiceReader(options)
-    for rule, find in _ORDER_RULES if is_ordering else _CHOICE_RULES:
-        found = find(answer, reader)
-        if found is not None:
-            return ParsedAnswer(found, rule) if found else ParsedAnswer(None, None)
-    return ParsedAnswer(None, None)
+    answer = answer_of(text)
+    if not answer:
+        return ParsedAnswer(None, None, "empty" if answer == "" else "thoughts_only")
+    if "{" in answer and (stated := choice_form(options, is_ordering).read(answer)):
+        return ParsedAnswer(stated, "json")
+    plain = "\n".join(line.strip() for line in plain_lines(answer) if line.strip())
+    rule, letters = (_order if is_ordering else _choice)(plain, options)
+    return ParsedAnswer(letters, rule) if letters else ParsedAnswer(None, None, "no_answer")
 
 
-_WHOLE_CHARS = 300
-
-
-def _whole(text: str, reader: Reader) -> str | None:
-    return reader.exact(text) if len(text) <= _WHOLE_CHARS else None
-
-
-def _marked(pattern: re.Pattern[str]) -> Callable[[str, Reader], str | None]:
-    """A rule for answers in a mark of their own: tags, a box, a field."""
-
-    def find(text: str, reader: Reader) -> str | None:
-        return settle(text, list(statements(text, pattern, reader.read, 0)))
-
-    return find
-
-
-def _stated(text: str, reader: Reader) -> str | None:
-    """Lines and sentences that say what the answer is; a line outweighs a sentence."""
-    stated = list(statements(text, LINE, reader.read, 1))
-    lines = {statement.end for statement in stated}
-    for statement in statements(text, SENTENCE, reader.read, 0):
-        if statement.end not in lines:
-            stated.append(statement)
-    stated += statements(text, CORRECTED, reader.read, 2)
-    if isinstance(reader, ChoiceReader):
-        stated += statements(text, CHOSEN, reader.letter_or_place, 0)
-        stated += statements(text, IS_RIGHT, reader.exact, 0)
-        stated += statements(text, CONFIRMED, reader.exact, 0)
-    else:
-        stated += statements(text, ORDER, reader.read, 0)
-        stated = [forward(text, statement) for statement in stated]
-    firm = [statement for statement in stated if not is_conditional(text, statement)]
-    if stated and not firm:
-        return CONTRADICTION
-    return turned(text, sorted(firm, key=lambda statement: statement.start), reader)
-
-
-def _verdicts(text: str, reader: ChoiceReader) -> str | None:
-    """The one option that is called right, or left, where all others are called right or wrong."""
-    found = {match["letter"].upper(): bool(match["yes"]) for match in VERDICT.finditer(text)}
-    for match in (*DENIED.finditer(text), *DENIED_BEHIND.finditer(text)):
-        found |= dict.fromkeys(
-            re.findall("(?<![A-Za-z])[A-Z](?![A-Za-z])", match["letters"]), False
-        )
-    right = [letter for letter, is_right in found.items() if is_right]
-    left = set(reader.letters) - set(found)
-    if left and (_WAIT.search(text) or CONDITIONAL.search(text) or not _LEAVES.search(text)):
-        return None
-    if len(left) > 1 or len(found) + len(left) < _MANY or (right and left):
-        return None
-    right += left
-    return right[0] if len(right) == 1 and right[0] in reader.letters else CONTRADICTION
-
-
-_LEAVES = words(r"\b(?:leav\w+|left|remain\w*|only|bleibt|reste|queda|rest[ao]|оста\w+)\b|剩|只有")
-_MANY = 3
-
-
-def _outer_line(text: str, reader: Reader) -> str | None:
-    """The last or the first line, where it is an answer and nothing else."""
-    found = [reader.exact(line) for line in (first_line(text), last_line(text))]
-    if isinstance(reader, ChoiceReader) and found == [None, None]:
-        last = _LAST_SENTENCE.search(last_line(text))
-        found[1] = reader.exact(last["letter"]) if last else None
-    named = {letters for letters in found if letters is not None}
-    if not named:
-        return None
-    if found[1] is None and _WAIT.search(text):
-        return CONTRADICTION
-    return named.pop() if len(named) == 1 else CONTRADICTION
-
-
-_LAST_SENTENCE = re.compile(
-    r"(?:[.!?]|(?:\A|[.;!]\s)\W{0,4}(?i:(?:(?:my|the|your|final|best)\s){0,2}(?:choice|pick"
-    r"|selection|selected|chosen|correct|decision|result|solution)):)\s(?P<letter>[A-Z])[.!]?\Z"
+_ANSWER = re.compile(
+    r"(?i)\banswer\b(?: to [^:\n]{1,60})? ?(?:is|(?:must|has to|should) be|:|=)\W{0,3}(?:is )?"
+    r"([^\n]{0,300})",
 )
-"""A letter alone behind a sentence, or behind a label that states an answer."""
-_WAIT = words(TAKES_BACK)
-
-
-def _listed(text: str, reader: OrderReader) -> str | None:
-    return reader.listed(text) or reader.ranked(text)
-
-
-_Rule = tuple[str, Callable[[str, Any], str | None]]
-_STATED: tuple[_Rule, ...] = (
-    ("whole", _whole),
-    ("tag", _marked(TAG)),
-    ("boxed", _marked(BOX)),
-    ("json", _marked(JSON)),
-    ("stated", _stated),
+_NOUN = r"(?:option|choice|answer|letter|picture|image|figure)"
+_HEAD = re.compile(
+    rf"(?si)\W{{0,9}}(?:(?:the|correct|right|best|probably) ){{0,4}}(?:{_NOUN} ?)?(?:is |: ?)?"
+    r"[(\[\"']{0,3}([A-Za-z])(?![\w'-])(.*)",
 )
-_CHOICE_RULES: tuple[_Rule, ...] = (
-    *_STATED,
-    ("verdicts", _verdicts),
-    ("outer_line", _outer_line),
-    ("concluded", concluded),
-    ("leading", leading),
-    ("only_one_named", only_one_named),
-    ("counted", counted),
-    ("only_text", only_text),
+_CLOSED = re.compile(r"\s?[)\]}\"'.:,;!-]|\s?\Z|\s(?:because|since|as|\()", re.I)
+_ALSO = re.compile(
+    rf"[)\]\"']{{0,2}}(?:\s?[,/&+]\s?|\s(?:or|and)\s)(?:{_NOUN}\s)?[(\[]?(?-i:[A-Z])(?![\w'])", re.I
 )
-_ORDER_RULES: tuple[_Rule, ...] = (
-    *_STATED,
-    ("outer_line", _outer_line),
-    ("numbered_list", _listed),
-    ("only_order", only_order),
+_STATED = re.compile(
+    r"(?i)\b(?:choose|chose|pick|select|go(?:ing)? with|choice is|(?:must|would|has to) be|so|thus"
+    rf"|therefore|I'd say)\b[:,]? (?:(?!between)[a-z]{{2,10}} ){{0,3}}(?:{_NOUN} )?"
+    r"\(?((?-i:[A-Z]))\)?(?![\w'-])"
+    r"|\b((?-i:[A-Z]))\)? (?:is|seems|looks|matches|fits)(?: [a-z]{2,10}){0,3} "
+    r"(?:correct|right|best|answer|goal|question)\b",
 )
+_NOT = re.compile(r"\b(?:not|never|\w{1,5}n't|cannot|wrong|incorrect)\b", re.I)
+_LETTER = re.compile(rf"\b(?i:{_NOUN}) \(?([A-Z])(?![\w'])|\(([A-Z])\)|^([A-Z])[).:]", re.M)
+_CLAUSE = re.compile(r"[.,;:(\n]\s|\s-")
+_NUMBER = re.compile(r"(?<![\d.])\d{1,6}(?:\.\d{1,6})?(?![\d.])")
+
+
+def _choice(plain: str, options: Sequence[str]) -> tuple[str, str | None]:
+    letters, lines = LETTERS[: len(options)], plain.split("\n")
+    if answers := _ANSWER.findall(plain):
+        return "answer_line", _named(answers[-1], options)
+    stated = [one[1] or one[2] for one in _STATED.finditer(plain) if not _NOT.search(one[0])]
+    if stated and stated[-1] in letters:
+        return "stated", stated[-1]
+    alone = {one for line in (lines[0], lines[-1]) if (one := _named(line, options))}
+    named = {next(filter(None, one)) for one in _LETTER.findall(plain)} & {*letters}
+    if alone or named:
+        one, *others = alone or named
+        return "line" if alone else "only_named", None if others else one
+    texts = [_folded(option) for option in options]
+    longest = sorted(filter(None, texts), key=len, reverse=True)
+    pattern = rf"(?<![\w.])(?:{'|'.join(map(re.escape, longest)) or '(?!)'})(?!\w|\.\d)"
+    found = {*re.findall(pattern, _folded(plain))}
+    return "only_named", letters[texts.index(found.pop())] if len(found) == 1 else None
+
+
+def _named(value: str, options: Sequence[str]) -> str | None:
+    """Return the letter of the one option that a short text names by text, letter or number."""
+    letters, texts = LETTERS[: len(options)], [_folded(option) for option in options]
+    if texts.count(_folded(value)) == 1:
+        return letters[texts.index(_folded(value))]
+    head = _HEAD.match(value)
+    if head and (letter := head[1].upper()) in letters:
+        rest = head[2]
+        is_said = _CLOSED.match(rest) and (head[1].isupper() or not re.search(r"\w", rest))
+        has_its_text = _folded(_CLAUSE.split(rest, 1)[0]) == (texts[letters.index(letter)] or None)
+        if is_said or has_its_text:
+            return None if _ALSO.match(rest) else letter
+    said = _NUMBER.findall(_folded(value.split(". ")[0]))
+    same = [at for at, text in enumerate(texts) if len(said) == 1 and _NUMBER.findall(text) == said]
+    return letters[same[0]] if len(same) == 1 else None
+
+
+def _folded(text: str) -> str:
+    """Return a text as options are compared: no case, edges, articles or double blanks."""
+    folded = " ".join(text.casefold().split()).strip(" .,:;!?()[]{}<>\"'*-")
+    return re.sub(r"^(?:the|an|a) ", "", folded)
+
+
+_BETWEEN = (
+    r"(?:[\s,;:>|/.()\[\]\u2192=-]|\d(?=[.)])|\b(?:then|and|to|picture|image|option)\b){0,12}"
+)
+
+
+def _order(plain: str, options: Sequence[str]) -> tuple[str, str | None]:
+    letters = LETTERS[: len(options)]
+    one = f"([{letters}])"
+    pattern = re.compile(rf"(?<![\w']){_BETWEEN.join([one] * len(letters))}(?![\w'])")
+    for rule, texts in (("answer_line", _ANSWER.findall(plain)), ("order", [plain])):
+        found = ["".join(groups) for text in texts for groups in pattern.findall(text)]
+        whole = [order for order in found if set(order) == set(letters)]
+        if whole:
+            return rule, whole[-1]
+    return "order", None
+
+
+def _json_order(value: Any, letters: str) -> str | None:
+    said = "".join(map(str, value)) if isinstance(value, list) else str(value)
+    order = re.sub(r"[\s,;>-]", "", said).upper()
+    return order if sorted(order) == sorted(letters) else None

@@ -1,198 +1,343 @@
-"""Reply text -> Plan, with the rule that matched, or a named failure.
+"""Reply text -> Plan, with the rule that matched, or a named problem.
 
 `official` is the released code's rule: every `block with index N` of the whole reply, in order.
-`steps`, the default, finds the lists of a reply (`reply_lists`), joins those that are parts of one
-plan, and takes the last plan that is complete. It reads nothing where a careful reader would not:
-a catalogue of the candidates, a refusal, thoughts without an answer, two plans and no choice.
-
-Both drop numbers that no candidate has and report them. Neither raises on any text.
+`steps`, the default, reads the form that was asked for, however it is decorated: JSON, else step
+lines, else a list whose items each name a block, else a bracketed list of numbers behind a word
+like "plan". Of several lists the last complete one is read, and what stands around it changes
+nothing. Both drop numbers that no candidate has and report them. Neither raises on any text.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Literal, get_args
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 from phyblock.domain import Plan
-from phyblock.parsing.alike_lines import as_steps, as_unknown_steps
-from phyblock.parsing.answer_form import FormProblem
-from phyblock.parsing.answer_patterns import DANGLES
-from phyblock.parsing.edits import edited
-from phyblock.parsing.legend import with_numbers
-from phyblock.parsing.listing import Listing
-from phyblock.parsing.plan_choice import PlanLists, chosen, plans_of
-from phyblock.parsing.plan_doubt import is_doubtful
-from phyblock.parsing.plan_patterns import (
-    AGAIN,
-    DOWNWARD,
-    NOT_REVERSED,
-    OFFER,
-    SUPPOSED,
-)
-from phyblock.parsing.plan_rank import LAST, MOVES, rank_of
-from phyblock.parsing.reply_lists import reply_lists
-from phyblock.parsing.speech import BACKWARD, REFUSAL
-from phyblock.parsing.text_forms import BOX, TAG, answer_of, plain_line
+from phyblock.parsing.structured import AnswerForm, whole_number
+from phyblock.parsing.text import READER_VERSION, answer_of, is_open, plain_lines
 from phyblock.types import PlanParser
 
-__all__ = ["PLAN_PROBLEMS", "ParsedPlan", "PlanProblem", "kept_plan", "parse_plan"]
-
-PlanProblem = Literal[
-    "empty",
-    "thoughts_only",
-    "refusal",
-    "catalogue",
-    "two_plans",
-    "ambiguous",
-    "no_plan",
-    FormProblem,
-]
-PLAN_PROBLEMS: tuple[PlanProblem, ...] = get_args(PlanProblem)
+PlanProblem = Literal["empty", "thoughts_only", "no_plan"]
 
 
 @dataclass(frozen=True)
 class ParsedPlan:
-    """What was read out of a reply.
+    """A plan that was read out of a reply.
 
-    `rule` names the form of the list that was read, None when nothing could be read (a parse
-    failure): then `problem` says why. `dropped` are the numbers that were read but name no
-    candidate, in order.
+    `rule` names its form, None when nothing could be read: then `problem` says why. `dropped` are
+    numbers that were read but name no candidate; `truncated` is true where the text breaks off.
     """
 
     plan: Plan
     rule: str | None
     dropped: tuple[int, ...] = ()
     problem: PlanProblem | None = None
+    truncated: bool = False
 
 
 def parse_plan(text: str, n_candidates: int, parser: PlanParser = "steps") -> ParsedPlan:
     """Read the plan out of a reply to a question with candidates 1..n_candidates."""
-    read = _official(text) if parser == "official" else _steps(text)
-    if isinstance(read, str):
-        return ParsedPlan(Plan(), None, problem=read)
-    return kept_plan(*read, n_candidates)
-
-
-def kept_plan(rule: str, numbers: Sequence[int], n_candidates: int) -> ParsedPlan:
-    """The plan that numbers read by a rule are; those that no candidate has are dropped."""
+    if parser == "official":
+        numbers = [int(match[1]) for match in _OFFICIAL.finditer(text)]
+        rule, is_cut = "block_with_index", False
+    else:
+        answer = answer_of(text)
+        if answer is None:
+            return ParsedPlan(Plan(), None, problem="thoughts_only")
+        rule, numbers, is_cut = _steps(answer, n_candidates)
+    if not numbers:
+        return ParsedPlan(Plan(), None, problem="no_plan" if text.strip() else "empty")
     kept = tuple(n for n in numbers if 1 <= n <= n_candidates)
-    return ParsedPlan(Plan(kept), rule, tuple(n for n in numbers if not 1 <= n <= n_candidates))
+    dropped = tuple(n for n in numbers if not 1 <= n <= n_candidates)
+    return ParsedPlan(Plan(kept), rule, dropped, truncated=is_cut)
 
 
-_Read = tuple[str, Sequence[int]] | PlanProblem
+def reader_version(parser: PlanParser) -> int:
+    """Return the version of a plan parser; `official` never changes."""
+    return 1 if parser == "official" else READER_VERSION
+
+
+def plan_form(n_candidates: int) -> AnswerForm[list[int]]:
+    """Return the JSON form of a plan: numbers of candidates 1 to `n_candidates`, in order."""
+    number = {"type": "integer", "enum": list(range(1, n_candidates + 1))}
+    return AnswerForm("plan", {"type": "array", "items": number}, _json_plan, "[N, N, ...]")
+
 
 # Longer runs of digits are no block numbers, and int() refuses thousands of digits.
 _OFFICIAL = re.compile(r"block with index (\d{1,6})(?!\d)")
+_KEYS = ("block", "index", "block_index", "candidate", "id")
 
 
-def _official(text: str) -> _Read:
-    numbers = [int(match.group(1)) for match in _OFFICIAL.finditer(text)]
-    return ("block_with_index", numbers) if numbers else "no_plan" if text.strip() else "empty"
+def _json_plan(value: Any) -> list[int] | None:
+    items = value if isinstance(value, list) else [None]
+    named = [
+        next((item[key] for key in _KEYS if key in item), None) if isinstance(item, dict) else item
+        for item in items
+    ]
+    numbers = [number for number in map(whole_number, named) if number is not None]
+    return numbers if len(numbers) == len(items) else None
 
 
-def _steps(text: str) -> _Read:
-    answer = answer_of(text)
-    if answer is None:
-        return "thoughts_only"
-    frames = [(frame.start(), "tag", frame["value"]) for frame in TAG.finditer(answer)]
-    frames += [(frame.start(), "boxed", frame["value"]) for frame in BOX.finditer(answer)]
-    for _, name, held in sorted(frames)[: -_MOST_FRAMES - 1 : -1]:
-        read = _choose(held if "\n" in held.strip() else f"Answer: {held.strip()}")
-        if not isinstance(read, str):
-            return name, read[1]
-    if not answer:
-        return "empty"
-    read = _choose(answer)
-    for other_way in _OTHER_WAYS.get(read, ()) if isinstance(read, str) else ():
-        rewritten = other_way(answer)
-        other = _choose(rewritten) if rewritten else "no_plan"
-        if not isinstance(other, str):
-            return other
-    return read
+def _steps(answer: str, n_candidates: int) -> tuple[str, list[int], bool]:
+    """Return the rule, the numbers of the plan, and True where the text breaks off in it."""
+    if "{" in answer and (stated := plan_form(n_candidates).read(answer)):
+        return "json", stated, False
+    lines, is_cut = plain_lines(answer), is_open(answer)
+    can_grow = is_cut and answer.rstrip()[-1:].isdigit()
+    found: list[tuple[str, list[int], bool]] = []
+    for rule, lists in zip(
+        ("steps", "list", "list"), (step_lists(lines), *item_lists(lines)), strict=True
+    ):
+        for one in lists:
+            one.values = [number for item in one.items for number in blocks_of(item)]
+        if can_grow and lists and lists[-1].ends_text(lines):
+            _drop_growing(lists[-1].values, n_candidates)
+        numbers, is_begun = chosen_list(lists, lines, is_open=is_cut)
+        found += [(rule, numbers, is_begun)] * bool(numbers)
+        if numbers and not is_begun:
+            break
+    if found:  # A list that was begun anew in another form may be whole above.
+        goes_on = not found[-1][2] and found[-1][1][: len(found[0][1])] == found[0][1]
+        return found[-1] if goes_on else found[0]
+    numbers = _numbers(lines)
+    if can_grow:
+        _drop_growing(numbers, n_candidates)
+    return "numbers", numbers, is_cut
 
 
-_MOST_FRAMES = 8
-_OTHER_WAYS: dict[str, tuple[Callable[[str], str | None], ...]] = {
-    "no_plan": (with_numbers, as_steps),
-    "catalogue": (with_numbers,),
-    "ambiguous": (as_unknown_steps,),
-}
-"""How a reply is rewritten to be read again where nothing was read."""
+def _drop_growing(numbers: list[int], n_candidates: int) -> None:
+    """Drop the last number where another digit may have followed."""
+    if numbers and 10 * numbers[-1] <= n_candidates:
+        numbers.pop()
 
 
-def _choose(answer: str) -> _Read:
-    """The plan among the lists of an answer."""
-    reply = reply_lists(answer)
-    found, below = reply.lists, reply.below
-    named = [listing for listing in found if listing.numbers]
-    ranks = [rank_of(listing) for listing in named]
-    best = max(ranks, default=0)
-    if not best:
-        if REFUSAL.search(answer):
-            return "refusal"
-        return (
-            "catalogue" if named or any(f.form in ("json", "table") for f in found) else "no_plan"
-        )
-    if REFUSAL.search(answer) and (best == LAST or _is_declined(named)):
-        return "refusal"
-    is_begun = named[-1].form == "layers" and DANGLES.search(answer.rstrip())
-    if best == LAST and (is_begun or OFFER.search(answer)):
-        return "no_plan"
-    plans = plans_of(named, ranks, best, found)
-    plans[-1].below = below
-    plan = chosen(plans, answer)
-    if plan is None:
-        return "two_plans"
-    is_cut_off = _is_cut_off(answer, found)
-    if plan is plans[-1] and is_cut_off:
-        firm = plans if len(plans) > 1 else [*plans_of(named, ranks, MOVES, found), plan]
-        plan = firm[-2] if len(firm) > 1 else plan
-    after = [] if plan.option else found[found.index(plan.lists[-1]) + 1 :]
-    if is_cut_off:
-        after = after[:-1]
-    before = found[: found.index(plan.lists[0])]
-    end = plan.lists[-1].last_line
-    numbers, edits = edited(plan.numbers, _behind(reply.lines, end))
-    after = [listing for listing in after if listing.first_line - end not in edits]
-    edit_lines = {plain_line(reply.lines[end + at]).strip() for at in edits}
-    for listing in after:
-        listing.above = [line for line in listing.above if line not in edit_lines]
-    beside = [line for line in plan.below if line not in edit_lines]
-    if numbers is None or plan.is_unclear or is_doubtful(plan.lists, beside, before, after):
-        return "ambiguous"
-    form = plan.lists[-1].form
-    if any(map(AGAIN.search, below)):
-        numbers = numbers * 2
-    is_reversed = _is_reversed(plan, form) and all(b.numbers[::-1] != numbers for b in before)
-    return form, numbers[::-1] if is_reversed else numbers
+_WORDS = r"\b(?:block|candidate|piece|index(?:es)?|indices|idx|number|no|id)s?\.?"
+_NAMED = re.compile(rf"(?:{_WORDS}[ :=#\"'(\[{{<-]{{0,6}}|#)(\d{{1,6}})(?!\w|\.\d)", re.I)
+_MORE = re.compile(
+    r"(?i) ?(?:\([^()\n]{0,80}\) ?)?(?:, ?and |, ?|& ?|\+ ?|and )(?:(?:the|another) )?"
+    rf"(?:(?:{_WORDS}|#) ?){{0,3}}(\d{{1,6}})(?![\w/]|\.\d| [a-z]+s\b)",
+)
+_VERB = r"(?:move|place|put|add|set|position|stack|insert|use|take|attach|lay|pick)\b"
+_BARE = re.compile(
+    rf"(?i)\W{{0,9}}(?:{_VERB})?[^\w\n]{{0,9}}(\d{{1,6}})(?!\w|\.\d)\W{{0,3}}(?:[(|].{{0,200}})?\Z"
+    r"|[^\d\n]{1,200}[(\[{]#?(\d{1,6})[)\]}][^\d\n]{0,200}\Z",
+)
+_TIMES = re.compile(
+    r"(?i)\btwice\b|(?<!\w)(?<![\d.] )[x\u00d7] ?([2-9])(?=\)|\W{0,9}\Z)"
+    rf"|([2-9]) ?[x\u00d7] ?(?={_WORDS}|#)",
+)
 
 
-def _behind(lines: Sequence[str], end: int) -> list[str]:
-    """What stands behind the last line of a plan, and in that line behind its first sentence."""
-    rest = _SENTENCE_END.split(lines[end], maxsplit=1)[1:] if end < len(lines) else []
-    return [rest[0] if rest else "", *lines[end + 1 :]]
+@dataclass
+class Item:
+    """A step or an item of a list; `span` is how many steps it says it is."""
+
+    number: int | None
+    span: int
+    text: str
+    line: int
+    more: list[str] = field(default_factory=list)  # Lines under it that belong to it.
 
 
-_SENTENCE_END = re.compile(r"(?<=[\d)\]])[.;]\s{1,4}(?=[^\W\d])")
+def blocks_of(item: Item) -> list[int]:
+    """Return the numbers of the blocks that an item places, in order."""
+    found = _blocks(item.text)
+    if not found:
+        below = _ACTS.match if _WORD.search(item.text) else _WORD.search
+        found = [number for line in filter(below, item.more) for number in _blocks(line)]
+    return found * item.span if len(found) == 1 else found
 
 
-def _is_cut_off(answer: str, found: list[Listing]) -> bool:
-    """Whether the text ends within its last list."""
-    unclosed = answer.count("{") > answer.count("}") or answer.count("```") % 2 == 1
-    return unclosed or (not found[-1].ends_named)
+def _blocks(text: str) -> list[int]:
+    first = _NAMED.search(text)
+    if first is None:
+        bare = _BARE.match(text)
+        return [int(bare[1] or bare[2])] if bare else []
+    found, end = [int(first[1])], first.end()
+    while more := _MORE.match(text, end):
+        found.append(int(more[1]))
+        end = more.end()
+    times = _TIMES.search(text) if len(found) == 1 else None
+    return found * int(times[1] or times[2] or 2) if times else found
 
 
-def _is_declined(named: list[Listing]) -> bool:
-    """Whether a refusal says of its list that it is only how one might look."""
-    return any(SUPPOSED.search(line) for listing in named for line in listing.above[-2:])
+# --- lists of steps ---
+
+_LABEL = re.compile(r"(?<![\w\n])(?=steps?[ #-]{0,3}\d{1,4}[\"')\]]{0,2} ?[:=])", re.I)
+_STEP = re.compile(
+    r"(?i)[^\w\n]{0,20}(?:\d{1,3}[.)]\W{0,9})?steps?[ #-]{0,3}(\d{1,4})"
+    r"((?: ?(?:, ?and|&|and|to|,|[-\u2013]) ?(?:step ?)?\d{1,4}){0,9})(?!\w)"
+    r"[\"')\]]{0,3}\s{0,9}[:.)=|>,\u2013-]{0,3}(.*)",
+)
+_ITEM = re.compile(
+    r"(?i)[\s>]{0,40}(?:[-*\u2022+|]\s{0,9})?\(?(\d{1,3})\s?[.):|\]]\s{0,9}(.*)"
+    rf"|[\s>]{{0,40}}[-*\u2022+]\s{{1,9}}(.*)|[\s>]{{0,40}}({_VERB}.*)",
+)
+_ACTS = re.compile(rf"[\W\d]{{0,20}}{_VERB}", re.I)
+_WORD = re.compile(r"[^\W\d]")
+_BLANK = re.compile(r"[\W\d]*+(?:json|plaintext|text|yaml)?[\W\d]*+\Z")
+_NEAR = 40  # Lines that are looked at under an item and above a list.
 
 
-def _is_reversed(plan: PlanLists, form: str) -> bool:
-    """Whether the reply says that its list is to be built from its end."""
-    titles = [plan.title, *plan.lists[-1].above[-3:], plan.lists[-1].label]
-    said = [*titles, *plan.below[:4]]
-    if any(BACKWARD.search(line) and not NOT_REVERSED.search(line) for line in said):
-        return True
-    return form in ("labeled", "chain", "marked") and bool(DOWNWARD.search(" ".join(titles)))
+@dataclass
+class StepList:
+    """Items that follow one another, the titles above them, and what was read out of them."""
+
+    items: list[Item]
+    titles: list[str]
+    values: list[Any] = field(default_factory=list)
+
+    @property
+    def title(self) -> str:
+        """The last line above that says something."""
+        return self.titles[0] if self.titles else ""
+
+    def ends_text(self, lines: Sequence[str]) -> bool:
+        """True if nothing stands behind the last item."""
+        last = self.items[-1]
+        return all(map(_BLANK.match, lines[last.line + 1 + len(last.more) :]))
+
+
+def step_lists(lines: list[str]) -> list[StepList]:
+    """Return the runs of step lines whose numbering goes on, whatever stands between them."""
+    lines[:] = _LABEL.sub("\n", "\n".join(lines)).split("\n")
+    runs: list[list[Item]] = []
+    end = 0
+    for at, line in enumerate(lines):
+        if step := _STEP.match(line):
+            number, *others = map(int, (step[1], *re.findall(r"\d+", step[2])))
+            if not runs or number <= end:
+                runs.append([])
+            end = max([number, *others[-1:]])
+            runs[-1].append(Item(number, min(end - number + 1, 20), step[3], at))
+    for run in runs:
+        ends = [item.line for item in run[1:]] + [len(lines)]
+        for item, end in zip(run, ends, strict=True):
+            for line in lines[item.line + 1 : min(end, item.line + _NEAR)]:
+                if line.startswith("#") or (_WORD.match(line) and _WORD.search(item.text)):
+                    break
+                item.more.append(line)
+    return _with_titles(runs, lines)
+
+
+def item_lists(lines: list[str]) -> tuple[list[StepList], list[StepList]]:
+    """Return the numbered lists and the lists without numbers that place blocks."""
+    numbered: list[list[Item]] = []
+    others: list[list[Item]] = []
+    for at, line in enumerate(lines):
+        if (match := _ITEM.match(line)) is None:
+            continue
+        item = Item(int(match[1] or 0) or None, 1, match[2] or match[3] or match[4] or "", at)
+        runs = numbered if item.number else others
+        last = runs[-1][-1] if runs else None
+        if not last or (
+            item.number != last.number + 1
+            if item.number and last.number
+            else any(map(_WORD.search, lines[last.line + 1 : at]))
+        ):
+            runs.append([])
+        runs[-1].append(item)
+    counted, bare = (
+        [
+            one
+            for one in _with_titles(runs, lines)
+            if not one.title
+            or _PLAN.search(one.title)
+            or all(_ACTS.match(item.text) for item in one.items)
+        ]
+        for runs in (numbered, others)
+    )
+    return counted, [one for one in bare if len(one.items) > 1 or _HEADING.search(one.title)]
+
+
+def _with_titles(runs: list[list[Item]], lines: list[str]) -> list[StepList]:
+    """Return the lists of which at least half the items name a block, with up to three titles."""
+    found: list[StepList] = []
+    for items in runs:
+        if sum(bool(blocks_of(item)) for item in items) * 2 >= len(items):
+            first = found[-1].items[-1].line + 1 if found else 0
+            above = lines[max(first, items[0].line - _NEAR) : items[0].line]
+            titles = [line.strip() for line in reversed(above) if not _BLANK.match(line)]
+            found.append(StepList(items, titles[:3]))
+    return found
+
+
+# --- the plan among lists ---
+
+_PART = re.compile(
+    r"(?i)\b(?:left|right|structure|construction|configuration|layer|level|part|section|side|stage)\b",
+)
+_WHOLE = re.compile(
+    r"(?i)\b(?:final|correct|revis|updat|improv|optimi|alternat|option|instead|again|whole|complete"
+    r"|full|overall|combined|entire|summary|both)",
+)
+_PLAN = re.compile(
+    r"\b(?:plan|order|sequence|assembl|steps?|instruction|answer|solution|output|result)", re.I
+)
+_EXPLAINS = re.compile(r"\b(?:expla|reason|rational|justif|note|verif|check)", re.I)
+_HEADING = re.compile(r"\A#|\A[^,.!?]{1,60}:\W{0,9}\Z")
+_FOR = re.compile(r"\bfor\b", re.I)
+
+
+def chosen_list(
+    lists: Sequence[StepList], lines: Sequence[str], *, is_open: bool
+) -> tuple[list[Any], bool]:
+    """Return the values of the last complete plan, and True where the text breaks off in it.
+
+    Lists that begin anew under titles of parts (a structure, a layer) are one plan. A list that the
+    text breaks off in loses to the plan before it if it says the beginning of that.
+    """
+    plans: list[list[StepList]] = []
+    goes_on, end = True, 0
+    for one in lists:
+        is_apart = goes_on or one.items[0].line > end + 1
+        goes_on, end = is_apart and one.items[0].number in (None, 0, 1), one.items[-1].line
+        if goes_on and plans and _is_part(one, plans[-1]):
+            plans[-1].append(one)
+        elif goes_on and not (plans and _EXPLAINS.search(one.title)):
+            plans.append([one])
+    plans = plans or [[one] for one in lists[-1:]]
+    if not plans:
+        return [], False
+    *before, values = [[value for one in plan for value in one.values] for plan in plans]
+    last = plans[-1][-1]
+    is_begun = not any(map(str.strip, lines[last.items[-1].line + 1 :]))
+    is_cut = (is_open and last.ends_text(lines)) or (is_begun and not blocks_of(last.items[-1]))
+    if is_cut and before and values == before[-1][: len(values)]:
+        return before[-1], False
+    return values, is_cut
+
+
+def _is_part(one: StepList, plan: list[StepList]) -> bool:
+    """Return True if a list that begins anew goes on with a plan: it builds something else."""
+    titles = [part.title for part in plan]
+    is_anew = any(_WHOLE.search(title) or _EXPLAINS.search(title) for title in one.titles)
+    if is_anew or len(one.title) > 80 or (one.title and one.title in titles):
+        return False
+    if _PART.search(one.title) or (_FOR.search(one.title) and _FOR.search(titles[-1])):
+        return len(plan) == 1 or plan[0].values != one.values
+    if one.title and (_PLAN.search(one.title) or not _HEADING.search(one.title)):
+        return False
+    n_same = min(len(plan[0].values), len(one.values))
+    return plan[0].values[:n_same] != one.values[:n_same]
+
+
+_SEQUENCE = r"(\d{1,6}+(?:(?:[\s,;\"'#>\u2192-]|block|index){1,9}+\d{1,6}+){1,64}+)[\s)\]\"'.,}]*+"
+_NUMBERS = re.compile(
+    r"(?i)\b(?:plan|order|sequence|steps|answer|solution|assembly)\b([^\d\n]{0,60}+)"
+    rf"{_SEQUENCE}(?:\(.*)?\Z",
+)
+_ALONE = re.compile(rf"\W{{0,9}}+{_SEQUENCE}\Z")
+
+
+def _numbers(lines: list[str]) -> list[int]:
+    """Return the last list of numbers behind a word for a plan, or that is the whole reply."""
+    with_digits = [line for line in lines if re.search(r"\d", line)]
+    for line in reversed(with_digits):
+        found = _NUMBERS.search(line)
+        if found and re.search(r"(?:[:=>\[(]|\bis)\W*\Z", found[1]):
+            return [int(digits) for digits in re.findall(r"\d+", found[2])]
+    alone = _ALONE.match(with_digits[0]) if len(with_digits) == 1 else None
+    return [int(digits) for digits in re.findall(r"\d+", alone[1])] if alone else []

@@ -11,7 +11,7 @@ from typing import Any
 from phyblock.config.suite import Suite, Variant
 from phyblock.data import Dataset
 from phyblock.data.version import UNNUMBERED
-from phyblock.parsing import READER_VERSION
+from phyblock.parsing.text import READER_VERSION
 from phyblock.records import FORMAT
 from phyblock.run.models import PlannedModel
 from phyblock.stable import hex_digest

@@ -9,7 +9,7 @@ from typing import Any
 
 from phyblock.config.suite import Variant
 from phyblock.errors import Problem, StoreError
-from phyblock.parsing import READER_VERSION
+from phyblock.parsing.text import READER_VERSION
 from phyblock.records import RECORDS, Manifest, Record
 from phyblock.records.reading import read_records
 from phyblock.run.judging import judged_apart

@@ -12,7 +12,7 @@ from typing import Any
 from phyblock.config.suite import Suite, Variant
 from phyblock.data import Dataset
 from phyblock.data.version import read_version
-from phyblock.parsing import READER_VERSION
+from phyblock.parsing.text import READER_VERSION
 from phyblock.records import Manifest
 from phyblock.run.identity import earlier_identities, identity_of, inputs_of
 from phyblock.run.models import PlannedModel

@@ -13,7 +13,8 @@ from pydantic import ValidationError
 from phyblock.config.suite import Suite, suite_model
 from phyblock.data import AssemblyTask, Dataset
 from phyblock.errors import DataError, Problem, SpecError, StoreError
-from phyblock.parsing import READER_VERSION, reader_version
+from phyblock.parsing.plan import reader_version
+from phyblock.parsing.text import READER_VERSION
 from phyblock.records import MANIFEST, Manifest, Record, read_manifest
 from phyblock.run.data import asked_about, recorded_dataset
 from phyblock.run.folder import check_place, run_folder

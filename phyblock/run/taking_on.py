@@ -17,7 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from phyblock.parsing import READER_VERSION
+from phyblock.parsing.text import READER_VERSION
 from phyblock.records import Line, Manifest, Record, Reply, Turn
 from phyblock.run.appending import AppendFile
 from phyblock.run.judged_again import (

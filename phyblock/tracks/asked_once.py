@@ -7,8 +7,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Generic, Protocol, TypeVar
 
-from phyblock import parsing
 from phyblock.models.base import Image, Request
+from phyblock.parsing.structured import AnswerForm
 from phyblock.stable import hex_digest
 from phyblock.tracks.base import ItemT
 from phyblock.tracks.examples import Examples, Shots, WorkedExample
@@ -59,7 +59,7 @@ class AskedOnce(ABC, Generic[ItemT, PicturesT]):
         """What baselines answer about."""
 
     @abstractmethod
-    def _form(self, item: ItemT) -> parsing.AnswerForm[Any] | None:
+    def _form(self, item: ItemT) -> AnswerForm[Any] | None:
         """The form in which an answer is asked for; None where that is text."""
 
     @abstractmethod

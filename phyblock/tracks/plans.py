@@ -28,6 +28,8 @@ class PlanParse(Line):
     """Version of the parser."""
     problem: str | None = None
     """Why nothing could be read."""
+    truncated: bool = False
+    """True where the text breaks off within the plan."""
 
 
 PLAN_COLUMNS = dict.fromkeys(("parser", "plan", "file_plan", "dropped", "shown"), "object")

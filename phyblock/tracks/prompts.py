@@ -13,9 +13,9 @@ import jinja2
 import jinja2.meta
 import jinja2.nodes
 
-from phyblock import parsing
 from phyblock.errors import Problem, PromptError, reason_of
 from phyblock.models.base import Image, Message
+from phyblock.parsing.structured import AnswerForm
 from phyblock.resources import bundled
 from phyblock.stable import hex_digest
 from phyblock.text import did_you_mean
@@ -40,7 +40,7 @@ _ALL_BLOCKS = (*_COMMON_BLOCKS, "answer", "turn", "check")
 """Blocks that bundled templates have; another would say its text to nobody."""
 
 
-def form_facts(form: parsing.AnswerForm[Any] | None) -> dict[str, object]:
+def form_facts(form: AnswerForm[Any] | None) -> dict[str, object]:
     """What templates may use of the form of the answer; None is a form of their own, in text."""
     if form is None:
         return {"answer_format": "text", **dict.fromkeys(FORM_FACTS)}
@@ -48,7 +48,7 @@ def form_facts(form: parsing.AnswerForm[Any] | None) -> dict[str, object]:
     return {"answer_format": "json_schema", **dict(zip(FORM_FACTS, facts, strict=True))}
 
 
-def response_format(form: parsing.AnswerForm[Any] | None) -> Mapping[str, object] | None:
+def response_format(form: AnswerForm[Any] | None) -> Mapping[str, object] | None:
     """What a request says of the form of the answer; nothing for text."""
     return None if form is None else form.response_format
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Generic, Protocol, TypeVar
 
-from phyblock import parsing
 from phyblock.data import AssemblyTask
 from phyblock.models.base import Image
+from phyblock.parsing.structured import AnswerForm
 from phyblock.tracks.asked_once import AskedOnce, PicturesT
 from phyblock.tracks.examples import Examples
 from phyblock.tracks.prompts import Prompt, form_facts
@@ -20,7 +20,7 @@ AS_IN_FILE = TaskShowing(Showing())
 
 
 class _Rules(Protocol):
-    def form(self, item: AssemblyTask) -> parsing.AnswerForm[Any] | None: ...
+    def form(self, item: AssemblyTask) -> AnswerForm[Any] | None: ...
 
 
 RulesT = TypeVar("RulesT", bound=_Rules)
@@ -61,7 +61,7 @@ class WholePlanTrack(AskedOnce[AssemblyTask, PicturesT], Generic[RulesT, Picture
             **form_facts(self._form(item)),
         }
 
-    def _form(self, item: AssemblyTask) -> parsing.AnswerForm[Any] | None:
+    def _form(self, item: AssemblyTask) -> AnswerForm[Any] | None:
         return self.rules.form(item)
 
     def _pictured(self, item: AssemblyTask) -> AssemblyTask:

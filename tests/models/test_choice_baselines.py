@@ -13,7 +13,7 @@ from phyblock.domain import LETTERS, Question, Scene, Subtask
 from phyblock.errors import SpecError
 from phyblock.models import Request
 from phyblock.models.baselines import BaselineModel
-from phyblock.parsing import parse_answer
+from phyblock.parsing.answer import parse_answer
 from phyblock.tracks.vqa.baselines import ChoiceSubject
 
 OPTIONS = ("cube", "arch", "cylinder", "cuboid")

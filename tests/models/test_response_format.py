@@ -13,7 +13,9 @@ from phyblock.config.models import ModelConfig, load_models
 from phyblock.config.suite import Suite
 from phyblock.errors import ModelError, RefusedError, SampleError, UnavailableError
 from phyblock.models import Reply, Request, reply_key, takes_format
-from phyblock.parsing import choice_form, move_form, parse_asked_plan, plan_form
+from phyblock.parsing.answer import choice_form
+from phyblock.parsing.move import move_form
+from phyblock.parsing.plan import parse_plan, plan_form
 from phyblock.resources import bundled
 from phyblock.run.models import to_config
 from tests.models.factory import ask, make_model, make_request, reply_of, with_fields
@@ -72,8 +74,8 @@ def test_the_schema_arrives_as_it_is_declared_and_the_reply_is_read() -> None:
         "type": "json_schema",
         "json_schema": {"name": "plan", "schema": FORM.schema, "strict": True},
     }
-    parsed = parse_asked_plan(reply.text, 16)
-    assert (parsed.plan.steps, parsed.rule) == ((1, 2, 3), "json_schema")
+    parsed = parse_plan(reply.text, 16)
+    assert (parsed.plan.steps, parsed.rule) == ((1, 2, 3), "json")
 
 
 def test_nothing_but_the_field_is_sent_more_and_without_it_nothing_is_other_than_before() -> None:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import pytest
 
-from phyblock.parsing import READER_VERSION
+from phyblock.parsing.text import READER_VERSION
 from phyblock.records import read_manifest
 from phyblock.report.compare import compare_runs
 from phyblock.run.rescore import rescore

@@ -15,11 +15,14 @@ from typing import Any
 
 import pytest
 
-from phyblock import parsing
 from phyblock.cli.main import phyblock
 from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
 from phyblock.errors import DataError, StoreError
+from phyblock.parsing import plan as plan_reader
+from phyblock.parsing.move import parse_move
+from phyblock.parsing.plan import parse_plan
+from phyblock.parsing.text import READER_VERSION
 from phyblock.play.answers import read_answers
 from phyblock.play.person import Person, plan_sitting
 from phyblock.records import read_manifest
@@ -29,13 +32,15 @@ from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.store import RunStore, held_run
 from phyblock.run.taking_on import begun_anew
 from phyblock.tables.load import load_run
+from phyblock.tracks.full_planning import track
+from phyblock.tracks.step_planning import episode
 from tests.run.test_step_runs import by_sample
 from tests.servers.chassis import Faults, Running, Seen
 from tests.servers.step_agent import StepAgent
 from tests.workspace import Raw, Workspace
 
 EARLIER = 5
-VERSIONED = (identity, judged_again, manifest, taking_on, parsing.version)  # type: ignore[attr-defined]
+VERSIONED = (identity, judged_again, manifest, taking_on, plan_reader)  # type: ignore[attr-defined]
 PRICE = {"input": 1000.0, "output": 1000.0}
 
 
@@ -68,11 +73,11 @@ def run(out: str | Path, *args: object) -> int:
 
 def read_earlier(monkeypatch: pytest.MonkeyPatch) -> None:
     """Read as readers of an earlier version, which did not read all numbers."""
-    plan, move = parsing.parse_plan, parsing.parse_move
+    plan, move = parse_plan, parse_move
     for module in VERSIONED:
         monkeypatch.setattr(module, "READER_VERSION", EARLIER)
-    monkeypatch.setattr(parsing, "parse_plan", lambda text, *rest: plan(unread(text), *rest))
-    monkeypatch.setattr(parsing, "parse_move", lambda text: move(unread(text)))
+    monkeypatch.setattr(track, "parse_plan", lambda text, *rest: plan(unread(text), *rest))
+    monkeypatch.setattr(episode, "parse_move", lambda text: move(unread(text)))
 
 
 def unread(text: str) -> str:
@@ -137,7 +142,7 @@ def test_it_goes_on_as_if_todays_readers_had_begun_it_and_pays_nothing_twice(
     capsys.readouterr()
     assert run("out", "--dry-run") == 0
     said = capsys.readouterr().out
-    assert "read the replies of this run (readers 5, now 6): they are read again before" in said
+    assert f"(readers {EARLIER}, now {READER_VERSION}): they are read again before" in said
     done = len([s for s in before if s not in anew and "/alpha/" in s])
     assert re.search(rf"^ alpha +litellm +10 +{done} ", said, re.MULTILINE)
     assert workspace.files() == files
@@ -150,7 +155,7 @@ def test_it_goes_on_as_if_todays_readers_had_begun_it_and_pays_nothing_twice(
     # Turns of which nobody knows how they were read came from the cache.
     assert max(Counter(begun.answered).values()) == 1
     now = read_manifest(workspace.out)
-    assert now.versions == {**earlier.versions, "readers": "6"}
+    assert now.versions == {**earlier.versions, "readers": str(READER_VERSION)}
     assert (now.identities[0], now.created) == (earlier.identity, earlier.created)
     assert now.identity == now.identities[1] == plan.manifest.identity
     assert call("score", "out") == 0
@@ -222,7 +227,7 @@ def test_the_same_command_finds_it_and_other_runs_are_refused_as_ever(
     assert call("run", "suite.yaml", "--no-report", "--yes") == 0
     assert plan.folder_in(folder.parent) == folder
     read_earlier(monkeypatch)
-    with pytest.raises(StoreError, match="read by readers 6, this version has readers 5"):
+    with pytest.raises(StoreError, match=f"by readers {READER_VERSION}, this version has"):
         run(folder, "--yes")
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from phyblock.data import AssemblyTask, read_official
 from phyblock.domain import Plan
-from phyblock.parsing import parse_plan
+from phyblock.parsing.plan import parse_plan
 from phyblock.scoring.plan import AssemblyScorer, Goal, match_plan
 from phyblock.types import MATCHERS, PLAN_PARSERS, SETTINGS, PlanParser
 from tests.official_replies import reply_texts

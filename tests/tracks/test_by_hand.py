@@ -7,16 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.domain import LETTERS, Question
-from phyblock.parsing import (
-    move_form,
-    parse_answer,
-    parse_asked_answer,
-    parse_asked_move,
-    parse_asked_plan,
-    parse_move,
-    parse_plan,
-    parse_poses,
-)
+from phyblock.parsing.answer import parse_answer
+from phyblock.parsing.move import parse_move
+from phyblock.parsing.plan import parse_plan
+from phyblock.parsing.poses import parse_poses
 from phyblock.resources import bundled
 from phyblock.run.data import open_dataset
 from phyblock.sim.compose import joined_size_px
@@ -43,15 +37,14 @@ def test_a_plan_is_read_as_it_was_picked(picks: list[int]) -> None:
     steps = tuple(pick + 1 for pick in picks)
     assert parse_plan(reply, N).plan.steps == steps
     assert parse_plan(reply, N, "official").plan.steps == steps
-    assert parse_asked_plan(reply, N).plan.steps == steps
 
 
 @pytest.mark.parametrize("pick", range(N + 1))
 def test_a_step_is_read_as_it_was_picked(pick: int) -> None:
     picking = pick_step(StepSubject(TASK.scene, TASK.candidates, (), ()))
     reply, wanted = picking.reply(picks_of([pick])), pick + 1 if pick < N else "Done"
-    for parsed in (parse_move(reply), parse_asked_move(reply, move_form(N))):
-        assert ("Done" if parsed.is_done else parsed.move) == wanted
+    parsed = parse_move(reply)
+    assert ("Done" if parsed.is_done else parsed.move) == wanted
 
 
 @given(st.permutations(range(4)), st.sampled_from([TEXTS, PICTURES]), st.booleans())
@@ -63,8 +56,7 @@ def test_an_answer_is_read_as_it_was_picked(
     picks = order if is_ordering else order[:1]
     reply = pick_answer(ChoiceSubject(question)).reply(picks_of(picks))
     letters = "".join(LETTERS[pick] for pick in picks)
-    for parse in (parse_answer, parse_asked_answer):
-        assert parse(reply, options, is_ordering).letters == letters
+    assert parse_answer(reply, options, is_ordering).letters == letters
 
 
 CENTIMETERS = st.integers(-100_000, 100_000).map(lambda n: n / 100)

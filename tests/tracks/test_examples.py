@@ -104,7 +104,7 @@ def test_the_answers_of_examples_are_right_and_follow_no_order_of_the_file(
         judged = track.judge(task, worked_plan(task, track.rules.form(task)))
         counts = next(score.counts for score in judged.scores if score.criterion == "aov")
         assert (counts.tp, counts.fp, counts.fn) == (len(task.scene), 0, 0)
-        assert (judged.parsed.rule == "json_schema") == (form == "json_schema")
+        assert (judged.parsed.rule == "json") == (form == "json_schema")
         ready = [task.scene.blocks[vertex].look for vertex in task.scene.graph.ready()]
         if len(set(ready)) == len(ready) > 1:
             first += judged.steps[0] == task.candidates.index_of(ready[0])
@@ -146,7 +146,7 @@ def test_examples_are_turns_before_the_question(
             assert track == "vqa" or pictures
             about = item if track == "full_planning" else item.question
             rule = shown.rules.read(about, answer.parts[0]).rule
-            assert (rule == "json_schema") if form == "json_schema" else rule
+            assert (rule == "json") if form == "json_schema" else rule
 
 
 def test_questions_have_examples_of_their_subtask_with_the_right_option(tmp_path: Path) -> None:

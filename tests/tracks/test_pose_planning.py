@@ -19,7 +19,8 @@ from phyblock.data import AssemblyTask, read_builtin
 from phyblock.domain import Block, Candidate, CandidateSet, PoseStep
 from phyblock.errors import InputError, StoreError
 from phyblock.models.base import Image as SentPicture
-from phyblock.parsing import POSE_READER_VERSION, pose_form
+from phyblock.parsing.poses import pose_form
+from phyblock.parsing.text import READER_VERSION
 from phyblock.records.known import known_records
 from phyblock.resources import bundled
 from phyblock.run.records import begun, judged
@@ -317,8 +318,8 @@ def test_a_run_with_faults_is_killed_resumed_and_scored_again(
     described = workspace.out / "run.yaml"
     told = described.read_text()
     # A run of another version is read anew, and not gone on with.
-    assert f"reader: {POSE_READER_VERSION}\n" in told
-    described.write_text(told.replace(f"reader: {POSE_READER_VERSION}\n", "reader: 0\n"))
+    assert f"reader: {READER_VERSION}\n" in told
+    described.write_text(told.replace(f"reader: {READER_VERSION}\n", "reader: 0\n"))
     monkeypatch.setattr(pose_track, "CARRY_VERSION", judging.CARRY_VERSION + 1)
     again = rescore(workspace.out, None, None, workspace.root / "again")
     with pytest.raises(StoreError, match="carries plans out and measures what stands otherwise"):

@@ -29,7 +29,7 @@ from phyblock.making.questions.question_production import problem_of
 from phyblock.making.questions.selection import pick
 from phyblock.making.questions.wording import WORDINGS, fill_template, stem_of, wording_ids
 from phyblock.models import Message, Model, Request
-from phyblock.parsing import parse_answer
+from phyblock.parsing.answer import parse_answer
 from phyblock.records.data_values import Name
 from phyblock.records.decode import shown
 from phyblock.records.faults import Fault, refuse, validated

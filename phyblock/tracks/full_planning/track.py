@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from phyblock import parsing
 from phyblock.data import AssemblyTask
 from phyblock.domain import Plan
 from phyblock.models.base import Image
+from phyblock.parsing.plan import ParsedPlan, parse_plan, plan_form, reader_version
+from phyblock.parsing.structured import AnswerForm
 from phyblock.scoring.plan import AssemblyScorer, Score
 from phyblock.tracks.examples import Examples
 from phyblock.tracks.full_planning.baselines import PlanSubject
@@ -36,16 +37,13 @@ class PlanningRules:
     level1: Level1Criterion | None
     answer_format: AnswerFormat = "text"
 
-    def form(self, item: AssemblyTask) -> parsing.AnswerForm[tuple[int, ...]] | None:
+    def form(self, item: AssemblyTask) -> AnswerForm[list[int]] | None:
         """The form in which a plan for a scene is asked for; None where that is text."""
-        return None if self.answer_format == "text" else parsing.plan_form(len(item.candidates))
+        return None if self.answer_format == "text" else plan_form(len(item.candidates))
 
-    def read(self, item: AssemblyTask, text: str) -> parsing.ParsedPlan:
+    def read(self, item: AssemblyTask, text: str) -> ParsedPlan:
         """What a reply to a question about a scene says."""
-        n_candidates = len(item.candidates)
-        if self.answer_format == "json_schema":
-            return parsing.parse_asked_plan(text, n_candidates)
-        return parsing.parse_plan(text, n_candidates, self.parser)
+        return parse_plan(text, len(item.candidates), self.parser)
 
 
 @dataclass(frozen=True)
@@ -53,7 +51,7 @@ class PlanJudgement:
     """What a reply was read as, and what that is worth."""
 
     parser: PlanParser
-    parsed: parsing.ParsedPlan
+    parsed: ParsedPlan
     scores: tuple[Score, ...]
     in_file: tuple[int, ...] | None = None
     """The plan in the numbers of the file, where others were shown."""
@@ -77,8 +75,9 @@ class PlanJudgement:
                 "plan": list(self.parsed.plan.steps),
                 "file_plan": self.in_file,
                 "dropped": list(self.parsed.dropped),
-                "version": parsing.reader_version(self.parser),
+                "version": reader_version(self.parser),
                 "problem": self.parsed.problem,
+                "truncated": self.parsed.truncated,
             },
             "scores": [score_fields(score) for score in self.scores],
         }
@@ -120,7 +119,7 @@ class FullPlanning(WholePlanTrack[PlanningRules, Pictures]):
 
     def judge(self, item: AssemblyTask, text: str | None) -> PlanJudgement:
         """Read and score a reply; None, where there is no reply, is scored as an empty plan."""
-        parsed = parsing.ParsedPlan(Plan(), None) if text is None else self.rules.read(item, text)
+        parsed = ParsedPlan(Plan(), None) if text is None else self.rules.read(item, text)
         key = (item.key, item.candidates)
         scorer = self._scorers.get(key)
         if scorer is None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from phyblock import parsing
 from phyblock.data import AssemblyTask
 from phyblock.domain import Scene
+from phyblock.parsing.structured import AnswerForm
 from phyblock.stable import drawn_bytes
 from phyblock.tracks.full_planning.baselines import plan_text
 
@@ -16,7 +16,7 @@ def can_be_worked(task: AssemblyTask) -> bool:
     return all(task.candidates.index_of(block.look) is not None for block in task.scene.blocks)
 
 
-def worked_plan(task: AssemblyTask, form: parsing.AnswerForm[tuple[int, ...]] | None) -> str:
+def worked_plan(task: AssemblyTask, form: AnswerForm[list[int]] | None) -> str:
     """A right answer in the form that is asked for, None for text.
 
     Blocks are placed in a valid order that does not follow that of the file.

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from phyblock.domain import PoseStep
-from phyblock.parsing import MOST_POSE_STEPS
-from phyblock.parsing.pose_step import FARTHEST_PLACE_CM
+from phyblock.parsing.poses import FARTHEST_PLACE_CM, MOST_POSE_STEPS
 from phyblock.tracks.by_hand import NumberField, Pick, Picking, candidate_choices
 from phyblock.tracks.pose_planning.baselines import PoseSubject, written
 from phyblock.tracks.pose_planning.pictures import KIT_LABEL

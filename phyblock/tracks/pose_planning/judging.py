@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from phyblock import parsing
 from phyblock.data import AssemblyTask
 from phyblock.domain import (
     Block,
@@ -24,6 +23,9 @@ from phyblock.domain import (
     euler_deg_to_matrix,
     turn_deg,
 )
+from phyblock.parsing.poses import ParsedPoses, parse_poses, pose_form
+from phyblock.parsing.structured import AnswerForm
+from phyblock.parsing.text import READER_VERSION
 from phyblock.scoring.plan import AssemblyScorer, Score
 from phyblock.scoring.pose import (
     PoseError,
@@ -84,11 +86,11 @@ class PoseRules:
             "reached_deg": self.reached_deg,
         }
 
-    def form(self, item: AssemblyTask) -> parsing.AnswerForm[Any] | None:
+    def form(self, item: AssemblyTask) -> AnswerForm[Any] | None:
         """The form in which a plan for a scene is asked for; None where that is text."""
         if self.answer_format == "text":
             return None
-        return parsing.pose_form(len(item.candidates), free=self.is_free)
+        return pose_form(len(item.candidates), free=self.is_free)
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,7 @@ class PoseJudgement:
     candidate.
     """
 
-    parsed: parsing.ParsedPoses
+    parsed: ParsedPoses
     kept: tuple[PoseStep, ...]
     in_file: tuple[int, ...] | None
     scores: tuple[Score, ...]
@@ -145,7 +147,7 @@ class PoseJudgement:
                 "plan": list(self.steps),
                 "file_plan": self.in_file,
                 "dropped": dropped,
-                "version": parsing.POSE_READER_VERSION,
+                "version": READER_VERSION,
                 "problem": self.parsed.problem,
                 "steps": [_given(step) for step in given],
             },
@@ -178,9 +180,9 @@ def judge_poses(
     A plan that is the `earlier` one ended as it did, as far as that is borne out by where its
     blocks came to lie.
     """
-    parsed = parsing.ParsedPoses(PosePlan(), None)
+    parsed = ParsedPoses(PosePlan(), None)
     if text is not None:
-        parsed = parsing.parse_poses(text, len(item.candidates), free=rules.is_free)
+        parsed = parse_poses(text, len(item.candidates), free=rules.is_free)
     given = parsed.plan.steps
     n = len(item.candidates)
     kept = tuple(step for step in given if 1 <= step.candidate <= n)

@@ -15,7 +15,7 @@ from typing import Any
 from phyblock.data import AssemblyTask
 from phyblock.domain import PoseStep
 from phyblock.models.base import Image, Request
-from phyblock.parsing import POSE_READER_VERSION
+from phyblock.parsing.text import READER_VERSION
 from phyblock.records import Record
 from phyblock.sim.carry import CarriedStep
 from phyblock.sim.placing import upright
@@ -72,7 +72,7 @@ class PosePlanning(WholePlanTrack[PoseRules, PosePictures]):
         """
         return {
             **super().identity(),
-            READER: POSE_READER_VERSION,
+            READER: READER_VERSION,
             CARRYING: CARRY_VERSION,
             **engine_identity(),
         }

@@ -6,10 +6,10 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
 
-from phyblock import parsing
 from phyblock.data import AssemblyTask
 from phyblock.domain import Block, Plan
 from phyblock.models.base import Image, Message, Request
+from phyblock.parsing.move import MoveProblem, ParsedMove, parse_move
 from phyblock.records.reply import Reply
 from phyblock.scoring.counts import Counts
 from phyblock.scoring.plan import ERROR_TYPES, ErrorType
@@ -24,7 +24,7 @@ from phyblock.types import Setting
 
 __all__ = ["Desk", "StepEpisode"]
 
-_NOT_TRIED = ("done", *get_args(parsing.MoveProblem))
+_NOT_TRIED = ("done", *get_args(MoveProblem))
 """Outcomes of steps in which no move was attempted."""
 
 
@@ -74,7 +74,7 @@ class StepEpisode:
         self._tally = Tally()
         self._past: list[PastStep] = []
         self._turns: list[dict[str, Any]] = []
-        self._votes: list[tuple[parsing.ParsedMove, str]] = []
+        self._votes: list[tuple[ParsedMove, str]] = []
         self._seen: Image | None = None
         self._settled = True
 
@@ -110,7 +110,7 @@ class StepEpisode:
 
     def take(self, request: Request, reply: Reply) -> None:
         """Go on with the reply to the last request."""
-        parsed = self._rules.read(reply.text, len(self._task.candidates))
+        parsed = parse_move(reply.text)
         usage = reply.usage
         self._tally.tokens += (usage.prompt_tokens or 0) + (usage.completion_tokens or 0)
         self._tally.usd += reply.cost_usd or 0.0

@@ -10,8 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from phyblock import parsing
 from phyblock.models.base import Image, Message
+from phyblock.parsing.move import MoveProblem, ParsedMove
+from phyblock.parsing.structured import AnswerForm
 from phyblock.scoring.steps import MoveOutcome
 from phyblock.tracks.prompts import TemplatePrompt, form_facts
 from phyblock.types import CandidateScale, Gating, Setting
@@ -20,17 +21,14 @@ __all__ = ["Feedback", "History", "PastStep", "StepOutcome", "StepPrompt"]
 
 Feedback = Literal["none", "success", "error_type"]
 History = Literal["text", "turns"]
-StepOutcome = MoveOutcome | Literal["done"] | parsing.MoveProblem
+StepOutcome = MoveOutcome | Literal["done"] | MoveProblem
 """What became of a step; a problem is a reply in which no single operation could be read."""
 
 _FORMAT: Mapping[str, str] = {
     "empty": "the answer was empty",
+    "thoughts_only": "the answer was empty",
     "no_move": "no operation could be read",
     "several_moves": "more than one operation was given",
-    "move_and_done": "more than one operation was given",
-    "broken_json": "the answer was no whole JSON object",
-    "wrong_json": "the answer was not the JSON that was asked for",
-    "several_json": "more than one operation was given",
 }
 _REASONS: Mapping[str, str] = {
     "shape_not_in_gt": "the goal has no block of this type and color",
@@ -82,7 +80,7 @@ class StepPrompt:
     gating: Gating = "aov"
     accepts: Setting = "A"
     is_blind: bool = False
-    form: Callable[[int], parsing.AnswerForm[parsing.ParsedMove] | None] = lambda _: None
+    form: Callable[[int], AnswerForm[ParsedMove] | None] = lambda _: None
 
     def __post_init__(self) -> None:
         """Raise PromptError where the template has no text for the turns of a conversation."""

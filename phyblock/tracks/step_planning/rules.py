@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from phyblock import parsing
+from phyblock.parsing.move import ParsedMove, move_form
+from phyblock.parsing.structured import AnswerForm
 from phyblock.types import AnswerFormat, Gating, Physics, Setting
 
 __all__ = ["ENDINGS", "Ending", "StepLimits", "StepRules", "Tally", "majority"]
@@ -63,18 +64,9 @@ class StepRules:
     answer_format: AnswerFormat = "text"
     cot: bool = True
 
-    def form(self, n_candidates: int) -> parsing.AnswerForm[parsing.ParsedMove] | None:
+    def form(self, n_candidates: int) -> AnswerForm[ParsedMove] | None:
         """The form in which an operation is asked for; None where that is text."""
-        return (
-            None
-            if self.answer_format == "text"
-            else parsing.move_form(n_candidates, reasons=self.cot)
-        )
-
-    def read(self, text: str, n_candidates: int) -> parsing.ParsedMove:
-        """What a reply says."""
-        form = self.form(n_candidates)
-        return parsing.parse_move(text) if form is None else parsing.parse_asked_move(text, form)
+        return None if self.answer_format == "text" else move_form(n_candidates, reasons=self.cot)
 
     def written(self, operation: str, n_candidates: int) -> str:
         """A reply that names an operation and nothing else, as it is shown in a conversation."""
@@ -117,7 +109,7 @@ class Tally:
         return next((name for name, n, most in reached if most is not None and n >= most), None)
 
 
-def majority(replies: Sequence[parsing.ParsedMove]) -> int:
+def majority(replies: Sequence[ParsedMove]) -> int:
     """Place of the reply that speaks for all: the first with the operation named most often.
 
     Operations named equally often are taken in the order in which they came. Replies that could

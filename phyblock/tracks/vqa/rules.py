@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from phyblock import parsing
 from phyblock.domain import Question
+from phyblock.parsing.answer import ParsedAnswer, choice_form, parse_answer
+from phyblock.parsing.structured import AnswerForm
 from phyblock.tracks.vqa.baselines import choice_text
 from phyblock.tracks.vqa.pictures import OptionsAs
 from phyblock.types import AnswerFormat
@@ -27,16 +28,15 @@ class VqaRules:
     wrong_image: bool = False
     answer_format: AnswerFormat = "text"
 
-    def form(self, question: Question) -> parsing.AnswerForm[str] | None:
+    def form(self, question: Question) -> AnswerForm[str] | None:
         """The form in which an answer is asked for; None where that is text."""
         if self.answer_format == "text":
             return None
-        return parsing.choice_form(question.options, question.subtask == "OR")
+        return choice_form(question.options, question.subtask == "OR")
 
-    def read(self, question: Question, text: str) -> parsing.ParsedAnswer:
+    def read(self, question: Question, text: str) -> ParsedAnswer:
         """What a reply to a question says."""
-        parse = parsing.parse_answer if self.answer_format == "text" else parsing.parse_asked_answer
-        return parse(text, question.options, question.subtask == "OR")
+        return parse_answer(text, question.options, question.subtask == "OR")
 
     def right_answer(self, question: Question) -> str:
         """A right answer in the form that is asked for."""

@@ -9,12 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from phyblock import parsing
 from phyblock.data import QuestionSet, QuestionTask
 from phyblock.domain import LETTERS, Question, Scene, is_picture_option
 from phyblock.domain.rotation import rotated, rotated_label
 from phyblock.models.base import Image
 from phyblock.models.guesses import Guesses
+from phyblock.parsing.answer import ParsedAnswer
+from phyblock.parsing.structured import AnswerForm
 from phyblock.stable import hex_digest
 from phyblock.tracks.asked_once import AskedOnce
 from phyblock.tracks.elsewhere import Elsewhere
@@ -62,7 +63,7 @@ class AskedQuestion:
 class ChoiceJudgement:
     """What a reply was read as, and whether that is right."""
 
-    parsed: parsing.ParsedAnswer
+    parsed: ParsedAnswer
     right: str
 
     @property
@@ -160,7 +161,7 @@ class Vqa(AskedOnce[AskedQuestion, QuestionPictures]):
     def judge(self, item: AskedQuestion, text: str | None) -> ChoiceJudgement:
         """Read and score a reply; None, where there is no reply, is no answer."""
         question = item.question
-        parsed = parsing.ParsedAnswer(None, None)
+        parsed = ParsedAnswer(None, None)
         if text is not None:
             parsed = self.rules.read(question, text)
         return ChoiceJudgement(parsed, question.answer_letters)
@@ -168,7 +169,7 @@ class Vqa(AskedOnce[AskedQuestion, QuestionPictures]):
     def _subject(self, item: AskedQuestion) -> ChoiceSubject:
         return ChoiceSubject(item.question, self._guesses.of(item.question))
 
-    def _form(self, item: AskedQuestion) -> parsing.AnswerForm[str] | None:
+    def _form(self, item: AskedQuestion) -> AnswerForm[str] | None:
         return self.rules.form(item.question)
 
     def _right_answer(self, item: AskedQuestion) -> str:

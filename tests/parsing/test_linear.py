@@ -1,0 +1,70 @@
+"""Law: every reader takes time that is linear in the text, whatever the text is made of."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from itertools import pairwise
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from phyblock.parsing.answer import parse_answer
+from phyblock.parsing.move import parse_move
+from phyblock.parsing.plan import parse_plan
+from phyblock.parsing.poses import parse_poses
+
+TEXTS = ("a red cube", "a blue cube", "an arch", "a cylinder")
+READERS: dict[str, Callable[[str], object]] = {
+    "plan": lambda text: parse_plan(text, 16),
+    "official": lambda text: parse_plan(text, 16, "official"),
+    "move": parse_move,
+    "choice": lambda text: parse_answer(text, TEXTS, is_ordering=False),
+    "order": lambda text: parse_answer(text, TEXTS, is_ordering=True),
+    "poses": lambda text: parse_poses(text, 16, free=True),
+}
+_PIECES = (
+    "Step1: Move block with index 7  \n|Step|step 12 & |Steps 1, 2 and 3|block |# Layer 1:\n|"
+    "index |1. |- |* |> |**|_|`|~~|```json\n|```|\n|  \n|\t|\u00a0|\u200b|\u00e9|7 |1, |and |"
+    '-> |(|)|[|]|{|}|"|\\"|\\n|{"plan": [|{"answer": |{"operation": "|\\boxed{|<answer>|'
+    "<think>|</think>|plan |order: |Answer: |answer is |option A |A, B |C is right|not |"
+    "Next plan: |Move(|Move block |done |move |at (1, 2, 3) |x = 1.5 |a red cube |mm |e|.|,|:|="
+)
+PIECES = (*_PIECES.split("|"), "twice", "x2", "|", "| 1 | 2 ", " " * 50, "7" * 40, "a" * 40)
+SIZES = [3125 * 2**k for k in range(6)]
+MOST_RATIO = 3.0  # 2 is linear, 4 quadratic.
+SMALL_S = 0.05  # Times below this say nothing.
+
+
+def seconds(read: Callable[[str], object], text: str) -> float:
+    """Return the CPU time of reading a text."""
+    start = time.process_time()
+    read(text)
+    return time.process_time() - start
+
+
+def check(read: Callable[[str], object], piece: str) -> None:
+    """Fail where a text that is twice as long takes much more than twice the time, each time."""
+    texts = [(piece * (size // len(piece) + 1))[:size] for size in SIZES]
+    for half, whole in pairwise(texts):
+        for _ in range(6):
+            took = seconds(read, whole)
+            if took < SMALL_S or took < MOST_RATIO * min(seconds(read, half) for _ in range(2)):
+                break
+        else:
+            pytest.fail(f"{len(whole)} characters take {took:.3f} s")
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_text_of_one_piece_is_read_in_linear_time(name: str) -> None:
+    for piece in PIECES:
+        check(READERS[name], piece)
+
+
+@pytest.mark.parametrize("name", READERS)
+@settings(max_examples=10, deadline=None)
+@given(st.lists(st.sampled_from(PIECES), min_size=2, max_size=8).map("".join))
+@example("Step1: Move block with index 16  \n")
+def test_a_text_of_many_pieces_is_read_in_linear_time(name: str, piece: str) -> None:
+    check(READERS[name], piece)
