@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from phyblock.sim.registry import ENGINES, RENDERERS
+from phyblock.sim.engine import ENGINES
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("phyblock",)
@@ -23,7 +23,7 @@ MODULES = {
     "sklearn": "scikit-learn",
     "typing_extensions": "typing-extensions",
     "yaml": "pyyaml",
-    **{engine.library: engine.distribution for engine in (*ENGINES.values(), *RENDERERS.values())},
+    **{engine.library: engine.distribution for engine in ENGINES.values()},
 }
 """Import names that differ from the package's."""
 

@@ -14,7 +14,7 @@ import pytest
 
 import phyblock
 from phyblock.errors import SpecError
-from phyblock.sim.registry import ENGINES
+from phyblock.sim.engine import ENGINES
 from tests.workspace import Workspace
 
 NAMES = ["PhyblockError", "Picture", "PlanScore", "Run", "SceneTask", "Suite", "__version__"]

@@ -26,8 +26,8 @@ from phyblock.data import read_builtin, read_questions
 from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions.question_production import problem_of
 from phyblock.resources import bundled
-from phyblock.sim.registry import PHYSICS_VARIABLE, installed_engines, told_engine
-from phyblock.sim.site import settle
+from phyblock.sim.dynamics import settle
+from phyblock.sim.engine import PHYSICS_VARIABLE, described_engine, installed_engines
 
 DYNAMIC = "dynamic_reasoning"
 """The category of questions whose answers physics decides."""
@@ -129,7 +129,7 @@ def main() -> None:
     names = []
     for engine in engines:
         os.environ[PHYSICS_VARIABLE] = engine
-        names.append(told_engine())
+        names.append(described_engine())
     took = ", ".join(
         f"{name} {took_s:.0f}" for name, took_s in zip(names, seconds.values(), strict=True)
     )

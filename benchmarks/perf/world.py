@@ -29,7 +29,7 @@ from phyblock.making.scenes.sketch import make_scene
 from phyblock.making.verification import audit_scene, verify_scene
 from phyblock.making.workers import Workers, open_workers
 from phyblock.resources import bundled
-from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
+from phyblock.sim.pictures import PictureStyle, candidates_png, composite_png, goal_png
 
 SIZES = (4, 12, 22)
 STYLE = PictureStyle()

@@ -10,7 +10,7 @@ from phyblock.api.given import expect
 from phyblock.data import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.files import write_named
-from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png, goal_style
+from phyblock.sim.pictures import PictureStyle, candidates_png, composite_png, goal_png, goal_style
 from phyblock.types import Background, View
 
 __all__ = ["Picture", "Shown", "render"]

@@ -15,8 +15,8 @@ from phyblock.files import write_named
 from phyblock.records import MANIFEST, RECORDS, Record, read_manifest
 from phyblock.records.reading import newest_starts, run_records
 from phyblock.run.data import recorded_dataset
-from phyblock.sim import PictureStyle
 from phyblock.sim.film import episode_gif, episode_images, episode_sheet
+from phyblock.sim.pictures import PictureStyle
 from phyblock.tables.design import read_design
 from phyblock.tables.track_report import EpisodeView
 from phyblock.text import counted

@@ -16,9 +16,7 @@ from phyblock.domain.blocks import (
     symmetries,
     turn_deg,
 )
-from phyblock.domain.candidates import MAX_CANDIDATES, Candidate, CandidateSet
-from phyblock.domain.plan import Plan
-from phyblock.domain.pose_plan import PosePlan, PoseStep
+from phyblock.domain.plan import Plan, PosePlan, PoseStep
 from phyblock.domain.question import (
     CATEGORIES,
     LETTERS,
@@ -30,7 +28,7 @@ from phyblock.domain.question import (
     Subtask,
     is_picture_option,
 )
-from phyblock.domain.scene import Block, Kind, Look, Scene
+from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, CandidateSet, Kind, Look, Scene
 
 __all__ = [
     "BLOCK_TYPES",

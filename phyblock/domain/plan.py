@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["Plan"]
+from phyblock.domain.blocks import Euler
 
 
 @dataclass(frozen=True)
@@ -15,3 +15,32 @@ class Plan:
 
     def __len__(self) -> int:
         return len(self.steps)
+
+
+@dataclass(frozen=True)
+class PoseStep:
+    """A candidate, by its 1-based number, and where it is to be put.
+
+    `center_cm` is the center of the smallest box with sides along the axes that holds the block as
+    it is turned [cm]; `euler_deg` are extrinsic x-y-z angles [degrees], None where the candidate's
+    own orientation is kept.
+    """
+
+    candidate: int
+    center_cm: tuple[float, float, float]
+    euler_deg: Euler | None = None
+
+
+@dataclass(frozen=True)
+class PosePlan:
+    """Steps in the order in which they are carried out."""
+
+    steps: tuple[PoseStep, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+    @property
+    def plan(self) -> Plan:
+        """The plan without its poses."""
+        return Plan(tuple(step.candidate for step in self.steps))

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import gymnasium
 
-from phyblock.env.environment import PhyBlockEnv
-from phyblock.env.play import DONE
-from phyblock.env.scenes import read_tasks
+from phyblock.env.environment import DONE, PhyBlockEnv, read_tasks
 
 __all__ = ["DONE", "ENV_ID", "PhyBlockEnv", "read_tasks"]
 

@@ -9,14 +9,10 @@ from typing import Literal
 
 from phyblock.domain.aov import AOVGraph, CycleError
 from phyblock.domain.blocks import KIT_PALETTE, BlockType, orientation_class
-from phyblock.domain.candidates import MAX_CANDIDATES, CandidateSet
-from phyblock.domain.scene import Block, Kind, Scene
+from phyblock.domain.scene import MAX_CANDIDATES, Block, CandidateSet, Kind, Scene
 from phyblock.errors import Problem
 from phyblock.making.poses import POSES, find_twins
-from phyblock.sim.pictures import PictureStyle
-from phyblock.sim.stability import DEFAULT_TRIAL, Stability, Trial, check
-from phyblock.sim.steps import Rest, check_at_rest, check_steps
-from phyblock.sim.support import (
+from phyblock.sim.contact import (
     FIT_TOLERANCE_M,
     GROUND,
     Gap,
@@ -25,7 +21,15 @@ from phyblock.sim.support import (
     find_overlaps,
     support_graph,
 )
-from phyblock.sim.visibility import LEAST_SHOWN, hidden_blocks, visible_shares
+from phyblock.sim.dynamics import (
+    DEFAULT_TRIAL,
+    Rest,
+    Stability,
+    Trial,
+    check,
+    check_steps,
+)
+from phyblock.sim.pictures import LEAST_SHOWN, PictureStyle, hidden_blocks, visible_shares
 
 CheckName = Literal[
     "size",
@@ -194,7 +198,7 @@ class SceneFacts:
     def finished(self) -> Stability:
         """What becomes of the finished structure, watched to the end or until it is at rest."""
         blocks, trial, rest = self.scene.blocks, self.tolerances.trial, self.tolerances.rest
-        return check(blocks, trial) if rest is None else check_at_rest(blocks, trial, rest)
+        return check(blocks, trial) if rest is None else check(blocks, trial, rest)
 
     @cached_property
     def steps(self) -> tuple[Stability, ...]:

@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from phyblock.domain.candidates import Candidate, CandidateSet
-from phyblock.domain.scene import Scene
+from phyblock.domain.scene import Candidate, CandidateSet, Scene
 from phyblock.errors import Problem, reason_of
 from phyblock.files import read_text
 from phyblock.making.checks import (
@@ -28,8 +27,7 @@ from phyblock.making.checks import (
 )
 from phyblock.making.scenes.scene_files import SUMS_FILE
 from phyblock.making.workers import Workers, open_workers
-from phyblock.sim.pictures import PictureStyle, candidate_camera, on_the_floor
-from phyblock.sim.render import picture
+from phyblock.sim.pictures import PictureStyle, candidate_camera, on_the_floor, picture
 from phyblock.stable import hex_digest
 from phyblock.text import csv_cell
 

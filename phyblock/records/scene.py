@@ -14,8 +14,7 @@ from typing_extensions import Self
 
 from phyblock.domain.aov import AOVGraph, CycleError
 from phyblock.domain.blocks import BlockType, Color
-from phyblock.domain.candidates import MAX_CANDIDATES, Candidate, CandidateSet
-from phyblock.domain.scene import Block, Scene
+from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, CandidateSet, Scene
 from phyblock.records.data_values import (
     Angles,
     Filled,

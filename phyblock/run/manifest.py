@@ -16,7 +16,7 @@ from phyblock.parsing.text import READER_VERSION
 from phyblock.records import Manifest
 from phyblock.run.identity import earlier_identities, identity_of, inputs_of
 from phyblock.run.models import PlannedModel
-from phyblock.sim.registry import ENGINES, told_engine
+from phyblock.sim.engine import ENGINES, described_engine
 from phyblock.tracks import AnyTrack, kind_of
 from phyblock.tracks.kind import kinds_with_physics
 
@@ -90,7 +90,7 @@ def _versions() -> dict[str, str]:
 def _of_tracks(suite: Suite) -> dict[str, Any]:
     """What single tracks say beyond what all of them have."""
     kinds = [kind_of(name) for name in suite.tracks]
-    told = {"engine": told_engine()} if kinds_with_physics(suite.model_dump()) else {}
+    told = {"engine": described_engine()} if kinds_with_physics(suite.model_dump()) else {}
     return told | {
         key: value
         for kind in kinds

@@ -38,7 +38,7 @@ from phyblock.run.folder import LOCK, check_place, run_folder
 from phyblock.run.prompts import PromptFile
 from phyblock.run.rewritten import manifest_text
 from phyblock.run.standing import Standing
-from phyblock.sim.registry import PHYSICS_VARIABLE, REFERENCE_ENGINE
+from phyblock.sim.engine import PHYSICS_VARIABLE, REFERENCE_ENGINE
 from phyblock.tracks.base import CARRYING, ENGINE
 
 __all__ = ["RunStore", "held_run"]

@@ -31,9 +31,16 @@ from scipy.optimize import linprog, nnls  # type: ignore[import-untyped]
 from phyblock.domain.blocks import FRICTION, SHAPES, BlockType, euler_deg_to_matrix
 from phyblock.domain.scene import Block
 from phyblock.errors import PhyblockError
-from phyblock.sim.convex import contact_corners_m, cross, separating_axes
+from phyblock.sim.contact import (
+    CONTACT_TOLERANCE_M,
+    bounds_m,
+    boxes_near,
+    contact_corners_m,
+    cross,
+    pieces_of,
+    separating_axes,
+)
 from phyblock.sim.geometry import ConvexPiece
-from phyblock.sim.support import CONTACT_TOLERANCE_M, bounds_m, boxes_near, pieces_of
 
 __all__ = ["FRICTIONS", "MARGIN_M", "MASSES", "is_balanced", "surely_falls", "surely_stands"]
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.sim.exact import dot, rounded, turned
+from phyblock.sim.geometry import dot, rounded, turned
 from phyblock.types import View
 
 __all__ = ["FIELD_OF_VIEW_DEG", "FULL_WINDOW", "VIEWS", "Camera", "Window", "frame", "view_axes"]

@@ -1,41 +1,92 @@
-"""What `sim` asks of a physics engine: two protocols, in terms of blocks on a floor.
+"""Physics engines behind one protocol, in terms of blocks on a floor, and the choice of one.
 
-A `PhysicsEngine` opens simulations; a `Simulation` holds blocks and moves them. The floor is the
-plane z = 0. Blocks are named by number, and `FLOOR` (0) stands for the floor; the caller names
-only blocks that are there. Poses are those of body frames (`phyblock.domain.blocks`). What a
-block is made of, an engine finds in `SHAPES` (center of mass), in `Physics.mass_kg` and in
+A `PhysicsEngine` opens simulations; a `Simulation` holds blocks and moves them; a `World` is a
+simulation that knows its blocks. The floor is the plane z = 0. Simulations name blocks by number,
+`FLOOR` (0) is the floor's. Poses are those of body frames (`phyblock.domain.blocks`). Engines take
+what a block is made of from `SHAPES` (center of mass), `Physics.mass_kg` and
 `phyblock.sim.geometry` (`collision_pieces`, `solid_mesh` with its inertia).
 
-To add an engine: write a module with a class that follows `PhysicsEngine`, name it in
-`phyblock.sim.registry`, and let `tests/sim/test_engine_laws.py` tell what it lacks.
+Blocks are let go in PyBullet where it is installed, in MuJoCo elsewhere; the environment variable
+`PHYBLOCK_PHYSICS` chooses by name, also for the processes that are started. Nothing is imported
+before it is chosen.
 """
 
 from __future__ import annotations
 
+import contextlib
+import functools
+import importlib
+import math
+import os
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
-from typing import NamedTuple, Protocol, runtime_checkable
+from dataclasses import dataclass, replace
+from importlib.util import find_spec
+from typing import NamedTuple, Protocol, cast
 
-from phyblock.domain.blocks import FRICTION, SHAPES, BlockType
-from phyblock.sim.pose import Pose
+import numpy as np
+from numpy.typing import NDArray
 
-__all__ = [
-    "FLOOR",
-    "GRAVITY_M_S2",
-    "Contact",
-    "Physics",
-    "PhysicsEngine",
-    "Simulation",
-    "Vector",
-    "Velocity",
-]
+from phyblock.domain.blocks import (
+    FRICTION,
+    SHAPES,
+    BlockType,
+    Euler,
+    euler_deg_to_quat_xyzw,
+    quat_xyzw_to_matrix,
+)
+from phyblock.domain.scene import Block
+from phyblock.errors import InputError, Problem, SimulationError
 
 Vector = tuple[float, float, float]
 """x, y and z in the world."""
 FLOOR = 0
 """The floor's number among the blocks."""
 GRAVITY_M_S2 = 9.81
+_POSITION_DIGITS = 4
+_ANGLE_DIGITS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """Origin (3,) [m] of a block's body frame, and its orientation (4,), a quaternion x y z w."""
+
+    position_m: NDArray[np.float64]
+    quat_xyzw: NDArray[np.float64]
+
+    @classmethod
+    def goal(cls, block: Block) -> Pose:
+        """The pose that the scene gives the block."""
+        return cls(np.array(block.position_m), euler_deg_to_quat_xyzw(block.euler_deg))
+
+    def distance_m(self, other: Pose) -> float:
+        """Distance between the two origins [m]."""
+        return float(np.linalg.norm(self.position_m - other.position_m))
+
+    def angle_deg(self, other: Pose) -> float:
+        """Angle of the turn from one orientation to the other [degrees]."""
+        cosine = min(1.0, abs(float(self.quat_xyzw @ other.quat_xyzw)))
+        return math.degrees(2 * math.acos(cosine))
+
+    def put(self, block: Block) -> Block:
+        """The block put here, its place and angles rounded to 0.1 mm and 0.01 degrees."""
+        x, y, z = (round(float(place), _POSITION_DIGITS) + 0.0 for place in self.position_m)
+        euler = quat_xyzw_to_euler_deg(self.quat_xyzw)
+        a, b, c = (round(angle, _ANGLE_DIGITS) + 0.0 for angle in euler)
+        return replace(block, position_m=(x, y, z), euler_deg=(a, b, c))
+
+
+def quat_xyzw_to_euler_deg(quat_xyzw: NDArray[np.float64]) -> Euler:
+    """Extrinsic x-y-z angles [degrees] of a unit quaternion (x, y, z, w)."""
+    rotation = quat_xyzw_to_matrix(quat_xyzw)
+    pitch = np.arcsin(np.clip(-rotation[2, 0], -1.0, 1.0))
+    if abs(rotation[2, 0]) > 1 - 1e-9:
+        roll, yaw = 0.0, np.arctan2(-rotation[0, 1], rotation[1, 1])
+    else:
+        roll = np.arctan2(rotation[2, 1], rotation[2, 2])
+        yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
+    x, y, z = (float(np.degrees(angle)) for angle in (roll, pitch, yaw))
+    return (x, y, z)
 
 
 @dataclass(frozen=True)
@@ -59,7 +110,7 @@ class Physics:
 
 
 class Velocity(NamedTuple):
-    """How a block moves: velocity of its center of mass [m/s], and its spin [rad/s]."""
+    """Velocity of a block's center of mass [m/s], and its spin [rad/s]."""
 
     linear_m_s: Vector
     angular_rad_s: Vector
@@ -68,8 +119,8 @@ class Velocity(NamedTuple):
 class Contact(NamedTuple):
     """A point where two bodies touch: their numbers, `first` below `second`.
 
-    `normal` is a unit vector from the first to the second; `distance_m` is how far apart they are
-    there [m], negative where they overlap.
+    `normal` is a unit vector from the first to the second; `distance_m` is the gap between them
+    [m], negative where they overlap.
     """
 
     first: int
@@ -79,7 +130,7 @@ class Contact(NamedTuple):
 
 
 class Simulation(Protocol):
-    """Rigid blocks on a floor.
+    """Rigid blocks on a floor; callers name only blocks that are there.
 
     The same calls on the same machine give the same bits, whatever other simulations are open.
     """
@@ -94,19 +145,18 @@ class Simulation(Protocol):
         """Simulate `n` time steps."""
 
     def pose(self, number: int) -> Pose:
-        """Where a block is now."""
+        """Return the pose of a block now."""
 
     def velocity(self, number: int) -> Velocity:
-        """How a block moves now."""
+        """Return the velocity of a block now."""
 
     def set_velocity(self, number: int, velocity: Velocity) -> None:
-        """Set how a block moves from now on, as far as contacts and gravity let it."""
+        """Make a block move like this from now on, as far as contacts and gravity let it."""
 
     def contacts(self) -> tuple[Contact, ...]:
         """List where bodies touched in the last time step; empty before the first step."""
 
 
-@runtime_checkable
 class PhysicsEngine(Protocol):
     """A way to simulate; any number of its simulations may be open at once."""
 
@@ -115,7 +165,7 @@ class PhysicsEngine(Protocol):
 
     @property
     def name(self) -> str:
-        """What it is called in `PHYBLOCK_PHYSICS` and in what is written about a run."""
+        """Its name in `ENGINES`, and in what is written about a run."""
 
     @property
     def versions(self) -> Mapping[str, str]:
@@ -126,3 +176,160 @@ class PhysicsEngine(Protocol):
 
         Raises SimulationError when the engine can open no more.
         """
+
+
+PHYSICS_VARIABLE = "PHYBLOCK_PHYSICS"
+REFERENCE_ENGINE = "pybullet"
+"""The engine that the built-in data were made with; records without an engine are its."""
+
+
+class KnownEngine(NamedTuple):
+    """Module and class of an engine, its library, its distribution, and how to get that."""
+
+    module: str
+    factory: str
+    library: str
+    distribution: str
+    hint: str
+
+
+ENGINES: Mapping[str, KnownEngine] = {
+    REFERENCE_ENGINE: KnownEngine(
+        "phyblock.sim.pybullet",
+        "BulletEngine",
+        "pybullet",
+        "pybullet",
+        "PyBullet has wheels for Python 3.10 and 3.11 on Linux, x86-64",
+    ),
+    "mujoco": KnownEngine(
+        "phyblock.sim.mujoco",
+        "MujocoEngine",
+        "mujoco",
+        "mujoco-core",
+        "pip install 'phyblock[mujoco]', for Python 3.11 and newer",
+    ),
+}
+"""The physics engines; the first that is installed is the usual one."""
+
+
+def installed_engines() -> tuple[str, ...]:
+    """Names of the engines whose libraries are installed; nothing is imported."""
+    return tuple(name for name, one in ENGINES.items() if find_spec(one.library) is not None)
+
+
+def physics_engine() -> PhysicsEngine:
+    """Return the engine that `PHYBLOCK_PHYSICS` names, or the usual one; one object a process.
+
+    Raises InputError for a name that is not known, and where the engine is not installed.
+    """
+    usual = next(iter(installed_engines()), REFERENCE_ENGINE)
+    name = os.environ.get(PHYSICS_VARIABLE, usual)
+    known = ENGINES.get(name)
+    if known is None:
+        allowed = ", ".join(ENGINES)
+        raise InputError(Problem(PHYSICS_VARIABLE, "is not known", found=name, allowed=allowed))
+    if find_spec(known.library) is None:
+        message = "is not installed"
+        raise InputError(Problem(PHYSICS_VARIABLE, message, found=name, hint=known.hint))
+    return _made(known)
+
+
+@functools.cache
+def _made(known: KnownEngine) -> PhysicsEngine:
+    module = importlib.import_module(known.module)
+    return cast(PhysicsEngine, getattr(module, known.factory)())
+
+
+def described_engine() -> str:
+    """The engine in use and its version, as in `pybullet 3.2.7`; raises as `physics_engine`."""
+    engine = physics_engine()
+    versions = engine.versions
+    if list(versions) == [engine.name]:
+        return f"{engine.name} {versions[engine.name]}"
+    return f"{engine.name} ({', '.join(' '.join(pair) for pair in versions.items())})"
+
+
+def other_engine() -> str:
+    """The engine in use, for messages, where it is not that of the built-in data; else empty."""
+    is_usual = physics_engine().name == REFERENCE_ENGINE
+    return "" if is_usual else f"the physics engine {described_engine()}"
+
+
+class World:
+    """Blocks on the ground in a simulation of their own; a context manager.
+
+    Blocks are named by their order. The same calls on the same machine give bitwise the same
+    poses. `engine` is the chosen one unless another is given. Every method raises SimulationError
+    when the world is not open, or a block that it names is not there.
+    """
+
+    def __init__(self, physics: Physics | None = None, engine: PhysicsEngine | None = None) -> None:
+        self.physics = physics or Physics()
+        self._engine = engine or physics_engine()
+        self._stack = contextlib.ExitStack()
+        self._opened: Simulation | None = None
+        self._blocks: dict[int, Block] = {}
+
+    def __enter__(self) -> World:
+        self._opened = self._stack.enter_context(self._engine.open(self.physics))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._opened = None
+        self._blocks.clear()
+        self._stack.close()
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """Orders of the blocks in the world, as they were placed."""
+        return tuple(self._blocks)
+
+    def place(self, *blocks: Block) -> None:
+        """Put blocks at their goal poses, at rest; SimulationError if an order is taken."""
+        for block in blocks:
+            simulation = self._simulation()
+            if block.order in self._blocks:
+                raise SimulationError(f"block {block.order} is already in the world")
+            simulation.add(block.order, block.type, Pose.goal(block))
+            self._blocks[block.order] = block
+
+    def remove(self, order: int) -> None:
+        """Take a block out."""
+        self._simulation(order).remove(order)
+        del self._blocks[order]
+
+    def step(self, duration_s: float) -> None:
+        """Simulate for `duration_s` [s], rounded to whole time steps."""
+        self._simulation().step(round(duration_s / self.physics.time_step_s))
+
+    def drive(self, order: int, velocity_m_s: tuple[float, float]) -> None:
+        """Give a block this velocity in x and y; how it rises and turns is left as it is."""
+        simulation = self._simulation(order)
+        linear, angular = simulation.velocity(order)
+        simulation.set_velocity(order, Velocity((*velocity_m_s, linear[2]), angular))
+
+    def fastest_m_s(self) -> float:
+        """Upper bound of the speed of the fastest corner [m/s]; 0 in an empty world."""
+        simulation = self._simulation()
+        fastest = 0.0
+        for order, block in self._blocks.items():
+            shape, velocity = SHAPES[block.type], simulation.velocity(order)
+            reach_m = math.dist(shape.low_m, shape.high_m)
+            spin = math.hypot(*velocity.angular_rad_s) * reach_m
+            fastest = max(fastest, math.hypot(*velocity.linear_m_s) + spin)
+        return fastest
+
+    def pose(self, order: int) -> Pose:
+        """Return the pose of a block now."""
+        return self._simulation(order).pose(order)
+
+    def poses(self) -> dict[int, Pose]:
+        """Return the poses of all blocks now, by order."""
+        return {order: self.pose(order) for order in self._blocks}
+
+    def _simulation(self, order: int | None = None) -> Simulation:
+        if self._opened is None:
+            raise SimulationError("the world is not open: use it in a with statement")
+        if order is not None and order not in self._blocks:
+            raise SimulationError(f"block {order} is not in the world")
+        return self._opened

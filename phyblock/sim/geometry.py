@@ -1,10 +1,9 @@
-"""Parametric geometry of the eight block types, in the body frames of `phyblock.domain.blocks`.
+"""Sums of products in a fixed order, for whatever decides a pixel.
 
-Every block is a prism: a flat outline pushed along an axis. From the outline come three things:
-a closed triangle mesh for mass properties, one for pictures, and the convex pieces that physics
-and the overlap test use. Curved sides are polygons (18 facets for the cylinder, 10 for the arcs),
-because that is what the blocks are: a smooth cylinder rolls away where an 18-gon stands. Pictures
-show them round, by facets of five degrees.
+Matrix products go to a BLAS, which adds up in another order, and with fused operations, on another
+machine; trigonometric functions differ by a unit in the last place from one C library to the next.
+Plain numpy arithmetic in 64 bits is the same everywhere, and so are pictures that follow from it
+and from a few angles whose sines were rounded.
 """
 
 from __future__ import annotations
@@ -17,10 +16,142 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain.blocks import SHAPES, BlockType, Euler, euler_deg_to_matrix
-from phyblock.sim.exact import rounded
-from phyblock.sim.mesh import Mesh
+from phyblock.domain.plan import PoseStep
+from phyblock.domain.scene import Block, Candidate, CandidateSet
 
-__all__ = ["ConvexPiece", "collision_pieces", "corners_m", "drawn_mesh", "solid_mesh"]
+Vectors = NDArray[np.float64]
+
+_DIGITS = 12
+
+
+def dot(one: Vectors, other: Vectors) -> Vectors:
+    """Scalar products along the last axis, which has length 3; the rest broadcasts."""
+    terms = [one[..., axis] * other[..., axis] for axis in range(3)]
+    product: Vectors = terms[0] + terms[1] + terms[2]
+    return product
+
+
+def cross(one: Vectors, other: Vectors) -> Vectors:
+    """Vector products along the last axis, which has length 3; the rest broadcasts."""
+    (a, b, c), (d, e, f) = np.moveaxis(one, -1, 0), np.moveaxis(other, -1, 0)
+    return np.stack([b * f - c * e, c * d - a * f, a * e - b * d], axis=-1)
+
+
+def turned(points: Vectors, matrix: Vectors) -> Vectors:
+    """The matrix (3, 3) applied to points (..., 3), as `points @ matrix.T` is."""
+    return np.stack([dot(points, row) for row in matrix], axis=-1)
+
+
+def unit(vectors: Vectors) -> Vectors:
+    """Vectors (..., 3) scaled to length 1; none may be zero."""
+    scaled: Vectors = vectors / np.sqrt(dot(vectors, vectors))[..., None]
+    return scaled
+
+
+def rounded(numbers: Vectors) -> Vectors:
+    """Numbers to 12 decimals, where C libraries agree; a zero has no sign."""
+    tidy: Vectors = np.round(numbers, _DIGITS) + 0.0
+    return tidy
+
+
+_SMOOTH_COSINE = math.cos(math.radians(30))
+"""Triangles that meet at a smaller angle are parts of one surface, flat or curved."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A triangle mesh: `vertices_m` shape (n, 3) [m], `triangles` shape (m, 3), 0-based.
+
+    Corners run counter-clockwise seen from outside. The mass properties are those of the solid
+    that a closed mesh bounds, by the divergence theorem: sums over the tetrahedra that the
+    triangles span with the origin.
+    """
+
+    vertices_m: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+
+    @functools.cached_property
+    def corners_m(self) -> NDArray[np.float64]:
+        """Corner points of every triangle, shape (m, 3, 3) [m]."""
+        corners: NDArray[np.float64] = self.vertices_m[self.triangles]
+        return corners
+
+    @functools.cached_property
+    def normals(self) -> NDArray[np.float64]:
+        """Outward unit normal of every triangle, shape (m, 3)."""
+        a, b, c = self.corners_m.transpose(1, 0, 2)
+        return unit(cross(b - a, c - a))
+
+    @functools.cached_property
+    def faces(self) -> NDArray[np.int64]:
+        """The face that each triangle is part of, shape (m,), by the number of its first triangle.
+
+        Neighbors whose normals differ by less than 30 degrees are parts of one face, which is flat
+        or curved.
+        """
+        number = list(range(len(self.triangles)))
+        for one, other in self._neighbors():
+            if dot(self.normals[one], self.normals[other]) > _SMOOTH_COSINE:
+                low, high = sorted((number[one], number[other]))
+                number = [low if each == high else each for each in number]
+        return np.array(number)
+
+    @functools.cached_property
+    def corner_normals(self) -> NDArray[np.float64]:
+        """Outward unit normal of the face at each corner of every triangle, shape (m, 3, 3).
+
+        On a curved face it is the mean of the triangles' around the corner, each counted by its
+        angle there, which makes the facets of a cylinder look round.
+        """
+        before, after = (np.roll(self.corners_m, n, axis=1) - self.corners_m for n in (1, -1))
+        sines = np.sqrt(dot(crossed := cross(after, before), crossed))
+        angles = rounded(np.arctan2(sines, dot(after, before)))
+        corner = self.triangles * len(self.triangles) + self.faces[:, None]
+        _, place = np.unique(corner, return_inverse=True)
+        place = place.reshape(corner.shape)
+        sums = np.zeros((int(place.max()) + 1, 3))
+        np.add.at(sums, place, angles[..., None] * self.normals[:, None])
+        return rounded(unit(sums[place]))
+
+    @functools.cached_property
+    def volume_m3(self) -> float:
+        """Volume of the solid [m3]."""
+        return float(self._tetrahedra_m3.sum())
+
+    @functools.cached_property
+    def center_of_mass_m(self) -> NDArray[np.float64]:
+        """Center of mass of the solid, shape (3,) [m]."""
+        moments: NDArray[np.float64] = self._tetrahedra_m3 @ self.corners_m.sum(axis=1) / 4
+        return moments / self.volume_m3
+
+    @functools.cached_property
+    def inertia_m2(self) -> NDArray[np.float64]:
+        """Inertia about the center of mass for a unit mass, shape (3, 3) [m2]."""
+        centered = self.corners_m - self.center_of_mass_m
+        volumes = np.linalg.det(centered) / 6
+        sums = centered.sum(axis=1)
+        second: NDArray[np.float64] = np.einsum("t,tci,tcj->ij", volumes, centered, centered)
+        second += np.einsum("t,ti,tj->ij", volumes, sums, sums)
+        second /= 20 * self.volume_m3
+        inertia: NDArray[np.float64] = np.trace(second) * np.eye(3) - second
+        return inertia
+
+    def _neighbors(self) -> list[tuple[int, int]]:
+        """Pairs of triangles that share an edge."""
+        beside: dict[tuple[int, int], int] = {}
+        pairs = []
+        for number, (a, b, c) in enumerate(self.triangles.tolist()):
+            for start, end in ((a, b), (b, c), (c, a)):
+                if (end, start) in beside:
+                    pairs.append((beside[end, start], number))
+                beside[start, end] = number
+        return pairs
+
+    @functools.cached_property
+    def _tetrahedra_m3(self) -> NDArray[np.float64]:
+        volumes: NDArray[np.float64] = np.linalg.det(self.corners_m) / 6
+        return volumes
+
 
 Outline = NDArray[np.float64]
 """Corners of a polygon, shape (n, 2) [m], counter-clockwise."""
@@ -205,3 +336,59 @@ def _one_of_each_line(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         if all(abs(vector @ other) < 1 - 1e-9 for other in kept):
             kept.append(vector)
     return np.array(kept)
+
+
+_CM = 100.0
+UPRIGHT: Euler = (0.0, 0.0, 0.0)
+
+
+def center_cm(block: Block) -> tuple[float, float, float]:
+    """The middle of the box round a block where it is [cm]."""
+    x, y, z = (np.array(block.position_m) + _box_middle_m(block.type, block.euler_deg)) * _CM
+    return float(x), float(y), float(z)
+
+
+def box_height_cm(block: Block) -> float:
+    """The height of the box round a block as it is turned [cm]."""
+    heights = corners_m(block.type, (0.0, 0.0, 0.0), block.euler_deg)[:, 2]
+    return float(np.ptp(heights)) * _CM
+
+
+def origin_m(
+    block_type: BlockType, euler_deg: Euler, center_cm: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Where the body frame of a block is [m] whose box has its middle at a place [cm]."""
+    x, y, z = np.array(center_cm) / _CM - _box_middle_m(block_type, euler_deg)
+    return float(x), float(y), float(z)
+
+
+def put(step: PoseStep, candidates: CandidateSet) -> Block | None:
+    """The block that a step puts, None for a number that no candidate has.
+
+    Without a rotation of its own it has that of its candidate.
+    """
+    if not 1 <= step.candidate <= len(candidates):
+        return None
+    candidate = candidates[step.candidate]
+    euler = candidate.euler_deg if step.euler_deg is None else step.euler_deg
+    place = origin_m(candidate.type, euler, step.center_cm)
+    return Block(1, candidate.type, candidate.color, place, euler, (), 1)
+
+
+def upright(candidates: CandidateSet) -> tuple[CandidateSet, tuple[int, ...]]:
+    """Each kind once, upright, and the number of its first candidate."""
+    first: dict[tuple[str, str], int] = {}
+    for number, one in enumerate(candidates.candidates, 1):
+        first.setdefault(one.kind, number)
+    kinds = [candidates[number].kind for number in first.values()]
+    kit = CandidateSet(tuple(Candidate(kind, color, UPRIGHT) for kind, color in kinds))
+    return kit, tuple(first.values())
+
+
+@functools.lru_cache(maxsize=4096)
+def _box_middle_m(block_type: BlockType, euler_deg: Euler) -> NDArray[np.float64]:
+    """The middle of the box round a block whose body frame is at the origin, shape (3,) [m]."""
+    corners = corners_m(block_type, (0.0, 0.0, 0.0), euler_deg)
+    middle: NDArray[np.float64] = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    middle.setflags(write=False)
+    return middle

@@ -17,10 +17,8 @@ import numpy as np
 
 from phyblock.domain.scene import Block
 from phyblock.sim.balance import FRICTIONS, MASSES
-from phyblock.sim.engine import GRAVITY_M_S2, Physics
-from phyblock.sim.pose import Pose
-from phyblock.sim.steps import groups, moments, wait
-from phyblock.sim.world import World
+from phyblock.sim.dynamics import groups, moments, wait
+from phyblock.sim.engine import GRAVITY_M_S2, Physics, Pose, World
 
 __all__ = [
     "DEFAULT_LIMITS",
@@ -172,7 +170,7 @@ def _moved_orders(
 def _settle(blocks: Sequence[Block], setting: Physics, push: Push | None) -> dict[int, Pose] | None:
     """Poses once all is at rest; None when that takes too long."""
     with World(setting) as world:
-        world.place_all(blocks)
+        world.place(*blocks)
         if push is not None:
             _push(world, push)
         return world.poses() if wait(world, _LONGEST_S) else None
@@ -181,7 +179,7 @@ def _settle(blocks: Sequence[Block], setting: Physics, push: Push | None) -> dic
 def _holds(blocks: Sequence[Block], setting: Physics, limits: Limits) -> bool | None:
     loose = Limits(limits.moved_m, limits.moved_deg, limits.moved_m, limits.moved_deg)
     with World(setting) as world:
-        world.place_all(blocks)
+        world.place(*blocks)
         for is_at_rest in moments(world, _LONGEST_S):
             if _moved_orders(blocks, world.poses(), loose):
                 return False

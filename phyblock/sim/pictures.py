@@ -1,7 +1,8 @@
 """The pictures a model sees: goal, numbered candidates, composite; and the keys they cache under.
 
-All functions here are pure in what they return: the same input gives the same bytes in every
-process of one machine. Keys name everything that the bytes depend on, and nothing else.
+Pictures are drawn at twice the size and scaled down, so the rasterizer needs no anti-aliasing.
+Outlines run where one face ends, which it tells by number. The same input gives the same bytes in
+every process of one machine; keys name everything that the bytes depend on, and nothing else.
 """
 
 from __future__ import annotations
@@ -12,54 +13,205 @@ import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import get_args
+from typing import TypeVar, get_args
 
 import numpy as np
+import PIL
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
 
-from phyblock.domain.blocks import SHAPES, BlockType, Color, Euler
-from phyblock.domain.candidates import CandidateSet
-from phyblock.domain.scene import Scene
+from phyblock.domain.blocks import (
+    SHAPES,
+    BlockType,
+    Color,
+    Euler,
+    euler_deg_to_matrix,
+    euler_deg_to_quat_xyzw,
+)
+from phyblock.domain.scene import Block, CandidateSet, Scene
 from phyblock.errors import DataError, Problem
+from phyblock.sim.backgrounds import DARK_INK, GROUNDS, INK_RGB, LIGHT_INK, TEXTURED, floor, shadow
 from phyblock.sim.camera import VIEWS, Camera, Window, frame, view_axes
-from phyblock.sim.compose import GRID_COLUMNS, LABEL_STRIP, numbered_grid, side_by_side, to_png
-from phyblock.sim.exact import dot
-from phyblock.sim.library_pixels import library_pixels
-from phyblock.sim.registry import renderer
-from phyblock.sim.render import DrawnBlock, picture
-from phyblock.sim.renderer import Renderer
+from phyblock.sim.engine import Pose
+from phyblock.sim.geometry import dot, drawn_mesh, rounded, turned
+from phyblock.sim.raster import RASTER_VERSION, Light, Prop, Raster, Rgb, draw
 from phyblock.stable import hex_digest
 from phyblock.types import BACKGROUNDS, Background, CandidateScale, View
 
-__all__ = [
-    "LARGEST_PX",
-    "RENDER_VERSION",
-    "SMALLEST_PX",
-    "PictureStyle",
-    "camera_for",
-    "candidate_camera",
-    "candidates_key",
-    "candidates_png",
-    "common_distance_m",
-    "composite_png",
-    "drawn",
-    "empty_cell",
-    "goal_camera",
-    "goal_key",
-    "goal_png",
-    "goal_style",
-    "on_the_floor",
-    "picture_key",
-    "pixel_versions",
-    "thumbnail",
-]
-
 RENDER_VERSION = 2
 """Raised whenever the same input gives other pixels, so that stored pictures are made again."""
+SUPERSAMPLE = 2
+COLOR_RGB: dict[Color, Rgb] = {
+    "red": (244, 54, 54),
+    "yellow": (250, 218, 50),
+    "blue": (56, 88, 246),
+    "green": (72, 190, 42),
+    "orange": (250, 124, 46),
+}
+"""Color of a fully lit face, 0..255."""
+_AMBIENT = 0.55
+_DIFFUSE = 0.55
+_LIGHT_AZIMUTH_DEG = -18.0
+_LIGHT_ELEVATION_DEG = 46.0
+
+Pixel = TypeVar("Pixel", np.uint8, np.float32)
+
+
+@dataclass(frozen=True)
+class DrawnBlock:
+    """A block as pictures need it: `position_m` is its body frame's origin [m]."""
+
+    type: BlockType
+    color: Color
+    position_m: tuple[float, float, float]
+    euler_deg: Euler
+
+    @property
+    def vertices_m(self) -> NDArray[np.float64]:
+        """World corners of what is drawn, shape (n, 3) [m]."""
+        vertices: NDArray[np.float64] = _turned_m(self.type, self.euler_deg) + self.position_m
+        return vertices
+
+    @property
+    def triangles_m(self) -> NDArray[np.float64]:
+        """World corners of the triangles that are drawn, shape (m, 3, 3) [m]."""
+        triangles: NDArray[np.float64] = self.vertices_m[drawn_mesh(self.type).triangles]
+        return triangles
+
+
+@functools.lru_cache(maxsize=1024)
+def _turned_m(block_type: BlockType, euler_deg: Euler) -> NDArray[np.float64]:
+    """World corners of what is drawn of a block at the origin, shape (n, 3) [m]; do not change."""
+    matrix = rounded(euler_deg_to_matrix(euler_deg))
+    return turned(drawn_mesh(block_type).vertices_m, matrix)
+
+
+def drawn(blocks: Iterable[Block]) -> list[DrawnBlock]:
+    """Blocks where they are, as they are drawn."""
+    return [DrawnBlock(b.type, b.color, b.position_m, b.euler_deg) for b in blocks]
+
+
+def on_the_floor(block_type: BlockType, color: Color, euler_deg: Euler) -> DrawnBlock:
+    """A single block in its orientation, its lowest point on the floor."""
+    lifted = DrawnBlock(block_type, color, (0.0, 0.0, 0.0), euler_deg)
+    return replace(lifted, position_m=(0.0, 0.0, -float(lifted.vertices_m[:, 2].min())))
+
+
+def picture(
+    blocks: Sequence[DrawnBlock],
+    camera: Camera,
+    background: Background,
+    size_px: int,
+    ground: NDArray[np.float32] | None = None,
+) -> Image.Image:
+    """Blocks on their floor, anti-aliased, an RGB image of `size_px` squared.
+
+    `ground` is the floor as `empty_ground` gives it, for those who draw it often.
+    """
+    image = empty_ground(background, camera, size_px) if ground is None else ground.copy()
+    if blocks:
+        raster = _raster(blocks, camera, size_px * SUPERSAMPLE)
+        image *= shadow(background, raster.shaded)
+        np.copyto(image, raster.rgb, where=raster.prop[..., None] >= 0)
+        image = draw_outlines(image, raster, background)
+    pixels = np.rint(image, out=image).astype(np.uint8)
+    return Image.fromarray(pixels).resize((size_px, size_px), Image.Resampling.BOX)
+
+
+def empty_ground(background: Background, camera: Camera, size_px: int) -> NDArray[np.float32]:
+    """The floor of a picture of `size_px` squared, before it is scaled down."""
+    return floor(background, camera, size_px * SUPERSAMPLE)
+
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """Blocks with their outlines, before floor and smoothing.
+
+    `rgb` shape (size, size, 3), 0..255; `block` shape (size, size), the 0-based number of the
+    block seen in each pixel, -1 where there is none.
+    """
+
+    rgb: NDArray[np.uint8]
+    block: NDArray[np.int64]
+
+
+def shoot(blocks: Sequence[DrawnBlock], camera: Camera, size_px: int) -> Shot:
+    """Draw blocks alone, with no floor, at exactly `size_px` and unsmoothed."""
+    raster = _raster(blocks, camera, size_px)
+    return Shot(draw_outlines(raster.rgb, raster, None), raster.prop)
+
+
+def segments(blocks: Sequence[DrawnBlock], camera: Camera, size_px: int) -> NDArray[np.int64]:
+    """The 0-based number of the block seen in each pixel, shape (size, size), -1 for none."""
+    light = Light(np.array([0.0, 0.0, 1.0]), 1.0, 0.0)
+    return draw(props_of(blocks), camera, light, size_px).prop
+
+
+def _raster(blocks: Sequence[DrawnBlock], camera: Camera, size_px: int) -> Raster:
+    light = Light(light_direction(camera), _AMBIENT, _DIFFUSE)
+    return draw(props_of(blocks), camera, light, size_px)
+
+
+def props_of(blocks: Sequence[DrawnBlock]) -> list[Prop]:
+    """Blocks as the rasterizer takes them."""
+    return [
+        Prop(
+            drawn_mesh(block.type),
+            COLOR_RGB[block.color],
+            Pose(np.array(block.position_m), euler_deg_to_quat_xyzw(block.euler_deg)),
+        )
+        for block in blocks
+    ]
+
+
+def light_direction(camera: Camera) -> NDArray[np.float64]:
+    """Unit vector to the light, which goes round with the camera: above, a little to its left."""
+    right = camera.axes[0]
+    azimuth = math.atan2(-right[0], right[1]) + math.radians(_LIGHT_AZIMUTH_DEG)
+    elevation = math.radians(_LIGHT_ELEVATION_DEG)
+    flat = math.cos(elevation)
+    towards = [flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(elevation)]
+    return rounded(np.array(towards))
+
+
+def draw_outlines(
+    image: NDArray[Pixel], raster: Raster, background: Background | None
+) -> NDArray[Pixel]:
+    """A picture (size, size, 3) of a raster with lines where faces end.
+
+    On a background, a rim goes round the blocks too, light on dark floors. A line takes a pixel on
+    either side of where a face ends, a rim one more on the floor: scaled down to half the size, it
+    fills a pixel's width wherever it lies.
+    """
+    lined: NDArray[Pixel] = image.copy()
+    lined[_ends(raster.face, raster.prop) & (raster.prop >= 0)] = INK_RGB
+    if background is not None:
+        rim = _ends(raster.prop >= 0)
+        lined[rim | _ends(rim) & (raster.prop < 0)] = GROUNDS[background].rim
+    return lined
+
+
+def _ends(*numbers: NDArray[np.int64] | NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The pixels beside which some number (size, size) changes, to the sides, above or below."""
+    across = np.logical_or.reduce([number[:, 1:] != number[:, :-1] for number in numbers])
+    down = np.logical_or.reduce([number[1:] != number[:-1] for number in numbers])
+    ends = np.zeros(numbers[0].shape, dtype=np.bool_)
+    ends[:, 1:] |= across
+    ends[:, :-1] |= across
+    ends[1:] |= down
+    ends[:-1] |= down
+    return ends
+
 
 SMALLEST_PX, LARGEST_PX = 128, 2048
 """Sides that pictures may have."""
+GRID_COLUMNS = 4
+LABEL_STRIP = 0.23
+"""Share of a cell's height, at its foot, that is kept free for the number."""
+_LABEL_SIZE = 0.17
+_LABEL_MARGIN = 0.05
+_RIM = 0.012
+_GAP = 0.016
 _GOAL_WINDOW = Window(-0.84, 0.84, -0.84, 0.84)
 _GOAL_MIN_DISTANCE_M = 0.48
 _CELL_WINDOW = Window(-0.86, 0.86, 2 * LABEL_STRIP - 1.0, 0.86)
@@ -72,7 +224,7 @@ _LEAST_CUBE = 0.08
 
 @dataclass(frozen=True)
 class PictureStyle:
-    """How pictures look: side length [pixels], background, and where they are seen from.
+    """Side length [pixels], background, and direction of the camera.
 
     Azimuth 0 looks from +x and 90 from +y; elevation 90 looks straight down [degrees]. Candidates
     share one scale in their grid (`common`), or each fills its cell (`fit`). Raises ValueError for
@@ -87,19 +239,18 @@ class PictureStyle:
     candidate_scale: CandidateScale = "common"
 
     def __post_init__(self) -> None:
-        if not SMALLEST_PX <= self.size_px <= LARGEST_PX:
-            allowed = f"allowed {SMALLEST_PX}..{LARGEST_PX}"
-            raise ValueError(f"size_px is {self.size_px}, {allowed}")
-        if self.background not in BACKGROUNDS:
-            raise ValueError(f"background is {self.background!r}, allowed {', '.join(BACKGROUNDS)}")
-        if self.candidate_scale not in (scales := get_args(CandidateScale)):
-            raise ValueError(
-                f"candidate_scale is {self.candidate_scale!r}, allowed {', '.join(scales)}"
-            )
-        if not 1 <= self.elevation_deg <= 90:
-            raise ValueError(f"elevation_deg is {self.elevation_deg}, allowed 1..90")
-        if not math.isfinite(self.azimuth_deg):
-            raise ValueError(f"azimuth_deg is {self.azimuth_deg}, allowed any finite number")
+        scales = get_args(CandidateScale)
+        size, elevation = self.size_px, self.elevation_deg
+        rules = (
+            ("size_px", SMALLEST_PX <= size <= LARGEST_PX, f"{SMALLEST_PX}..{LARGEST_PX}"),
+            ("background", self.background in BACKGROUNDS, ", ".join(BACKGROUNDS)),
+            ("candidate_scale", self.candidate_scale in scales, ", ".join(scales)),
+            ("elevation_deg", 1 <= elevation <= 90, "1..90"),
+            ("azimuth_deg", math.isfinite(self.azimuth_deg), "any finite number"),
+        )
+        for name, is_allowed, allowed in rules:
+            if not is_allowed:
+                raise ValueError(f"{name} is {getattr(self, name)!r}, allowed {allowed}")
 
     @classmethod
     def from_view(
@@ -110,28 +261,48 @@ class PictureStyle:
             raise ValueError(f"view is {view!r}, allowed {', '.join(sorted(VIEWS))}")
         return cls(size_px, background, *VIEWS[view])
 
+    @property
+    def axes(self) -> NDArray[np.float64]:
+        """Right, up and forward of the view, rows of a (3, 3) array."""
+        return view_axes(self.azimuth_deg, self.elevation_deg)
+
 
 def goal_png(scene: Scene, style: PictureStyle) -> bytes:
     """PNG of the finished structure, square, framed so that no block is cut off."""
-    blocks = drawn(scene)
-    image = picture(blocks, goal_camera(scene, style), style.background, style.size_px)
-    return to_png(image)
+    camera = goal_camera(scene, style)
+    return to_png(picture(drawn(scene.blocks), camera, style.background, style.size_px))
 
 
 def candidates_png(candidates: CandidateSet, style: PictureStyle) -> bytes:
     """PNG of the numbered candidates, square, 4 by 4 cells, seen from where the goal is seen."""
-    cell_px = math.ceil(style.size_px / GRID_COLUMNS)
-    blocks = [on_the_floor(c.type, c.color, c.euler_deg) for c in candidates.candidates]
-    distance_m = common_distance_m(blocks, style) if style.candidate_scale == "common" else None
-    cells = [thumbnail(block, style, cell_px, distance_m, renderer()) for block in blocks]
-    empty = empty_cell(style, cell_px)
-    return to_png(numbered_grid(cells, empty, style.background, style.size_px))
+    grid, _, _ = candidates_grid(candidates, style)
+    return to_png(grid)
 
 
 def composite_png(goal: bytes, candidates: bytes) -> bytes:
     """PNG with the goal on the left and the candidates on the right of a narrow white gap."""
     with Image.open(io.BytesIO(goal)) as left, Image.open(io.BytesIO(candidates)) as right:
-        return to_png(side_by_side(left.convert("RGB"), right.convert("RGB")))
+        gap = _gap_px(left.height)
+        joined = Image.new("RGB", (left.width + gap + right.width, left.height), "white")
+        joined.paste(left.convert("RGB"), (0, 0))
+        joined.paste(right.convert("RGB"), (left.width + gap, 0))
+        return to_png(joined)
+
+
+def joined_size_px(side_px: int) -> tuple[int, int]:
+    """Width and height of two squares side by side, as in the composite."""
+    return 2 * side_px + _gap_px(side_px), side_px
+
+
+def _gap_px(height_px: int) -> int:
+    return max(2, round(height_px * _GAP))
+
+
+def to_png(image: Image.Image) -> bytes:
+    """The image as PNG; the same pixels always give the same bytes (no time, no metadata)."""
+    buffer = io.BytesIO()
+    image.save(buffer, format="PNG", optimize=False, compress_level=6)
+    return buffer.getvalue()
 
 
 def goal_key(scene: Scene, style: PictureStyle) -> str:
@@ -146,9 +317,26 @@ def candidates_key(candidates: CandidateSet, style: PictureStyle) -> str:
     return picture_key("candidates", style, [style.candidate_scale, *content])
 
 
+def picture_key(kind: str, style: PictureStyle, content: Iterable[object]) -> str:
+    """SHA-256 [hex] of a picture's content, its style, and the versions of what draws it."""
+    parts = {
+        "kind": kind,
+        "render_version": RENDER_VERSION,
+        **pixel_versions(),
+        "style": [style.size_px, style.background, style.azimuth_deg, style.elevation_deg],
+        "content": list(content),
+    }
+    return hex_digest(json.dumps(parts, sort_keys=True, allow_nan=False))
+
+
+def pixel_versions() -> dict[str, str]:
+    """Versions of what draws: the rasterizer, and Pillow for text, lines, scaling and PNG."""
+    return {"raster": RASTER_VERSION, "pillow": PIL.__version__}
+
+
 def goal_camera(scene: Scene, style: PictureStyle) -> Camera:
     """The camera of the goal picture; raises DataError for a scene without blocks."""
-    return camera_for(drawn(scene), style, scene.id)
+    return camera_for(drawn(scene.blocks), style, scene.id)
 
 
 def goal_style(scene: Scene, style: PictureStyle) -> PictureStyle:
@@ -178,9 +366,81 @@ def camera_for(
     if not blocks:
         raise DataError(Problem(where=where, field="blocks", message="there is none to draw"))
     points = np.vstack([block.vertices_m for block in blocks])
-    axes = view_axes(style.azimuth_deg, style.elevation_deg)
     drawn_m = np.vstack([block.vertices_m for block in shown]) if shown else None
-    return frame(points, axes, _GOAL_WINDOW, _GOAL_MIN_DISTANCE_M, drawn_m)
+    return frame(points, style.axes, _GOAL_WINDOW, _GOAL_MIN_DISTANCE_M, drawn_m)
+
+
+class Lookout:
+    """The camera of a scene's goal, from which other blocks are drawn quickly."""
+
+    def __init__(self, scene: Scene, style: PictureStyle) -> None:
+        self._goal, self._style = drawn(scene.blocks), style
+        camera = self._camera(self._goal)
+        self._eye_m = camera.eye_m
+        self._ground = empty_ground(style.background, camera, style.size_px)
+
+    def image(self, blocks: Sequence[Block]) -> Image.Image:
+        """The blocks on the ground, an RGB image of the style's size."""
+        shown, style = drawn(blocks), self._style
+        camera = self._camera(shown)
+        # Blocks that fell towards the camera may have pushed it back.
+        is_known = np.array_equal(camera.eye_m, self._eye_m)
+        ground = self._ground if is_known else None
+        return picture(shown, camera, style.background, style.size_px, ground)
+
+    def _camera(self, shown: Sequence[DrawnBlock]) -> Camera:
+        return camera_for(self._goal, self._style, "current", shown)
+
+
+def candidates_grid(
+    candidates: CandidateSet, style: PictureStyle
+) -> tuple[Image.Image, list[DrawnBlock], float | None]:
+    """Candidates in a 4 by 4 grid from the top left, numbered from 1; with the blocks drawn.
+
+    The number is their common distance from the camera [m], None where each fills its cell.
+    """
+    size_px, cell_px = style.size_px, math.ceil(style.size_px / GRID_COLUMNS)
+    blocks = [on_the_floor(c.type, c.color, c.euler_deg) for c in candidates.candidates]
+    distance_m = common_distance_m(blocks, style) if style.candidate_scale == "common" else None
+    cube = on_the_floor("cube", "red", (0.0, 0.0, 0.0))
+    empty = picture([], candidate_camera(cube, style), style.background, cell_px)
+    grid = Image.new("RGB", (size_px, size_px))
+    edges = [round(i * size_px / GRID_COLUMNS) for i in range(GRID_COLUMNS + 1)]
+    for place in range(GRID_COLUMNS**2):
+        row, column = divmod(place, GRID_COLUMNS)
+        box = (edges[column], edges[row], edges[column + 1], edges[row + 1])
+        cell = empty
+        if place < len(blocks):
+            cell = thumbnail(blocks[place], style, cell_px, distance_m).copy()
+            _write_number(cell, place + 1, style.background)
+        grid.paste(cell.resize((box[2] - box[0], box[3] - box[1])), box[:2])
+    lines, ink = ImageDraw.Draw(grid), GROUNDS[style.background].line
+    for edge in edges[1:-1]:
+        lines.line([(edge, 0), (edge, size_px)], fill=ink)
+        lines.line([(0, edge), (size_px, edge)], fill=ink)
+    return grid, blocks, distance_m
+
+
+def _write_number(cell: Image.Image, number: int, background: Background) -> None:
+    """The number at the foot of the cell; on a floor with a grain, with a rim around it."""
+    side = cell.height
+    font = ImageFont.load_default(size=_LABEL_SIZE * side)
+    place = (side * (1 - _LABEL_MARGIN), side * (1 - _LABEL_MARGIN))
+    ink = GROUNDS[background].ink
+    rim = DARK_INK if ink == LIGHT_INK else LIGHT_INK
+    width = round(side * _RIM) if background in TEXTURED else 0
+    ImageDraw.Draw(cell).text(
+        place, str(number), ink, font, anchor="rs", stroke_width=width, stroke_fill=rim
+    )
+
+
+@functools.lru_cache(maxsize=512)
+def thumbnail(
+    block: DrawnBlock, style: PictureStyle, cell_px: int, distance_m: float | None
+) -> Image.Image:
+    """One cell of the grid of candidates, before its number; shared: do not draw on it."""
+    camera = candidate_camera(block, style, distance_m)
+    return picture([block], camera, style.background, cell_px)
 
 
 def candidate_camera(
@@ -188,16 +448,23 @@ def candidate_camera(
 ) -> Camera:
     """The camera of one cell, `distance_m` from the middle of the block [m].
 
-    Without a distance the block fills the cell above the number's strip, longer ones a little more
-    (fourth root of the diagonal), so that a picture still tells which of two is the larger.
+    Without a distance the block fills the cell above the number's strip.
     """
-    axes = view_axes(style.azimuth_deg, style.elevation_deg)
-    if distance_m is not None:
-        return frame(block.vertices_m, axes, _CELL_WINDOW, distance_m - _half_depth_m(block, axes))
+    if distance_m is None:
+        return close_camera(block, style, _CELL_WINDOW)
+    nearest_m = distance_m - _half_depth_m(block, style)
+    return frame(block.vertices_m, style.axes, _CELL_WINDOW, nearest_m)
+
+
+def close_camera(block: DrawnBlock, style: PictureStyle, window: Window) -> Camera:
+    """The camera of a block by itself, which fills a like share of the window whatever its type.
+
+    Longer ones fill a little more (fourth root of the diagonal), so that a picture still tells
+    which of two is the larger.
+    """
     shape = SHAPES[block.type]
-    diagonal_m = math.dist(shape.low_m, shape.high_m)
-    window = _CELL_WINDOW.scaled((diagonal_m / _LARGEST_DIAGONAL_M) ** _SIZE_CUE)
-    return frame(block.vertices_m, axes, window)
+    share = math.dist(shape.low_m, shape.high_m) / _LARGEST_DIAGONAL_M
+    return frame(block.vertices_m, style.axes, window.scaled(share**_SIZE_CUE))
 
 
 def common_distance_m(blocks: Iterable[DrawnBlock], style: PictureStyle) -> float:
@@ -205,64 +472,46 @@ def common_distance_m(blocks: Iterable[DrawnBlock], style: PictureStyle) -> floa
 
     Blocks at one distance are drawn at one scale.
     """
-    axes = view_axes(style.azimuth_deg, style.elevation_deg)
-    needed = [0.0]
+    axes, needed = style.axes, [0.0]
     for block in blocks:
         closest = frame(block.vertices_m, axes, _CELL_WINDOW)
         nearest_m = float(dot(block.vertices_m - closest.eye_m, axes[2]).min())
-        needed.append(nearest_m + _half_depth_m(block, axes))
+        needed.append(nearest_m + _half_depth_m(block, style))
     return max(needed)
 
 
-def _half_depth_m(block: DrawnBlock, axes: NDArray[np.float64]) -> float:
-    return float(np.ptp(dot(block.vertices_m, axes[2]))) / 2
+def _half_depth_m(block: DrawnBlock, style: PictureStyle) -> float:
+    return float(np.ptp(dot(block.vertices_m, style.axes[2]))) / 2
 
 
-def on_the_floor(block_type: BlockType, color: Color, euler_deg: Euler) -> DrawnBlock:
-    """A single block in its orientation, its lowest point on the floor."""
-    lifted = DrawnBlock(block_type, color, (0.0, 0.0, 0.0), euler_deg)
-    return DrawnBlock(
-        block_type, color, (0.0, 0.0, -float(lifted.vertices_m[:, 2].min())), euler_deg
-    )
+LEAST_SHARE = 12 / 256**2
+"""The least share of a goal picture that must show of a block: 48 pixels of 512 by 512.
+
+What cannot be seen cannot be planned.
+"""
+LEAST_SHOWN = 0.03
+"""The least share of a block's own outline that must show in the goal picture of a scene."""
+_SEEN_PX = 256
 
 
-@functools.lru_cache(maxsize=512)
-def thumbnail(
-    block: DrawnBlock,
-    style: PictureStyle,
-    cell_px: int,
-    distance_m: float | None,
-    drawn_by: Renderer,
-) -> Image.Image:
-    """One cell of the grid of candidates, before its number; shared: do not draw on it."""
-    camera = candidate_camera(block, style, distance_m)
-    return picture([block], camera, style.background, cell_px, drawn_by=drawn_by)
+def visible_shares(scene: Scene, style: PictureStyle) -> dict[int, float]:
+    """For each block's order, the share of its pixels that no other block hides, 0..1.
+
+    Its pixels are those that it covers when it is drawn alone by the same camera. Raises
+    DataError for a scene without blocks.
+    """
+    camera, blocks = goal_camera(scene, style), drawn(scene.blocks)
+    together = segments(blocks, camera, style.size_px)
+    shares = {}
+    for vertex, (block, one) in enumerate(zip(scene.blocks, blocks, strict=True)):
+        alone = segments([one], camera, style.size_px) == 0
+        shares[block.order] = float((together[alone] == vertex).sum() / max(alone.sum(), 1))
+    return shares
 
 
-def empty_cell(style: PictureStyle, cell_px: int) -> Image.Image:
-    """A cell of the grid in which there is no candidate."""
-    block = on_the_floor("cube", "red", (0.0, 0.0, 0.0))
-    return picture([], candidate_camera(block, style), style.background, cell_px)
-
-
-def drawn(scene: Scene) -> list[DrawnBlock]:
-    """The blocks of a scene as the renderer takes them."""
-    return [DrawnBlock(b.type, b.color, b.position_m, b.euler_deg) for b in scene.blocks]
-
-
-def pixel_versions() -> dict[str, str]:
-    """The chosen renderer with its versions, and what the picture library draws."""
-    drawn_by = renderer()
-    return {"renderer": drawn_by.name, **drawn_by.versions, "pillow": library_pixels()}
-
-
-def picture_key(kind: str, style: PictureStyle, content: Iterable[object]) -> str:
-    """SHA-256 [hex] of what decides a picture: what it shows, its style, and who draws it."""
-    parts = {
-        "kind": kind,
-        "render_version": RENDER_VERSION,
-        **pixel_versions(),
-        "style": [style.size_px, style.background, style.azimuth_deg, style.elevation_deg],
-        "content": list(content),
-    }
-    return hex_digest(json.dumps(parts, sort_keys=True, allow_nan=False))
+def hidden_blocks(scene: Scene) -> tuple[int, ...]:
+    """Orders of the blocks that show less than `LEAST_SHARE` in the default goal picture."""
+    seen = segments(drawn(scene.blocks), goal_camera(scene, PictureStyle()), _SEEN_PX)
+    counts = np.bincount(seen[seen >= 0], minlength=len(scene))
+    least = LEAST_SHARE * _SEEN_PX**2
+    return tuple(b.order for b, n in zip(scene.blocks, counts, strict=True) if n < least)

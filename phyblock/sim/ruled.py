@@ -9,21 +9,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from phyblock.domain.scene import Block, Scene
-from phyblock.sim.backgrounds import TONES
+from phyblock.domain.scene import Block, CandidateSet, Scene
+from phyblock.sim.backgrounds import GROUNDS
 from phyblock.sim.camera import Camera, Window, frame, view_axes
-from phyblock.sim.compose import to_png
-from phyblock.sim.exact import rounded
-from phyblock.sim.pictures import PictureStyle, drawn, picture_key
-from phyblock.sim.render import SUPERSAMPLE, DrawnBlock, empty_ground, picture
-
-__all__ = ["RULED_VERSION", "RuledFloor", "ruled_key", "ruled_png"]
+from phyblock.sim.geometry import rounded
+from phyblock.sim.pictures import (
+    GRID_COLUMNS,
+    LARGEST_PX,
+    SUPERSAMPLE,
+    DrawnBlock,
+    PictureStyle,
+    candidate_camera,
+    candidates_grid,
+    drawn,
+    empty_ground,
+    picture,
+    picture_key,
+    to_png,
+)
 
 RULED_VERSION = 1
 """Raised whenever the rules come out otherwise, so that stored pictures are made again."""
@@ -75,7 +84,7 @@ class RuledFloor:
     """The ruled floor of a scene, which must have a block: draws blocks seen as its goal is."""
 
     def __init__(self, scene: Scene, style: PictureStyle) -> None:
-        blocks = drawn(scene)
+        blocks = drawn(scene.blocks)
         field = _field(blocks, style)
         self._camera, self._style = _camera(blocks, field, style), style
         empty = empty_ground(style.background, self._camera, style.size_px)
@@ -90,7 +99,7 @@ class RuledFloor:
 
 def ruled_key(scene: Scene, style: PictureStyle) -> str:
     """SHA-256 [hex] of all that the picture depends on."""
-    content = [RULED_VERSION, *(list(astuple(block)) for block in drawn(scene))]
+    content = [RULED_VERSION, *(list(astuple(block)) for block in drawn(scene.blocks))]
     return picture_key("ruled goal", style, content)
 
 
@@ -136,7 +145,7 @@ def _ruled(
     for start, end, is_major in _lines(field):
         pen.line(start, end, _MAJOR if is_major else _MINOR, 2 if is_major else 1)
     share = np.asarray(pen.image, dtype=np.float32)[..., None] / np.float32(255)
-    ink = np.array(TONES[style.background].ink, dtype=np.float32)
+    ink = np.array(GROUNDS[style.background].ink, dtype=np.float32)
     ruled = ground * (1 - share) + ink * share
     image = Image.fromarray(np.rint(ruled).astype(np.uint8))
     _write(_Pen(camera, size_px, image), field, style)
@@ -194,7 +203,7 @@ class _Pen:
 
 def _write(pen: _Pen, field: _Field, style: PictureStyle) -> None:
     """Axes through the origin, names and numbers, and the pole."""
-    ink = TONES[style.background].ink
+    ink = GROUNDS[style.background].ink
     is_dark = sum(ink) < 380
     x_ink, y_ink, z_ink = (_X_DARK, _Y_DARK, _Z_DARK) if is_dark else (_X_INK, _Y_INK, _Z_INK)
     (x0, x1), (y0, y1) = field.x, field.y
@@ -221,3 +230,64 @@ def _write(pen: _Pen, field: _Field, style: PictureStyle) -> None:
                 dx, dy = across[0] * 2.4, across[1] * 2.4
                 pen.text((x + dx, y + dy, z), str(z), z_ink, 1.9)
         pen.text((x, y, field.z + 1.6), "z", z_ink, 2.2)
+
+
+KIT_VERSION = 1
+"""Raised whenever the sheet comes out otherwise, so that stored pictures are made again."""
+
+_GROWTH = 1.5
+
+_TEXT, _MARGIN, _DOT = 0.105, 0.04, 0.035
+
+
+def written_style(style: PictureStyle) -> PictureStyle:
+    """The style of pictures that are written on: half as large again, so that it can be read."""
+    return replace(style, size_px=min(math.ceil(style.size_px * _GROWTH), LARGEST_PX))
+
+
+def kit_png(candidates: CandidateSet, style: PictureStyle) -> bytes:
+    """PNG of the sheet, square, 4 by 4 cells, seen from where the style says."""
+    sheet, blocks, distance_m = candidates_grid(candidates, style)
+    for place, block in enumerate(blocks):
+        row, column = divmod(place, GRID_COLUMNS)
+        side = style.size_px / GRID_COLUMNS
+        corner = (column * side, row * side)
+        _write_kit(sheet, block, candidate_camera(block, style, distance_m), corner, side, style)
+    return to_png(sheet)
+
+
+def kit_key(candidates: CandidateSet, style: PictureStyle) -> str:
+    """SHA-256 [hex] of all that the sheet depends on."""
+    content = [astuple(candidate) for candidate in candidates.candidates]
+    return picture_key("kit", style, [KIT_VERSION, style.candidate_scale, *content])
+
+
+def box_cm(block: DrawnBlock) -> NDArray[np.float64]:
+    """Low and high corner of the smallest box round a block as it is drawn, shape (2, 3) [cm]."""
+    points = block.vertices_m * _CM
+    return np.stack([points.min(axis=0), points.max(axis=0)])
+
+
+def _write_kit(
+    sheet: Image.Image,
+    block: DrawnBlock,
+    camera: Camera,
+    corner: tuple[float, float],
+    side: float,
+    style: PictureStyle,
+) -> None:
+    low, high = box_cm(block)
+    draw, ink = ImageDraw.Draw(sheet), GROUNDS[style.background].ink
+    font = ImageFont.load_default(size=_TEXT * side)
+    sizes = (f"{name} {_number(size)}" for name, size in zip("xyz", high - low, strict=True))
+    left, foot = corner[0] + _MARGIN * side, corner[1] + side * (1 - _MARGIN)
+    draw.text((left, foot), ", ".join(sizes), ink, font, anchor="ls")
+    middle = ((low + high) / 2 / _CM)[None]
+    x, y = camera.to_pixels(middle, round(side))[0]
+    column, row = corner[0] + float(x), corner[1] + float(y)
+    for radius, fill in ((_DOT * side, "white"), (_DOT * side * 0.6, "black")):
+        draw.ellipse((column - radius, row - radius, column + radius, row + radius), fill=fill)
+
+
+def _number(size_cm: float) -> str:
+    return f"{round(float(size_cm), 1):g}"

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from phyblock.data import AssemblyTask, Dataset
     from phyblock.models import Image
     from phyblock.records import Record
-    from phyblock.sim import PictureStyle
     from phyblock.sim.film import FilmStep
+    from phyblock.sim.pictures import PictureStyle
     from phyblock.tables.design import Design
     from phyblock.tables.load import Run
 

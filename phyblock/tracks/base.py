@@ -12,7 +12,7 @@ from phyblock.domain import Scene
 from phyblock.models.base import Request
 from phyblock.records import Record
 from phyblock.records.reply import Reply
-from phyblock.sim.registry import REFERENCE_ENGINE, physics_engine
+from phyblock.sim.engine import REFERENCE_ENGINE, physics_engine
 
 __all__ = [
     "CARRYING",

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from phyblock.sim.compose import GRID_COLUMNS
+from phyblock.sim.pictures import GRID_COLUMNS
 
 __all__ = [
     "Choice",

@@ -7,7 +7,7 @@ from typing import Any
 
 from phyblock.domain import BLOCK_TYPES, Block, CandidateSet, Scene
 from phyblock.sim.geometry import solid_mesh
-from phyblock.sim.render import COLOR_RGB
+from phyblock.sim.pictures import COLOR_RGB
 
 __all__ = ["block_entry", "kit", "rounded", "scene_entry"]
 

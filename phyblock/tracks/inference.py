@@ -14,9 +14,8 @@ from phyblock.data import AssemblyTask, Dataset
 from phyblock.errors import Problem, SpecError
 from phyblock.records import Record
 from phyblock.records.reading import read_records
-from phyblock.sim import PictureStyle, candidates_png
 from phyblock.sim.film import FilmStep, Tone
-from phyblock.sim.site import Lookout
+from phyblock.sim.pictures import Lookout, PictureStyle, candidates_png
 from phyblock.tables.drawing import INK, MUTED, headed, new_figure, text_width_in, wrapped
 from phyblock.tables.load import Run
 from phyblock.tables.track_report import EpisodeView

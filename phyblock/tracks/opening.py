@@ -11,7 +11,7 @@ from phyblock.config.validation import PictureControls
 from phyblock.data import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.resources import cache_dir
-from phyblock.sim import PictureStyle
+from phyblock.sim.pictures import PictureStyle
 from phyblock.tracks.base import AnyTrack
 from phyblock.tracks.kind import Opening, kind_of
 from phyblock.tracks.pictures import PicturePolicy, Pictures

@@ -11,7 +11,7 @@ from phyblock.data import AssemblyTask
 from phyblock.errors import DataError, Problem
 from phyblock.files import decode_picture, read_picture
 from phyblock.models.base import Image
-from phyblock.sim import (
+from phyblock.sim.pictures import (
     PictureStyle,
     candidates_key,
     candidates_png,
@@ -19,8 +19,9 @@ from phyblock.sim import (
     goal_key,
     goal_png,
     goal_style,
+    joined_size_px,
+    to_png,
 )
-from phyblock.sim.compose import joined_size_px, to_png
 from phyblock.stable import hex_digest
 from phyblock.tracks.showing import ShownTask
 from phyblock.tracks.studio import Drawing, Studio, Workshop, to_image

@@ -164,7 +164,7 @@ def test_other_tables_code_or_settings_are_other_inputs(
     assert not is_current(copied.rename(copied.with_name("of-another-name")))
     copied.with_name("of-another-name").rename(copied)
     with monkeypatch.context() as patch:
-        patch.setenv("PHYBLOCK_RENDERER", "mine:make")
+        patch.setenv("PHYBLOCK_PHYSICS", "mujoco")
         assert not is_current(copied)
     with monkeypatch.context() as patch:
         patch.setattr(code, "version", lambda _: "99")

@@ -11,7 +11,7 @@ import click
 import pytest
 
 from phyblock.cli.main import phyblock as group
-from phyblock.sim.registry import ENGINES
+from phyblock.sim.engine import ENGINES
 
 VERBS = tuple(group.list_commands(None))  # type: ignore[arg-type]
 CALLS = re.compile(rf"\bphyblock ((?:{'|'.join(VERBS)})\b[^\n`;|&>\"#]*)")

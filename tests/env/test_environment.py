@@ -18,8 +18,8 @@ from phyblock.domain import BLOCK_TYPES, COLORS, Block, Candidate, CandidateSet,
 from phyblock.env import DONE, PhyBlockEnv, read_tasks
 from phyblock.errors import DataError
 from phyblock.scoring.pose import blocks_reached
-from phyblock.sim.carry import carry_out
-from phyblock.sim.placing import put
+from phyblock.sim.dynamics import execute
+from phyblock.sim.geometry import put
 from phyblock.types import SETTINGS, Setting
 
 ROOT = Path(__file__).parents[2]
@@ -328,7 +328,7 @@ def test_poses_are_carried_out_as_a_plan_is() -> None:
         PoseStep(1, (0.0, 0.0, 2.5)), PoseStep(3, (5.5, 0.0, 6.25)), PoseStep(2, (11.0, 0.0, 2.5)),
         PoseStep(16, (0.0, 0.0, 2.5)), PoseStep(2, (0.0, 0.3, 2.5)), PoseStep(2, (0.0, 0.0, 30.0)),
     ]  # fmt: skip
-    done = carry_out([put(step, kit) for step in plan])
+    done = execute([put(step, kit) for step in plan])
     env.reset()
     total = 0.0
     for step, ended in zip(plan, done.steps, strict=True):

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from phyblock.domain import BLOCK_TYPES, SHAPES, Block, orientation_class
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, canonical_form
 from phyblock.making.poses import POSES, transformed
-from phyblock.sim import find_overlaps, support_graph
-from phyblock.sim.render import DrawnBlock
+from phyblock.sim.contact import find_overlaps, support_graph
+from phyblock.sim.pictures import DrawnBlock
 from tests.designs.scenes import designed_scenes
 
 SCENES = designed_scenes()

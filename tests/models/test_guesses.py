@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from phyblock.domain import LETTERS, Question, Scene
-from phyblock.domain.rotation import rotated
+from phyblock.domain.question import rotated
 from phyblock.models.guesses import FOLDS, PROBES, Folds, Guesses
 
 WORDS = ("cube", "arch", "cylinder", "cuboid", "cone", "prism")

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from phyblock.errors import StoreError
 from phyblock.report import load_run
-from phyblock.sim.registry import ENGINES
+from phyblock.sim.engine import ENGINES
 from tests.report.factory import (
     frames_from,
     laws,

@@ -17,7 +17,7 @@ from phyblock.cli.main import phyblock
 from phyblock.errors import SimulationError
 from phyblock.run.rescore import rescore
 from phyblock.run.shielded import to_its_end
-from phyblock.sim import carry
+from phyblock.sim import dynamics
 from phyblock.tracks.pose_planning.track import PosePlanning
 from phyblock.tracks.studio import Workshop
 from tests.run.killing import killed
@@ -91,7 +91,7 @@ def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
         run_suite("suite.yaml", out="out", limit=2)
     # A plan that takes too long is given up, in a worker or without one, and says so.
     monkeypatch.setattr(PosePlanning, "judge_apart", whole)
-    monkeypatch.setattr(carry, "LONGEST_S", -1.0)
+    monkeypatch.setattr(dynamics, "LONGEST_S", -1.0)
     kept = workspace.records(rescore(workspace.out, None, None, workspace.root / "slow"))
     given_up = next(record for record in kept if record["sample"] == lost["sample"])
     assert given_up["error"]["kind"] == "unjudged"

@@ -17,7 +17,7 @@ from PIL import Image as PillowImage
 from phyblock.data import read_builtin, read_questions
 from phyblock.domain import LETTERS, SUBTASKS, Question
 from phyblock.report import published_table
-from phyblock.sim import PictureStyle
+from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_png
 from tests.fork_server import Done
 from tests.servers.chassis import Running, Seen

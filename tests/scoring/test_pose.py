@@ -29,8 +29,8 @@ from phyblock.domain.blocks import SHAPES, BlockType
 from phyblock.scoring.plan import Goal, most_placed
 from phyblock.scoring.pose import Laid, Piece, PoseScore, PoseScorer, overlap_volume, placed, volume
 from phyblock.scoring.pose_matching import Motion, Nearness, cheapest, matched
+from phyblock.sim.engine import quat_xyzw_to_euler_deg
 from phyblock.sim.geometry import collision_pieces
-from phyblock.sim.pose import quat_xyzw_to_euler_deg
 from phyblock.types import SETTINGS, Setting
 
 KINDS: tuple[BlockType, ...] = ("cube", "cuboid2", "triangle", "arch")

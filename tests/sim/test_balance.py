@@ -23,7 +23,7 @@ from phyblock.sim.balance import (
     surely_falls,
     surely_stands,
 )
-from phyblock.sim.steps import groups
+from phyblock.sim.dynamics import groups
 from tests.sim.structures import block, counterweighted_beam, tower, turned
 
 HALF_CUBE_M = 0.025

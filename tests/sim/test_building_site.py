@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import itertools
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,11 +15,10 @@ from PIL import Image
 
 from phyblock.data import read_builtin
 from phyblock.domain import Block, Scene
-from phyblock.sim import PictureStyle, check, goal_png
-from phyblock.sim.question_pictures import question_key, question_png
-from phyblock.sim.site import ONE_SETTING, Settled, Site, settle, state_picture
-from phyblock.sim.stability import DEFAULT_TRIAL, Trial
-from phyblock.sim.world import World
+from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, Settled, Site, Trial, check, settle
+from phyblock.sim.engine import World
+from phyblock.sim.pictures import PictureStyle, goal_png
+from phyblock.sim.question_pictures import question_key, question_png, state_picture
 
 STYLE = PictureStyle(128)
 BUILT_IN = read_builtin(Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400").tasks
@@ -35,7 +35,7 @@ def seesaw() -> Scene:
 
 
 def test_what_stands_stays_where_it_was_put() -> None:
-    with Site() as site:
+    with closing(Site()) as site:
         for task in BUILT_IN[::80]:
             found = site.settle(task.scene.blocks)
             assert found.stands
@@ -61,12 +61,12 @@ def test_an_empty_ground_stands() -> None:
 def test_a_site_gives_the_same_verdict_whatever_was_tried_on_it_before(trial: Trial) -> None:
     structures = [task.scene.blocks for task in BUILT_IN[::150]]
     structures += [seesaw().blocks[:2], structures[0][:1], seesaw().blocks]
-    with Site(trial) as site:
+    with closing(Site(trial)) as site:
         first = [site.settle(blocks) for blocks in structures]
         again = [site.settle(blocks) for blocks in reversed(structures)][::-1]
     alone = []
     for blocks in structures:
-        with Site(trial) as site:
+        with closing(Site(trial)) as site:
             alone.append(site.settle(blocks))
     assert first == again == alone == [settle(blocks, trial) for blocks in structures]
 
@@ -98,7 +98,7 @@ def test_an_arrangement_is_tried_once_wherever_it_stands(monkeypatch: pytest.Mon
 
     monkeypatch.setattr(World, "step", counted)
     blocks = seesaw().blocks
-    with Site(ONE_SETTING) as site:
+    with closing(Site(ONE_SETTING)) as site:
         assert site.settle(blocks).stands
         once = len(simulated)
         moved = elsewhere(blocks)

@@ -11,8 +11,7 @@ from numpy.testing import assert_allclose
 from phyblock.data import read_official
 from phyblock.domain import Scene
 from phyblock.sim.camera import VIEWS, Window, frame, view_axes
-from phyblock.sim.pictures import PictureStyle, drawn, goal_camera
-from phyblock.sim.render import shoot
+from phyblock.sim.pictures import PictureStyle, drawn, goal_camera, shoot
 from tests.designs.scenes import designed_scene
 from tests.sim.structures import clouds, scene_of
 
@@ -27,7 +26,7 @@ MARGIN = 0.16
 
 
 def projected(scene: Scene, style: PictureStyle) -> np.ndarray:
-    corners = np.vstack([block.vertices_m for block in drawn(scene)])
+    corners = np.vstack([block.vertices_m for block in drawn(scene.blocks)])
     return goal_camera(scene, style).project(corners)
 
 
@@ -82,7 +81,7 @@ def test_no_official_scene_is_cut_off(view: str, official_checkout: Path) -> Non
 def test_the_renderer_draws_where_the_camera_says(view: str) -> None:
     scene = designed_scene("l2-rocket")
     camera, size_px = goal_camera(scene, PictureStyle.from_view(view)), 512
-    blocks = drawn(scene)
+    blocks = drawn(scene.blocks)
     shot = shoot(blocks, camera, size_px)
     rows, columns = np.nonzero(shot.block >= 0)
     pixels = np.vstack([camera.to_pixels(block.vertices_m, size_px) for block in blocks])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -14,15 +14,18 @@ from hypothesis import strategies as st
 from phyblock.domain import Block, BlockType, euler_deg_to_matrix
 from phyblock.domain.blocks import SHAPES
 from phyblock.scoring.pose import blocks_reached, overlap_volume, placed
-from phyblock.sim.carry import CarryLimits, carry_out
-from phyblock.sim.engine import Physics, PhysicsEngine, Velocity
-from phyblock.sim.pose import Pose
-from phyblock.sim.registry import installed_engines, physics_engine
-from phyblock.sim.stability import DEFAULT_TRIAL
-from phyblock.sim.support import find_overlaps
-from phyblock.sim.voxels import VOXEL_M, filled_voxels, voxel_iou
+from phyblock.sim.contact import VOXEL_M, filled_voxels, find_overlaps, voxel_iou
+from phyblock.sim.dynamics import DEFAULT_TRIAL, ExecutionLimits, execute
+from phyblock.sim.engine import (
+    Contact,
+    Physics,
+    PhysicsEngine,
+    Pose,
+    Velocity,
+    installed_engines,
+    physics_engine,
+)
 from phyblock.tracks.pose_planning.bodies import pieces_of
-from tests.sim.still_engine import StillEngine, StillSimulation
 from tests.sim.structures import block, counterweighted_beam, tower
 
 CREEP_M_S = 0.0015
@@ -40,11 +43,11 @@ def at(one: Block, x_m: float, y_m: float, z_m: float) -> Block:
 
 
 def ends(blocks: list[Block | None], engine: PhysicsEngine, **limits: float) -> list[str]:
-    return [step.end for step in carry_out(blocks, CarryLimits(**limits), engine).steps]
+    return [step.end for step in execute(blocks, ExecutionLimits(**limits), engine).steps]
 
 
 def test_a_tower_stands_in_its_order_and_falls_in_the_opposite_one(engine: PhysicsEngine) -> None:
-    done = carry_out(tower(3), engine=engine)
+    done = execute(tower(3), engine=engine)
     assert [step.end for step in done.steps] == ["stands"] * 3
     assert [len(world) for world in done.worlds] == [1, 2, 3]
     assert voxel_iou(tower(3), done.blocks) == 1
@@ -53,7 +56,7 @@ def test_a_tower_stands_in_its_order_and_falls_in_the_opposite_one(engine: Physi
 
 
 def test_what_floats_falls_as_far_as_the_gap_below_it(engine: PhysicsEngine) -> None:
-    (step,) = carry_out([at(tower(1)[0], 0, 0, 0.065)], engine=engine).steps
+    (step,) = execute([at(tower(1)[0], 0, 0, 0.065)], engine=engine).steps
     assert (step.end, step.gap_cm, step.overlap_cm) == ("falls", pytest.approx(4), 0)
     assert step.moved_cm == pytest.approx(4, abs=0.1)
 
@@ -65,7 +68,7 @@ def test_overlaps_beyond_the_tolerance_are_refused_and_smaller_ones_give_way(
     deep, slight = at(first, 0.03, 0, 0.025), at(first, 0.046, 0, 0.025)
     assert ends([first, deep, slight], engine) == ["stands", "overlaps", "stands"]
     assert ends([first, slight], engine, overlap_cm=0.3) == ["stands", "overlaps"]
-    done = carry_out([first, deep, slight], engine=engine)
+    done = execute([first, deep, slight], engine=engine)
     assert [len(world) for world in done.worlds] == [1, 1, 2]
     assert done.steps[1].overlap_cm == pytest.approx(2, abs=0.01)
     assert done.steps[2].overlap_cm == pytest.approx(0.4, abs=0.05)
@@ -75,7 +78,7 @@ def test_overlaps_beyond_the_tolerance_are_refused_and_smaller_ones_give_way(
 def test_what_is_under_the_floor_or_no_block_is_not_put(engine: PhysicsEngine) -> None:
     first = tower(1)[0]
     blocks = [at(first, 0, 0, 0.01), at(first, 0, 0, -0.5), None, at(first, 0, 0, 0.0215)]
-    done = carry_out(blocks, engine=engine)
+    done = execute(blocks, engine=engine)
     found = [step.end for step in done.steps]
     assert found == ["under_floor", "under_floor", "no_block", "stands"]
     assert done.blocks[0].order == 4
@@ -83,7 +86,7 @@ def test_what_is_under_the_floor_or_no_block_is_not_put(engine: PhysicsEngine) -
 
 def test_who_is_knocked_over_is_named_and_stays_so(engine: PhysicsEngine) -> None:
     beam = counterweighted_beam()
-    done = carry_out([*beam[:3], None, beam[0]], engine=engine)
+    done = execute([*beam[:3], None, beam[0]], engine=engine)
     assert [step.end for step in done.steps[:2]] == ["stands", "stands"]
     assert done.steps[2].end == "knocks_over"
     assert done.steps[2].knocked == (2,)
@@ -96,9 +99,9 @@ def test_the_same_plan_ends_the_same_to_the_last_digit_whatever_came_before(
     engine: PhysicsEngine,
 ) -> None:
     beam: list[Block | None] = [*counterweighted_beam()[:3]]
-    first = carry_out(beam, engine=engine)
-    carry_out(tower(2), engine=engine)
-    assert carry_out(beam, engine=engine) == first
+    first = execute(beam, engine=engine)
+    execute(tower(2), engine=engine)
+    assert execute(beam, engine=engine) == first
 
 
 def test_what_stands_elsewhere_changes_no_verdict(engine: PhysicsEngine) -> None:
@@ -119,7 +122,7 @@ def test_what_stands_elsewhere_changes_no_verdict(engine: PhysicsEngine) -> None
         block(5, "cylinder", (0.025, -0.0625, 0.09886), (90.0, 0.0, 90.0)),
     ]
     for near in (lying, [at(tower(1)[0], 0.0, -0.1, 0.065)]):
-        alone, beside = carry_out(near, engine=engine), carry_out([*far, *near], engine=engine)
+        alone, beside = execute(near, engine=engine), execute([*far, *near], engine=engine)
         assert beside.steps[len(far) :] == alone.steps
         assert [one.position_m for one in beside.blocks[len(far) :]] == [
             one.position_m for one in alone.blocks
@@ -130,30 +133,53 @@ def test_what_falls_upon_others_that_stand_apart_moves_them(engine: PhysicsEngin
     low, post = at(tower(1)[0], 0.11, 0.0, 0.025), block(1, "cube", (0.0, 0.0, 0.025))
     plank = block(2, "cuboid3", (0.0, 0.0, 0.125), (0.0, 90.0, 0.0))
     leaning = replace(plank, position_m=(0.03, 0.0, 0.125))
-    done = carry_out([low, post, leaning], engine=engine)
+    done = execute([low, post, leaning], engine=engine)
     assert [step.end for step in done.steps[:2]] == ["stands", "stands"]
     assert done.steps[2].end in ("falls", "knocks_over")
     assert not find_overlaps(done.blocks, 0.002)
 
 
-class CreepingSimulation(StillSimulation):
+class CreepingSimulation:
     """Everything goes to one side for ever, slowly, and never rests."""
+
+    def __init__(self) -> None:
+        self._poses: dict[int, Pose] = {}
+
+    def add(self, number: int, _: BlockType, pose: Pose) -> None:
+        self._poses[number] = pose
+
+    def remove(self, number: int) -> None:
+        del self._poses[number]
+
+    def pose(self, number: int) -> Pose:
+        return self._poses[number]
+
+    def velocity(self, _: int) -> Velocity:
+        return Velocity((0.01, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+    def set_velocity(self, number: int, velocity: Velocity) -> None:
+        raise NotImplementedError
+
+    def contacts(self) -> tuple[Contact, ...]:
+        raise NotImplementedError
 
     def step(self, n: int) -> None:
         for number, pose in self._poses.items():
             way_m = np.array([CREEP_M_S * n * Physics().time_step_s, 0.0, 0.0])
             self._poses[number] = Pose(pose.position_m + way_m, pose.quat_xyzw)
-            self._velocities[number] = Velocity((0.01, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
-class CreepingEngine(StillEngine):
+class CreepingEngine:
+    name = "creeping"
+    versions: Mapping[str, str] = {"creeping": "1"}
+
     @contextlib.contextmanager
-    def open(self, physics: Physics) -> Iterator[StillSimulation]:  # noqa: ARG002
+    def open(self, physics: Physics) -> Iterator[CreepingSimulation]:  # noqa: ARG002
         yield CreepingSimulation()
 
 
 def test_what_an_engine_lets_creep_stands_where_it_was_put() -> None:
-    done = carry_out(tower(3), engine=CreepingEngine())
+    done = execute(tower(3), engine=CreepingEngine())
     assert [step.end for step in done.steps] == ["stands"] * 3
     assert done.steps[0].moved_cm == pytest.approx(100 * CREEP_M_S * DEFAULT_TRIAL.duration_s)
     assert voxel_iou(tower(3), done.blocks) == 1

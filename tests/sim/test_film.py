@@ -9,8 +9,8 @@ import numpy as np
 from PIL import Image
 
 from phyblock.data import read_builtin
-from phyblock.sim import PictureStyle, goal_png
 from phyblock.sim.film import FilmStep, episode_gif, episode_images, episode_sheet
+from phyblock.sim.pictures import PictureStyle, goal_png
 
 TASK = read_builtin(Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400").tasks[0]
 STYLE = PictureStyle(128)

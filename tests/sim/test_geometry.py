@@ -10,8 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial import ConvexHull
 
 from phyblock.domain import BLOCK_TYPES, KIT_PALETTE, SHAPES, BlockType, Color
-from phyblock.sim.geometry import collision_pieces, drawn_mesh, solid_mesh
-from phyblock.sim.mesh import Mesh
+from phyblock.sim.geometry import Mesh, collision_pieces, drawn_mesh, solid_mesh
 
 every_type = pytest.mark.parametrize("block_type", BLOCK_TYPES)
 

@@ -9,13 +9,23 @@ from PIL import Image, ImageSequence
 
 from phyblock.domain import Scene
 from phyblock.errors import DataError
-from phyblock.sim import PictureStyle, goal_png
-from phyblock.sim.assembly import animation, filmstrip_png, step_images
-from phyblock.sim.exploded import exploded_blocks, exploded_png
-from phyblock.sim.marked import marked_png
-from phyblock.sim.pictures import camera_for, drawn, goal_camera
-from phyblock.sim.render import shoot
-from phyblock.sim.visibility import visible_shares
+from phyblock.sim.film import (
+    animation,
+    exploded_blocks,
+    exploded_png,
+    filmstrip_png,
+    marked_png,
+    step_images,
+)
+from phyblock.sim.pictures import (
+    PictureStyle,
+    camera_for,
+    drawn,
+    goal_camera,
+    goal_png,
+    shoot,
+    visible_shares,
+)
 from tests.designs.scenes import designed_scenes
 from tests.sim.structures import block, scene_of, tower
 
@@ -47,8 +57,8 @@ def test_shares_add_up_to_what_the_picture_shows(name: str) -> None:
     scene = SCENES[name]
     shares = visible_shares(scene, SMALL)
     camera = goal_camera(scene, SMALL)
-    alone = [int((shoot([one], camera, 128).block == 0).sum()) for one in drawn(scene)]
-    shown = int((shoot(drawn(scene), camera, 128).block >= 0).sum())
+    alone = [int((shoot([one], camera, 128).block == 0).sum()) for one in drawn(scene.blocks)]
+    shown = int((shoot(drawn(scene.blocks), camera, 128).block >= 0).sum())
     assert set(shares) == {b.order for b in scene.blocks}
     assert all(0 <= share <= 1 for share in shares.values())
     told = sum(n * share for n, share in zip(alone, shares.values(), strict=True))
@@ -58,7 +68,7 @@ def test_shares_add_up_to_what_the_picture_shows(name: str) -> None:
 @pytest.mark.parametrize("name", sorted(SCENES))
 def test_exploding_parts_what_stands_on_one_another(name: str) -> None:
     scene = SCENES[name]
-    before, after = drawn(scene), exploded_blocks(scene)
+    before, after = drawn(scene.blocks), exploded_blocks(scene)
     number = {b.order: v for v, b in enumerate(scene.blocks)}
     for vertex, one in enumerate(scene.blocks):
         for order in one.depend:
@@ -139,7 +149,7 @@ def test_marked_blocks_keep_their_colors_and_others_fade() -> None:
     style = PictureStyle.from_view("front", 128, "white")
     plain, marked = (pixels(marked_png(scene_of(blocks), named, style)) for named in ([], [2]))
     assert np.array_equal(plain, pixels(goal_png(scene_of(blocks), style)))
-    seen = shoot(drawn(scene_of(blocks)), goal_camera(scene_of(blocks), style), 128).block
+    seen = shoot(drawn(scene_of(blocks).blocks), goal_camera(scene_of(blocks), style), 128).block
     inside = {n: (np.pad(seen, 2)[4:, 4:] == n) & (np.pad(seen, 2)[:-4, :-4] == n) for n in (0, 1)}
     assert np.array_equal(marked[inside[1]], plain[inside[1]])
     assert (255 - marked[inside[0]]).mean() < 0.45 * (255 - plain[inside[0]]).mean()

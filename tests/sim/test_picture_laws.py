@@ -17,10 +17,12 @@ from phyblock.data.questions import read_questions
 from phyblock.domain import BLOCK_TYPES, Color
 from phyblock.domain.question import QuestionPicture
 from phyblock.making.poses import POSES
-from phyblock.sim.backgrounds import TONES
+from phyblock.sim.backgrounds import GROUNDS, TEXTURED, floor
 from phyblock.sim.camera import Camera, view_axes
-from phyblock.sim.exploded import exploded_blocks
+from phyblock.sim.film import exploded_blocks
 from phyblock.sim.pictures import (
+    COLOR_RGB,
+    DrawnBlock,
     PictureStyle,
     camera_for,
     candidate_camera,
@@ -29,11 +31,11 @@ from phyblock.sim.pictures import (
     goal_camera,
     goal_style,
     on_the_floor,
+    picture,
+    segments,
+    shoot,
 )
 from phyblock.sim.question_pictures import drawn_blocks, question_camera
-from phyblock.sim.render import COLOR_RGB, DrawnBlock, picture, segments, shoot
-from phyblock.sim.surfaces import SURFACES
-from phyblock.sim.textures import floor
 from phyblock.types import BACKGROUNDS, Background
 from tests.sim.structures import block, clouds, scene_of
 
@@ -46,7 +48,7 @@ EVERY_LOOK = [(kind, euler) for kind in BLOCK_TYPES for euler in POSES[kind].val
 every_background = pytest.mark.parametrize(
     "background",
     [
-        pytest.param(name, marks=pytest.mark.slow if name in SURFACES else ())
+        pytest.param(name, marks=pytest.mark.slow if name in TEXTURED else ())
         for name in BACKGROUNDS
     ],
 )
@@ -99,7 +101,7 @@ def test_no_picture_of_a_question_is_cut_open_whatever_it_frames(
 def test_no_built_in_picture_is_cut_open(every: int) -> None:
     for task in SCENES.tasks[::every]:
         exploded = exploded_blocks(task.scene)
-        assert lies_between_planes(drawn(task.scene), goal_camera(task.scene, STYLE))
+        assert lies_between_planes(drawn(task.scene.blocks), goal_camera(task.scene, STYLE))
         assert lies_between_planes(exploded, camera_for(exploded, STYLE, task.scene.id))
     for recipe in recipes(every):
         assert lies_between_planes(drawn_blocks(recipe), question_camera(recipe, STYLE)), recipe
@@ -108,7 +110,7 @@ def test_no_built_in_picture_is_cut_open(every: int) -> None:
 @pytest.mark.parametrize("every", [80, pytest.param(4, marks=pytest.mark.slow)])
 def test_built_in_pictures_are_the_same_with_the_planes_wide_open(every: int) -> None:
     for task in SCENES.tasks[::every]:
-        assert is_the_same_wide_open(drawn(task.scene), goal_camera(task.scene, STYLE))
+        assert is_the_same_wide_open(drawn(task.scene.blocks), goal_camera(task.scene, STYLE))
     for recipe in recipes(every):
         assert is_the_same_wide_open(drawn_blocks(recipe), question_camera(recipe, STYLE))
 
@@ -194,8 +196,8 @@ def test_lines_round_blocks_stand_out_from_floor_and_shadow(background: Backgrou
     one = on_the_floor("cube", "red", (0.0, 0.0, 0.0))
     camera = camera_for([one], STYLE, "cube")
     ground = floor(background, camera, 256).reshape(-1, 3).astype(np.float64)
-    line = luminance(np.array(TONES[background].rim, dtype=np.float64))
-    for left in (1.0, 1 - TONES[background].shadow):
+    line = luminance(np.array(GROUNDS[background].rim, dtype=np.float64))
+    for left in (1.0, 1 - GROUNDS[background].shadow):
         assert np.mean(contrast(line, luminance(ground * left)) >= LEAST_CONTRAST) >= 0.99
 
 

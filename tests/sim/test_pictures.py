@@ -16,17 +16,21 @@ from phyblock.domain import KIT_PALETTE, Candidate, CandidateSet, Scene
 from phyblock.errors import DataError
 from phyblock.making.poses import POSES
 from phyblock.making.scenes.candidate_sets import make_candidates
-from phyblock.sim import (
+from phyblock.sim.pictures import (
+    LABEL_STRIP,
     PictureStyle,
+    candidate_camera,
+    candidates_grid,
     candidates_key,
     candidates_png,
     composite_png,
     goal_key,
     goal_png,
+    on_the_floor,
+    picture,
+    shoot,
+    thumbnail,
 )
-from phyblock.sim.compose import LABEL_STRIP, numbered_grid
-from phyblock.sim.pictures import candidate_camera, on_the_floor
-from phyblock.sim.render import picture, shoot
 from phyblock.types import BACKGROUNDS
 from tests.designs.scenes import designed_scene
 from tests.sim.structures import block, scene_of
@@ -108,11 +112,14 @@ def test_a_candidate_fills_its_cell_and_leaves_room_for_its_number(candidate: Ca
 @pytest.mark.parametrize("size_px", [128, 256, 512, 1024])
 def test_numbers_stay_in_the_strip_below_the_blocks(size_px: int, background: str) -> None:
     cell_px = size_px // 4
-    plain = Image.new("RGB", (cell_px, cell_px), (128, 128, 128))
-    grid = np.asarray(numbered_grid([plain] * 16, plain, background, size_px)).astype(int)
+    style = PictureStyle(size_px, background)
+    cubes = CandidateSet((Candidate("cube", "red", (0.0, 0.0, 0.0)),) * 16)
+    sheet, (block, *_), distance_m = candidates_grid(cubes, style)
+    grid = np.asarray(sheet).astype(int)
+    plain = np.asarray(thumbnail(block, style, cell_px, distance_m)).astype(int)
     for row, column in itertools.product(range(4), range(4)):
         cell = grid[row * cell_px : (row + 1) * cell_px, column * cell_px : (column + 1) * cell_px]
-        ink = np.abs(cell[2:-2, 2:-2] - 128).max(axis=-1) > 20
+        ink = np.abs(cell - plain)[2:-2, 2:-2].max(axis=-1) > 20
         assert ink.any()
         assert np.nonzero(ink)[0].min() + 2 >= (1 - LABEL_STRIP) * cell_px
         assert np.nonzero(ink)[1].min() + 2 > cell_px / 2

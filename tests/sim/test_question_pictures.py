@@ -14,12 +14,19 @@ from PIL import Image
 from phyblock.domain.question import Mark, QuestionPicture
 from phyblock.domain.scene import Block
 from phyblock.errors import DataError
+from phyblock.sim.engine import Pose, quat_xyzw_to_euler_deg
 from phyblock.sim.outcomes import after, after_removal, holds
 from phyblock.sim.pictures import PictureStyle
-from phyblock.sim.pose import quat_xyzw_to_euler_deg
-from phyblock.sim.question_pictures import question_camera, question_key, question_png
-from phyblock.sim.seeing import block_mark, differing_pixels, is_inside, seen, seen_order
-from phyblock.sim.world import Pose
+from phyblock.sim.question_pictures import (
+    block_mark,
+    differing_pixels,
+    is_inside,
+    question_camera,
+    question_key,
+    question_png,
+    seen,
+    seen_order,
+)
 from phyblock.types import BACKGROUNDS
 
 STYLE = PictureStyle(256)

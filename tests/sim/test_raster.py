@@ -1,4 +1,4 @@
-"""Our renderer against rays: what shows where, how bright it is, and what lies in shadow."""
+"""The rasterizer against rays: what shows where, how bright it is, and what lies in shadow."""
 
 from __future__ import annotations
 
@@ -15,19 +15,18 @@ from numpy.typing import NDArray
 import phyblock.sim
 from phyblock.domain import BLOCK_TYPES, Block, euler_deg_to_quat_xyzw, quat_xyzw_to_matrix
 from phyblock.sim.camera import FULL_WINDOW, Camera, frame, view_axes
+from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import drawn_mesh
-from phyblock.sim.pose import Pose
-from phyblock.sim.raster.renderer import NumpyRenderer
-from phyblock.sim.render import COLOR_RGB, light_direction
-from phyblock.sim.renderer import Light, Prop, Raster
+from phyblock.sim.pictures import COLOR_RGB, light_direction
+from phyblock.sim.raster import Light, Prop, Raster, draw
 from tests.sim.structures import block, block_types, clouds, eulers
 
 SIZE_PX = 160
 RAYS = 40
 COLORS = tuple(COLOR_RGB)
 DIGEST = "077f19edea00090368f8a9efc8a70dd88b668db1ee19f511f0d31b1d2652a7d5"
+EXACT = ("dot", "cross", "turned", "unit", "rounded")
 PRODUCTS = ("dot", "einsum", "inner", "linalg", "matmul", "tensordot", "vdot")
-RENDERER = NumpyRenderer()
 views = st.tuples(st.floats(-180, 180), st.floats(3, 90))
 
 
@@ -67,8 +66,8 @@ def light_of(camera: Camera) -> Light:
     return Light(light_direction(camera), 0.5, 0.5)
 
 
-def draw(props: list[Prop], camera: Camera) -> Raster:
-    return RENDERER.draw(props, camera, light_of(camera), SIZE_PX)
+def drawn(props: list[Prop], camera: Camera) -> Raster:
+    return draw(props, camera, light_of(camera), SIZE_PX)
 
 
 def hits(
@@ -125,7 +124,7 @@ def test_each_pixel_shows_what_the_ray_through_its_center_meets(
     camera = camera_on(props, view)
     pixels = some_pixels(seed)
     away, _ = met_by(props, np.broadcast_to(camera.eye_m, (RAYS, 3)), rays(camera, pixels))
-    shown = draw(props, camera).prop[pixels[:, 0], pixels[:, 1]]
+    shown = drawn(props, camera).prop[pixels[:, 0], pixels[:, 1]]
     # Where faces of two blocks lie in one plane, either may show; no prop is infinitely far.
     away = np.vstack([away, np.full(RAYS, np.inf)])
     off = away[shown, np.arange(RAYS)] - np.minimum(away.min(axis=0), 1e9)
@@ -142,7 +141,7 @@ def test_a_pixel_is_as_bright_as_its_face_and_what_stands_before_the_light_say(
     """Points near the edge of a shadow are left out; round faces bend between their facets."""
     props = props_of(blocks)
     camera = camera_on(props, view)
-    light, pixels, raster = light_of(camera), some_pixels(seed, 5 * RAYS), draw(props, camera)
+    light, pixels, raster = light_of(camera), some_pixels(seed, 5 * RAYS), drawn(props, camera)
     shown = raster.prop[pixels[:, 0], pixels[:, 1]]
     pixels, shown = pixels[shown >= 0], shown[shown >= 0]
     ways = rays(camera, pixels)
@@ -173,7 +172,7 @@ def test_the_ground_is_in_shadow_where_something_stands_before_the_light(
     pixels, ways = pixels[below], ways[below]
     ground = camera.eye_m + ways * (camera.eye_m[2] / -ways[:, 2:])
     shaded = is_hidden(props, ground, light_of(camera).direction)
-    assert (draw(props, camera).shaded[pixels[:, 0], pixels[:, 1]] != shaded).sum() <= 1
+    assert (drawn(props, camera).shaded[pixels[:, 0], pixels[:, 1]] != shaded).sum() <= 1
 
 
 @given(clouds(), views, st.randoms(use_true_random=False))
@@ -183,7 +182,7 @@ def test_the_order_of_blocks_changes_their_numbers_alone(blocks, view, random) -
     camera = camera_on(props, view)
     order = list(range(len(props)))
     random.shuffle(order)
-    one, other = draw(props, camera), draw([props[place] for place in order], camera)
+    one, other = drawn(props, camera), drawn([props[place] for place in order], camera)
     assert one.rgb.tobytes() == other.rgb.tobytes()
     assert one.shaded.tobytes() == other.shaded.tobytes()
     assert (np.append(order, -1)[other.prop] == one.prop).all()
@@ -194,7 +193,7 @@ def test_the_order_of_blocks_changes_their_numbers_alone(blocks, view, random) -
 def test_with_even_light_every_pixel_has_the_color_of_what_it_shows(blocks, view) -> None:
     props = props_of(blocks)
     even = Light(np.array([0.0, 0.0, 1.0]), 1.0, 0.0)
-    raster = RENDERER.draw(props, camera_on(props, view), even, SIZE_PX)
+    raster = draw(props, camera_on(props, view), even, SIZE_PX)
     colors = np.array([prop.rgb for prop in props])
     assert (raster.rgb[raster.prop >= 0] == colors[raster.prop[raster.prop >= 0]]).all()
 
@@ -218,7 +217,7 @@ def test_half_a_pixel_to_the_side_changes_edges_alone(blocks, view) -> None:
     camera = camera_on(props, view)
     depth_m = float(np.mean([(p.pose.position_m - camera.eye_m) @ camera.axes[2] for p in props]))
     shift_m = camera.axes[0] * camera.width_m(depth_m) / SIZE_PX / 2
-    one, other = draw(props, camera), draw(props, replace(camera, eye_m=camera.eye_m + shift_m))
+    one, other = drawn(props, camera), drawn(props, replace(camera, eye_m=camera.eye_m + shift_m))
     shown = one.prop >= 0
     near = range(-2, 3)
     around = np.stack([np.roll(one.prop, (i, j), (0, 1)) for i in near for j in near])
@@ -234,8 +233,8 @@ def test_a_picture_is_the_same_with_its_planes_wide_open(blocks, view) -> None:
     depths = [(triangles_m(prop).reshape(-1, 3) - camera.eye_m) @ camera.axes[2] for prop in props]
     assert camera.near_m < np.min(np.concatenate(depths))
     assert np.max(np.concatenate(depths)) < camera.far_m
-    wide = draw(props, replace(camera, near_m=1e-6, far_m=1e9))
-    one = draw(props, camera)
+    wide = drawn(props, replace(camera, near_m=1e-6, far_m=1e9))
+    one = drawn(props, camera)
     assert one.rgb.tobytes() == wide.rgb.tobytes()
     assert one.prop.tobytes() == wide.prop.tobytes()
 
@@ -244,7 +243,7 @@ def test_what_reaches_behind_the_camera_is_drawn_as_far_as_it_is_before_it() -> 
     """A long block beside the eye: only what is in front of it can show."""
     plank = Block(1, "cuboid3", "red", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (), 1)
     camera = Camera(np.array([-0.05, 0.0, 0.05]), view_axes(180.0, 1.0), 1e-3, 10.0, 90.0)
-    shown = draw(props_of([plank]), camera).prop >= 0
+    shown = drawn(props_of([plank]), camera).prop >= 0
     assert shown[-1].any()
     assert not shown[: SIZE_PX // 2].any()
 
@@ -264,7 +263,7 @@ def test_the_bytes_of_a_picture_are_the_same_on_every_machine() -> None:
         for place, kind in enumerate(BLOCK_TYPES)
     ]
     props = props_of(blocks)
-    raster = draw(props, camera_on(props, (45.0, 22.0)))
+    raster = drawn(props, camera_on(props, (45.0, 22.0)))
     digest = hashlib.sha256()
     for part in (raster.rgb, raster.prop.astype("<i8"), raster.face.astype("<i8"), raster.shaded):
         digest.update(part.tobytes())
@@ -274,10 +273,16 @@ def test_the_bytes_of_a_picture_are_the_same_on_every_machine() -> None:
 def test_no_matrix_product_decides_a_pixel() -> None:
     """A BLAS adds up in another order on another machine."""
     sim = Path(phyblock.sim.__file__).parent
-    named = ("exact", "camera", "outlines", "render", "surfaces", "textures")
-    for path in [*sim.glob("raster/*.py"), *(sim / f"{name}.py" for name in named)]:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            assert not isinstance(node, ast.MatMult), path
+    for name in ("raster", "camera", "backgrounds", "pictures", "geometry"):
+        tree = ast.parse((sim / f"{name}.py").read_text(encoding="utf-8"))
+        found = list(ast.walk(tree))
+        if name == "geometry":
+            exact = [one for one in tree.body if isinstance(one, ast.FunctionDef)]
+            exact = [one for one in exact if one.name in EXACT]
+            assert len(exact) == len(EXACT)
+            found = [node for one in exact for node in ast.walk(one)]
+        for node in found:
+            assert not isinstance(node, ast.MatMult), name
             if isinstance(node, ast.Attribute):
                 is_numpy = isinstance(node.value, ast.Name) and node.value.id == "np"
-                assert not (is_numpy and node.attr in PRODUCTS), path
+                assert not (is_numpy and node.attr in PRODUCTS), name

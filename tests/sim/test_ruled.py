@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from phyblock.domain import BLOCK_TYPES, SHAPES, BlockType, Candidate, CandidateSet, Scene
-from phyblock.sim import kit, ruled
-from phyblock.sim.kit import box_cm, kit_key, kit_png, written_style
+from phyblock.sim import ruled
 from phyblock.sim.pictures import PictureStyle, drawn, goal_key, on_the_floor
-from phyblock.sim.ruled import ruled_key, ruled_png
+from phyblock.sim.ruled import box_cm, kit_key, kit_png, ruled_key, ruled_png, written_style
 from tests.sim.structures import block, tower
 
 STYLE = PictureStyle(128)
@@ -35,13 +34,13 @@ def test_all_that_is_ruled_and_written_is_in_the_picture(
     blocks = [block(n, "cube", place) for n, place in enumerate(places, 1)]
     scene = Scene("s", (2,), tuple(blocks), ("s",))
     style = replace(STYLE, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
-    field = ruled._field(drawn(scene), style)
-    camera = ruled._camera(drawn(scene), field, style)
+    field = ruled._field(drawn(scene.blocks), style)
+    camera = ruled._camera(drawn(scene.blocks), field, style)
     ends = [
         (x, y, 0.0) for x in (*field.x, field.beyond(0, 5)) for y in (*field.y, field.beyond(1, 5))
     ]
     assert np.abs(camera.project(np.array(ends) / 100)).max() <= 1
-    points = np.vstack([one.vertices_m for one in drawn(scene)]) * 100
+    points = np.vstack([one.vertices_m for one in drawn(scene.blocks)]) * 100
     for axis, (low, high) in enumerate((field.x, field.y)):
         assert low % 5 == high % 5 == 0
         assert low <= points[:, axis].min() - 3 + 1e-6
@@ -66,8 +65,8 @@ def test_pictures_are_the_same_every_time_and_their_keys_tell_all_that_they_depe
 def test_the_floor_is_ruled_where_there_are_no_blocks() -> None:
     """The line at y = -5 is told from the floor beside it."""
     style = PictureStyle(512, "white", 0.0, 90.0)
-    field = ruled._field(drawn(SCENE), style)
-    camera = ruled._camera(drawn(SCENE), field, style)
+    field = ruled._field(drawn(SCENE.blocks), style)
+    camera = ruled._camera(drawn(SCENE.blocks), field, style)
     with Image.open(io.BytesIO(ruled_png(SCENE, style))) as picture:
         pixels = np.asarray(picture.convert("L")).astype(int)
 
@@ -97,4 +96,4 @@ def test_the_sheet_is_drawn_large_enough_and_says_so_in_its_key() -> None:
     assert kit_png(CANDIDATES, style) == kit_png(CANDIDATES, style)
     fewer = CandidateSet(CANDIDATES.candidates[:-1])
     assert kit_key(fewer, style) != kit_key(CANDIDATES, style)
-    assert kit._number(7.0711) == "7.1"
+    assert ruled._number(7.0711) == "7.1"

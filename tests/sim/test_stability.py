@@ -5,19 +5,19 @@ from pathlib import Path
 import pytest
 
 from phyblock.data import read_official
-from phyblock.sim import Physics, Trial, check
+from phyblock.sim.dynamics import Trial, check
+from phyblock.sim.engine import Physics
 from tests.sim.structures import block, counterweighted_beam, tower
 from tests.sim.test_support import FLOATING
 
 QUICK = Trial(duration_s=1.0, physics=(Physics(),))
 
 
-def test_a_tower_stands_and_says_how_that_was_tried() -> None:
+def test_a_tower_stands() -> None:
     found = check(tower(4))
     assert found.stable
     assert found.agreed
     assert found.moved_m < 0.002
-    assert [p.time_step_s for p in found.trial.physics] == [1 / 240, 1 / 480]
 
 
 def test_nothing_at_all_stands() -> None:

@@ -5,10 +5,14 @@ from dataclasses import replace
 import pytest
 
 from phyblock.domain import Block
-from phyblock.sim import Trial, check
-from phyblock.sim.stability import DEFAULT_TRIAL
-from phyblock.sim.steps import Rest, check_at_rest, check_steps, groups
-from phyblock.sim.support import bounds_m
+from phyblock.sim.contact import bounds_m
+from phyblock.sim.dynamics import (
+    DEFAULT_TRIAL,
+    Rest,
+    check,
+    check_steps,
+    groups,
+)
 from tests.designs.pad import Pad
 from tests.designs.scenes import designed_scenes
 
@@ -38,7 +42,7 @@ def test_steps_stand_as_the_long_trial_says(name: str) -> None:
     blocks = SCENES[name]
     assert [step.fallen for step in check_steps(blocks, FIRST)] == [()] * len(blocks)
     assert all(check(blocks[:count], FIRST).stable for count in range(1, 5))
-    assert check_at_rest(blocks, FIRST).stable
+    assert check(blocks, FIRST).stable
 
 
 def test_what_falls_midway_is_named_at_its_step() -> None:
@@ -52,8 +56,8 @@ def test_a_slow_tip_is_not_taken_for_rest() -> None:
     sketch = Pad()
     sketch.put("cube")
     sketch.put("cuboid3", 1.004, pose="flat-y")
-    assert not check_at_rest(sketch.blocks, FIRST).stable
-    assert check_at_rest(sketch.blocks[:1], FIRST).stable
+    assert not check(sketch.blocks, FIRST).stable
+    assert check(sketch.blocks[:1], FIRST).stable
 
 
 def test_groups_are_what_nothing_brings_near() -> None:
@@ -67,13 +71,11 @@ def test_a_fall_in_one_group_is_found_and_the_other_stands() -> None:
     gates = two_gates()
     x, y, z = gates[3].position_m
     gates[3] = replace(gates[3], position_m=(x, y, z + 0.03))
-    assert check_at_rest(gates, FIRST).fallen == (4,)
+    assert check(gates, FIRST).fallen == (4,)
     assert [step.fallen for step in check_steps(gates, FIRST)] == [(), (), (), (4,)]
 
 
-def test_without_rest_every_trial_takes_its_time() -> None:
-    short = Trial(duration_s=0.1, physics=FIRST.physics)
-    assert check_steps(beam(), short, rest=None)[-1].trial == short
+def test_a_longer_rest_changes_no_verdict() -> None:
     assert check_steps(beam(), FIRST, Rest(quiet_s=1.0))[2].fallen == (2, 3)
 
 

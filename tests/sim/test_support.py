@@ -11,15 +11,17 @@ from scipy.optimize import linprog
 
 from phyblock.data import read_official
 from phyblock.domain import Block, euler_deg_to_quat_xyzw, quat_xyzw_to_matrix
-from phyblock.sim.convex import drop_m, moved, separating_axes
-from phyblock.sim.geometry import ConvexPiece, collision_pieces
-from phyblock.sim.support import (
+from phyblock.sim.contact import (
     GROUND,
     drop_height_m,
+    drop_m,
     find_gaps,
     find_overlaps,
+    moved,
+    separating_axes,
     support_graph,
 )
+from phyblock.sim.geometry import ConvexPiece, collision_pieces
 from tests.sim.structures import angles_deg, block, block_types, clouds, eulers, tower, turned
 
 OVERLAPPING = {"001", "003", "187", "214", "297", "342"}

@@ -3,10 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from phyblock.sim.backgrounds import GROUNDS, PERIOD_M, TEXTURED, floor, sample, surface_map
 from phyblock.sim.camera import frame, view_axes
-from phyblock.sim.surfaces import PERIOD_M, SURFACES, Surface, sample, surface_map
-from phyblock.sim.textures import floor
-from phyblock.types import BACKGROUNDS
+from phyblock.types import BACKGROUNDS, Background
 
 FINE_M = 0.0001
 
@@ -22,17 +21,12 @@ def footprint(x_m: np.ndarray, width_m: float) -> np.ndarray:
     return np.full(x_m.shape, width_m, dtype=np.float32)
 
 
-def test_every_surface_is_a_background() -> None:
-    assert set(SURFACES) < set(BACKGROUNDS)
+def test_every_background_is_a_row() -> None:
+    assert tuple(sorted(GROUNDS)) == tuple(sorted(BACKGROUNDS))
 
 
-def test_a_background_without_a_floor_is_not_drawn_as_another() -> None:
-    with pytest.raises(ValueError, match="sand has no floor"):
-        floor("sand", frame(np.zeros((1, 3)), view_axes(45.0, 22.0), min_distance_m=0.5), 16)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("surface", SURFACES)
-def test_a_surface_is_seamless(surface: Surface) -> None:
+@pytest.mark.parametrize("surface", TEXTURED)
+def test_a_surface_is_seamless(surface: Background) -> None:
     """A step across the seam is no larger than steps elsewhere."""
     texture = surface_map(surface)[0].astype(np.int16)
     for axis in (0, 1):
@@ -41,8 +35,8 @@ def test_a_surface_is_seamless(surface: Surface) -> None:
         assert seam <= steps.max() + 1e-3
 
 
-@pytest.mark.parametrize("surface", SURFACES)
-def test_a_surface_repeats_and_keeps_its_colors_in_range(surface: Surface) -> None:
+@pytest.mark.parametrize("surface", TEXTURED)
+def test_a_surface_repeats_and_keeps_its_colors_in_range(surface: Background) -> None:
     x_m, y_m = points(24)
     here = sample(surface, x_m, y_m, footprint(x_m, FINE_M))
     there = sample(surface, x_m + PERIOD_M, y_m - 3 * PERIOD_M, footprint(x_m, FINE_M))
@@ -50,8 +44,8 @@ def test_a_surface_repeats_and_keeps_its_colors_in_range(surface: Surface) -> No
     assert 0 <= here.min() <= here.max() <= 255
 
 
-@pytest.mark.parametrize("surface", SURFACES)
-def test_far_ground_shows_the_mean_color(surface: Surface) -> None:
+@pytest.mark.parametrize("surface", TEXTURED)
+def test_far_ground_shows_the_mean_color(surface: Background) -> None:
     x_m, y_m = points(24)
     near = sample(surface, x_m, y_m, footprint(x_m, FINE_M))
     far = sample(surface, x_m, y_m, footprint(x_m, 2 * PERIOD_M))
@@ -61,8 +55,8 @@ def test_far_ground_shows_the_mean_color(surface: Surface) -> None:
     assert np.abs(far - mean).max() < 0.51
 
 
-@pytest.mark.parametrize("surface", SURFACES)
-def test_the_sky_is_no_different_from_far_ground(surface: Surface) -> None:
+@pytest.mark.parametrize("surface", TEXTURED)
+def test_the_sky_is_no_different_from_far_ground(surface: Background) -> None:
     """From just above the ground the upper half looks over the horizon."""
     camera = frame(np.array([[0.0, 0.0, 0.05]]), view_axes(20.0, 1.0), min_distance_m=0.5)
     colors = floor(surface, camera, 64)

@@ -11,10 +11,9 @@ from numpy.testing import assert_allclose
 from phyblock.domain import BLOCK_TYPES, SHAPES, BlockType
 from phyblock.errors import SimulationError
 from phyblock.making.poses import POSES
-from phyblock.sim import Physics, Pose, World
-from phyblock.sim.registry import ENGINES
-from phyblock.sim.steps import wait
-from phyblock.sim.support import drop_height_m
+from phyblock.sim.contact import drop_height_m
+from phyblock.sim.dynamics import wait
+from phyblock.sim.engine import ENGINES, Physics, Pose, World
 from tests.sim.structures import block, counterweighted_beam, tower
 
 LINE_BALANCED = {"bowl", "bowl-turned"}
@@ -22,7 +21,7 @@ LINE_BALANCED = {"bowl", "bowl-turned"}
 
 def poses_as_hex(blocks, duration_s: float) -> str:
     with World() as world:
-        world.place_all(blocks)
+        world.place(*blocks)
         world.step(duration_s)
         rows = [np.concatenate([p.position_m, p.quat_xyzw]) for p in world.poses().values()]
     return np.stack(rows).tobytes().hex()
@@ -82,14 +81,14 @@ def test_friction_of_the_pair_decides_whether_a_slab_slides(friction: float, sli
     out = 0.0125 / 2**0.5 + SHAPES["triangle"].high_m[2] / 2
     slab = block(2, "cuboid1", (0.0, out, 0.05 + out), (-45.0, 0.0, 0.0))
     with World(Physics(friction=friction)) as world:
-        world.place_all([post, wedge, slab])
+        world.place(post, wedge, slab)
         world.step(0.25)
         assert (world.pose(2).distance_m(Pose.goal(slab)) > 0.005) == slides
 
 
 def test_removing_a_block_lets_the_one_above_fall() -> None:
     with World() as world:
-        world.place_all(tower(2))
+        world.place(*tower(2))
         world.remove(1)
         assert world.orders == (2,)
         wait(world, 5.0)

@@ -13,7 +13,7 @@ from phyblock.parsing.plan import parse_plan
 from phyblock.parsing.poses import parse_poses
 from phyblock.resources import bundled
 from phyblock.run.data import open_dataset
-from phyblock.sim.compose import joined_size_px
+from phyblock.sim.pictures import joined_size_px
 from phyblock.tracks.by_hand import Picking, Spot, picks_of
 from phyblock.tracks.full_planning.baselines import PlanSubject
 from phyblock.tracks.full_planning.by_hand import pick_plan

@@ -27,9 +27,9 @@ from phyblock.run.records import begun, judged
 from phyblock.run.rescore import rescore
 from phyblock.scoring.plan import Goal
 from phyblock.scoring.pose import POSE_ERRORS, PoseFit, pose_errors
-from phyblock.sim.carry import CarryLimits, carry_out
-from phyblock.sim.placing import center_cm, put
-from phyblock.sim.pose import Pose
+from phyblock.sim.dynamics import ExecutionLimits, execute
+from phyblock.sim.engine import Pose
+from phyblock.sim.geometry import center_cm, put
 from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
 from phyblock.tracks.pose_planning import judging
 from phyblock.tracks.pose_planning import track as pose_track
@@ -49,7 +49,7 @@ from tests.servers.openai_chat import OpenAIChat
 from tests.sim.structures import block_types, eulers
 from tests.workspace import SCENES, Workspace
 
-RULES = PoseRules("candidate", ("A", "B"), ("optimal", "paper"), CarryLimits(), 1.0, 10.0)
+RULES = PoseRules("candidate", ("A", "B"), ("optimal", "paper"), ExecutionLimits(), 1.0, 10.0)
 FREE = replace(RULES, rotation="free")
 STANDS = "Step1: block 1 at (0, 0, 2.5)\nStep2: block 3 at (0, 0, 7.5)"
 
@@ -184,7 +184,7 @@ def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(
     text = POSE_RULES[baseline](subject, np.random.default_rng(1))
     found = track.judge(item, text)
     blocks = [put(step, item.candidates) for step in found.parsed.plan.steps]
-    worlds = carry_out(blocks, RULES.limits).worlds
+    worlds = execute(blocks, RULES.limits).worlds
     record = judged(begun("s", track.name, "m", item, 0, None), item, found)
     assert isinstance(record, PoseRecord)
     assert record.pose is not None
@@ -314,7 +314,7 @@ def test_a_run_with_faults_is_killed_resumed_and_scored_again(
 
     assert by_sample(workspace.records()) == by_sample(whole)
     # What fell when it was asked is what fell: nothing is carried out again.
-    monkeypatch.setattr(judging, "carry_out", None)
+    monkeypatch.setattr(judging, "execute", None)
     described = workspace.out / "run.yaml"
     told = described.read_text()
     # A run of another version is read anew, and not gone on with.

@@ -14,7 +14,7 @@ from PIL import Image
 from phyblock.data import QuestionSet, read_builtin, read_questions
 from phyblock.domain import LETTERS, is_picture_option
 from phyblock.errors import SpecError, StoreError
-from phyblock.sim import PictureStyle
+from phyblock.sim.pictures import PictureStyle
 from phyblock.tracks.vqa.export import export_questions
 from phyblock.tracks.vqa.pictures import QuestionPictures
 from tests.vqa_set import write_questions

@@ -16,7 +16,7 @@ from phyblock.domain import Plan
 from phyblock.errors import DataError, SpecError
 from phyblock.models.base import Image
 from phyblock.records.reply import Reply, Usage
-from phyblock.sim import PictureStyle, candidates_png, goal_png
+from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png
 from phyblock.tracks import PicturePolicy, Pictures
 from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
 from phyblock.tracks.goal_blind.learning import goal_blind_plans

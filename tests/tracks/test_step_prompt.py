@@ -16,7 +16,7 @@ from phyblock.models.base import Image, Message
 from phyblock.records.reply import Reply
 from phyblock.resources import bundled
 from phyblock.scoring.steps import MOVE_OUTCOMES
-from phyblock.sim import PictureStyle
+from phyblock.sim.pictures import PictureStyle
 from phyblock.tracks import PicturePolicy, Pictures, TemplatePrompt
 from phyblock.tracks.step_planning.prompt import Feedback, PastStep, StepPrompt
 from phyblock.tracks.step_planning.rules import StepRules

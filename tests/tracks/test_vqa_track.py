@@ -16,11 +16,11 @@ from PIL import Image as PillowImage
 
 from phyblock.data import QuestionSet, QuestionTask, read_builtin, read_questions
 from phyblock.domain import LETTERS, Question
-from phyblock.domain.rotation import rotated
+from phyblock.domain.question import rotated
 from phyblock.errors import DataError, SpecError
 from phyblock.models.base import Image, Request
 from phyblock.resources import bundled
-from phyblock.sim import PictureStyle
+from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.tracks import TemplatePrompt
 from phyblock.tracks.vqa.baselines import ChoiceSubject

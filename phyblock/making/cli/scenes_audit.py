@@ -16,8 +16,8 @@ from phyblock.files import OutFolder, check_free, make_folder, write_named
 from phyblock.making.checks import FOREIGN, CheckName, Finding, find_duplicates
 from phyblock.making.cli.working import jobs_option, tracked
 from phyblock.making.verification import AUDITED, SceneAudit, audit_scenes, findings_csv
-from phyblock.sim import PictureStyle
-from phyblock.sim.marked import marked_png
+from phyblock.sim.film import marked_png
+from phyblock.sim.pictures import PictureStyle
 from phyblock.text import counted
 
 _DEPENDING: tuple[CheckName, ...] = ("undeclared dependency", "dependency without contact")

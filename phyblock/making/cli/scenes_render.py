@@ -14,10 +14,9 @@ from phyblock.data import AssemblyTask
 from phyblock.data.named import read_data_set
 from phyblock.files import OutFolder
 from phyblock.making.cli.scene_sets import find_scenes
-from phyblock.sim import PictureStyle, candidates_png, composite_png, goal_png
-from phyblock.sim.assembly import animation, filmstrip_png
 from phyblock.sim.camera import VIEWS
-from phyblock.sim.exploded import exploded_png
+from phyblock.sim.film import animation, exploded_png, filmstrip_png
+from phyblock.sim.pictures import PictureStyle, candidates_png, composite_png, goal_png
 from phyblock.text import counted
 from phyblock.types import BACKGROUNDS, Background
 

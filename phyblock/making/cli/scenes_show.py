@@ -10,8 +10,7 @@ from phyblock.data import AssemblyTask
 from phyblock.data.named import read_data_set
 from phyblock.domain import Block
 from phyblock.making.cli.scene_sets import find_scenes
-from phyblock.sim import PictureStyle
-from phyblock.sim.visibility import visible_shares
+from phyblock.sim.pictures import PictureStyle, visible_shares
 from phyblock.text import counted
 
 __all__ = ["command"]

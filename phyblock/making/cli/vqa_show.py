@@ -21,7 +21,7 @@ from phyblock.making.cli.question_sets import (
     read_question_set,
     size_option,
 )
-from phyblock.sim import PictureStyle
+from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_png
 from phyblock.text import did_you_mean
 

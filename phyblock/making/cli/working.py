@@ -10,7 +10,7 @@ import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from phyblock.cli.console import make_console
-from phyblock.sim.registry import other_simulators
+from phyblock.sim.engine import other_engine
 
 __all__ = ["jobs_option", "ray_option", "seed_option", "tell_simulators", "tracked"]
 
@@ -56,7 +56,7 @@ def tracked(items: Iterable[T], total: int, doing: str, noun: str = "scenes") ->
 
 def tell_simulators() -> None:
     """Say on standard error where a set is not what the default simulators make of its seed."""
-    for other in other_simulators():
+    if other := other_engine():
         click.echo(
             f"made with {other}: the default one may make another set of the same seed", err=True
         )

@@ -41,11 +41,19 @@ from phyblock.making.questions.question_draft import Draft, UnfairError
 from phyblock.making.questions.selection import pick, shuffled
 from phyblock.making.questions.wording import slots_of
 from phyblock.sim.balance import is_balanced, surely_falls, surely_stands
+from phyblock.sim.contact import bounds_m, drop_height_m, find_overlaps
+from phyblock.sim.dynamics import groups
 from phyblock.sim.outcomes import holds
-from phyblock.sim.question_pictures import BLOCK_LABEL
-from phyblock.sim.seeing import Top, is_apart, is_inside, mark_pixel, seen, seen_order, visible_tops
-from phyblock.sim.steps import groups
-from phyblock.sim.support import bounds_m, drop_height_m, find_overlaps
+from phyblock.sim.question_pictures import (
+    BLOCK_LABEL,
+    Top,
+    is_apart,
+    is_inside,
+    mark_pixel,
+    seen,
+    seen_order,
+    visible_tops,
+)
 
 _ANNEXED = 0.6
 _STRUCTURES_TRIED = 4

@@ -17,8 +17,8 @@ from phyblock.domain.blocks import COLORS, SHAPES, BlockType, Euler
 from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions.selection import pick, shuffled
 from phyblock.sim.balance import MARGIN_M
+from phyblock.sim.contact import bounds_m, find_gaps, find_overlaps
 from phyblock.sim.geometry import corners_m
-from phyblock.sim.support import bounds_m, find_gaps, find_overlaps
 from phyblock.stable import plain_sum
 
 __all__ = ["with_annex"]

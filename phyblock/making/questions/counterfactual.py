@@ -45,11 +45,11 @@ from phyblock.making.questions.referring import TAKEN, marked_order
 from phyblock.making.questions.selection import pick, shuffled
 from phyblock.making.questions.wording import slots_of
 from phyblock.sim.balance import is_balanced, surely_falls, surely_stands
+from phyblock.sim.contact import support_graph
+from phyblock.sim.dynamics import groups
 from phyblock.sim.outcomes import Outcome, after_removal
-from phyblock.sim.render import Shot
-from phyblock.sim.seeing import block_mark, seen
-from phyblock.sim.steps import groups
-from phyblock.sim.support import support_graph
+from phyblock.sim.pictures import Shot
+from phyblock.sim.question_pictures import block_mark, seen
 
 OUTCOME_TEXTS = (
     "No other block moves or falls.",

@@ -34,7 +34,7 @@ from phyblock.making.questions.static_drafts import (
     window,
 )
 from phyblock.making.questions.wording import slots_of, stem_of
-from phyblock.sim.support import GROUND, support_graph
+from phyblock.sim.contact import GROUND, support_graph
 
 _PLURALS = {word: f"{word}es" if word == "arch" else f"{word}s" for word in SHAPE_WORDS}
 _TYPES_OF = {_PLURALS[word]: types for word, types in SHAPE_WORDS.items()}

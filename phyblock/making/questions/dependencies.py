@@ -21,7 +21,7 @@ from phyblock.making.questions.referring import Feature, names, resolve_one
 from phyblock.making.questions.selection import pick, shuffled
 from phyblock.making.questions.static_drafts import StaticMaker, draft, seen_blocks
 from phyblock.making.questions.wording import slots_of
-from phyblock.sim.support import GROUND, support_graph
+from phyblock.sim.contact import GROUND, support_graph
 
 __all__ = ["DependencyMaker"]
 

@@ -22,7 +22,7 @@ from phyblock.making.questions.picture_view import (
     shares,
 )
 from phyblock.making.questions.question_draft import UnfairError
-from phyblock.sim.support import GROUND, bounds_m, boxes_near, support_graph, whole_bounds_m
+from phyblock.sim.contact import GROUND, bounds_m, boxes_near, support_graph, whole_bounds_m
 
 _STEP_DEG = 15
 _SAME = 1e-4

@@ -31,7 +31,7 @@ from phyblock.making.questions.pictured_drafts import (
 from phyblock.making.questions.question_draft import Draft, UnfairError
 from phyblock.making.questions.selection import pick
 from phyblock.making.questions.wording import slots_of
-from phyblock.sim.seeing import seen
+from phyblock.sim.question_pictures import seen
 
 __all__ = ["OrderingMaker"]
 

@@ -14,10 +14,15 @@ from phyblock.domain.question import Question, QuestionPicture
 from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions.question_draft import UnfairError
 from phyblock.sim.camera import view_axes
-from phyblock.sim.pictures import PictureStyle, drawn, goal_camera
-from phyblock.sim.render import DrawnBlock, shoot
-from phyblock.sim.support import bounds_m
-from phyblock.sim.visibility import visible_shares
+from phyblock.sim.contact import bounds_m
+from phyblock.sim.pictures import (
+    DrawnBlock,
+    PictureStyle,
+    drawn,
+    goal_camera,
+    shoot,
+    visible_shares,
+)
 
 __all__ = [
     "COUNTED",
@@ -158,7 +163,7 @@ def _spans(blocks: tuple[Block, ...], view: View) -> Mapping[int, tuple[float, f
     scene = Scene("", (1,), blocks, ())
     camera = goal_camera(scene, _style(view))
     spans = {}
-    for block, one in zip(blocks, drawn(scene), strict=True):
+    for block, one in zip(blocks, drawn(scene.blocks), strict=True):
         across = camera.project(one.vertices_m)[:, 0]
         spans[block.order] = (float(across.min()), float(across.max()))
     return spans
@@ -169,7 +174,7 @@ def _areas(blocks: tuple[Block, ...], view: View) -> Mapping[int, float]:
     """Share of the picture that each block covers, by order."""
     scene = Scene("", (1,), blocks, ())
     camera = goal_camera(scene, _style(view))
-    seen = shoot(drawn(scene), camera, _SIZE_PX).block
+    seen = shoot(drawn(scene.blocks), camera, _SIZE_PX).block
     counts = np.bincount(seen[seen >= 0], minlength=len(blocks))
     return {
         block.order: float(count) / _SIZE_PX**2 for block, count in zip(blocks, counts, strict=True)

@@ -15,11 +15,17 @@ from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions.question_draft import Draft, Option, UnfairError
 from phyblock.making.questions.selection import pick
 from phyblock.making.questions.wording import fill, wording_ids
+from phyblock.sim.contact import whole_bounds_m
+from phyblock.sim.engine import Pose
 from phyblock.sim.outcomes import DEFAULT_LIMITS
-from phyblock.sim.render import Shot
-from phyblock.sim.seeing import changed_pixels, differing_pixels, is_inside, least_difference, seen
-from phyblock.sim.support import whole_bounds_m
-from phyblock.sim.world import Pose
+from phyblock.sim.pictures import Shot
+from phyblock.sim.question_pictures import (
+    changed_pixels,
+    differing_pixels,
+    is_inside,
+    least_difference,
+    seen,
+)
 
 LEAST_PIXELS = 220
 """In so many pixels of 256 by 256 any two pictures that are compared differ, at the least."""

@@ -26,7 +26,7 @@ from phyblock.making.questions.referring import Feature, names, resolve_one
 from phyblock.making.questions.selection import pick, shuffled
 from phyblock.making.questions.static_drafts import StaticMaker, draft, index_of, seen_blocks
 from phyblock.making.questions.wording import slots_of, stem_of
-from phyblock.sim.support import bounds_m
+from phyblock.sim.contact import bounds_m
 
 __all__ = ["PositionMaker"]
 

@@ -38,10 +38,10 @@ from phyblock.making.questions.selection import pick, shuffled
 from phyblock.making.questions.wording import slots_of
 from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.camera import view_axes
+from phyblock.sim.contact import bounds_m, boxes_near
+from phyblock.sim.dynamics import groups
 from phyblock.sim.outcomes import OUTCOME_SETTINGS, Outcome, Push, after
-from phyblock.sim.seeing import block_mark, seen, shown_pixels
-from phyblock.sim.steps import groups
-from phyblock.sim.support import bounds_m, boxes_near
+from phyblock.sim.question_pictures import block_mark, seen, shown_pixels
 from phyblock.stable import plain_sum
 
 _STAGES_TRIED = 3

@@ -12,7 +12,7 @@ from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write, check_free, writing
 from phyblock.records.question import StoredQuestion
-from phyblock.sim.registry import other_simulators
+from phyblock.sim.engine import other_engine
 from phyblock.stable import hex_digest
 
 QUESTIONS_FILE = "questions.jsonl"
@@ -93,7 +93,7 @@ def question_card(name: str, scenes_name: str, questions: Sequence[Question], ma
         scenes=len({question.scene.id for question in questions}),
         subtasks=sum(bool(asked) for asked in by_subtask.values()),
         made_by=made_by,
-        simulators="".join(f", with {one}," for one in other_simulators()),
+        simulators=f", with {engine}," if (engine := other_engine()) else "",
         rows="\n".join(_row(asked) for asked in by_subtask.values() if asked),
     )
 

@@ -17,8 +17,8 @@ from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block
 from phyblock.making.questions.picture_view import outermost, shows_profile
 from phyblock.making.questions.question_draft import UnfairError
-from phyblock.sim.seeing import seen, seen_order
-from phyblock.sim.support import bounds_m
+from phyblock.sim.contact import bounds_m
+from phyblock.sim.question_pictures import seen, seen_order
 
 Feature = Literal["color", "type", "size", "layer", "side", "support"]
 """What an expression may speak of; `size` tells rectangular prisms apart by their length."""

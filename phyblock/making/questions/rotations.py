@@ -42,14 +42,14 @@ from phyblock.making.questions.referring import resolve_one, shape_word
 from phyblock.making.questions.selection import pick, shuffled
 from phyblock.making.questions.static_drafts import StaticMaker, draft, seen_blocks
 from phyblock.making.questions.wording import slots_of, stem_of
-from phyblock.sim.outcomes import holds
-from phyblock.sim.support import (
+from phyblock.sim.contact import (
     FIT_TOLERANCE_M,
     bounds_m,
     drop_height_m,
     find_overlaps,
     support_graph,
 )
+from phyblock.sim.outcomes import holds
 
 AXIS_TURNS: tuple[str, ...] = (
     "no turn at all",

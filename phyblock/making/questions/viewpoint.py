@@ -37,7 +37,7 @@ from phyblock.making.questions.properties import recolored
 from phyblock.making.questions.question_draft import Draft, UnfairError
 from phyblock.making.questions.selection import pick, shuffled
 from phyblock.making.questions.wording import slots_of
-from phyblock.sim.seeing import least_difference, seen, shown_pixels
+from phyblock.sim.question_pictures import least_difference, seen, shown_pixels
 
 __all__ = ["ViewpointMaker"]
 

@@ -11,8 +11,7 @@ import math
 from collections import Counter
 
 from phyblock.domain.blocks import KIT_PALETTE, BlockType
-from phyblock.domain.candidates import MAX_CANDIDATES, Candidate, CandidateSet
-from phyblock.domain.scene import Kind, Look, Scene
+from phyblock.domain.scene import MAX_CANDIDATES, Candidate, CandidateSet, Kind, Look, Scene
 from phyblock.errors import DataError, Problem
 from phyblock.making.poses import POSES
 from phyblock.stable import drawn_bytes

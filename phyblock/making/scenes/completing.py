@@ -14,8 +14,7 @@ from phyblock.config.yaml import YamlSource, read_yaml
 from phyblock.data.raw import lines_of, parse_json, read_json
 from phyblock.domain.aov import CycleError
 from phyblock.domain.blocks import KIT_PALETTE, BlockType, Color
-from phyblock.domain.candidates import CandidateSet
-from phyblock.domain.scene import Block, Scene
+from phyblock.domain.scene import Block, CandidateSet, Scene
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.making.checks import LEVEL_LIMITS, OURS_IN_HASTE, CheckName, SceneFacts, findings_of
 from phyblock.making.scenes.sketch import Palette, scene_of

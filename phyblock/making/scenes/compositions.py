@@ -14,7 +14,7 @@ from phyblock.making.poses import transformed
 from phyblock.making.scenes.buildings import BUILDINGS
 from phyblock.making.scenes.creatures import CREATURES
 from phyblock.making.scenes.sketch import UNIT_M, Draft, Theme
-from phyblock.sim.support import whole_bounds_m
+from phyblock.sim.contact import whole_bounds_m
 
 __all__ = ["COMPOSITIONS", "Axis", "beside"]
 

@@ -10,19 +10,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from phyblock.data.version import VERSION_FILE
-from phyblock.domain.candidates import CandidateSet
-from phyblock.domain.scene import Scene
+from phyblock.domain.scene import CandidateSet, Scene
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write, check_free, writing
 from phyblock.making.checks import FINISHED_REST, LEVEL_LIMITS
 from phyblock.making.scenes.candidate_sets import make_candidates
 from phyblock.making.scenes.sketch import PALETTES, Palette
 from phyblock.records.scene import StoredScene
-from phyblock.sim.registry import other_simulators
-from phyblock.sim.stability import DEFAULT_TRIAL
-from phyblock.sim.steps import DEFAULT_REST
-from phyblock.sim.support import FIT_TOLERANCE_M
-from phyblock.sim.visibility import LEAST_SHARE, LEAST_SHOWN
+from phyblock.sim.contact import FIT_TOLERANCE_M
+from phyblock.sim.dynamics import DEFAULT_REST, DEFAULT_TRIAL
+from phyblock.sim.engine import other_engine
+from phyblock.sim.pictures import LEAST_SHARE, LEAST_SHOWN
 from phyblock.stable import hex_digest
 
 SCENES_FILE = "scenes.jsonl"
@@ -224,7 +222,7 @@ def card(name: str, written: SetWriter, command: str, palette_text: str) -> str:
         base=written.base,
         varied=written.count - written.base,
         command=command,
-        simulators="".join(f", by {one}" for one in other_simulators()),
+        simulators=f", by {engine}" if (engine := other_engine()) else "",
         palette=palette_text,
         fit_mm=FIT_TOLERANCE_M * 1000,
         duration=DEFAULT_TRIAL.duration_s,

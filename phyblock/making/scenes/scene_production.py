@@ -25,7 +25,7 @@ from phyblock.making.scenes.compositions import COMPOSITIONS, beside
 from phyblock.making.scenes.creatures import CREATURES
 from phyblock.making.scenes.sketch import PALETTES, Draft, Palette, Theme, make_scene
 from phyblock.making.workers import Workers
-from phyblock.sim.support import find_gaps
+from phyblock.sim.contact import find_gaps
 from phyblock.stable import drawn_bytes
 
 Group = Literal["1", "1+2", "2", "3", "4"]

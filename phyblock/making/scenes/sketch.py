@@ -17,8 +17,8 @@ from phyblock.domain.aov import AOVGraph
 from phyblock.domain.blocks import BLOCK_TYPES, COLORS, KIT_PALETTE, SHAPES, BlockType, Color
 from phyblock.domain.scene import Block, Scene
 from phyblock.making.poses import POSES
+from phyblock.sim.contact import GROUND, drop_height_m, support_graph, whole_bounds_m
 from phyblock.sim.geometry import corners_m
-from phyblock.sim.support import GROUND, drop_height_m, support_graph, whole_bounds_m
 
 UNIT_M = 0.025
 """Grid unit [m]: half the side of a cube."""

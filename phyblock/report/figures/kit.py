@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from phyblock.domain.blocks import BLOCK_TYPES, KIT_PALETTE, SHAPES, BlockType, Color
 from phyblock.sim.camera import Camera
 from phyblock.sim.pictures import (
+    DrawnBlock,
     PictureStyle,
     candidate_camera,
     common_distance_m,
     on_the_floor,
+    picture,
 )
-from phyblock.sim.render import DrawnBlock, picture
 from phyblock.tables.drawing import INK, MUTED, drawn_width_in, headed, new_figure, wrapped
 from phyblock.tables.load import Run
 

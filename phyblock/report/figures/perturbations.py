@@ -14,8 +14,7 @@ from phyblock.config.suite import FACTORS, ImagesSpec, with_values
 from phyblock.data import AssemblyTask, Dataset
 from phyblock.errors import Problem, SpecError
 from phyblock.report.sensitivity_view import factor_name
-from phyblock.sim import candidates_key, candidates_png, goal_key, goal_png
-from phyblock.sim.pictures import PictureStyle
+from phyblock.sim.pictures import PictureStyle, candidates_key, candidates_png, goal_key, goal_png
 from phyblock.tables.drawing import drawn_width_in, headed, new_figure
 from phyblock.tables.load import Run
 from phyblock.text import some_of

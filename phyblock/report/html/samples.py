@@ -11,7 +11,7 @@ from phyblock.records import PromptLines, Record, Score, SentPrompt
 from phyblock.records.reading import any_records
 from phyblock.report.html.index import Item, Place, SampleIndex
 from phyblock.report.html.pack import Pack
-from phyblock.sim import PictureStyle
+from phyblock.sim.pictures import PictureStyle
 from phyblock.tables.track_report import PageItems
 from phyblock.tracks.kind import kinds
 

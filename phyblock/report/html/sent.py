@@ -12,7 +12,7 @@ from phyblock.data import AssemblyTask
 from phyblock.files import atomic_write
 from phyblock.models import Image
 from phyblock.resources import cache_dir
-from phyblock.sim import PictureStyle
+from phyblock.sim.pictures import PictureStyle
 from phyblock.tables.track_report import PageItems
 from phyblock.tracks import PicturePolicy, Pictures
 from phyblock.tracks.studio import Drawing, Studio

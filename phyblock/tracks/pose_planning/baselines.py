@@ -9,7 +9,7 @@ import numpy as np
 
 from phyblock.domain import Block, CandidateSet, PoseStep, Scene
 from phyblock.errors import DataError, Problem
-from phyblock.sim.placing import box_height_cm, center_cm
+from phyblock.sim.geometry import box_height_cm, center_cm
 
 __all__ = ["POSE_FLOORS", "POSE_RULES", "PoseSubject"]
 

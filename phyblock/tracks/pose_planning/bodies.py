@@ -6,8 +6,7 @@ import functools
 
 from phyblock.domain import BlockType, Candidate, PoseStep
 from phyblock.scoring.pose import Laid, Piece
-from phyblock.sim.geometry import collision_pieces
-from phyblock.sim.placing import origin_m
+from phyblock.sim.geometry import collision_pieces, origin_m
 
 __all__ = ["laid", "pieces_of"]
 

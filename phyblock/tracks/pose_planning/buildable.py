@@ -7,8 +7,7 @@ from dataclasses import replace
 
 from phyblock.domain import Block, Scene
 from phyblock.sim.balance import MARGIN_M, is_balanced
-from phyblock.sim.site import settle
-from phyblock.sim.steps import groups
+from phyblock.sim.dynamics import groups, settle
 
 __all__ = ["buildable_order"]
 

@@ -11,10 +11,16 @@ from dataclasses import dataclass, replace
 
 from phyblock.domain import Block
 from phyblock.scoring.pose import blocks_reached
-from phyblock.sim.carry import CarriedStep, CarryLimits, depth_cm, end_of, moved_between
-from phyblock.sim.pose import Pose
-from phyblock.sim.stability import DEFAULT_TRIAL
-from phyblock.sim.voxels import voxel_iou
+from phyblock.sim.contact import voxel_iou
+from phyblock.sim.dynamics import (
+    DEFAULT_TRIAL,
+    ExecutedStep,
+    ExecutionLimits,
+    depth_cm,
+    end_of,
+    moved_between,
+)
+from phyblock.sim.engine import Pose
 from phyblock.tracks.pose_planning.resting import Rest, worlds_of
 from phyblock.types import REFUSED_ENDS, StepEnd
 
@@ -35,7 +41,7 @@ class Ended:
     whether that is the whole goal and nothing else, and the engine with its version.
     """
 
-    steps: tuple[CarriedStep, ...]
+    steps: tuple[ExecutedStep, ...]
     rests: tuple[tuple[Rest, ...] | None, ...]
     reached: int
     iou: float
@@ -47,7 +53,7 @@ def borne_out(
     put: Sequence[Block | None],
     goal: Sequence[Block],
     ended: Ended,
-    limits: CarryLimits,
+    limits: ExecutionLimits,
     reached: tuple[float, float],
 ) -> Ended:
     """What became of a plan, where it was kept what each step moved; as it was said where not.
@@ -91,7 +97,7 @@ def _lying_alone(
     )
 
 
-def _refused(block: Block | None, step: CarriedStep, limits: CarryLimits) -> CarriedStep:
+def _refused(block: Block | None, step: ExecutedStep, limits: ExecutionLimits) -> ExecutedStep:
     """The step, refused where there is no block or no room above the floor, and only there."""
     end: StepEnd = "overlaps" if step.end == "overlaps" else "stands"
     if block is None:
@@ -103,12 +109,12 @@ def _refused(block: Block | None, step: CarriedStep, limits: CarryLimits) -> Car
 
 
 def _step(
-    step: CarriedStep,
+    step: ExecutedStep,
     number: int,
     block: Block | None,
     worlds: Sequence[Sequence[Block]],
-    limits: CarryLimits,
-) -> CarriedStep:
+    limits: ExecutionLimits,
+) -> ExecutedStep:
     """How a step ended, by the worlds before and after it, of which the first is left out."""
     if block is None or step.end in REFUSED_ENDS:
         return step
@@ -133,7 +139,7 @@ def _poses(world: Sequence[Block]) -> Mapping[int, Pose]:
     return {block.order: Pose.goal(block) for block in world}
 
 
-def _is_past(way: tuple[float, float], said: bool, limits: CarryLimits) -> bool:
+def _is_past(way: tuple[float, float], said: bool, limits: ExecutionLimits) -> bool:
     """Whether a block moved past the limits of standing; as it was said where that is near."""
     allowed = (limits.stand_cm, limits.stand_deg)
     slack = (_SET_BACK_CM, _SET_BACK_DEG)

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 from phyblock.data import AssemblyTask
 from phyblock.domain import Block, PoseStep
 from phyblock.scoring.pose import PoseError
-from phyblock.sim.carry import CarryLimits, carry_out
+from phyblock.sim.dynamics import ExecutionLimits, execute
+from phyblock.sim.engine import described_engine
 from phyblock.sim.film import FilmStep, Tone
-from phyblock.sim.placing import put, upright
-from phyblock.sim.registry import told_engine
+from phyblock.sim.geometry import put, upright
 from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number
 from phyblock.text import counted
 from phyblock.tracks.pose_planning.measures import ERROR_NAMES
@@ -77,9 +77,9 @@ def pose_film(record: PoseRecord, task: AssemblyTask) -> Iterator[FilmStep]:
     by = ""
     if worlds is None:
         tolerances = pose.limits
-        limits = CarryLimits(tolerances.overlap_cm, tolerances.stand_cm, tolerances.stand_deg)
-        worlds = carry_out(blocks, limits).worlds
-        if pose.engine != (engine := told_engine()):
+        limits = ExecutionLimits(tolerances.overlap_cm, tolerances.stand_cm, tolerances.stand_deg)
+        worlds = execute(blocks, limits).worlds
+        if pose.engine != (engine := described_engine()):
             by = f" (shown in {engine}, not {pose.engine})"
     for n, (one, step, world) in enumerate(zip(given, pose.steps, worlds, strict=True), 1):
         tone: Tone = "good" if step.error is None else "bad"

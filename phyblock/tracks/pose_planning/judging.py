@@ -36,10 +36,10 @@ from phyblock.scoring.pose import (
     pose_errors,
 )
 from phyblock.scoring.pose_matching import TURN_TOLERANCE_DEG
-from phyblock.sim.carry import Carried, CarriedStep, CarryLimits, carry_out
-from phyblock.sim.placing import put
-from phyblock.sim.registry import told_engine
-from phyblock.sim.voxels import voxel_iou
+from phyblock.sim.contact import voxel_iou
+from phyblock.sim.dynamics import ExecutedStep, Execution, ExecutionLimits, execute
+from phyblock.sim.engine import described_engine
+from phyblock.sim.geometry import put
 from phyblock.tracks.plans import score_fields
 from phyblock.tracks.pose_planning.bodies import laid, pieces_of
 from phyblock.tracks.pose_planning.ended import Ended, borne_out
@@ -67,7 +67,7 @@ class PoseRules:
     rotation: PoseRotation
     settings: tuple[Setting, ...]
     matchers: tuple[Matcher, ...]
-    limits: CarryLimits
+    limits: ExecutionLimits
     reached_cm: float
     reached_deg: float
     answer_format: AnswerFormat = "text"
@@ -213,13 +213,13 @@ def judge_poses(
 def _carried(item: AssemblyTask, blocks: Sequence[Block | None], rules: PoseRules) -> Ended:
     # An engine has no more than one plan at a time, whichever thread asks.
     with _ONE_AT_A_TIME:
-        done: Carried = carry_out(blocks, rules.limits)
+        done: Execution = execute(blocks, rules.limits)
     goal = item.scene.blocks
     reached = blocks_reached(goal, done.blocks, rules.reached_cm, rules.reached_deg)
     is_whole = reached == len(goal) == len(done.blocks)
     iou = round(voxel_iou(goal, done.blocks), _DIGITS)
     rests = rests_of(blocks, done.worlds)
-    return Ended(done.steps, rests, reached, iou, is_whole, told_engine())
+    return Ended(done.steps, rests, reached, iou, is_whole, described_engine())
 
 
 @functools.lru_cache(maxsize=_KEPT)
@@ -271,7 +271,7 @@ def _given(step: PoseStep) -> dict[str, Any]:
 
 def _step(
     fit: PoseFit | None,
-    end: CarriedStep,
+    end: ExecutedStep,
     rests: tuple[Rest, ...] | None,
     error: PoseError | None,
 ) -> dict[str, Any]:

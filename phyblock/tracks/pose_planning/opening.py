@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from phyblock.config.suite import Suite
 from phyblock.errors import Problem, SpecError
-from phyblock.sim.carry import CarryLimits
+from phyblock.sim.dynamics import ExecutionLimits
 from phyblock.tracks.kind import Opening
 from phyblock.tracks.opening import (
     check_drawn,
@@ -63,7 +63,7 @@ def _rules(suite: Suite, poses: PoseSpec) -> PoseRules:
         poses.rotation,
         suite.settings,
         suite.scoring.matchers,
-        CarryLimits(poses.overlap_cm, poses.stand_cm, poses.stand_deg),
+        ExecutionLimits(poses.overlap_cm, poses.stand_cm, poses.stand_deg),
         poses.reached_cm,
         poses.reached_deg,
         suite.answer_format,

@@ -8,10 +8,9 @@ from pathlib import Path
 
 from phyblock.data import AssemblyTask
 from phyblock.models.base import Image
-from phyblock.sim import PictureStyle, goal_style
 from phyblock.sim.camera import VIEWS
-from phyblock.sim.kit import kit_key, kit_png, written_style
-from phyblock.sim.ruled import ruled_key, ruled_png
+from phyblock.sim.pictures import PictureStyle, goal_style
+from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
 from phyblock.tracks.pose_planning.spec import ViewSpec
 from phyblock.tracks.showing import ShownTask
 from phyblock.tracks.studio import Drawing, Studio, Workshop

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from phyblock.domain import Block, Euler
-from phyblock.sim.placing import center_cm, origin_m
-from phyblock.sim.pose import Pose
+from phyblock.sim.engine import Pose
+from phyblock.sim.geometry import center_cm, origin_m
 
 __all__ = ["Rest", "rests_of", "worlds_of"]
 

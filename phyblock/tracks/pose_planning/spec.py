@@ -8,12 +8,12 @@ from typing import Annotated, get_args
 from pydantic import AfterValidator, Discriminator, Field, Tag
 
 from phyblock.config.validation import PictureControls, Section, TemplateName, UniqueSome, refuse
-from phyblock.sim.carry import CarryLimits
+from phyblock.sim.dynamics import ExecutionLimits
 from phyblock.types import PoseRotation, View
 
 __all__ = ["MOST_VIEWS", "PoseSpec", "ViewSpec"]
 
-_LIMITS = CarryLimits()
+_LIMITS = ExecutionLimits()
 MOST_VIEWS = 4
 
 

@@ -17,8 +17,8 @@ from phyblock.domain import PoseStep
 from phyblock.models.base import Image, Request
 from phyblock.parsing.text import READER_VERSION
 from phyblock.records import Record
-from phyblock.sim.carry import CarriedStep
-from phyblock.sim.placing import upright
+from phyblock.sim.dynamics import ExecutedStep
+from phyblock.sim.geometry import upright
 from phyblock.tracks.base import CARRYING, READER, engine_identity
 from phyblock.tracks.pose_planning.baselines import PoseSubject
 from phyblock.tracks.pose_planning.ended import Ended
@@ -111,7 +111,7 @@ def _earlier(record: Record | None) -> Earlier | None:
         return None
     given = tuple(PoseStep(s.block, s.center_cm, s.euler_deg) for s in record.parse.steps)
     steps = tuple(
-        CarriedStep(s.end, s.moved_cm, s.turned_deg, s.gap_cm, s.overlap_cm, s.knocked)
+        ExecutedStep(s.end, s.moved_cm, s.turned_deg, s.gap_cm, s.overlap_cm, s.knocked)
         for s in record.pose.steps
     )
     rests = tuple(kept_rests(step) for step in record.pose.steps)

@@ -14,7 +14,7 @@ from phyblock.records.reply import Reply
 from phyblock.scoring.counts import Counts
 from phyblock.scoring.plan import ERROR_TYPES, ErrorType
 from phyblock.scoring.steps import Assembly, attempted_counts, placed_counts
-from phyblock.sim.site import Settled
+from phyblock.sim.dynamics import Settled
 from phyblock.tracks.prompts import response_format
 from phyblock.tracks.showing import file_plan
 from phyblock.tracks.step_planning.baselines import StepSubject

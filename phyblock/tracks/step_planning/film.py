@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 from phyblock.data import AssemblyTask
 from phyblock.domain import Block
+from phyblock.sim.dynamics import settle
+from phyblock.sim.engine import REFERENCE_ENGINE, described_engine
 from phyblock.sim.film import FilmStep, Tone
-from phyblock.sim.registry import REFERENCE_ENGINE, told_engine
-from phyblock.sim.site import settle
 from phyblock.tables.text_table import Column, TextTable
 from phyblock.text import counted
 from phyblock.tracks.step_planning.episode_views import ENDING_NAMES, OUTCOME_NAMES
@@ -66,7 +66,7 @@ def episode_film(record: EpisodeRecord, task: AssemblyTask) -> Iterator[FilmStep
     if record.ending == "collapsed":
         blocks = settle(blocks).blocks
         # Older records say no engine, and no version of it.
-        engine, now = record.engine or REFERENCE_ENGINE, told_engine()
+        engine, now = record.engine or REFERENCE_ENGINE, described_engine()
         if engine not in (now, now.partition(" ")[0]):
             by = f" (falls in {now}, not {engine})"
     tone = "good" if record.ending == "completed" else "bad"

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 from phyblock.errors import Problem, SpecError
-from phyblock.sim.registry import PHYSICS_VARIABLE, REFERENCE_ENGINE
+from phyblock.sim.engine import PHYSICS_VARIABLE, REFERENCE_ENGINE
 from phyblock.tables.load import Run
 from phyblock.tables.measures import Measure
 from phyblock.tables.showing import planning_words

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from phyblock.data import AssemblyTask
-from phyblock.sim import PictureStyle, goal_style
-from phyblock.sim.question_pictures import question_key
-from phyblock.sim.site import state_picture
+from phyblock.sim.pictures import PictureStyle, goal_style
+from phyblock.sim.question_pictures import question_key, state_picture
 from phyblock.tracks.step_planning.record import EpisodeRecord
 
 __all__ = ["state_keys"]

@@ -19,10 +19,9 @@ from phyblock.domain import Block
 from phyblock.models.base import Image, Message, Request
 from phyblock.records import Record
 from phyblock.scoring.steps import Assembly
-from phyblock.sim.question_pictures import question_key, question_png
-from phyblock.sim.registry import told_engine
-from phyblock.sim.site import ONE_SETTING, Settled, settle, state_picture
-from phyblock.sim.stability import DEFAULT_TRIAL
+from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, Settled, settle
+from phyblock.sim.engine import described_engine
+from phyblock.sim.question_pictures import question_key, question_png, state_picture
 from phyblock.stable import hex_digest
 from phyblock.tracks.base import engine_identity
 from phyblock.tracks.goal_blind.guessing import BlindGuesses
@@ -87,7 +86,7 @@ class StepPlanning:
         """The most steps that an episode of it can take, the physics engine, where there is one,
         and how the scene is shown.
         """
-        engine = {} if self.rules.physics == "off" else {"engine": told_engine()}
+        engine = {} if self.rules.physics == "off" else {"engine": described_engine()}
         most = self.rules.limits.max_steps(len(item.scene))
         return {"max_steps": most, **engine, **showing_fields(item)}
 

@@ -17,7 +17,7 @@ from phyblock.domain import LETTERS, SUBTASKS, is_picture_option
 from phyblock.files import OutFolder, writing
 from phyblock.models.base import Image
 from phyblock.resources import needs
-from phyblock.sim import PictureStyle
+from phyblock.sim.pictures import PictureStyle
 from phyblock.tables.track_report import ItemExport
 from phyblock.tracks.opening import picture_folder
 from phyblock.tracks.studio import render_workers

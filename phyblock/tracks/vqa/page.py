@@ -10,7 +10,7 @@ from phyblock.data import Dataset, QuestionTask
 from phyblock.domain import Question, QuestionPicture
 from phyblock.errors import DataError, Problem
 from phyblock.records import MANIFEST, Record
-from phyblock.sim import PictureStyle
+from phyblock.sim.pictures import PictureStyle
 from phyblock.tables.load import Run
 from phyblock.tables.track_report import PageItems
 from phyblock.tracks.drawable import block_entry, rounded

@@ -12,9 +12,14 @@ from phyblock.domain import LETTERS, Question, QuestionPicture
 from phyblock.errors import DataError, Problem
 from phyblock.files import read_picture
 from phyblock.models.base import Image
-from phyblock.sim import PictureStyle
-from phyblock.sim.lettered import LETTERED_VERSION, lettered_sheet_png, sheet_size_px
-from phyblock.sim.question_pictures import question_key, question_png
+from phyblock.sim.pictures import PictureStyle
+from phyblock.sim.question_pictures import (
+    LETTERED_VERSION,
+    lettered_sheet_png,
+    question_key,
+    question_png,
+    sheet_size_px,
+)
 from phyblock.stable import hex_digest
 from phyblock.tracks.studio import Drawing, Studio, Workshop, to_image
 from phyblock.types import Background

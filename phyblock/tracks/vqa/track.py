@@ -11,7 +11,7 @@ from typing import Any
 
 from phyblock.data import QuestionSet, QuestionTask
 from phyblock.domain import LETTERS, Question, Scene, is_picture_option
-from phyblock.domain.rotation import rotated, rotated_label
+from phyblock.domain.question import rotated, rotated_label
 from phyblock.models.base import Image
 from phyblock.models.guesses import Guesses
 from phyblock.parsing.answer import ParsedAnswer

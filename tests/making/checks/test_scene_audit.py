@@ -19,7 +19,8 @@ from phyblock.making.verification import (
     audit_scenes,
     findings_csv,
 )
-from phyblock.sim import Physics, Trial
+from phyblock.sim.dynamics import Trial
+from phyblock.sim.engine import Physics
 from tests.designs.scenes import designed_scenes
 from tests.sim.structures import counterweighted_beam, scene_of
 from tests.sim.test_support import FLOATING, OVERLAPPING

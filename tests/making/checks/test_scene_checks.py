@@ -10,8 +10,9 @@ from phyblock.making.checks import CHECKS, FOREIGN, OURS, Finding, SceneFacts, f
 from phyblock.making.scenes.candidate_sets import make_candidates
 from phyblock.making.scenes.sketch import make_scene
 from phyblock.making.verification import AUDITED, LAWS, audit_scene, verify_scene
-from phyblock.sim import Physics, Trial
-from phyblock.sim.support import GROUND
+from phyblock.sim.contact import GROUND
+from phyblock.sim.dynamics import Trial
+from phyblock.sim.engine import Physics
 from tests.designs.acceptance import form_problems, physics_problems
 from tests.designs.pad import Pad
 from tests.designs.scenes import designed_scene

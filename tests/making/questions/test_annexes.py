@@ -9,7 +9,7 @@ from phyblock.domain import Block, Scene
 from phyblock.making.questions.annexes import with_annex
 from phyblock.making.questions.counterfactual import is_sure, resting_on
 from phyblock.resources import bundled
-from phyblock.sim.support import find_gaps, find_overlaps
+from phyblock.sim.contact import find_gaps, find_overlaps
 
 TASKS = read_builtin(bundled("benchmarks", "data", "phyblock-400")).tasks
 SCENES = [task.scene for task in TASKS if len(task.scene) < 9][::30]

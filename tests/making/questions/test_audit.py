@@ -8,7 +8,7 @@ import pytest
 
 from phyblock.data import read_builtin, read_questions
 from phyblock.domain import LETTERS, Question
-from phyblock.domain.rotation import rotated
+from phyblock.domain.question import rotated
 from phyblock.making.questions.audit import audit_questions, duplicates_of, referents
 from tests.vqa_set import questions, write_questions
 from tests.workspace import Workspace

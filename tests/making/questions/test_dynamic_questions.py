@@ -17,8 +17,8 @@ from phyblock.making.questions.question_production import make_questions, proble
 from phyblock.making.workers import open_workers
 from phyblock.records.question import StoredQuestion
 from phyblock.resources import bundled
-from phyblock.sim.seeing import is_inside, least_difference, seen
-from phyblock.sim.support import find_gaps
+from phyblock.sim.contact import find_gaps
+from phyblock.sim.question_pictures import is_inside, least_difference, seen
 
 DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
 SCENES: dict[str, Scene] = {task.scene.id: task.scene for task in DATA.tasks}

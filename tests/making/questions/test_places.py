@@ -17,8 +17,8 @@ from phyblock.making.questions.affordance import (
     stays_round,
 )
 from phyblock.making.questions.picture_view import shows_solid
-from phyblock.sim.seeing import Top
-from phyblock.sim.support import bounds_m
+from phyblock.sim.contact import bounds_m
+from phyblock.sim.question_pictures import Top
 from tests.sim.structures import block, tower
 
 TOP_M = 0.075

@@ -24,8 +24,8 @@ from phyblock.making.questions.question_production import (
 from phyblock.making.workers import open_workers
 from phyblock.records.question import StoredQuestion
 from phyblock.resources import bundled
-from phyblock.sim.registry import other_simulators
-from phyblock.sim.seeing import mark_pixel
+from phyblock.sim.engine import other_engine
+from phyblock.sim.question_pictures import mark_pixel
 
 FOLDER = bundled("benchmarks", "data", "phyblock-vqa")
 DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
@@ -116,7 +116,7 @@ def test_a_subtask_made_by_the_command_of_the_card_has_the_same_bytes(subtask: S
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(bool(other_simulators()), reason="the set is made with the default simulators")
+@pytest.mark.skipif(bool(other_engine()), reason="the set is made with the default simulators")
 @pytest.mark.parametrize("subtask", SUBTASKS)
 def test_shipped_lines_are_among_those_that_their_scenes_give(
     built_in: QuestionSet, subtask: Subtask
@@ -140,7 +140,7 @@ def test_the_card_is_made_from_these_questions(built_in: QuestionSet) -> None:
     shipped = (FOLDER / "CARD.md").read_text(encoding="utf-8")
     made_by = shipped.split("\n\n    ", 1)[1].splitlines()[0]
     asked = [task.question for task in built_in.tasks]
-    if not other_simulators():
+    if not other_engine():
         assert question_card(FOLDER.name, "phyblock-400", asked, made_by) == shipped
 
 

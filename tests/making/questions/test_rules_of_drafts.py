@@ -28,8 +28,8 @@ from phyblock.making.questions.question_draft import Draft, UnfairError
 from phyblock.making.questions.rotations import AXIS_TURNS, axis_turns, tipped_over
 from phyblock.making.questions.viewpoint import ViewpointMaker
 from phyblock.resources import bundled
-from phyblock.sim.seeing import least_difference, seen
-from phyblock.sim.support import find_overlaps, support_graph
+from phyblock.sim.contact import find_overlaps, support_graph
+from phyblock.sim.question_pictures import least_difference, seen
 
 SCENES = [t.scene for t in read_builtin(bundled("benchmarks", "data", "phyblock-400")).tasks]
 scenes = st.sampled_from(SCENES[::9])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from phyblock.sim import find_gaps, find_overlaps
-from phyblock.sim.visibility import hidden_blocks
+from phyblock.sim.contact import find_gaps, find_overlaps
+from phyblock.sim.pictures import hidden_blocks
 from tests.designs.acceptance import accept, form_problems
 from tests.designs.scenes import designed_scene, designed_scenes
 

@@ -16,8 +16,7 @@ from phyblock.making.scenes.compositions import COMPOSITIONS, beside
 from phyblock.making.scenes.creatures import CREATURES
 from phyblock.making.scenes.scene_production import GROUP_LEVELS, Request, draw
 from phyblock.making.scenes.sketch import PALETTES, Draft
-from phyblock.sim import find_gaps, find_overlaps
-from phyblock.sim.support import bounds_m
+from phyblock.sim.contact import bounds_m, find_gaps, find_overlaps
 from tests.designs.acceptance import form_problems
 
 GROUPS = tuple(GROUP_LEVELS)

@@ -15,11 +15,15 @@ from phyblock.errors import DataError, StoreError
 from phyblock.making.scenes.scene_files import SetWriter, card, open_writer, sums_text
 from phyblock.making.scenes.scene_production import Order, Share, produce, shares
 from phyblock.making.workers import open_workers
-from phyblock.sim.registry import REFERENCE_ENGINE, other_simulators, physics_engine
-from phyblock.sim.visibility import hidden_blocks
+from phyblock.sim.engine import (
+    REFERENCE_ENGINE,
+    described_engine,
+    installed_engines,
+    other_engine,
+    physics_engine,
+)
+from phyblock.sim.pictures import hidden_blocks
 from tests.designs.acceptance import accept
-from tests.sim.box_renderer import BOX_RENDERER
-from tests.sim.still_engine import STILL_ENGINE
 
 SMALL = Order(3, "kit", (Share("1", 3, 1), Share("2", 4, 2), Share("3", 2, 1)))
 
@@ -42,22 +46,19 @@ def scenes() -> list[Scene]:
     return made(SMALL)
 
 
-def test_a_card_names_other_simulators_and_says_nothing_of_the_usual_ones(
+def test_a_card_names_another_engine_and_not_the_usual_one(
     scenes: list[Scene], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     written = write(tmp_path / "set", scenes)
-    others = "".join(f", by {one}" for one in other_simulators())
+    others = f", by {other_engine()}" if other_engine() else ""
     assert bool(others) == (physics_engine().name != REFERENCE_ENGINE)
     here = card("few", written, "make", "kit")
     assert f"number of processes{others}.\n" in here
     usual = here.replace(others, "")
-    monkeypatch.setenv("PHYBLOCK_PHYSICS", STILL_ENGINE)
-    by_still = ", by the physics engine still 1"
-    assert card("few", written, "make", "kit") == usual.replace(
-        "number of processes", f"number of processes{by_still}"
-    )
-    monkeypatch.setenv("PHYBLOCK_RENDERER", BOX_RENDERER)
-    assert f"processes{by_still}, by the renderer boxes (" in card("few", written, "make", "kit")
+    if "mujoco" in installed_engines():
+        monkeypatch.setenv("PHYBLOCK_PHYSICS", "mujoco")
+        told = f"number of processes, by the physics engine {described_engine()}"
+        assert card("few", written, "make", "kit") == usual.replace("number of processes", told)
 
 
 def test_the_built_in_shares() -> None:

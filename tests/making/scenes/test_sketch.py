@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from phyblock.domain import BLOCK_TYPES, orientation_class
 from phyblock.making.poses import POSES
 from phyblock.making.scenes.sketch import make_scene
-from phyblock.sim import find_gaps, find_overlaps, support_graph
+from phyblock.sim.contact import find_gaps, find_overlaps, support_graph
 from tests.designs.pad import Pad
 from tests.designs.scenes import designed_scenes
 

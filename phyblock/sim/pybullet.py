@@ -1,4 +1,4 @@
-"""PyBullet as a physics engine.
+"""PyBullet as a physics engine, loaded when a simulation is opened.
 
 The measured conditions for wooden-block structures to stand as they do on a table: collision
 hulls moved inward by the 1 mm margin that Bullet adds to meshes, the cylinder as the 18-gon it
@@ -9,26 +9,23 @@ square root of the pair's friction on each body, because Bullet multiplies them.
 from __future__ import annotations
 
 import contextlib
+import functools
+import importlib.metadata
 import math
+import os
 import tempfile
 from collections.abc import Iterator, Mapping
-from itertools import product
 from pathlib import Path
 from types import ModuleType
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain.blocks import SHAPES, BlockType, quat_xyzw_to_matrix
 from phyblock.errors import SimulationError
-from phyblock.sim.bullet.client import client as fresh_client
-from phyblock.sim.bullet.client import version
-from phyblock.sim.engine import FLOOR, Contact, Physics, Velocity
+from phyblock.sim.engine import FLOOR, Contact, Physics, Pose, Velocity
 from phyblock.sim.geometry import collision_pieces, solid_mesh
-from phyblock.sim.pose import Pose
-
-__all__ = ["BulletEngine", "BulletSimulation"]
 
 _MESH_MARGIN_M = 0.001
 
@@ -38,16 +35,37 @@ class BulletEngine:
 
     name = "pybullet"
 
-    @property
+    @functools.cached_property
     def versions(self) -> Mapping[str, str]:
         """PyBullet's."""
-        return {"pybullet": version()}
+        return {"pybullet": importlib.metadata.version("pybullet")}
 
     @contextlib.contextmanager
     def open(self, physics: Physics) -> Iterator[BulletSimulation]:
         """Open a floor without blocks; SimulationError when too many are open."""
-        with fresh_client() as (bullet, client):
+        bullet = _loaded()
+        client = bullet.connect(bullet.DIRECT)
+        if client < 0:
+            raise SimulationError("PyBullet gave no client: too many are open in this process")
+        try:
             yield BulletSimulation(bullet, client, physics)
+        finally:
+            bullet.disconnect(client)
+
+
+@functools.cache
+def _loaded() -> ModuleType:
+    """The `pybullet` module; its C code's build banner is kept off standard error."""
+    kept = os.dup(2)
+    null = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(null, 2)
+        import pybullet
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(null)
+    return cast(ModuleType, pybullet)
 
 
 class _Body(NamedTuple):
@@ -64,7 +82,6 @@ class BulletSimulation:
         self._bullet = bullet
         self._client = client
         self._physics = physics
-        self._friction = math.sqrt(physics.friction)
         self._shapes: dict[BlockType, int] = {}
         self._bodies: dict[int, _Body] = {}
         bullet.setGravity(*physics.gravity_m_s2, physicsClientId=client)
@@ -80,10 +97,12 @@ class BulletSimulation:
 
     def add(self, number: int, block_type: BlockType, pose: Pose) -> None:
         """Put a block at a pose, at rest."""
+        if block_type not in self._shapes:
+            self._shapes[block_type] = self._shape(block_type)
         mass_kg = self._physics.mass_kg(block_type)
         body = self._bullet.createMultiBody(
             baseMass=mass_kg,
-            baseCollisionShapeIndex=self._shape(block_type),
+            baseCollisionShapeIndex=self._shapes[block_type],
             physicsClientId=self._client,
         )
         inertia = np.diag(solid_mesh(block_type).inertia_m2) * mass_kg
@@ -108,7 +127,7 @@ class BulletSimulation:
             self._bullet.stepSimulation(physicsClientId=self._client)
 
     def pose(self, number: int) -> Pose:
-        """Where a block is now."""
+        """Return the pose of a block now."""
         body = self._bodies[number]
         center_m, quat = self._bullet.getBasePositionAndOrientation(
             body.id, physicsClientId=self._client
@@ -117,12 +136,12 @@ class BulletSimulation:
         return Pose(np.array(center_m) - quat_xyzw_to_matrix(quat_xyzw) @ body.center_m, quat_xyzw)
 
     def velocity(self, number: int) -> Velocity:
-        """How a block moves now."""
+        """Return the velocity of a block now."""
         body = self._bodies[number].id
         return Velocity(*self._bullet.getBaseVelocity(body, physicsClientId=self._client))
 
     def set_velocity(self, number: int, velocity: Velocity) -> None:
-        """Make a block move this way from now on."""
+        """Make a block move like this from now on."""
         self._bullet.resetBaseVelocity(
             self._bodies[number].id,
             velocity.linear_m_s,
@@ -131,7 +150,7 @@ class BulletSimulation:
         )
 
     def contacts(self) -> tuple[Contact, ...]:
-        """Where bodies touched in the last time step."""
+        """List where bodies touched in the last time step."""
         numbers = {body.id: number for number, body in self._bodies.items()}
         numbers[self._floor] = FLOOR
         contacts = []
@@ -147,7 +166,7 @@ class BulletSimulation:
         self._bullet.changeDynamics(
             body,
             -1,
-            lateralFriction=self._friction,
+            lateralFriction=math.sqrt(self._physics.friction),
             rollingFriction=0.0,
             spinningFriction=0.0,
             restitution=0.0,
@@ -155,53 +174,34 @@ class BulletSimulation:
         )
 
     def _shape(self, block_type: BlockType) -> int:
-        """Collision shape of a type about its center of mass, made once a simulation."""
-        if block_type not in self._shapes:
-            self._shapes[block_type] = self._make_shape(block_type)
-        return self._shapes[block_type]
+        """Make the collision shape of a type about its center of mass.
 
-    def _make_shape(self, block_type: BlockType) -> int:
-        if (half_m := _half_sides_m(block_type)) is not None:
+        Bullet keeps its margin inside a box, so boxes need not be moved inward. Hulls go by an
+        OBJ file of one object each, since PyBullet takes no more than one hull from memory; the
+        faces in it are a mere fan, as Bullet wraps a hull round the corners.
+        """
+        if SHAPES[block_type].is_box:
+            half_m = list(SHAPES[block_type].high_m)
             return int(
                 self._bullet.createCollisionShape(
                     self._bullet.GEOM_BOX, halfExtents=half_m, physicsClientId=self._client
                 )
             )
+        center = np.array(SHAPES[block_type].center_of_mass_m)
+        lines: list[str] = []
+        first = 1
+        for number, piece in enumerate(collision_pieces(block_type, _MESH_MARGIN_M)):
+            lines.append(f"o piece{number}")
+            lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in (piece.vertices_m - center).tolist()]
+            count = len(piece.vertices_m)
+            lines += [f"f {first} {first + i} {first + i + 1}" for i in range(1, count - 1)]
+            first += count
         with tempfile.TemporaryDirectory(prefix="phyblock-") as folder:
             path = Path(folder, f"{block_type}.obj")
-            path.write_text(_hulls_as_obj(block_type), encoding="ascii")
+            path.write_text("\n".join(lines) + "\n", encoding="ascii")
             shape = self._bullet.createCollisionShape(
                 self._bullet.GEOM_MESH, fileName=str(path), physicsClientId=self._client
             )
         if shape < 0:
             raise SimulationError(f"PyBullet refused the collision shape of {block_type}")
         return int(shape)
-
-
-def _half_sides_m(block_type: BlockType) -> list[float] | None:
-    """Half the sides of a block that is a box about its center of mass [m]; None for another.
-
-    Bullet keeps its margin inside a box, so that boxes need not be moved inward.
-    """
-    corners = solid_mesh(block_type).vertices_m - np.array(SHAPES[block_type].center_of_mass_m)
-    half: list[float] = corners.max(axis=0).tolist()
-    box = set(product(*((-side, side) for side in half)))
-    return half if set(map(tuple, corners.tolist())) == box else None
-
-
-def _hulls_as_obj(block_type: BlockType) -> str:
-    """The convex pieces as an OBJ of one object each, which Bullet reads as a compound of hulls.
-
-    A file, since PyBullet takes no more than one hull from memory. Its faces are a mere fan:
-    Bullet wraps a hull round the corners.
-    """
-    center = np.array(SHAPES[block_type].center_of_mass_m)
-    lines: list[str] = []
-    first = 1
-    for number, piece in enumerate(collision_pieces(block_type, _MESH_MARGIN_M)):
-        lines.append(f"o piece{number}")
-        lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in (piece.vertices_m - center).tolist()]
-        count = len(piece.vertices_m)
-        lines += [f"f {first} {first + i} {first + i + 1}" for i in range(1, count - 1)]
-        first += count
-    return "\n".join(lines) + "\n"

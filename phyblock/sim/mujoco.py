@@ -1,4 +1,4 @@
-"""MuJoCo as a physics engine, where PyBullet has no wheels.
+"""MuJoCo as a physics engine, where PyBullet has no wheels; loaded when a simulation is opened.
 
 The measured conditions for block structures to stand as they do in PyBullet: four substeps in
 each time step; contacts stiff enough not to creep, but not so stiff that they burst where facets
@@ -10,31 +10,27 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import importlib.metadata
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import product
 from types import ModuleType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain.blocks import SHAPES, BlockType, quat_xyzw_to_matrix
 from phyblock.errors import SimulationError
-from phyblock.sim.engine import FLOOR, Contact, Physics, Velocity
+from phyblock.sim.engine import FLOOR, Contact, Physics, Pose, Velocity
 from phyblock.sim.geometry import collision_pieces, solid_mesh
-from phyblock.sim.mujoco.library import load, version
-from phyblock.sim.pose import Pose
-
-__all__ = ["MujocoEngine", "MujocoSimulation"]
 
 _SUBSTEPS = 4
 _CONTACT_STEPS = 5.0
 """Time constant of contacts in substeps; with 2, facets that meet edge to edge burst apart."""
 _FRICTION_STIFFNESS = 10.0
-"""How much stiffer friction is than what keeps blocks apart; with less of it blocks creep."""
+"""Stiffness of friction over that of normal forces; with less of it blocks creep."""
 _INSET_M = 0.00002
-"""How far collision pieces are moved inward."""
+"""Distance by which collision pieces are moved inward."""
 _KEPT = 256
 
 Floats = NDArray[np.float64]
@@ -45,15 +41,30 @@ class MujocoEngine:
 
     name = "mujoco"
 
-    @property
+    @functools.cached_property
     def versions(self) -> Mapping[str, str]:
         """MuJoCo's."""
-        return {"mujoco": version()}
+        try:
+            return {"mujoco": importlib.metadata.version("mujoco-core")}
+        except importlib.metadata.PackageNotFoundError:  # Some builds are one distribution.
+            return {"mujoco": importlib.metadata.version("mujoco")}
 
     @contextlib.contextmanager
     def open(self, physics: Physics) -> Iterator[MujocoSimulation]:
         """Open a floor without blocks."""
-        yield MujocoSimulation(load(), physics)
+        yield MujocoSimulation(_loaded(), physics)
+
+
+@functools.cache
+def _loaded() -> ModuleType:
+    """The `mujoco` module, kept from writing MUJOCO_LOG.TXT into the working folder."""
+    import mujoco
+
+    def ignore(_message: str) -> None:
+        """Warnings are looked up after each step."""
+
+    mujoco.set_mju_user_warning(ignore)
+    return cast(ModuleType, mujoco)
 
 
 @dataclass
@@ -83,8 +94,8 @@ class _Body:
 class MujocoSimulation:
     """Blocks on a plane, as `Simulation`.
 
-    A model in MuJoCo holds the blocks that it was made with, so that another is begun when a block
-    came or went; it takes over where blocks are and how they move.
+    A model in MuJoCo holds the blocks that it was made with, so another is begun when a block came
+    or went; it takes over the poses and velocities.
     """
 
     def __init__(self, mujoco: ModuleType, physics: Physics) -> None:
@@ -120,25 +131,25 @@ class MujocoSimulation:
             raise SimulationError("MuJoCo found no way on: forces or contacts beyond all bounds")
 
     def pose(self, number: int) -> Pose:
-        """Where a block is now."""
+        """Return the pose of a block now."""
         place = self._bodies[number].place
         return Pose(place[:3].copy(), np.roll(place[3:], -1))
 
     def velocity(self, number: int) -> Velocity:
-        """How a block moves now."""
+        """Return the velocity of a block now."""
         body = self._bodies[number]
         spin = body.rotation @ body.motion[3:]
         linear = body.motion[:3] + np.cross(spin, body.center_m)
         return Velocity(_vector(linear), _vector(spin))
 
     def set_velocity(self, number: int, velocity: Velocity) -> None:
-        """Make a block move this way from now on."""
+        """Make a block move like this from now on."""
         body, spin = self._bodies[number], np.array(velocity.angular_rad_s)
         body.motion[:3] = velocity.linear_m_s - np.cross(spin, body.center_m)
         body.motion[3:] = body.rotation.T @ spin
 
     def contacts(self) -> tuple[Contact, ...]:
-        """Where bodies touched in the last time step."""
+        """List where bodies touched in the last time step."""
         if self._contacts is None:
             self._contacts = tuple(sorted(self._measured()))
         return self._contacts
@@ -182,8 +193,8 @@ def _vector(values: Floats) -> tuple[float, float, float]:
 
 @functools.lru_cache(maxsize=_KEPT)
 def _model(types: tuple[BlockType, ...], physics: Physics) -> Any:
-    """A model of blocks of these types on a floor; where they are is no part of it."""
-    mujoco = load()
+    """A model of blocks of these types on a floor; their poses are no part of it."""
+    mujoco = _loaded()
     spec = mujoco.MjSpec()
     option = spec.option
     option.timestep = physics.time_step_s / _SUBSTEPS
@@ -201,7 +212,7 @@ def _model(types: tuple[BlockType, ...], physics: Physics) -> Any:
     plane = mujoco.mjtGeom.mjGEOM_PLANE
     spec.worldbody.add_geom(type=plane, size=[1.0, 1.0, 1.0], **surface)
     for block_type in dict.fromkeys(types):
-        if _half_sides_m(block_type) is None:
+        if not SHAPES[block_type].is_box:
             for number, piece in enumerate(collision_pieces(block_type, _INSET_M)):
                 name = f"{block_type}{number}"
                 spec.add_mesh(name=name, uservert=piece.vertices_m.ravel())
@@ -214,26 +225,11 @@ def _model(types: tuple[BlockType, ...], physics: Physics) -> Any:
             explicitinertial=True,
         )
         body.add_freejoint()
-        for shape in _shapes(mujoco, block_type):
-            body.add_geom(**shape, **surface)
+        if SHAPES[block_type].is_box:
+            size = [side - _INSET_M for side in SHAPES[block_type].high_m]
+            body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=size, **surface)
+            continue
+        for number in range(len(collision_pieces(block_type))):
+            name = f"{block_type}{number}"
+            body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **surface)
     return spec.compile()
-
-
-def _shapes(mujoco: ModuleType, block_type: BlockType) -> Iterator[dict[str, Any]]:
-    """What a block collides with, as arguments of its geoms."""
-    half_m = _half_sides_m(block_type)
-    if half_m is not None:
-        box = mujoco.mjtGeom.mjGEOM_BOX
-        yield {"type": box, "size": [side - _INSET_M for side in half_m]}
-        return
-    for number in range(len(collision_pieces(block_type))):
-        yield {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": f"{block_type}{number}"}
-
-
-@functools.cache
-def _half_sides_m(block_type: BlockType) -> list[float] | None:
-    """Half the sides of a block that is a box about its origin [m]; None for another."""
-    corners = solid_mesh(block_type).vertices_m
-    half: list[float] = corners.max(axis=0).tolist()
-    box = set(product(*((-side, side) for side in half)))
-    return half if set(map(tuple, corners.tolist())) == box else None

@@ -1,0 +1,557 @@
+"""Blocks let go under physics: states, building orders, and plans with poses.
+
+Two facts save time and change no verdict. Blocks that nothing brings near one another cannot
+disturb one another, so they are tried group by group (`groups`); what stands elsewhere would only
+change the order in which an engine goes through contacts. And a group that has been quiet for a
+while is at rest (`Rest`), for an unsupported load of .2 % of a block's weight would show.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import threading
+import time
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phyblock.domain import Block
+from phyblock.errors import SimulationError
+from phyblock.sim.contact import (
+    FIT_TOLERANCE_M,
+    bounds_m,
+    boxes_near,
+    drop_height_m,
+    pieces_of,
+    separating_axes,
+)
+from phyblock.sim.engine import Physics, PhysicsEngine, Pose, World, physics_engine
+from phyblock.types import StepEnd
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A test of stability: simulated time [s], limits of movement, at each of `physics`."""
+
+    duration_s: float = 2.0
+    limit_m: float = 0.005
+    limit_deg: float = 5.0
+    physics: tuple[Physics, ...] = (Physics(1 / 240, 50), Physics(1 / 480, 100))
+
+
+DEFAULT_TRIAL = Trial()
+ONE_SETTING = Trial(physics=DEFAULT_TRIAL.physics[:1])
+"""A trial that costs half as much as the default and decides nothing that a score rests on."""
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Blocks are at rest when no corner was faster than `speed_m_s` [m/s] for `quiet_s` [s].
+
+    Speeds are read every `every_s` [s]. 5 mm/s lies above the jitter of resting contacts (up to
+    4 mm/s) and far below the speed of a block that has begun to tip.
+    """
+
+    speed_m_s: float = 0.005
+    quiet_s: float = 0.25
+    every_s: float = 0.05
+
+
+DEFAULT_REST = Rest()
+REACH_M = 0.012
+"""Groups this far apart stay apart while no block passes the limits of a trial."""
+_COLLAPSE_S = 3.0
+"""Time that fallen blocks are given to come to rest [s]."""
+
+
+class Movement(NamedTuple):
+    """Effect of a trial at one of its settings: the largest movement, and who passed a limit."""
+
+    moved_m: float
+    turned_deg: float
+    fallen: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Result of a trial over all its settings.
+
+    `fallen` are the orders of blocks that passed a limit under any setting; `moved_m` [m] and
+    `turned_deg` [degrees] the largest movement of any block. `agreed` is true where the settings
+    name the same blocks.
+    """
+
+    fallen: tuple[int, ...]
+    moved_m: float
+    turned_deg: float
+    agreed: bool
+
+    @classmethod
+    def of(cls, movements: Sequence[Movement]) -> Stability:
+        """Combine the movements under each setting."""
+        return cls(
+            fallen=tuple(sorted({order for one in movements for order in one.fallen})),
+            moved_m=max((one.moved_m for one in movements), default=0.0),
+            turned_deg=max((one.turned_deg for one in movements), default=0.0),
+            agreed=len({one.fallen for one in movements}) <= 1,
+        )
+
+    @property
+    def stable(self) -> bool:
+        """True if every block stayed within the limits under every setting."""
+        return not self.fallen
+
+
+def check(
+    blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL, rest: Rest | None = None
+) -> Stability:
+    """Let blocks go at their goal poses and see which of them stay.
+
+    With `rest`, each group is let go alone and watched until it is at rest; without, all blocks
+    are watched together for the whole time.
+    """
+    movements = []
+    for physics in trial.physics:
+        with World(physics) as world:
+            parts = (tuple(blocks),) if rest is None else groups(blocks)
+            tried = [_tried(world, group, trial, rest) for group in parts]
+        fallen = tuple(sorted(order for one in tried for order in one.fallen))
+        moved_m = max((one.moved_m for one in tried), default=0.0)
+        turned_deg = max((one.turned_deg for one in tried), default=0.0)
+        movements.append(Movement(moved_m, turned_deg, fallen))
+    return Stability.of(movements)
+
+
+def check_steps(
+    blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL, rest: Rest = DEFAULT_REST
+) -> tuple[Stability, ...]:
+    """Stability after each step when blocks are placed in the order given.
+
+    Only the group of the block just placed is tried, every block at its goal pose; the other
+    groups were tried at earlier steps.
+    """
+    by_step: list[list[Movement]] = [[] for _ in blocks]
+    for physics in trial.physics:
+        with World(physics) as world:
+            for count, block in enumerate(blocks, 1):
+                group = next(group for group in groups(blocks[:count]) if block in group)
+                by_step[count - 1].append(_tried(world, group, trial, rest))
+    return tuple(Stability.of(movements) for movements in by_step)
+
+
+def groups(blocks: Sequence[Block], reach_m: float = REACH_M) -> tuple[tuple[Block, ...], ...]:
+    """The blocks in groups that keep more than `reach_m` [m] of free space between them."""
+    boxes = [bounds_m(block) for block in blocks]
+    left = set(range(len(blocks)))
+    touching: list[tuple[Block, ...]] = []
+    while left:
+        frontier = [min(left)]
+        left.remove(frontier[0])
+        members = []
+        while frontier:
+            at = frontier.pop()
+            members.append(at)
+            near = {other for other in left if boxes_near(boxes[at], boxes[other], reach_m)}
+            left -= near
+            frontier += sorted(near)
+        touching.append(tuple(blocks[member] for member in sorted(members)))
+    return tuple(touching)
+
+
+def movement(blocks: Sequence[Block], poses: Mapping[int, Pose], trial: Trial) -> Movement:
+    """Distance of blocks from their goal poses, and the orders of those past a limit."""
+    moved = {b.order: poses[b.order].distance_m(Pose.goal(b)) for b in blocks}
+    turned = {b.order: poses[b.order].angle_deg(Pose.goal(b)) for b in blocks}
+    fallen = (o for o in moved if moved[o] > trial.limit_m or turned[o] > trial.limit_deg)
+    return Movement(
+        max(moved.values(), default=0.0), max(turned.values(), default=0.0), tuple(sorted(fallen))
+    )
+
+
+def wait(world: World, limit_s: float, rest: Rest = DEFAULT_REST) -> bool:
+    """Simulate until all has been quiet for a while; True if that was within `limit_s` [s]."""
+    return any(moments(world, limit_s, rest))
+
+
+def moments(world: World, limit_s: float, rest: Rest = DEFAULT_REST) -> Iterator[bool]:
+    """Simulate moment by moment up to `limit_s` [s]; yields True once all is at rest."""
+    every_s = max(rest.every_s, world.physics.time_step_s)
+    quiet_s = 0.0
+    for _ in range(round(limit_s / every_s)):
+        world.step(every_s)
+        quiet_s = quiet_s + every_s if world.fastest_m_s() < rest.speed_m_s else 0.0
+        yield quiet_s >= rest.quiet_s - every_s / 2
+
+
+@contextlib.contextmanager
+def _placed(world: World, blocks: Sequence[Block]) -> Iterator[None]:
+    """Blocks in a world for a while."""
+    world.place(*blocks)
+    try:
+        yield
+    finally:
+        for block in reversed(blocks):
+            world.remove(block.order)
+
+
+def _tried(world: World, group: Sequence[Block], trial: Trial, rest: Rest | None) -> Movement:
+    """Movement of a group, alone in the world for this trial."""
+    with _placed(world, group):
+        if rest is None:
+            world.step(trial.duration_s)
+        else:
+            wait(world, trial.duration_s, rest)
+        return movement(group, world.poses(), trial)
+
+
+_KEPT = 65_536
+"""Arrangements and states that are remembered, about 1 kB each."""
+_PLACE_DIGITS = 6
+_ONE_AT_A_TIME = threading.Lock()
+
+
+@dataclass(frozen=True)
+class Settled:
+    """Blocks that were let go.
+
+    `fallen` are the orders of those that passed the trial's limits, or did so in the fall of
+    others; `blocks` all of them, at their goal poses but for the fallen, which lie where they came
+    to rest.
+    """
+
+    fallen: tuple[int, ...]
+    blocks: tuple[Block, ...]
+
+    @property
+    def stands(self) -> bool:
+        """True if every block stayed where it was put."""
+        return not self.fallen
+
+
+class Site:
+    """Worlds kept open to try one state after another, each once.
+
+    A partly built structure is always tried with every block at its goal pose, so that no step is
+    judged by the drift of the ones before it, and each arrangement of a group once, wherever on
+    the ground and in whatever colors it is met again: a verdict depends on nothing that was tried
+    before. `engine` is the chosen one unless another is given.
+    """
+
+    def __init__(self, trial: Trial = DEFAULT_TRIAL, engine: PhysicsEngine | None = None) -> None:
+        self.trial = trial
+        self._engine = engine or physics_engine()
+        self._stack = contextlib.ExitStack()
+        self._worlds: dict[Physics, World] = {}
+        self._known = functools.lru_cache(_KEPT)(self._settle)
+        self._stands = functools.lru_cache(_KEPT)(self._stand)
+
+    def close(self) -> None:
+        """Release the worlds; the next trial opens new ones."""
+        self._worlds.clear()
+        self._stack.close()
+
+    def settle(self, blocks: Sequence[Block]) -> Settled:
+        """Let blocks go at their goal poses; they fall when they do under any of the settings."""
+        return self._known(tuple(blocks))
+
+    def _settle(self, blocks: tuple[Block, ...]) -> Settled:
+        if all(self._stands(_arrangement(group)) for group in groups(blocks)):
+            return Settled((), blocks)
+        fallen: set[int] = set()
+        shown: tuple[Block, ...] = ()
+        for physics in self.trial.physics:
+            # A fresh world: how blocks tumble could depend on what was in a used one before.
+            with World(physics, self._engine) as world:
+                world.place(*blocks)
+                wait(world, self.trial.duration_s)
+                moved = movement(blocks, world.poses(), self.trial).fallen
+                if moved:
+                    wait(world, _COLLAPSE_S)
+                    poses = world.poses()
+                    moved = (*moved, *movement(blocks, poses, self.trial).fallen)
+                    shown = shown or tuple(
+                        poses[b.order].put(b) if b.order in moved else b for b in blocks
+                    )
+            fallen.update(moved)
+        return Settled(tuple(sorted(fallen)), shown or blocks)
+
+    def _stand(self, blocks: tuple[Block, ...]) -> bool:
+        """True if blocks, alone in the world, stay where they are under every setting."""
+        for physics in self.trial.physics:
+            if physics not in self._worlds:
+                self._worlds[physics] = self._stack.enter_context(World(physics, self._engine))
+            if _tried(self._worlds[physics], blocks, self.trial, DEFAULT_REST).fallen:
+                return False
+        return True
+
+
+def _arrangement(group: Sequence[Block]) -> tuple[Block, ...]:
+    """All of a group that its stability depends on: the first block at the origin, no colors."""
+    x0, y0, _ = group[0].position_m
+
+    def moved(block: Block) -> tuple[float, float, float]:
+        x, y, z = block.position_m
+        return (round(x - x0, _PLACE_DIGITS) + 0.0, round(y - y0, _PLACE_DIGITS) + 0.0, z)
+
+    return tuple(
+        Block(number, block.type, "red", moved(block), block.euler_deg, (), 1)
+        for number, block in enumerate(group, 1)
+    )
+
+
+@functools.cache
+def _shared_site(trial: Trial, engine: PhysicsEngine) -> Site:
+    return Site(trial, engine)
+
+
+def settle(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> Settled:
+    """As `Site.settle`, at a site that lasts as long as the process; for any thread."""
+    with _ONE_AT_A_TIME:
+        return _shared_site(trial, physics_engine()).settle(blocks)
+
+
+LONGEST_S = 600.0
+"""A plan whose execution takes longer, by the clock, is given up [s]."""
+_TRIES = 16
+_CM = 100.0
+_DIGITS = 3
+
+
+@dataclass(frozen=True)
+class ExecutionLimits:
+    """Tolerances of an execution.
+
+    A block may be moved out of others by `overlap_cm` [cm]; one that moves by up to `stand_cm` and
+    `stand_deg` [degrees] when it is let go, or another is, still counts as standing.
+    """
+
+    overlap_cm: float = 0.5
+    stand_cm: float = 1.0
+    stand_deg: float = 10.0
+
+
+@dataclass(frozen=True)
+class ExecutedStep:
+    """Result of a step.
+
+    `moved_cm` and `turned_deg` say how far the block came to lie from the pose it was to have,
+    `gap_cm` how far it was above whatever it would fall on when it was let go, `overlap_cm` how far
+    it had to be moved out of others or the floor, or how deep it was refused; `knocked` are the
+    numbers of the steps whose blocks it moved, from 1.
+    """
+
+    end: StepEnd
+    moved_cm: float = 0.0
+    turned_deg: float = 0.0
+    gap_cm: float = 0.0
+    overlap_cm: float = 0.0
+    knocked: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Execution:
+    """Result of a plan: its steps, and the blocks where they lie after each of them.
+
+    The order of a block is the number of its step.
+    """
+
+    steps: tuple[ExecutedStep, ...]
+    worlds: tuple[tuple[Block, ...], ...]
+
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """The blocks in the end."""
+        return self.worlds[-1] if self.worlds else ()
+
+
+def execute(
+    blocks: Sequence[Block | None],
+    limits: ExecutionLimits | None = None,
+    engine: PhysicsEngine | None = None,
+) -> Execution:
+    """Put blocks at their poses, one after another; None stands for a step that names no block.
+
+    Their orders are taken anew, from 1 by step. The same call gives the same result, whatever was
+    executed before; `engine` is the chosen one unless another is given. Raises SimulationError
+    where the engine cannot be used, and for a plan that takes longer than `LONGEST_S`.
+    """
+    give_up_s = time.monotonic() + LONGEST_S
+    steps: list[ExecutedStep] = []
+    worlds: list[tuple[Block, ...]] = []
+    with Executor(limits, engine) as executor:
+        for number, block in enumerate(blocks, 1):
+            if time.monotonic() > give_up_s:
+                message = (
+                    f"carrying out a plan of {len(blocks)} steps took more than {LONGEST_S:g} s"
+                )
+                raise SimulationError(f"{message}; it was given up before step {number}")
+            steps.append(executor.step(block))
+            worlds.append(executor.blocks)
+    return Execution(tuple(steps), tuple(worlds))
+
+
+class Executor:
+    """Execution of a plan with poses, step by step; a context manager.
+
+    The hand that puts a block gives way a little: one that would share space with others, or with
+    the floor, by no more than a tolerance is moved out the shortest way, and one that hangs no
+    higher above them is lowered; where it would share more, it is refused and stays out. Nothing
+    is set right later: what fell or was knocked over stays so for the steps that follow.
+
+    A block is let go with the blocks near it alone; others join as soon as something that fell
+    comes near them. Where a step moves no block past the limits of `DEFAULT_TRIAL`, all is set
+    back, so that no step is judged by the drift of the ones before it.
+    """
+
+    def __init__(
+        self, limits: ExecutionLimits | None = None, engine: PhysicsEngine | None = None
+    ) -> None:
+        self._limits = limits or ExecutionLimits()
+        self._world = World(engine=engine)
+        self._resting: dict[int, Block] = {}
+        self._steps = 0
+
+    def __enter__(self) -> Executor:
+        self._world.__enter__()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._world.__exit__(*error)
+
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """The blocks where they lie now, each with the number of its step as its order."""
+        return tuple(self._resting.values())
+
+    def step(self, block: Block | None) -> ExecutedStep:
+        """Put a block where it is, if there is room for it, and let it go."""
+        self._steps += 1
+        if block is None:
+            return ExecutedStep("no_block")
+        block = replace(block, order=self._steps)
+        below_cm = depth_cm(block)
+        if below_cm > self._limits.overlap_cm:
+            return ExecutedStep("under_floor", overlap_cm=round(below_cm, _DIGITS))
+        others = self.blocks
+        most_m = self._limits.overlap_cm / _CM
+        free, given_m = _out_of_others(block, others, most_m)
+        if free is None:
+            return ExecutedStep("overlaps", overlap_cm=round(given_m * _CM, _DIGITS))
+        gap_m = drop_height_m(free, others)
+        if FIT_TOLERANCE_M < gap_m <= most_m:
+            x, y, z = free.position_m
+            free = replace(free, position_m=(x, y, z - gap_m))
+        after = self._let_go(free)
+        moved_cm, turned_deg = moved_between(Pose.goal(block), after[block.order])
+        knocked = tuple(
+            other.order
+            for other in others
+            if other.order in after
+            and not self._is_still(*moved_between(Pose.goal(other), after[other.order]))
+        )
+        end = end_of(knocked, self._is_still(moved_cm, turned_deg))
+        numbers = (moved_cm, turned_deg, gap_m * _CM, given_m * _CM)
+        moved, turned, gap, given = (round(number, _DIGITS) + 0.0 for number in numbers)
+        return ExecutedStep(end, moved, turned, gap, given, knocked)
+
+    def _let_go(self, block: Block) -> dict[int, Pose]:
+        """Poses of the block and of all that it could move, once they rest."""
+        self._resting[block.order] = block
+        apart = groups(self.blocks)
+        near: tuple[Block, ...] = ()
+        reached = {block.order}
+        while reached:
+            reached.update(one.order for one in near)
+            meant = (group for group in apart if any(b.order in reached for b in group))
+            near = tuple(b for group in meant for b in group)
+            others = tuple(b for b in self.blocks if b not in near)
+            with _placed(self._world, near):
+                reached = self._watched(near, others, DEFAULT_TRIAL.duration_s)
+                # What has not fallen by then stands: an engine may let it creep on for ever.
+                if not reached and movement(near, self._world.poses(), DEFAULT_TRIAL).fallen:
+                    reached = self._watched(near, others, _COLLAPSE_S)
+                after = self._world.poses()
+        if movement(near, after, DEFAULT_TRIAL).fallen:
+            for order, pose in after.items():
+                self._resting[order] = pose.put(self._resting[order])
+        return after
+
+    def _watched(self, near: Sequence[Block], others: Sequence[Block], limit_s: float) -> set[int]:
+        """Let blocks go until they rest or come near others, whose orders are returned."""
+        before = self._world.poses()
+        for is_quiet in moments(self._world, limit_s):
+            after = self._world.poses()
+            fallen = movement(near, after, DEFAULT_TRIAL).fallen if others else ()
+            reached: set[int] = set()
+            for block in near:
+                if block.order in fallen:
+                    was, now = (bounds_m(at[block.order].put(block)) for at in (before, after))
+                    way = np.stack([np.minimum(was, now)[0], np.maximum(was, now)[1]])
+                    reached |= {o.order for o in others if boxes_near(bounds_m(o), way, REACH_M)}
+            if reached:
+                return reached
+            if is_quiet:
+                break
+            before = after
+        return set()
+
+    def _is_still(self, moved_cm: float, turned_deg: float) -> bool:
+        return moved_cm <= self._limits.stand_cm and turned_deg <= self._limits.stand_deg
+
+
+def depth_cm(block: Block) -> float:
+    """Depth to which a block reaches below the floor [cm]; negative above it."""
+    return -float(bounds_m(block)[0, 2]) * _CM
+
+
+def moved_between(start: Pose, end: Pose) -> tuple[float, float]:
+    """Distance [cm] and turn [degrees] from one pose to another."""
+    return start.distance_m(end) * _CM, start.angle_deg(end)
+
+
+def end_of(knocked: Collection[int], is_still: bool) -> StepEnd:
+    """The end of a step whose block was let go."""
+    return "knocks_over" if knocked else "stands" if is_still else "falls"
+
+
+def _out_of_others(
+    block: Block, others: Sequence[Block], most_m: float
+) -> tuple[Block | None, float]:
+    """The block moved out of others and of the floor, and the distance [m].
+
+    None in place of the block where that is more than `most_m` [m].
+    """
+    start = np.array(block.position_m)
+    for _ in range(_TRIES):
+        way = _way_out(block, others)
+        depth_m = float(np.linalg.norm(way))
+        moved_m = float(np.linalg.norm(np.array(block.position_m) + way - start))
+        if moved_m > most_m or depth_m > most_m:
+            return None, max(moved_m, depth_m)
+        if depth_m <= FIT_TOLERANCE_M:
+            break
+        x, y, z = (float(part) for part in np.array(block.position_m) + way)
+        block = replace(block, position_m=(x, y, z))
+    return block, float(np.linalg.norm(np.array(block.position_m) - start))
+
+
+def _way_out(block: Block, others: Sequence[Block]) -> NDArray[np.float64]:
+    """The shortest way out of the deepest overlap, shape (3,) [m]; zero where there is none."""
+    box = bounds_m(block)
+    deepest = np.array([0.0, 0.0, max(0.0, -float(box[0, 2]))])
+    for other in others:
+        if not boxes_near(bounds_m(other), box, 0.0):
+            continue
+        for theirs in pieces_of(other):
+            for mine in pieces_of(block):
+                axes = separating_axes(theirs, mine)
+                best = int(axes.gaps_m.argmax())
+                if axes.gaps_m[best] < 0:
+                    way = -axes.gaps_m[best] * axes.directions[best]
+                    if np.linalg.norm(way) > np.linalg.norm(deepest):
+                        deepest = way
+    return deepest

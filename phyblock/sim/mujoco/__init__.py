@@ -1,1 +1,0 @@
-"""MuJoCo behind the protocol of engines: the only package that imports it, and then late."""

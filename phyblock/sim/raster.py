@@ -1,0 +1,475 @@
+"""The rasterizer: triangles to pixels in numpy, with shadows, the same bytes on every machine.
+
+Colored meshes, a camera and a light in, pixels out; floor, outlines and smoothing are made in
+`phyblock.sim.pictures`. All triangles are scanned at once: each row of pixels that a triangle
+crosses is a span, each span a run of pixels. The nearest triangle of each pixel is kept by its
+nearness, a number that is linear over the screen (the inverse of depth for a camera; the height
+towards a light from far away).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phyblock.domain.blocks import quat_xyzw_to_matrix
+from phyblock.sim.camera import Camera
+from phyblock.sim.engine import Pose
+from phyblock.sim.geometry import Mesh, cross, dot, rounded, turned, unit
+
+RASTER_VERSION = "1"
+"""Raised whenever the same props give other pixels."""
+NOTHING = -1
+"""Stands for the triangle of a pixel that shows none."""
+
+Rgb = tuple[int, int, int]
+"""Red, green and blue, 0..255."""
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_AT_ONCE = 1 << 16
+"""Pixels that are worked on together: what they take of memory is used again and again."""
+_FLAT = 1e-9
+"""Unit normals that differ by less in each component are those of one plane."""
+_LEAST_DEPTH_M = 1e-3
+"""What is nearer to a camera is not drawn, as one cannot project what is behind it."""
+_LIGHT_SCREEN = 0.75
+"""Side of the light's picture, as a share of the camera's: props fill the former wholly."""
+_MARGIN_PX = 2
+_AWAY = -1e-6
+_TOUCHING_M = 5e-5
+"""What lies this little behind a face is at it: blocks at rest overlap by less [m]."""
+_TAPS = ((0, 0), (1, 0), (0, 1), (1, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class Prop:
+    """A mesh in one color at a pose."""
+
+    mesh: Mesh
+    rgb: Rgb
+    pose: Pose
+
+
+@dataclass(frozen=True, eq=False)
+class Light:
+    """A light from far away: `direction` (3,) is the unit vector to it, in the world.
+
+    A face with the outward unit normal n has its mesh's color times
+    ambient + diffuse * max(0, n . direction), or times ambient where a mesh stands in the way of
+    the light.
+    """
+
+    direction: Floats
+    ambient: float
+    diffuse: float
+
+
+@dataclass(frozen=True, eq=False)
+class Raster:
+    """A drawing: `rgb` shape (size, size, 3), 0..255, row 0 on top.
+
+    `prop` shape (size, size) is the place in the list of the prop that each pixel shows, -1 where
+    it shows none and its color does not matter. `face` shape (size, size) tells the faces of a
+    prop apart, by any numbers: outlines run between them. `shaded` shape (size, size) is where the
+    ground, the plane z = 0, lies in shadow, whatever stands before it.
+    """
+
+    rgb: NDArray[np.uint8]
+    prop: Ints
+    face: Ints
+    shaded: NDArray[np.bool_]
+
+
+def draw(props: Sequence[Prop], camera: Camera, light: Light, size_px: int) -> Raster:
+    """Draw closed meshes between the camera's near and far plane, `size_px` squared."""
+    screen = _CameraScreen(camera, size_px)
+    rgb = np.zeros((size_px, size_px, 3), dtype=np.uint8)
+    if not props:
+        nothing = np.full((size_px, size_px), NOTHING)
+        return Raster(rgb, nothing, nothing, nothing != NOTHING)
+    solid = _solids(props)
+    front = solid[dot(solid.normals, solid.anchor_m - camera.eye_m) < 0]
+    corners_px, owner = screen.corners_px(front.corners_m)
+    covering = _spans(corners_px, size_px)
+    covering = covering._replace(triangle=owner[covering.triangle])
+    triangle, nearness = _nearest(
+        covering, screen.planes(front), size_px, screen.least, screen.most
+    )
+    look = _Look(props, solid, front, screen, light)
+    prop, face = (np.full((size_px, size_px), NOTHING) for _ in range(2))
+    pixels = np.flatnonzero(triangle != NOTHING)
+    for start in range(0, len(pixels), _AT_ONCE):
+        part = pixels[start : start + _AT_ONCE]
+        shown = triangle.ravel()[part]
+        row, column = np.divmod(part, size_px)
+        points = _Points(column * 1.0, row * 1.0, 1 / nearness.ravel()[part])
+        rgb.reshape(-1, 3)[part] = look.colors(shown, points)
+        prop.ravel()[part], face.ravel()[part] = front.prop[shown], front.face[shown]
+    return Raster(rgb, prop, face, _ground_shadow(solid, light.direction, screen))
+
+
+@dataclass(frozen=True, eq=False)
+class _Solids:
+    """Triangles of all props in the world, n of them.
+
+    `corners_m` shape (n, 3, 3) [m]; `anchor_m` (n, 3) [m] a point of the plane that is the same
+    for all triangles of a flat face; `normals` (n, 3) of the triangles, unit; `bends` (n, 3, 3) of
+    the surface at their corners; `prop` (n,) the place of the prop in the list; `face` (n,) the
+    face's number within it.
+    """
+
+    corners_m: Floats
+    anchor_m: Floats
+    normals: Floats
+    bends: Floats
+    prop: Ints
+    face: Ints
+
+    def __getitem__(self, chosen: NDArray[np.bool_]) -> _Solids:
+        """Some of the triangles."""
+        return _Solids(*(getattr(self, field.name)[chosen] for field in fields(self)))
+
+
+def _solids(props: Sequence[Prop]) -> _Solids:
+    """The triangles of some props, one at least.
+
+    Their order does not depend on that of props, so that of two faces in one place the same one
+    shows.
+    """
+
+    def name(place: int) -> tuple[object, ...]:
+        prop = props[place]
+        pose, vertices = prop.pose, prop.mesh.vertices_m.ravel()
+        return (pose.position_m.tolist(), pose.quat_xyzw.tolist(), prop.rgb, vertices.tolist())
+
+    parts = []
+    for place in sorted(range(len(props)), key=name):
+        mesh, pose = props[place].mesh, props[place].pose
+        matrix = rounded(quat_xyzw_to_matrix(pose.quat_xyzw))
+        corners_m = turned(mesh.corners_m, matrix) + pose.position_m
+        apart = np.abs(mesh.normals - mesh.normals[mesh.faces]).max(axis=1)
+        anchors = np.where(apart < _FLAT, mesh.faces, np.arange(len(corners_m)))
+        normals, bends = turned(mesh.normals, matrix), turned(mesh.corner_normals, matrix)
+        numbers = np.full(len(corners_m), place)
+        parts.append((corners_m, corners_m[anchors, 0], normals, bends, numbers, mesh.faces))
+    return _Solids(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+@dataclass(frozen=True, eq=False)
+class _CameraScreen:
+    """The screen of a camera, `size_px` squared; nearness is the inverse of depth [1/m]."""
+
+    camera: Camera
+    size_px: int
+
+    @property
+    def least(self) -> float:
+        """Nearness of the far plane."""
+        return 1 / self.camera.far_m
+
+    @property
+    def most(self) -> float:
+        """Nearness of the near plane, or of what is as near as can be drawn."""
+        return 1 / max(self.camera.near_m, _LEAST_DEPTH_M)
+
+    def linear(self, vectors: Floats) -> Floats:
+        """Scalar product of vectors (n, 3) with the ray through a pixel's center, as (n, 3).
+
+        The three numbers a, b, c stand for a * column + b * row + c; rays have a depth of 1.
+        """
+        right, up, forward = turned(vectors, self.camera.axes).T
+        step = 2 * self.camera.half_tangent / self.size_px
+        middle = (1 - self.size_px) / 2
+        across, down = right * step, -up * step
+        return np.stack([across, down, (across + down) * middle + forward], axis=1)
+
+    def planes(self, triangles: _Solids) -> Floats:
+        """Nearness of each triangle's plane, linear over the screen, shape (n, 3)."""
+        away = dot(triangles.normals, triangles.anchor_m - self.camera.eye_m)
+        return self.linear(triangles.normals / away[:, None])
+
+    def corners_px(self, corners_m: Floats) -> tuple[Floats, Ints]:
+        """Triangles (n, 3, 3) [m] on the screen, shape (k, 3, 2), and the owner of each of the k.
+
+        What lies before the nearest depth is cut off, which may leave two of a triangle or none.
+        """
+        seen = turned(corners_m - self.camera.eye_m, self.camera.axes)
+        whole = (seen[..., 2] >= _LEAST_DEPTH_M).all(axis=1)
+        owner = np.flatnonzero(whole)
+        kept, owners = [seen[whole]], [owner]
+        for number in np.flatnonzero(~whole & (seen[..., 2] >= _LEAST_DEPTH_M).any(axis=1)):
+            parts = _cut(seen[number])
+            kept.append(parts)
+            owners.append(np.full(len(parts), number))
+        points = np.concatenate(kept)
+        middle = self.size_px / 2
+        scale = middle / self.camera.half_tangent
+        column = points[..., 0] / points[..., 2] * scale + middle
+        row = middle - points[..., 1] / points[..., 2] * scale
+        return np.stack([column, row], axis=-1), np.concatenate(owners)
+
+
+def _cut(corners: Floats) -> Floats:
+    """The part of a triangle (3, 3) in front of the camera, as triangles (1 or 2, 3, 3)."""
+    polygon: list[Floats] = []
+    for one, other in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        if one[2] >= _LEAST_DEPTH_M:
+            polygon.append(one)
+        if (one[2] >= _LEAST_DEPTH_M) != (other[2] >= _LEAST_DEPTH_M):
+            share = (_LEAST_DEPTH_M - one[2]) / (other[2] - one[2])
+            polygon.append(one + share * (other - one))
+    return np.array([[polygon[0], polygon[i], polygon[i + 1]] for i in range(1, len(polygon) - 1)])
+
+
+class _Spans(NamedTuple):
+    """Runs of pixels: their triangle, their row, the first column and the one after the last."""
+
+    triangle: Ints
+    row: Ints
+    left: Ints
+    right: Ints
+
+
+def _spans(corners_px: Floats, size_px: int) -> _Spans:
+    """The spans of triangles with corners (n, 3, 2), column and row, on a screen `size_px` wide.
+
+    A pixel belongs to a triangle that holds its center, half a pixel from its edges. The crossing
+    of an edge with a row is computed from the edge's ends alone, in one order, so two triangles
+    that share an edge cover every pixel along it once.
+    """
+
+    def from_center(place: Floats) -> Ints:
+        """The first pixel whose center is not before a place, within the screen."""
+        return np.ceil(np.clip(place, 0.0, size_px) - 0.5).astype(np.int64)
+
+    order = np.argsort(corners_px[..., 1], axis=1, kind="stable")
+    x, y = np.moveaxis(np.take_along_axis(corners_px, order[..., None], axis=1), -1, 0)
+    first, end = (from_center(y[:, i]) for i in (0, 2))
+    heights = np.maximum(end - first, 0)
+    triangle = np.repeat(np.arange(len(x)), heights)
+    row = np.arange(len(triangle)) - np.repeat(np.cumsum(heights) - heights - first, heights)
+    x, y, center = x[triangle], y[triangle], row + 0.5
+
+    def crossing(start: int, end: int) -> Floats:
+        """Crossing of the edge between two corners with a row's center; any for a level edge."""
+        rise = y[:, end] - y[:, start]
+        slope = (x[:, end] - x[:, start]) / np.where(rise > 0, rise, 1.0)
+        found: Floats = x[:, start] + (center - y[:, start]) * slope
+        return found
+
+    long = crossing(0, 2)
+    short = np.where(center < y[:, 1], crossing(0, 1), crossing(1, 2))
+    left, right = from_center(np.minimum(long, short)), from_center(np.maximum(long, short))
+    some = right > left
+    return _Spans(triangle[some], row[some], left[some], right[some])
+
+
+def _nearest(
+    covering: _Spans, planes: Floats, size_px: int, least: float, most: float
+) -> tuple[NDArray[np.int32], Floats]:
+    """The nearest triangle of each pixel, or `NOTHING`, and its nearness there, (size, size).
+
+    `planes` (n, 3) give the nearness of each triangle as a * column + b * row + c; what lies
+    outside `least`..`most` is left out. Of two that are equally near the later counts.
+    """
+    best = np.full(size_px * size_px, least)
+    shown = np.full(size_px * size_px, NOTHING, dtype=np.int32)
+    ends = np.cumsum(covering.right - covering.left)
+    cuts = np.flatnonzero(np.diff(ends // _AT_ONCE)) + 1
+    for group in np.split(np.arange(len(ends)), cuts):
+        part = _Spans(*(column[group] for column in covering))
+        lengths = part.right - part.left
+        a, b, c = planes.T[:, part.triangle]
+        start = np.cumsum(lengths) - lengths
+        column = np.arange(int(lengths.sum())) - np.repeat(start - part.left, lengths)
+        pixel = column + np.repeat(part.row * size_px, lengths)
+        nearness = np.repeat(a, lengths) * column
+        nearness += np.repeat(b * part.row + c, lengths)
+        if nearness.max(initial=-np.inf) > most:
+            nearness[nearness > most] = -np.inf
+        np.maximum.at(best, pixel, nearness)
+        seen = nearness == best[pixel]
+        shown[pixel[seen]] = np.repeat(part.triangle, lengths)[seen]
+    return shown.reshape(size_px, size_px), best.reshape(size_px, size_px)
+
+
+class _Points(NamedTuple):
+    """Points that pixels show, each (n,): their column and row, and the depth [m]."""
+
+    column: Floats
+    row: Floats
+    depth_m: Floats
+
+    def some(self, chosen: Ints) -> _Points:
+        return _Points(self.column[chosen], self.row[chosen], self.depth_m[chosen])
+
+    def linear(self, start: Floats, slope: Floats) -> Floats:
+        """The sum start + depth * (a * column + b * row + c) for `slope` (3,) or (3, n)."""
+        a, b, c = slope
+        total: Floats = (a * self.column + (b * self.row + c)) * self.depth_m
+        total += start
+        return total
+
+
+class _Look:
+    """Colors of the triangles in `front` of a camera, in a light that all of `solid` shades."""
+
+    def __init__(
+        self,
+        props: Sequence[Prop],
+        solid: _Solids,
+        front: _Solids,
+        screen: _CameraScreen,
+        light: Light,
+    ) -> None:
+        self._rgb = np.array([prop.rgb for prop in props], dtype=np.float64)[front.prop]
+        self._light, self._map = light, None
+        # The cosine to the light is known at corners, and linear between them.
+        cosines = dot(front.bends, light.direction)
+        gradient = _gradient(front.corners_m, cosines)
+        self._is_bent = np.ptp(cosines, axis=1) > 0
+        self._cosine = cosines[:, 0]
+        self._start = cosines[:, 0]
+        self._start = self._start + dot(gradient, screen.camera.eye_m - front.corners_m[:, 0])
+        self._slope = screen.linear(gradient).T
+        if light.diffuse:
+            self._map = _LightMap(solid, light.direction, round(screen.size_px * _LIGHT_SCREEN))
+            steps = screen.linear(self._map.steps)
+            eye = self._map.places(screen.camera.eye_m)
+            self._map_places = list(zip(eye, steps, strict=True))
+
+    def colors(self, shown: NDArray[np.int32], points: _Points) -> Floats:
+        """Color of each point by the triangle that it is of, shape (n, 3), 0..255, whole."""
+        bright = self._cosine[shown]
+        bent = np.flatnonzero(self._is_bent[shown])
+        which = shown[bent]
+        bright[bent] = points.some(bent).linear(self._start[which], self._slope[:, which])
+        to_light = np.flatnonzero(bright > 0)
+        if self._map is not None:
+            lit = points.some(to_light)
+            places = [lit.linear(start, slope) for start, slope in self._map_places]
+            bright[to_light] *= self._map.lit(*places)
+        np.maximum(bright, 0.0, out=bright)
+        bright *= self._light.diffuse
+        bright += self._light.ambient
+        colors: Floats = self._rgb[shown]
+        colors *= bright[:, None]
+        np.minimum(colors, 255.0, out=colors)
+        return np.rint(colors, out=colors)
+
+
+def _gradient(corners_m: Floats, values: Floats) -> Floats:
+    """Gradient (n, 3) in its plane of values (n, 3) at a triangle's corners."""
+    one, two = (corners_m[:, i] - corners_m[:, 0] for i in (1, 2))
+    normal = cross(one, two)
+    rise_one, rise_two = (values[:, i, None] - values[:, :1] for i in (1, 2))
+    gradient = rise_one * cross(two, normal) + rise_two * cross(normal, one)
+    gradient /= dot(normal, normal)[:, None]
+    return gradient
+
+
+class _LightMap:
+    """The picture from the light, `size_px` squared: shadows of props on props.
+
+    It shows, for each of its pixels, the face nearest to the light of those that look away from
+    it: where light leaves a solid. A point is in shadow when it lies behind that face's plane.
+    Faces that look to the light never shade themselves this way, so that no bias is needed, and
+    shadows touch what casts them (second-depth shadow mapping: Wang and Molnar 1994). Nearness is
+    the height towards the light [m]; `axes` are right, up, towards the light (world).
+    """
+
+    def __init__(self, solid: _Solids, direction: Floats, size_px: int) -> None:
+        beside = np.array([0.0, 0.0, 1.0] if abs(direction[2]) < 0.9 else [1.0, 0.0, 0.0])
+        right = unit(cross(beside, direction))
+        self._axes = np.stack([right, cross(direction, right), direction])
+        flat = turned(solid.corners_m, self._axes)[..., :2].reshape(-1, 2)
+        low, high = flat.min(axis=0), flat.max(axis=0)
+        self._pixel_m = max(float((high - low).max()) / (size_px - 2 * _MARGIN_PX), 1e-6)
+        self._low_m = low - _MARGIN_PX * self._pixel_m
+        self._size_px = size_px
+        backs = solid[dot(solid.normals, direction) < _AWAY]
+        planes = self._planes_of(backs)
+        covering = _spans(self.places(backs.corners_m)[..., :2], size_px)
+        shown, _ = _nearest(covering, planes, size_px, -np.inf, np.inf)
+        alike = np.ones(shown.shape, dtype=np.bool_)
+        alike[:-1, :-1] = shown[:-1, :-1] == shown[1:, 1:]
+        alike[:-1, :-1] &= (shown[:-1, :-1] == shown[:-1, 1:]) & (shown[:-1, :-1] == shown[1:, :-1])
+        self._shown, self._alike = shown.ravel(), alike.ravel()
+        # Where nothing is seen, nothing shades.
+        self._planes = np.vstack([planes, [0.0, 0.0, -np.inf]]).T.copy()
+
+    def _planes_of(self, triangles: _Solids) -> Floats:
+        """Nearness of each triangle's plane, linear over the screen, shape (n, 3)."""
+        right, up, towards = turned(triangles.normals, self._axes).T
+        a, b = -right / towards * self._pixel_m, -up / towards * self._pixel_m
+        level = dot(triangles.normals, triangles.anchor_m) / towards
+        level += (a * self._low_m[0] + b * self._low_m[1]) / self._pixel_m
+        return np.stack([a, b, level + (a + b) / 2], axis=1)
+
+    def places(self, points_m: Floats) -> Floats:
+        """Column, row and height towards the light of points (..., 3) [m], on the last axis."""
+        places = turned(points_m, self._axes)
+        places[..., :2] = (places[..., :2] - self._low_m) / self._pixel_m
+        return places
+
+    @property
+    def steps(self) -> Floats:
+        """Change of `places` for a way of 1 m along x, y and z: rows column, row, height."""
+        steps: Floats = self._axes / np.array([[self._pixel_m], [self._pixel_m], [1.0]])
+        return steps
+
+    def lit(self, column: Floats, row: Floats, height: Floats) -> Floats:
+        """The share of the light that points of a surface get, 0..1, by their places.
+
+        The four pixels round a point count by how near they are to it.
+        """
+        column, row = column - 0.5, row - 0.5
+        left, top = np.floor(column), np.floor(row)
+        pixel = (top * self._size_px + left).astype(np.int64)
+        lit = self._is_before(pixel, column, row, height).astype(np.float64)
+        mixed = np.flatnonzero(~self._alike[pixel])
+        pixel, column, row, height = pixel[mixed], column[mixed], row[mixed], height[mixed]
+        across, down = column - left[mixed], row - top[mixed]
+        share = np.zeros(len(mixed))
+        for right, below in _TAPS:
+            tap = pixel + (below * self._size_px + right)
+            weight = (across if right else 1 - across) * (down if below else 1 - down)
+            share += weight * self._is_before(tap, column, row, height)
+        lit[mixed] = share
+        return lit
+
+    def _is_before(
+        self, pixel: Ints, column: Floats, row: Floats, height: Floats
+    ) -> NDArray[np.bool_]:
+        """True for points on the light's side of the face that each pixel shows."""
+        a, b, c = self._planes
+        shown = self._shown[pixel]
+        before: NDArray[np.bool_] = height + _TOUCHING_M > a[shown] * column + (
+            b[shown] * row + c[shown]
+        )
+        return before
+
+
+def _ground_shadow(solid: _Solids, direction: Floats, screen: _CameraScreen) -> NDArray[np.bool_]:
+    """The pixels whose ground z = 0 lies in shadow, whatever stands before it, (size, size)."""
+    size_px = screen.size_px
+    inside = np.zeros((size_px, size_px), dtype=np.bool_)
+    if direction[2] <= 0:
+        return inside
+    backs = solid.corners_m[dot(solid.normals, direction) < _AWAY]
+    corners_px, _ = screen.corners_px(backs - backs[..., 2:] * (direction / direction[2]))
+    covering = _spans(corners_px, size_px)
+    if len(covering.row):
+        first, end = int(covering.row.min()), int(covering.row.max()) + 1
+        n, start = (end - first) * (size_px + 1), (covering.row - first) * (size_px + 1)
+        depth = np.bincount(start + covering.left, minlength=n)
+        depth -= np.bincount(start + covering.right, minlength=n)
+        # A row's spans end within it, so that one sum runs through all rows.
+        np.cumsum(depth, out=depth)
+        inside[first:end] = depth.reshape(-1, size_px + 1)[:, :-1] > 0
+    return inside
