@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from phyblock.data import read_builtin
 from phyblock.errors import PromptError
 from phyblock.models.base import Image, Message
+from phyblock.parsing.move import MOVE_PROBLEMS
 from phyblock.records.reply import Reply
 from phyblock.resources import bundled
 from phyblock.scoring.steps import MOVE_OUTCOMES
@@ -108,7 +109,7 @@ def test_memory_bounds_what_is_shown_and_always_ends_with_the_state_as_it_is(
 
 @pytest.mark.parametrize("feedback", get_args(Feedback))
 def test_feedback_tells_no_more_than_it_may(feedback: Feedback) -> None:
-    outcomes = [*MOVE_OUTCOMES, "no_move", "several_moves", "move_and_done", "empty"]
+    outcomes = [*MOVE_OUTCOMES, *MOVE_PROBLEMS]
     told = {outcome: past(outcome)[0].report(feedback) for outcome in outcomes}
     if feedback == "none":
         assert set(told.values()) == {""}

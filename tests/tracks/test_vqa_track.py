@@ -307,7 +307,7 @@ def test_judging_reads_scores_and_says_what_was_right(question_set: QuestionSet)
         right = item.question.answer_letters
         good = track.judge(item, f"I looked closely.\nAnswer: {', '.join(right)}")
         assert good.fields() == {
-            "parse": {"rule": "stated", "letters": right},
+            "parse": {"rule": "answer_line", "letters": right},
             "scores": [],
             "answer": {"right": right, "given": right, "correct": True},
         }
