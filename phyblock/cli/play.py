@@ -115,7 +115,7 @@ def command(
         check_folder(export, _RUNS)
         return _export(console, plan, person, export)
     folder = out or plan.folder_in(_RUNS)
-    if held_run(folder, plan.manifest, plan.earlier) is not None:
+    if held_run(folder, plan.manifest) is not None:
         run_folder(folder).check(names_to_write(folder, page=True))
     if answers is not None:
         return _import(console, plan, person, folder, answers, page=not no_report)

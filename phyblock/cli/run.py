@@ -21,7 +21,7 @@ from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
 from phyblock.report.made import names_to_write
 from phyblock.resources import bundled
-from phyblock.run.asking import asking_remarks, moved_remarks, reader_remarks
+from phyblock.run.asking import asking_remarks, moved_remarks
 from phyblock.run.consent import spending_refused, unlimited_spending
 from phyblock.run.estimate import estimate
 from phyblock.run.execute import Cause, RunResult
@@ -97,10 +97,9 @@ def command(
     folder = out or plan.folder_in(Path("results"))
     asks = {"use_cache": not no_cache, "retry_failed": retry_failed}
     moved: list[str] = []
-    found = held_run(folder, plan.manifest, plan.earlier)
+    found = held_run(folder, plan.manifest)
     if found is not None:
-        read = reader_remarks(found, plan) if dry_run else []
-        moved = [*read, *moved_remarks(found, plan)]
+        moved = moved_remarks(found, plan)
         names = () if dry_run else names_to_write(folder, page=not no_report)
         run_folder(folder).check(names)
     if dry_run:

@@ -121,7 +121,7 @@ def _other_sitting(
     for field, value, known in (
         ("model", file.model, (person.model,)),
         ("consent", file.consent, (person.consent_sha256,)),
-        ("run", file.run, (plan.manifest.identity, *plan.earlier)),
+        ("run", file.run, (plan.manifest.identity,)),
     ):
         if value not in known:
             hint = "give the suite, --set, --limit, --name, --number and --consent of the export"

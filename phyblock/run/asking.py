@@ -12,12 +12,9 @@ from phyblock.data import recorded_models
 from phyblock.errors import DataError
 from phyblock.records import Manifest
 from phyblock.run.plan import RunPlan
-from phyblock.run.taking_on import earlier_readers
 from phyblock.tracks import kind_of
 from phyblock.tracks.opening import template_prompt
 from phyblock.tracks.prompts import FORM_FACTS
-
-__all__ = ["asking_remarks", "moved_remarks", "reader_remarks"]
 
 
 def asking_remarks(suite: Suite, plan: RunPlan) -> list[str]:
@@ -39,13 +36,6 @@ def asking_remarks(suite: Suite, plan: RunPlan) -> list[str]:
         return own
     unsaid = [_unsaid(track, path) for (track, path), one in used.items() if not _says(track, one)]
     return [*own, *_models(plan), *unsaid]
-
-
-def reader_remarks(begun: Manifest, plan: RunPlan) -> list[str]:
-    """That replies of a run will be read again, where earlier readers read them."""
-    if begun.identity == plan.manifest.identity:
-        return []
-    return [f"{earlier_readers(begun)}: they are read again before anybody is asked"]
 
 
 def moved_remarks(begun: Manifest, plan: RunPlan) -> list[str]:

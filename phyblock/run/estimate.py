@@ -23,14 +23,13 @@ from phyblock.models import (
     waiting_keys,
 )
 from phyblock.models import estimate as estimate_call
-from phyblock.records import BatchLines, Manifest
+from phyblock.records import BatchLines
 from phyblock.records.reading import run_records
 from phyblock.resources import reply_cache_file
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan
 from phyblock.run.samples import Sample
 from phyblock.run.store import held_run
-from phyblock.run.taking_on import begun_anew
 from phyblock.tracks import AnyTrack, Item, shown_item
 
 __all__ = ["Estimate", "estimate"]
@@ -202,8 +201,8 @@ def estimate(
         )
         for m in plan.models
     ]
-    found = held_run(folder, plan.manifest, plan.earlier)
-    settled = set() if found is None else _settled(plan, folder, found, rows, again=retry_failed)
+    found = held_run(folder, plan.manifest)
+    settled = set() if found is None else _settled(plan, folder, rows, again=retry_failed)
     lines = () if found is None else tuple(line for _, line in BatchLines(folder))
     waiting = {
         model.name: waiting_keys(model.config, lines, folder)
@@ -254,22 +253,18 @@ def _outlines(
             yield [seed], list(track.outlines(shown[seed]))
 
 
-def _settled(
-    plan: RunPlan, folder: Path, found: Manifest, rows: Sequence[Estimate], *, again: bool
-) -> set[str]:
-    """Samples that are not asked again, by their newest records and the readers of today; from
-    replies the rows learn. `again` asks for those whose request was rejected.
+def _settled(plan: RunPlan, folder: Path, rows: Sequence[Estimate], *, again: bool) -> set[str]:
+    """Return the samples that are not asked again, by their newest records; rows learn from
+    replies. `again` asks for those whose request was rejected.
     """
     by_model = {row.model: row for row in rows}
     newest: dict[str, bool] = {}
-    for _, record in run_records(folder, plan.going_on(found), plan.sample_ids()):
+    for _, record in run_records(folder, plan.manifest, plan.sample_ids()):
         newest[record.sample] = record.is_answered if again else record.is_final
         kind = _kind(record.track, record.way)
         for reply in record.replies:
             by_model[record.model].add_reply(reply.usage.completion_tokens, kind)
-    settled = {sample for sample, is_settled in newest.items() if is_settled}
-    is_todays = found.identity == plan.manifest.identity
-    return settled if is_todays else settled - begun_anew(plan, folder, found)
+    return {sample for sample, is_settled in newest.items() if is_settled}
 
 
 def _add(

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import os
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from phyblock.errors import Problem, StoreError
 from phyblock.files import LIST, OutFolder, writing
 from phyblock.records import BATCHES, MANIFEST, PROMPTS, RECORDS, TURNS
-
-__all__ = ["LOCK", "check_place", "run_folder"]
 
 LOCK = ".lock"
 _OWN = (MANIFEST, RECORDS, TURNS, PROMPTS, BATCHES, "batches", LOCK, LIST)
@@ -22,6 +23,19 @@ _HINT = "choose another folder with --out"
 def run_folder(path: Path) -> OutFolder:
     """A run's folder, to write into what can be made again from its records."""
     return OutFolder(path)
+
+
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold the lock of a run folder, which one process writes; StoreError where another does."""
+    with (folder / LOCK).open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            hint = "wait for it to end, or choose another folder with --out"
+            message = "is being written by another phyblock run"
+            raise StoreError(Problem(str(folder), message, hint=hint)) from error
+        yield
 
 
 def check_place(folder: Path) -> None:

@@ -1,27 +1,22 @@
-"""What decides a run's results, and the digests of it that name the run."""
+"""Identity of a run: a digest of everything that decides its results."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import product
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from phyblock.config.suite import Suite, Variant
 from phyblock.data import Dataset
 from phyblock.data.version import UNNUMBERED
-from phyblock.parsing.text import READER_VERSION
 from phyblock.records import FORMAT
 from phyblock.run.models import PlannedModel
 from phyblock.stable import hex_digest
 from phyblock.tracks import AnyTrack
-from phyblock.tracks.base import READER
-
-__all__ = ["Inputs", "earlier_identities", "identity_of", "inputs_of"]
 
 Inputs = Mapping[str, Any]
-"""What decides the results but for the version of the readers that tracks share."""
+"""Data that decides the results, but for the version of the readers."""
 
 
 def inputs_of(
@@ -32,7 +27,7 @@ def inputs_of(
     variants: Mapping[Variant, Sequence[AnyTrack]],
     limit: int | None,
 ) -> Inputs:
-    """What decides the results; `variants` has the tracks of every way of asking."""
+    """Return what decides the results; `variants` has the tracks of every condition."""
     inputs: dict[str, Any] = {
         "format": FORMAT,
         "suite": suite.identity(),
@@ -50,44 +45,11 @@ def inputs_of(
     return inputs
 
 
-def identity_of(inputs: Inputs, readers: int | None) -> str:
-    """Hex digest of the inputs, whatever the order of the models; `readers` None stands for a time
-    when their versions were not counted.
-    """
+def identity_of(inputs: Inputs) -> str:
+    """Return the hex digest of the inputs, whatever the order of the models."""
     by_name = sorted(inputs["models"], key=lambda model: str(model["name"]))
-    decided = {**inputs, "models": by_name}
-    if readers is not None:
-        decided["readers"] = readers
-    canonical = json.dumps(decided, sort_keys=True, separators=(",", ":"))
+    canonical = json.dumps({**inputs, "models": by_name}, sort_keys=True, separators=(",", ":"))
     return hex_digest(canonical)
-
-
-def earlier_identities(inputs: Inputs) -> tuple[str, ...]:
-    """What the same run was named while earlier readers read its replies, the latest first."""
-    known = (*range(READER_VERSION, 0, -1), None)
-    named = [identity_of(one, readers) for readers, one in product(known, _by_own(inputs))]
-    return tuple(named[1:])
-
-
-def _by_own(inputs: Inputs) -> Iterator[Inputs]:
-    """The inputs under every version up to this one of the readers that tracks have of their own,
-    this version first.
-    """
-    own = {name: told[READER] for name, told in inputs["tracks"].items() if READER in told}
-
-    def under(told: Mapping[str, Any], versions: Mapping[str, int]) -> dict[str, Any]:
-        return {
-            name: {**about, READER: versions[name]} if READER in about else about
-            for name, about in told.items()
-        }
-
-    for chosen in product(*(range(version, 0, -1) for version in own.values())):
-        versions = dict(zip(own, chosen, strict=True))
-        changed = {**inputs, "tracks": under(inputs["tracks"], versions)}
-        if "variants" in inputs:
-            of_variants = inputs["variants"].items()
-            changed["variants"] = {key: under(told, versions) for key, told in of_variants}
-        yield changed
 
 
 def _dataset(dataset: Dataset, data_version: int) -> dict[str, object]:

@@ -18,26 +18,12 @@ from phyblock.run.replayed import counted_again
 from phyblock.text import counted
 from phyblock.tracks import AnyTrack, EpisodeTrack, SingleTrack, kind_of, shown_item
 
-__all__ = [
-    "Tell",
-    "is_read_otherwise",
-    "judged_again",
-    "records_with_items",
-    "reply_judged_again",
-    "untold",
-]
-
 Tell = Callable[[str], object]
 """Takes what a person should know of what was done."""
 
 
 def untold(_: str) -> None:
     """Tell nobody."""
-
-
-def is_read_otherwise(manifest: Manifest) -> bool:
-    """Whether readers of another version read the replies of a run."""
-    return manifest.versions.get("readers") != str(READER_VERSION)
 
 
 async def judged_again(
@@ -51,11 +37,11 @@ async def judged_again(
     """The records of the run in `folder`, those of the tracks of `variants` judged again.
 
     With `anew`, what they say of their items is taken from the data as well. An episode that would
-    go otherwise under readers of this version than under those of the run stays as it was, which
-    `tell` is told; with `anew`, or where the readers are the same, it is a fault.
+    take another course today stays as it was, since what was asked next followed from what was
+    read then; `tell` is told. With `anew` it is a fault.
     Raises StoreError for a record that is not of the run, and for such a fault.
     """
-    or_kept = not anew and is_read_otherwise(manifest)
+    or_kept = not anew
     kept: Counter[str] = Counter()
     where = str(folder / RECORDS)
     records: list[Record] = []
@@ -73,9 +59,9 @@ async def judged_again(
     for name, count in kept.items():
         if count:
             tell(
-                f"{kind_of(name).title}: {counted(count, 'episode')} of the run would go otherwise "
-                f"under readers {READER_VERSION}, and stay as they were: what was asked next "
-                "followed from what was read. The command that made the run asks on from there."
+                f"{kind_of(name).title}: {counted(count, 'episode')} would take another course "
+                f"with today's readers ({READER_VERSION}) and stay as they were: what was asked "
+                "next followed from what was read."
             )
     return records
 

@@ -14,7 +14,7 @@ from phyblock.data import Dataset
 from phyblock.data.version import read_version
 from phyblock.parsing.text import READER_VERSION
 from phyblock.records import Manifest
-from phyblock.run.identity import earlier_identities, identity_of, inputs_of
+from phyblock.run.identity import identity_of, inputs_of
 from phyblock.run.models import PlannedModel
 from phyblock.sim.engine import ENGINES, described_engine
 from phyblock.tracks import AnyTrack, kind_of
@@ -33,18 +33,18 @@ def make_manifest(
     dataset: Dataset,
     variants: Mapping[Variant, Sequence[AnyTrack]],
     limit: int | None,
-) -> tuple[Manifest, tuple[str, ...]]:
-    """The manifest, and its identities under earlier readers.
+) -> Manifest:
+    """Return the manifest of a run.
 
     `identity` digests what decides the results, so that only the same run goes on in a folder.
     Limits, prices, labels, tables, paths, and where and in which order models are named and served
-    are no part of it. `variants` has the tracks of every way of asking.
+    are no part of it. `variants` has the tracks of every condition.
     """
     data_version = read_version(dataset.root)
     inputs = inputs_of(suite, models, dataset, data_version, variants, limit)
     scenes = [task.scene for task in dataset.tasks]
     fields = {
-        "identity": identity_of(inputs, READER_VERSION),
+        "identity": identity_of(inputs),
         "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         **inputs,
         "suite": suite.model_dump(mode="json"),
@@ -70,7 +70,7 @@ def make_manifest(
             **_versions(),
         },
     }
-    return Manifest.model_validate(fields), earlier_identities(inputs)
+    return Manifest.model_validate(fields)
 
 
 def _place(model: PlannedModel) -> dict[str, object]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,14 +12,13 @@ from phyblock.config.models import RECORDED, ModelConfig, with_members
 from phyblock.config.suite import Suite, Variant
 from phyblock.data import Dataset
 from phyblock.errors import Problem, SpecError
-from phyblock.records import MANIFEST, Manifest, read_manifest
+from phyblock.records import Manifest
 from phyblock.run.data import open_dataset
-from phyblock.run.kept_floors import kept_floors
 from phyblock.run.manifest import make_manifest
 from phyblock.run.models import PlannedModel, plan_models, recorded_format, recorded_order
 from phyblock.run.samples import Sample
 from phyblock.tracks import AnyTrack, EpisodeTrack, Item, Opening, kind_of, open_tracks
-from phyblock.tracks.selection import select_tasks
+from phyblock.tracks.selection import interleaved, select_tasks
 
 if TYPE_CHECKING:
     from phyblock.run.floors import FloorValues
@@ -30,10 +28,11 @@ __all__ = ["RunPlan", "make_plan"]
 
 @dataclass(frozen=True)
 class RunPlan:
-    """Everything a run needs; `manifest` is what `run.yaml` holds, but for what floors reach;
-    `earlier` are its identities under earlier readers, the latest first; `tracks` are those of the
-    reference, `variants` all ways of asking with the tracks of each; `floors` gives what floors
-    reach; `arranged` says in which order the items of a track are asked about.
+    """Everything a run needs.
+
+    `manifest` is what `run.yaml` holds, but for the values of floors, which `floors` computes;
+    `tracks` are those of the reference, `variants` all conditions with the tracks of each;
+    `arranged` gives the order in which the items of a track are asked about.
     """
 
     suite: Suite
@@ -41,9 +40,8 @@ class RunPlan:
     dataset: Dataset
     variants: Mapping[Variant, tuple[AnyTrack, ...]]
     manifest: Manifest
-    earlier: tuple[str, ...]
     floors: Callable[[], FloorValues]
-    arranged: Callable[[Sequence[Item]], Sequence[Item]] = tuple
+    arranged: Callable[[Sequence[Item]], Sequence[Item]] = interleaved
 
     @property
     def tracks(self) -> tuple[AnyTrack, ...]:
@@ -53,11 +51,6 @@ class RunPlan:
     def begun(self) -> Manifest:
         """The manifest of a run that begins, with what floors reach; it may take some seconds."""
         return self.manifest.model_copy(update={"floors": self.floors()})
-
-    def going_on(self, found: Manifest) -> Manifest:
-        """The manifest by which lines of the run in a folder are known, which `found` describes."""
-        changes = {"identity": found.identity, "identities": found.identities}
-        return self.manifest.model_copy(update=changes)
 
     @property
     def samples_per_model(self) -> int:
@@ -71,14 +64,8 @@ class RunPlan:
         return any(isinstance(track, EpisodeTrack) for track in self.tracks)
 
     def folder_in(self, root: Path) -> Path:
-        """The run's folder below `root` when none is named: the same command finds it again, also
-        one that was begun under earlier readers.
-        """
-        own = (self.manifest.identity, *self.earlier)
-        folders = [root / f"{self.suite.name}-{identity[:8]}" for identity in own]
-        begun = (folder for folder in folders if (folder / MANIFEST).is_file())
-        known = (folder for folder in begun if read_manifest(folder).identity in own)
-        return next(known, folders[0])
+        """Return the run's folder below `root` when none is named: the same command finds it."""
+        return root / f"{self.suite.name}-{self.manifest.identity[:8]}"
 
     def sample_ids(self) -> frozenset[str]:
         """The ids of all samples of all models."""
@@ -131,14 +118,18 @@ def make_plan(
     if asks:
         for of_variant in variants.values():
             _check_prompts(of_variant)
-    manifest, earlier = make_manifest(suite, models, selected, variants, limit)
+    manifest = make_manifest(suite, models, selected, variants, limit)
 
     def reopened(name: str, one: Suite) -> AnyTrack:
-        opening = Opening(one, dataset, limit, False)
-        return kind_of(name).open(opening)
+        return kind_of(name).open(Opening(one, dataset, limit, False))
 
-    floors = partial(kept_floors, manifest, suite, reopened, dataset)
-    return RunPlan(suite, models, selected, variants, manifest, earlier, floors)
+    def floors() -> FloorValues:
+        # Values are computed in frames of pandas, which a run else does without until it ends.
+        from phyblock.run.floors import floor_values
+
+        return floor_values(manifest, suite, reopened)
+
+    return RunPlan(suite, models, selected, variants, manifest, floors)
 
 
 def _with_plain_names(suite: Suite, known: Mapping[str, ModelConfig]) -> Suite:

@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import takewhile
 from typing import Any
 
 from phyblock.errors import Problem, StoreError
 from phyblock.records import Record
 from phyblock.run.records import judged
 from phyblock.tracks import Episode, EpisodeTrack, Item
-
-__all__ = ["counted_again", "read_again"]
-
-_HOW = "rule"
-"""What says how a reply was read, from which nothing follows."""
 
 
 async def counted_again(
@@ -46,21 +40,6 @@ async def counted_again(
     return record.model_copy(update={"counts": again.counts})
 
 
-async def read_again(
-    track: EpisodeTrack[Item], item: Item, record: Record
-) -> tuple[Record | None, int]:
-    """The record of an episode as it is read now, None where it would go otherwise; and how many
-    of its first turns go as they did, so that the reply to the next answers what would be asked.
-    """
-    episode = await _played(track, item, record)
-    now = episode.fields()["turns"]
-    both = list(zip(record.asked_turns, now, strict=False))
-    alike = sum(1 for _ in takewhile(lambda pair: _goes_on(pair[0].fields(), pair[1]), both))
-    again = judged(record.as_given(), item, episode, _turns(episode, record))
-    is_same = alike == len(record.asked_turns) and not {*_changed(record, again)} - {"turns"}
-    return (again if is_same else None), alike
-
-
 def _turns(episode: Episode, record: Record) -> dict[str, Any]:
     """The turns of a record with what became of them now."""
     asked, now = record.asked_turns, episode.fields()["turns"]
@@ -71,17 +50,6 @@ def _changed(record: Record, again: Record) -> list[str]:
     """Fields of a record that say something else now, but for what measures count."""
     was, now = record.fields(), again.fields()
     return [name for name in was if name != "counts" and not _alike(was[name], now.get(name))]
-
-
-def _goes_on(was: Mapping[str, Any], now: Mapping[str, Any]) -> bool:
-    """Whether a turn came to what it comes to now, as far as its line says."""
-    return all(
-        _goes_on(value, now[name])
-        if isinstance(value, Mapping) and isinstance(now[name], Mapping)
-        else _alike(value, now[name])
-        for name, value in was.items()
-        if name in now and name != _HOW
-    )
 
 
 def _alike(was: object, now: object) -> bool:

@@ -1,9 +1,10 @@
-"""Reading and scoring stored replies again: no model is called, nothing stored is changed."""
+"""Judging stored replies again with today's code: no model is called."""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,10 +17,10 @@ from phyblock.errors import DataError, Problem, SpecError, StoreError
 from phyblock.parsing.plan import reader_version
 from phyblock.parsing.text import READER_VERSION
 from phyblock.records import MANIFEST, Manifest, Record, read_manifest
+from phyblock.records.reading import run_records
 from phyblock.run.data import asked_about, recorded_dataset
-from phyblock.run.folder import check_place, run_folder
-from phyblock.run.judged_again import Tell, is_read_otherwise, judged_again, untold
-from phyblock.run.kept_floors import kept_floors
+from phyblock.run.folder import check_place, locked, run_folder
+from phyblock.run.judged_again import Tell, judged_again, untold
 from phyblock.run.reopen import reopen_tracks
 from phyblock.run.rewritten import write_run
 from phyblock.tracks import AnyTrack, kind_of
@@ -28,8 +29,6 @@ from phyblock.types import Matcher, PlanParser
 
 if TYPE_CHECKING:
     from phyblock.run.floors import FloorValues
-
-__all__ = ["judged_anew", "recorded_suite", "rescore"]
 
 
 def rescore(
@@ -40,45 +39,58 @@ def rescore(
     data: Path | None = None,
     tell: Tell = untold,
 ) -> Path:
-    """Score a run again, with another parser or headline matcher, into a run folder of its own.
+    """Judge every stored reply of a run again with today's code; nobody is asked.
 
-    The new folder (`<run>/scores/<parser>-<matcher>` when `out` is None) holds a manifest and
-    records like any run, so that tables and notebooks read it. Parser and matcher are those of
-    plans. Of other tracks, what measures count of each sample is counted again; where nothing is,
-    their records are taken over as they are, unless an earlier version of the readers read them.
+    Without parser, matcher and `out` the records of the run itself are replaced in one step. Else
+    they go to a run folder of their own (`<run>/scores/<parser>-<matcher>` when `out` is None), so
+    that tables and notebooks read them like any run. Parser and matcher are those of plans.
     `data` is where the data set is now, if it has moved. `tell` is called with what could not be
-    read again and stays as it was.
+    judged again and stays as it was.
     Raises SpecError for a parser that cannot read what was asked for, StoreError for a folder that
     is no run or cannot be written, DataError when the data are not what the run was made on.
     """
     manifest = read_manifest(folder)
     suite = recorded_suite(folder, manifest, parser, matcher)
+    in_place = parser is None and matcher is None and out is None
     name = f"scores/{suite.parser}-{suite.scoring.matchers[0]}"
-    target = out or folder / name
-    by = f"{suite.parser} {reader_version(suite.parser)}, {suite.scoring.matchers[0]}"
-    identity = f"{manifest.identity} scored by {by}"
-    earlier = [f"{one} scored by {by}" for one in manifest.identities]
-    if out is None:
-        run_folder(folder).check([f"{name}/"])
-    _check_target(target, (identity, *earlier))
+    target = folder if in_place else out or folder / name
+    identity = manifest.identity
+    if not in_place:
+        by = f"{suite.parser} {reader_version(suite.parser)}, {suite.scoring.matchers[0]}"
+        identity = f"{manifest.identity} scored by {by}"
+        if out is None:
+            run_folder(folder).check([f"{name}/"])
+        _check_target(target, identity)
     dataset = recorded_dataset(folder, manifest, suite.levels, data)
     stayed: list[str] = []
     names = [name for name in suite.tracks if kind_of(name).rescored or counts_samples(name)]
-    if is_read_otherwise(manifest):
-        names += _read_anew(folder, manifest, suite, names, dataset, stayed.append)
+    names += _read_anew(folder, manifest, suite, names, dataset, stayed.append)
     scored = _scored(folder, manifest, suite, names, dataset, stayed.append)
-    # As long as some stay as earlier readers read them, the folder is not one of this version's.
-    readers = {} if stayed else {"readers": str(READER_VERSION)}
     changes = {
         "identity": identity,
         "suite": suite.model_dump(mode="json"),
         "floors": scored.floors,
-        "versions": {**manifest.versions, **readers},
+        "versions": {**manifest.versions, "readers": str(READER_VERSION)},
     }
-    write_run(target, manifest.model_copy(update=changes), scored.records)
+    again = manifest.model_copy(update=changes)
+    with locked(folder) if in_place else nullcontext():
+        # Lines that later ones replaced stay: what they cost counts against the limit.
+        replaced = _replaced(folder, manifest) if in_place else []
+        write_run(target, again, [*replaced, *scored.records])
     for text in stayed:
         tell(text)
     return target
+
+
+def _replaced(folder: Path, manifest: Manifest) -> list[Record]:
+    """Return the records of a run that later records of the same sample replaced."""
+    newest: dict[str, Record] = {}
+    earlier = []
+    for _, record in run_records(folder, manifest):
+        if record.sample in newest:
+            earlier.append(newest[record.sample])
+        newest[record.sample] = record
+    return earlier
 
 
 def judged_anew(folder: Path) -> tuple[Manifest, list[Record]]:
@@ -129,6 +141,9 @@ def _scored(
 ) -> _Scored:
     """The records of a run, those of the tracks in `names` judged again; see `judged_again`."""
 
+    # Values of floors are computed in frames of pandas.
+    from phyblock.run.floors import floor_values
+
     def reopened(name: str, one: Suite) -> AnyTrack:
         return reopen_tracks(folder, manifest, one, [name], dataset)[name]
 
@@ -138,7 +153,7 @@ def _scored(
     }
     records = asyncio.run(judged_again(folder, manifest, tracks, tell, anew=anew))
     changes = {"suite": suite.model_dump(mode="json")}
-    floors = kept_floors(manifest.model_copy(update=changes), suite, reopened, dataset)
+    floors = floor_values(manifest.model_copy(update=changes), suite, reopened)
     asked = asked_about(manifest, suite.levels, dataset).tasks
     items = {name: len(track.items) for name, track in tracks[""].items()}
     return _Scored(records, floors, asked, items)
@@ -168,13 +183,11 @@ def _read_anew(
     return names
 
 
-def _check_target(target: Path, identities: Collection[str]) -> None:
-    """Raise StoreError unless `target` is new, empty or holds these scores, maybe as they were
-    under earlier readers.
-    """
+def _check_target(target: Path, identity: str) -> None:
+    """Raise StoreError unless `target` is new, empty or holds these scores."""
     check_place(target)
-    if (target / MANIFEST).exists() and read_manifest(target).identity not in identities:
-        hint = "choose another folder with --out: what a run stored is never changed"
+    if (target / MANIFEST).exists() and read_manifest(target).identity != identity:
+        hint = "choose another folder with --out"
         raise StoreError(Problem(str(target), "holds another run", hint=hint))
 
 

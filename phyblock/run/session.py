@@ -30,7 +30,6 @@ from phyblock.run.execute import Executor, RunResult
 from phyblock.run.plan import RunPlan
 from phyblock.run.soundness import provider_problem
 from phyblock.run.store import RunStore, held_run
-from phyblock.run.taking_on import take_on
 from phyblock.run.writer import RecordWriter
 
 __all__ = ["Session", "check_ready"]
@@ -83,10 +82,8 @@ class Session:
     async def __aenter__(self) -> Session:
         plan = self._plan
         try:
-            found = held_run(self._folder, plan.manifest, plan.earlier)
-            if found is not None and found.identity != plan.manifest.identity:
-                found = await take_on(plan, self._folder, found, self._tell)
-            manifest = plan.begun() if found is None else plan.going_on(found)
+            found = held_run(self._folder, plan.manifest)
+            manifest = plan.begun() if found is None else plan.manifest
             self._store = RunStore(self._folder, manifest, plan.sample_ids())
             self._check_batches(self._store)
             remove_unfinished(self._folder)

@@ -59,13 +59,11 @@ class Standing:
     limit_usd: float = 0.0
     batches: list[BatchLine] = field(default_factory=list)
 
-    def add(self, record: Record, *, counts: bool) -> None:
-        """Take in a record as it was read, oldest first; of one that does not count, its cost."""
-        if counts:
-            self.samples[record.sample] = Summary.of(record)
+    def add(self, record: Record) -> None:
+        """Take in a record as it was read, oldest first."""
+        self.samples[record.sample] = Summary.of(record)
         self.limit_usd += record.limit_usd
 
     def add_turn(self, turn: Turn) -> None:
         """Take in an answered turn of an episode."""
-        if not turn.read_again:
-            self.limit_usd += turn.reply.limit_usd
+        self.limit_usd += turn.reply.limit_usd

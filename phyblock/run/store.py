@@ -2,17 +2,17 @@
 
 A record counts only when it is appended and synced, so a kill at any moment loses nothing that was
 written; a line that a kill cut short is dropped when the run is opened again. A later record of a
-sample replaces an earlier one. `run.yaml` changes only when later readers take the run on.
+sample replaces an earlier one.
 """
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 from collections.abc import Callable, Collection, Container, Iterator, Mapping
+from contextlib import ExitStack
 from pathlib import Path
-from typing import IO, Any, TypeVar
+from typing import Any, TypeVar
 
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write, writing
@@ -25,7 +25,6 @@ from phyblock.records import (
     Lines,
     Manifest,
     PromptLines,
-    Record,
     Reply,
     Stopped,
     TurnLines,
@@ -34,7 +33,7 @@ from phyblock.records import (
 )
 from phyblock.records.reading import any_records, collect_turns, run_records
 from phyblock.run.appending import AppendFile
-from phyblock.run.folder import LOCK, check_place, run_folder
+from phyblock.run.folder import check_place, locked, run_folder
 from phyblock.run.prompts import PromptFile
 from phyblock.run.rewritten import manifest_text
 from phyblock.run.standing import Standing
@@ -75,17 +74,16 @@ class RunStore:
         self.standing = Standing()
         self._folder = folder
         self._belonging = Belonging.of(manifest, samples)
-        self._lock: IO[str] | None = None
+        self._lock = ExitStack()
         self._files: list[AppendFile] = []
         try:
             with writing(folder, _HINT):
                 check_place(folder)
                 run_folder(folder).claim([])
-                self._lock = (folder / LOCK).open("w")
-                self._acquire()
+                self._lock.enter_context(locked(folder))
                 self._claim(manifest)
                 records = run_records(folder, manifest, samples)
-                self.records = self._open(records, self._add)
+                self.records = self._open(records, self.standing.add)
                 turns = TurnLines(folder, self._belonging)
                 self.turns = self._open(turns, self.standing.add_turn)
                 batches = BatchLines(folder)
@@ -106,9 +104,7 @@ class RunStore:
         """Release the files and the lock, once what is being written is written."""
         for file in self._files:
             file.close()
-        if self._lock is not None:
-            self._lock.close()
-            self._lock = None
+        self._lock.close()
 
     def note_stopped(self, models: Mapping[str, str], run: str, asked: Collection[str]) -> None:
         """Keep why the models `asked` about, or the whole run, were stopped, for whoever reads it.
@@ -129,14 +125,6 @@ class RunStore:
         """The replies of episodes that have begun and are not `done`, by sample id."""
         return collect_turns(TurnLines(self._folder, self._belonging), done)
 
-    def take_on(self, manifest: Manifest) -> None:
-        """Replace `run.yaml`, of the run that it is under readers of another version."""
-        with writing(self._folder, _HINT):
-            atomic_write(self._folder / MANIFEST, manifest_text(manifest), sync=True)
-
-    def _add(self, record: Record) -> None:
-        self.standing.add(record, counts=self._belonging.counts(record))
-
     def _open(
         self,
         lines: Lines[LineT],
@@ -155,43 +143,41 @@ class RunStore:
             file.end_line()
         return file
 
-    def _acquire(self) -> None:
-        assert self._lock is not None
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            hint = "wait for it to end, or choose another folder with --out"
-            message = "is being written by another phyblock run"
-            raise StoreError(Problem(str(self._folder), message, hint=hint)) from error
-
     def _claim(self, manifest: Manifest) -> None:
         if held_run(self._folder, manifest) is None:
-            self.take_on(manifest)
+            with writing(self._folder, _HINT):
+                atomic_write(self._folder / MANIFEST, manifest_text(manifest), sync=True)
 
 
-def held_run(folder: Path, manifest: Manifest, earlier: Collection[str] = ()) -> Manifest | None:
-    """The manifest in `folder`, which holds the run that `manifest` describes, or that run under
-    one of its `earlier` identities; None where it holds no run. Reads alone.
+def held_run(folder: Path, manifest: Manifest) -> Manifest | None:
+    """Return the manifest in `folder`, which holds the run that `manifest` describes; None where it
+    holds no run. Nothing is written.
 
-    Raises StoreError when it holds records or turns of another run, or what is no run. A manifest
-    without any is no run yet: one that failed at once leaves it behind, and nothing would be lost
-    with it.
+    Raises StoreError when it holds records or turns of another run, of a run that another version
+    of phyblock began, or what is no run. A manifest without any is no run yet: one that failed at
+    once leaves it behind, and nothing would be lost with it.
     """
     check_place(folder)
     if not (folder / MANIFEST).exists():
         return None
     found = read_manifest(folder)
-    if found.identity == manifest.identity:
+    if found.identity == manifest.identity and _readers(found) == _readers(manifest):
         return found
     paid: tuple[Lines[Any], ...] = (any_records(folder), TurnLines(folder), BatchLines(folder))
     if all(next(iter(lines), None) is None for lines in paid):
         return None
-    if found.identity in earlier:
-        return found
+    if found.identity == manifest.identity:
+        message = f"was begun by another version, whose readers are {_readers(found)}"
+        hint = f"phyblock score {folder} judges its replies again and asks nobody; then it goes on"
+        raise StoreError(Problem(str(folder), message, allowed=_readers(manifest), hint=hint))
     names = _changed(found, manifest)
     changed = f"different: {', '.join(names) or 'how phyblock asks, draws or reads'}"
     hint = "; ".join((*_reasons(found, manifest), _HINT))
     raise StoreError(Problem(str(folder), "holds another run", found=changed, hint=hint))
+
+
+def _readers(manifest: Manifest) -> str:
+    return manifest.versions.get("readers", "1")
 
 
 def _reasons(found: Manifest, wanted: Manifest) -> Iterator[str]:
@@ -205,14 +191,6 @@ def _reasons(found: Manifest, wanted: Manifest) -> Iterator[str]:
     if engines[0] != engines[1] and engines[0].keys() == engines[1].keys():
         was, is_now = (one.engine or REFERENCE_ENGINE for one in (found, wanted))
         yield f"its blocks are let go in {was}, here in {is_now} ({PHYSICS_VARIABLE} chooses)"
-    read, reads = (one.versions.get("readers", "1") for one in (found, wanted))
-    # Earlier readers are no reason: those of today take their runs on.
-    if read != reads and not (read.isdecimal() and int(read) < int(reads)):
-        yield (
-            f"its replies were read by readers {read}, this version has readers {reads}: "
-            "phyblock score FOLDER reads and scores them again and asks nobody, and a run in "
-            "another folder takes them from the reply cache"
-        )
     for track, about in wanted.tracks.items():
         if track in found.tracks and found.tracks[track].get(CARRYING) != about.get(CARRYING):
             yield (

@@ -26,8 +26,8 @@ __all__ = ["Opening", "TrackKind", "kind_of", "kinds", "kinds_with_physics"]
 class Opening:
     """What a track is opened with; without `with_prompts` nothing is asked of anyone.
 
-    `limit` is how many items the user wants at most, None for all; `shop` is where pictures of all
-    tracks are drawn.
+    `limit` is how many items the user wants at most, None for all. `shop` is where pictures
+    of all tracks are drawn.
     """
 
     suite: Suite

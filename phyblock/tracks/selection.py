@@ -1,4 +1,4 @@
-"""Which scenes a run asks about: by level, and a stratified few of them under a limit."""
+"""Selection of the scenes that a run asks about, and the order in which they are asked."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from phyblock.data import AssemblyTask
-
-__all__ = ["evenly", "select_tasks", "spread", "stratified"]
+from phyblock.tracks.base import ItemT
 
 
 def select_tasks(
@@ -15,7 +14,7 @@ def select_tasks(
     levels: Sequence[int],
     limit: int | None,
 ) -> tuple[AssemblyTask, ...]:
-    """The tasks counted in any of `levels`, at most `limit` of them, in their order.
+    """Return the tasks counted in any of `levels`, at most `limit` of them, in their order.
 
     They are evenly spread, and a higher limit keeps all that a lower one keeps.
     """
@@ -27,17 +26,30 @@ def select_tasks(
 
 
 def evenly(strata: Sequence[int], limit: int) -> list[int]:
-    """`limit` positions, shared among the strata and evenly spread in each; see `stratified`."""
+    """Return `limit` positions, shared among the strata and evenly spread in each."""
+    return sorted(_fair_order(strata)[:limit])
+
+
+def interleaved(items: Sequence[ItemT]) -> list[ItemT]:
+    """Return items in an order in which any first few are a fair sample of levels and scenes."""
+    return [items[position] for position in _fair_order([item.scene.level for item in items])]
+
+
+def _fair_order(strata: Sequence[int]) -> list[int]:
+    """Return all positions: strata in turn by their sizes, positions of each evenly spread.
+
+    Every stratum gets one place before any gets two; then each place goes to the stratum that has
+    least for its size (Webster's method, which is monotone in the number of places).
+    """
     members: dict[int, list[int]] = {}
     for position, stratum in enumerate(strata):
         members.setdefault(stratum, []).append(position)
-    names = sorted(members)
-    shares = stratified([len(members[name]) for name in names], limit)
-    return sorted(
-        members[name][place]
-        for name, share in zip(names, shares, strict=True)
-        for place in spread(len(members[name]), share)
+    places = sorted(
+        (rank > 0, Fraction(2 * rank + 1, len(of_stratum)), stratum, of_stratum[place])
+        for stratum, of_stratum in members.items()
+        for rank, place in enumerate(_spread_out(len(of_stratum)))
     )
+    return [position for *_, position in places]
 
 
 def spread(size: int, share: int) -> list[int]:

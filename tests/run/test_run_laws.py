@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+import re
 import shutil
 import time
 from pathlib import Path
@@ -40,6 +41,12 @@ def copy(finished: Workspace, tmp_path: Path) -> Workspace:
     return Workspace(root, finished.cache / "pictures")
 
 
+def lasting(files: dict[str, bytes]) -> dict[str, bytes]:
+    """Run, records and tables; what is noted of builds may change."""
+    parts = ("run.yaml", "records.jsonl", "/tables/")
+    return {name: data for name, data in files.items() if any(part in name for part in parts)}
+
+
 def scores(records: list[Raw]) -> dict[str, Raw]:
     """What was read in each reply and what it is worth, by sample."""
     return {r["sample"]: {k: r[k] for k in ("outcome", "parse", "scores")} for r in records}
@@ -70,11 +77,26 @@ def test_scoring_again_by_the_same_rules_changes_nothing(copy: Workspace) -> Non
     before = copy.files()
     done = copy.phyblock("score", "out", fresh=True)
     assert (done.code, done.err) == (0, "")
-    again = copy.out / "scores" / "steps-optimal"
-    assert copy.records(again) == copy.records()
-    assert copy.tables(again) == copy.tables()
-    after = copy.files()
-    assert {name: after[name] for name in before} == before
+    assert lasting(copy.files()) == lasting(before)
+
+
+def test_a_run_of_other_readers_is_scored_before_it_goes_on(copy: Workspace) -> None:
+    before = copy.files()
+    manifest = copy.out / "run.yaml"
+    text = re.sub(r"readers: '\d+'", "readers: '1'", manifest.read_text(encoding="utf-8"))
+    manifest.write_text(text, encoding="utf-8")
+    refused = copy.run()
+    assert refused.code == 2
+    assert "phyblock score" in refused.err
+    path = copy.out / "records.jsonl"
+    lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    for line in lines:
+        if line["reply"] is not None:
+            line.update(outcome="parse_failure", scores=[])
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
+    assert copy.phyblock("score", "out").code == 0
+    assert copy.run().code == 0
+    assert lasting(copy.files()) == lasting(before)
 
 
 def test_another_parser_scores_the_same_replies(copy: Workspace) -> None:
