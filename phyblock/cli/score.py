@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import cast
 
@@ -14,6 +15,8 @@ from phyblock.text import plain_lines
 from phyblock.types import MATCHERS, PLAN_PARSERS, Matcher, PlanParser
 
 __all__ = ["command"]
+
+_EVERY_S = 2.0
 
 
 @click.command("score")
@@ -31,7 +34,20 @@ def command(
     Writes the new scores to RUN/scores/PARSER-MATCHER (or --out), and leaves RUN as it is.
     """
     chosen = cast("PlanParser | None", parser), cast("Matcher | None", matcher)
-    show_tables(rescore(run, *chosen, out, data, _tell), data)
+    show_tables(rescore(run, *chosen, out, data, _tell, _Progress()), data)
+
+
+class _Progress:
+    """Says every two seconds how many samples are scored."""
+
+    def __init__(self) -> None:
+        self._said = time.monotonic()
+
+    def __call__(self, done: int) -> None:
+        """Say it, if it is time."""
+        if time.monotonic() - self._said > _EVERY_S:
+            self._said = time.monotonic()
+            click.echo(f"scored {done:,} samples", err=True)
 
 
 def _tell(text: str) -> None:

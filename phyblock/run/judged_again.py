@@ -33,12 +33,14 @@ async def judged_again(
     tell: Tell,
     *,
     anew: bool,
+    watch: Callable[[int], object] = lambda _: None,
 ) -> list[Record]:
     """The records of the run in `folder`, those of the tracks of `variants` judged again.
 
     With `anew`, what they say of their items is taken from the data as well. An episode that would
     take another course today stays as it was, since what was asked next followed from what was
     read then; `tell` is told. With `anew` it is a fault.
+    `watch` is called with the number of records that are done.
     Raises StoreError for a record that is not of the run, and for such a fault.
     """
     or_kept = not anew
@@ -46,6 +48,7 @@ async def judged_again(
     where = str(folder / RECORDS)
     records: list[Record] = []
     for record, track, item in records_with_items(folder, manifest, variants):
+        watch(len(records))
         if track is None:
             records.append(record)
             continue

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +38,7 @@ def rescore(
     out: Path | None,
     data: Path | None = None,
     tell: Tell = untold,
+    watch: Callable[[int], object] = lambda _: None,
 ) -> Path:
     """Judge every stored reply of a run again with today's code; nobody is asked.
 
@@ -45,7 +46,7 @@ def rescore(
     they go to a run folder of their own (`<run>/scores/<parser>-<matcher>` when `out` is None), so
     that tables and notebooks read them like any run. Parser and matcher are those of plans.
     `data` is where the data set is now, if it has moved. `tell` is called with what could not be
-    judged again and stays as it was.
+    judged again and stays as it was, `watch` with the number of samples that are done.
     Raises SpecError for a parser that cannot read what was asked for, StoreError for a folder that
     is no run or cannot be written, DataError when the data are not what the run was made on.
     """
@@ -65,7 +66,7 @@ def rescore(
     stayed: list[str] = []
     names = [name for name in suite.tracks if kind_of(name).rescored or counts_samples(name)]
     names += _read_anew(folder, manifest, suite, names, dataset, stayed.append)
-    scored = _scored(folder, manifest, suite, names, dataset, stayed.append)
+    scored = _scored(folder, manifest, suite, names, dataset, stayed.append, watch=watch)
     changes = {
         "identity": identity,
         "suite": suite.model_dump(mode="json"),
@@ -138,6 +139,7 @@ def _scored(
     tell: Tell,
     *,
     anew: bool = False,
+    watch: Callable[[int], object] = lambda _: None,
 ) -> _Scored:
     """The records of a run, those of the tracks in `names` judged again; see `judged_again`."""
 
@@ -151,7 +153,7 @@ def _scored(
         variant.key: reopen_tracks(folder, manifest, suite.at(variant), names, dataset)
         for variant in dict.fromkeys(variant.shown for variant in suite.vary.variants)
     }
-    records = asyncio.run(judged_again(folder, manifest, tracks, tell, anew=anew))
+    records = asyncio.run(judged_again(folder, manifest, tracks, tell, anew=anew, watch=watch))
     changes = {"suite": suite.model_dump(mode="json")}
     floors = floor_values(manifest.model_copy(update=changes), suite, reopened)
     asked = asked_about(manifest, suite.levels, dataset).tasks
