@@ -13,7 +13,7 @@ from phyblock.errors import Problem, StoreError
 from phyblock.files import read_bytes
 from phyblock.parsing.text import READER_VERSION
 from phyblock.records import MANIFEST, RECORDS, Line, Manifest
-from phyblock.records.decode import decode, problem_of
+from phyblock.records.line import decode, problems_of
 from phyblock.report.inputs import digest_of_file
 from phyblock.stable import hex_digest
 
@@ -118,8 +118,7 @@ def read_about(path: Path, folder: Path, manifest: Manifest) -> About:
     try:
         about = decode(_ABOUT, read_bytes(folder / ABOUT, MEMBERS[ABOUT]))
     except ValidationError as error:
-        (first, *_) = error.errors(include_url=False)
-        raise StoreError(problem_of(first, where, _IS_NOT, _HINT)) from error
+        raise StoreError(problems_of(error, where, About, _IS_NOT, _HINT)) from error
     except ValueError as error:
         raise StoreError(Problem(where, f"{_IS_NOT}: {error}", hint=_HINT)) from error
     assert isinstance(about, About)

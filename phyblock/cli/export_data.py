@@ -8,7 +8,7 @@ import click
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import NAME_OR_PATH, UserPath
-from phyblock.data.named import read_data_set
+from phyblock.data import read_data_set
 from phyblock.tables.track_report import ItemExport
 from phyblock.tracks import kinds
 

@@ -1,22 +1,92 @@
-"""Readers of the data formats: the project's own and the official PhyBlock layout."""
+"""Readers of data: sets of scenes and questions in our own format and in the official layout.
 
-from phyblock.data.base import AssemblyTask, Dataset, QuestionSet, QuestionTask
-from phyblock.data.builtin import SCENES_FILE, read_builtin
-from phyblock.data.official import official_prompt, read_official, recorded_models
-from phyblock.data.official_questions import read_official_questions
+A set is named by its folder, by a file in it, or, where it comes with phyblock, by its name.
+"""
+
+from pathlib import Path
+
+from phyblock.data.base import (
+    UNNUMBERED,
+    VERSION_FILE,
+    AssemblyTask,
+    Dataset,
+    QuestionSet,
+    QuestionTask,
+    read_version,
+)
+from phyblock.data.official import (
+    official_prompt,
+    read_official,
+    read_official_questions,
+    recorded_models,
+)
 from phyblock.data.questions import QUESTIONS_FILE, read_questions
+from phyblock.data.scenes import SCENES_FILE, read_builtin
+from phyblock.errors import DataError, Problem
+from phyblock.resources import bundled, bundled_sets
 
 __all__ = [
     "QUESTIONS_FILE",
     "SCENES_FILE",
+    "UNNUMBERED",
+    "VERSION_FILE",
     "AssemblyTask",
     "Dataset",
     "QuestionSet",
     "QuestionTask",
+    "find_data_set",
+    "find_questions",
     "official_prompt",
     "read_builtin",
+    "read_data_set",
     "read_official",
     "read_official_questions",
     "read_questions",
+    "read_version",
     "recorded_models",
 ]
+
+
+def find_data_set(name: str) -> Path:
+    """Return the folder that `name` means: a data set, an official checkout, or a bundled set.
+
+    Raises DataError that lists the bundled sets when there is no such folder.
+    """
+    path = Path(name)
+    if (path / SCENES_FILE).is_file() or (path / "data").is_dir():
+        return path
+    if (folder := _file_or_bundled(path, SCENES_FILE)) is not None:
+        return folder
+    names = ", ".join(bundled_sets(SCENES_FILE))
+    allowed = f"a folder with {SCENES_FILE}, an official checkout, or a bundled set: {names}"
+    message = "holds no data set" if path.is_dir() else "there is no such data set"
+    raise DataError(Problem(name, message, allowed=allowed))
+
+
+def read_data_set(name: str) -> Dataset:
+    """Return the data set that `name` means; DataError with everything that is wrong in it."""
+    folder = find_data_set(name)
+    return read_builtin(folder) if (folder / SCENES_FILE).is_file() else read_official(folder)
+
+
+def find_questions(name: str) -> Path:
+    """Return the folder that `name` means: one with questions, or a bundled set.
+
+    Raises DataError that lists the bundled sets when there is no such folder.
+    """
+    path = Path(name)
+    if path.is_dir():
+        return path
+    if (folder := _file_or_bundled(path, QUESTIONS_FILE)) is not None:
+        return folder
+    names = ", ".join(bundled_sets(QUESTIONS_FILE))
+    allowed = f"a folder with {QUESTIONS_FILE}, or a bundled set: {names}"
+    raise DataError(Problem(name, "there are no such questions", allowed=allowed))
+
+
+def _file_or_bundled(path: Path, file: str) -> Path | None:
+    """The folder of a data file that is named itself, or of a bundled set."""
+    if path.name == file and path.is_file():
+        return path.parent
+    inside = bundled("benchmarks", "data", *path.parts)
+    return inside if len(path.parts) == 1 and (inside / file).is_file() else None

@@ -1,46 +1,337 @@
-"""Reader of questions: a folder with `questions.jsonl`, one question a line, about known scenes.
+"""`questions.jsonl`: a multiple-choice question about a scene a line; docs/vqa.md describes it.
 
-`phyblock.records.question` declares the line; docs/vqa.md describes it.
+Pictures are recipes: each says how it differs from the scene that the question names.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from phyblock.data.base import Dataset, QuestionSet, QuestionTask
-from phyblock.data.raw import read_lines, read_text
+from pydantic import Discriminator, Field, StrictInt, Tag
+from typing_extensions import Self
+
+from phyblock.data.base import Dataset, QuestionSet, QuestionTask, read_lines, read_text
+from phyblock.data.scenes import (
+    MAX_BLOCKS,
+    Angles,
+    Format,
+    Name,
+    Position,
+    StoredBlock,
+    Text,
+    View,
+    plain,
+    triple,
+)
+from phyblock.domain.blocks import BlockType, Color
+from phyblock.domain.question import (
+    LETTERS,
+    Category,
+    Mark,
+    Question,
+    QuestionPicture,
+    Subtask,
+    category_of,
+    is_picture_option,
+)
+from phyblock.domain.scene import Block, Scene
 from phyblock.errors import DataError, Problem
-from phyblock.records.faults import validated
-from phyblock.records.picture import About
-from phyblock.records.question import StoredQuestion
-
-__all__ = ["QUESTIONS_FILE", "read_questions"]
+from phyblock.records.line import Fault, Line, checked, refuse, shown, validated
+from phyblock.types import Background
 
 QUESTIONS_FILE = "questions.jsonl"
+_MOST_OPTIONS = 26
+_MOST_PICTURES = 2 + len(LETTERS)
 _FEW = 20
-"""So many lines with faults are told one by one."""
-_ALLOWED = f"a folder with {QUESTIONS_FILE}, or a bundled set of questions"
+"""So many lines with faults are reported one by one."""
+
+
+class StoredPose(Line, extra="ignore"):
+    """Where a block stands in a picture."""
+
+    position: Position
+    """As of a block."""
+    euler: Angles
+    """As of a block."""
+
+
+class StoredKind(Line, extra="ignore"):
+    """What a block is in a picture."""
+
+    type: BlockType
+    """Its shape."""
+    color: Color
+    """Its color."""
+
+
+class StoredMark(Line, extra="ignore"):
+    """A lettered place."""
+
+    letter: Literal["A", "B", "C", "D", "X"]
+    """A to D where the places are the options, X where the text speaks of one."""
+    position: Position
+    """Where it is [m]."""
+
+
+_Whole = Annotated[Literal[True], Tag("true")]
+# The blocks of several outcomes, so that all of their pictures are framed alike.
+_Framed = Annotated[tuple[StoredBlock, ...], Field(min_length=1, max_length=4 * MAX_BLOCKS)]
+
+
+class StoredPicture(Line, extra="forbid"):
+    """How a picture differs from the scene, recolored as in `colors`."""
+
+    label: Literal["scene", "block", "A", "B", "C", "D"]
+    """What it shows: the scene, the block asked about, or the option of this letter."""
+    view: View
+    """Azimuth (0 from +x, 90 from +y) and elevation of the camera [degrees]."""
+    without: Annotated[tuple[StrictInt, ...], Field(min_length=1, max_length=MAX_BLOCKS)] = ()
+    """Orders of blocks that are not drawn."""
+    poses: dict[str, StoredPose] = Field(default_factory=dict)
+    """Where blocks stand that are not at their place, by order."""
+    swap: dict[str, StoredKind] = Field(default_factory=dict)
+    """What blocks are that differ from the scene, by order."""
+    add: Annotated[tuple[StoredBlock, ...], Field(min_length=1, max_length=MAX_BLOCKS)] = ()
+    """Whole blocks that the scene does not have."""
+    marks: Annotated[tuple[StoredMark, ...], Field(min_length=1, max_length=MAX_BLOCKS)] = ()
+    """Places."""
+    framed: Annotated[
+        _Whole | Annotated[_Framed, Tag("")],
+        Discriminator(lambda value: "true" if value is True else ""),
+    ] = ()
+    """What the camera is framed on: true, the whole scene; or these blocks. Left out: what is
+    drawn."""
+
+    @classmethod
+    def of(cls, picture: QuestionPicture, scene: Scene) -> Self:
+        """Return a recipe as it is written."""
+        known = {block.order: block for block in scene.blocks}
+        drawn = {block.order: block for block in picture.blocks}
+        kept = [(known[order], block) for order, block in drawn.items() if order in known]
+        recipe: dict[str, Any] = {
+            "without": [order for order in known if order not in drawn],
+            "poses": {
+                str(new.order): {"position": plain(new.position_m), "euler": plain(new.euler_deg)}
+                for old, new in kept
+                if (old.position_m, old.euler_deg) != (new.position_m, new.euler_deg)
+            },
+            "swap": {
+                str(new.order): {"type": new.type, "color": new.color}
+                for old, new in kept
+                if old.kind != new.kind
+            },
+            "add": [StoredBlock.of(block) for order, block in drawn.items() if order not in known],
+            "marks": [{"letter": m.letter, "position": plain(m.position_m)} for m in picture.marks],
+            "framed": picture.framed == scene.blocks or [*map(StoredBlock.of, picture.framed)],
+        }
+        given = {name: part for name, part in recipe.items() if part}
+        return cls.model_validate(
+            {"label": picture.label, "view": plain(picture.view_deg), **given}
+        )
+
+    def picture(self, scene: Scene, background: Background | None) -> QuestionPicture:
+        """Return the picture that it makes of a scene."""
+        kept = (block for block in scene.blocks if block.order not in self.without)
+        added = (stored.block() for stored in self.add)
+        azimuth, elevation, _ = triple((*self.view, 0.0))
+        framed = scene.blocks if self.framed is True else (b.block() for b in self.framed)
+        return QuestionPicture(
+            self.label,
+            (*map(self._changed, kept), *added),
+            (azimuth, elevation),
+            tuple(Mark(mark.letter, triple(mark.position)) for mark in self.marks),
+            tuple(framed),
+            background,
+        )
+
+    def _changed(self, block: Block) -> Block:
+        name = str(block.order)
+        if kind := self.swap.get(name):
+            block = replace(block, type=kind.type, color=kind.color)
+        if pose := self.poses.get(name):
+            position_m, euler_deg = triple(pose.position), triple(pose.euler)
+            block = replace(block, position_m=position_m, euler_deg=euler_deg)
+        return block
+
+    def faults(self, scene: Scene) -> Iterator[Fault]:
+        """Yield what is wrong with it as a picture of a scene."""
+        orders = {str(block.order) for block in scene.blocks}
+        yield from _unknown_orders(self.without, scene, "without")
+        yield from _unknown_orders(self.poses, scene, "poses")
+        yield from _unknown_orders(self.swap, scene, "swap")
+        for block in self.add:
+            if str(block.order) in orders:
+                message = "has the order of a block of the scene"
+                yield Fault(message, found=str(block.order), at=("add",))
+        if not self.add and len(set(self.without)) == len(scene):
+            yield Fault("draws no blocks", found="")
+
+
+def _unknown_orders(orders: Iterable[object], scene: Scene, field: str) -> Iterator[Fault]:
+    known = [str(block.order) for block in scene.blocks]
+    allowed = "orders of the scene: " + ", ".join(known)
+    for order in orders:
+        if str(order) not in known:
+            yield Fault("names no block", allowed, shown(order), (field,))
+
+
+def _option_faults(options: Sequence[str]) -> Iterator[Fault]:
+    if len(options) != len(LETTERS):
+        yield Fault("are not four", "four options", str(len(options)))
+    # Letter case and spaces do not tell options apart.
+    read = [" ".join(option.lower().split()) for option in options]
+    for i, option in enumerate(options):
+        first = read.index(read[i])
+        if first != i:
+            message = f"is the same as option {LETTERS[first]}" if first < 4 else "stands twice"
+            yield Fault(message, "four options that differ", shown(option), (i,))
+    wanted = [f"<img{i}>" for i in range(1, len(LETTERS) + 1)]
+    if any(map(is_picture_option, options)) and list(options) != wanted:
+        yield Fault("are not the four pictures", " ".join(wanted))
+
+
+Options = Annotated[
+    tuple[Text, ...], Field(min_length=1, max_length=_MOST_OPTIONS), checked(_option_faults)
+]
+"""Four different texts, or the four pictures in order."""
+
+
+class StoredQuestion(Line, extra="forbid"):
+    """A multiple-choice question about a scene."""
+
+    id: Name
+    """Unique in the file."""
+    subtask: Subtask
+    """The letters of its subtask, as above."""
+    category: Category | None = None
+    """The category of the paper that the subtask belongs to."""
+    scene_id: str
+    """The scene in the data set that the questions are about."""
+    wording: str = ""
+    """Id of the template that the text was filled from."""
+    question: Text
+    """The text."""
+    options: Options
+    """Four texts, or `<img1>` to `<img4>` for pictures A to D."""
+    answer: str
+    """`A` to `D`; for ordering all four letters in the right order, like `BADC`."""
+    colors: dict[str, Color] = Field(default_factory=dict)
+    """Colors of blocks that are recolored, by order; left out where none is."""
+    background: Background | None = None
+    """Ground of all its pictures; left out where a run's own is drawn, as in older sets."""
+    pictures: Annotated[tuple[StoredPicture, ...], Field(min_length=1, max_length=_MOST_PICTURES)]
+    """Its pictures."""
+    evidence: dict[str, Any] = Field(default_factory=dict)
+    """What the answer was derived from; `slots` are the words in the template."""
+    format: Format = 1
+    """Version of the line, 1 where it does not say."""
+
+    @classmethod
+    def of(cls, question: Question, original: Scene) -> Self:
+        """Return a question as it is written; `original` is the scene as stored."""
+        colors = {
+            str(block.order): block.color
+            for block, before in zip(question.scene.blocks, original.blocks, strict=True)
+            if block.color != before.color
+        }
+        background = question.pictures[0].background if question.pictures else None
+        optional: dict[str, Any] = {"colors": colors, "background": background}
+        return cls(
+            id=question.id,
+            subtask=question.subtask,
+            category=question.category,
+            scene_id=question.scene.id,
+            wording=question.wording,
+            question=question.text,
+            options=question.options,
+            answer=question.answer_letters,
+            **{name: value for name, value in optional.items() if value},
+            pictures=tuple(StoredPicture.of(p, question.scene) for p in question.pictures),
+            evidence=dict(question.evidence),
+        )
+
+    def about(self, original: Scene) -> Question:
+        """Return the question that it asks about the scene that it names, given as stored."""
+        blocks = tuple(
+            replace(block, color=self.colors.get(str(block.order), block.color))
+            for block in original.blocks
+        )
+        scene = replace(original, blocks=blocks)
+        return Question(
+            self.id,
+            self.subtask,
+            scene,
+            self.question,
+            self.options,
+            tuple(map(LETTERS.index, self.answer)),
+            tuple(picture.picture(scene, self.background) for picture in self.pictures),
+            self.wording,
+            self.evidence,
+        )
+
+    def faults(self, scene: Scene) -> Iterator[Fault]:
+        """Yield what is wrong with it as a question about a scene."""
+        if self.category not in (None, category_of(self.subtask)):
+            yield _wrong("category", "is not known", category_of(self.subtask), self.category)
+        if self.subtask == "OR" and sorted(self.answer) != list(LETTERS):
+            allowed = "all of A, B, C, D in the right order"
+            yield _wrong("answer", "is none of the options", allowed, self.answer)
+        if self.subtask != "OR" and self.answer not in tuple(LETTERS):
+            yield _wrong("answer", "is none of the options", "A, B, C or D", self.answer)
+        yield from _unknown_orders(self.colors, scene, "colors")
+        for i, picture in enumerate(self.pictures):
+            for each in picture.faults(scene):
+                yield each._replace(at=("pictures", i, *each.at))
+        labels = [picture.label for picture in self.pictures]
+        for i, label in enumerate(labels):
+            if label in labels[:i]:
+                yield Fault("is used twice", found=shown(label), at=("pictures", i, "label"))
+        wanted = set(LETTERS) if any(map(is_picture_option, self.options)) else set()
+        missing, spare = sorted(wanted - set(labels)), sorted(set(LETTERS) & set(labels) - wanted)
+        if missing or spare:
+            what = "is missing for options" if missing else "is there for no option"
+            yield _wrong("pictures", f"a picture {what}", "", missing or spare)
+        marked = {mark.letter for picture in self.pictures for mark in picture.marks}
+        unmarked = sorted(set(LETTERS) - marked)
+        if unmarked and list(self.options) == [f"place {letter}" for letter in LETTERS]:
+            allowed = "marks A to D where the options are places"
+            yield _wrong("pictures", "no picture marks the places", allowed, unmarked)
+
+
+def _wrong(field: str, message: str, allowed: str, found: object) -> Fault:
+    return Fault(message, allowed, shown(found), (field,))
+
+
+def scene_of(name: str, scenes: Mapping[str, Scene], where: str) -> Scene:
+    """Return the scene that a question names; DataError where the data set has none such."""
+    if name not in scenes:
+        allowed = f"one of the {len(scenes)} scenes of the data set"
+        refuse([_wrong("scene_id", "names no scene of the data set", allowed, name)], where)
+    return scenes[name]
 
 
 def read_questions(folder: Path, scenes: Dataset) -> QuestionSet:
-    """All questions of a folder, about these scenes; DataError with everything that is wrong.
+    """Return all questions of a folder, about these scenes; DataError with all that is wrong.
 
     Where most are about scenes of another data set, that is what is wrong.
     """
     known = {task.scene.id: task.scene for task in scenes.tasks}
     is_about: list[bool] = []
 
-    def read_task(raw: Any, where: str) -> QuestionTask:
-        about = About.named_in(raw, known)
-        is_about.append(about.scene is not None)
-        line = validated(StoredQuestion, raw, where, about)
-        return QuestionTask(line.about(known[line.scene_id]))
+    def read(raw: Any, where: str) -> QuestionTask:
+        is_about.append(isinstance(raw, dict) and str(raw.get("scene_id")) in known)
+        line = validated(StoredQuestion, raw, where)
+        scene = scene_of(line.scene_id, known, where)
+        refuse(line.faults(scene), where)
+        return QuestionTask(line.about(scene))
 
     path = folder / QUESTIONS_FILE
     try:
-        text = read_text(path, _ALLOWED)
-        tasks = read_lines(path, text, "question", read_task, lambda task: task.key)
+        text = read_text(path, f"a folder with {QUESTIONS_FILE}, or a bundled set of questions")
+        tasks = read_lines(path, text, "question", read, lambda task: task.key)
     except DataError as error:
         if len(is_about) < _FEW or 2 * sum(is_about) > len(is_about):
             raise

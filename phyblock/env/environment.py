@@ -15,8 +15,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from PIL import Image
 
-from phyblock.data import AssemblyTask
-from phyblock.data.named import read_data_set
+from phyblock.data import AssemblyTask, read_data_set
 from phyblock.domain import (
     BLOCK_TYPES,
     COLORS,

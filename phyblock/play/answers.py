@@ -8,14 +8,13 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from phyblock.data.raw import parse_json
+from phyblock.data.base import parse_json
 from phyblock.errors import DataError, Problem, reason_of
 from phyblock.files import load_json, read_bytes, read_text
 from phyblock.models import HaltedError, Request
 from phyblock.play.page import default_consent
 from phyblock.play.person import Given, Person, picking_of
-from phyblock.records.decode import problem_of
-from phyblock.records.line import Amount
+from phyblock.records.line import Amount, problems_of
 from phyblock.run.plan import RunPlan
 from phyblock.stable import hex_digest
 from phyblock.tracks.base import shown_item
@@ -109,8 +108,7 @@ def _read_file(path: Path) -> AnswersFile:
     try:
         return AnswersFile.model_validate(parse_json(text, path))
     except ValidationError as error:
-        faults = error.errors(include_url=False)
-        problems = [problem_of(fault, str(path), _IS_NOT, _AS_SAVED) for fault in faults]
+        problems = problems_of(error, str(path), is_not=_IS_NOT, hint=_AS_SAVED)
         raise DataError(problems) from error
 
 

@@ -17,7 +17,6 @@ from phyblock.records.lines import (
 )
 from phyblock.records.manifest import FORMAT, MANIFEST, Manifest, read_manifest
 from phyblock.records.others import BatchLine, PictureMark, Prompt, PromptMessage, Turn
-from phyblock.records.question import StoredQuestion
 from phyblock.records.record import (
     AskedTurn,
     Course,
@@ -30,7 +29,6 @@ from phyblock.records.record import (
 )
 from phyblock.records.record_lines import RecordedLines
 from phyblock.records.reply import Reply, StoredError, Usage
-from phyblock.records.scene import StoredScene
 from phyblock.records.stopped import STOPPED, Stopped, read_stopped
 
 __all__ = [
@@ -63,8 +61,6 @@ __all__ = [
     "ShownScene",
     "Stopped",
     "StoredError",
-    "StoredQuestion",
-    "StoredScene",
     "Turn",
     "TurnLines",
     "Usage",

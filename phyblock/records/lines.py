@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Iterator
 from json import JSONDecodeError
 from pathlib import Path
@@ -12,8 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 from phyblock.errors import InputError, Problem, StoreError
 from phyblock.files import NotRegularError, open_regular
 from phyblock.records.belonging import Belonging
-from phyblock.records.decode import decode, is_cut, problem_of
-from phyblock.records.line import Line
+from phyblock.records.line import Line, decode, problems_of
 from phyblock.records.others import BatchLine, Prompt, Turn
 
 __all__ = [
@@ -102,8 +102,7 @@ class Lines(Generic[LineT]):
 
     def problem(self, error: ValidationError, where: str) -> Problem:
         """What is wrong with the first of the fields that are."""
-        (first, *_) = error.errors(include_url=False)
-        return problem_of(first, where, f"is not a {self.noun}", self.hint)
+        return next(problems_of(error, where, Line, f"is not a {self.noun}", self.hint))
 
     def _check(self, where: str, line: LineT) -> None:
         problem = None if self._belonging is None else self._belonging.problem(where, line)
@@ -131,6 +130,17 @@ class Lines(Generic[LineT]):
         except ValueError as error:
             raise self.error(Problem(where, f"{is_not}: it {error}", hint=self.hint)) from error
         return read
+
+
+def is_cut(line: bytes) -> bool:
+    """True if a line is no JSON, as one that a kill cut short; one out of bounds is whole."""
+    try:
+        json.loads(line)
+    except (JSONDecodeError, UnicodeDecodeError):
+        return True
+    except (ValueError, RecursionError):
+        return False
+    return False
 
 
 _TURN: TypeAdapter[Turn] = TypeAdapter(Turn)

@@ -13,8 +13,7 @@ from pydantic import AfterValidator, Field, ValidationError
 from phyblock.config.yaml import TooMuchError, YamlBounds, load_yaml
 from phyblock.errors import Problem, StoreError
 from phyblock.files import read_text
-from phyblock.records.decode import problem_of
-from phyblock.records.line import Line, encodable
+from phyblock.records.line import Line, encodable, problems_of
 
 __all__ = [
     "FORMAT",
@@ -163,10 +162,8 @@ def read_manifest(folder: Path) -> Manifest:
         message, missing = "is not a run manifest", "no such key"
         raise StoreError(Problem(str(path), message, "identity", missing, hint=_HINT)) from error
     except ValidationError as error:
-        raise StoreError(
-            problem_of(one, str(path), "is not a run manifest", _HINT)
-            for one in error.errors(include_url=False)
-        ) from error
+        problems = problems_of(error, str(path), Manifest, "is not a run manifest", _HINT)
+        raise StoreError(problems) from error
     except ValueError as error:
         raise StoreError(Problem(str(path), str(error), hint=_HINT)) from error
 

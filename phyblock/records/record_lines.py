@@ -12,7 +12,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from phyblock.errors import DataError, Problem
 from phyblock.records.belonging import Belonging
-from phyblock.records.decode import problem_of
+from phyblock.records.line import problems_of
 from phyblock.records.lines import RECORDS, Lines
 from phyblock.records.record import Record, Recorded
 
@@ -48,8 +48,9 @@ class RecordLines(Lines[Record]):
         (first, *_) = error.errors(include_url=False)
         if first["type"] not in _BY_TRACK:
             # The place begins with the track by which the model was chosen.
-            of_track = {**first, "loc": first["loc"][1:]}
-            return problem_of(of_track, where, f"is not a {self.noun}", self.hint)
+            return next(
+                problems_of(error, where, Record, f"is not a {self.noun}", self.hint, skip=1)
+            )
         try:
             _COMMON.validate_python(first["input"])
         except ValidationError as common:

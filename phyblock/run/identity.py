@@ -8,8 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from phyblock.config.suite import Suite, Variant
-from phyblock.data import Dataset
-from phyblock.data.version import UNNUMBERED
+from phyblock.data import UNNUMBERED, Dataset
 from phyblock.records import FORMAT
 from phyblock.run.models import PlannedModel
 from phyblock.stable import hex_digest

@@ -10,8 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from phyblock.config.suite import Suite, Variant
-from phyblock.data import Dataset
-from phyblock.data.version import read_version
+from phyblock.data import Dataset, read_version
 from phyblock.parsing.text import READER_VERSION
 from phyblock.records import Manifest
 from phyblock.run.identity import identity_of, inputs_of

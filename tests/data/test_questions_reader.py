@@ -130,7 +130,11 @@ BROKEN_PICTURES = {
     "a view with one angle": ({"view": [45]}, "pictures[0].view", "[45]"),
     "an unknown label": ({"label": "E"}, "pictures[0].label", '"E"'),
     "no such block": ({"without": [3]}, "pictures[0].without", "3"),
-    "a pose of no block": ({"poses": {"3": {}}}, "pictures[0].poses", '"3"'),
+    "a pose of no block": (
+        {"poses": {"3": {"position": [0, 0, 0], "euler": [0, 0, 0]}}},
+        "pictures[0].poses",
+        '"3"',
+    ),
     "a type that is not known": (
         {"swap": {"1": {"type": "ball", "color": "red"}}},
         "pictures[0].swap.1.type",

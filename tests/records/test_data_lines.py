@@ -11,14 +11,16 @@ import pytest
 from hypothesis import given
 
 from phyblock.data import Dataset, QuestionSet, read_builtin, read_questions
+from phyblock.data.questions import StoredQuestion
+from phyblock.data.scenes import StoredScene
 from phyblock.errors import DataError
-from phyblock.records import Line, StoredQuestion, StoredScene
-from phyblock.records.faults import validated
+from phyblock.records import Line
+from phyblock.records.line import validated
 from phyblock.resources import bundled
 from tests.data.broken import Raw, sound_scene, with_value, without
 from tests.data.test_builtin_laws import as_json, tasks
+from tests.documents import ROOT
 from tests.fuzz.strategies import sound_question
-from tests.records.test_documents import ROOT
 
 SCENES = Path("phyblock-400", "scenes.jsonl")
 QUESTIONS = Path("phyblock-vqa", "questions.jsonl")
@@ -72,13 +74,13 @@ def test_a_line_may_say_its_version_and_none_is_from_the_future(kind: type[Line]
 
 
 def test_everything_that_is_wrong_with_a_question_is_said_at_once() -> None:
-    broken = without(sound_question(), "question") | {"answer": "E", "colour": 1}
+    broken = without(sound_question(), "question") | {"answer": 1, "colour": 1}
     broken = with_value(broken, "pictures.0.marks.0.position", [0, 0])
     with pytest.raises(DataError) as caught:
         validated(StoredQuestion, broken, "here")
     assert {(p.field, p.message) for p in caught.value.problems} == {
         ("question", "is missing"),
-        ("answer", "is none of the options"),
+        ("answer", "is no text"),
         ("colour", "is not known"),
         ("pictures[0].marks[0].position", "is not a vector in range"),
     }

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import jsonschema
 import pytest
 
-from phyblock.run.documents import make_documents
+from tests.documents import ROOT, make_documents
 from tests.records.damage import DAMAGED, lines_before
-
-ROOT = Path(__file__).parents[2]
 
 
 def test_tables_and_schemas_are_current() -> None:
-    for path, text in make_documents(ROOT).items():
-        assert (ROOT / path).read_text(encoding="utf-8") == text, "run python -m phyblock.run"
+    for path, text in make_documents().items():
+        assert (ROOT / path).read_text(encoding="utf-8") == text, "run python -m tests.documents"
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from phyblock.config.yaml import YamlBounds, load_yaml
 from phyblock.errors import StoreError
 from phyblock.records import MANIFEST, read_manifest
-from phyblock.records.decode import problem_of
+from phyblock.records.line import shown
 from tests.records.damage import YAML_TEXTS
 
 # A path that is not UTF-8 is text with halves of characters.
@@ -78,7 +78,6 @@ def test_an_unknown_field_may_hold_any_plain_data(tmp_path: Path) -> None:
     ids=lambda value: type(value).__name__,
 )
 def test_any_value_can_be_shown(value: object) -> None:
-    error = {"loc": ("a",), "type": "int_type", "msg": "Input should be", "input": value}
-    problem = problem_of(error, "x", "is no line", "")
-    assert len(problem.found) <= 60
-    str(problem).encode()
+    text = shown(value)
+    assert len(text) <= 60
+    text.encode()

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.data.version import UNNUMBERED, VERSION_FILE, read_version
+from phyblock.data import UNNUMBERED, VERSION_FILE, read_version
 from phyblock.errors import DataError, SpecError
 from phyblock.records import read_manifest
 from phyblock.report.alike import check_alike

@@ -5,8 +5,7 @@ from __future__ import annotations
 import click
 
 from phyblock.cli.paths import NAME_OR_PATH
-from phyblock.data import QuestionSet, read_questions
-from phyblock.data.named import find_questions, read_data_set
+from phyblock.data import QuestionSet, find_questions, read_data_set, read_questions
 
 _QUESTIONS = "phyblock-vqa"
 _SCENES = "phyblock-400"

@@ -10,7 +10,7 @@ import click
 
 from phyblock.cli.console import make_console, plain_table, shown_path
 from phyblock.cli.paths import NAME_OR_PATH, UserPath
-from phyblock.data.named import read_data_set
+from phyblock.data import read_data_set
 from phyblock.domain import Scene
 from phyblock.files import OutFolder, check_free, make_folder, write_named
 from phyblock.making.checks import FOREIGN, CheckName, Finding, find_duplicates

@@ -10,8 +10,7 @@ import click
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import NAME_OR_PATH, UserPath
-from phyblock.data import AssemblyTask
-from phyblock.data.named import read_data_set
+from phyblock.data import AssemblyTask, read_data_set
 from phyblock.files import OutFolder
 from phyblock.making.cli.scene_sets import find_scenes
 from phyblock.sim.camera import VIEWS

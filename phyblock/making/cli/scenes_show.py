@@ -6,8 +6,7 @@ import click
 
 from phyblock.cli.console import make_console, plain_table
 from phyblock.cli.paths import NAME_OR_PATH
-from phyblock.data import AssemblyTask
-from phyblock.data.named import read_data_set
+from phyblock.data import AssemblyTask, read_data_set
 from phyblock.domain import Block
 from phyblock.making.cli.scene_sets import find_scenes
 from phyblock.sim.pictures import PictureStyle, visible_shares

@@ -9,8 +9,7 @@ import click
 
 from phyblock.cli.console import make_console, plain_table
 from phyblock.cli.paths import NAME_OR_PATH
-from phyblock.data import AssemblyTask, Dataset
-from phyblock.data.named import read_data_set
+from phyblock.data import AssemblyTask, Dataset, read_data_set
 from phyblock.domain import BLOCK_TYPES, COLORS, Scene
 from phyblock.text import counted
 

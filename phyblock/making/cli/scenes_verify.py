@@ -9,8 +9,7 @@ import click
 
 from phyblock.cli.console import make_console, plain_table
 from phyblock.cli.paths import NAME_OR_PATH
-from phyblock.data import SCENES_FILE, AssemblyTask, read_builtin
-from phyblock.data.named import find_data_set
+from phyblock.data import SCENES_FILE, AssemblyTask, find_data_set, read_builtin
 from phyblock.errors import DataError, Problem
 from phyblock.making.checks import find_duplicates, find_orphans
 from phyblock.making.cli.working import jobs_option, ray_option, tracked

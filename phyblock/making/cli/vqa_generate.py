@@ -9,7 +9,7 @@ from rich.progress import Progress, TaskID
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
-from phyblock.data.named import read_data_set
+from phyblock.data import read_data_set
 from phyblock.domain import SUBTASKS, Subtask
 from phyblock.making.cli.question_sets import data_option
 from phyblock.making.cli.subtasks_option import subtasks_option

@@ -9,8 +9,7 @@ import click
 
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath
-from phyblock.data import read_questions
-from phyblock.data.named import find_questions, read_data_set
+from phyblock.data import find_questions, read_data_set, read_questions
 from phyblock.domain import Question
 from phyblock.errors import DataError, Problem
 from phyblock.making.cli.question_sets import data_option, questions_option

@@ -6,12 +6,12 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from phyblock.data.version import VERSION_FILE
+from phyblock.data import VERSION_FILE
+from phyblock.data.questions import StoredQuestion
 from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
 from phyblock.domain.scene import Scene
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write, check_free, writing
-from phyblock.records.question import StoredQuestion
 from phyblock.sim.engine import other_engine
 from phyblock.stable import hex_digest
 

@@ -21,7 +21,8 @@ from pathlib import Path
 import numpy as np
 from pydantic import StrictBool
 
-from phyblock.data.raw import lines_of, parse_json
+from phyblock.data.base import lines_of, parse_json, read_text
+from phyblock.data.scenes import Name
 from phyblock.domain import LETTERS, Question, Subtask, is_picture_option
 from phyblock.errors import DataError, Problem
 from phyblock.files import load_json
@@ -30,10 +31,7 @@ from phyblock.making.questions.selection import pick
 from phyblock.making.questions.wording import WORDINGS, fill_template, stem_of, wording_ids
 from phyblock.models import Message, Model, Request
 from phyblock.parsing.answer import parse_answer
-from phyblock.records.data_values import Name
-from phyblock.records.decode import shown
-from phyblock.records.faults import Fault, refuse, validated
-from phyblock.records.line import Line
+from phyblock.records.line import Fault, Line, refuse, shown, validated
 from phyblock.tracks import TemplatePrompt
 
 _LENGTHS = (15, 400)
@@ -253,7 +251,7 @@ def read_wordings(path: Path) -> tuple[Wording, ...]:
     """The accepted wordings of a file; raises DataError with everything that is wrong in it."""
     wordings: list[Wording] = []
     problems: list[Problem] = []
-    for number, text in enumerate(lines_of(path, _ALLOWED), 1):
+    for number, text in enumerate(lines_of(read_text(path, _ALLOWED)), 1):
         where = f"{path}:{number}"
         try:
             line = validated(_StoredWording, parse_json(text, path, number), where)

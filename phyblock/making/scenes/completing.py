@@ -11,7 +11,22 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from phyblock.config.yaml import YamlSource, read_yaml
-from phyblock.data.raw import lines_of, parse_json, read_json
+from phyblock.data.base import lines_of, parse_json, read_json, read_text
+from phyblock.data.scenes import (
+    EITHER_NAME,
+    MAX_BLOCKS,
+    NAME_ALLOWED,
+    Angles,
+    CandidateList,
+    Format,
+    Levels,
+    Name,
+    Order,
+    Position,
+    candidate_set,
+    is_name,
+    triple,
+)
 from phyblock.domain.aov import CycleError
 from phyblock.domain.blocks import KIT_PALETTE, BlockType, Color
 from phyblock.domain.scene import Block, CandidateSet, Scene
@@ -19,19 +34,7 @@ from phyblock.errors import DataError, Problem, SpecError
 from phyblock.making.checks import LEVEL_LIMITS, OURS_IN_HASTE, CheckName, SceneFacts, findings_of
 from phyblock.making.scenes.sketch import Palette, scene_of
 from phyblock.records import Line
-from phyblock.records.data_values import (
-    NAME_ALLOWED,
-    Angles,
-    Filled,
-    Format,
-    Name,
-    Order,
-    Position,
-    is_name,
-    triple,
-)
-from phyblock.records.faults import validated
-from phyblock.records.scene import EITHER_NAME, MAX_BLOCKS, CandidateList, Levels, candidate_set
+from phyblock.records.line import validated
 
 _GEOMETRY: tuple[CheckName, ...] = ("overlap", "floating", "order", "candidates")
 _STANDING: tuple[CheckName, ...] = ("unstable step", "unstable")
@@ -179,7 +182,7 @@ class GivenBlock(Line, extra="forbid"):
 class GivenScene(Line, extra="forbid"):
     """A goal structure; what is left out is derived."""
 
-    blocks: Annotated[tuple[GivenBlock, ...], Filled(MAX_BLOCKS)]
+    blocks: Annotated[tuple[GivenBlock, ...], Field(min_length=1, max_length=MAX_BLOCKS)]
     id: Name | None = None
     levels: Levels | None = None
     parents: tuple[Name, ...] = Field(default=(), max_length=100)
@@ -237,7 +240,7 @@ def _files(path: Path) -> list[Path]:
 
 def _read(file: Path) -> Iterator[ReadScene]:
     if file.suffix == ".jsonl":
-        for number, line in enumerate(lines_of(file, _ALLOWED), 1):
+        for number, line in enumerate(lines_of(read_text(file, _ALLOWED)), 1):
             where = f"{file}:{number}"
             yield _scene(parse_json(line, file, number), f"{file.stem}-{number}", where)
         return

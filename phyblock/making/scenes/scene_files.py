@@ -9,14 +9,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from phyblock.data.version import VERSION_FILE
+from phyblock.data import VERSION_FILE
+from phyblock.data.scenes import StoredScene
 from phyblock.domain.scene import CandidateSet, Scene
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write, check_free, writing
 from phyblock.making.checks import FINISHED_REST, LEVEL_LIMITS
 from phyblock.making.scenes.candidate_sets import make_candidates
 from phyblock.making.scenes.sketch import PALETTES, Palette
-from phyblock.records.scene import StoredScene
 from phyblock.sim.contact import FIT_TOLERANCE_M
 from phyblock.sim.dynamics import DEFAULT_REST, DEFAULT_TRIAL
 from phyblock.sim.engine import other_engine

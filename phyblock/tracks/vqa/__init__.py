@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from phyblock.config.suite import Suite
-from phyblock.data.version import read_version
+from phyblock.data import read_version
 from phyblock.records import Manifest
 from phyblock.resources import bundled
 from phyblock.tables.track_report import TrackReport

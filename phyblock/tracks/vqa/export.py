@@ -11,8 +11,7 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from phyblock.data import Dataset, QuestionTask
-from phyblock.data.named import find_questions
+from phyblock.data import Dataset, QuestionTask, find_questions
 from phyblock.domain import LETTERS, SUBTASKS, is_picture_option
 from phyblock.files import OutFolder, writing
 from phyblock.models.base import Image

@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from phyblock.data import read_builtin
+from phyblock.data.questions import StoredQuestion
 from phyblock.domain import LETTERS, Question, Subtask
 from phyblock.domain.blocks import COLORS
 from phyblock.domain.scene import Scene
@@ -15,7 +16,6 @@ from phyblock.making.questions.counterfactual import OUTCOME_TEXTS
 from phyblock.making.questions.pictured_drafts import LEAST_PIXELS
 from phyblock.making.questions.question_production import make_questions, problem_of
 from phyblock.making.workers import open_workers
-from phyblock.records.question import StoredQuestion
 from phyblock.resources import bundled
 from phyblock.sim.contact import find_gaps
 from phyblock.sim.question_pictures import is_inside, least_difference, seen

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from phyblock.data import QuestionSet, read_builtin, read_questions
+from phyblock.data.questions import StoredQuestion
 from phyblock.domain import LETTERS, SUBTASKS, Subtask
 from phyblock.making.questions.audit import duplicates_of
 from phyblock.making.questions.question_files import question_card
@@ -22,7 +23,6 @@ from phyblock.making.questions.question_production import (
     scene_drafts,
 )
 from phyblock.making.workers import open_workers
-from phyblock.records.question import StoredQuestion
 from phyblock.resources import bundled
 from phyblock.sim.engine import other_engine
 from phyblock.sim.question_pictures import mark_pixel

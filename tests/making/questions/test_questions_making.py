@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.data import read_builtin, read_questions
+from phyblock.data.questions import StoredQuestion
 from phyblock.domain import LETTERS, Question, Scene, Subtask
 from phyblock.errors import DataError, StoreError
 from phyblock.making.questions.audit import referents
@@ -27,7 +28,6 @@ from phyblock.making.questions.question_production import (
 from phyblock.making.questions.selection import BALANCE, even_letters
 from phyblock.making.questions.wording import WORDINGS
 from phyblock.making.workers import open_workers
-from phyblock.records.question import StoredQuestion
 from phyblock.resources import bundled
 from phyblock.types import BACKGROUNDS
 

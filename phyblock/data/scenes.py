@@ -1,0 +1,348 @@
+"""`scenes.jsonl`: a goal structure and its candidate set a line; see docs/data-format.md.
+
+The types of single values and the checks of relations (orders, dependencies, layers, looks) serve
+every layout that is read.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import (
+    AliasChoices,
+    Field,
+    StrictInt,
+    WithJsonSchema,
+)
+from typing_extensions import Self
+
+from phyblock.data.base import AssemblyTask, Dataset, read_lines, read_text
+from phyblock.domain.aov import AOVGraph, CycleError
+from phyblock.domain.blocks import BlockType, Color
+from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, CandidateSet, Scene
+from phyblock.records.line import (
+    Fault,
+    Line,
+    checked,
+    refuse,
+    shown,
+    validated,
+    worded,
+)
+
+SCENES_FILE = "scenes.jsonl"
+MAX_BLOCKS = 22
+NAME_ALLOWED = "up to 100 letters, digits, '.', '_' or '-', a letter or digit first"
+_NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
+_MOST_PARENTS = 100
+_MOST_ORDER = 9999
+_LEVELS = ([1], [2], [3], [4], [1, 2])
+_NO_LEVELS = ("are not allowed", "one level 1 to 4, or [1, 2]")
+_NO_NUMBER = "is not an allowed number"
+_NO_TEXT = ("is no text", "a text that is not blank")
+_NO_VECTOR = "is not a vector in range"
+Vector = tuple[float, float, float]
+
+
+# Bounds are far above any use, and near enough to zero for geometry to be exact. Numbers stay
+# integers or floats as they were given, so that a line is written as it was read.
+_Meters = Annotated[
+    Annotated[int, Field(strict=True, ge=-100, le=100)]
+    | Annotated[float, Field(strict=True, ge=-100, le=100, allow_inf_nan=False)],
+    WithJsonSchema({"type": "number", "minimum": -100, "maximum": 100}),
+]
+_Degrees = Annotated[
+    Annotated[int, Field(strict=True, ge=-36_000, le=36_000)]
+    | Annotated[float, Field(strict=True, ge=-36_000, le=36_000, allow_inf_nan=False)],
+    WithJsonSchema({"type": "number", "minimum": -36_000, "maximum": 36_000}),
+]
+_Elevation = Annotated[
+    Annotated[int, Field(strict=True, ge=1, le=90)]
+    | Annotated[float, Field(strict=True, ge=1, le=90, allow_inf_nan=False)],
+    WithJsonSchema({"type": "number", "minimum": 1, "maximum": 90}),
+]
+
+Position = Annotated[
+    tuple[_Meters, _Meters, _Meters],
+    worded(_NO_VECTOR, "three finite numbers of -100 to 100 m"),
+]
+"""A point [m]."""
+Angles = Annotated[
+    tuple[_Degrees, _Degrees, _Degrees],
+    worded(_NO_VECTOR, "three finite numbers of -36000 to 36000 degrees"),
+]
+"""Three angles [degrees]."""
+View = Annotated[
+    tuple[_Degrees, _Elevation],
+    worded("is no view", "azimuth, and elevation 1 to 90 [degrees]"),
+]
+"""Azimuth and elevation of a camera [degrees]."""
+Format = Annotated[int, Field(strict=True, ge=1, le=1), worded("is not known", "1")]
+"""Version of a line of data; a newer one may mean something else."""
+Order = Annotated[
+    int,
+    Field(strict=True, ge=1, le=_MOST_ORDER),
+    worded(_NO_NUMBER, f"an integer of at least 1, at most {_MOST_ORDER}"),
+]
+"""Number of a block or of a layer."""
+OrderOrGround = Annotated[
+    int,
+    Field(strict=True, ge=0, le=_MOST_ORDER),
+    worded(_NO_NUMBER, f"an integer of at least 0, at most {_MOST_ORDER}"),
+]
+"""Number of a block, 0 for the ground."""
+Name = Annotated[str, Field(pattern=_NAME), worded("is not a name", NAME_ALLOWED)]
+"""A name that is safe in file names and tables."""
+Text = Annotated[
+    str, worded(*_NO_TEXT), checked(lambda text: () if text.strip() else [Fault(*_NO_TEXT)])
+]
+"""A text that is not blank."""
+# The paper's text calls the field `orientation`, the released files `euler`.
+EITHER_NAME = Field(validation_alias=AliasChoices("euler", "orientation"))
+"""An orientation, by either name."""
+
+
+def triple(numbers: Vector) -> Vector:
+    """Return floats, without -0.0, so that equal scenes have equal digests."""
+    x, y, z = numbers
+    return float(x) + 0.0, float(y) + 0.0, float(z) + 0.0
+
+
+def plain(vector: tuple[float, ...]) -> Any:
+    """Return whole numbers as integers, which read better in a file."""
+    return tuple(int(number) if float(number).is_integer() else number for number in vector)
+
+
+def is_name(text: str) -> bool:
+    """True if a text is a `Name`."""
+    return re.fullmatch(_NAME, text) is not None
+
+
+class StoredBlock(Line, extra="ignore"):
+    """A block of a goal structure at its goal pose."""
+
+    order: Order
+    """Its number, from 1, unique in the scene."""
+    type: BlockType
+    """Its shape."""
+    color: Color
+    """Its color."""
+    layer: Order
+    """1 on the ground, else 1 + the highest layer that it depends on (checked)."""
+    depend: Annotated[tuple[OrderOrGround, ...], Field(min_length=1, max_length=MAX_BLOCKS)]
+    """Orders of the blocks that must stand before it; 0 is the ground; never empty, no cycles."""
+    position: Position
+    """Origin of the body frame in the world [m], z up, the ground at z = 0."""
+    euler: Annotated[Angles, EITHER_NAME]
+    """Extrinsic x-y-z angles [degrees]: R = Rz·Ry·Rx (scipy's `'xyz'`)."""
+
+    @classmethod
+    def of(cls, block: Block, position: Vector | None = None) -> Self:
+        """Return a block as it is written; `position` where that is written in another way."""
+        return cls(
+            order=block.order,
+            type=block.type,
+            color=block.color,
+            layer=block.layer,
+            depend=block.depend or (0,),
+            position=plain(block.position_m) if position is None else position,
+            euler=plain(block.euler_deg),
+        )
+
+    def block(self) -> Block:
+        """Return the block that the line describes."""
+        depend = tuple(order for order in self.depend if order)
+        position_m, euler_deg = triple(self.position), triple(self.euler)
+        return Block(self.order, self.type, self.color, position_m, euler_deg, depend, self.layer)
+
+
+class StoredCandidate(Line, extra="ignore"):
+    """A block of the dictionary shown to a model."""
+
+    type: BlockType
+    """Its shape."""
+    color: Color
+    """Its color."""
+    euler: Annotated[Angles, EITHER_NAME]
+    """As of a block."""
+    required: Any = None
+    """True if the scene needs it; not read."""
+
+    @functools.cached_property
+    def candidate(self) -> Candidate:
+        """The candidate that the line describes."""
+        return Candidate(self.type, self.color, triple(self.euler))
+
+
+def _order_faults(blocks: Sequence[StoredBlock]) -> Iterator[Fault]:
+    orders = [block.order for block in blocks]
+    for i, order in enumerate(orders):
+        if order in orders[:i]:
+            yield Fault("is used twice", "unique orders", str(order), (i, "order"))
+
+
+def _dependency_faults(blocks: Sequence[StoredBlock]) -> list[Fault]:
+    """Dependencies that name no block or run in a circle, in a list whose orders are unique."""
+    orders = [block.order for block in blocks]
+    known = "0 (the ground) or an order of the scene: " + ", ".join(map(str, sorted(orders)))
+    unknown = [
+        Fault("names no block", known, str(order), (i, "depend"))
+        for i, block in enumerate(blocks)
+        for order in block.depend
+        if order and order not in orders
+    ]
+    if unknown:
+        return unknown
+    try:
+        _graph(blocks)
+    except CycleError as error:
+        cycle = " -> ".join(str(orders[v]) for v in (*error.vertices, error.vertices[0]))
+        at = (error.vertices[0], "depend")
+        return [Fault("is part of a cycle", "dependencies without a cycle", cycle, at)]
+    return []
+
+
+def _layer_faults(blocks: Sequence[StoredBlock]) -> Iterator[Fault]:
+    for i, (block, layer) in enumerate(zip(blocks, _graph(blocks).layers, strict=True)):
+        if block.layer != layer:
+            wanted = f"{layer}, the longest path of dependencies"
+            yield Fault("is wrong", wanted, str(block.layer), (i, "layer"))
+
+
+def _graph(blocks: Sequence[StoredBlock]) -> AOVGraph:
+    vertex = {block.order: v for v, block in enumerate(blocks)}
+    return AOVGraph(tuple(frozenset(vertex[o] for o in b.depend if o) for b in blocks))
+
+
+def look_faults(candidates: Sequence[StoredCandidate]) -> Iterator[Fault]:
+    """Yield candidates that look the same as an earlier one."""
+    first: dict[object, int] = {}
+    for i, stored in enumerate(candidates):
+        number = first.setdefault(stored.candidate.look, i + 1)
+        if number != i + 1:
+            message = f"looks the same as candidate {number}"
+            found = shown([stored.type, stored.color, stored.euler])
+            allowed = "candidates that differ in type, color or orientation"
+            yield Fault(message, allowed, found, (i,))
+
+
+def _level_faults(levels: Sequence[int]) -> Iterator[Fault]:
+    if list(levels) not in _LEVELS:
+        yield Fault(*_NO_LEVELS)
+
+
+SceneBlocks = Annotated[
+    tuple[StoredBlock, ...],
+    Field(min_length=1, max_length=MAX_BLOCKS),
+    checked(_order_faults),
+    checked(_dependency_faults),
+]
+"""Blocks with unique orders whose dependencies are a graph without cycles."""
+CandidateList = Annotated[
+    tuple[StoredCandidate, ...],
+    Field(min_length=1, max_length=MAX_CANDIDATES),
+    checked(look_faults),
+]
+"""Candidates of which no two look the same."""
+Levels = Annotated[
+    tuple[StrictInt, ...],
+    worded(*_NO_LEVELS),
+    checked(_level_faults),
+    WithJsonSchema({"enum": list(_LEVELS)}),
+]
+"""The levels that a scene counts in."""
+
+
+class StoredScene(Line, extra="ignore"):
+    """A goal structure with its candidate set."""
+
+    id: Name
+    """Unique in the file; up to 100 letters, digits, `.`, `_`, `-`, a letter or digit first."""
+    levels: Levels
+    """The levels that the scene counts in: `[1]`, `[2]`, `[3]`, `[4]` or `[1, 2]`."""
+    parents: Annotated[tuple[Name, ...], Field(min_length=1, max_length=_MOST_PARENTS)]
+    """The base scenes that it was made from, one at least; a base scene names itself. Statistics
+    cluster by them."""
+    blocks: Annotated[SceneBlocks, checked(_layer_faults)]
+    """The goal structure: 1 to 22 blocks."""
+    candidates: CandidateList
+    """1 to 16 candidates, numbered from 1 in this order. No two may look the same, and every block
+    needs one of its look."""
+    format: Format = 1
+    """Version of the line, 1 where it does not say."""
+
+    @classmethod
+    def of(cls, scene: Scene, candidates: CandidateSet) -> Self:
+        """Return a scene as it is written: lengths to a micrometer."""
+        blocks = []
+        for block in scene.blocks:
+            x, y, z = (round(length, 6) + 0.0 for length in block.position_m)
+            blocks.append(StoredBlock.of(block, (x, y, z)))
+        looks = {block.look for block in scene.blocks}
+        offered = [
+            StoredCandidate(
+                type=c.type, color=c.color, euler=plain(c.euler_deg), required=c.look in looks
+            )
+            for c in candidates.candidates
+        ]
+        return cls(
+            id=scene.id,
+            levels=scene.levels,
+            parents=scene.parents,
+            blocks=tuple(blocks),
+            candidates=tuple(offered),
+        )
+
+    def scene(self) -> Scene:
+        """Return the goal structure."""
+        blocks = tuple(stored.block() for stored in self.blocks)
+        return Scene(self.id, self.levels, blocks, self.parents)
+
+
+def candidate_set(stored: Sequence[StoredCandidate]) -> CandidateSet:
+    """Return the candidate set that these are."""
+    return CandidateSet(tuple(one.candidate for one in stored))
+
+
+def task_of(
+    scene: Scene, candidates: CandidateSet, where: str, composite: Path | None = None
+) -> AssemblyTask:
+    """Return a scene with its candidates; DataError where no candidate can stand for a block."""
+    missing = candidates.missing(scene)
+    refuse(
+        (
+            Fault(
+                f"hold nothing that block {block.order} of scene {scene.id} needs",
+                "every type, color and orientation that the scene uses",
+                shown([block.type, block.color, block.euler_deg]),
+                ("candidates",),
+            )
+            for block in scene.blocks
+            if block.order in missing
+        ),
+        where,
+    )
+    return AssemblyTask(scene, candidates, composite)
+
+
+def read_builtin(folder: Path) -> Dataset:
+    """Return all scenes of a data set folder; DataError with everything that is wrong in it."""
+    path = folder / SCENES_FILE
+    allowed = f"a folder with {SCENES_FILE}, or the name of a bundled data set"
+    return Dataset(folder.name, folder, _tasks(path, read_text(path, allowed)))
+
+
+@functools.lru_cache(maxsize=1)
+def _tasks(path: Path, text: str) -> tuple[AssemblyTask, ...]:
+    """The scenes in a file's text, which a run reads again for its report."""
+
+    def read(raw: Any, where: str) -> AssemblyTask:
+        line = validated(StoredScene, raw, where)
+        return task_of(line.scene(), candidate_set(line.candidates), where)
+
+    tasks = read_lines(path, text, "scene", read, lambda task: task.key)
+    return tuple(sorted(tasks, key=lambda task: task.key))
