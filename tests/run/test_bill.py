@@ -226,8 +226,7 @@ def test_a_dry_run_says_where_prices_are_from_and_which_change_soon(workspace: W
     plan = planned(workspace)
     told = " ".join(printed(plan, estimate(plan, workspace.out, use_cache=False)).split())
     assert (
-        f"Prices of {today()}: models.yaml line 4 (a); litellm {version('litellm')} map (b)."
-        in told
+        f"Prices of {today()}: the models file (a); litellm {version('litellm')} map (b)." in told
     )
     costs = "costs $2.5 in and $5 out per million tokens in place of $1 in and $2 out per million"
     assert f"From {soon} on a {costs}" in told

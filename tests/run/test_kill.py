@@ -130,7 +130,7 @@ def test_no_process_outlives_a_killed_run(workspace: Workspace) -> None:
         prepare(workspace, running.url, 1)
         with workspace.start() as process:
             family: list[psutil.Process] = []
-            while not any("spawn_main" in " ".join(_command(child)) for child in family):
+            while not any("phyblock.workers" in " ".join(_command(child)) for child in family):
                 family = psutil.Process(process.pid).children(recursive=True)
                 time.sleep(0.01)
             os.kill(process.pid, signal.SIGKILL)
