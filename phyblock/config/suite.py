@@ -176,6 +176,8 @@ class CandidatesSpec(Section):
 class ScoringSpec(Section):
     """How replies are scored."""
 
+    later: ClassVar[tuple[str, ...]] = ("extractor",)
+
     matchers: UniqueSome[Matcher] = Field(
         default=("optimal", "paper"),
         description="optimal: interchangeable blocks are matched so that most steps count. paper: "
@@ -190,6 +192,12 @@ class ScoringSpec(Section):
         default="count",
         description="A missing reply: count its blocks as not placed, or skip the scene (as the "
         "paper did).",
+    )
+    extractor: str | None = Field(
+        default=None,
+        description="A model of the models file that is sent the text of replies from which "
+        "nothing could be read, and copies what they say into the asked form; its calls count "
+        "against limits.max_cost_usd. Null: such replies stay unread.",
     )
 
 

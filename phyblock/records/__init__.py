@@ -20,6 +20,7 @@ from phyblock.records.others import BatchLine, PictureMark, Prompt, PromptMessag
 from phyblock.records.record import (
     AskedTurn,
     Course,
+    Extraction,
     Record,
     Recorded,
     Score,
@@ -44,6 +45,7 @@ __all__ = [
     "BatchLines",
     "Belonging",
     "Course",
+    "Extraction",
     "Line",
     "Lines",
     "Manifest",

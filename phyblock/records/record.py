@@ -116,6 +116,15 @@ class ShownScene(Line):
     """The scene whose goal was shown; null: none was."""
 
 
+class Extraction(Line):
+    """An extraction model's copy of what a reply says that no reader could read."""
+
+    model: str
+    """The model that was asked."""
+    reply: Reply
+    """Its reply."""
+
+
 class Record(Line):
     """A sample's stored outcome."""
 
@@ -154,6 +163,8 @@ class Record(Line):
     """When it was written, UTC."""
     run: str = ""
     """Digest of the run that it belongs to; older records have none."""
+    extraction: Extraction | None = None
+    """What another model copied out of the reply; null: it was read, or nobody was asked."""
     read_again: bool = False
     """Whether later readers made it of an earlier record, with which its cost was counted."""
     shown: ShownScene | None = None
@@ -253,7 +264,8 @@ class Record(Line):
 
         Replies from the cache were paid for elsewhere; an episode can hold both kinds.
         """
-        paid = [reply.cost_usd for reply in self.replies if not reply.cached]
+        more = () if self.extraction is None else (self.extraction.reply,)
+        paid = [reply.cost_usd for reply in (*self.replies, *more) if not reply.cached]
         known = [cost for cost in paid if cost is not None]
         return plain_sum(known) if len(known) == len(paid) else None
 
@@ -262,8 +274,9 @@ class Record(Line):
         """What the run's cost limit counted for this line [US dollars]."""
         if self.read_again:
             return 0.0
+        more = 0.0 if self.extraction is None else self.extraction.reply.limit_usd
         if self.reply is not None:
-            return self.reply.limit_usd
+            return self.reply.limit_usd + more
         return self.failed_usd
 
     @property

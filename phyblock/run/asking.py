@@ -32,6 +32,8 @@ def asking_remarks(suite: Suite, plan: RunPlan) -> list[str]:
     own = [*_recorded(called, suite)]
     own += [_named(track, path, one) for (track, path), one in used.items()]
     own += [_unused(track, path, suite) for track, path in suite.files.unused.items()]
+    if plan.extractor is not None:
+        own.append(f"replies that cannot be read are sent to {plan.extractor.name}, as text")
     if suite.answer_format == "text":
         return own
     unsaid = [_unsaid(track, path) for (track, path), one in used.items() if not _says(track, one)]

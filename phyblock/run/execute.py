@@ -17,6 +17,7 @@ from typing import Any
 from phyblock.errors import BudgetReachedError, UnavailableError
 from phyblock.models import AskLaterError, GatheringModel, Halt, HaltedError, Model
 from phyblock.run.events import ModelStopped, SampleDone, Stopping, Watcher
+from phyblock.run.extraction import Extractor
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan
 from phyblock.run.samples import Sample, SampleRunner
@@ -80,9 +81,10 @@ class Executor:
         halt: Halt,
         *,
         retry_failed: bool = False,
+        extractor: Extractor | None = None,
     ) -> None:
         """`halt` is the switch that `models` were built with; `retry_failed` asks again also where
-        a request was rejected for good.
+        a request was rejected for good; `extractor` is asked what unread replies say.
         """
         self.settled: Mapping[str, Summary] = {
             sample: summary
@@ -95,7 +97,7 @@ class Executor:
         self._turns = RecordWriter(store.turns)
         begun = store.begun_turns(self.settled) if plan.has_episodes else {}
         run = plan.manifest.run
-        self._samples = SampleRunner(self._turns, store.prompts, halt, begun, run)
+        self._samples = SampleRunner(self._turns, store.prompts, halt, begun, run, extractor)
         self._models = models
         self._watch = watch
         self._halt = halt

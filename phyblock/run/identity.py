@@ -7,9 +7,11 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from phyblock.config.models import ModelConfig
 from phyblock.config.suite import Suite, Variant
 from phyblock.data import UNNUMBERED, Dataset
 from phyblock.records import FORMAT
+from phyblock.run.extraction import extraction_prompt
 from phyblock.run.models import PlannedModel
 from phyblock.stable import hex_digest
 from phyblock.tracks import AnyTrack
@@ -25,6 +27,7 @@ def inputs_of(
     data_version: int,
     variants: Mapping[Variant, Sequence[AnyTrack]],
     limit: int | None,
+    extractor: ModelConfig | None = None,
 ) -> Inputs:
     """Return what decides the results; `variants` has the tracks of every condition."""
     inputs: dict[str, Any] = {
@@ -35,6 +38,9 @@ def inputs_of(
         "tracks": {track.name: track.identity() for track in variants[Variant()]},
         "limit": limit,
     }
+    if extractor is not None:
+        version = extraction_prompt().version
+        inputs["extractor"] = {**extractor.identity(), "prompt": version}
     if suite.vary.factors:
         inputs["variants"] = {
             variant.key: {track.name: track.identity() for track in of_variant}

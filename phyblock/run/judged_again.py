@@ -12,6 +12,7 @@ from phyblock.errors import Problem, StoreError
 from phyblock.parsing.text import READER_VERSION
 from phyblock.records import RECORDS, Manifest, Record
 from phyblock.records.reading import read_records
+from phyblock.run.extraction import read_extraction
 from phyblock.run.judging import judged_apart
 from phyblock.run.records import about_item
 from phyblock.run.replayed import counted_again
@@ -102,7 +103,10 @@ async def reply_judged_again(
     if not record.is_judged:
         # What it holds is of no plan that was carried out.
         given["error"] = earlier = None
-    return await judged_apart(track, item, text, given, earlier)
+    again = await judged_apart(track, item, text, given, earlier)
+    if again.outcome != "parse_failure" or record.extraction is None:
+        return again
+    return await read_extraction(track, item, again, record.extraction, earlier)
 
 
 def _variant(record: Record, known: Collection[str], where: str) -> Variant:

@@ -9,6 +9,7 @@ from datetime import datetime, timezone
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from phyblock.config.models import ModelConfig
 from phyblock.config.suite import Suite, Variant
 from phyblock.data import Dataset, read_version
 from phyblock.parsing.text import READER_VERSION
@@ -32,6 +33,7 @@ def make_manifest(
     dataset: Dataset,
     variants: Mapping[Variant, Sequence[AnyTrack]],
     limit: int | None,
+    extractor: ModelConfig | None = None,
 ) -> Manifest:
     """Return the manifest of a run.
 
@@ -40,7 +42,7 @@ def make_manifest(
     are no part of it. `variants` has the tracks of every condition.
     """
     data_version = read_version(dataset.root)
-    inputs = inputs_of(suite, models, dataset, data_version, variants, limit)
+    inputs = inputs_of(suite, models, dataset, data_version, variants, limit, extractor)
     scenes = [task.scene for task in dataset.tasks]
     fields = {
         "identity": identity_of(inputs),

@@ -62,6 +62,23 @@ def plan_models(
     return tuple(_planned(name, spec, suite) for name, spec in specs.items())
 
 
+def plan_extractor(suite: Suite, known: Mapping[str, ModelConfig]) -> ModelConfig | None:
+    """Return the model that a suite has unread replies copied by, or None.
+
+    Raises SpecError for a name that no model of the models file has.
+    """
+    name = suite.scoring.extractor
+    if name is None:
+        return None
+    if name not in known or known[name].kind != "litellm":
+        names = [other for other, config in known.items() if config.kind == "litellm"]
+        where, message = suite.where("scoring", "extractor"), "is no model that can be asked"
+        field, hint = "scoring.extractor", did_you_mean(name, names)
+        raise SpecError(Problem(where, message, field, name, ", ".join(names), hint))
+    config = to_config(name, known[name], suite.model_copy(update={"answer_format": "text"}))
+    return config.model_copy(update={"batch": False})
+
+
 def recorded_order(folder: Path) -> CandidateOrder:
     """The order in which candidates were shown to a recorded model.
 

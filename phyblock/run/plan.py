@@ -15,7 +15,13 @@ from phyblock.errors import Problem, SpecError
 from phyblock.records import Manifest
 from phyblock.run.data import open_dataset
 from phyblock.run.manifest import make_manifest
-from phyblock.run.models import PlannedModel, plan_models, recorded_format, recorded_order
+from phyblock.run.models import (
+    PlannedModel,
+    plan_extractor,
+    plan_models,
+    recorded_format,
+    recorded_order,
+)
 from phyblock.run.samples import Sample
 from phyblock.tracks import AnyTrack, EpisodeTrack, Item, Opening, kind_of, open_tracks
 from phyblock.tracks.selection import interleaved, select_tasks
@@ -32,7 +38,8 @@ class RunPlan:
 
     `manifest` is what `run.yaml` holds, but for the values of floors, which `floors` computes;
     `tracks` are those of the reference, `variants` all conditions with the tracks of each;
-    `arranged` gives the order in which the items of a track are asked about.
+    `arranged` gives the order in which the items of a track are asked about; `extractor` is asked
+    about replies that cannot be read.
     """
 
     suite: Suite
@@ -42,6 +49,7 @@ class RunPlan:
     manifest: Manifest
     floors: Callable[[], FloorValues]
     arranged: Callable[[Sequence[Item]], Sequence[Item]] = interleaved
+    extractor: ModelConfig | None = None
 
     @property
     def tracks(self) -> tuple[AnyTrack, ...]:
@@ -118,7 +126,8 @@ def make_plan(
     if asks:
         for of_variant in variants.values():
             _check_prompts(of_variant)
-    manifest = make_manifest(suite, models, selected, variants, limit)
+    extractor = plan_extractor(suite, known)
+    manifest = make_manifest(suite, models, selected, variants, limit, extractor)
 
     def reopened(name: str, one: Suite) -> AnyTrack:
         return kind_of(name).open(Opening(one, dataset, limit, False))
@@ -129,7 +138,7 @@ def make_plan(
 
         return floor_values(manifest, suite, reopened)
 
-    return RunPlan(suite, models, selected, variants, manifest, floors)
+    return RunPlan(suite, models, selected, variants, manifest, floors, extractor=extractor)
 
 
 def _with_plain_names(suite: Suite, known: Mapping[str, ModelConfig]) -> Suite:

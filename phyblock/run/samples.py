@@ -12,6 +12,7 @@ from phyblock.config.suite import Variant
 from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
 from phyblock.models import AskLaterError, Halt, Model, Request
 from phyblock.records import Record, Reply, SentPrompt, Turn, Usage
+from phyblock.run.extraction import Extractor
 from phyblock.run.judging import judged_apart
 from phyblock.run.prompts import PromptFile
 from phyblock.run.records import about_prompt, begun, judged
@@ -68,7 +69,7 @@ class SampleRunner:
     """Turns samples into records; answered turns of episodes are on disk before the next is asked.
 
     `earlier` are the replies of episodes that an earlier command began, by sample id; `run` is the
-    digest that shows whose the records are.
+    digest that shows whose the records are; `extractor` is asked what unread replies say.
     """
 
     def __init__(
@@ -78,7 +79,9 @@ class SampleRunner:
         halt: Halt,
         earlier: Mapping[str, Sequence[Reply]],
         run: str,
+        extractor: Extractor | None = None,
     ) -> None:
+        self._extractor = extractor
         self._turns = turns
         self._prompts = prompts
         self._halt = halt
@@ -125,12 +128,20 @@ class SampleRunner:
         fields = self._begin(sample, answer) | _asked(config, request)
         fields["prompt"] = self._prompt(track, request)
         text = answer.text if isinstance(answer, Reply) else None
-        record, is_cancelled = await to_its_end(judged_apart(track, sample.item, text, fields))
+        record, is_cancelled = await to_its_end(self._judged(track, sample.item, text, fields))
         task = asyncio.current_task()
         if is_cancelled and task is not None:
             # It ends at its next wait, which is that for its record.
             task.cancel()
         return record
+
+    async def _judged(
+        self, track: SingleTrack[Any], item: Item, text: str | None, fields: Mapping[str, Any]
+    ) -> Record:
+        record = await judged_apart(track, item, text, fields)
+        if self._extractor is None:
+            return record
+        return await self._extractor.read(track, item, record)
 
     async def _play(
         self,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 
@@ -27,6 +28,7 @@ from phyblock.records import BATCHES
 from phyblock.resources import reply_cache_file
 from phyblock.run.events import ModelNotice, RunNotice, RunStarted, Watcher
 from phyblock.run.execute import Executor, RunResult
+from phyblock.run.extraction import Extractor
 from phyblock.run.plan import RunPlan
 from phyblock.run.soundness import provider_problem
 from phyblock.run.store import RunStore, held_run
@@ -38,17 +40,18 @@ __all__ = ["Session", "check_ready"]
 def check_ready(plan: RunPlan) -> None:
     """Raise SpecError naming every model whose key or address is not set."""
     problems: list[Problem] = []
-    for model in plan.models:
-        status = api_key_status(model.config)
+    configs = [*(model.config for model in plan.models), *filter(None, [plan.extractor])]
+    for config in configs:
+        status = api_key_status(config)
         if status.fault:
-            problems.append(Problem(f"model {model.name}", status.fault, "", model.config.id))
-        if (unknown := provider_problem(model.config, f"model {model.name}")) is not None:
+            problems.append(Problem(f"model {config.name}", status.fault, "", config.id))
+        if (unknown := provider_problem(config, f"model {config.name}")) is not None:
             problems.append(unknown)
         elif status.is_needed and not status.is_set:
             message = "needs an API key, and none is set"
             names = " or ".join(status.variables)
             hint = f"set {names} in the environment, or leave the model out with --models"
-            problems.append(Problem(f"model {model.name}", message, "", model.config.id, hint=hint))
+            problems.append(Problem(f"model {config.name}", message, "", config.id, hint=hint))
     if problems:
         raise SpecError(problems)
 
@@ -77,6 +80,7 @@ class Session:
         self._store: RunStore | None = None
         self._batch_writer: RecordWriter | None = None
         self._models: dict[str, Model] = {}
+        self._extracting: Model | None = None
         self.executor: Executor
 
     async def __aenter__(self) -> Session:
@@ -87,7 +91,8 @@ class Session:
             self._store = RunStore(self._folder, manifest, plan.sample_ids())
             self._check_batches(self._store)
             remove_unfinished(self._folder)
-            if self._use_cache and any(m.config.kind == "litellm" for m in plan.models):
+            asks = any(m.config.kind == "litellm" for m in plan.models) or plan.extractor
+            if self._use_cache and asks:
                 self._cache = ReplyCache(reply_cache_file(), self._tell)
             limits = plan.suite.limits
             overall = Gate(limits.max_concurrency)
@@ -99,21 +104,26 @@ class Session:
                 limits.max_attempts, limits.retry_for_s, limits.max_connection_failures
             )
             breakers = Breakers(policy, self._tell)
+            build = partial(
+                build_model,
+                cache=self._cache,
+                overall=overall,
+                budget=budget,
+                observer=self._notice,
+                policy=policy,
+                breakers=breakers,
+                halt=halt,
+            )
             for model in plan.models:
                 if model.name in self._present:
                     self._models[model.name] = self._present[model.name]
                     continue
-                self._models[model.name] = build_model(
-                    model.config,
-                    cache=self._cache,
-                    overall=overall,
-                    budget=budget,
-                    observer=self._notice,
-                    policy=policy,
-                    breakers=breakers,
-                    halt=halt,
-                    batches=self._batches(self._store) if model.config.batch else None,
-                )
+                batches = self._batches(self._store) if model.config.batch else None
+                self._models[model.name] = build(model.config, batches=batches)
+            extractor = None
+            if plan.extractor is not None:
+                self._extracting = build(plan.extractor)
+                extractor = Extractor(self._extracting, plan.extractor)
             self.executor = Executor(
                 plan,
                 self._store,
@@ -121,6 +131,7 @@ class Session:
                 self._watch,
                 halt,
                 retry_failed=self._retry_failed,
+                extractor=extractor,
             )
         except BaseException:
             await self._close()
@@ -195,7 +206,7 @@ class Session:
         self._watch(RunNotice(text))
 
     async def _close(self) -> None:
-        for model in self._models.values():
+        for model in (*self._models.values(), *filter(None, [self._extracting])):
             await model.aclose()
         if self._batch_writer is not None:
             await self._batch_writer.drain()

@@ -21,7 +21,10 @@ from phyblock.tables.text_table import (
 
 __all__ = ["coverage_frame", "coverage_in_terminal", "coverage_view"]
 
-_COUNTS = ("recorded", *OUTCOMES, "replies", "tokens_unknown", "cost_unknown", "cached", "attempts")
+_COUNTS = (
+    *("recorded", *OUTCOMES, "extracted", "replies"),
+    *("tokens_unknown", "cost_unknown", "cached", "attempts"),
+)
 
 _ROW = ["model", "track"]
 _COLUMNS = (
@@ -30,6 +33,7 @@ _COLUMNS = (
     "recorded",
     "not_run",
     *OUTCOMES,
+    "extracted",
     "replies",
     *TOKENS,
     "tokens_unknown",
@@ -45,7 +49,8 @@ _COLUMNS = (
 def coverage_frame(run: Run) -> pd.DataFrame:
     """One row a model and track.
 
-    `expected` samples are `recorded` + `not_run`; the outcomes split `recorded`. Of the `replies`
+    `expected` samples are `recorded` + `not_run`; the outcomes split `recorded`,
+    and `extracted` are those that an extraction model read. Of the `replies`
     (samples that hold one): token sums of those that tell, with `tokens_unknown` that do not;
     `cost_usd` what the run paid, the sum of the known prices, NaN where none is, with
     `cost_unknown` without one; `cached` ones were paid for by another run and cost nothing here;
@@ -60,6 +65,7 @@ def coverage_frame(run: Run) -> pd.DataFrame:
     facts = records[[*_ROW, *TOKENS]].assign(
         recorded=1,
         **{name: (records["outcome"] == name).astype("int64") for name in OUTCOMES},
+        extracted=(records["rule"] == "extractor").astype("int64"),
         replies=replied.astype("int64"),
         tokens_unknown=(replied & records["completion_tokens"].isna()).astype("int64"),
         cost_usd=records["paid_usd"].where(paid),
@@ -136,6 +142,11 @@ def _cost(known: float, unknown: int, replies: int) -> str:
 
 def _coverage_notes(table: pd.DataFrame, run: Run) -> list[str]:
     notes = []
+    if table["extracted"].any():
+        read = table[table["extracted"] > 0]
+        counts = zip(read["model"], read["extracted"], read["recorded"], strict=True)
+        listed = ", ".join(f"{model} {count} of {recorded}" for model, count, recorded in counts)
+        notes.append(f"Read by extractor: {listed}.")
     if table["latency_s"].notna().any():
         notes.append("Latency is the mean over replies that were asked for in this run.")
     if table["cached"].any():
