@@ -33,11 +33,6 @@ def cache_dir() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "phyblock"
 
 
-def learned_dir() -> Path:
-    """Return the folder of what floors learned and reach, which costs time alone."""
-    return cache_dir() / "goal-blind"
-
-
 def reply_cache_file() -> Path:
     """Return the reply cache that all runs of this user share."""
     return cache_dir() / "replies.sqlite"

@@ -15,8 +15,12 @@ from phyblock.tables.estimates import pooled_in, value_of_cells
 from phyblock.tables.headline import headline_rows
 from phyblock.tables.load import Run
 from phyblock.tables.measures import CELL, Cell, Measure
-from phyblock.tracks.estimates import counted_samples, track_measures
-from phyblock.tracks.headline import headline_columns, main_measure
+from phyblock.tracks.estimates import (
+    counted_samples,
+    headline_columns,
+    main_measure,
+    track_measures,
+)
 from phyblock.tracks.kind import kind_of, kinds
 
 __all__ = ["Comparable", "Part", "comparable", "comparable_tracks"]

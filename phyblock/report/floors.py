@@ -24,8 +24,13 @@ from phyblock.tables.text_table import (
     track_column,
     track_text,
 )
-from phyblock.tracks.estimates import track_estimates, track_measures
-from phyblock.tracks.headline import headline_columns, main_column, main_measure
+from phyblock.tracks.estimates import (
+    headline_columns,
+    main_column,
+    main_measure,
+    track_estimates,
+    track_measures,
+)
 from phyblock.tracks.kind import kind_of
 
 __all__ = [

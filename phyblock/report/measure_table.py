@@ -19,8 +19,13 @@ from phyblock.tables.text_table import (
     track_text,
 )
 from phyblock.text import counted
-from phyblock.tracks.estimates import samples_lacking, track_estimates, track_measures
-from phyblock.tracks.headline import headline_columns, main_column
+from phyblock.tracks.estimates import (
+    headline_columns,
+    main_column,
+    samples_lacking,
+    track_estimates,
+    track_measures,
+)
 from phyblock.tracks.kind import kind_of
 
 __all__ = [

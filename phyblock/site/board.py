@@ -14,8 +14,7 @@ from phyblock.site.runs import SiteRun
 from phyblock.site.values import AllValues, TrackValues, values_of
 from phyblock.tables.headline import Value
 from phyblock.tables.showing import varied_words
-from phyblock.tracks.estimates import track_measures
-from phyblock.tracks.headline import headline_columns, main_column, main_measure
+from phyblock.tracks.estimates import headline_columns, main_column, main_measure, track_measures
 from phyblock.tracks.kind import kind_of
 
 __all__ = ["all_values", "board_of"]

@@ -16,8 +16,8 @@ from phyblock.site.entries import Entry
 from phyblock.site.runs import SiteRun
 from phyblock.site.values import AllValues, TrackValues
 from phyblock.tables.load import Run
-from phyblock.tracks.drawable import scene_entry
 from phyblock.tracks.kind import kind_of
+from phyblock.tracks.pictures import scene_entry
 
 __all__ = ["write_samples"]
 

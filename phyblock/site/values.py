@@ -13,8 +13,7 @@ from phyblock.tables.coverage import coverage_frame
 from phyblock.tables.headline import Value, headline_values
 from phyblock.tables.load import Run
 from phyblock.tables.measures import Measure
-from phyblock.tracks.estimates import track_estimates, track_measures
-from phyblock.tracks.headline import headline_columns
+from phyblock.tracks.estimates import headline_columns, track_estimates, track_measures
 
 __all__ = ["AllValues", "Facts", "Key", "TrackValues", "values_of"]
 

@@ -24,7 +24,7 @@ from phyblock.site.page import render_page
 from phyblock.site.runs import SiteRun, open_runs
 from phyblock.site.samples import write_samples
 from phyblock.stable import hex_digest
-from phyblock.tracks.drawable import kit
+from phyblock.tracks.pictures import kit
 
 __all__ = ["INDEX", "SiteWritten", "write_site"]
 

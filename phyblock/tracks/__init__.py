@@ -16,9 +16,8 @@ from phyblock.tracks.base import (
 )
 from phyblock.tracks.kind import Opening, TrackKind, kind_of, kinds
 from phyblock.tracks.opening import open_tracks
-from phyblock.tracks.pictures import PicturePolicy, Pictures
+from phyblock.tracks.pictures import Drawing, PicturePolicy, Pictures, Studio
 from phyblock.tracks.prompts import OfficialPrompt, Prompt, TemplatePrompt
-from phyblock.tracks.studio import Drawing, Studio
 
 __all__ = [
     "AnyTrack",

@@ -14,17 +14,8 @@ from phyblock.tables.estimates import ESTIMATE_COLUMNS, estimate_frame
 from phyblock.tables.load import Run
 from phyblock.tables.measures import SCORED_BY, Measure, SampleCounts
 from phyblock.tables.outcomes import has_reply
+from phyblock.tables.track_report import HeadlineColumn
 from phyblock.tracks.kind import kind_of
-
-__all__ = [
-    "all_estimates",
-    "counted_samples",
-    "numbers_of",
-    "samples_lacking",
-    "stored_counts",
-    "track_estimates",
-    "track_measures",
-]
 
 
 def track_measures(track: str) -> tuple[Measure, ...]:
@@ -111,3 +102,25 @@ def counted_samples(run: Run, track: str, counted: SampleCounts) -> pd.DataFrame
         **dict.fromkeys(SCORED_BY, ""), replied=has_reply(rows)
     )
     return kind_of(track).report().in_cells(pd.concat([kept, numbers], axis=1), run)
+
+
+def headline_columns(run: Run, track: str) -> tuple[HeadlineColumn, ...]:
+    """The columns of a track's headline: those it chooses, else its first measure in every cell."""
+    report = kind_of(track).report()
+    if report.headline is not None:
+        return report.headline(run)
+    (first, *_) = report.measures
+    return tuple(HeadlineColumn(first.name, cell.name, cell.heading) for cell in report.cells(run))
+
+
+def main_column(run: Run, track: str) -> HeadlineColumn:
+    """The column that models are ranked by: the one headed as the track says, else the last."""
+    columns = headline_columns(run, track)
+    main = kind_of(track).report().main
+    return next((column for column in columns if column.heading == main), columns[-1])
+
+
+def main_measure(run: Run, track: str) -> Measure:
+    """The measure of that column: the one that is drawn, compared and ranked by."""
+    name = main_column(run, track).measure
+    return next(measure for measure in track_measures(track) if measure.name == name)

@@ -17,7 +17,7 @@ from phyblock.tables.measures import SampleCounts
 from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.base import AnyTrack
 from phyblock.tracks.by_hand import Picking
-from phyblock.tracks.studio import Workshop, render_workers
+from phyblock.tracks.pictures import Workshop, render_workers
 
 __all__ = ["Opening", "TrackKind", "kind_of", "kinds", "kinds_with_physics"]
 

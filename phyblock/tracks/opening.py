@@ -14,10 +14,9 @@ from phyblock.resources import cache_dir
 from phyblock.sim.pictures import PictureStyle
 from phyblock.tracks.base import AnyTrack
 from phyblock.tracks.kind import Opening, kind_of
-from phyblock.tracks.pictures import PicturePolicy, Pictures
+from phyblock.tracks.pictures import PicturePolicy, Pictures, Workshop, render_workers
 from phyblock.tracks.prompts import TemplatePrompt
 from phyblock.tracks.showing import Showing, TaskShowing
-from phyblock.tracks.studio import Workshop, render_workers
 from phyblock.types import BACKGROUNDS
 
 __all__ = [

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from phyblock.records import Line, ShownScene
-from phyblock.scoring.plan import Score
+import numpy as np
 
-__all__ = ["PLAN_COLUMNS", "PlanParse", "plan_row", "score_fields"]
+from phyblock.domain import CandidateSet, Scene
+from phyblock.records import Line, ShownScene
+from phyblock.scoring.counts import Floats, ratio_of
+from phyblock.scoring.plan import Score
+from phyblock.tables.measures import Measure, SampleCounts
 
 
 class PlanParse(Line):
@@ -65,3 +68,84 @@ def score_fields(score: Score) -> dict[str, Any]:
         "blocks": score.blocks,
         "kept": score.kept,
     }
+
+
+def pose_choices(
+    scene: Scene, candidates: CandidateSet, steps: Sequence[int]
+) -> Iterator[tuple[bool, bool]]:
+    """For each kind that could be chosen wrongly and was named: whether the pose that is listed
+    first is right, and whether the pose that was named first is.
+
+    Such a kind is needed in one pose or several, and offered in a pose in which it is not. Numbers
+    that no candidate has name nothing.
+    """
+    needed = {block.look for block in scene.blocks}
+    kinds = {block.kind for block in scene.blocks}
+    chosen: dict[Any, bool] = {}
+    for step in steps:
+        if 1 <= step <= len(candidates):
+            one = candidates[step]
+            chosen.setdefault(one.kind, one.look in needed)
+    for kind in sorted(kinds & set(chosen)):
+        right = [one.look in needed for one in candidates.candidates if one.kind == kind]
+        if not all(right):
+            yield right[0], chosen[kind]
+
+
+def pose_counts(
+    scene: Scene, candidates: CandidateSet, steps: Sequence[int]
+) -> tuple[int, int, int, int]:
+    """The numbers of `POSE_COUNTS`."""
+    choices = list(pose_choices(scene, candidates, steps))
+    first = [is_right for is_first, is_right in choices if is_first]
+    later = [is_right for is_first, is_right in choices if not is_first]
+    return sum(first), len(first), sum(later), len(later)
+
+
+def _count(item: Any, judged: Any) -> tuple[int, int, int, int]:
+    return pose_counts(item.scene, item.candidates, judged.steps)
+
+
+def _first(sums: Floats) -> Floats:
+    return ratio_of(sums[..., :2])
+
+
+def _later(sums: Floats) -> Floats:
+    return ratio_of(sums[..., 2:])
+
+
+def _gap(sums: Floats) -> Floats:
+    return np.asarray(_first(sums) - _later(sums))
+
+
+POSE_COUNTS = SampleCounts(
+    "poses", ("first_right", "first_n", "later_right", "later_n"), sample=_count
+)
+POSE_MEASURES = (
+    Measure(
+        "pose_first",
+        "Right pose, listed first",
+        POSE_COUNTS,
+        _first,
+        "kinds named in the right pose, of those whose right pose is listed first among others",
+        over="kinds",
+    ),
+    Measure(
+        "pose_later",
+        "Right pose, listed later",
+        POSE_COUNTS,
+        _later,
+        "the same, of those of which a wrong pose is listed first",
+        over="kinds",
+    ),
+    Measure(
+        "pose_gap",
+        "Listed first less later",
+        POSE_COUNTS,
+        _gap,
+        "what is won by the place in the list: nothing, for a model that goes by the picture",
+        better="lower",
+        over="kinds",
+        is_difference=True,
+    ),
+)

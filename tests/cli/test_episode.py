@@ -9,9 +9,8 @@ from PIL import Image
 
 from phyblock.data import read_builtin
 from phyblock.records.reading import read_records
-from phyblock.tracks.step_planning.episode_views import OUTCOME_NAMES
-from phyblock.tracks.step_planning.film import episode_film, episode_table
-from phyblock.tracks.step_planning.record import EpisodeRecord
+from phyblock.tracks.step_planning import EpisodeRecord
+from phyblock.tracks.step_planning_results import OUTCOME_NAMES, episode_film, episode_table
 from tests.workspace import Workspace
 
 SEESAW = {

@@ -24,7 +24,7 @@ from phyblock.models import (
     RetryPolicy,
     build_model,
 )
-from phyblock.tracks.full_planning.baselines import PlanSubject
+from phyblock.tracks.full_planning import PlanSubject
 
 T = TypeVar("T")
 

@@ -15,7 +15,7 @@ from phyblock.config.models import ModelConfig
 from phyblock.domain import Candidate, CandidateSet, Plan
 from phyblock.errors import DataError, SpecError
 from phyblock.models import Gate, Reply, Request, build_model
-from phyblock.tracks.full_planning.baselines import PLAN_RULES, PlanSubject
+from phyblock.tracks.full_planning import PLAN_RULES, PlanSubject
 from tests.models.factory import CANDIDATES, SCENE, make_request
 
 PLANNERS = list(PLAN_RULES)

@@ -40,7 +40,7 @@ from phyblock.models import (
 )
 from phyblock.models.cost import plausible
 from phyblock.models.picture_tokens import picture_tokens
-from phyblock.tracks.full_planning.baselines import PlanSubject
+from phyblock.tracks.full_planning import PlanSubject
 from phyblock.types import ImageDetail
 from tests.models.factory import CANDIDATES, SCENE, ask, make_model, make_request, run
 from tests.models.routes import KEY_VARIABLE, ROUTES

@@ -12,9 +12,9 @@ from phyblock.report.html.leads import table_leads
 from phyblock.report.html.standing import cautions, samples_done
 from phyblock.report.write import make_tables
 from phyblock.tables.text_table import NO_VALUE
-from phyblock.tracks.full_planning.assembly import assembly_frame
-from phyblock.tracks.step_planning.table3 import step_intervals, table3_frame
-from phyblock.tracks.vqa.accuracy import questions_frame
+from phyblock.tracks.full_planning_results import assembly_frame
+from phyblock.tracks.step_planning_results import step_intervals, table3_frame
+from phyblock.tracks.vqa_results import questions_frame
 from tests.report.factory import manifest, record, run_of, score
 from tests.workspace import Workspace
 

@@ -25,13 +25,14 @@ from phyblock.tables.design import OVERALL
 from phyblock.tables.text_table import NO_VALUE, level_name, number
 from phyblock.tables.track_report import TableMaker
 from phyblock.tracks.estimates import all_estimates
-from phyblock.tracks.full_planning.assembly import assembly_frame
-from phyblock.tracks.full_planning.figures.levels import f1_radar, settings_dots
-from phyblock.tracks.full_planning.settings import settings_frame
-from phyblock.tracks.step_planning.table3 import step_intervals, step_scores_frame
-from phyblock.tracks.vqa.accuracy import questions_frame
-from phyblock.tracks.vqa.figure import accuracy_by_subtask
-from phyblock.tracks.vqa.table2 import vqa_intervals
+from phyblock.tracks.full_planning_results import (
+    assembly_frame,
+    f1_radar,
+    settings_dots,
+    settings_frame,
+)
+from phyblock.tracks.step_planning_results import step_intervals, step_scores_frame
+from phyblock.tracks.vqa_results import accuracy_by_subtask, questions_frame, vqa_intervals
 from tests.report.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
 
 METRICS = {"Prec": "precision", "Rec": "recall", "F1": "f1"}

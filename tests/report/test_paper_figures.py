@@ -19,10 +19,14 @@ from phyblock.report.figures.forest import difference_forest
 from phyblock.tables.drawing import COLUMN_IN, Look, heading_of, styled
 from phyblock.tables.load import Run, load_run
 from phyblock.tracks.estimates import track_estimates
-from phyblock.tracks.full_planning.figures.errors import error_bars
-from phyblock.tracks.full_planning.figures.levels import f1_radar, settings_dots
-from phyblock.tracks.full_planning.figures.losses import loss_bars
-from phyblock.tracks.full_planning.figures.scatter import f1_by_size, stated_size_b
+from phyblock.tracks.full_planning_results import (
+    error_bars,
+    f1_by_size,
+    f1_radar,
+    loss_bars,
+    settings_dots,
+    stated_size_b,
+)
 from tests.report.factory import LEVELS, manifest, record, run_of, score, write_run
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")

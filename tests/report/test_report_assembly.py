@@ -12,10 +12,15 @@ from hypothesis import strategies as st
 
 from phyblock.scoring.counts import Counts, micro
 from phyblock.scoring.plan import ERROR_TYPES
-from phyblock.tracks.full_planning.assembly import ASSEMBLY_COLUMNS, assembly_frame, table1_frame
-from phyblock.tracks.full_planning.errors import errors_frame
-from phyblock.tracks.full_planning.settings import settings_frame
-from phyblock.tracks.full_planning.views import errors_view, table1_view
+from phyblock.tracks.full_planning_results import (
+    ASSEMBLY_COLUMNS,
+    assembly_frame,
+    errors_frame,
+    errors_view,
+    settings_frame,
+    table1_frame,
+    table1_view,
+)
 from tests.report.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
 
 Records = list[dict[str, Any]]

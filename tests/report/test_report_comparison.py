@@ -10,12 +10,12 @@ import pytest
 
 from phyblock.data.published_names import PUBLISHED_NAMES, match_published
 from phyblock.report import NO_VALUE, published_table
-from phyblock.tracks.full_planning.published import (
+from phyblock.tracks.full_planning_results import (
     comparison_notes,
     largest_differences,
     published_frame,
+    published_view,
 )
-from phyblock.tracks.full_planning.views import published_view
 from tests.report.factory import manifest, record, run_of, score
 
 LEVELS = ["1", "2", "3", "4", "overall"]

@@ -17,9 +17,9 @@ from phyblock.report.figures import Wanted, figure_names, write_figures, write_p
 from phyblock.run.folder import run_folder
 from phyblock.tables.drawing import COLORS, GRID, MUTED, PAGE_LOOK, PALE
 from phyblock.tables.load import load_run
-from phyblock.tracks.stacked import HATCHES, Part, stack
-from phyblock.tracks.step_planning.figure import step_progress
-from phyblock.tracks.vqa.figure import accuracy_by_subtask, vqa_heat_map
+from phyblock.tracks.figures import HATCHES, Part, stack
+from phyblock.tracks.step_planning_results import step_progress
+from phyblock.tracks.vqa_results import accuracy_by_subtask, vqa_heat_map
 from tests.report.factory import LEVELS, manifest, record, run_of, score, write_run
 
 matplotlib = pytest.importorskip("matplotlib", reason="matplotlib is not installed")

@@ -9,8 +9,7 @@ import pytest
 from phyblock.scoring.plan import BLOCK_OUTCOMES
 from phyblock.tables.load import Run
 from phyblock.tracks.estimates import track_estimates
-from phyblock.tracks.full_planning.losses import losses_frame, losses_view
-from phyblock.tracks.full_planning.measures import BLOCK_NAMES, NAME
+from phyblock.tracks.full_planning_results import BLOCK_NAMES, NAME, losses_frame, losses_view
 from tests.report.factory import manifest, record, run_of, score
 
 FACTS: dict[str, Any] = {"seeds": (0,), "settings": ("A",), "matchers": ("optimal",)}

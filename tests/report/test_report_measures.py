@@ -12,8 +12,8 @@ from phyblock.errors import SpecError
 from phyblock.report import Run
 from phyblock.report.compare import compare_models, compare_runs
 from phyblock.report.compare_view import compare_view, flipped_lines
-from phyblock.tracks.step_planning.table3 import step_intervals
-from phyblock.tracks.vqa.accuracy import questions_frame
+from phyblock.tracks.step_planning_results import step_intervals
+from phyblock.tracks.vqa_results import questions_frame
 from tests.report.factory import LEVELS, manifest, record, run_of, score
 
 SCENES = tuple(f"{n:03}" for n in range(30))

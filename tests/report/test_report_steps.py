@@ -13,13 +13,15 @@ import yaml
 from phyblock.report import load_run
 from phyblock.report.write import write_tables
 from phyblock.tables.cost import cost_frame, cost_view
-from phyblock.tracks.step_planning.episodes import (
+from phyblock.tracks.step_planning_results import (
     endings_frame,
     episodes_frame,
     moves_frame,
     progress_frame,
+    step_intervals,
+    step_scores_frame,
+    table3_frame,
 )
-from phyblock.tracks.step_planning.table3 import step_intervals, step_scores_frame, table3_frame
 from tests.report.factory import manifest, record
 
 STEPS = {"gating": "aov", "physics": "settle", "feedback": "success", "history": "text"}

@@ -14,9 +14,14 @@ from hypothesis import strategies as st
 from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
 from phyblock.report import Run, published_table, to_latex, to_markdown
 from phyblock.report.write import make_tables
-from phyblock.tracks.vqa.accuracy import questions_frame
-from phyblock.tracks.vqa.answers import CELLS, letters_frame
-from phyblock.tracks.vqa.table2 import letters_view, published_cells, table2_frame, table2_view
+from phyblock.tracks.vqa import CELLS, letters_frame
+from phyblock.tracks.vqa_results import (
+    letters_view,
+    published_cells,
+    questions_frame,
+    table2_frame,
+    table2_view,
+)
 from tests.report.factory import laws, manifest, record, run_of
 
 

@@ -21,8 +21,8 @@ from phyblock.report.figures.perturbations import perturbation_strip
 from phyblock.scoring.plan import AssemblyScorer
 from phyblock.tables.drawing import COLUMN_IN, Look
 from phyblock.tables.load import Run
-from phyblock.tracks.full_planning.film import PLAN_VIEW
-from phyblock.tracks.full_planning.record import PlanRecord
+from phyblock.tracks.full_planning import PlanRecord
+from phyblock.tracks.full_planning_results import PLAN_VIEW
 from phyblock.tracks.kind import kind_of
 from phyblock.tracks.plans import score_fields
 from tests.report.factory import laws, manifest, record, run_of

@@ -14,7 +14,7 @@ from phyblock.records import read_manifest
 from phyblock.report.alike import check_alike
 from phyblock.report.compare import compare_runs
 from phyblock.tables.load import load_run
-from phyblock.tracks.headline import main_measure
+from phyblock.tracks.estimates import main_measure
 from tests.report.factory import manifest, run_of
 from tests.workspace import Workspace
 

@@ -13,8 +13,7 @@ from phyblock.report.compare import compare_runs
 from phyblock.run.rescore import rescore
 from phyblock.sim.engine import ENGINES, described_engine, installed_engines
 from phyblock.tables.load import load_run
-from phyblock.tracks.step_planning.rules import StepRules
-from phyblock.tracks.step_planning.track import StepPlanning
+from phyblock.tracks.step_planning import StepPlanning, StepRules
 from phyblock.types import Physics
 from tests.workspace import Raw, Workspace, candidates
 

@@ -18,8 +18,8 @@ from phyblock.errors import SimulationError
 from phyblock.run.rescore import rescore
 from phyblock.run.shielded import to_its_end
 from phyblock.sim import dynamics
-from phyblock.tracks.pose_planning.track import PosePlanning
-from phyblock.tracks.studio import Workshop
+from phyblock.tracks.pictures import Workshop
+from phyblock.tracks.pose_planning import PosePlanning
 from tests.run.killing import killed
 from tests.workspace import SCENES, Workspace
 

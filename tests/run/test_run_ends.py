@@ -19,7 +19,7 @@ from phyblock.run.execute import Cause
 from phyblock.run.plan import make_plan
 from phyblock.run.session import Session
 from phyblock.run.writer import RecordWriter
-from phyblock.tracks.full_planning.track import FullPlanning
+from phyblock.tracks.full_planning import FullPlanning
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace

@@ -15,14 +15,10 @@ from phyblock.resources import bundled
 from phyblock.run.data import open_dataset
 from phyblock.sim.pictures import joined_size_px
 from phyblock.tracks.by_hand import Picking, Spot, picks_of
-from phyblock.tracks.full_planning.baselines import PlanSubject
-from phyblock.tracks.full_planning.by_hand import pick_plan
-from phyblock.tracks.pose_planning.baselines import PoseSubject
-from phyblock.tracks.pose_planning.by_hand import pick_poses
-from phyblock.tracks.step_planning.baselines import StepSubject
-from phyblock.tracks.step_planning.by_hand import pick_step
-from phyblock.tracks.vqa.baselines import ChoiceSubject
-from phyblock.tracks.vqa.by_hand import pick_answer
+from phyblock.tracks.full_planning import PlanSubject, pick_plan
+from phyblock.tracks.pose_planning import PoseSubject, pick_poses
+from phyblock.tracks.step_planning import StepSubject, pick_step
+from phyblock.tracks.vqa import ChoiceSubject, pick_answer
 
 DATA = open_dataset("builtin", bundled("benchmarks", "data", "phyblock-400"))
 TASK = DATA.tasks[0]

@@ -23,11 +23,10 @@ from phyblock.models.base import Image
 from phyblock.resources import bundled
 from phyblock.run.data import open_dataset
 from phyblock.run.manifest import make_manifest
-from phyblock.tracks import Opening, open_tracks
+from phyblock.tracks import Opening, open_tracks, vqa
 from phyblock.tracks.examples import Examples
-from phyblock.tracks.full_planning.worked import worked_plan
-from phyblock.tracks.vqa import opening
-from phyblock.tracks.vqa.spec import VqaSpec
+from phyblock.tracks.full_planning import worked_plan
+from phyblock.tracks.vqa import VqaSpec
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
@@ -46,7 +45,7 @@ def suite_file(folder: Path) -> Path:
 
 @pytest.fixture(autouse=True, scope="module")
 def _questions_are_read_once() -> Iterator[None]:
-    read, known = opening.open_questions, {}
+    read, known = vqa.open_questions, {}
 
     def once(*args: Any) -> Any:
         if not known:
@@ -54,7 +53,7 @@ def _questions_are_read_once() -> Iterator[None]:
         return known[""]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(opening, "open_questions", once)
+        patch.setattr(vqa, "open_questions", once)
         yield
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from phyblock.data import AssemblyTask, read_builtin
 from phyblock.sim.pictures import PictureStyle
 from phyblock.tracks import PicturePolicy, Pictures, TemplatePrompt
-from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
+from phyblock.tracks.full_planning import FullPlanning, PlanningRules
 from tests.data.broken import write_scenes
 from tests.workspace import SCENES
 

@@ -10,9 +10,14 @@ from hypothesis import strategies as st
 from phyblock.domain import COLORS, KIT_PALETTE, Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring.counts import micro
 from phyblock.scoring.plan import Goal, match_plan
-from phyblock.tracks.goal_blind.learning import CONSTANT, FREQUENCIES, goal_blind_plans
-from phyblock.tracks.goal_blind.lessons import lessons, related
-from phyblock.tracks.goal_blind.offered import units
+from phyblock.tracks.goal_blind import (
+    CONSTANT,
+    FREQUENCIES,
+    goal_blind_plans,
+    lessons,
+    related,
+    units,
+)
 from phyblock.types import Setting
 
 KIT = tuple(Candidate(*kind, (0.0, 0.0, 0.0)) for kind in KIT_PALETTE)

@@ -30,16 +30,21 @@ from phyblock.scoring.pose import POSE_ERRORS, PoseFit, pose_errors
 from phyblock.sim.dynamics import ExecutionLimits, execute
 from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import center_cm, put
-from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
-from phyblock.tracks.pose_planning import judging
-from phyblock.tracks.pose_planning import track as pose_track
-from phyblock.tracks.pose_planning.baselines import POSE_RULES, PoseSubject, written
-from phyblock.tracks.pose_planning.film import pose_film, pose_table
-from phyblock.tracks.pose_planning.judging import PoseRules
-from phyblock.tracks.pose_planning.record import PoseOutcome, PoseRecord, kept_rests
-from phyblock.tracks.pose_planning.resting import worlds_of
-from phyblock.tracks.pose_planning.spec import PoseSpec
-from phyblock.tracks.pose_planning.track import PosePlanning
+from phyblock.tracks import pose_judging as judging
+from phyblock.tracks import pose_planning as pose_track
+from phyblock.tracks.full_planning import FullPlanning, PlanningRules
+from phyblock.tracks.pose_judging import PoseRules, worlds_of
+from phyblock.tracks.pose_planning import (
+    POSE_RULES,
+    PoseOutcome,
+    PosePlanning,
+    PoseRecord,
+    PoseSpec,
+    PoseSubject,
+    kept_rests,
+    written,
+)
+from phyblock.tracks.pose_planning_results import pose_film, pose_table
 from phyblock.tracks.prompts import TemplatePrompt
 from phyblock.tracks.showing import ShownTask
 from phyblock.types import REFUSED_ENDS, STEP_ENDS, StepEnd

@@ -17,7 +17,7 @@ from phyblock.parsing.plan import parse_plan, plan_form
 from phyblock.parsing.structured import AnswerForm
 from phyblock.resources import bundled
 from phyblock.tracks import OfficialPrompt, TemplatePrompt, kinds
-from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
+from phyblock.tracks.full_planning import FullPlanning, PlanningRules
 from phyblock.tracks.prompts import form_facts
 from tests.workspace import Workspace
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ast
 import json
-import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -86,43 +84,3 @@ def test_counts_of_another_measure_name_the_file(tmp_path: Path) -> None:
 
 MADE_ELSEWHERE = {"phyblock/cli/main.py": {"vqa"}}
 """The verb of the package beside this one that makes questions."""
-
-
-def test_only_the_registry_and_its_own_folder_name_a_track() -> None:
-    """In imports, names and texts, documentation too; what makes data of a track may name it."""
-    root = Path(registry.__file__).parent
-    names = set(registry.known_tracks())
-    folders = [folder for folder in (root / "tracks").iterdir() if folder.name in names]
-    assert len(folders) == len(names)
-    found = {
-        f"{place}: {name}"
-        for path in root.rglob("*.py")
-        if path != root / "registry.py" and not {*path.parents} & {*folders, root / "making"}
-        for place in [path.relative_to(root.parent).as_posix()]
-        for name in tracks_named(path, names) - MADE_ELSEWHERE.get(place, set())
-    }
-    assert not found
-
-
-def test_what_tracks_share_lies_beside_them() -> None:
-    names, root = registry.known_tracks(), Path(registry.__file__).parent / "tracks"
-    borrowed = {
-        (name, node.module)
-        for name in names
-        for path in (root / name).rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.ImportFrom)
-        and (node.module or "").startswith("phyblock.tracks.")
-        and (set(str(node.module).split(".")) & set(names)) - {name}
-    }
-    assert not borrowed
-
-
-def tracks_named(path: Path, tracks: set[str]) -> set[str]:
-    """Tracks that a module names."""
-    texts: list[str] = []
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str):
-            texts.append(re.sub(r"\w+\.md", "", node.value))
-        texts += [str(getattr(node, part, "")) for part in ("module", "name", "id", "attr", "arg")]
-    return {word for text in texts for word in re.findall(r"\w+", text)} & tracks

@@ -18,8 +18,8 @@ from phyblock.models.base import Image
 from phyblock.records.reply import Reply, Usage
 from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png
 from phyblock.tracks import PicturePolicy, Pictures
-from phyblock.tracks.full_planning.track import FullPlanning, PlanningRules
-from phyblock.tracks.goal_blind.learning import goal_blind_plans
+from phyblock.tracks.full_planning import FullPlanning, PlanningRules
+from phyblock.tracks.goal_blind import goal_blind_plans
 from phyblock.tracks.showing import (
     Showing,
     ShownTask,
@@ -29,8 +29,7 @@ from phyblock.tracks.showing import (
     showing_fields,
     shown_order,
 )
-from phyblock.tracks.step_planning.rules import StepRules
-from phyblock.tracks.step_planning.track import StepPlanning
+from phyblock.tracks.step_planning import StepPlanning, StepRules
 from tests.data.broken import write_scenes
 from tests.workspace import SCENES
 

@@ -21,10 +21,17 @@ from phyblock.models.base import Request
 from phyblock.parsing.move import MOVE_PROBLEMS, parse_move
 from phyblock.records.reply import Reply, Usage
 from phyblock.scoring.steps import MOVE_OUTCOMES
-from phyblock.tracks.step_planning.baselines import STEP_RULES, StepSubject
-from phyblock.tracks.step_planning.episode import StepEpisode
-from phyblock.tracks.step_planning.rules import ENDINGS, StepLimits, StepRules, Tally, majority
-from phyblock.tracks.step_planning.track import StepPlanning
+from phyblock.tracks.step_planning import (
+    ENDINGS,
+    STEP_RULES,
+    StepEpisode,
+    StepLimits,
+    StepPlanning,
+    StepRules,
+    StepSubject,
+    Tally,
+    majority,
+)
 from phyblock.types import SETTINGS, Setting
 from tests.parsing.test_move import REPLIES
 

@@ -19,9 +19,7 @@ from phyblock.resources import bundled
 from phyblock.scoring.steps import MOVE_OUTCOMES
 from phyblock.sim.pictures import PictureStyle
 from phyblock.tracks import PicturePolicy, Pictures, TemplatePrompt
-from phyblock.tracks.step_planning.prompt import Feedback, PastStep, StepPrompt
-from phyblock.tracks.step_planning.rules import StepRules
-from phyblock.tracks.step_planning.track import StepPlanning
+from phyblock.tracks.step_planning import Feedback, PastStep, StepPlanning, StepPrompt, StepRules
 from phyblock.types import Setting
 
 TEMPLATE = TemplatePrompt(bundled("prompts", "step_planning.j2"), "default")

@@ -23,10 +23,7 @@ from phyblock.resources import bundled
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.tracks import TemplatePrompt
-from phyblock.tracks.vqa.baselines import ChoiceSubject
-from phyblock.tracks.vqa.pictures import QuestionPictures, ShownQuestion
-from phyblock.tracks.vqa.rules import VqaRules
-from phyblock.tracks.vqa.track import Vqa
+from phyblock.tracks.vqa import ChoiceSubject, QuestionPictures, ShownQuestion, Vqa, VqaRules
 from tests.vqa_set import write_questions
 from tests.workspace import Workspace
 

@@ -25,8 +25,7 @@ from phyblock.tables.headline import headline_rows, rows_of
 from phyblock.tables.load import Run
 from phyblock.tables.measures import Measure
 from phyblock.text import counted
-from phyblock.tracks.estimates import track_estimates
-from phyblock.tracks.headline import headline_columns, main_column, main_measure
+from phyblock.tracks.estimates import headline_columns, main_column, main_measure, track_estimates
 from phyblock.tracks.kind import kind_of
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from phyblock.tables.load import Run
 from phyblock.tables.measures import in_unit
 from phyblock.tables.text_table import between, level_name, number
 from phyblock.text import counted
-from phyblock.tracks.headline import main_measure
+from phyblock.tracks.estimates import main_measure
 from phyblock.tracks.kind import kind_of
 
 if TYPE_CHECKING:

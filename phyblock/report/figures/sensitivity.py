@@ -21,7 +21,7 @@ from phyblock.tables.drawing import (
     text_width_in,
 )
 from phyblock.tables.load import Run
-from phyblock.tracks.headline import main_measure
+from phyblock.tracks.estimates import main_measure
 from phyblock.tracks.kind import kind_of
 
 if TYPE_CHECKING:

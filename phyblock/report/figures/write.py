@@ -29,7 +29,7 @@ from phyblock.tables.drawing import (
 )
 from phyblock.tables.load import Run
 from phyblock.tables.track_report import FigureMaker, SceneFigure
-from phyblock.tracks.headline import main_measure
+from phyblock.tracks.estimates import main_measure
 from phyblock.tracks.kind import kind_of, kinds
 
 if TYPE_CHECKING:

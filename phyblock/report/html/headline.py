@@ -20,8 +20,7 @@ from phyblock.tables.measures import Better
 from phyblock.tables.showing import captioned, varied_words
 from phyblock.tables.text_table import NO_VALUE, number, spread
 from phyblock.tables.track_report import HeadlineColumn
-from phyblock.tracks.estimates import track_measures
-from phyblock.tracks.headline import headline_columns, main_measure
+from phyblock.tracks.estimates import headline_columns, main_measure, track_measures
 from phyblock.tracks.kind import kind_of
 
 __all__ = ["Cell", "Headline", "Row", "headlines"]

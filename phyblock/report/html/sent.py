@@ -15,7 +15,7 @@ from phyblock.resources import cache_dir
 from phyblock.sim.pictures import PictureStyle
 from phyblock.tables.track_report import PageItems
 from phyblock.tracks import PicturePolicy, Pictures
-from phyblock.tracks.studio import Drawing, Studio
+from phyblock.tracks.pictures import Drawing, Studio
 
 __all__ = ["PictureShelf"]
 

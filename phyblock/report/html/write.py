@@ -35,8 +35,8 @@ from phyblock.report.made import PAGE
 from phyblock.report.write import TablesWritten
 from phyblock.run.folder import run_folder
 from phyblock.tables.load import Run
-from phyblock.tracks.drawable import kit, scene_entry
 from phyblock.tracks.opening import picture_policy
+from phyblock.tracks.pictures import kit, scene_entry
 from phyblock.tracks.showing import in_order
 
 __all__ = ["REPORT_FILE", "PageWritten", "page_files", "write_page", "write_report"]

@@ -19,7 +19,7 @@ from phyblock.making.scenes.candidate_sets import NEEDED, make_candidates
 from phyblock.making.scenes.scene_production import Group, Request, draw, shares
 from phyblock.scoring.counts import micro
 from phyblock.scoring.plan import Goal, match_plan
-from phyblock.tracks.goal_blind.learning import CONSTANT, FREQUENCIES, goal_blind_plans
+from phyblock.tracks.goal_blind import CONSTANT, FREQUENCIES, goal_blind_plans
 from phyblock.types import SETTINGS, Setting
 from tests.designs.scenes import designed_scene
 

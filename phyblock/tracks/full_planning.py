@@ -1,0 +1,366 @@
+"""What a suite says of the full-planning track: the section `full_planning`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from phyblock.config.suite import Suite
+from phyblock.config.validation import PictureControls
+from phyblock.data import AssemblyTask, Dataset, official_prompt
+from phyblock.domain import Block, CandidateSet, Plan, Scene
+from phyblock.errors import DataError, Problem, SpecError
+from phyblock.models.base import Image
+from phyblock.parsing.plan import ParsedPlan, parse_plan, plan_form, reader_version
+from phyblock.parsing.structured import AnswerForm
+from phyblock.records import Record
+from phyblock.resources import bundled
+from phyblock.scoring.plan import AssemblyScorer, Score
+from phyblock.stable import drawn_bytes
+from phyblock.tables.track_report import TrackReport
+from phyblock.tracks.asked_once import AS_IN_FILE, WholePlanTrack
+from phyblock.tracks.by_hand import Picking, candidate_choices
+from phyblock.tracks.examples import Examples, examples_of
+from phyblock.tracks.goal_blind import BlindGuesses
+from phyblock.tracks.kind import Opening, TrackKind
+from phyblock.tracks.opening import assembly_pictures, task_showing, template_prompt
+from phyblock.tracks.pictures import Pictures
+from phyblock.tracks.plans import PLAN_COLUMNS, POSE_COUNTS, PlanParse, plan_row, score_fields
+from phyblock.tracks.prompts import OfficialPrompt, Prompt
+from phyblock.tracks.selection import select_tasks
+from phyblock.tracks.showing import TaskShowing, file_plan
+from phyblock.types import AnswerFormat, Level1Criterion, Matcher, PlanParser, Setting
+
+
+class PlanningSpec(PictureControls):
+    """How the scenes of the full_planning track are shown, beside `images` and `candidates`."""
+
+
+class PlanRecord(Record):
+    """A plan for a scene."""
+
+    track: Literal["full_planning"]
+    """`full_planning`."""
+    parse: PlanParse | None = None
+    """The plan that was read."""
+
+    columns: ClassVar[Mapping[str, str]] = PLAN_COLUMNS
+
+    def row(self) -> Mapping[str, Any]:
+        """The plan in both numberings, and by which parser it was read."""
+        return plan_row(self.parse, self.shown)
+
+
+_RANDOM_STEPS = 4
+"""As in the paper's Random row."""
+
+
+@dataclass(frozen=True)
+class PlanSubject:
+    """A whole plan is asked for; `guess` gives one that was learned without the goal."""
+
+    scene: Scene
+    candidates: CandidateSet
+    guess: Callable[[], Plan] = field(default=Plan, compare=False)
+
+
+def plan_text(steps: Iterable[int]) -> str:
+    """A plan in the benchmark's own reply form."""
+    return "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(steps, 1))
+
+
+def _random_plan(subject: PlanSubject, rng: np.random.Generator) -> str:
+    return plan_text(int(n) for n in rng.integers(1, len(subject.candidates) + 1, _RANDOM_STEPS))
+
+
+def _all_candidates(subject: PlanSubject, _: np.random.Generator) -> str:
+    return plan_text(range(1, len(subject.candidates) + 1))
+
+
+def _oracle_plan(subject: PlanSubject, rng: np.random.Generator) -> str:
+    blocks = subject.scene.blocks
+    return plan_text(_needed(subject, blocks[v]) for v in subject.scene.graph.random_order(rng))
+
+
+def _unoriented_plan(subject: PlanSubject, rng: np.random.Generator) -> str:
+    """A valid order in which every block stands wrongly, wherever a wrong one can be chosen."""
+    blocks = subject.scene.blocks
+    order = subject.scene.graph.random_order(rng)
+    return plan_text(
+        _turned(subject.candidates, blocks[v], rng) or _needed(subject, blocks[v]) for v in order
+    )
+
+
+def _first_poses(subject: PlanSubject, rng: np.random.Generator) -> str:
+    """A valid order of the right kinds, of each kind the pose that is listed first."""
+    blocks = subject.scene.blocks
+    order = subject.scene.graph.random_order(rng)
+    first = subject.candidates.first_of
+    return plan_text(first(blocks[v].kind) or _needed(subject, blocks[v]) for v in order)
+
+
+def _goal_blind(subject: PlanSubject, _: np.random.Generator) -> str:
+    return plan_text(subject.guess().steps)
+
+
+def _needed(subject: PlanSubject, block: Block) -> int:
+    index = subject.candidates.index_of(block.look)
+    if index is None:
+        found = f"{block.color} {block.type} turned {block.euler_deg}"
+        where = f"scene {subject.scene.id}"
+        message = "no candidate looks like this block"
+        raise DataError(Problem(where, message, f"blocks[order={block.order}]", found))
+    return index
+
+
+def _turned(candidates: CandidateSet, block: Block, rng: np.random.Generator) -> int | None:
+    """Number of a candidate of the block's kind that looks otherwise, or None."""
+    numbers = range(1, len(candidates) + 1)
+    wrong = [
+        n for n in numbers if candidates[n].kind == block.kind and candidates[n].look != block.look
+    ]
+    return wrong[int(rng.integers(len(wrong)))] if wrong else None
+
+
+PLAN_RULES = {
+    "random": _random_plan,
+    "all-candidates": _all_candidates,
+    "goal-blind": _goal_blind,
+    "first-pose": _first_poses,
+    "oracle": _oracle_plan,
+    "oracle-no-orientation": _unoriented_plan,
+}
+"""Rules by name of the baseline."""
+PLAN_FLOORS = ("goal-blind", "all-candidates", "random")
+"""Those that never see the goal."""
+
+
+_MOST_STEPS = 99
+"""Far above what any goal has."""
+
+
+def pick_plan(subject: PlanSubject) -> Picking:
+    """Any candidates, each as often as needed."""
+    return Picking(
+        candidate_choices(len(subject.candidates)),
+        least=1,
+        most=_MOST_STEPS,
+        repeats=True,
+        noun="step",
+        write=lambda picks: plan_text(pick.place + 1 for pick in picks),
+    )
+
+
+def can_be_worked(task: AssemblyTask) -> bool:
+    """Whether every block of the goal is among the candidates."""
+    return all(task.candidates.index_of(block.look) is not None for block in task.scene.blocks)
+
+
+def worked_plan(task: AssemblyTask, form: AnswerForm[list[int]] | None) -> str:
+    """A right answer in the form that is asked for, None for text.
+
+    Blocks are placed in a valid order that does not follow that of the file.
+    """
+    looks = [task.scene.blocks[vertex].look for vertex in _drawn_order(task.scene)]
+    numbers = [task.candidates.index_of(look) for look in looks]
+    steps = [number for number in numbers if number is not None]
+    if form is None:
+        return plan_text(steps)
+    reasoning = f"The goal has {len(steps)} blocks. Each is placed once all it rests on is there."
+    return form.write(steps, reasoning)
+
+
+def _drawn_order(scene: Scene) -> list[int]:
+    """Vertices in a valid order: the next is the ready one whose digest is the least."""
+
+    def place(vertex: int) -> bytes:
+        return drawn_bytes("example plan", scene.id, vertex)
+
+    order: list[int] = []
+    while ready := scene.graph.ready(sum(1 << vertex for vertex in order)):
+        order.append(min(ready, key=place))
+    return order
+
+
+@dataclass(frozen=True)
+class PlanningRules:
+    """How replies are read and scored; the first matcher is the headline."""
+
+    parser: PlanParser
+    settings: tuple[Setting, ...]
+    matchers: tuple[Matcher, ...]
+    level1: Level1Criterion | None
+    answer_format: AnswerFormat = "text"
+
+    def form(self, item: AssemblyTask) -> AnswerForm[list[int]] | None:
+        """The form in which a plan for a scene is asked for; None where that is text."""
+        return None if self.answer_format == "text" else plan_form(len(item.candidates))
+
+    def read(self, item: AssemblyTask, text: str) -> ParsedPlan:
+        """What a reply to a question about a scene says."""
+        return parse_plan(text, len(item.candidates), self.parser)
+
+
+@dataclass(frozen=True)
+class PlanJudgement:
+    """What a reply was read as, and what that is worth."""
+
+    parser: PlanParser
+    parsed: ParsedPlan
+    scores: tuple[Score, ...]
+    in_file: tuple[int, ...] | None = None
+    """The plan in the numbers of the file, where others were shown."""
+
+    @property
+    def steps(self) -> tuple[int, ...]:
+        """The candidates that were named, in order."""
+        return self.parsed.plan.steps
+
+    @property
+    def is_read(self) -> bool:
+        """Whether a rule matched."""
+        return self.parsed.rule is not None
+
+    def fields(self) -> dict[str, Any]:
+        """`parse` and `scores` of the record (docs/results.md)."""
+        return {
+            "parse": {
+                "parser": self.parser,
+                "rule": self.parsed.rule,
+                "plan": list(self.parsed.plan.steps),
+                "file_plan": self.in_file,
+                "dropped": list(self.parsed.dropped),
+                "version": reader_version(self.parser),
+                "problem": self.parsed.problem,
+                "truncated": self.parsed.truncated,
+            },
+            "scores": [score_fields(score) for score in self.scores],
+        }
+
+
+class FullPlanning(WholePlanTrack[PlanningRules, Pictures]):
+    """Prompt, parse and score of the track; pure but for the pictures it asks for."""
+
+    name = "full_planning"
+
+    def __init__(
+        self,
+        rules: PlanningRules,
+        prompt: Prompt | None = None,
+        pictures: Pictures | None = None,
+        items: Sequence[AssemblyTask] = (),
+        showing: TaskShowing = AS_IN_FILE,
+        pool: Sequence[AssemblyTask] = (),
+        examples: Examples[AssemblyTask] | None = None,
+    ) -> None:
+        """`prompt` and `pictures` are None where every model is a recording; from `pool`, else
+        `items`, baselines learn. `examples` are in the form in which they are shown.
+        """
+        super().__init__(rules, prompt, pictures, items, showing, examples)
+        self._guesses = BlindGuesses(showing, pool or items, rules.settings[0])
+        self._scorers: dict[object, AssemblyScorer] = {}
+
+    def facts(self, item: AssemblyTask, pictures: tuple[Image, ...]) -> dict[str, object]:
+        """What templates may use; nothing in it gives an answer away."""
+        scale = None if self._pictures is None else self._pictures.candidate_scale
+        return {**super().facts(item, pictures), "candidate_scale": scale}
+
+    def _right_answer(self, item: AssemblyTask) -> str:
+        return worked_plan(item, self._form(item))
+
+    def _subject(self, item: AssemblyTask) -> PlanSubject:
+        guess = partial(self._guesses.plan, item)
+        return PlanSubject(item.scene, item.candidates, guess)
+
+    def judge(self, item: AssemblyTask, text: str | None) -> PlanJudgement:
+        """Read and score a reply; None, where there is no reply, is scored as an empty plan."""
+        parsed = ParsedPlan(Plan(), None) if text is None else self.rules.read(item, text)
+        key = (item.key, item.candidates)
+        scorer = self._scorers.get(key)
+        if scorer is None:
+            scorer = AssemblyScorer(item.scene, item.candidates, self.rules.settings)
+            self._scorers[key] = scorer
+        scores = scorer.score(parsed.plan, self.rules.matchers, self.rules.level1)
+        in_file = file_plan(item, parsed.plan.steps)
+        return PlanJudgement(self.rules.parser, parsed, scores, in_file)
+
+
+def open_full_planning(opening: Opening) -> FullPlanning:
+    """The track; SpecError, DataError or PromptError with what is wrong."""
+    suite = opening.suite
+    tasks = select_tasks(opening.dataset.tasks, suite.levels, opening.limit)
+    pool = opening.dataset.tasks
+    showing = task_showing(suite, PlanningSpec, FullPlanning.name, tasks, pool)
+    if not opening.with_prompts:
+        return FullPlanning(_rules(suite), items=tasks, showing=showing, pool=pool)
+    if suite.images.source == "dataset":
+        _check_composites(opening.dataset, tasks)
+    prompt, pictures = _prompt(opening.suite), assembly_pictures(suite, opening.shop)
+    as_shown = TaskShowing(replace(showing.how, wrong_image=False))
+    able = [
+        as_shown.of(task, suite.seeds[0])
+        for task in pool
+        if can_be_worked(task) and (task.composite or suite.images.source == "render")
+    ]
+    examples = examples_of(opening.suite, able, tasks, "scene", stand_ins=showing.stand_ins)
+    return FullPlanning(_rules(suite), prompt, pictures, tasks, showing, pool, examples)
+
+
+def _rules(suite: Suite) -> PlanningRules:
+    """How a suite reads and scores plans."""
+    level1 = suite.scoring.level1
+    criterion = None if level1 == "aov" else level1
+    matchers, asked = suite.scoring.matchers, suite.answer_format
+    return PlanningRules(suite.parser, suite.settings, matchers, criterion, asked)
+
+
+def _prompt(suite: Suite) -> Prompt:
+    if suite.prompt != "official":
+        return template_prompt(suite, FullPlanning.name)
+    if suite.dataset.format != "official":
+        message = "the official prompt is read from the official data set"
+        hint = "set dataset.format to official and dataset.path to its checkout"
+        raise SpecError(Problem(str(suite.files.path), message, "prompt", "official", hint=hint))
+    return OfficialPrompt(official_prompt(suite.files.dataset))
+
+
+def _check_composites(dataset: Dataset, tasks: Sequence[AssemblyTask]) -> None:
+    """Raise DataError when the data set has no picture of a scene."""
+    lacking = [task.key for task in tasks if task.composite is None]
+    if lacking:
+        message = f"has no picture of {len(lacking)} of {len(tasks)} scenes"
+        found = ", ".join(lacking[:8]) + (", ..." if len(lacking) > 8 else "")
+        hint = "render them: --set images.source=render"
+        raise DataError(Problem(str(dataset.root), message, "images.source", found, hint=hint))
+
+
+def _report() -> TrackReport:
+    from phyblock.tracks.full_planning_results import REPORT
+
+    return REPORT
+
+
+TRACK = TrackKind(
+    name=FullPlanning.name,
+    title="Full planning",
+    item="scene",
+    about="a whole plan in one reply",
+    open=open_full_planning,
+    report=_report,
+    subject=PlanSubject,
+    baselines=PLAN_RULES,
+    by_hand=pick_plan,
+    section=("full_planning", PlanningSpec, "How scenes are shown in the full_planning track."),
+    record=PlanRecord,
+    template=bundled("prompts", "full_planning.j2"),
+    json_template=bundled("prompts", "full_planning_json.j2"),
+    counted=(POSE_COUNTS,),
+    tables=("assembly", "table1", "errors"),
+    rescored=True,
+    no_examples="",
+    varies=("prompt", "background", "view", "candidate_order", "layout", "examples", "repeats"),
+)
