@@ -25,7 +25,7 @@ from phyblock.domain import (
 )
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.records import MANIFEST, Record
-from phyblock.scoring.counts import chance, ratio_of
+from phyblock.scoring.counts import chance, letter_rates, ratio_of
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_png
 from phyblock.stable import plain_sum
@@ -59,6 +59,7 @@ from phyblock.tables.paper_numbers import (
     published_table,
     row_name,
 )
+from phyblock.tables.shares import shares_of
 from phyblock.tables.showing import control_words
 from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number, with_interval
 from phyblock.tables.track_report import (
@@ -74,23 +75,121 @@ from phyblock.tracks.estimates import track_estimates
 from phyblock.tracks.opening import picture_style
 from phyblock.tracks.pictures import block_entry, rounded
 from phyblock.tracks.vqa import (
-    CELLS,
-    OVERALL_CELL,
     AskedQuestion,
     ChoiceRecord,
     QuestionPictures,
     ShownQuestion,
-    answers_of,
-    expected_answers,
-    letters_frame,
+    VqaSpec,
     open_questions,
-    question_digest,
-    questions_counted,
-    scored_answers,
-    showing,
-    subtasks_of,
 )
 from phyblock.tracks.vqa_export import QUESTION_EXPORT
+
+_TRACK = "vqa"
+
+
+_RIGHT_GIVEN = ("right", "given")
+
+
+OVERALL_CELL = "overall"
+
+
+CELLS: tuple[str, ...] = (
+    *(name for category, subtasks in CATEGORIES.items() for name in (*subtasks, category)),
+    OVERALL_CELL,
+)
+"""Cells in the order of Table 2: the subtasks of a category, its average, ..., the overall one."""
+
+
+def showing(run: Run) -> VqaSpec:
+    """What the run's suite says of it."""
+    return run.section("vqa", VqaSpec)
+
+
+def question_digest(run: Run) -> str | None:
+    """Digest of the set that the run's questions were chosen from; None where it is not told."""
+    return run.manifest.tracks.get(_TRACK, {}).get("questions")
+
+
+@made_once_copied
+def questions_counted(run: Run) -> pd.DataFrame:
+    """The questions behind accuracies: model, subtask, scene, question, seed, variant, correct,
+    n.
+
+    One row a model, question, seed and variant, `correct` 0 or 1, `n` 1; with rotations it is
+    right only if each of them is. Subtasks in which a model said nothing are left out.
+    """
+    records = run.records[run.records["track"] == _TRACK]
+    keys = ["model", "subtask", "scene", "question", "seed", "variant"]
+    rows = records[keys].assign(
+        correct=records["given"].eq(records["right"]).fillna(False).astype("int64"),
+        left_out=records["outcome"].isin(run.design.outcomes_left_out),
+        replied=has_reply(records),
+    )
+    asked = rows.groupby(keys, sort=True).agg(
+        {"correct": "sum", "left_out": "any", "replied": "any"}
+    )
+    asked["replied"] = asked.groupby(["model", "subtask"])["replied"].transform("any")
+    kept = asked[asked["replied"].astype(bool) & ~asked["left_out"].astype(bool)]
+    correct = (kept["correct"] == showing(run).rotations).astype("int64")
+    return pd.DataFrame({"correct": correct, "n": 1}, index=kept.index).reset_index()
+
+
+def letters_frame(run: Run) -> pd.DataFrame:
+    """How often each letter was right and was given [%], by model, without ordering.
+
+    `n` answers were scored; `unread` of them (all failures) have no letter. Columns `right_a`,
+    `given_a` to `given_d`, the latter with `*_lo` and `*_hi`, the ends of 95 % intervals. A model
+    without any reply has no rates.
+    """
+    rows, counted = [], []
+    for model in run.design.model_names:
+        answers = scored_answers(run, model)
+        rates = letter_rates(zip(answers["right"], answers["given"], strict=True))
+        unread = rates.n - sum(rates.given.values())
+        rows.append({"model": model, "n": rates.n, "unread": unread})
+        counted.append(answers[answers["right"].str.len() == 1])
+    named = {f"{kind}_{letter.lower()}": letter for letter in LETTERS for kind in _RIGHT_GIVEN}
+    answers = pd.concat(counted)
+    letters = {name: (answers[name[:5]] == letter).astype(int) for name, letter in named.items()}
+    replied = has_reply(answers)
+    samples = answers[["model", "scene", "seed"]].assign(**letters, replied=replied, n=1)
+    shares = 100 * shares_of(run, samples, list(named), whole="n").droplevel(CELL)
+    columns = {f"{name}_share": name for name in named}
+    columns |= {f"{n}_{end}": f"{n}_{end}" for n in named for end in ("lo", "hi") if n[0] == "g"}
+    return pd.DataFrame(rows).join(shares[list(columns)].rename(columns=columns), on="model")
+
+
+def subtasks_of(cell: str) -> tuple[str, ...]:
+    """The subtasks that one of `CELLS` stands for."""
+    if cell == OVERALL_CELL:
+        return SUBTASKS
+    return next((parts for name, parts in CATEGORIES.items() if name == cell), (cell,))
+
+
+def answers_of(run: Run, model: str) -> pd.DataFrame:
+    """Records of the questions that a model was asked."""
+    records = run.records
+    return records[(records["track"] == _TRACK) & (records["model"] == model)]
+
+
+def scored_answers(run: Run, model: str) -> pd.DataFrame:
+    """Samples that count; under `missing: skip` a question goes with all its rotations."""
+    samples = answers_of(run, model)
+    left_out = samples["outcome"].isin(run.design.outcomes_left_out)
+    if not left_out.any():
+        return samples
+    names = pd.Series(
+        list(zip(*(samples[name] for name in ("question", "seed", "variant")), strict=True)),
+        samples.index,
+    )
+    return samples[~names.isin(set(names[left_out]))]
+
+
+def expected_answers(run: Run) -> dict[str, int]:
+    """Samples of each subtask that a complete run holds of one model."""
+    asked = run.manifest.tracks.get(_TRACK, {}).get("by_subtask", {})
+    return {name: count * run.design.repeats for name, count in asked.items()}
+
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

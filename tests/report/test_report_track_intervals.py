@@ -9,8 +9,7 @@ from scipy import stats
 from phyblock.domain import SUBTASKS
 from phyblock.report import Run, to_markdown
 from phyblock.tracks.step_planning_results import step_intervals, step_intervals_view
-from phyblock.tracks.vqa import CELLS
-from phyblock.tracks.vqa_results import questions_frame, vqa_intervals, vqa_intervals_view
+from phyblock.tracks.vqa_results import CELLS, questions_frame, vqa_intervals, vqa_intervals_view
 from tests.report.factory import LEVELS, manifest, record, run_of, score
 
 

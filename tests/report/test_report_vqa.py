@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
 from phyblock.report import Run, published_table, to_latex, to_markdown
 from phyblock.report.write import make_tables
-from phyblock.tracks.vqa import CELLS, letters_frame
 from phyblock.tracks.vqa_results import (
+    CELLS,
+    letters_frame,
     letters_view,
     published_cells,
     questions_frame,

@@ -195,7 +195,7 @@ def test_no_example_is_kin_of_what_is_shown_instead(tmp_path: Path, track: str) 
 
 def manifest_of(folder: Path, *sets: str) -> Any:
     track, loaded = opened(folder, *sets, limit=4)
-    return make_manifest(loaded, (), DATA, {Variant(): (track,)}, 4)[0]
+    return make_manifest(loaded, (), DATA, {Variant(): (track,)}, 4)
 
 
 def test_examples_are_a_part_of_what_a_run_is_only_where_there_are_some(tmp_path: Path) -> None:
