@@ -10,8 +10,9 @@ nothing. Both drop numbers that no candidate has and report them. Neither raises
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal
 
 from phyblock.domain import Plan
@@ -87,11 +88,9 @@ def _steps(answer: str, n_candidates: int) -> tuple[str, list[int], bool]:
     lines, is_cut = plain_lines(answer), is_open(answer)
     can_grow = is_cut and answer.rstrip()[-1:].isdigit()
     found: list[tuple[str, list[int], bool]] = []
-    for rule, lists in zip(
-        ("steps", "list", "list"), (step_lists(lines), *item_lists(lines)), strict=True
-    ):
+    for rule, lists in _forms(lines):
         for one in lists:
-            one.values = [number for item in one.items for number in blocks_of(item)]
+            one.values = [number for item in one.items for number in item.blocks]
         if can_grow and lists and lists[-1].ends_text(lines):
             _drop_growing(lists[-1].values, n_candidates)
         numbers, is_begun = chosen_list(lists, lines, is_open=is_cut)
@@ -105,6 +104,12 @@ def _steps(answer: str, n_candidates: int) -> tuple[str, list[int], bool]:
     if can_grow:
         _drop_growing(numbers, n_candidates)
     return "numbers", numbers, is_cut
+
+
+def _forms(lines: list[str]) -> Iterator[tuple[str, list[StepList]]]:
+    yield "steps", step_lists(lines)
+    for lists in item_lists(lines):
+        yield "list", lists
 
 
 def _drop_growing(numbers: list[int], n_candidates: int) -> None:
@@ -140,14 +145,14 @@ class Item:
     line: int
     more: list[str] = field(default_factory=list)  # Lines under it that belong to it.
 
-
-def blocks_of(item: Item) -> list[int]:
-    """Return the numbers of the blocks that an item places, in order."""
-    found = _blocks(item.text)
-    if not found:
-        below = _ACTS.match if _WORD.search(item.text) else _WORD.search
-        found = [number for line in filter(below, item.more) for number in _blocks(line)]
-    return found * item.span if len(found) == 1 else found
+    @cached_property
+    def blocks(self) -> list[int]:
+        """The numbers of the blocks that it places, in order."""
+        found = _blocks(self.text)
+        if not found:
+            below = _ACTS.match if _WORD.search(self.text) else _WORD.search
+            found = [number for line in filter(below, self.more) for number in _blocks(line)]
+        return found * self.span if len(found) == 1 else found
 
 
 def _blocks(text: str) -> list[int]:
@@ -256,7 +261,7 @@ def _with_titles(runs: list[list[Item]], lines: list[str]) -> list[StepList]:
     """Return the lists of which at least half the items name a block, with up to three titles."""
     found: list[StepList] = []
     for items in runs:
-        if sum(bool(blocks_of(item)) for item in items) * 2 >= len(items):
+        if sum(bool(item.blocks) for item in items) * 2 >= len(items):
             first = found[-1].items[-1].line + 1 if found else 0
             above = lines[max(first, items[0].line - _NEAR) : items[0].line]
             titles = [line.strip() for line in reversed(above) if not _BLANK.match(line)]
@@ -304,7 +309,7 @@ def chosen_list(
     *before, values = [[value for one in plan for value in one.values] for plan in plans]
     last = plans[-1][-1]
     is_begun = not any(map(str.strip, lines[last.items[-1].line + 1 :]))
-    is_cut = (is_open and last.ends_text(lines)) or (is_begun and not blocks_of(last.items[-1]))
+    is_cut = (is_open and last.ends_text(lines)) or (is_begun and not last.items[-1].blocks)
     if is_cut and before and values == before[-1][: len(values)]:
         return before[-1], False
     return values, is_cut
