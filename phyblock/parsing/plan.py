@@ -325,6 +325,8 @@ def _is_part(one: StepList, plan: list[StepList]) -> bool:
         return len(plan) == 1 or plan[0].values != one.values
     if one.title and (_PLAN.search(one.title) or not _HEADING.search(one.title)):
         return False
+    if not one.title and ('"' in one.items[0].text) != ('"' in plan[-1].items[0].text):
+        return False  # The plan once more, in another form.
     n_same = min(len(plan[0].values), len(one.values))
     return plan[0].values[:n_same] != one.values[:n_same]
 

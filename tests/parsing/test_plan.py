@@ -70,6 +70,8 @@ READ: dict[str, list[str]] = {
         f"{asked(1, 2, 3)}\n\n### Final plan\n{asked(7, 3, 12, 5)}",
         f"{asked(7, 3, 12, 5)}\n\nThe same as JSON:\n```json\n{asked(7, 3, 12, 5)}\n```",
         f"{asked(7, 3, 12, 5)}\n\n**Explanation:**\n- Step 1: block 7 is low.\n- Step 4: block 5",
+        f"{asked(7, 12)}\n\n"
+        + json.dumps({f"Step{i}": f"block {n}" for i, n in enumerate((7, 3, 12, 5), 1)}),
         f"{asked(7, 3, 12, 5)}\n\n1. Block 2 is not used.\n2. Block 4 is not used.",
         "Required blocks:\n1. Block 9 (red)\n2. Block 4 (blue)\n\nAssembly order:\n"
         + asked(7, 3, 12, 5),
