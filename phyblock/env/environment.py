@@ -1,13 +1,22 @@
-"""Where an environment takes its scenes from."""
+"""The assembly of one scene as an episode of reinforcement learning (docs/environment.md).
+
+An action is the number of a candidate, or 0 for Done: a right move puts the block at its goal pose
+and gives a reward of 1, a wrong one changes nothing and gives 0. With `action="pose"` it also says
+where the block goes, and physics decides where it comes to rest.
+
+With `observe="state"` a block is a row of `TRAITS` numbers: 1 where there is a block, the indices
+of its type and color in `phyblock.domain.BLOCK_TYPES` and `COLORS`, its Euler angles [degrees], and
+the position of its center [m], 0 for candidates. Rows that hold no block are 0.
+"""
 
 from __future__ import annotations
 
 import contextlib
-import io
 from collections import OrderedDict
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, Protocol, cast, get_args
+from typing import Any, Literal, cast, get_args
 
 import gymnasium
 import numpy as np
@@ -22,7 +31,6 @@ from phyblock.domain import (
     MAX_CANDIDATES,
     Block,
     Candidate,
-    CandidateSet,
     PoseStep,
 )
 from phyblock.errors import DataError, Problem
@@ -35,12 +43,31 @@ from phyblock.sim.pictures import (
     SMALLEST_PX,
     Lookout,
     PictureStyle,
-    candidates_png,
+    candidates_grid,
     goal_style,
 )
-from phyblock.sim.ruled import RuledFloor, kit_png
+from phyblock.sim.ruled import RuledFloor, kit_sheet
 from phyblock.text import some_of
 from phyblock.types import GATINGS, SETTINGS, Background, Gating, Physics, PoseRotation, Setting
+
+Observation = dict[str, NDArray[Any]]
+Observe = Literal["pictures", "state"]
+Action = Literal["block", "pose"]
+
+DONE = 0
+"""The number that ends the assembly; any other is that of a candidate."""
+MOST_BLOCKS = 64
+"""Rows of a goal; built-in ones have 22 blocks at most."""
+TRAITS = 9
+"""There, type, color, three angles, three coordinates."""
+_KEPT_PICTURES = 64
+"""Pictures of one scene that are kept; 50 MB at 512 pixels."""
+_SMALLEST_PX = 16
+_LEVELS = (1, 2, 3, 4)
+_CM = 100.0
+_HALF_TURN_DEG = 180.0
+_NEAR = (1.0, 10.0)
+"""Distance and turn within which a block has reached its place [cm, degrees]."""
 
 
 def read_tasks(data: str | Path) -> tuple[AssemblyTask, ...]:
@@ -51,40 +78,12 @@ def read_tasks(data: str | Path) -> tuple[AssemblyTask, ...]:
     return read_data_set(str(data)).tasks
 
 
-MOST_BLOCKS = 64
-"""Rows of a goal; built-in ones have 22 blocks at most."""
-TRAITS = 9
-"""There, type, color, three angles, three coordinates."""
-LARGEST = 360.0
-"""No number of a row is larger, nor smaller than its negative."""
-
-
-def rows_space(count: int) -> spaces.Box:
-    """Rows of so many blocks, shape (count, TRAITS)."""
-    return spaces.Box(-LARGEST, LARGEST, (count, TRAITS), np.float32)
-
-
-def goal_rows(blocks: Sequence[Block]) -> NDArray[np.float32]:
-    """The blocks of a goal in their order, shape (MOST_BLOCKS, TRAITS).
-
-    Raises ValueError for more blocks than there are rows.
-    """
-    if len(blocks) > MOST_BLOCKS:
-        raise ValueError(f"a goal of {len(blocks)} blocks; at most {MOST_BLOCKS} fit in a state")
-    return block_rows(blocks)
-
-
-def block_rows(blocks: Sequence[Block]) -> NDArray[np.float32]:
-    """Blocks where they are, the first `MOST_BLOCKS` of them, shape (MOST_BLOCKS, TRAITS)."""
-    return _rows(blocks, MOST_BLOCKS)
-
-
-def candidate_rows(candidates: Sequence[Candidate]) -> NDArray[np.float32]:
-    """The candidates by their numbers, the first in row 0, shape (16, TRAITS)."""
-    return _rows(candidates, MAX_CANDIDATES)
+def _rows_space(count: int) -> spaces.Box:
+    return spaces.Box(-360.0, 360.0, (count, TRAITS), np.float32)
 
 
 def _rows(blocks: Sequence[Block] | Sequence[Candidate], most: int) -> NDArray[np.float32]:
+    """The first `most` blocks as rows, shape (most, TRAITS)."""
     rows = np.zeros((most, TRAITS), dtype=np.float32)
     for row, block in zip(rows, blocks, strict=False):
         position = block.position_m if isinstance(block, Block) else (0.0, 0.0, 0.0)
@@ -93,104 +92,31 @@ def _rows(blocks: Sequence[Block] | Sequence[Candidate], most: int) -> NDArray[n
     return rows
 
 
-DONE = 0
-"""The number that ends the assembly; any other is that of a candidate."""
+class _BlockPlay:
+    """Building with candidates: a right move puts its block at its goal pose, a wrong one nothing.
 
-
-class Acted(NamedTuple):
-    """What became of an action, what it is worth, and whether it was no failure."""
-
-    outcome: str
-    reward: float
-    is_right: bool
-
-
-class Play(Protocol):
-    """One way of building a scene; `begin` comes before all else."""
-
-    action_space: spaces.Space[Any]
-
-    def begin(self, task: AssemblyTask) -> None:
-        """Begin a scene."""
-
-    def candidates(self, task: AssemblyTask) -> CandidateSet:
-        """The candidates of a scene as they are shown."""
-        return task.candidates
-
-    def act(self, action: Any) -> Acted | None:
-        """Take an action; None for Done. ValueError for one outside the space."""
-
-    @property
-    def has_ended(self) -> bool:
-        """Whether the goal is complete, or the rules end it."""
-
-    @property
-    def blocks(self) -> tuple[Block, ...]:
-        """The blocks in the world."""
-
-    @property
-    def chosen(self) -> tuple[int, ...]:
-        """The candidates in the world, in the order in which they came there."""
-
-    def right_moves(self) -> tuple[Any, ...]:
-        """The actions that would place a block now."""
-
-    def image(self, blocks: tuple[Block, ...]) -> Image.Image:
-        """Blocks, seen as the goal is."""
-
-    def candidates_image(self) -> Image.Image:
-        """The numbered candidates."""
-
-    def info(self) -> dict[str, Any]:
-        """The state in structure; tuples, since arrays of several lengths make no vector."""
-
-    def more_spaces(self) -> dict[str, spaces.Space[Any]]:
-        """What `observe="state"` shows of this way of building alone, by name."""
-        return {}
-
-    def more_state(self) -> dict[str, NDArray[Any]]:
-        """These observations as they are now."""
-        return {}
-
-    def close(self) -> None:
-        """Release the simulator."""
-
-
-def picture_of(png: bytes) -> Image.Image:
-    """A PNG as an RGB image."""
-    with Image.open(io.BytesIO(png)) as image:
-        rgb: Image.Image = image.convert("RGB")
-        return rgb
-
-
-class BlockPlay(Play):
-    """A right move puts its block at its goal pose; a wrong one changes nothing."""
+    `begin` comes before all else. `act` returns the outcome of an action, its reward, and whether
+    it was right; None for Done.
+    """
 
     def __init__(
-        self,
-        task: AssemblyTask,
-        setting: Setting,
-        gating: Gating,
-        physics: Physics,
-        style: PictureStyle,
+        self, style: PictureStyle, setting: Setting, gating: Gating, physics: Physics
     ) -> None:
         self.action_space = spaces.Discrete(MAX_CANDIDATES + 1)
-        self._setting, self._gating, self._physics = setting, gating, physics
-        self._style = style
-        self._site = Site(DEFAULT_TRIAL if physics == "strict" else ONE_SETTING)
-        self._task = task
-        self._lookout: Lookout | None = None
+        self._style, self._setting, self._gating = style, setting, gating
+        self._physics, self._is_strict = physics, physics == "strict"
+        self._site = Site(DEFAULT_TRIAL if self._is_strict else ONE_SETTING)
+        self._task: AssemblyTask | None = None
 
     def begin(self, task: AssemblyTask) -> None:
-        """Begin a scene."""
         if self._task is not task:
-            self._task, self._lookout = task, None
+            self._task, self._scene, self.candidates = task, task.scene, task.candidates
+            self._lookout: Lookout | None = None
         self._assembly = Assembly(task.scene, task.candidates, self._setting, self._gating)
         self._swapped: tuple[tuple[int, int], ...] = ()
         self._settled = Settled((), ())
 
-    def act(self, action: Any) -> Acted | None:
-        """Try a candidate; None for Done. ValueError for an action outside the space."""
+    def act(self, action: Any) -> tuple[str, float, bool] | None:
         if not 0 <= int(action) <= MAX_CANDIDATES:
             raise ValueError(f"action {action} is outside 0..{MAX_CANDIDATES}")
         self._swapped = ()
@@ -200,42 +126,40 @@ class BlockPlay(Play):
         self._swapped = move.swapped
         is_placed = move.outcome == "placed"
         if is_placed:
-            self._settle()
-        return Acted(move.outcome, float(is_placed), is_placed)
+            state = tuple(self._scene.blocks[vertex] for vertex in self._assembly.vertices)
+            self._settled = Settled((), state)
+            if self._physics != "off":
+                settled = self._site.settle(state)
+                # What falls is held at its goal pose, or under `strict` lies where it fell.
+                lying = settled.blocks if self._is_strict else state
+                self._settled = Settled(settled.fallen, lying)
+        return move.outcome, float(is_placed), is_placed
 
     @property
     def has_ended(self) -> bool:
-        """Whether the goal is complete, or what stood has collapsed."""
-        has_collapsed = self._physics == "strict" and not self._settled.stands
-        return self._assembly.is_complete or has_collapsed
+        return self._assembly.is_complete or (self._is_strict and not self._settled.stands)
 
     @property
     def blocks(self) -> tuple[Block, ...]:
-        """The blocks in the world."""
         return self._settled.blocks
 
     @property
     def chosen(self) -> tuple[int, ...]:
-        """The candidates that were placed, in order."""
         return tuple(self._assembly.chosen)
 
     def right_moves(self) -> tuple[int, ...]:
-        """The actions that would place a block now."""
         return self._assembly.right_moves()
 
     def image(self, blocks: tuple[Block, ...]) -> Image.Image:
-        """Blocks, seen as the goal is."""
         if self._lookout is None:
-            self._lookout = Lookout(self._task.scene, self._style)
+            self._lookout = Lookout(self._scene, self._style)
         return self._lookout.image(blocks)
 
     def candidates_image(self) -> Image.Image:
-        """The numbered candidates."""
-        return picture_of(candidates_png(self._task.candidates, self._style))
+        return candidates_grid(self.candidates, self._style)[0]
 
     def info(self) -> dict[str, Any]:
-        """The state in structure."""
-        blocks = self._task.scene.blocks
+        blocks = self._scene.blocks
         return {
             "placed": tuple(blocks[vertex].order for vertex in self._assembly.vertices),
             "swapped": tuple((blocks[a].order, blocks[b].order) for a, b in self._swapped),
@@ -244,109 +168,82 @@ class BlockPlay(Play):
         }
 
     def close(self) -> None:
-        """Release the simulator."""
         self._site.close()
 
-    def _settle(self) -> None:
-        """Let the assembly go: what falls is held at its goal pose, or under `strict` lies."""
-        blocks = self._task.scene.blocks
-        state = tuple(blocks[vertex] for vertex in self._assembly.vertices)
-        self._settled = Settled((), state)
-        if self._physics != "off":
-            settled = self._site.settle(state)
-            is_held = self._physics == "settle"
-            self._settled = Settled(settled.fallen, state if is_held else settled.blocks)
 
-
-_CM = 100.0
-_HALF_TURN_DEG = 180.0
-_FALLS = ("falls", "knocks_over")
-_NEAR = (1.0, 10.0)
-"""How far a block may be from its place and still have reached it [cm, degrees]."""
-
-
-class PosePlay(Play):
-    """Blocks are put where actions say, let go, and lie where they come to rest.
+class _PosePlay:
+    """Building with poses: blocks are put where actions say, let go, and lie where they rest.
 
     The tolerances are those of the track with poses: a block may be moved and still stand as
-    `ExecutionLimits` says, and a goal block is reached by one of its kind within `_NEAR`.
+    `ExecutionLimits` says, and a goal block is reached by one of its kind within `_NEAR`. Where
+    actions turn blocks, each kind is a candidate once, upright. `begin` comes before all else.
     """
 
-    def __init__(
-        self,
-        task: AssemblyTask,
-        rotation: PoseRotation,
-        style: PictureStyle,
-        *,
-        is_strict: bool,
-    ) -> None:
-        self._is_free = rotation == "free"
+    def __init__(self, style: PictureStyle, rotation: PoseRotation, *, is_strict: bool) -> None:
+        self._style, self._is_strict, self._is_free = style, is_strict, rotation == "free"
         self._parts = ("center_m", "half_turns") if self._is_free else ("center_m",)
         parts = {name: spaces.Box(-1.0, 1.0, (3,), np.float64) for name in self._parts}
         number = spaces.Discrete(MAX_CANDIDATES + 1)
         self.action_space = spaces.Dict({"block": number, **parts})
-        self._style, self._is_strict = style, is_strict
         self._stack = contextlib.ExitStack()
-        self._task = task
-        self._floor: RuledFloor | None = None
+        self._task: AssemblyTask | None = None
 
     def begin(self, task: AssemblyTask) -> None:
-        """Begin a scene on an empty floor."""
         if self._task is not task:
-            self._task, self._floor = task, None
-        self._kit = self.candidates(task)
+            self._task, self._scene = task, task.scene
+            self.candidates = upright(task.candidates)[0] if self._is_free else task.candidates
+            self._floor: RuledFloor | None = None
         self._stack.close()
-        self._carrying = self._stack.enter_context(Executor())
+        self._executor = self._stack.enter_context(Executor())
         self._last: ExecutedStep | None = None
         self._named: list[int] = []
         self._reached = 0
 
-    def candidates(self, task: AssemblyTask) -> CandidateSet:
-        """The candidates of a scene as they are shown: where actions turn them, each kind once,
-        upright.
-        """
-        return upright(task.candidates)[0] if self._is_free else task.candidates
-
-    def act(self, action: Any) -> Acted | None:
-        """Put a block and let it go; None for Done. ValueError for an action outside the space.
-
-        It is worth as many goal blocks as are reached now and were not, less those that were and
-        are not.
-        """
-        step = self._step(action)
+    def act(self, action: Any) -> tuple[str, float, bool] | None:
+        """Put a block and let it go; worth the goal blocks newly reached, less those lost."""
+        names = ("block", *self._parts)
+        if not isinstance(action, Mapping) or set(action) != set(names):
+            raise ValueError(f"action is {action!r}; allowed: a mapping of {', '.join(names)}")
+        number = int(action["block"])
+        if not 0 <= number <= MAX_CANDIDATES:
+            raise ValueError(f"action block {number} is outside 0..{MAX_CANDIDATES}")
+        values = []
+        for name, unit in zip(self._parts, (_CM, _HALF_TURN_DEG), strict=False):
+            found = np.asarray(action[name], dtype=np.float64)
+            if found.shape != (3,) or not np.all(np.abs(found) <= 1):
+                allowed = "3 numbers from -1 to 1"
+                raise ValueError(f"action {name} is {action[name]!r}; allowed: {allowed}")
+            x, y, z = (found * unit).tolist()
+            values.append((x, y, z))
         self._last = None
-        if step.candidate == DONE:
+        if number == DONE:
             return None
-        self._last = self._carrying.step(put(step, self._kit))
-        self._named.append(step.candidate)
-        before = self._reached
-        self._reached = self._count(self._task.scene.blocks)
+        self._last = self._executor.step(put(PoseStep(number, *values), self.candidates))
+        self._named.append(number)
+        before, self._reached = self._reached, self._count(self._scene.blocks)
         end = self._last.end
-        return Acted(end, float(self._reached - before), end == "stands")
+        return end, float(self._reached - before), end == "stands"
 
     @property
     def has_ended(self) -> bool:
-        """Whether the goal is complete and nothing else lies about, or, where it is strict,
-        something has fallen.
-        """
-        has_fallen = self._last is not None and self._last.end in _FALLS
+        """True once the goal is complete and nothing else lies about, or a strict step failed."""
+        has_fallen = self._last is not None and self._last.end in ("falls", "knocks_over")
         return self._is_complete or (self._is_strict and has_fallen)
 
     @property
     def blocks(self) -> tuple[Block, ...]:
-        """The blocks in the world, where they lie."""
-        return self._carrying.blocks
+        return self._executor.blocks
 
     @property
     def chosen(self) -> tuple[int, ...]:
-        """The candidates in the world, in the order in which they were put."""
         return tuple(self._named[block.order - 1] for block in self.blocks)
 
     def right_moves(self) -> tuple[dict[str, Any], ...]:
-        """The actions that would put a goal block in its place now, those of low layers first:
-        it is not reached, and all that it rests on is.
+        """The actions that would put a goal block in its place now, those of low layers first.
+
+        Such a block is not reached, and all that it rests on is.
         """
-        scene = self._task.scene
+        scene, kit = self._scene, self.candidates
         is_there = [self._count((block,)) == 1 for block in scene.blocks]
         needs, layers = scene.graph.depends_on, scene.graph.layers
         ready = [
@@ -354,95 +251,38 @@ class PosePlay(Play):
             for vertex in range(len(scene))
             if not is_there[vertex] and all(is_there[below] for below in needs[vertex])
         ]
-        moves = (self._right(scene.blocks[v]) for v in sorted(ready, key=lambda v: layers[v]))
-        return tuple(move for move in moves if move is not None)
+        moves = []
+        for block in (scene.blocks[v] for v in sorted(ready, key=lambda v: layers[v])):
+            number = kit.first_of(block.kind) if self._is_free else kit.index_of(block.look)
+            if number is not None:
+                turns = (np.array(block.euler_deg) / _HALF_TURN_DEG + 1) % 2 - 1
+                values = (np.array(center_cm(block)) / _CM, turns)
+                parts = dict(zip(self._parts, values, strict=False))
+                moves.append({"block": np.int64(number), **parts})
+        return tuple(moves)
 
     def image(self, blocks: tuple[Block, ...]) -> Image.Image:
-        """Blocks on a ruled floor, seen as the goal is."""
         if self._floor is None:
-            scene = self._task.scene
-            self._floor = RuledFloor(scene, goal_style(scene, self._style))
+            self._floor = RuledFloor(self._scene, goal_style(self._scene, self._style))
         return self._floor.image(blocks)
 
     def candidates_image(self) -> Image.Image:
-        """The sheet of the candidates with their sizes."""
-        return picture_of(kit_png(self._kit, self._style))
+        return kit_sheet(self.candidates, self._style)
 
     def info(self) -> dict[str, Any]:
-        """What the last step came to, and how much of the goal is reached."""
-        last = self._last or ExecutedStep("no_block")
-        return {
-            "moved_cm": last.moved_cm,
-            "turned_deg": last.turned_deg,
-            "gap_cm": last.gap_cm,
-            "overlap_cm": last.overlap_cm,
-            "knocked": last.knocked,
-            "reached": self._reached,
-            "is_complete": self._is_complete,
-        }
-
-    def more_spaces(self) -> dict[str, spaces.Space[Any]]:
-        """Where the blocks lie, rows as in a goal."""
-        return {"world": rows_space(MOST_BLOCKS)}
-
-    def more_state(self) -> dict[str, NDArray[Any]]:
-        """Of more blocks than there are rows, those that came last."""
-        return {"world": block_rows(self.blocks[-MOST_BLOCKS:])}
+        last = asdict(self._last or ExecutedStep("no_block"))
+        del last["end"]
+        return {**last, "reached": self._reached, "is_complete": self._is_complete}
 
     def close(self) -> None:
-        """Release the simulator."""
         self._stack.close()
 
     @property
     def _is_complete(self) -> bool:
-        return self._reached == len(self._task.scene) == len(self.blocks)
+        return self._reached == len(self._scene) == len(self.blocks)
 
     def _count(self, goal: tuple[Block, ...]) -> int:
         return blocks_reached(goal, self.blocks, *_NEAR)
-
-    def _right(self, block: Block) -> dict[str, Any] | None:
-        kit = self._kit
-        number = kit.first_of(block.kind) if self._is_free else kit.index_of(block.look)
-        if number is None:
-            return None
-        parts = {"center_m": np.array(center_cm(block)) / _CM}
-        if self._is_free:
-            parts["half_turns"] = (np.array(block.euler_deg) / _HALF_TURN_DEG + 1) % 2 - 1
-        return {"block": np.int64(number), **parts}
-
-    def _step(self, action: Any) -> PoseStep:
-        names = ("block", *self._parts)
-        if not isinstance(action, Mapping) or set(action) != set(names):
-            raise ValueError(f"action is {action!r}; allowed: a mapping of {', '.join(names)}")
-        number = int(action["block"])
-        if not 0 <= number <= MAX_CANDIDATES:
-            raise ValueError(f"action block {number} is outside 0..{MAX_CANDIDATES}")
-        values = [_three(name, action[name]) for name in self._parts]
-        center = _scaled(values[0], _CM)
-        return PoseStep(number, center, *(_scaled(turns, _HALF_TURN_DEG) for turns in values[1:]))
-
-
-def _three(name: str, value: Any) -> NDArray[np.float64]:
-    found = np.asarray(value, dtype=np.float64)
-    if found.shape != (3,) or not np.all(np.abs(found) <= 1):
-        raise ValueError(f"action {name} is {value!r}; allowed: 3 numbers from -1 to 1")
-    return found
-
-
-def _scaled(values: NDArray[np.float64], by: float) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in values * by)
-    return x, y, z
-
-
-Observation = dict[str, NDArray[Any]]
-Observe = Literal["pictures", "state"]
-Action = Literal["block", "pose"]
-_PICTURES = ("current", "goal", "candidates")
-_KEPT_PICTURES = 64
-"""Pictures of one scene that are kept; 50 MB at 512 pixels."""
-_MOST_OF_A_KIND = 255
-_SMALLEST_PX = 16
-_RENDER_MODES = ("rgb_array",)
 
 
 class PhyBlockEnv(gymnasium.Env[Observation, Any]):
@@ -450,15 +290,15 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
 
     Observations are pictures (`current`, `goal`, `candidates`: RGB, shape (size, size, 3), uint8)
     or, with `observe="state"`, numbers alone (`goal` and `candidates`: a row a block, float32, see
-    `phyblock.env.environment`; `placed`: number of blocks placed as each candidate, shape (16,),
-    uint8; `left`: the share of steps that is left, shape (1,), float32; where actions are poses
-    also `world`: where the blocks lie, rows as in `goal`).
+    the module; `placed`: number of blocks placed as each candidate, shape (16,), uint8; `left`: the
+    share of steps that is left, shape (1,), float32; where actions are poses also `world`: the
+    blocks where they lie, rows as in `goal`).
     The episode terminates with Done, with the goal complete, and under `physics="strict"` with a
     collapse; it is truncated after `max_steps` steps (None: twice the number of blocks) or
     `max_failures` failed moves in a row (None: no bound).
     """
 
-    metadata: dict[str, Any] = {"render_modes": [*_RENDER_MODES], "render_fps": 2}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 2}  # noqa: RUF012
 
     def __init__(
         self,
@@ -478,48 +318,80 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         max_failures: int | None = None,
         render_mode: str | None = None,
     ) -> None:
-        """`data` is a data set (see `read_tasks`) or tasks; `levels` plays scenes of these alone
-        (None: of all), `scene` that one. With `action="pose"` a block is put where the action says,
+        """Play `data`, a data set (see `read_tasks`) or tasks: scenes of `levels` (None: of all),
+        or one `scene`. With `action="pose"` a block is put where the action says,
         turned as its candidate is or, with `rotation="free"`, as the action says; `setting` and
         `gating` are of `action="block"` alone.
 
         Raises DataError for a data set or scene that is not there, ValueError for an option that
         is not among those allowed, a limit below 1, or no tasks at all.
         """
-        _check_options(
-            setting=setting,
-            gating=gating,
-            physics=physics,
-            observe=observe,
-            action=action,
-            rotation=rotation,
+        options: tuple[tuple[str, str, tuple[str, ...]], ...] = (
+            ("setting", setting, SETTINGS),
+            ("gating", gating, GATINGS),
+            ("physics", physics, get_args(Physics)),
+            ("observe", observe, get_args(Observe)),
+            ("action", action, get_args(Action)),
+            ("rotation", rotation, get_args(PoseRotation)),
         )
-        _check_together(action, setting, gating, physics, rotation)
-        _check_limits(max_steps=max_steps, max_failures=max_failures)
-        _check_pictures(render_mode, size_px)
-        self._tasks = {task.scene.id: task for task in _tasks_of(data, levels)}
+        for name, value, allowed in options:
+            if value not in allowed:
+                raise ValueError(f"{name} is {value!r}; allowed: {', '.join(allowed)}")
+        if action == "block" and rotation != "candidate":
+            raise ValueError(f"rotation is {rotation!r}, which needs action='pose'")
+        if action == "pose" and (setting != "A" or gating != "aov"):
+            raise ValueError("setting and gating are of action='block'; leave them out")
+        if action == "pose" and physics == "off":
+            raise ValueError("physics is 'off'; a pose is carried out: allowed: settle, strict")
+        for name, most in (("max_steps", max_steps), ("max_failures", max_failures)):
+            if most is not None and most < 1:
+                raise ValueError(f"{name} is {most}; allowed: 1 or more, or None")
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"render_mode is {render_mode!r}; allowed: rgb_array, or None")
+        if not _SMALLEST_PX <= size_px <= LARGEST_PX:
+            raise ValueError(f"size_px is {size_px}, allowed {_SMALLEST_PX}..{LARGEST_PX}")
+        tasks = read_tasks(data) if isinstance(data, str | Path) else tuple(data)
+        of_levels = ""
+        if levels is not None:
+            if not isinstance(levels, Collection) or not set(levels) <= set(_LEVELS):
+                raise ValueError(f"levels is {levels!r}; allowed: several of {_LEVELS}, or None")
+            tasks = tuple(task for task in tasks if set(task.scene.levels) & set(levels))
+            of_levels = f" of levels {sorted(levels)}"
+        if not tasks:
+            raise ValueError(f"data holds no tasks{of_levels}")
+        self._tasks = {task.scene.id: task for task in tasks}
         self._scene = None if scene is None else self._find(scene).scene.id
         self._observe = observe
         # Below the smallest that is drawn, whole pixels are put together.
         self._shrink = max(1, -(-SMALLEST_PX // size_px))
         style = PictureStyle(size_px * self._shrink, background)
         self._task = next(iter(self._tasks.values()))
-        self._play: Play = (
-            PosePlay(self._task, rotation, style, is_strict=physics == "strict")
+        self._play: _BlockPlay | _PosePlay = (
+            _PosePlay(style, rotation, is_strict=physics == "strict")
             if action == "pose"
-            else BlockPlay(self._task, setting, gating, physics, style)
+            else _BlockPlay(style, setting, gating, physics)
         )
-        self._max_steps = max_steps
-        self._max_failures = max_failures
+        self._max_steps, self._max_failures = max_steps, max_failures
         self.render_mode = render_mode
-        self._steps = self._failures = self._most_steps = 0
-        self._outcome: str = ""
-        self._is_over = False
-        self._pictures: OrderedDict[tuple[Block, ...] | str, NDArray[np.uint8]] = OrderedDict()
+        self._pictures: OrderedDict[tuple[Block, ...] | None, NDArray[np.uint8]] = OrderedDict()
+        self._steps = self._most_steps = self._failures = 0
+        self._outcome, self._is_over = "begun", False
         self._begin(self._task)
         self.action_space = self._play.action_space
-        space = _space(observe, size_px, self._play.more_spaces())
-        self.observation_space = cast(spaces.Space[Observation], space)
+        parts: dict[str, spaces.Space[Any]] = {
+            name: spaces.Box(0, 255, (size_px, size_px, 3), np.uint8)
+            for name in ("current", "goal", "candidates")
+        }
+        if observe == "state":
+            parts = {
+                "goal": _rows_space(MOST_BLOCKS),
+                "candidates": _rows_space(MAX_CANDIDATES),
+                "placed": spaces.Box(0, 255, (MAX_CANDIDATES,), np.uint8),
+                "left": spaces.Box(0.0, 1.0, (1,), np.float32),
+            }
+            if action == "pose":
+                parts["world"] = _rows_space(MOST_BLOCKS)
+        self.observation_space = cast(spaces.Space[Observation], spaces.Dict(parts))
 
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -550,37 +422,36 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         if acted is None:
             self._outcome, self._is_over = "done", True
             return self._observation(), 0.0, True, False, self._info()
-        self._outcome = acted.outcome
-        self._failures = 0 if acted.is_right else self._failures + 1
+        self._outcome, reward, is_right = acted
+        self._failures = 0 if is_right else self._failures + 1
         ended = self._play.has_ended
         cut = self._steps >= self._most_steps or self._failures == self._max_failures
         self._is_over = ended or cut
-        return self._observation(), acted.reward, ended, cut and not ended, self._info()
+        return self._observation(), reward, ended, cut and not ended, self._info()
 
     def render(self) -> NDArray[np.uint8] | None:
         """The current picture, shape (size, size, 3), in render mode `rgb_array`."""
-        return None if self.render_mode is None else self._current().copy()
+        return None if self.render_mode is None else self._picture(self._play.blocks).copy()
 
     def close(self) -> None:
         """Release the simulator."""
         self._play.close()
 
     def right_moves(self) -> tuple[Any, ...]:
-        """The actions that would place a block now: what an oracle knows."""
+        """The actions that would place a block now: those of an oracle."""
         return self._play.right_moves()
 
     def action_masks(self) -> NDArray[np.bool_]:
-        """Which numbers mean something in this scene, shape (17,): Done, and its candidates."""
+        """The numbers that mean something in this scene, shape (17,): Done, and its candidates."""
         mask = np.zeros(MAX_CANDIDATES + 1, dtype=np.bool_)
-        mask[: len(self._play.candidates(self._task)) + 1] = True
+        mask[: len(self._play.candidates) + 1] = True
         return mask
 
     def _begin(self, task: AssemblyTask) -> None:
         self._play.begin(task)
         self._steps = self._failures = 0
         self._outcome, self._is_over = "begun", False
-        most = self._max_steps
-        self._most_steps = 2 * len(task.scene) if most is None else most
+        self._most_steps = self._max_steps or 2 * len(task.scene)
         if task is not self._task:
             self._task = task
             self._pictures.clear()
@@ -592,44 +463,41 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         raise DataError(Problem("PhyBlockEnv", message, "scene", str(scene), allowed))
 
     def _observation(self) -> Observation:
-        if self._observe == "state":
-            return self._state()
-        return {
-            "current": self._current().copy(),
-            "goal": self._picture(self._task.scene.blocks).copy(),
-            "candidates": self._kept_picture("candidates", self._play.candidates_image).copy(),
-        }
-
-    def _state(self) -> Observation:
-        placed = np.bincount(self._play.chosen, minlength=MAX_CANDIDATES + 1)[1:]
+        play, goal = self._play, self._task.scene.blocks
+        if self._observe == "pictures":
+            return {
+                "current": self._picture(play.blocks).copy(),
+                "goal": self._picture(goal).copy(),
+                "candidates": self._picture(None).copy(),
+            }
+        if len(goal) > MOST_BLOCKS:
+            most = f"at most {MOST_BLOCKS} fit in a state"
+            raise ValueError(f"a goal of {len(goal)} blocks; {most}")
+        placed = np.bincount(play.chosen, minlength=MAX_CANDIDATES + 1)[1:]
         left = 1 - self._steps / self._most_steps
-        return {
-            "goal": goal_rows(self._task.scene.blocks),
-            "candidates": candidate_rows(self._play.candidates(self._task).candidates),
+        state: Observation = {
+            "goal": _rows(goal, MOST_BLOCKS),
+            "candidates": _rows(play.candidates.candidates, MAX_CANDIDATES),
             "placed": placed.astype(np.uint8),
             "left": np.array([max(0.0, left)], dtype=np.float32),
-            **self._play.more_state(),
         }
+        if isinstance(play, _PosePlay):
+            # Of more than there are rows, those that came last.
+            state["world"] = _rows(play.blocks[-MOST_BLOCKS:], MOST_BLOCKS)
+        return state
 
-    def _current(self) -> NDArray[np.uint8]:
-        return self._picture(self._play.blocks)
-
-    def _picture(self, blocks: tuple[Block, ...]) -> NDArray[np.uint8]:
-        return self._kept_picture(blocks, lambda: self._play.image(blocks))
-
-    def _kept_picture(
-        self, name: tuple[Block, ...] | str, draw: Callable[[], Image.Image]
-    ) -> NDArray[np.uint8]:
-        """A picture drawn once while it is in use; those unused for longest make room."""
-        if name not in self._pictures:
-            self._pictures[name] = np.asarray(draw().reduce(self._shrink))
+    def _picture(self, blocks: tuple[Block, ...] | None) -> NDArray[np.uint8]:
+        """A picture of blocks, or of the candidates; those unused for longest make room."""
+        if blocks not in self._pictures:
+            play = self._play
+            drawn = play.candidates_image() if blocks is None else play.image(blocks)
+            self._pictures[blocks] = np.asarray(drawn.reduce(self._shrink))
             if len(self._pictures) > _KEPT_PICTURES:
                 self._pictures.popitem(last=False)
-        self._pictures.move_to_end(name)
-        return self._pictures[name]
+        self._pictures.move_to_end(blocks)
+        return self._pictures[blocks]
 
     def _info(self) -> dict[str, Any]:
-        """The state in structure; tuples, since arrays of several lengths make no vector."""
         return {
             "scene": self._task.scene.id,
             "outcome": self._outcome,
@@ -639,75 +507,3 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
             "right_moves": self.right_moves(),
             **self._play.info(),
         }
-
-
-_LEVELS = (1, 2, 3, 4)
-_OPTIONS: Mapping[str, tuple[str, ...]] = {
-    "setting": SETTINGS,
-    "gating": GATINGS,
-    "physics": get_args(Physics),
-    "observe": get_args(Observe),
-    "action": get_args(Action),
-    "rotation": get_args(PoseRotation),
-}
-
-
-def _check_options(**options: str) -> None:
-    for name, value in options.items():
-        if value not in _OPTIONS[name]:
-            raise ValueError(f"{name} is {value!r}; allowed: {', '.join(_OPTIONS[name])}")
-
-
-def _check_together(
-    action: Action, setting: Setting, gating: Gating, physics: Physics, rotation: PoseRotation
-) -> None:
-    if action == "block" and rotation != "candidate":
-        raise ValueError(f"rotation is {rotation!r}, which needs action='pose'")
-    if action == "pose" and (setting != "A" or gating != "aov"):
-        raise ValueError("setting and gating are of action='block'; leave them out")
-    if action == "pose" and physics == "off":
-        raise ValueError("physics is 'off'; a pose is carried out: allowed: settle, strict")
-
-
-def _check_limits(**limits: int | None) -> None:
-    for name, most in limits.items():
-        if most is not None and most < 1:
-            raise ValueError(f"{name} is {most}; allowed: 1 or more, or None")
-
-
-def _check_pictures(render_mode: str | None, size_px: int) -> None:
-    if render_mode not in (None, *_RENDER_MODES):
-        allowed = ", ".join(_RENDER_MODES)
-        raise ValueError(f"render_mode is {render_mode!r}; allowed: {allowed}, or None")
-    if not _SMALLEST_PX <= size_px <= LARGEST_PX:
-        raise ValueError(f"size_px is {size_px}, allowed {_SMALLEST_PX}..{LARGEST_PX}")
-
-
-def _tasks_of(
-    data: str | Path | Sequence[AssemblyTask], levels: Collection[int] | None
-) -> tuple[AssemblyTask, ...]:
-    """The tasks to play, at least one; ValueError where there are none."""
-    tasks = read_tasks(data) if isinstance(data, str | Path) else tuple(data)
-    if levels is not None:
-        if not isinstance(levels, Collection) or not set(levels) <= set(_LEVELS):
-            raise ValueError(f"levels is {levels!r}; allowed: several of {_LEVELS}, or None")
-        tasks = tuple(task for task in tasks if set(task.scene.levels) & set(levels))
-    if not tasks:
-        of_levels = "" if levels is None else f" of levels {sorted(levels)}"
-        raise ValueError(f"data holds no tasks{of_levels}")
-    return tasks
-
-
-def _space(observe: str, size_px: int, more: Mapping[str, spaces.Space[Any]]) -> spaces.Dict[Any]:
-    if observe == "state":
-        return spaces.Dict(
-            {
-                "goal": rows_space(MOST_BLOCKS),
-                "candidates": rows_space(MAX_CANDIDATES),
-                "placed": spaces.Box(0, _MOST_OF_A_KIND, (MAX_CANDIDATES,), np.uint8),
-                "left": spaces.Box(0.0, 1.0, (1,), np.float32),
-                **more,
-            }
-        )
-    shape = (size_px, size_px, 3)
-    return spaces.Dict({name: spaces.Box(0, 255, shape, np.uint8) for name in _PICTURES})
