@@ -1,9 +1,10 @@
-"""The block library: types, colors, sizes, symmetries, mass, and the one Euler conversion.
+"""The block library: one row a shape, colors, material, symmetries, and the one Euler conversion.
 
-Eight types in five colors (paper, appendix A.1), base unit 5 cm. Body frames are fixed here and
-used by the geometry in `phyblock.sim`: boxes and the cylinder are centered, the semi-cylinder and
-the triangle have their origin at the center of the flat (hypotenuse) face, the arch at the center
-of its bounding box.
+Eight types in five colors (paper, appendix A.1), base unit 5 cm. A block is a prism: a flat profile
+pushed along an axis of its body frame. Meshes and convex pieces (`phyblock.sim.geometry`), mass,
+symmetries, poses of designs and words of questions follow from the row of its shape in `SHAPES`.
+Boxes and the cylinder are centered in their frames, the semi-cylinder and the triangle have their
+origin at the center of the flat (hypotenuse) face, the arch at the center of its bounding box.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 import numpy as np
@@ -19,30 +21,13 @@ from numpy.typing import NDArray
 
 from phyblock.stable import plain_sum
 
-__all__ = [
-    "BLOCK_TYPES",
-    "COLORS",
-    "DENSITY_KG_M3",
-    "FRICTION",
-    "KIT_PALETTE",
-    "SHAPES",
-    "BlockType",
-    "Color",
-    "Euler",
-    "Shape",
-    "euler_deg_to_matrix",
-    "euler_deg_to_quat_xyzw",
-    "orientation_class",
-    "quat_xyzw_to_matrix",
-    "symmetries",
-    "turn_deg",
-]
-
 BlockType = Literal[
     "arch", "cube", "cuboid1", "cuboid2", "cuboid3", "cylinder", "semi_cylinder", "triangle"
 ]
 Color = Literal["red", "yellow", "blue", "green", "orange"]
 Euler = tuple[float, float, float]
+Outline = NDArray[np.float64]
+"""Corners of a polygon, shape (n, 2) [m], counter-clockwise."""
 
 BLOCK_TYPES: tuple[BlockType, ...] = get_args(BlockType)
 COLORS: tuple[Color, ...] = get_args(Color)
@@ -51,30 +36,148 @@ DENSITY_KG_M3 = 1040.0
 """ABS plastic, paper appendix A.1."""
 FRICTION = 0.35
 """Coulomb coefficient of a pair of blocks, paper appendix A.1."""
+_LONG = 1.5
+"""The longest side of a long block is more than so many times the second."""
+_MOST_SEEN_TURNS = 8
+"""Of a prism with more sides, a turn by one side can hardly be seen."""
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """The cross-section of a prism: its outline, area [m2] and centroid [m].
+
+    `parts` are convex outlines that together fill it; `caps` triangulates it, as indices.
+    """
+
+    outline: Outline
+    area_m2: float
+    centroid_m: tuple[float, float]
+    parts: tuple[Outline, ...]
+    caps: tuple[tuple[int, int, int], ...]
+
+
+def polygon(
+    outline: Outline, area_m2: float | None = None, centroid_m: tuple[float, float] | None = None
+) -> Profile:
+    """A convex profile; area and centroid follow from the outline unless they are given."""
+    if area_m2 is None or centroid_m is None:
+        after = np.roll(outline, -1, axis=0)
+        twice = outline[:, 0] * after[:, 1] - after[:, 0] * outline[:, 1]
+        area_m2 = plain_sum(twice.tolist()) / 2
+        u, v = (plain_sum(each.tolist()) for each in ((outline + after) * twice[:, None]).T)
+        centroid_m = (u / (6 * area_m2), v / (6 * area_m2))
+    fan = tuple((0, i, i + 1) for i in range(1, len(outline) - 1))
+    return Profile(outline, area_m2, centroid_m, (outline,), fan)
+
+
+def _rectangle(u_m: float, v_m: float) -> Profile:
+    u, v = u_m / 2, v_m / 2
+    return polygon(np.array([[u, v], [-u, v], [-u, -v], [u, -v]]), u_m * v_m, (0.0, 0.0))
+
+
+def _disc(radius_m: float, facets: int) -> Profile:
+    angles = np.radians(np.arange(facets) * (360 / facets))
+    corners = radius_m * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    area_m2 = 0.5 * facets * radius_m**2 * math.sin(2 * math.pi / facets)
+    return polygon(corners, area_m2, (0.0, 0.0))
+
+
+def _half_disc(radius_m: float, segments: int) -> Profile:
+    """Half a disc above the first axis, its arc from angle 0 to 180 degrees."""
+    angles, step = np.linspace(0.0, math.pi, segments + 1), math.pi / segments
+    corners = np.stack([radius_m * np.cos(angles), radius_m * np.sin(angles)], axis=1)
+    area_m2 = 0.5 * segments * radius_m**2 * math.sin(step)
+    moment = plain_sum(
+        (math.sin(i * step) + math.sin((i + 1) * step)) * radius_m / 3 for i in range(segments)
+    ) * (0.5 * radius_m**2 * math.sin(step))
+    return polygon(corners, area_m2, (0.0, moment / area_m2))
+
+
+def _right_triangle(leg_m: float) -> Profile:
+    """A right triangle on its hypotenuse."""
+    half_m = leg_m / math.sqrt(2)
+    corners = np.array([[half_m, 0.0], [0.0, half_m], [-half_m, 0.0]])
+    return polygon(corners, 0.5 * leg_m**2, (0.0, half_m / 3))
+
+
+def _gate(width_m: float, height_m: float, radius_m: float, segments: int) -> Profile:
+    """A rectangle with half a disc taken out of its foot.
+
+    Its parts are two legs, each with an end segment of the arc, and a slice for each other one.
+    """
+    half_u, half_v = width_m / 2, height_m / 2
+    hole = _half_disc(radius_m, segments)
+    area_m2 = width_m * height_m - hole.area_m2
+    center_v = -hole.area_m2 * (hole.centroid_m[1] - half_v) / area_m2
+    arc = hole.outline - [0.0, half_v]
+    right_foot, right_top = [half_u, -half_v], [half_u, half_v]
+    left_foot, left_top = [-half_u, -half_v], [-half_u, half_v]
+    outline = np.array([*arc[::-1], right_foot, right_top, left_top, left_foot])
+    right_leg = np.array([arc[0], right_foot, right_top, [arc[1, 0], half_v], arc[1]])
+    left_leg = np.array([arc[-1], arc[-2], [arc[-2, 0], half_v], left_top, left_foot])
+    slices = [
+        np.array([arc[i], [arc[i, 0], half_v], [arc[i + 1, 0], half_v], arc[i + 1]])
+        for i in range(1, segments - 1)
+    ]
+    middle, last = segments // 2, segments
+    foot_right, top_right, top_left, foot_left = range(last + 1, last + 5)
+    caps = [(foot_left, 0, top_left), (last, foot_right, top_right), (middle, top_right, top_left)]
+    caps += [(top_left, i, i + 1) for i in range(middle)]
+    caps += [(top_right, i, i + 1) for i in range(middle, last)]
+    return Profile(outline, area_m2, (0.0, center_v), (right_leg, *slices, left_leg), tuple(caps))
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A type of block: its colors in the official kit, and its solid in the body frame.
+    """A type of block.
 
-    `low_m` and `high_m` are the corners of the bounding box [m]; `volume_m3` the solid's volume;
-    `center_of_mass_m` its centroid [m]; `fold` the order of the rotational symmetry about the
-    body z axis, and `flips` whether half turns about axes in the x-y plane map it to itself. What
-    else rules ask of a shape follows from these.
+    `profile` is pushed by half of `length_m` to both sides along the body axis `axis`: for x it
+    lies in the y-z plane, for z in the x-y plane. `fold` is the order of the rotational symmetry
+    about the body z axis, and `flips` is true where half turns about axes in the x-y plane map the
+    block to itself; every block is its own mirror image in x = 0. `kit_colors` are its colors in
+    the official kit, the first the one that designs use. `poses` are the orientations that designs
+    use, by name, the first by default. `word` is the paper's (appendix A.4); `exact` names the type
+    where others share that word. `mistaken_for` are types that a viewer may take a half-hidden one
+    for. `drawn` is a finer profile for pictures of round blocks.
     """
 
-    low_m: tuple[float, float, float]
-    high_m: tuple[float, float, float]
-    volume_m3: float
-    center_of_mass_m: tuple[float, float, float]
+    profile: Profile
+    axis: Literal["x", "z"]
+    length_m: float
     fold: int
     flips: bool
     kit_colors: tuple[Color, ...]
-    """The first is the one that designs use; ValueError where there is none."""
+    poses: Mapping[str, Euler]
+    word: str
+    exact: str = ""
+    mistaken_for: tuple[BlockType, ...] = ()
+    drawn: Profile | None = None
+    low_m: tuple[float, float, float] = field(init=False)
+    high_m: tuple[float, float, float] = field(init=False)
 
     def __post_init__(self) -> None:
         if not self.kit_colors:
             raise ValueError("a shape needs a color of the kit, which designs use")
+        low, high = self.profile.outline.min(axis=0), self.profile.outline.max(axis=0)
+        # The ends of a disc mirror one another but for rounding.
+        low = np.where(np.isclose(-low, high, rtol=1e-12), -high, low)
+        half_m = self.length_m / 2
+        object.__setattr__(self, "low_m", self._in_body(low.tolist(), -half_m))
+        object.__setattr__(self, "high_m", self._in_body(high.tolist(), half_m))
+
+    def _in_body(self, across: Sequence[float], along: float) -> tuple[float, float, float]:
+        u, v = across
+        return (along, u, v) if self.axis == "x" else (u, v, along)
+
+    @functools.cached_property
+    def volume_m3(self) -> float:
+        """Volume of the solid [m3]."""
+        return self.profile.area_m2 * self.length_m
+
+    @functools.cached_property
+    def center_of_mass_m(self) -> tuple[float, float, float]:
+        """Centroid of the solid [m]."""
+        return self._in_body(self.profile.centroid_m, 0.0)
 
     @property
     def mass_kg(self) -> float:
@@ -89,94 +192,146 @@ class Shape:
 
     @property
     def is_box(self) -> bool:
-        """Whether the solid fills its bounding box."""
+        """True if the solid fills its bounding box."""
         return math.isclose(self.volume_m3, math.prod(self.sides_m))
 
     @property
     def is_cube(self) -> bool:
-        """Whether it is a box with equal sides, which has more symmetries than `fold` says."""
+        """True for a box with equal sides, which has more symmetries than `fold` says."""
         return self.is_box and len(set(self.sides_m)) == 1
 
     @property
     def is_round(self) -> bool:
-        """Whether turns about the body z axis can hardly be seen."""
+        """True if turns about the body z axis can hardly be seen."""
         return self.fold > _MOST_SEEN_TURNS
 
     @property
     def is_long(self) -> bool:
-        """Whether one side is by far the longest, and turns about it can be seen."""
+        """True if one side is by far the longest, and turns about it can be seen."""
         _, second, longest = sorted(self.sides_m)
         return longest > _LONG * second and not self.is_round
 
 
-_LONG = 1.5
-"""The longest side of a long block is more than so many times the second."""
-_MOST_SEEN_TURNS = 8
-"""Of a prism with more sides, a turn by one side can hardly be seen."""
-_FACETS = 18
-_CYLINDER_RADIUS_M = 0.025
-_CYLINDER_AREA_M2 = 0.5 * _FACETS * _CYLINDER_RADIUS_M**2 * math.sin(2 * math.pi / _FACETS)
+def _turns(*names: str, roll: float = 0.0, pitch: float = 0.0) -> dict[str, Euler]:
+    """One pose and its quarter turns about the vertical, as many as there are names."""
+    return {name: (roll, pitch, 90.0 * turn) for turn, name in enumerate(names)}
 
 
-def _half_disc(radius_m: float, segments: int) -> tuple[float, float]:
-    """Area [m2] and centroid height above the diameter [m] of a half disc of `segments` chords."""
-    step = math.pi / segments
-    area = 0.5 * segments * radius_m**2 * math.sin(step)
-    moment = plain_sum(
-        (math.sin(i * step) + math.sin((i + 1) * step)) * radius_m / 3 for i in range(segments)
-    ) * (0.5 * radius_m**2 * math.sin(step))
-    return area, moment / area
-
-
-def _box(x_m: float, y_m: float, z_m: float, *kit_colors: Color) -> Shape:
-    half = (x_m / 2, y_m / 2, z_m / 2)
-    low = (-half[0], -half[1], -half[2])
-    fold = 4 if x_m == y_m else 2
-    return Shape(low, half, x_m * y_m * z_m, (0.0, 0.0, 0.0), fold, True, kit_colors)
-
-
-def _arch(*kit_colors: Color) -> Shape:
-    hole_m2, hole_z_m = _half_disc(0.0375, 10)
-    solid_m2 = 0.1 * 0.05
-    area_m2 = solid_m2 - hole_m2
-    center = (0.0, 0.0, -hole_m2 * (hole_z_m - 0.025) / area_m2)
-    half = (0.025, 0.05, 0.025)
-    return Shape((-0.025, -0.05, -0.025), half, area_m2 * 0.05, center, 2, False, kit_colors)
-
-
-def _semi_cylinder(*kit_colors: Color) -> Shape:
-    area_m2, center_z_m = _half_disc(0.025, 10)
-    center = (0.0, 0.0, center_z_m)
-    high = (0.025, 0.025, 0.025)
-    return Shape((-0.025, -0.025, 0.0), high, area_m2 * 0.05, center, 2, False, kit_colors)
-
-
-def _triangle(*kit_colors: Color) -> Shape:
-    leg_m = 0.05
-    half_m = leg_m / math.sqrt(2)
-    volume_m3 = 0.5 * leg_m**2 * 0.05
-    center = (0.0, 0.0, half_m / 3)
-    low, high = (-0.025, -half_m, 0.0), (0.025, half_m, half_m)
-    return Shape(low, high, volume_m3, center, 2, False, kit_colors)
-
-
-def _cylinder(*kit_colors: Color) -> Shape:
-    y_m = _CYLINDER_RADIUS_M * math.sin(math.radians(80))
-    low, high = (-_CYLINDER_RADIUS_M, -y_m, -0.05), (_CYLINDER_RADIUS_M, y_m, 0.05)
-    center = (0.0, 0.0, 0.0)
-    return Shape(low, high, _CYLINDER_AREA_M2 * 0.1, center, _FACETS, True, kit_colors)
-
+_EDGE = _turns("edge-x", "edge-y", roll=90.0)
+_SLAB = {**_turns("flat-x", "flat-y"), **_EDGE, **_turns("upright-x", "upright-y", pitch=90.0)}
 
 SHAPES: dict[BlockType, Shape] = {
-    "arch": _arch("red"),
-    "cube": _box(0.05, 0.05, 0.05, "red", "blue", "green", "orange", "yellow"),
-    "cuboid1": _box(0.05, 0.05, 0.025, "blue"),
-    "cuboid2": _box(0.1, 0.05, 0.025, "green"),
-    "cuboid3": _box(0.15, 0.05, 0.025, "yellow"),
-    "cylinder": _cylinder("orange"),
-    "semi_cylinder": _semi_cylinder("yellow"),
-    "triangle": _triangle("orange"),
+    "arch": Shape(
+        profile=_gate(0.1, 0.05, 0.0375, 10),
+        drawn=_gate(0.1, 0.05, 0.0375, 36),
+        axis="x",
+        length_m=0.05,
+        fold=2,
+        flips=False,
+        kit_colors=("red",),
+        word="arch",
+        poses={
+            **_turns("gate", "gate-turned"),
+            **_turns("cradle", "cradle-turned", pitch=180.0),
+            **_turns("open+y", "open-x", "open-y", "open+x", roll=90.0),
+        },
+    ),
+    "cube": Shape(
+        profile=_rectangle(0.05, 0.05),
+        axis="z",
+        length_m=0.05,
+        fold=4,
+        flips=True,
+        kit_colors=("red", "blue", "green", "orange", "yellow"),
+        word="cube",
+        mistaken_for=("cuboid1",),
+        poses=_turns("flat"),
+    ),
+    "cuboid1": Shape(
+        profile=_rectangle(0.05, 0.05),
+        axis="z",
+        length_m=0.025,
+        fold=4,
+        flips=True,
+        kit_colors=("blue",),
+        word="rectangular prism",
+        exact="short rectangular prism",
+        mistaken_for=("cube",),
+        poses={**_turns("flat"), **_EDGE},
+    ),
+    "cuboid2": Shape(
+        profile=_rectangle(0.1, 0.05),
+        axis="z",
+        length_m=0.025,
+        fold=2,
+        flips=True,
+        kit_colors=("green",),
+        word="rectangular prism",
+        exact="medium rectangular prism",
+        poses=_SLAB,
+    ),
+    "cuboid3": Shape(
+        profile=_rectangle(0.15, 0.05),
+        axis="z",
+        length_m=0.025,
+        fold=2,
+        flips=True,
+        kit_colors=("yellow",),
+        word="rectangular prism",
+        exact="long rectangular prism",
+        poses=_SLAB,
+    ),
+    "cylinder": Shape(
+        profile=_disc(0.025, 18),
+        drawn=_disc(0.025, 72),
+        axis="z",
+        length_m=0.1,
+        fold=18,
+        flips=True,
+        kit_colors=("orange",),
+        word="cylinder",
+        mistaken_for=("semi_cylinder",),
+        poses={
+            **_turns("upright"),
+            "lying-x": (90.0, 0.0, 90.0),
+            "lying-y": (90.0, 0.0, 0.0),
+        },
+    ),
+    "semi_cylinder": Shape(
+        profile=_half_disc(0.025, 10),
+        drawn=_half_disc(0.025, 36),
+        axis="x",
+        length_m=0.05,
+        fold=2,
+        flips=False,
+        kit_colors=("yellow",),
+        word="half cylinder",
+        mistaken_for=("cylinder",),
+        poses={
+            **_turns("dome", "dome-turned"),
+            **_turns("bowl", "bowl-turned", roll=180.0),
+            **_turns("round+x", "round+y", "round-x", "round-y", pitch=90.0),
+        },
+    ),
+    "triangle": Shape(
+        profile=_right_triangle(0.05),
+        axis="x",
+        length_m=0.05,
+        fold=2,
+        flips=False,
+        kit_colors=("orange",),
+        word="triangular prism",
+        poses={
+            **_turns("roof", "roof-turned"),
+            **_turns("ramp+y", "ramp-x", "ramp-y", "ramp+x", roll=135.0),
+            **_turns("wedge+x", "wedge+y", "wedge-x", "wedge-y", roll=-135.0, pitch=90.0),
+        },
+    ),
 }
+"""The shapes by type. A `ramp+y` slopes down towards +y, a `round+x` shows its round side to +x, an
+arch that is `open+y` stands on one end with its hole to +y. `x` and `y` name the direction of the
+long side, and for `upright` slabs the one that the slab is thin in.
+"""
 
 KIT_PALETTE: tuple[tuple[BlockType, Color], ...] = tuple(
     sorted(
@@ -228,16 +383,12 @@ def symmetries(block_type: BlockType) -> NDArray[np.float64]:
     shape = SHAPES[block_type]
     if shape.is_cube:
         return _cube_rotations()
-    turns = [_turn_z(360.0 * i / shape.fold) for i in range(shape.fold)]
+    turns = [euler_deg_to_matrix((0.0, 0.0, 360.0 * i / shape.fold)) for i in range(shape.fold)]
     if shape.flips:
         # Every block mirrors in x = 0: where half a turn about z is none, that is one about y.
         half_turn = [1.0, -1.0, -1.0] if shape.fold % 2 == 0 else [-1.0, 1.0, -1.0]
         turns += [turn @ np.diag(half_turn) for turn in turns]
     return np.stack(turns)
-
-
-def _turn_z(angle_deg: float) -> NDArray[np.float64]:
-    return euler_deg_to_matrix((0.0, 0.0, angle_deg))
 
 
 def _cube_rotations() -> NDArray[np.float64]:
@@ -264,9 +415,7 @@ def orientation_class(block_type: BlockType, euler_deg: Euler) -> tuple[float, .
 
 
 def turn_deg(block_type: BlockType, one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
-    """The least angle [degrees] by which a block is to be turned from one rotation (3, 3) to what
-    looks like the other.
-    """
+    """The least angle [degrees] between two rotations (3, 3) of a block, up to its symmetry."""
     alike = one @ symmetries(block_type)
     cosines = (np.einsum("kij,ij->k", alike, other) - 1) / 2
     return math.degrees(math.acos(min(1.0, max(-1.0, float(cosines.max())))))

@@ -1,9 +1,14 @@
-"""Sums of products in a fixed order, for whatever decides a pixel.
+"""Geometry of the blocks: meshes, convex pieces, and exact sums for whatever decides a pixel.
+
+A block is a prism, and what is needed of it follows from its profile in `SHAPES`: a closed triangle
+mesh for mass properties, a finer one for pictures, and the convex pieces that physics and contact
+tests use. Curved sides are polygons, because that is what the blocks are: a smooth cylinder rolls
+away where an 18-gon stands. Pictures show them round, by facets of five degrees.
 
 Matrix products go to a BLAS, which adds up in another order, and with fused operations, on another
 machine; trigonometric functions differ by a unit in the last place from one C library to the next.
 Plain numpy arithmetic in 64 bits is the same everywhere, and so are pictures that follow from it
-and from a few angles whose sines were rounded.
+(`dot`, `cross`, `turned`, `unit`) and from a few angles whose sines were rounded (`rounded`).
 """
 
 from __future__ import annotations
@@ -15,7 +20,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.domain.blocks import SHAPES, BlockType, Euler, euler_deg_to_matrix
+from phyblock.domain.blocks import (
+    SHAPES,
+    BlockType,
+    Euler,
+    Outline,
+    Profile,
+    Shape,
+    euler_deg_to_matrix,
+)
 from phyblock.domain.plan import PoseStep
 from phyblock.domain.scene import Block, Candidate, CandidateSet
 
@@ -153,14 +166,6 @@ class Mesh:
         return volumes
 
 
-Outline = NDArray[np.float64]
-"""Corners of a polygon, shape (n, 2) [m], counter-clockwise."""
-
-_ARC_SEGMENTS, _FACETS = 10, 18
-_ROUND_ARC_SEGMENTS, _ROUND_FACETS = 36, 72
-_ARCH_HOLE_RADIUS_M = 0.0375
-
-
 @dataclass(frozen=True, eq=False)
 class ConvexPiece:
     """A convex polytope in a body frame.
@@ -174,40 +179,25 @@ class ConvexPiece:
     edge_directions: NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class _Prism:
-    """An outline in the plane of axes `plane`, pushed to ±`half_m` along axis `axis`.
-
-    `parts` are convex outlines that together fill `outline`; `caps` triangulates it, as indices.
-    (`plane`, `axis`) is a right-handed triple, so a counter-clockwise outline faces +`axis`.
-    """
-
-    outline: Outline
-    half_m: float
-    plane: tuple[int, int]
-    axis: int
-    parts: tuple[Outline, ...]
-    caps: tuple[tuple[int, int, int], ...]
-
-
 @functools.cache
 def solid_mesh(block_type: BlockType) -> Mesh:
     """The block's surface: closed, outward, every corner once, in the body frame."""
-    return _mesh(_prism(block_type))
+    return _mesh(SHAPES[block_type], SHAPES[block_type].profile)
 
 
 @functools.cache
 def drawn_mesh(block_type: BlockType) -> Mesh:
     """The surface as pictures show it: as `solid_mesh`, but finer where the block is round."""
-    mesh = _mesh(_prism(block_type, _ROUND_ARC_SEGMENTS, _ROUND_FACETS))
+    shape = SHAPES[block_type]
+    mesh = _mesh(shape, shape.drawn or shape.profile)
     return Mesh(rounded(mesh.vertices_m), mesh.triangles)
 
 
-def _mesh(prism: _Prism) -> Mesh:
-    n = len(prism.outline)
-    vertices = np.vstack([_place(prism, prism.outline, side) for side in (-1, 1)])
+def _mesh(shape: Shape, profile: Profile) -> Mesh:
+    n, half_m = len(profile.outline), shape.length_m / 2
+    vertices = np.vstack([_cap(shape, profile.outline, along) for along in (-half_m, half_m)])
     triangles: list[tuple[int, int, int]] = []
-    for a, b, c in prism.caps:
+    for a, b, c in profile.caps:
         triangles += [(c, b, a), (n + a, n + b, n + c)]
     for i in range(n):
         j = (i + 1) % n
@@ -215,15 +205,21 @@ def _mesh(prism: _Prism) -> Mesh:
     return Mesh(vertices, np.array(triangles))
 
 
+def _cap(shape: Shape, outline: Outline, along_m: float) -> NDArray[np.float64]:
+    """The outline in the body frame at a place along the axis, shape (n, 3) [m]."""
+    column = 0 if shape.axis == "x" else 2
+    return np.insert(outline, column, along_m, axis=1)
+
+
 def corners_m(
     block_type: BlockType, position_m: tuple[float, float, float], euler_deg: Euler
 ) -> NDArray[np.float64]:
     """World corners of a block's solid at a pose, shape (n, 3) [m]."""
-    turned: NDArray[np.float64] = (
+    corners: NDArray[np.float64] = (
         solid_mesh(block_type).vertices_m @ euler_deg_to_matrix(euler_deg).T
     )
-    turned += np.array(position_m)
-    return turned
+    corners += np.array(position_m)
+    return corners
 
 
 @functools.cache
@@ -233,81 +229,20 @@ def collision_pieces(block_type: BlockType, inset_m: float = 0.0) -> tuple[Conve
     One piece, but for the arch: ten (each leg with its first arc segment, and eight slices).
     The inset takes back the margin that a simulator adds around hulls.
     """
-    prism = _prism(block_type)
-    return tuple(_convex_prism(prism, _shrink(part, inset_m), inset_m) for part in prism.parts)
-
-
-def _arc(radius_m: float, segments: int) -> Outline:
-    """Half a circle above the first axis, from angle 0 to 180 degrees, shape (segments + 1, 2)."""
-    angles = np.linspace(0.0, math.pi, segments + 1)
-    return np.stack([radius_m * np.cos(angles), radius_m * np.sin(angles)], axis=1)
-
-
-def _fan(corners: int) -> tuple[tuple[int, int, int], ...]:
-    return tuple((0, i, i + 1) for i in range(1, corners - 1))
-
-
-def _convex(outline: Outline, half_m: float, plane: tuple[int, int], axis: int) -> _Prism:
-    return _Prism(outline, half_m, plane, axis, (outline,), _fan(len(outline)))
-
-
-@functools.cache
-def _prism(
-    block_type: BlockType, arc_segments: int = _ARC_SEGMENTS, facets: int = _FACETS
-) -> _Prism:
-    """A block with half circles of so many segments, and circles of so many facets.
-
-    Raises ValueError for a type that has no outline here.
-    """
     shape = SHAPES[block_type]
-    high = shape.high_m
-    if block_type == "arch":
-        return _arch_prism(arc_segments)
-    if block_type == "semi_cylinder":
-        return _convex(_arc(high[1], arc_segments), high[0], (1, 2), 0)
-    if block_type == "triangle":
-        corners = np.array([[high[1], 0.0], [0.0, high[2]], [-high[1], 0.0]])
-        return _convex(corners, high[0], (1, 2), 0)
-    if block_type == "cylinder":
-        angles = np.radians(np.arange(facets) * (360 / facets))
-        circle = high[0] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        return _convex(circle, high[2], (0, 1), 2)
-    if not shape.is_box:
-        raise ValueError(f"{block_type} has no geometry")
-    x, y, z = high
-    return _convex(np.array([[x, y], [-x, y], [-x, -y], [x, -y]]), z, (0, 1), 2)
+    half_m = shape.length_m / 2 - inset_m
+    axis = np.array([1.0, 0.0, 0.0] if shape.axis == "x" else [0.0, 0.0, 1.0])
+    pieces = []
+    for part in shape.profile.parts:
+        outline = _shrunk(part, inset_m)
+        vertices = np.vstack([_cap(shape, outline, along) for along in (-half_m, half_m)])
+        sides = _one_of_each_line(_cap(shape, np.roll(outline, -1, axis=0) - outline, 0.0))
+        normals = np.cross(sides, axis)
+        pieces.append(ConvexPiece(vertices, np.vstack([normals, axis]), np.vstack([sides, axis])))
+    return tuple(pieces)
 
 
-def _arch_prism(segments: int) -> _Prism:
-    half_x, half_y, half_z = SHAPES["arch"].high_m
-    arc = _arc(_ARCH_HOLE_RADIUS_M, segments) - [0.0, half_z]
-    right_foot, right_top = [half_y, -half_z], [half_y, half_z]
-    left_foot, left_top = [-half_y, -half_z], [-half_y, half_z]
-    outline = np.array([*arc[::-1], right_foot, right_top, left_top, left_foot])
-    right_leg = np.array([arc[0], right_foot, right_top, [arc[1, 0], half_z], arc[1]])
-    left_leg = np.array([arc[-1], arc[-2], [arc[-2, 0], half_z], left_top, left_foot])
-    slices = [
-        np.array([arc[i], [arc[i, 0], half_z], [arc[i + 1, 0], half_z], arc[i + 1]])
-        for i in range(1, segments - 1)
-    ]
-    last = segments
-    middle = last // 2
-    foot_right, top_right, top_left, foot_left = range(last + 1, last + 5)
-    caps = [(foot_left, 0, top_left), (last, foot_right, top_right), (middle, top_right, top_left)]
-    caps += [(top_left, i, i + 1) for i in range(middle)]
-    caps += [(top_right, i, i + 1) for i in range(middle, last)]
-    return _Prism(outline, half_x, (1, 2), 0, (right_leg, *slices, left_leg), tuple(caps))
-
-
-def _place(prism: _Prism, outline: Outline, side: int, inset_m: float = 0.0) -> Outline:
-    """The outline as the cap on one side of the prism, shape (n, 3)."""
-    placed = np.empty((len(outline), 3))
-    placed[:, prism.plane] = outline
-    placed[:, prism.axis] = side * (prism.half_m - inset_m)
-    return placed
-
-
-def _shrink(outline: Outline, inset_m: float) -> Outline:
+def _shrunk(outline: Outline, inset_m: float) -> Outline:
     """A convex outline with every side moved inward by `inset_m`."""
     sides = np.roll(outline, -1, axis=0) - outline
     normals = np.stack([sides[:, 1], -sides[:, 0]], axis=1)
@@ -316,17 +251,6 @@ def _shrink(outline: Outline, inset_m: float) -> Outline:
     pairs = np.stack([np.roll(normals, 1, axis=0), normals], axis=1)
     rights = np.stack([np.roll(offsets, 1), offsets], axis=1)
     return np.linalg.solve(pairs, rights[..., None])[..., 0]
-
-
-def _convex_prism(prism: _Prism, outline: Outline, inset_m: float) -> ConvexPiece:
-    vertices = np.vstack([_place(prism, outline, side, inset_m) for side in (-1, 1)])
-    axis = np.zeros(3)
-    axis[prism.axis] = 1.0
-    sides = np.zeros((len(outline), 3))
-    sides[:, prism.plane] = np.roll(outline, -1, axis=0) - outline
-    sides = _one_of_each_line(sides)
-    normals = np.cross(sides, axis)
-    return ConvexPiece(vertices, np.vstack([normals, axis]), np.vstack([sides, axis]))
 
 
 def _one_of_each_line(vectors: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -153,10 +152,3 @@ def _colored_part(path: Path) -> Mesh:
     number = {corner: index for index, corner in enumerate(used)}
     faces = [[number[corner] for corner in triangle] for triangle in triangles]
     return Mesh(np.array([vertices[corner] for corner in used]), np.array(faces))
-
-
-def test_a_type_without_an_outline_is_no_box(monkeypatch: pytest.MonkeyPatch) -> None:
-    pyramid = replace(SHAPES["cube"], volume_m3=SHAPES["cube"].volume_m3 / 3)
-    monkeypatch.setitem(SHAPES, "pyramid", pyramid)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="pyramid has no geometry"):
-        solid_mesh("pyramid")  # type: ignore[arg-type]

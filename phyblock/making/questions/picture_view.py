@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.domain.blocks import BlockType, euler_deg_to_matrix
+from phyblock.domain.blocks import SHAPES, BlockType, euler_deg_to_matrix
 from phyblock.domain.question import Question, QuestionPicture
 from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions.question_draft import UnfairError
@@ -61,10 +61,7 @@ SHAPED = 0.28
 SHAPED_AREA = 0.004
 """and the least share of the picture that it covers."""
 _PROFILE_AXES: Mapping[BlockType, int] = {
-    "arch": 0,
-    "triangle": 0,
-    "semi_cylinder": 0,
-    "cylinder": 2,
+    block_type: "xyz".index(shape.axis) for block_type, shape in SHAPES.items() if not shape.is_box
 }
 """Body axes along which these types look like what they are, and from elsewhere like boxes."""
 _MOST_OF_A_FACE = 0.8

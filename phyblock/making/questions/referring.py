@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from phyblock.domain.blocks import COLORS, BlockType, Color
+from phyblock.domain.blocks import COLORS, SHAPES, BlockType, Color
 from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block
 from phyblock.making.questions.picture_view import outermost, shows_profile
@@ -22,30 +22,21 @@ from phyblock.sim.question_pictures import seen, seen_order
 
 Feature = Literal["color", "type", "size", "layer", "side", "support"]
 """What an expression may speak of; `size` tells rectangular prisms apart by their length."""
+_ORDER = ("cube", "rectangular prism", "triangular prism", "half cylinder", "cylinder", "arch")
+"""The paper's six words (appendix A.4); those of further shapes come behind."""
 SHAPE_WORDS: dict[str, tuple[BlockType, ...]] = {
-    "cube": ("cube",),
-    "rectangular prism": ("cuboid1", "cuboid2", "cuboid3"),
-    "triangular prism": ("triangle",),
-    "half cylinder": ("semi_cylinder",),
-    "cylinder": ("cylinder",),
-    "arch": ("arch",),
+    word: tuple(one for one, shape in SHAPES.items() if shape.word == word)
+    for word in dict.fromkeys((*_ORDER, *(shape.word for shape in SHAPES.values())))
 }
-"""The paper's six words for the eight types (appendix A.4)."""
+"""The types that each word names."""
 _SIZED: dict[str, tuple[BlockType, ...]] = {
-    "short rectangular prism": ("cuboid1",),
-    "medium rectangular prism": ("cuboid2",),
-    "long rectangular prism": ("cuboid3",),
+    shape.exact: (one,) for one, shape in SHAPES.items() if shape.exact
 }
 _NOUNS: dict[str, tuple[BlockType, ...]] = {
     **SHAPE_WORDS,
     **_SIZED,
     "block": tuple(block_type for types in SHAPE_WORDS.values() for block_type in types),
 }
-_ALIKE: tuple[frozenset[BlockType], ...] = (
-    frozenset({"cube", "cuboid1"}),
-    frozenset({"cylinder", "semi_cylinder"}),
-)
-"""Types that a reader may take for one another when part of a block is hidden."""
 _SIDES = ("leftmost", "rightmost", "topmost")
 _TOP_GAP_M = 0.02
 _SIMPLE = rf"(?:(?:{'|'.join(COLORS)}) )?(?:{'|'.join(_NOUNS)})"
@@ -178,7 +169,7 @@ def _fits(
         # Seen from this side, it may be taken for anything but what it is.
         return block.type not in types and words["color"] in (None, block.color)
     if loosely:
-        types = types.union(*(alike for alike in _ALIKE if alike & types))
+        types = types.union(*(SHAPES[one].mistaken_for for one in types))
     return block.type in types and words["color"] in (None, block.color)
 
 
