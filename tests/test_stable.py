@@ -17,11 +17,11 @@ from hypothesis import strategies as st
 
 from phyblock.data import read_builtin, read_questions
 from phyblock.domain import euler_deg_to_matrix
-from phyblock.models.guess_features import option_features
 from phyblock.resources import bundled
 from phyblock.scoring.pose import Piece, PoseFit, overlap_volume, placed
 from phyblock.sim.geometry import collision_pieces
 from phyblock.stable import plain_sum
+from phyblock.tracks.guesses import text_features
 from phyblock.tracks.pose_judging import FITS
 
 DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
@@ -55,7 +55,7 @@ def test_what_is_lost_is_not_made_up_for() -> None:
 
 def texts() -> list[Any]:
     """What is seen of options' texts: by it drafts are kept, and the text-only probe answers."""
-    return [option_features(task.question) for task in ASKED.tasks[::5]]
+    return [text_features(task.question.text, task.question.options) for task in ASKED.tasks[::5]]
 
 
 def solids() -> list[Any]:

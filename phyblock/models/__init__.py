@@ -8,24 +8,26 @@ from phyblock.models.batches import BatchFiles, remove_unfinished, under_way, wa
 from phyblock.models.breaker import Breakers
 from phyblock.models.build import build_model
 from phyblock.models.cache import CacheStats, ReplyCache, reply_key
-from phyblock.models.cost import (
-    Budget,
-    Estimate,
-    cost_usd,
-    estimate,
-    is_billed,
-    most_usd,
-    prices_of,
-)
+from phyblock.models.costs import Budget, Estimate, estimate, most_usd
 from phyblock.models.events import ModelEvent, Observer, Tell
 from phyblock.models.formats import takes_format
 from phyblock.models.halt import Halt, HaltedError
 from phyblock.models.keys import KeyStatus, api_key_status, server_address
 from phyblock.models.limits import Gate
-from phyblock.models.prices import Price, Prices, Rate, Tariff, today
+from phyblock.models.prices import (
+    Price,
+    Prices,
+    Rate,
+    Tariff,
+    ends_on,
+    is_billed,
+    is_unlisted,
+    prices_of,
+    reply_cost_usd,
+    today,
+)
 from phyblock.models.providers import known_providers
-from phyblock.models.raw_replies import RawReply, read_raw_reply
-from phyblock.models.retirement import ends_on, is_unlisted
+from phyblock.models.replay import read_raw_reply
 from phyblock.models.retry import RetryPolicy
 from phyblock.records.reply import Reply, Usage
 
@@ -49,7 +51,6 @@ __all__ = [
     "Price",
     "Prices",
     "Rate",
-    "RawReply",
     "Reply",
     "ReplyCache",
     "Request",
@@ -59,7 +60,6 @@ __all__ = [
     "Usage",
     "api_key_status",
     "build_model",
-    "cost_usd",
     "ends_on",
     "estimate",
     "is_billed",
@@ -69,6 +69,7 @@ __all__ = [
     "prices_of",
     "read_raw_reply",
     "remove_unfinished",
+    "reply_cost_usd",
     "reply_key",
     "server_address",
     "takes_format",

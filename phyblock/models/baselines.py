@@ -11,8 +11,6 @@ from phyblock.records.reply import Reply, Usage
 from phyblock.registry import baseline_names, baseline_rules
 from phyblock.stable import drawn_bytes
 
-__all__ = ["BaselineModel"]
-
 
 class BaselineModel:
     """A rule instead of a model.
@@ -29,27 +27,23 @@ class BaselineModel:
             problem = Problem(f"model {config.name}", "is no baseline", "", config.name, allowed)
             raise SpecError(problem)
         self.name = config.name
-        self._id = config.name
         self._rules = baseline_rules(config.name)
 
     async def ask(self, request: Request) -> Reply:
-        """The rule's answer; DataError when an oracle lacks a candidate.
-
-        Raises SpecError for a subject that the baseline has no rule for.
+        """Return the rule's answer; DataError when an oracle lacks a candidate, SpecError for a
+        subject that the baseline has no rule for.
         """
         rule = self._rules.get(type(request.subject))
         if rule is None:
             problem = Problem(f"model {self.name}", "has no rule for this track")
             raise SpecError(problem)
-        seed_text = f"{self._id}|{request.seed}|{request.key}"
-        digest = drawn_bytes(seed_text)
+        digest = drawn_bytes(f"{self.name}|{request.seed}|{request.key}")
         rng = np.random.default_rng(int.from_bytes(digest, "big"))
-        text = rule(request.subject, rng)
         return Reply(
-            text=text,
+            text=rule(request.subject, rng),
             usage=Usage(prompt_tokens=0, completion_tokens=0),
             cost_usd=0.0,
-            provider_model=self._id,
+            provider_model=self.name,
             attempts=0,
         )
 

@@ -9,7 +9,7 @@ from phyblock.models.batches import BatchFiles, BatchModel, BatchParts, batch_pr
 from phyblock.models.breaker import Breakers
 from phyblock.models.cache import ReplyCache
 from phyblock.models.chat import ChatModel, ChatParts
-from phyblock.models.cost import Budget, prices_of, require_prices
+from phyblock.models.costs import Budget
 from phyblock.models.direct_call import DirectTransport
 from phyblock.models.events import Observer, ignore_event
 from phyblock.models.halt import Halt
@@ -17,6 +17,7 @@ from phyblock.models.http_client import Client
 from phyblock.models.keys import secrets_of
 from phyblock.models.limits import Gate, ModelLimiter
 from phyblock.models.litellm_call import LitellmTransport
+from phyblock.models.prices import prices_of, require_prices
 from phyblock.models.replay import open_replay
 from phyblock.models.replicas import Replicas
 from phyblock.models.retry import RetryPolicy

@@ -24,7 +24,7 @@ from phyblock.errors import Problem, StoreError, reason_of
 from phyblock.models.base import Image, Message, Request
 from phyblock.models.events import Tell
 from phyblock.models.payload import wire_params
-from phyblock.models.raw_replies import token_count
+from phyblock.models.replay import token_count
 from phyblock.records.reply import Reply
 from phyblock.stable import hex_digest
 

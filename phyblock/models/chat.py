@@ -18,7 +18,7 @@ from phyblock.errors import (
 )
 from phyblock.models.base import Request
 from phyblock.models.cache import ReplyCache, reply_key
-from phyblock.models.cost import Budget, estimate
+from phyblock.models.costs import Budget, estimate
 from phyblock.models.events import EventKind, ModelEvent, Observer
 from phyblock.models.halt import Halt, HaltedError
 from phyblock.models.keys import hidden

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 
 from phyblock.errors import ModelError, RetryableError
-from phyblock.models.raw_replies import read_chat_completion
+from phyblock.models.replay import read_chat_completion
 from phyblock.records.reply import Reply, Usage
 
 __all__ = ["read_completion"]
@@ -46,7 +46,7 @@ def _read(body: object, latency_s: float, status: int) -> Reply:
         finish=raw.finish,
         usage=usage,
         latency_s=latency_s,
-        provider_model=raw.model,
+        provider_model=raw.provider_model,
     )
 
 

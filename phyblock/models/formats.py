@@ -6,7 +6,7 @@ import re
 
 from phyblock.config.models import DIRECT_PROVIDERS, ModelConfig
 from phyblock.errors import ModelError, RefusedError
-from phyblock.models.price_map import map_entry
+from phyblock.models.prices import map_entry
 
 __all__ = ["FORMAT_HINT", "refuses_format", "takes_format"]
 

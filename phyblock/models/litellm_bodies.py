@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from phyblock.models.http_client import Answer
-from phyblock.models.raw_replies import token_count
+from phyblock.models.replay import token_count
 
 __all__ = ["readable_body"]
 

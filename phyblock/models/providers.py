@@ -7,7 +7,7 @@ import importlib.util
 from phyblock.config.models import DIRECT_PROVIDERS, ModelConfig
 from phyblock.models.keys import KEYLESS
 from phyblock.models.litellm_call import litellm_providers
-from phyblock.models.price_map import map_entry, mapped_providers
+from phyblock.models.prices import map_entry, mapped_providers
 
 __all__ = ["known_providers"]
 

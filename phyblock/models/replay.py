@@ -1,89 +1,63 @@
-"""Recorded replies in the place of a model: a folder of raw replies, or a run of our own."""
+"""Recorded replies in the place of a model, and raw replies of providers in all their shapes.
+
+Known are the six shapes of the official outputs and their near relatives. The reader of each
+returns None for anything that is not of its shape.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import DataError, Problem, RefusedError, SampleError, reason_of
 from phyblock.files import load_json, read_text
 from phyblock.models.base import Request
-from phyblock.models.raw_replies import RawReply, read_raw_reply
 from phyblock.records import RECORDS, Recorded, RecordedLines
-from phyblock.records.reply import Reply
+from phyblock.records.reply import Reply, Usage
+from phyblock.text import well_formed
+from phyblock.types import Finish
 
-__all__ = ["ReplayModel", "open_replay"]
+_MOST_TOKENS = 10**9
+"""Counts above this are believed by nobody: a hundred times the longest context that there is."""
+
+_FINISH: Mapping[str, Finish] = {
+    **dict.fromkeys(("stop", "end_turn", "stop_sequence", "eos", "eos_token"), "stop"),
+    **dict.fromkeys(("length", "max_tokens", "model_context_window_exceeded"), "length"),
+    **dict.fromkeys(("content_filter", "content_filtered", "refusal", "safety"), "refusal"),
+    **dict.fromkeys(("recitation", "blocklist", "prohibited_content"), "refusal"),
+    **dict.fromkeys(("spii", "image_safety"), "refusal"),
+}
+"""Words for the end of a reply, in lower case, by provider's dialect."""
 
 
 class ReplayModel:
-    """Raw provider replies, one file a request: `<key>.json`, or one `<key>_*.json`."""
+    """Answers with recorded replies."""
 
     needs_messages = False
 
-    def __init__(self, config: ModelConfig, folder: Path) -> None:
+    def __init__(self, config: ModelConfig, find: Callable[[Request], Reply | None]) -> None:
         self.name = config.name
-        self._folder = folder
+        self._find = find
 
     async def ask(self, request: Request) -> Reply | None:
-        """The reply recorded for the request's key, whatever its seed, or None.
+        """Return the reply recorded for the request, which costs nothing; None where there is none.
 
-        Raises DataError when the file is no JSON, or a reply of no known shape.
+        Raises what was recorded in its place, and DataError for a recording that cannot be read.
         """
-        path = self._file(request.key)
-        if path is None:
-            return None
-        raw = read_raw_reply(_read_json(path), str(path))
-        return _replayed(raw)
-
-    async def aclose(self) -> None:
-        """Nothing is held open."""
-
-    def _file(self, key: str) -> Path | None:
-        path = self._folder / f"{key}.json"
-        if path.is_file():
-            return path
-        others = sorted(p for p in self._folder.glob(f"{_escaped(key)}_*.json") if p.is_file())
-        if len(others) > 1:
-            names = ", ".join(p.name for p in others)
-            message = "holds more than one recording of a scene"
-            raise DataError(Problem(str(self._folder), message, key, names, f"one {key}*.json"))
-        return others[0] if others else None
-
-
-class RunReplayModel:
-    """The replies in a run folder's records, matched by track, key and seed."""
-
-    needs_messages = False
-
-    def __init__(self, config: ModelConfig, path: Path) -> None:
-        self.name = config.name
-        self._records = _read_records(path, config.name)
-
-    async def ask(self, request: Request) -> Reply | None:
-        """The reply recorded for the request's track, key and seed, or None.
-
-        Raises SampleError or RefusedError where that is what was recorded.
-        """
-        known, what = self._records, (request.key, request.seed)
-        record = known.get((request.track, *what)) or known.get(("", *what))
-        if record is None:
-            return None
-        error = record.error
-        if error is not None and error.kind in ("sample", "refused"):
-            cls = RefusedError if error.kind == "refused" else SampleError
-            raise cls(error.message, status=error.status)
-        if record.reply is None:
-            return None
-        return record.reply.model_copy(update={"cost_usd": 0.0, "attempts": 0, "cached": False})
+        reply = self._find(request)
+        free = {"cost_usd": 0.0, "attempts": 0, "cached": False}
+        return None if reply is None else reply.model_copy(update=free)
 
     async def aclose(self) -> None:
         """Nothing is held open."""
 
 
-def open_replay(config: ModelConfig) -> ReplayModel | RunReplayModel:
-    """The recording that a configuration names.
+def open_replay(config: ModelConfig) -> ReplayModel:
+    """Open the recording that a configuration names.
 
-    A folder with `records.jsonl` is a run of our own, any other a folder of raw replies. Raises
+    A folder with `records.jsonl` is a run of phyblock, any other a folder of raw replies. Raises
     DataError when there is no such folder, or no JSON in it.
     """
     folder = config.recording
@@ -93,46 +67,47 @@ def open_replay(config: ModelConfig) -> ReplayModel | RunReplayModel:
         problem = Problem(where, "recordings not found", "replay", str(folder), "a folder", hint)
         raise DataError(problem)
     if (folder / RECORDS).is_file():
-        return RunReplayModel(config, folder / RECORDS)
+        records = _read_records(folder / RECORDS, config.name)
+        return ReplayModel(config, lambda request: _recorded(records, request))
     if not any(folder.glob("*.json")):
         allowed = f"a file a scene such as 000.json, or {RECORDS}"
         raise DataError(Problem(str(folder), "holds no recorded replies", allowed=allowed))
-    return ReplayModel(config, folder)
+    return ReplayModel(config, lambda request: _read_file(folder, request.key))
 
 
-def _replayed(raw: RawReply) -> Reply:
-    return Reply(
-        text=raw.text,
-        reasoning=raw.reasoning,
-        finish=raw.finish,
-        usage=raw.usage,
-        cost_usd=0.0,
-        provider_model=raw.model,
-        attempts=0,
-    )
-
-
-def _read_json(path: Path) -> object:
+def _read_file(folder: Path, key: str) -> Reply | None:
+    """Return the raw reply in `<key>.json`, or in the one `<key>_*.json`, whatever the seed."""
+    path = folder / f"{key}.json"
+    if not path.is_file():
+        escaped = "".join(f"[{char}]" if char in "*?[" else char for char in key)
+        others = sorted(found for found in folder.glob(f"{escaped}_*.json") if found.is_file())
+        if len(others) > 1:
+            names = ", ".join(other.name for other in others)
+            message = "holds more than one recording of a scene"
+            raise DataError(Problem(str(folder), message, key, names, f"one {key}*.json"))
+        if not others:
+            return None
+        path = others[0]
     try:
-        return load_json(read_text(path), finite=False)
+        raw = load_json(read_text(path), finite=False)
     except OSError as error:
         raise DataError(Problem(str(path), f"cannot be read: {reason_of(error)}")) from error
     except ValueError as error:
         where = f"{path}:{getattr(error, 'lineno', 1)}:{getattr(error, 'colno', 1)}"
         raise DataError(Problem(where, f"is not JSON: {error}")) from error
+    return read_raw_reply(raw, str(path))
 
 
 def _read_records(path: Path, model: str) -> dict[tuple[str, str, int], Recorded]:
-    """Records of one model by track, key and seed; the last one counts where a sample has several.
+    """Read the records of one model by track, key and seed, the last one of a sample.
 
     An unfinished last line, which a killed run leaves, is not there yet. A run of one model is
     that model's whatever its name. Of a varied run the reference alone counts.
     """
     found: dict[str, dict[tuple[str, str, int], Recorded]] = {}
     for _, record in RecordedLines(path):
-        if record.variant:
-            continue
-        found.setdefault(record.model, {})[record.track, record.key, record.seed] = record
+        if not record.variant:
+            found.setdefault(record.model, {})[record.track, record.key, record.seed] = record
     if model in found:
         return found[model]
     if len(found) == 1:
@@ -142,5 +117,206 @@ def _read_records(path: Path, model: str) -> dict[tuple[str, str, int], Recorded
     )
 
 
-def _escaped(key: str) -> str:
-    return "".join(f"[{char}]" if char in "*?[" else char for char in key)
+def _recorded(known: Mapping[tuple[str, str, int], Recorded], request: Request) -> Reply | None:
+    """Return the reply recorded for the request's track, key and seed, or None.
+
+    Raises SampleError or RefusedError where that is what was recorded.
+    """
+    what = (request.key, request.seed)
+    record = known.get((request.track, *what)) or known.get(("", *what))
+    error = None if record is None else record.error
+    if error is not None and error.kind in ("sample", "refused"):
+        cls = RefusedError if error.kind == "refused" else SampleError
+        raise cls(error.message, status=error.status)
+    return None if record is None else record.reply
+
+
+def read_raw_reply(raw: object, where: str) -> Reply:
+    """Read a decoded JSON document; `where` names it in errors.
+
+    Raises DataError when it has no known shape.
+    """
+    if (reply := _read(raw)) is not None:
+        return reply
+    found = f"keys {', '.join(map(str, raw))}" if isinstance(raw, Mapping) else type(raw).__name__
+    allowed = "a chat completion, an Anthropic message, a Gemini response, predict, text, response"
+    raise DataError(Problem(where, "is no recorded reply of a known shape", "", found, allowed))
+
+
+def finish_of(word: object) -> Finish:
+    """Return the end that a provider's word stands for."""
+    return _FINISH.get(str(word).rpartition(".")[2].lower(), "unknown")
+
+
+def token_count(value: object) -> int | None:
+    """Return a number of tokens as a server wrote it; None, not known, for what cannot be one."""
+    if not isinstance(value, int) or isinstance(value, bool):
+        return None
+    return value if 0 <= value <= _MOST_TOKENS else None
+
+
+def read_chat_completion(raw: object) -> Reply | None:
+    """Read OpenAI's shape and its copies: `choices[0].message`, or `choices[0].text`."""
+    choice = _first(_get(raw, "choices"))
+    if not isinstance(choice, Mapping):
+        return None
+    message = choice.get("message", choice)
+    if not isinstance(message, Mapping) or not {"content", "text", "refusal"} & message.keys():
+        return None
+    text, thoughts = _parts(message.get("content", message.get("text")))
+    shown = _text(message.get("reasoning_content") or message.get("reasoning"))
+    refusal = message.get("refusal")
+    return _reply(
+        text or _text(refusal),
+        "\n".join(part for part in (shown, thoughts) if part),
+        "refusal" if refusal and not text else finish_of(choice.get("finish_reason")),
+        _usage(_get(raw, "usage"), "prompt_tokens", "completion_tokens"),
+        _get(raw, "model"),
+    )
+
+
+def _read(raw: object) -> Reply | None:
+    return next((reply for reader in _READERS if (reply := reader(raw)) is not None), None)
+
+
+def _anthropic(raw: object) -> Reply | None:
+    """Read Anthropic Messages: `content` is a list of text and thinking blocks.
+
+    Its `input_tokens` are those that no cache knows.
+    """
+    content, counts = _get(raw, "content"), _get(raw, "usage")
+    if not isinstance(content, list) or not all(isinstance(b, Mapping) for b in content):
+        return None
+    usage = _usage(counts, "input_tokens", "output_tokens")
+    if usage.prompt_tokens is not None:
+        cached = token_count(_get(counts, "cache_read_input_tokens"))
+        written = token_count(_get(counts, "cache_creation_input_tokens"))
+        usage = usage.model_copy(
+            update={
+                "prompt_tokens": usage.prompt_tokens + (cached or 0) + (written or 0),
+                "cached_tokens": cached,
+                "cache_write_tokens": written,
+            }
+        )
+    finish = finish_of(_get(raw, "stop_reason"))
+    return _reply(*_parts(content), finish, usage, _get(raw, "model"))
+
+
+def _gemini(raw: object) -> Reply | None:
+    """Read Gemini's generateContent, in the REST names or those of the Python client.
+
+    An answer without candidates is an empty reply when it says why or what it took.
+    """
+    if not isinstance(raw, Mapping) or "candidates" not in raw:
+        return None
+    candidate = _first(raw["candidates"])
+    blocked = _get(_get(raw, "promptFeedback", "prompt_feedback"), "blockReason", "block_reason")
+    counts = _get(raw, "usageMetadata", "usage_metadata")
+    if not isinstance(candidate, Mapping) and not blocked and counts is None:
+        return None
+    finish = finish_of(_get(candidate, "finishReason", "finish_reason"))
+    cached = _get(counts, "cachedContentTokenCount", "cached_content_token_count")
+    usage = Usage(
+        prompt_tokens=token_count(_get(counts, "promptTokenCount", "prompt_token_count")),
+        completion_tokens=token_count(
+            _get(counts, "candidatesTokenCount", "candidates_token_count")
+        ),
+        reasoning_tokens=token_count(_get(counts, "thoughtsTokenCount", "thoughts_token_count")),
+        cached_tokens=token_count(cached),
+    )
+    parts = _get(_get(candidate, "content"), "parts")
+    text, thoughts = _parts(parts if isinstance(parts, list) else [])
+    model = _get(raw, "modelVersion", "model_version")
+    return _reply(text, thoughts, "refusal" if blocked else finish, usage, model)
+
+
+def _single_field(raw: object) -> Reply | None:
+    """Read a dump with the reply under one name; `predict` may stand beside a dataset's `output`.
+
+    A document that wraps another, as a line of a batch does, is read as that one.
+    """
+    for name in ("predict", "prediction", "text", "response", "answer", "outputs", "output"):
+        value = _get(raw, name)
+        if isinstance(value, list) and len(value) == 1:
+            value = value[0]
+        if isinstance(value, str):
+            return _reply(value)
+    inner = _get(raw, "response", "body")
+    return _read(inner) if isinstance(inner, Mapping) else None
+
+
+def _bare(raw: object) -> Reply | None:
+    """Read a lone text, or a list of one document."""
+    if isinstance(raw, list) and len(raw) == 1:
+        raw = raw[0]
+        if isinstance(raw, Mapping):
+            return _read(raw)
+    return _reply(raw) if isinstance(raw, str) else None
+
+
+_READERS: tuple[Callable[[object], Reply | None], ...] = (
+    *(read_chat_completion, _anthropic, _gemini, _single_field, _bare),
+)
+
+
+def _reply(
+    text: str,
+    reasoning: str = "",
+    finish: Finish = "unknown",
+    usage: Usage | None = None,
+    model: object = "",
+) -> Reply:
+    """Return a reply in which characters that no file can hold (lone surrogates) are replaced."""
+    return Reply(
+        text=well_formed(text),
+        reasoning=well_formed(reasoning),
+        finish=finish,
+        usage=usage or Usage(),
+        provider_model=well_formed(_text(model)),
+    )
+
+
+def _parts(content: object) -> tuple[str, str]:
+    """Return text and thoughts of a content: a string, or a list of parts in any dialect."""
+    if isinstance(content, str):
+        return content, ""
+    texts: list[str] = []
+    thoughts: list[str] = []
+    for part in content if isinstance(content, list) else []:
+        if thinking := _text(_get(part, "thinking")):
+            thoughts.append(thinking)
+        elif _get(part, "thought") is True:
+            thoughts.append(_text(_get(part, "text")))
+        else:
+            texts.append(part if isinstance(part, str) else _text(_get(part, "text")))
+    return "".join(texts), "\n".join(text for text in thoughts if text)
+
+
+def _usage(counts: object, prompt: str, completion: str) -> Usage:
+    details = _get(counts, "completion_tokens_details", "output_tokens_details")
+    kept = _get(counts, "prompt_tokens_details", "input_tokens_details")
+    cached = _get(kept, "cached_tokens")
+    if cached is None:
+        cached = _get(counts, "cached_tokens", "prompt_cache_hit_tokens")
+    return Usage(
+        prompt_tokens=token_count(_get(counts, prompt)),
+        completion_tokens=token_count(_get(counts, completion)),
+        reasoning_tokens=token_count(_get(details, "reasoning_tokens")),
+        cached_tokens=token_count(cached),
+        cache_write_tokens=token_count(_get(kept, "cache_write_tokens", "cache_creation_tokens")),
+    )
+
+
+def _get(raw: object, *names: str) -> Any:
+    """Return the first of the names that a mapping holds with a value, else None."""
+    if not isinstance(raw, Mapping):
+        return None
+    return next((raw[name] for name in names if raw.get(name) is not None), None)
+
+
+def _first(items: object) -> object:
+    return items[0] if isinstance(items, list) and items else None
+
+
+def _text(value: object) -> str:
+    return value if isinstance(value, str) else ""

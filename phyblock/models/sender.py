@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 from phyblock.config.models import ModelConfig
 from phyblock.errors import ModelError, UnavailableError
 from phyblock.models.base import Request
-from phyblock.models.cost import Budget, Estimate, counted, may_be_billed, reply_cost_usd
+from phyblock.models.costs import Budget, Estimate, counted, may_be_billed
 from phyblock.models.formats import FORMAT_HINT, refuses_format
 from phyblock.models.halt import Halt
 from phyblock.models.payload import wire_params
-from phyblock.models.prices import Prices, today
+from phyblock.models.prices import Prices, reply_cost_usd, today
 from phyblock.models.transport import Call, SeedRefusedError, Transport
 from phyblock.records.reply import Reply
 

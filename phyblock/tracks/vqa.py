@@ -38,7 +38,6 @@ from phyblock.domain.question import rotated, rotated_label
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.files import read_picture
 from phyblock.models.base import Image
-from phyblock.models.guesses import Guesses
 from phyblock.parsing.answer import ParsedAnswer, choice_form, parse_answer
 from phyblock.parsing.structured import AnswerForm
 from phyblock.records import Line, Manifest, Record
@@ -58,6 +57,7 @@ from phyblock.tracks.asked_once import AskedOnce
 from phyblock.tracks.by_hand import Choice, Picking, Spot
 from phyblock.tracks.elsewhere import Elsewhere
 from phyblock.tracks.examples import Examples, examples_of
+from phyblock.tracks.guesses import Guesses
 from phyblock.tracks.kind import Opening, TrackKind
 from phyblock.tracks.opening import (
     picture_folder,
@@ -263,12 +263,12 @@ class VqaRules:
 class ChoiceSubject:
     """One of several options is asked for, of a question as it is shown.
 
-    `guesses` holds what rules over the whole question set answer, by the rule's name: the 0-based
-    indices of `question.answer`'s form.
+    `guess` returns what a rule over the whole question set answers, by the rule's name: 0-based
+    indices as in `question.answer`.
     """
 
     question: Question
-    guesses: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    guess: Callable[[str], tuple[int, ...]] = field(compare=False)
 
 
 def _random_choice(subject: ChoiceSubject, rng: np.random.Generator) -> str:
@@ -283,11 +283,11 @@ def _oracle_choice(subject: ChoiceSubject, _: np.random.Generator) -> str:
 
 
 def _majority_choice(subject: ChoiceSubject, _: np.random.Generator) -> str:
-    return choice_text(subject.guesses["majority"])
+    return choice_text(subject.guess("majority"))
 
 
 def _text_choice(subject: ChoiceSubject, _: np.random.Generator) -> str:
-    return choice_text(subject.guesses["text-only"])
+    return choice_text(subject.guess("text-only"))
 
 
 def choice_text(indices: Iterable[int]) -> str:
@@ -584,7 +584,8 @@ class Vqa(AskedOnce[AskedQuestion, QuestionPictures]):
         return ChoiceJudgement(parsed, question.answer_letters)
 
     def _subject(self, item: AskedQuestion) -> ChoiceSubject:
-        return ChoiceSubject(item.question, self._guesses.of(item.question))
+        question = item.question
+        return ChoiceSubject(question, lambda probe: self._guesses.guess(probe, question))
 
     def _form(self, item: AskedQuestion) -> AnswerForm[str] | None:
         return self.rules.form(item.question)

@@ -19,14 +19,17 @@ from phyblock.models import (
     Price,
     Prices,
     Rate,
+    Reply,
     Tariff,
     Usage,
-    cost_usd,
+    ends_on,
+    is_unlisted,
     most_usd,
     prices_of,
+    reply_cost_usd,
 )
-from phyblock.models.cost import plausible
-from phyblock.models.price_map import map_entry
+from phyblock.models.costs import counted
+from phyblock.models.prices import map_entry
 from phyblock.run.models import to_config
 from tests.models.factory import make_model, make_request, reply_of, with_fields
 from tests.models.routes import KEY_VARIABLE, ROUTES
@@ -91,8 +94,6 @@ def test_the_highest_tier_below_the_prompt_holds(
     known = Prices((Tariff(rates),))
     below = [rate for rate in rates if rate.above_tokens < prompt] or [rates[0]]
     assert known.at(DAY, prompt, batched=batched) == below[-1].price
-    half = known.with_halves().at(DAY, prompt, batched=batched)
-    assert half == (below[-1].price.halved() if batched else below[-1].price)
 
 
 @pytest.mark.parametrize(
@@ -133,18 +134,26 @@ def test_the_price_of_batches_can_be_told(tmp_path: Path) -> None:
     assert known.at(DAY, batched=True) == Price(3.0, 4.0, 1.0)
 
 
-@given(st.lists(st.integers(0, 400), min_size=1, max_size=4, unique=True), st.integers(-9, 410))
-def test_the_price_of_a_day_is_the_last_that_has_begun(begins: list[int], asked: int) -> None:
+@given(
+    st.lists(st.integers(0, 400), min_size=1, max_size=4, unique=True),
+    st.integers(-9, 410),
+    st.booleans(),
+)
+def test_the_price_of_a_day_is_the_last_that_has_begun(
+    begins: list[int], asked: int, is_mapped: bool
+) -> None:
     days = [DAY + timedelta(days=n) for n in sorted(begins)]
-    tariffs = tuple(
-        Tariff((Rate(Price(float(n), 0.0)),), day) for n, day in enumerate(days, start=1)
-    )
-    mapped = Prices.flat(99.0, 0.0)
+    told = [{"from": one, "input": float(n), "output": 0} for n, one in enumerate(days, start=1)]
+    model_id = "azure/gpt-4o-2024-08-06" if is_mapped else "azure/mine"
+    known, mapped = prices_of(config(model_id, price=told)), prices_of(config(model_id))
     day = DAY + timedelta(days=asked)
-    begun = [t for t in tariffs if t.since is not None and t.since <= day]
-    own = Prices(tariffs).at(day)
-    assert own == (begun[-1].at(0) if begun else None)
-    assert Prices(tariffs).after(mapped).at(day) == (own or mapped.at(day))
+    begun = [price["input"] for price in told if price["from"] <= day]  # type: ignore[operator]
+    assert known is not None
+    assert (mapped is not None) == is_mapped
+    if begun:
+        assert known.at(day) == Price(begun[-1], 0)  # type: ignore[arg-type]
+    else:
+        assert known.at(day) == (mapped and mapped.at(day))
 
 
 @given(prices, st.integers(0, 10**6), st.integers(0, 10**5), st.data())
@@ -165,7 +174,7 @@ def test_no_call_costs_more_than_the_most(
         cache_write_tokens=written,
     )
     for day in days:
-        cost = cost_usd(both, usage, day, batched=batched)
+        cost = reply_cost_usd(both, Reply(text="a", usage=usage, batched=batched), day)
         assert cost is not None
         assert cost <= most * (1 + 1e-9)
 
@@ -334,7 +343,7 @@ def test_no_more_is_cached_than_the_prompt_holds(
         cached_tokens=cached,
         cache_write_tokens=written,
     )
-    read = plausible(usage, expected, said_something=True)
+    read = counted(Reply(text="a", usage=usage), expected).usage
     assert (read.cached_tokens or 0) >= 0
     assert (read.cache_write_tokens or 0) >= 0
     assert (read.cached_tokens or 0) + (read.cache_write_tokens or 0) <= (read.prompt_tokens or 0)
@@ -356,3 +365,24 @@ def test_a_reply_costs_what_its_day_asks_for(monkeypatch: pytest.MonkeyPatch) ->
             paid.append(reply.cost_usd)
             assert budget.spent_usd == pytest.approx(reply.cost_usd)
     assert paid == pytest.approx([0.014, 0.028])
+
+
+def test_a_day_that_the_map_names_is_read() -> None:
+    dated = config("openai/gpt-4o-2024-08-06")
+    said = map_entry(dated)["deprecation_date"]
+    assert ends_on(dated) == date.fromisoformat(said)
+    assert not is_unlisted(dated)
+
+
+@pytest.mark.parametrize(
+    ("asked", "unlisted"),
+    [
+        (config("openai/no-such-model"), True),
+        (config("openai/no-such-model", api_base="http://localhost:1/v1"), False),
+        (config("hosted_vllm/no-such-model"), False),
+        (ModelConfig(name="oracle"), False),
+    ],
+)
+def test_models_that_the_map_does_not_know_have_no_day(asked: ModelConfig, unlisted: bool) -> None:
+    assert ends_on(asked) is None
+    assert is_unlisted(asked) == unlisted

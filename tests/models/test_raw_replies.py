@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.errors import DataError
-from phyblock.models import RawReply, Usage, read_raw_reply
-from phyblock.models.raw_replies import token_count
+from phyblock.models import Reply, Usage, read_raw_reply
+from phyblock.models.replay import token_count
 from phyblock.text import well_formed
 
 STEPS = "Step1: Move block with index 3"
@@ -21,7 +22,16 @@ def choice(message: object, finish: str = "stop") -> dict[str, object]:
     return {"choices": [{"index": 0, "finish_reason": finish, "message": message}]}
 
 
-SHAPES: dict[str, tuple[object, RawReply]] = {
+def reply(text: str, finish: Any = "unknown", reasoning: str = "", **counts: int) -> Reply:
+    return Reply(text=text, finish=finish, reasoning=reasoning, usage=Usage(**counts))
+
+
+def named(model: str, one: Reply) -> Reply:
+    return one.model_copy(update={"provider_model": model})
+
+
+PART = {"type": "text", "text": "a"}
+SHAPES: dict[str, tuple[object, Reply]] = {
     "openai": (
         {
             **choice({"role": "assistant", "content": STEPS, "refusal": None}),
@@ -30,47 +40,25 @@ SHAPES: dict[str, tuple[object, RawReply]] = {
                 "prompt_tokens": 7,
                 "completion_tokens": 5,
                 "completion_tokens_details": {"reasoning_tokens": 2},
+                "prompt_tokens_details": {"cached_tokens": 3, "cache_write_tokens": 1},
             },
         },
-        RawReply(
-            "chat completion",
-            STEPS,
-            "",
-            "stop",
-            Usage(prompt_tokens=7, completion_tokens=5, reasoning_tokens=2),
-            "gpt",
-        ),
+        named("gpt", reply(STEPS, "stop", prompt_tokens=7, completion_tokens=5, reasoning_tokens=2,
+                           cached_tokens=3, cache_write_tokens=1)),
     ),
     "openai refusal": (
         choice({"role": "assistant", "content": None, "refusal": "I will not"}),
-        RawReply("chat completion", "I will not", "", "refusal"),
+        reply("I will not", "refusal"),
     ),
-    "openai cut": (
-        choice({"content": ""}, "length"),
-        RawReply("chat completion", "", "", "length"),
-    ),
+    "openai cut": (choice({"content": ""}, "length"), reply("", "length")),
     "reasoning beside": (
         choice({"content": STEPS, "reasoning_content": "red"}),
-        RawReply("chat completion", STEPS, "red", "stop"),
+        reply(STEPS, "stop", "red"),
     ),
-    "parts": (
-        choice({"content": [{"type": "text", "text": "a"}, {"type": "text", "text": "b"}]}),
-        RawReply("chat completion", "ab", "", "stop"),
-    ),
+    "parts": (choice({"content": [PART, {**PART, "text": "b"}]}), reply("ab", "stop")),
     "completion with text": (
         {"choices": [{"text": STEPS, "finish_reason": "length"}]},
-        RawReply("chat completion", STEPS, "", "length"),
-    ),
-    "dashscope choices": (
-        {
-            "output": choice({"content": [{"text": STEPS}]}),
-            "usage": {"input_tokens": 7, "output_tokens": 5},
-        },
-        RawReply("DashScope", STEPS, "", "stop", Usage(prompt_tokens=7, completion_tokens=5)),
-    ),
-    "dashscope text": (
-        {"output": {"text": STEPS, "finish_reason": "stop"}, "usage": {"input_tokens": 7}},
-        RawReply("DashScope", STEPS, "", "stop", Usage(prompt_tokens=7, completion_tokens=None)),
+        reply(STEPS, "length"),
     ),
     "anthropic": (
         {
@@ -78,16 +66,10 @@ SHAPES: dict[str, tuple[object, RawReply]] = {
             "model": "claude",
             "content": [{"type": "text", "text": STEPS, "citations": None}],
             "stop_reason": "end_turn",
-            "usage": {"input_tokens": 7, "output_tokens": 5},
+            "usage": {"input_tokens": 7, "output_tokens": 5, "cache_read_input_tokens": 2},
         },
-        RawReply(
-            "Anthropic message",
-            STEPS,
-            "",
-            "stop",
-            Usage(prompt_tokens=7, completion_tokens=5),
-            "claude",
-        ),
+        named("claude", reply(STEPS, "stop", prompt_tokens=9, completion_tokens=5,
+                              cached_tokens=2)),
     ),
     "anthropic thinking": (
         {
@@ -97,7 +79,7 @@ SHAPES: dict[str, tuple[object, RawReply]] = {
             ],
             "stop_reason": "max_tokens",
         },
-        RawReply("Anthropic message, thinking", STEPS, "block with index 9", "length"),
+        reply(STEPS, "length", "block with index 9"),
     ),
     "gemini of the client": (
         {
@@ -107,9 +89,7 @@ SHAPES: dict[str, tuple[object, RawReply]] = {
             "model_version": "gemini",
             "usage_metadata": {"prompt_token_count": 7, "candidates_token_count": 5},
         },
-        RawReply(
-            "Gemini", STEPS, "", "stop", Usage(prompt_tokens=7, completion_tokens=5), "gemini"
-        ),
+        named("gemini", reply(STEPS, "stop", prompt_tokens=7, completion_tokens=5)),
     ),
     "gemini of the wire": (
         {
@@ -121,49 +101,39 @@ SHAPES: dict[str, tuple[object, RawReply]] = {
             ],
             "usageMetadata": {"promptTokenCount": 7, "thoughtsTokenCount": 3},
         },
-        RawReply(
-            "Gemini",
-            STEPS,
-            "red",
-            "length",
-            Usage(prompt_tokens=7, completion_tokens=None, reasoning_tokens=3),
-        ),
+        reply(STEPS, "length", "red", prompt_tokens=7, reasoning_tokens=3),
     ),
     "gemini with an enum's name": (
         {"candidates": [{"content": {"parts": []}, "finish_reason": "FinishReason.SAFETY"}]},
-        RawReply("Gemini", "", "", "refusal"),
+        reply("", "refusal"),
     ),
     "gemini blocked": (
         {"candidates": [], "promptFeedback": {"blockReason": "SAFETY"}},
-        RawReply("Gemini", "", "", "refusal"),
+        reply("", "refusal"),
     ),
     "gemini without content": (
         {"candidates": [{"content": None, "finish_reason": "MAX_TOKENS"}]},
-        RawReply("Gemini", "", "", "length"),
+        reply("", "length"),
     ),
     "gemini without candidates": (
         {"candidates": None, "usage_metadata": {"prompt_token_count": 7}},
-        RawReply("Gemini", "", "", "unknown", Usage(prompt_tokens=7)),
+        reply("", prompt_tokens=7),
     ),
     "internvl": (
         {"instruction": "i", "input": "", "output": "gold", "image": ["a"], "predict": STEPS},
-        RawReply("predict", STEPS),
+        reply(STEPS),
     ),
-    "predict in a list": ({"predict": [STEPS]}, RawReply("predict", STEPS)),
-    "text": ({"text": STEPS, "model_id": "llava"}, RawReply("text", STEPS)),
-    "response": ({"response": STEPS}, RawReply("response", STEPS)),
+    "predict in a list": ({"predict": [STEPS]}, reply(STEPS)),
+    "text": ({"text": STEPS, "model_id": "llava"}, reply(STEPS)),
+    "response": ({"response": STEPS}, reply(STEPS)),
     "batch response": (
         {"custom_id": "7", "response": {"status_code": 200, "body": choice({"content": STEPS})}},
-        RawReply("chat completion", STEPS, "", "stop"),
+        reply(STEPS, "stop"),
     ),
-    "conversation": (
-        {"conversations": [{"from": "human", "value": "?"}, {"from": "gpt", "value": STEPS}]},
-        RawReply("conversation", STEPS),
-    ),
-    "bare": (STEPS, RawReply("text", STEPS)),
-    "bare in a list": ([STEPS], RawReply("text", STEPS)),
-    "list of one": ([choice({"content": STEPS})], RawReply("chat completion", STEPS, "", "stop")),
-}
+    "bare": (STEPS, reply(STEPS)),
+    "bare in a list": ([STEPS], reply(STEPS)),
+    "list of one": ([choice({"content": STEPS})], reply(STEPS, "stop")),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -196,11 +166,12 @@ def test_another_shape_is_an_error_that_names_the_file_and_its_keys(
 
 WORDS = (
     *("choices", "message", "content", "text", "output", "usage", "candidates", "parts", "value"),
-    *("finish_reason", "thinking", "conversations", "response", "body", "predict", "from"),
-    *("promptFeedback", "refusal"),
+    *("finish_reason", "thinking", "response", "body", "predict", "promptFeedback", "refusal"),
+    *("model", "modelVersion", "prompt_tokens", "input_tokens", "promptTokenCount"),
 )
+texts = st.text(st.characters(), max_size=5)
 json_values = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.text(max_size=5),
+    st.none() | st.booleans() | st.integers() | st.floats() | texts,
     lambda inner: (
         st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from(WORDS), inner, max_size=4)
     ),
@@ -210,51 +181,46 @@ json_values = st.recursive(
 
 @given(json_values)
 def test_any_document_is_read_or_refused_with_a_data_error(raw: object) -> None:
+    """What is read can be written: texts as UTF-8, counts as numbers."""
     try:
-        reply = read_raw_reply(raw, "x.json")
+        read = read_raw_reply(raw, "x.json")
     except DataError:
         return
-    assert isinstance(reply.text, str)
-    assert isinstance(reply.reasoning, str)
-    assert reply.finish in ("stop", "length", "refusal", "unknown")
+    assert read.storable() == read
+    for text in (read.text, read.reasoning, read.provider_model):
+        text.encode()
 
 
-@pytest.mark.parametrize(
-    ("model", "shape", "replies"),
-    [
-        ("gpt-4o", "chat completion", 400),
-        ("Qwen-VL-max", "chat completion", 400),
-        ("claude-3-5-haiku", "Anthropic message", 400),
-        ("claude-3-7-thinking", "Anthropic message, thinking", 390),
-        ("gemini-2.0-flash", "Gemini", 400),
-        ("InternVL2.5-8B", "predict", 400),
-    ],
-)
-def test_the_official_recordings_are_all_read(
-    official_checkout: Path, model: str, shape: str, replies: int
-) -> None:
-    files = sorted((official_checkout / "outputs" / model).glob("*.json"))
-    read = [read_raw_reply(json.loads(path.read_text()), str(path)) for path in files]
-    assert len(read) == replies
-    assert {reply.shape for reply in read} == {shape}
-    assert all(reply.text for reply in read)
-    assert all(bool(reply.reasoning) == ("thinking" in shape) for reply in read)
+@given(texts)
+def test_only_characters_that_no_file_can_hold_are_replaced(text: str) -> None:
+    read = read_raw_reply({**choice({"content": f"{text}\ud800"}), "model": f"\udfff{text}"}, "x")
+    for kept in (read.text, read.provider_model):
+        assert kept.replace("\ufffd", "") == well_formed(text).replace("\ufffd", "")
 
 
 @given(st.one_of(st.integers(), st.floats(), st.booleans(), st.text(max_size=3), st.none()))
 def test_a_number_of_tokens_is_one_or_not_known(value: object) -> None:
     count = token_count(value)
-    if count is not None:
-        assert type(count) is int
-        assert 0 <= count <= 10**9
-        assert count == value
-    else:
-        assert type(value) is not int or not 0 <= value <= 10**9
+    is_count = type(value) is int and 0 <= value <= 10**9
+    assert count == (value if is_count else None)
 
 
-@given(st.text(st.characters()))
-def test_every_text_of_a_reply_can_be_written(text: str) -> None:
-    raw = RawReply("x", f"{text}\ud800", f"\udfff{text}", model=f"{text}\udc00\ud800")
-    for kept in (raw.text, raw.reasoning, raw.model):
-        kept.encode()
-        assert kept.replace("\ufffd", "") == well_formed(text).replace("\ufffd", "")
+@pytest.mark.parametrize(
+    ("model", "replies"),
+    [
+        ("gpt-4o", 400),
+        ("Qwen-VL-max", 400),
+        ("claude-3-5-haiku", 400),
+        ("claude-3-7-thinking", 390),
+        ("gemini-2.0-flash", 400),
+        ("InternVL2.5-8B", 400),
+    ],
+)
+def test_the_official_recordings_are_all_read(
+    official_checkout: Path, model: str, replies: int
+) -> None:
+    files = sorted((official_checkout / "outputs" / model).glob("*.json"))
+    read = [read_raw_reply(json.loads(path.read_text()), str(path)) for path in files]
+    assert len(read) == replies
+    assert all(one.text for one in read)
+    assert all(bool(one.reasoning) == ("thinking" in model) for one in read)

@@ -13,7 +13,7 @@ from phyblock.config.models import ModelConfig, group_names, load_models
 from phyblock.config.suite import Suite
 from phyblock.models import ends_on
 from phyblock.models.keys import KEYLESS
-from phyblock.models.price_map import map_entry
+from phyblock.models.prices import map_entry
 from phyblock.run.models import to_config
 from tests.models.factory import make_model, make_request, reply_of
 from tests.models.routes import KEY_VARIABLE, ROUTES

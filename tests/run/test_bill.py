@@ -19,7 +19,7 @@ from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
 from phyblock.models import Estimate as CallEstimate
 from phyblock.models import Prices, today
-from phyblock.models.text_tokens import text_tokens
+from phyblock.models.costs import text_tokens
 from phyblock.resources import bundled
 from phyblock.run.estimate import Estimate, estimate
 from phyblock.run.plan import RunPlan, make_plan

@@ -50,7 +50,7 @@ def test_an_answer_is_read_as_it_was_picked(
     subtask = "OR" if is_ordering else "SH"
     question = Question("q", subtask, TASK.scene, "Which?", options, (0,))
     picks = order if is_ordering else order[:1]
-    reply = pick_answer(ChoiceSubject(question)).reply(picks_of(picks))
+    reply = pick_answer(ChoiceSubject(question, {}.__getitem__)).reply(picks_of(picks))
     letters = "".join(LETTERS[pick] for pick in picks)
     assert parse_answer(reply, options, is_ordering).letters == letters
 
@@ -134,7 +134,7 @@ def test_in_pictures_of_a_data_set_nothing_is_clicked_but_whole_pictures() -> No
     assert all(choice.spots for choice in plan.choices)
     assert not any(choice.spots for choice in plan.without_cells().choices)
     question = Question("q", "VP", TASK.scene, "Which?", PICTURES, (0,))
-    shown = pick_answer(ChoiceSubject(question)).without_cells().choices
+    shown = pick_answer(ChoiceSubject(question, {}.__getitem__)).without_cells().choices
     assert [choice.spots for choice in shown] == [(Spot(letter),) for letter in LETTERS]
 
 

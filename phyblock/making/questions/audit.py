@@ -23,9 +23,9 @@ from phyblock.making.questions.picture_view import shares
 from phyblock.making.questions.question_draft import UnfairError
 from phyblock.making.questions.referring import resolve
 from phyblock.making.questions.selection import BALANCE
-from phyblock.models.guesses import FOLDS, Folds, Guesses
 from phyblock.sim.pictures import COLOR_RGB, Shot
 from phyblock.sim.question_pictures import changed_pixels, seen
+from phyblock.tracks.guesses import FOLDS, Folds, Guesses
 
 Floats = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from phyblock.domain.question import LETTERS
 from phyblock.making.questions.question_draft import Draft
-from phyblock.models.guess_features import text_features
+from phyblock.tracks.guesses import text_features
 
 _LOOKED_AT = 100
 _SPREAD = 20

@@ -64,18 +64,19 @@ class BatchFiles:
 class Batch:
     """A batch: its line of intent, what became of it, and its answers when they are here.
 
-    `held` is its reservation in the budget, `following` the work that ends when it has ended.
+    `held` are the reservations of its requests in the budget,
+    `following` the work that ends when it has ended.
     """
 
     intent: BatchLine
     event: BatchEvent = "intended"
     id: str = ""
     is_complete: bool = True
-    held: int | None = None
     following: asyncio.Future[None] | None = None
     results: Results | None = None
     words: str = ""
     places: dict[str, int] = field(default_factory=dict)
+    held: dict[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.places = {key: place for place, key in enumerate(self.intent.keys)}

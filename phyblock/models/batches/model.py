@@ -16,11 +16,11 @@ from phyblock.models.batches.purse import Purse
 from phyblock.models.batches.sending import Draft, Sender, UnsureError
 from phyblock.models.batches.wording import Wording, Written
 from phyblock.models.cache import ReplyCache, reply_key
-from phyblock.models.cost import Budget, may_be_billed, reply_cost_usd
+from phyblock.models.costs import Budget, may_be_billed
 from phyblock.models.events import EventKind, ModelEvent, Observer
 from phyblock.models.halt import Halt
 from phyblock.models.http_client import Client
-from phyblock.models.prices import Prices, today
+from phyblock.models.prices import Prices, reply_cost_usd, today
 from phyblock.models.retry import RetryPolicy
 from phyblock.models.transport import Transport
 from phyblock.records.reply import Reply
@@ -220,7 +220,7 @@ class BatchModel:
             files = self._parts.files
             self._draft = Draft(self._parts.protocol, files, seeded=written.seeded)
         self._draft.add(key, written, most_usd)
-        self._draft.held = self._purse.hold(most_usd, self._draft.held)
+        self._purse.hold(key, most_usd, self._draft.held)
         return True
 
     @property
@@ -271,7 +271,6 @@ class BatchModel:
         """Count all that is under way as spent: no more is heard of it in this command."""
         for batch in self._ledger.batches.values():
             self._purse.settle_all(batch.held, None)
-            batch.held = None
 
     def _say_seedless(self) -> None:
         self._tell("takes no seed: seeds are independent repeats", "seed_unsupported")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from phyblock.config.models import ModelConfig
 from phyblock.models.base import Request
 from phyblock.models.batches.ledger import Batch
-from phyblock.models.cost import Budget, estimate, most_usd
+from phyblock.models.costs import Budget, estimate, most_usd
 from phyblock.models.halt import Halt
 from phyblock.models.prices import Prices, today
 from phyblock.records.reply import Reply
@@ -49,26 +49,27 @@ class Purse:
             with halt.giving_up():
                 self._budget.settle(await self._budget.reserve(lambda: usd or 0.0), 0.0)
 
-    def hold(self, usd: float | None, onto: int | None) -> int | None:
-        """Hold so much, together with what is held already."""
-        return None if self._budget is None else self._budget.hold(usd or 0.0, onto)
+    def hold(self, key: str, usd: float | None, held: dict[str, int]) -> None:
+        """Hold so much for a request, whose reservation is put into `held`."""
+        if self._budget is not None:
+            held[key] = self._budget.hold(usd or 0.0)
 
     def hold_again(self, batch: Batch, key: str) -> None:
         """Hold for a request of an earlier command, once."""
         if (batch.token, key) not in self._held:
             self._held.add((batch.token, key))
-            batch.held = self.hold(batch.most_usd(key), batch.held)
+            self.hold(key, batch.most_usd(key), batch.held)
 
     def settle(self, key: str, batch: Batch, usd: float | None) -> None:
         """Count what a request cost; None is all that it can have cost."""
-        if self._budget is not None and batch.held is not None:
-            spent_usd = self._budget.settle_part(batch.held, batch.most_usd(key), usd)
+        if self._budget is not None and key in batch.held:
+            spent_usd = self._budget.settle(batch.held.pop(key), usd)
             self._billed_usd[key] = self._billed_usd.get(key, 0.0) + spent_usd
 
-    def settle_all(self, held: int | None, usd: float | None) -> None:
-        """Count what all requests of a reservation cost that are not settled."""
-        if self._budget is not None and held is not None:
-            self._budget.settle_rest(held, usd)
+    def settle_all(self, held: dict[str, int], usd: float | None) -> None:
+        """Count what all requests cost that are not settled."""
+        while self._budget is not None and held:
+            self._budget.settle(held.popitem()[1], usd)
 
     def billed_usd(self, key: str) -> float | None:
         """What was counted for a request; None where there is no limit."""

@@ -41,7 +41,8 @@ class UnsureError(UnavailableError):
 
 class Draft:
     """A batch that is being written into a file; `keys` are its requests with the most that each
-    can cost [US dollars], None where no price is known; `held` is its reservation in the budget.
+    can cost [US dollars], None where no price is known; `held` are their
+    reservations in the budget.
     """
 
     def __init__(self, protocol: BatchProtocol, files: BatchFiles, *, seeded: bool) -> None:
@@ -49,7 +50,7 @@ class Draft:
         self.token = new_token()
         self.path = files.requests(self.token)
         self.keys: dict[str, float | None] = {}
-        self.held: int | None = None
+        self.held: dict[str, int] = {}
         self._protocol = protocol
         self._bytes = 0
         with writing(self.path, _HINT):

@@ -12,7 +12,7 @@ from phyblock.models.base import Request
 from phyblock.models.batches.capture import AnsweringClient, CapturingClient
 from phyblock.models.batches.ledger import Batch
 from phyblock.models.batches.protocol import BatchProtocol
-from phyblock.models.cost import counted, estimate
+from phyblock.models.costs import counted, estimate
 from phyblock.models.formats import FORMAT_HINT, refuses_format
 from phyblock.models.http_client import Answer, Client
 from phyblock.models.payload import wire_params

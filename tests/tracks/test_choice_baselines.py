@@ -25,7 +25,7 @@ def answer(
     right = (2, 0, 3, 1) if subtask == "OR" else (2,)
     question = Question("q", subtask, Scene("s", (1,), (), ()), "?", OPTIONS, right)
     model = BaselineModel(ModelConfig(name=name))
-    subject = ChoiceSubject(question, guesses or {})
+    subject = ChoiceSubject(question, (guesses or {}).__getitem__)
     reply = asyncio.run(model.ask(Request(key, 0, (), {}, "", subject)))
     letters = parse_answer(reply.text, OPTIONS, subtask == "OR").letters
     assert letters is not None

@@ -1,0 +1,343 @@
+"""Tokens that a call will take, what it can cost at most, and a budget that is not passed."""
+
+from __future__ import annotations
+
+import asyncio
+import functools
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import date, timedelta
+
+from phyblock.config.models import ModelConfig
+from phyblock.errors import BudgetReachedError, ModelError
+from phyblock.models.base import Image, Request
+from phyblock.models.payload import wire_params
+from phyblock.models.prices import Prices, map_entry
+from phyblock.records.reply import Reply, Usage
+from phyblock.types import ImageDetail
+
+_TYPICAL_REPLY_TOKENS = 500
+_TYPICAL_THINKING_TOKENS = 4_000
+_ROOM_TO_THINK_TOKENS = 8_192
+_LONGEST_REPLY_TOKENS = 32_768
+_PROMPT_MARGIN = 1.5
+_MOST_TIMES_EXPECTED = 100
+_LEAST_EXPECTED_TOKENS = 1_000
+
+
+class Budget:
+    """A cost limit for a whole run: room is reserved before a call and settled after it.
+
+    What was spent never becomes less, and a cost that is not known counts as the most that was
+    reserved. Of each model the largest ratio of real to estimated prompt tokens is remembered, so
+    that pictures which a provider counts higher than the estimate soon are reserved for.
+    """
+
+    def __init__(self, max_cost_usd: float, spent_usd: float = 0.0) -> None:
+        self._max_usd = _amount(max_cost_usd)
+        self._spent_usd = _amount(spent_usd)
+        self._held: dict[int, float] = {}
+        self._held_usd = 0.0
+        self._next = 0
+        self._changed = asyncio.Event()
+        self._ratio: dict[str, float] = {}
+
+    @property
+    def spent_usd(self) -> float:
+        """What settled calls cost, what was `spent_usd` at the start included."""
+        return self._spent_usd
+
+    def most_usd(
+        self, model: str, prices: Prices, expected: Estimate, day: date, *, batched: bool = False
+    ) -> float:
+        """Return the most that a call can cost, as far as the model is known by now."""
+        return most_usd(prices, expected, day, self._ratio.get(model, 1.0), batched=batched)
+
+    async def reserve(self, most_usd: Callable[[], float]) -> int:
+        """Hold the most that a call can cost, waiting for calls under way to settle; return the
+        reservation's number.
+
+        `most_usd` is asked anew whenever a call has settled, since more is known of the model then.
+        Raises BudgetReachedError when it does not fit although nothing is under way.
+        """
+        usd = _amount(most_usd())
+        while not self.fits(usd):
+            if not self._held:
+                raise BudgetReachedError(
+                    f"max_cost_usd {self._max_usd:g} is reached: {self._spent_usd:.4f} spent, "
+                    f"the next call can cost {usd:.4f}"
+                )
+            self._changed.clear()
+            await self._changed.wait()
+            usd = _amount(most_usd())
+        return self.hold(usd)
+
+    def fits(self, usd: float) -> bool:
+        """True if a further cost would stay within the limit."""
+        return self._spent_usd + self._held_usd + usd <= self._max_usd
+
+    def hold(self, usd: float) -> int:
+        """Make a reservation, whether it fits or not; return its number."""
+        self._next += 1
+        self._held[self._next] = _amount(usd)
+        self._held_usd += usd
+        return self._next
+
+    def settle(self, reservation: int, usd: float | None) -> float:
+        """Put the real cost in the place of a reservation; what is no amount counts all that was
+        held, as None does. Return what was counted [US dollars].
+        """
+        held = self._held.pop(reservation)
+        # Rounding of a sum that goes up and down must not add up over a run.
+        self._held_usd = max(0.0, self._held_usd - held) if self._held else 0.0
+        counted = usd if usd is not None and _is_amount(usd) else held
+        self._spent_usd += counted
+        self._changed.set()
+        return counted
+
+    def learn(self, model: str, expected: Estimate, usage: Usage) -> None:
+        """Compare an estimate with plausible counts of the provider."""
+        if usage.prompt_tokens is not None and expected.prompt_tokens > 0:
+            ratio = min(usage.prompt_tokens / expected.prompt_tokens, _MOST_TIMES_EXPECTED)
+            self._ratio[model] = max(self._ratio.get(model, 1.0), ratio)
+
+
+def _amount(usd: float) -> float:
+    if not _is_amount(usd):
+        raise ValueError(f"no amount of money: {usd}")
+    return usd
+
+
+def _is_amount(usd: float) -> bool:
+    return math.isfinite(usd) and usd >= 0
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Tokens of a call that was not made yet.
+
+    `prompt_tokens`: texts by their words, and pictures by their providers' rules;
+    `completion_tokens`: a usual reply, with thoughts where the model is told to think or has room
+    for them; `most_completion_tokens`: the longest possible.
+    """
+
+    prompt_tokens: int
+    completion_tokens: int
+    most_completion_tokens: int
+
+
+def estimate(config: ModelConfig, request: Request) -> Estimate:
+    """Estimate the tokens that the request would take."""
+    texts, pictures = 0.0, 0
+    for part in (part for message in request.messages for part in message.parts):
+        if isinstance(part, Image):
+            pictures += picture_tokens(config.id, part, config.image_detail)
+        else:
+            texts += text_tokens(config.id, part)
+    params = wire_params(config, request)
+    given = params.get("max_completion_tokens", params.get("max_tokens"))
+    known = map_entry(config).get("max_output_tokens")
+    most = next((n for n in (given, known) if isinstance(n, int)), _LONGEST_REPLY_TOKENS)
+    thinks = params.get("reasoning_effort", "none") != "none" or (
+        isinstance(given, int) and given > _ROOM_TO_THINK_TOKENS
+    )
+    usual = _TYPICAL_THINKING_TOKENS if thinks else _TYPICAL_REPLY_TOKENS
+    return Estimate(math.ceil(texts) + pictures, min(usual, most), most)
+
+
+def most_usd(
+    prices: Prices, expected: Estimate, day: date, ratio: float = 1.0, *, batched: bool = False
+) -> float:
+    """Return the most US dollars that a call can cost, its prompt `ratio` times its estimate.
+
+    There is a margin on the prompt, as its tokens are estimated, and a day: a call that is sent
+    before midnight may be answered after it, and one of a batch a day after that.
+    """
+    prompt = expected.prompt_tokens * _PROMPT_MARGIN * ratio
+    days = [day + timedelta(days=n) for n in range(3 if batched else 2)]
+    known = [prices.at(one, math.ceil(prompt), batched=batched) for one in days]
+    return max(p.most(prompt, expected.most_completion_tokens) for p in known if p is not None)
+
+
+def may_be_billed(error: ModelError) -> bool:
+    """True if the server may have made a reply: it promised one, or was lost on the way."""
+    return error.sent in ("lost", "maybe") or 200 <= (error.status or 0) < 300
+
+
+def counted(reply: Reply, expected: Estimate) -> Reply:
+    """Return the reply with the counts alone that can be true; the others are not known.
+
+    Every request has a prompt and every reply that says something took tokens, whatever a server
+    or a library puts in the place of a count that it does not have; and no call takes a hundred
+    times what was expected of it.
+    """
+
+    def plausible(count: int | None, least: int, expected: int) -> int | None:
+        most = _MOST_TIMES_EXPECTED * max(expected, _LEAST_EXPECTED_TOKENS)
+        is_count = isinstance(count, int) and not isinstance(count, bool)
+        return count if is_count and least <= (count or 0) <= most else None
+
+    usage, longest = reply.usage, expected.most_completion_tokens
+    prompt = plausible(usage.prompt_tokens, 1, expected.prompt_tokens)
+    cached = plausible(usage.cached_tokens, 0, expected.prompt_tokens)
+    written = plausible(usage.cache_write_tokens, 0, expected.prompt_tokens)
+    if (cached or 0) + (written or 0) > (prompt or 0):
+        cached = written = None
+    said_something = bool(reply.text or reply.reasoning)
+    known = Usage(
+        prompt_tokens=prompt,
+        completion_tokens=plausible(usage.completion_tokens, int(said_something), longest),
+        reasoning_tokens=plausible(usage.reasoning_tokens, 0, longest),
+        cached_tokens=cached,
+        cache_write_tokens=written,
+    )
+    return reply.model_copy(update={"usage": known})
+
+
+_PIECE = re.compile(
+    r"[^\r\n\w]?[A-Za-z]+|[^\W\d_a-zA-Z]{1,2}|\d{1,3}| ?[^\s\w]+[\r\n]*|_|\s*[\r\n]+|\s+(?!\S)|\s+"
+)
+_CHARS_PER_TOKEN = 4
+_MORE_OF_ANTHROPIC = 1.03
+
+
+def text_tokens(model_id: str, text: str) -> float:
+    """Return about how many tokens of a model a text is; `model_id` may name any provider.
+
+    Tokenizers cut a text into words, runs of digits and of signs before they cut these into tokens,
+    and nearly every English word is one token. So pieces are counted, without the megabytes that a
+    tokenizer takes: in the bundled prompts with their questions there are as many as tokens of
+    o200k, OpenAI's vocabulary, within 1 %. Anthropic's last published vocabulary makes 3 % more of
+    them. Google says that a token is about four characters.
+    """
+    name = model_id.lower()
+    if "gemini" in name or "gemma" in name:
+        return len(text) / _CHARS_PER_TOKEN
+    return _pieces(text) * (_MORE_OF_ANTHROPIC if "claude" in name else 1.0)
+
+
+@functools.lru_cache(maxsize=1024)
+def _pieces(text: str) -> int:
+    return sum(1 for _ in _PIECE.finditer(text))
+
+
+# Pictures, by the rules that providers publish. Sources, read in November 2026: OpenAI, guide to
+# images and vision, sections on sizing and costs; Anthropic, vision guide, section on costs;
+# Google, Gemini API guides to token counting and media resolution; xAI, guide to image
+# understanding; Qwen, model cards of Qwen2.5-VL and Qwen3-VL.
+
+_Count = Callable[[float, float], float]
+"""Tokens of a picture of so many pixels in width and height."""
+
+
+def picture_tokens(model_id: str, image: Image, detail: ImageDetail | None = None) -> int:
+    """Return the tokens of a picture in a detail, or in the one that a provider takes where none is
+    asked for.
+
+    `model_id` may name any provider that serves the model. Models that no rule names count as
+    GPT-4o does; a budget learns what a provider really counts.
+    """
+    name = model_id.rpartition("/")[2].lower()
+    for pattern, usual, details in _PICTURE_RULES:
+        if re.search(rf"(^|\.){pattern}", name):
+            count = details.get(detail or "auto", usual)
+            return math.ceil(count(image.width_px, image.height_px))
+    raise AssertionError("the last rule matches every name")
+
+
+def _fixed(tokens: int) -> _Count:
+    return lambda _width, _height: tokens
+
+
+def _covering(side_px: int, width: float, height: float) -> int:
+    return math.ceil(width / side_px) * math.ceil(height / side_px)
+
+
+def _tiles(whole: int, tile: int) -> _Count:
+    """Tiles of 512 x 512 of a picture fit into 2048 x 2048, then its short side to 768."""
+
+    def count(width: float, height: float) -> float:
+        scale = min(1.0, 2048 / max(width, height), 768 / min(width, height))
+        return whole + tile * _covering(512, width * scale, height * scale)
+
+    return count
+
+
+def _patches(factor: float, most: int, longest_px: int = 2048) -> _Count:
+    """Square patches of 32 pixels of a picture that is scaled down to a longest side, then until
+    they are at most so many; each counts as `factor` tokens.
+    """
+
+    def count(width: float, height: float) -> float:
+        scale = min(1.0, longest_px / max(width, height))
+        width, height = (max(1, round(side * scale)) for side in (width, height))
+        if _covering(32, width, height) > most:
+            scale = math.sqrt(32**2 * most / (width * height))
+            whole = (
+                math.floor(side * scale / 32) / (side * scale / 32) for side in (width, height)
+            )
+            scale *= min(part or 1.0 for part in whole)
+            width, height = (max(1, math.floor(side * scale)) for side in (width, height))
+        return min(most, _covering(32, width, height)) * factor
+
+    return count
+
+
+def _framed(side_px: int, extra: int) -> _Count:
+    """Square patches, and some tokens that frame them."""
+    return lambda width, height: _covering(side_px, width, height) + extra
+
+
+def _shrunk(side_px: int, longest_px: int, most: int) -> _Count:
+    """Square patches of a picture that is scaled down until it fits both bounds."""
+
+    def count(width: float, height: float) -> float:
+        scale = min(1.0, longest_px / max(width, height))
+        scale = min(scale, math.sqrt(most * side_px**2 / (width * height)))
+        return min(_covering(side_px, width * scale, height * scale), most)
+
+    return count
+
+
+def _crops(width: float, height: float) -> float:
+    """A small picture counts once; a larger one by the squares that cover it."""
+    return 258 if max(width, height) <= 384 else 258 * _covering(768, width, height)
+
+
+def _grok(width: float, height: float) -> float:
+    """Tiles of 448 x 448, at most six, and one of the whole; 256 tokens each."""
+    return 256 * (min(6, _covering(448, width, height)) + 1)
+
+
+_SMALL = _patches(1.2, 2500, 512)
+_HIGH = _patches(1.2, 2500)
+_ORIGINAL = _patches(1.2, 10_000, 6000)
+_WHOLE = _patches(1.2, 30_000, 65_535)
+_GEMINI = {"low": _fixed(280), "medium": _fixed(560), "ultra_high": _fixed(2240)}
+_PICTURE_RULES: tuple[tuple[str, _Count, Mapping[str, _Count]], ...] = (
+    (r"gpt-4o-mini", _tiles(2833, 5667), {"low": _fixed(2833)}),
+    (r"gpt-4\.1-mini", _patches(1.62, 6144), {}),
+    (r"gpt-4\.1-nano", _patches(2.46, 1536), {}),
+    (r"o4-mini", _patches(1.72, 1536), {}),
+    (r"gpt-5-nano", _patches(1.5, 1536), {}),
+    (r"gpt-5-mini", _patches(1.2, 1536), {}),
+    (r"gpt-5(\.1)?($|-)", _tiles(70, 140), {"low": _fixed(70)}),
+    (r"gpt-5\.[23]", _patches(1.2, 6144), {}),
+    (r"gpt-5\.4", _HIGH, {"low": _patches(1.2, 6144), "original": _ORIGINAL}),
+    (r"gpt-5\.5", _ORIGINAL, {"low": _SMALL, "high": _HIGH}),
+    (r"gpt-([6-9]|5\.\d)", _WHOLE, {"low": _SMALL, "high": _HIGH}),
+    (r"o[13]($|-)", _tiles(75, 150), {"low": _fixed(75)}),
+    (r"claude-(opus-4-[7-9]|[a-z]+-([5-9]|\d\d))", _shrunk(28, 2576, 4784), {}),
+    (r"claude", _shrunk(28, 1568, 1568), {}),
+    (r"gemini-([12]|exp)", _crops, {"low": _fixed(64), "medium": _fixed(256)}),
+    (r"gemini", _fixed(1120), _GEMINI),
+    (r"grok", _grok, {}),
+    (r"qwen2(\.5)?-vl", _framed(28, 2), {}),
+    (r"qwen3", _framed(32, 2), {}),
+    (r"", _tiles(85, 170), {"low": _fixed(85)}),
+)
+"""Count of a picture, and in a detail where that differs, by the beginning of a model's name, or
+what follows a dot in it; the first that matches.
+"""
