@@ -20,9 +20,10 @@ from pydantic import TypeAdapter
 
 from phyblock.data.questions import StoredQuestion
 from phyblock.data.scenes import StoredScene
-from phyblock.records import BatchLine, Line, Manifest, Prompt, Record, Stopped, Turn
-from phyblock.records.known import known_records, record_types
-from phyblock.records.line import parts
+from phyblock.records.files import known_records, record_types
+from phyblock.records.line import Line, parts
+from phyblock.records.manifest import Manifest
+from phyblock.records.record import BatchLine, Prompt, Record, Stopped, Turn
 
 ROOT = Path(__file__).parents[1]
 SCHEMAS = Path("benchmarks", "schemas")

@@ -12,8 +12,9 @@ from phyblock.bundle.archive import ABOUT, MEMBERS
 from phyblock.errors import Problem, StoreError
 from phyblock.files import read_bytes
 from phyblock.parsing.text import READER_VERSION
-from phyblock.records import MANIFEST, RECORDS, Line, Manifest
-from phyblock.records.line import decode, problems_of
+from phyblock.records.files import RECORDS
+from phyblock.records.line import Line, decode, problems_of
+from phyblock.records.manifest import MANIFEST, Manifest
 from phyblock.report.inputs import digest_of_file
 from phyblock.stable import hex_digest
 

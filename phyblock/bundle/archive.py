@@ -19,7 +19,8 @@ from typing import BinaryIO
 
 from phyblock.errors import Problem, StoreError, reason_of
 from phyblock.files import open_regular
-from phyblock.records import MANIFEST, RECORDS
+from phyblock.records.files import RECORDS
+from phyblock.records.manifest import MANIFEST
 
 __all__ = ["ABOUT", "MEMBERS", "pack", "unpack"]
 

@@ -10,7 +10,8 @@ from typing import Any
 from phyblock.bundle.about import BundledData, data_of
 from phyblock.bundle.texts import Cleaner, model_name, without_paths
 from phyblock.errors import DataError, Problem, SpecError
-from phyblock.records import Manifest, Record
+from phyblock.records.manifest import Manifest
+from phyblock.records.record import Record
 from phyblock.records.reply import Reply
 from phyblock.resources import bundled
 from phyblock.run.data import asked_about, open_dataset, recorded_dataset

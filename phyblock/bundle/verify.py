@@ -17,7 +17,9 @@ from phyblock.bundle.portable import localized
 from phyblock.bundle.tables import digests_of_tables
 from phyblock.errors import Problem, StoreError
 from phyblock.parsing.text import READER_VERSION
-from phyblock.records import MANIFEST, RECORDS, Manifest, Record, read_manifest
+from phyblock.records.files import RECORDS
+from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
+from phyblock.records.record import Record
 from phyblock.run.rescore import judged_anew
 from phyblock.run.rewritten import manifest_text, record_lines, write_run
 from phyblock.tables.design import read_design

@@ -15,8 +15,8 @@ from phyblock.bundle.tables import digests_of_tables
 from phyblock.bundle.verify import Verified, opened_bundle
 from phyblock.errors import DataError
 from phyblock.files import atomic_write, write_named
-from phyblock.records import MANIFEST, RECORDS, read_manifest
-from phyblock.records.reading import read_records
+from phyblock.records.files import RECORDS, read_records
+from phyblock.records.manifest import MANIFEST, read_manifest
 from phyblock.run.folder import run_folder
 from phyblock.run.rewritten import write_run
 

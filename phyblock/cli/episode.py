@@ -12,8 +12,9 @@ from phyblock.cli.paths import UserPath
 from phyblock.data import AssemblyTask
 from phyblock.errors import DataError, Problem, StoreError
 from phyblock.files import write_named
-from phyblock.records import MANIFEST, RECORDS, Record, read_manifest
-from phyblock.records.reading import newest_starts, run_records
+from phyblock.records.files import RECORDS, newest_starts, run_records
+from phyblock.records.manifest import MANIFEST, read_manifest
+from phyblock.records.record import Record
 from phyblock.run.data import recorded_dataset
 from phyblock.sim.film import episode_gif, episode_images, episode_sheet
 from phyblock.sim.pictures import PictureStyle

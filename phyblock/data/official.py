@@ -276,7 +276,7 @@ def _entries(path: Path) -> list[tuple[str, Any]]:
 
 
 def _index_base(entries: list[Any]) -> int | None:
-    """Where the indices of a file begin, or None where its answers do not tell."""
+    """The first index of a file, 0 or 1, or None where its answers do not tell."""
     indices: set[int] = set()
     for raw in entries:
         answer = raw.get("answer") if isinstance(raw, dict) else None

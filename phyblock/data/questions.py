@@ -50,7 +50,7 @@ _FEW = 20
 
 
 class StoredPose(Line, extra="ignore"):
-    """Where a block stands in a picture."""
+    """The pose of a block in a picture."""
 
     position: Position
     """As of a block."""
@@ -59,7 +59,7 @@ class StoredPose(Line, extra="ignore"):
 
 
 class StoredKind(Line, extra="ignore"):
-    """What a block is in a picture."""
+    """The kind of a block in a picture."""
 
     type: BlockType
     """Its shape."""
@@ -73,7 +73,7 @@ class StoredMark(Line, extra="ignore"):
     letter: Literal["A", "B", "C", "D", "X"]
     """A to D where the places are the options, X where the text speaks of one."""
     position: Position
-    """Where it is [m]."""
+    """Its place [m]."""
 
 
 _Whole = Annotated[Literal[True], Tag("true")]
@@ -82,18 +82,18 @@ _Framed = Annotated[tuple[StoredBlock, ...], Field(min_length=1, max_length=4 * 
 
 
 class StoredPicture(Line, extra="forbid"):
-    """How a picture differs from the scene, recolored as in `colors`."""
+    """The differences of a picture from the scene, recolored as in `colors`."""
 
     label: Literal["scene", "block", "A", "B", "C", "D"]
-    """What it shows: the scene, the block asked about, or the option of this letter."""
+    """Its content: the scene, the block asked about, or the option of this letter."""
     view: View
     """Azimuth (0 from +x, 90 from +y) and elevation of the camera [degrees]."""
     without: Annotated[tuple[StrictInt, ...], Field(min_length=1, max_length=MAX_BLOCKS)] = ()
     """Orders of blocks that are not drawn."""
     poses: dict[str, StoredPose] = Field(default_factory=dict)
-    """Where blocks stand that are not at their place, by order."""
+    """Poses of blocks that are not at their place, by order."""
     swap: dict[str, StoredKind] = Field(default_factory=dict)
-    """What blocks are that differ from the scene, by order."""
+    """Kinds of blocks that differ from the scene, by order."""
     add: Annotated[tuple[StoredBlock, ...], Field(min_length=1, max_length=MAX_BLOCKS)] = ()
     """Whole blocks that the scene does not have."""
     marks: Annotated[tuple[StoredMark, ...], Field(min_length=1, max_length=MAX_BLOCKS)] = ()
@@ -102,8 +102,7 @@ class StoredPicture(Line, extra="forbid"):
         _Whole | Annotated[_Framed, Tag("")],
         Discriminator(lambda value: "true" if value is True else ""),
     ] = ()
-    """What the camera is framed on: true, the whole scene; or these blocks. Left out: what is
-    drawn."""
+    """Blocks that the camera is framed on: true, the whole scene; left out: all that are drawn."""
 
     @classmethod
     def of(cls, picture: QuestionPicture, scene: Scene) -> Self:
@@ -225,7 +224,7 @@ class StoredQuestion(Line, extra="forbid"):
     pictures: Annotated[tuple[StoredPicture, ...], Field(min_length=1, max_length=_MOST_PICTURES)]
     """Its pictures."""
     evidence: dict[str, Any] = Field(default_factory=dict)
-    """What the answer was derived from; `slots` are the words in the template."""
+    """Facts that the answer was derived from; `slots` are the words in the template."""
     format: Format = 1
     """Version of the line, 1 where it does not say."""
 

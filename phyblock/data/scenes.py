@@ -24,15 +24,7 @@ from phyblock.data.base import AssemblyTask, Dataset, read_lines, read_text
 from phyblock.domain.aov import AOVGraph, CycleError
 from phyblock.domain.blocks import BlockType, Color
 from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, CandidateSet, Scene
-from phyblock.records.line import (
-    Fault,
-    Line,
-    checked,
-    refuse,
-    shown,
-    validated,
-    worded,
-)
+from phyblock.records.line import Fault, Line, checked, refuse, shown, validated, worded
 
 SCENES_FILE = "scenes.jsonl"
 MAX_BLOCKS = 22

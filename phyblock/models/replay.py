@@ -14,7 +14,8 @@ from phyblock.config.models import ModelConfig
 from phyblock.errors import DataError, Problem, RefusedError, SampleError, reason_of
 from phyblock.files import load_json, read_text
 from phyblock.models.base import Request
-from phyblock.records import RECORDS, Recorded, RecordedLines
+from phyblock.records.files import RECORDS, RecordLines
+from phyblock.records.record import Record
 from phyblock.records.reply import Reply, Usage
 from phyblock.text import well_formed
 from phyblock.types import Finish
@@ -67,7 +68,7 @@ def open_replay(config: ModelConfig) -> ReplayModel:
         problem = Problem(where, "recordings not found", "replay", str(folder), "a folder", hint)
         raise DataError(problem)
     if (folder / RECORDS).is_file():
-        records = _read_records(folder / RECORDS, config.name)
+        records = _read_records(folder, config.name)
         return ReplayModel(config, lambda request: _recorded(records, request))
     if not any(folder.glob("*.json")):
         allowed = f"a file a scene such as 000.json, or {RECORDS}"
@@ -98,32 +99,32 @@ def _read_file(folder: Path, key: str) -> Reply | None:
     return read_raw_reply(raw, str(path))
 
 
-def _read_records(path: Path, model: str) -> dict[tuple[str, str, int], Recorded]:
+def _read_records(folder: Path, model: str) -> dict[tuple[str, str, int], Record]:
     """Read the records of one model by track, key and seed, the last one of a sample.
 
     An unfinished last line, which a killed run leaves, is not there yet. A run of one model is
     that model's whatever its name. Of a varied run the reference alone counts.
     """
-    found: dict[str, dict[tuple[str, str, int], Recorded]] = {}
-    for _, record in RecordedLines(path):
+    found: dict[str, dict[tuple[str, str, int], Record]] = {}
+    for _, record in RecordLines(folder):
         if not record.variant:
             found.setdefault(record.model, {})[record.track, record.key, record.seed] = record
     if model in found:
         return found[model]
     if len(found) == 1:
         return next(iter(found.values()))
+    where = str(folder / RECORDS)
     raise DataError(
-        Problem(str(path), "has no records of this model", "model", model, ", ".join(found))
+        Problem(where, "has no records of this model", "model", model, ", ".join(found))
     )
 
 
-def _recorded(known: Mapping[tuple[str, str, int], Recorded], request: Request) -> Reply | None:
+def _recorded(known: Mapping[tuple[str, str, int], Record], request: Request) -> Reply | None:
     """Return the reply recorded for the request's track, key and seed, or None.
 
     Raises SampleError or RefusedError where that is what was recorded.
     """
-    what = (request.key, request.seed)
-    record = known.get((request.track, *what)) or known.get(("", *what))
+    record = known.get((request.track, request.key, request.seed))
     error = None if record is None else record.error
     if error is not None and error.kind in ("sample", "refused"):
         cls = RefusedError if error.kind == "refused" else SampleError

@@ -17,7 +17,7 @@ from phyblock.play.answers import ANSWERS_FORMAT
 from phyblock.play.page import assets
 from phyblock.play.person import Person, picking_of
 from phyblock.play.shown import Place, pictures_of, shown
-from phyblock.records import MANIFEST
+from phyblock.records.manifest import MANIFEST
 from phyblock.run.plan import RunPlan
 from phyblock.tracks import SingleTrack
 from phyblock.tracks.base import shown_item

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from phyblock.errors import SpecError
-from phyblock.records import Record
-from phyblock.records.reading import read_records
+from phyblock.records.files import read_records
+from phyblock.records.record import Record
 from phyblock.report.alike import check_alike
 from phyblock.report.comparable import Comparable, Part, comparable
 from phyblock.tables.design import Design

@@ -184,6 +184,10 @@ def problems_of(
         elif what == "literal_error":
             allowed = context["expected"].replace("'", "").replace(" or ", ", ")
             faults = (Fault("is not known", allowed),)
+        elif what in ("union_tag_invalid", "union_tag_not_found"):
+            found, allowed = context.get("tag", ""), context.get("expected_tags", "a text")
+            at = (context["discriminator"].strip("'"),)
+            faults = (Fault("is not known" if found else "is missing", allowed, found, at),)
         elif what == "too_long":
             n, most = context["actual_length"], context["max_length"]
             faults = (Fault("are too many", f"at most {most}", str(n)),)

@@ -1,4 +1,4 @@
-"""`run.yaml`: what a run is."""
+"""`run.yaml`: what a run is, written before anything is asked."""
 
 from __future__ import annotations
 
@@ -15,16 +15,6 @@ from phyblock.errors import Problem, StoreError
 from phyblock.files import read_text
 from phyblock.records.line import Line, encodable, problems_of
 
-__all__ = [
-    "FORMAT",
-    "MANIFEST",
-    "Manifest",
-    "ManifestDataset",
-    "ManifestModel",
-    "ManifestQuestions",
-    "read_manifest",
-]
-
 FORMAT = 1
 """Version of run folders; one that adds fields alone stays the same."""
 MANIFEST = "run.yaml"
@@ -36,7 +26,7 @@ _BOUNDS = YamlBounds(values=100_000, depth=64)
 
 
 def _encodable(suite: dict[str, Any]) -> dict[str, Any]:
-    """A suite, which came from a UTF-8 file; what was edited since could be drawn nowhere."""
+    # It came from a UTF-8 file; what was edited since could be drawn nowhere.
     try:
         json.dumps(suite, ensure_ascii=False).encode()
     except UnicodeEncodeError:
@@ -46,6 +36,7 @@ def _encodable(suite: dict[str, Any]) -> dict[str, Any]:
 
 Text = Annotated[str, AfterValidator(encodable)]
 """Any text but a path, which may be of bytes that are not UTF-8."""
+Version = Annotated[int, Field(ge=1)]
 
 
 class ManifestModel(Line):
@@ -54,7 +45,7 @@ class ManifestModel(Line):
     name: Text
     """Its name in the run."""
     published: Text | None = None
-    """What the paper calls it."""
+    """Its name in the paper."""
     size_b: float | None = None
     """Its size [billion parameters]."""
     served_at: tuple[str, ...] = ()
@@ -65,7 +56,7 @@ class ManifestModel(Line):
 
     @property
     def is_baseline(self) -> bool:
-        """Whether it is a rule; rules have no rank among models."""
+        """True if it is a rule; rules have no rank among models."""
         return self.kind == "baseline"
 
 
@@ -76,12 +67,12 @@ class ManifestDataset(Line):
     """Its name."""
     sha256: str
     """Digest of the scenes that were asked about."""
-    version: Annotated[int, Field(ge=1)] = 1
+    version: Version = 1
     """Its version; results on different versions are never mixed."""
     format: str = "builtin"
     """Its layout."""
     root: str = ""
-    """Where it was."""
+    """The folder that it was in."""
 
 
 class ManifestQuestions(Line):
@@ -90,21 +81,18 @@ class ManifestQuestions(Line):
     format: str
     """Its layout."""
     root: str
-    """Where it was."""
-    version: Annotated[int, Field(ge=1)] = 1
+    """The folder that it was in."""
+    version: Version = 1
     """Its version; results on different versions are never mixed."""
 
 
 class Manifest(Line):
-    """What a run is: written before anything is asked, and changed by later readers alone."""
+    """A description of a run, written before anything is asked."""
 
     identity: str
     """Digest of what decides the results: only the same run goes on in a folder."""
-    identities: tuple[str, ...] = ()
-    """Where readers of several versions read the replies: its identity under each of them, oldest
-    first. Lines of the one in `identity` count, others stay and are passed over."""
     created: str = ""
-    """When it was begun, UTC."""
+    """The time when it was begun, UTC."""
     format: Annotated[int, Field(ge=1, le=FORMAT)] = FORMAT
     """Version of the run folder."""
     suite: Annotated[dict[str, Any], AfterValidator(_encodable)] = Field(default_factory=dict)
@@ -122,13 +110,13 @@ class Manifest(Line):
     questions: ManifestQuestions | None = None
     """The question set, where one is asked."""
     items: dict[str, int] = Field(default_factory=dict)
-    """How many items each track asks about."""
+    """Number of items that each track asks about."""
     scenes: int = 0
     """Distinct scenes."""
     scenes_by_level: dict[int, int] = Field(default_factory=dict)
     """Scenes of each level; one scene may be of several."""
     floors: dict[str, dict[str, dict[str, float]]] = Field(default_factory=dict)
-    """What baselines reach on these scenes that never see the goal, by track and name, in [0, 1]:
+    """Scores on these scenes of baselines that never see the goal, by track and name, in [0, 1]:
     by measure, cell, setting, matcher and criterion."""
     engine: str | None = None
     """The physics engine that blocks are let go in, with its version; null where nothing of the run
@@ -138,47 +126,35 @@ class Manifest(Line):
 
     @property
     def run(self) -> str:
-        """What its records carry to show that they are its own."""
+        """The digest by which its records show that they are its own."""
         return self.identity[:_DIGITS]
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """The run's manifest; StoreError when there is none or it cannot be read."""
+    """Return the run's manifest; StoreError when there is none or it cannot be read."""
     path = folder / MANIFEST
+    where = str(path)
     try:
         return _manifest(read_text(path, _LARGEST_BYTES))
     except (FileNotFoundError, NotADirectoryError) as error:
         allowed = "a folder that phyblock run wrote"
         raise StoreError(Problem(str(folder), f"holds no {MANIFEST}", allowed=allowed)) from error
     except OSError as error:
-        raise StoreError(Problem(str(path), f"cannot be read: {error.strerror}")) from error
-    except TooMuchError as error:
-        where, message, allowed = _at(path, error.mark), error.message, error.allowed
+        raise StoreError(Problem(where, f"cannot be read: {error.strerror}")) from error
+    except (yaml.YAMLError, TooMuchError) as error:
+        message, allowed, mark = "is not YAML", "", getattr(error, "problem_mark", None)
+        if isinstance(error, TooMuchError):
+            message, allowed, mark = error.message, error.allowed, error.mark
+        where += f":{mark.line + 1}:{mark.column + 1}" if mark else ""
         raise StoreError(Problem(where, message, allowed=allowed, hint=_HINT)) from error
-    except yaml.YAMLError as error:
-        where = _at(path, getattr(error, "problem_mark", None))
-        raise StoreError(Problem(where, "is not YAML", hint=_HINT)) from error
-    except LookupError as error:
-        message, missing = "is not a run manifest", "no such key"
-        raise StoreError(Problem(str(path), message, "identity", missing, hint=_HINT)) from error
     except ValidationError as error:
-        problems = problems_of(error, str(path), Manifest, "is not a run manifest", _HINT)
-        raise StoreError(problems) from error
+        is_not = "is not a run manifest"
+        raise StoreError(problems_of(error, where, Manifest, is_not, _HINT)) from error
     except ValueError as error:
-        raise StoreError(Problem(str(path), str(error), hint=_HINT)) from error
+        raise StoreError(Problem(where, str(error), hint=_HINT)) from error
 
 
 @functools.lru_cache(maxsize=2)
 def _manifest(text: str) -> Manifest:
-    """A manifest, which one command reads several times; LookupError where it lacks what any has.
-
-    Raises as `load_yaml` and pydantic do.
-    """
-    content = load_yaml(text, _BOUNDS)
-    if not isinstance(content, dict) or "identity" not in content:
-        raise LookupError("identity")
-    return Manifest.model_validate(content)
-
-
-def _at(path: Path, mark: yaml.Mark | None) -> str:
-    return f"{path}:{mark.line + 1}:{mark.column + 1}" if mark else str(path)
+    """A manifest, which one command reads several times; raises as `load_yaml` and pydantic do."""
+    return Manifest.model_validate(load_yaml(text, _BOUNDS))

@@ -1,4 +1,4 @@
-"""A line of `records.jsonl`: what was asked of whom, what came back, and what it is worth.
+"""The lines of a run folder: records first, then turns of episodes, prompts, batches, its end.
 
 `Record` declares what all tracks have in common. A track declares what it adds in a subclass of
 its own, with its name as the literal type of `track`.
@@ -7,33 +7,24 @@ its own, with its name as the literal type of `track`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 from pydantic import Field
 
 from phyblock.config.suite import Variant
-from phyblock.records.line import Amount, Line, Whole
+from phyblock.records.line import Amount, Line, Usd, Whole
 from phyblock.records.reply import Reply, StoredError
 from phyblock.stable import plain_sum
-from phyblock.types import AskedAs, Outcome
+from phyblock.types import AskedAs, Outcome, Role
 
-__all__ = [
-    "AskedTurn",
-    "Course",
-    "Record",
-    "Recorded",
-    "Score",
-    "SentImage",
-    "SentPrompt",
-    "ShownScene",
-]
+BatchEvent = Literal["intended", "created", "lost", "ended"]
 
 
 class SentImage(Line):
     """A picture that was sent."""
 
     label: str
-    """What it shows."""
+    """Its content: goal, candidates, ..."""
     sha256: str
     """Digest of the bytes sent."""
     width_px: Whole
@@ -43,7 +34,7 @@ class SentImage(Line):
 
 
 class SentPrompt(Line):
-    """What was sent."""
+    """The prompt that was sent."""
 
     template: str
     """Name of the template."""
@@ -64,9 +55,9 @@ class Score(Line):
     """Fields that are counts beside tp, fp and fn; older lines lack them."""
 
     criterion: str
-    """What is counted."""
+    """The rule by which steps count."""
     matcher: str | None = None
-    """How steps and goal blocks are matched; null where the criterion knows no choice."""
+    """The rule that matches steps and goal blocks; null where the criterion knows no choice."""
     setting: str
     """`A`: with orientation; `B`: without."""
     tp: Whole
@@ -88,8 +79,8 @@ class Score(Line):
 
 
 class Course(NamedTuple):
-    """How an assembly went: each step by what it names, with its error type (None: it is right),
-    and how many blocks of the goal are missing at the end.
+    """An assembly: each step by what it names, with its error type (None: it is right), and the
+    number of blocks of the goal that are missing at the end.
     """
 
     steps: tuple[tuple[str, str | None], ...]
@@ -104,11 +95,11 @@ class AskedTurn(Line):
     reply: Reply
     """The reply."""
     prompt: SentPrompt | None = None
-    """What was sent."""
+    """The prompt that was sent."""
 
 
 class ShownScene(Line):
-    """How a scene was shown, where that was not as the file has it."""
+    """The presentation of a scene, where that was not as the file has it."""
 
     order: tuple[Whole, ...]
     """The number in the file of each candidate, in the order shown."""
@@ -147,16 +138,16 @@ class Record(Line):
     seed: Whole
     """The repeat."""
     outcome: Outcome
-    """What became of the request."""
+    """The outcome of the request."""
     reply: Reply | None
     """The reply, null when there is none; of an episode, all its replies together."""
     error: StoredError | None
     """The error, null when there is none."""
     prompt: SentPrompt | None = None
-    """What was sent, null for recordings and baselines, which are sent nothing; of an episode, with
+    """The prompt, null for recordings and baselines, which are sent nothing; of an episode, that of
     the first turn."""
     parse: Any = None
-    """What was read in the reply, as the track says; null: nothing was."""
+    """The answer that was read in the reply, as the track says; null: none was."""
     scores: tuple[Score, ...]
     """Counts for every setting, matcher and criterion; none for questions."""
     time: str = ""
@@ -164,18 +155,16 @@ class Record(Line):
     run: str = ""
     """Digest of the run that it belongs to; older records have none."""
     extraction: Extraction | None = None
-    """What another model copied out of the reply; null: it was read, or nobody was asked."""
-    read_again: bool = False
-    """Whether later readers made it of an earlier record, with which its cost was counted."""
+    """The copy that another model made of the reply; null: it was read, or nobody was asked."""
     shown: ShownScene | None = None
-    """How the scene was shown; null: as the file has it."""
+    """The presentation of the scene; null: as the file has it."""
     asked: AskedAs | None = None
-    """How an answer in JSON was asked for: in the `prompt` alone, or in the request's
+    """Place where an answer in JSON was asked for: the `prompt` alone, or the request's
     `response_format` too; null: a text was asked for, or nobody was asked."""
     variant: dict[str, str] = Field(default_factory=dict)
     """Factors in which the way of asking differs from the run's reference, with their levels."""
     counts: dict[str, tuple[Amount, ...]] = Field(default_factory=dict)
-    """What was counted for measures beside `scores`, by name."""
+    """Counts of measures beside `scores`, by name."""
 
     columns: ClassVar[Mapping[str, str]] = {}
     """Columns that the track adds to the frame of records, with their types in pandas."""
@@ -198,7 +187,7 @@ class Record(Line):
 
     @property
     def is_correct(self) -> bool | None:
-        """Whether it is right, where it can only be right or wrong; else None."""
+        """True if it is right, False if it is wrong, None where it can be in between."""
         return None
 
     @property
@@ -208,12 +197,12 @@ class Record(Line):
 
     @property
     def said(self) -> str | None:
-        """What was read in the reply, in short."""
+        """The answer that was read in the reply, in short."""
         plan = getattr(self.parse, "plan", None)
         return None if plan is None else " ".join(map(str, plan))
 
     def course(self, matcher: str) -> Course | None:
-        """How an assembly went, by a matcher where it was scored by that; None for what is none."""
+        """Return the steps of an assembly by a matcher, if it was scored by that; else None."""
         assemblies = [score for score in self.scores if score.why is not None]
         score = next(
             (one for one in assemblies if one.matcher == matcher), next(iter(assemblies), None)
@@ -239,18 +228,24 @@ class Record(Line):
         return self.key or self.scene
 
     @property
+    def named(self) -> str:
+        """The id that its other fields make."""
+        variant = f"/{self.way.key}" if self.variant else ""
+        return f"{self.track}/{self.model}/{self.item}/s{self.seed}{variant}"
+
+    @property
     def is_answered(self) -> bool:
-        """Whether the model answered, if only by refusing; a recording may have no reply."""
+        """True if the model answered, if only by refusing; a recording may have no reply."""
         return self.error is None or self.error.kind in ("refused", "unjudged")
 
     @property
     def is_judged(self) -> bool:
-        """Whether its reply was judged, where it has one."""
+        """True if its reply was judged, or there is none."""
         return self.error is None or self.error.kind != "unjudged"
 
     @property
     def is_final(self) -> bool:
-        """Whether asking again would be wrong: answered, or an error that asking cannot mend."""
+        """True if it is not asked again: answered, or an error that would come again."""
         return self.error is None or self.error.kind in ("refused", "sample", "unjudged")
 
     @property
@@ -260,7 +255,7 @@ class Record(Line):
 
     @property
     def paid_usd(self) -> float | None:
-        """What the run paid for its replies [US dollars]; None where a price is not known.
+        """Cost of its replies to the run [US dollars]; None where a price is not known.
 
         Replies from the cache were paid for elsewhere; an episode can hold both kinds.
         """
@@ -271,9 +266,7 @@ class Record(Line):
 
     @property
     def limit_usd(self) -> float:
-        """What the run's cost limit counted for this line [US dollars]."""
-        if self.read_again:
-            return 0.0
+        """Amount that the run's cost limit counted for this line [US dollars]."""
         more = 0.0 if self.extraction is None else self.extraction.reply.limit_usd
         if self.reply is not None:
             return self.reply.limit_usd + more
@@ -281,28 +274,78 @@ class Record(Line):
 
     @property
     def failed_usd(self) -> float:
-        """What the run's cost limit counted for a request that failed [US dollars]."""
+        """Amount that the run's cost limit counted for a request that failed [US dollars]."""
         return 0.0 if self.error is None else self.error.billed_usd or 0.0
 
 
-class Recorded(Line):
-    """What a recording needs of a record: whose reply it is, and to what."""
+class Turn(Line):
+    """An answered turn of an episode, finished or not."""
 
+    sample: str
+    """The sample that it is a turn of."""
+    turn: Whole
+    """Its place in the episode, from 0."""
+    reply: Reply
+    """The reply, as in a record."""
+    run: str = ""
+    """Digest of the run that it belongs to; older turns have none."""
+
+
+class PictureMark(Line):
+    """Stands where a picture stood."""
+
+    image: str
+    """Label of the picture."""
+
+
+class PromptMessage(Line):
+    """One chat message."""
+
+    role: Role
+    """The speaker."""
+    parts: tuple[str | PictureMark, ...]
+    """Texts and pictures in the order sent."""
+
+
+class Prompt(Line):
+    """A prompt as it was sent."""
+
+    sha256: str
+    """Digest of the messages, by which records name it."""
+    messages: tuple[PromptMessage, ...]
+    """The messages that were sent."""
+
+
+class BatchLine(Line):
+    """An event of a batch of requests; the first line of each is written before it is sent."""
+
+    batch: str
+    """Our name for it, which the provider is told, so that it is found there again."""
     model: str
-    """The model that was asked."""
-    key: str
-    """The item that it was asked about."""
-    seed: Whole
-    """The repeat."""
-    track: str = ""
-    """The track that asked; records of older versions may not say it."""
-    reply: Reply | None = None
-    """The reply."""
-    error: StoredError | None = None
-    """The error."""
-    variant: dict[str, str] = Field(default_factory=dict)
-    """What a varied run asked otherwise than its reference."""
-    shown: ShownScene | None = None
-    """How the item was shown."""
-    asked: AskedAs | None = None
-    """How an answer in JSON was asked for."""
+    """Name of the model."""
+    event: BatchEvent
+    """`intended`: it is about to be sent; `created`: the provider has it; `lost`: it has not, and
+    nothing was asked; `ended`: its answers are in `batches/`."""
+    time: str
+    """When, UTC."""
+    id: str = ""
+    """The provider's name for it."""
+    keys: tuple[str, ...] = ()
+    """Requests of an intended batch in their order, by their keys in the reply cache."""
+    most_usd: tuple[Usd, ...] = ()
+    """Most that each request of an intended batch can cost; empty where no price is known."""
+    seeded: bool = True
+    """True if the requests of an intended batch carry seeds."""
+    words: str = ""
+    """The reason why it was lost, or how it ended."""
+    is_complete: bool = True
+    """False where the provider took back what it had not asked when the batch ended."""
+
+
+class Stopped(Line):
+    """The reasons why the last session on a run did not ask all; there while there are any."""
+
+    models: dict[str, str] = Field(default_factory=dict)
+    """The reason why a model could not be asked on, by its name."""
+    run: str = ""
+    """The reason why the whole run was stopped; empty: it was not."""

@@ -1,4 +1,4 @@
-"""What came back of a request, as it is stored: a reply, or why there is none."""
+"""A reply, at run time and in every file; or the error in its place."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ class Reply(Line):
     reasoning: str = ""
     """The reasoning that the provider showed beside it."""
     finish: Finish = "stop"
-    """Why it ended: by itself, at the token limit, by a content filter, or not said."""
+    """The reason why it ended: by itself, at the token limit, by a content filter, or not said."""
     usage: Usage = Usage()
     """Its tokens."""
     cost_usd: Usd | None = None
     """Its price [US dollars]; null: not known."""
     billed_usd: Usd | None = None
-    """What `max_cost_usd` counted [US dollars], failed attempts included, a reply without token
-    counts at its dearest; null: no limit was set."""
+    """Amount that `max_cost_usd` counted [US dollars], failed attempts included, a reply without
+    token counts at its dearest; null: no limit was set."""
     latency_s: Amount = 0.0
     """Time of the successful request alone [s]."""
     provider_model: str = ""
@@ -58,11 +58,11 @@ class Reply(Line):
     attempts: Whole = 1
     """Requests sent for it, 0 from the cache."""
     cached: bool = False
-    """Whether it came from the cache."""
+    """True if it came from the cache."""
     seed_sent: bool = True
-    """Whether the provider takes a seed; where not, seeds are independent repeats."""
+    """True if the provider takes a seed; where not, seeds are independent repeats."""
     batched: bool = False
-    """Whether it came in a batch, at the price of one."""
+    """True if it came in a batch, at the price of one."""
 
     def storable(self) -> Self:
         """Return the reply with all its fields, as it is written.
@@ -75,10 +75,7 @@ class Reply(Line):
         usage = fields["usage"].items()
         counts = {name: _within(count, -LARGEST_WHOLE) for name, count in usage}
         money = {name: _within(fields[name], 0) for name in ("cost_usd", "billed_usd")}
-        fields |= {**texts, **money, "usage": counts}
-        if not self.batched:
-            del fields["batched"]
-        return self.model_validate(fields)
+        return self.model_validate({**fields, **texts, **money, "usage": counts})
 
     @property
     def tokens(self) -> int:
@@ -87,14 +84,14 @@ class Reply(Line):
 
     @property
     def limit_usd(self) -> float:
-        """What a limit counted for it, else its cost unless that was paid elsewhere."""
+        """Amount that a limit counted for it, else its cost unless that was paid elsewhere."""
         if self.billed_usd is not None:
             return self.billed_usd
         return 0.0 if self.cached else self.cost_usd or 0.0
 
 
 class StoredError(Line):
-    """Why there is no reply, or no judgement of it."""
+    """The reason why there is no reply, or no judgement of it."""
 
     kind: ErrorKind
     """`retryable`: every attempt failed; `sample`: this request cannot succeed; `refused`: by a
@@ -102,6 +99,6 @@ class StoredError(Line):
     status: Whole | None = None
     """HTTP status, where there was one."""
     message: str = ""
-    """What was said."""
+    """The words of it."""
     billed_usd: Usd | None = None
     """As of a reply."""

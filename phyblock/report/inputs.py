@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from phyblock.files import NotRegularError, open_regular
-from phyblock.records import MANIFEST, PROMPTS, RECORDS, STOPPED, read_manifest
+from phyblock.records.files import PROMPTS, RECORDS, STOPPED
+from phyblock.records.manifest import MANIFEST, read_manifest
 from phyblock.resources import cache_dir
 from phyblock.run.code import code_digest, digest_of, state_of
 from phyblock.tables.design import read_design

@@ -10,7 +10,7 @@ from phyblock.config.models import RECORDED
 from phyblock.config.suite import Suite
 from phyblock.data import recorded_models
 from phyblock.errors import DataError
-from phyblock.records import Manifest
+from phyblock.records.manifest import Manifest
 from phyblock.run.plan import RunPlan
 from phyblock.tracks import kind_of
 from phyblock.tracks.opening import template_prompt

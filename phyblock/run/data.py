@@ -8,7 +8,7 @@ from pathlib import Path
 
 from phyblock.data import SCENES_FILE, Dataset, read_builtin, read_official
 from phyblock.errors import DataError, Problem
-from phyblock.records import MANIFEST, Manifest
+from phyblock.records.manifest import MANIFEST, Manifest
 from phyblock.resources import bundled_sets
 from phyblock.tracks.selection import select_tasks
 

@@ -23,8 +23,7 @@ from phyblock.models import (
     waiting_keys,
 )
 from phyblock.models import estimate as estimate_call
-from phyblock.records import BatchLines
-from phyblock.records.reading import run_records
+from phyblock.records.files import BatchLines, run_records
 from phyblock.resources import reply_cache_file
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from phyblock.records import Record
+from phyblock.records.record import Record
 from phyblock.run.standing import Summary
 from phyblock.text import counted
 

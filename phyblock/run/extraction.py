@@ -13,7 +13,8 @@ from phyblock.config.models import ModelConfig
 from phyblock.errors import BudgetReachedError, ModelError
 from phyblock.models import AskLaterError, HaltedError, Model, Request
 from phyblock.models.base import Message
-from phyblock.records import Extraction, Record, Reply
+from phyblock.records.record import Extraction, Record
+from phyblock.records.reply import Reply
 from phyblock.resources import bundled
 from phyblock.run.judging import judged_apart
 from phyblock.tracks import Item, SingleTrack

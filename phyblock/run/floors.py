@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from phyblock.config.suite import Suite
-from phyblock.records import MANIFEST, Manifest, Record
-from phyblock.records.manifest import ManifestModel
+from phyblock.records.manifest import MANIFEST, Manifest, ManifestModel
+from phyblock.records.record import Record
 from phyblock.records.reply import Reply
 from phyblock.run.floor_orders import floor_orders, floor_seeds
 from phyblock.run.records import begun, judged

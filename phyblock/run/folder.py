@@ -11,7 +11,8 @@ from pathlib import Path
 
 from phyblock.errors import Problem, StoreError
 from phyblock.files import LIST, OutFolder, writing
-from phyblock.records import BATCHES, MANIFEST, PROMPTS, RECORDS, TURNS
+from phyblock.records.files import BATCHES, PROMPTS, RECORDS, TURNS
+from phyblock.records.manifest import MANIFEST
 
 LOCK = ".lock"
 _OWN = (MANIFEST, RECORDS, TURNS, PROMPTS, BATCHES, "batches", LOCK, LIST)

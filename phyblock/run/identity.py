@@ -10,7 +10,7 @@ from typing import Any
 from phyblock.config.models import ModelConfig
 from phyblock.config.suite import Suite, Variant
 from phyblock.data import UNNUMBERED, Dataset
-from phyblock.records import FORMAT
+from phyblock.records.manifest import FORMAT
 from phyblock.run.extraction import extraction_prompt
 from phyblock.run.models import PlannedModel
 from phyblock.stable import hex_digest

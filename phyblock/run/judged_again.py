@@ -10,8 +10,9 @@ from typing import Any
 from phyblock.config.suite import Variant
 from phyblock.errors import Problem, StoreError
 from phyblock.parsing.text import READER_VERSION
-from phyblock.records import RECORDS, Manifest, Record
-from phyblock.records.reading import read_records
+from phyblock.records.files import RECORDS, read_records
+from phyblock.records.manifest import Manifest
+from phyblock.records.record import Record
 from phyblock.run.extraction import read_extraction
 from phyblock.run.judging import judged_apart
 from phyblock.run.records import about_item

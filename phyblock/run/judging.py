@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from phyblock.errors import SimulationError
-from phyblock.records import Record, StoredError
+from phyblock.records.record import Record
+from phyblock.records.reply import StoredError
 from phyblock.run.records import judged
 from phyblock.tracks import Item, SingleTrack, judgement_of
 

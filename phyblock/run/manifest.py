@@ -13,7 +13,7 @@ from phyblock.config.models import ModelConfig
 from phyblock.config.suite import Suite, Variant
 from phyblock.data import Dataset, read_version
 from phyblock.parsing.text import READER_VERSION
-from phyblock.records import Manifest
+from phyblock.records.manifest import Manifest
 from phyblock.run.identity import identity_of, inputs_of
 from phyblock.run.models import PlannedModel
 from phyblock.sim.engine import ENGINES, described_engine

@@ -19,7 +19,8 @@ from phyblock.data import recorded_models
 from phyblock.data.published_names import match_published
 from phyblock.errors import Problem, SpecError
 from phyblock.models import server_address, takes_format
-from phyblock.records import RECORDS, Recorded, RecordedLines
+from phyblock.records.files import RECORDS, RecordLines
+from phyblock.records.record import Record
 from phyblock.registry import baseline_names
 from phyblock.text import did_you_mean
 from phyblock.types import AnswerFormat, CandidateOrder
@@ -95,10 +96,10 @@ def recorded_format(folder: Path) -> AnswerFormat:
     return "json_schema" if any(record.asked for record in _recorded(folder)) else "text"
 
 
-def _recorded(folder: Path) -> Iterator[Recorded]:
+def _recorded(folder: Path) -> Iterator[Record]:
     """The records of a run that can be replayed: of a varied one those of its reference."""
     if (folder / RECORDS).is_file():
-        yield from (record for _, record in RecordedLines(folder / RECORDS) if not record.variant)
+        yield from (record for _, record in RecordLines(folder) if not record.variant)
 
 
 def _check_known(names: Sequence[str], known: Sequence[str], message: Callable[[str], str]) -> None:

@@ -12,7 +12,7 @@ from phyblock.config.models import RECORDED, ModelConfig, with_members
 from phyblock.config.suite import Suite, Variant
 from phyblock.data import Dataset
 from phyblock.errors import Problem, SpecError
-from phyblock.records import Manifest
+from phyblock.records.manifest import Manifest
 from phyblock.run.data import open_dataset
 from phyblock.run.manifest import make_manifest
 from phyblock.run.models import (

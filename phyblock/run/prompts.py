@@ -11,8 +11,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from phyblock.models.base import Image, Message
-from phyblock.records import PictureMark, Prompt, PromptLines, PromptMessage
+from phyblock.records.files import PromptLines
 from phyblock.records.line import encodable
+from phyblock.records.record import PictureMark, Prompt, PromptMessage
 from phyblock.run.appending import AppendFile
 from phyblock.stable import hex_digest
 

@@ -8,14 +8,9 @@ from typing import Any
 
 from phyblock.errors import ModelError, RefusedError, RetryableError, SampleError
 from phyblock.models.base import Image, Message, Request
-from phyblock.records import (
-    Record,
-    SentImage,
-    SentPrompt,
-    StoredError,
-)
-from phyblock.records.known import known_records
-from phyblock.records.reply import Reply
+from phyblock.records.files import known_records
+from phyblock.records.record import Record, SentImage, SentPrompt
+from phyblock.records.reply import Reply, StoredError
 from phyblock.tracks import Episode, Item, Judgement
 from phyblock.tracks.counting import count_sample
 from phyblock.types import Outcome

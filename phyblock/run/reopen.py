@@ -9,7 +9,7 @@ from phyblock.config.suite import Suite, SuiteFiles
 from phyblock.config.yaml import YamlSource
 from phyblock.data import Dataset
 from phyblock.errors import DataError, Problem
-from phyblock.records import MANIFEST, Manifest
+from phyblock.records.manifest import MANIFEST, Manifest
 from phyblock.run.data import CHANGED
 from phyblock.tracks import AnyTrack, kind_of
 from phyblock.tracks.base import CARRYING, ENGINE, READER

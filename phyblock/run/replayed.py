@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from phyblock.errors import Problem, StoreError
-from phyblock.records import Record
+from phyblock.records.record import Record
 from phyblock.run.records import judged
 from phyblock.tracks import Episode, EpisodeTrack, Item
 

@@ -16,8 +16,9 @@ from phyblock.data import AssemblyTask, Dataset
 from phyblock.errors import DataError, Problem, SpecError, StoreError
 from phyblock.parsing.plan import reader_version
 from phyblock.parsing.text import READER_VERSION
-from phyblock.records import MANIFEST, Manifest, Record, read_manifest
-from phyblock.records.reading import run_records
+from phyblock.records.files import run_records
+from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
+from phyblock.records.record import Record
 from phyblock.run.data import asked_about, recorded_dataset
 from phyblock.run.folder import check_place, locked, run_folder
 from phyblock.run.judged_again import Tell, judged_again, untold

@@ -9,7 +9,9 @@ from pathlib import Path
 import yaml
 
 from phyblock.files import atomic_write, writing
-from phyblock.records import MANIFEST, RECORDS, Manifest, Record
+from phyblock.records.files import RECORDS
+from phyblock.records.manifest import MANIFEST, Manifest
+from phyblock.records.record import Record
 from phyblock.run.folder import run_folder
 
 __all__ = ["manifest_text", "record_lines", "write_run"]

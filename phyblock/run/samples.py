@@ -11,7 +11,8 @@ from phyblock.config.models import ModelConfig
 from phyblock.config.suite import Variant
 from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
 from phyblock.models import AskLaterError, Halt, Model, Request
-from phyblock.records import Record, Reply, SentPrompt, Turn, Usage
+from phyblock.records.record import Record, SentPrompt, Turn
+from phyblock.records.reply import Reply, Usage
 from phyblock.run.extraction import Extractor
 from phyblock.run.judging import judged_apart
 from phyblock.run.prompts import PromptFile

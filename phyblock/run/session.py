@@ -24,7 +24,7 @@ from phyblock.models import (
     remove_unfinished,
     under_way,
 )
-from phyblock.records import BATCHES
+from phyblock.records.files import BATCHES
 from phyblock.resources import reply_cache_file
 from phyblock.run.events import ModelNotice, RunNotice, RunStarted, Watcher
 from phyblock.run.execute import Executor, RunResult

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from phyblock.records import BatchLine, Record, Turn
+from phyblock.records.record import BatchLine, Record, Turn
 from phyblock.scoring.counts import Counts
 
 __all__ = ["Standing", "Summary"]

@@ -16,22 +16,22 @@ from typing import Any, TypeVar
 
 from phyblock.errors import Problem, StoreError
 from phyblock.files import atomic_write, writing
-from phyblock.records import (
-    MANIFEST,
+from phyblock.records.files import (
     STOPPED,
     BatchLines,
-    Belonging,
-    Line,
     Lines,
-    Manifest,
     PromptLines,
-    Reply,
-    Stopped,
+    RecordLines,
     TurnLines,
-    read_manifest,
+    Validation,
+    collect_turns,
     read_stopped,
+    run_records,
 )
-from phyblock.records.reading import any_records, collect_turns, run_records
+from phyblock.records.line import Line
+from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
+from phyblock.records.record import Stopped
+from phyblock.records.reply import Reply
 from phyblock.run.appending import AppendFile
 from phyblock.run.folder import check_place, locked, run_folder
 from phyblock.run.prompts import PromptFile
@@ -73,7 +73,7 @@ class RunStore:
         """
         self.standing = Standing()
         self._folder = folder
-        self._belonging = Belonging.of(manifest, samples)
+        self._validation = Validation(manifest, samples)
         self._lock = ExitStack()
         self._files: list[AppendFile] = []
         try:
@@ -84,12 +84,14 @@ class RunStore:
                 self._claim(manifest)
                 records = run_records(folder, manifest, samples)
                 self.records = self._open(records, self.standing.add)
-                turns = TurnLines(folder, self._belonging)
+                turns = TurnLines(folder, self._validation)
                 self.turns = self._open(turns, self.standing.add_turn)
                 batches = BatchLines(folder)
                 self.batches = self._open(batches, self.standing.batches.append)
-                known = PromptLines(folder)
-                self.prompts = PromptFile(self._open(known, sync=False), known.digests)
+                known: set[str] = set()
+                prompts = PromptLines(folder)
+                file = self._open(prompts, lambda one: known.add(one.sha256), sync=False)
+                self.prompts = PromptFile(file, known)
         except StoreError:
             self.close()
             raise
@@ -123,7 +125,7 @@ class RunStore:
 
     def begun_turns(self, done: Container[str]) -> dict[str, list[Reply]]:
         """The replies of episodes that have begun and are not `done`, by sample id."""
-        return collect_turns(TurnLines(self._folder, self._belonging), done)
+        return collect_turns(TurnLines(self._folder, self._validation), done)
 
     def _open(
         self,
@@ -135,7 +137,7 @@ class RunStore:
         """Open a file for appending, rid of a line that a kill cut short; `take` sees the rest."""
         file = AppendFile(lines.path, sync=sync)
         self._files.append(file)
-        for _, line in lines.every():
+        for _, line in lines:
             take(line)
         if lines.is_cut:
             os.truncate(lines.path, lines.whole_bytes)
@@ -163,7 +165,7 @@ def held_run(folder: Path, manifest: Manifest) -> Manifest | None:
     found = read_manifest(folder)
     if found.identity == manifest.identity and _readers(found) == _readers(manifest):
         return found
-    paid: tuple[Lines[Any], ...] = (any_records(folder), TurnLines(folder), BatchLines(folder))
+    paid: tuple[Lines[Any], ...] = (RecordLines(folder), TurnLines(folder), BatchLines(folder))
     if all(next(iter(lines), None) is None for lines in paid):
         return None
     if found.identity == manifest.identity:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 
-from phyblock.records import Line
+from phyblock.records.line import Line
 from phyblock.run.appending import AppendFile
 
 __all__ = ["RecordWriter"]

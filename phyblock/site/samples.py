@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from phyblock.records import Record
-from phyblock.records.reading import any_records
+from phyblock.records.files import RecordLines
+from phyblock.records.record import Record
 from phyblock.report.html.index import Numbers, read_places
 from phyblock.report.html.pack import Pack
 from phyblock.report.html.samples import IN_INDEX
@@ -146,7 +146,7 @@ def _records(run: Run) -> Iterator[Record]:
     known = set(run.design.suite.tracks)
     places = [place for place in read_places(run.path, run.design) if place.track in known]
     places.sort(key=lambda place: order.get(place.model, len(order)))
-    yield from any_records(run.path).at(place.start for place in places)
+    yield from RecordLines(run.path).at(place.start for place in places)
 
 
 def _scene(scene: str, runs: Sequence[SiteRun]) -> dict[str, Any] | None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from phyblock.records import Score
+from phyblock.records.record import Score
 from phyblock.tables.design import OVERALL
 from phyblock.tables.flat import BLOCK_COLUMNS, MATCHED
 from phyblock.tables.load import Run, made_once

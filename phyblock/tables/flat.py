@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from phyblock.records import Record, Score
-from phyblock.records.known import record_types
+from phyblock.records.files import record_types
+from phyblock.records.record import Record, Score
 from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES
 
 __all__ = ["BLOCK_COLUMNS", "MATCHED", "TOKENS", "Flattened", "joined_counts"]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from phyblock.scoring.plan import ERROR_TYPES
 
 if TYPE_CHECKING:
-    from phyblock.records import Record
+    from phyblock.records.record import Record
     from phyblock.tables.design import Design
 
 __all__ = ["ListedScore", "Listing", "by_settings"]

@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from phyblock.records import MANIFEST, Manifest, Record, read_manifest
-from phyblock.records.reading import run_records
+from phyblock.records.files import run_records
+from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
+from phyblock.records.record import Record
 from phyblock.tables.design import Design, SectionT, read_design, read_section
 from phyblock.tables.flat import Flattened
 

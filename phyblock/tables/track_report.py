@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from phyblock.data import AssemblyTask, Dataset
     from phyblock.models import Image
-    from phyblock.records import Record
+    from phyblock.records.record import Record
     from phyblock.sim.film import FilmStep
     from phyblock.sim.pictures import PictureStyle
     from phyblock.tables.design import Design

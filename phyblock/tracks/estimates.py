@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from phyblock.errors import Problem, StoreError
-from phyblock.records import RECORDS
+from phyblock.records.files import RECORDS
 from phyblock.registry import added_measures
 from phyblock.tables.estimates import ESTIMATE_COLUMNS, estimate_frame
 from phyblock.tables.load import Run

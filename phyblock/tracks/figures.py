@@ -15,8 +15,8 @@ from PIL import Image
 from phyblock.config.suite import ImagesSpec
 from phyblock.data import AssemblyTask, Dataset
 from phyblock.errors import Problem, SpecError
-from phyblock.records import Record
-from phyblock.records.reading import read_records
+from phyblock.records.files import read_records
+from phyblock.records.record import Record
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.pictures import Lookout, PictureStyle, candidates_png
 from phyblock.tables.drawing import (

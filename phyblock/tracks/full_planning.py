@@ -17,7 +17,7 @@ from phyblock.errors import DataError, Problem, SpecError
 from phyblock.models.base import Image
 from phyblock.parsing.plan import ParsedPlan, parse_plan, plan_form, reader_version
 from phyblock.parsing.structured import AnswerForm
-from phyblock.records import Record
+from phyblock.records.record import Record
 from phyblock.resources import bundled
 from phyblock.scoring.plan import AssemblyScorer, Score
 from phyblock.stable import drawn_bytes

@@ -19,7 +19,7 @@ import pandas as pd
 from phyblock.data import AssemblyTask
 from phyblock.domain import Block
 from phyblock.errors import Problem, SpecError
-from phyblock.records import Score
+from phyblock.records.record import Score
 from phyblock.scoring.counts import Floats, f1_of, precision_of, ratio_of, recall_of
 from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES, BlockOutcome, ErrorType
 from phyblock.scoring.statistics import Clusters, bounded, jackknife

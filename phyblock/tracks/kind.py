@@ -11,7 +11,8 @@ from pydantic import BaseModel
 
 from phyblock.config.suite import Suite
 from phyblock.data import Dataset
-from phyblock.records import Manifest, Record
+from phyblock.records.manifest import Manifest
+from phyblock.records.record import Record
 from phyblock.registry import known_tracks
 from phyblock.tables.measures import SampleCounts
 from phyblock.tables.track_report import TrackReport

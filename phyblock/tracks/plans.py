@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from phyblock.domain import CandidateSet, Scene
-from phyblock.records import Line, ShownScene
+from phyblock.records.line import Line
+from phyblock.records.record import ShownScene
 from phyblock.scoring.counts import Floats, ratio_of
 from phyblock.scoring.plan import Score
 from phyblock.tables.measures import Measure, SampleCounts

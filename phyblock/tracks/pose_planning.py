@@ -20,8 +20,8 @@ from phyblock.errors import DataError, Problem, SpecError
 from phyblock.models.base import Image, Request
 from phyblock.parsing.poses import FARTHEST_PLACE_CM, MOST_POSE_STEPS
 from phyblock.parsing.text import READER_VERSION
-from phyblock.records import Course, Line, Record
-from phyblock.records.line import Amount, Whole
+from phyblock.records.line import Amount, Line, Whole
+from phyblock.records.record import Course, Record
 from phyblock.resources import bundled
 from phyblock.scoring.pose import POSE_ERRORS, PoseError
 from phyblock.scoring.pose_matching import TOLERANCES_CM

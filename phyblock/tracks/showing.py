@@ -14,7 +14,7 @@ from typing import Any
 from phyblock.data import AssemblyTask
 from phyblock.domain import CandidateSet
 from phyblock.errors import DataError, Problem
-from phyblock.records import Record
+from phyblock.records.record import Record
 from phyblock.stable import drawn_bytes
 from phyblock.tracks.elsewhere import Elsewhere
 from phyblock.types import CandidateOrder

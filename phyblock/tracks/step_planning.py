@@ -20,8 +20,8 @@ from phyblock.domain import Block, CandidateSet, Plan, Scene
 from phyblock.models.base import Image, Message, Request
 from phyblock.parsing.move import MoveProblem, ParsedMove, move_form, parse_move
 from phyblock.parsing.structured import AnswerForm
-from phyblock.records import AskedTurn, Course, Line, Record
-from phyblock.records.line import Whole
+from phyblock.records.line import Line, Whole
+from phyblock.records.record import AskedTurn, Course, Record
 from phyblock.records.reply import Reply
 from phyblock.resources import bundled
 from phyblock.scoring.counts import Counts

@@ -40,8 +40,9 @@ from phyblock.files import read_picture
 from phyblock.models.base import Image
 from phyblock.parsing.answer import ParsedAnswer, choice_form, parse_answer
 from phyblock.parsing.structured import AnswerForm
-from phyblock.records import Line, Manifest, Record
-from phyblock.records.line import Whole
+from phyblock.records.line import Line, Whole
+from phyblock.records.manifest import Manifest
+from phyblock.records.record import Record
 from phyblock.resources import bundled, bundled_sets
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import (

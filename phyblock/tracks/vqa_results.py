@@ -24,7 +24,8 @@ from phyblock.domain import (
     is_picture_option,
 )
 from phyblock.errors import DataError, Problem, SpecError
-from phyblock.records import MANIFEST, Record
+from phyblock.records.manifest import MANIFEST
+from phyblock.records.record import Record
 from phyblock.scoring.counts import chance, letter_rates, ratio_of
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_png

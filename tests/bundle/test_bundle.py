@@ -16,7 +16,8 @@ from phyblock.bundle import bundle_run, opened_bundle
 from phyblock.bundle.about import about_text, describe
 from phyblock.bundle.archive import ABOUT, MEMBERS, pack, unpack
 from phyblock.errors import DataError, StoreError
-from phyblock.records import MANIFEST, RECORDS, read_manifest
+from phyblock.records.files import RECORDS
+from phyblock.records.manifest import MANIFEST, read_manifest
 from tests.vqa_set import questions, write_questions
 from tests.workspace import SCENES, Raw, Workspace
 

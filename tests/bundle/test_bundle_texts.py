@@ -9,8 +9,8 @@ import pytest
 
 from phyblock.bundle.portable import portable_manifest, portable_records
 from phyblock.bundle.texts import model_name
-from phyblock.records import Manifest
-from phyblock.records.known import known_records
+from phyblock.records.files import known_records
+from phyblock.records.manifest import Manifest
 from tests.report.factory import manifest, record
 
 SERVERS = ["http://10.0.0.5:8000/v1", "http://gpu-7.lab:9000/v1"]

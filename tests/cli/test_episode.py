@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from phyblock.data import read_builtin
-from phyblock.records.reading import read_records
+from phyblock.records.files import read_records
 from phyblock.tracks.step_planning import EpisodeRecord
 from phyblock.tracks.step_planning_results import OUTCOME_NAMES, episode_film, episode_table
 from tests.workspace import Workspace

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from phyblock.cli.progress import ProgressView
 from phyblock.cli.remarks import Remarks
-from phyblock.records.known import known_records
+from phyblock.records.files import known_records
 from phyblock.run.events import (
     ModelNotice,
     ModelStopped,

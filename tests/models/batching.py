@@ -26,7 +26,7 @@ from phyblock.models import (
     build_model,
     remove_unfinished,
 )
-from phyblock.records import BatchLine
+from phyblock.records.record import BatchLine
 from tests.models.factory import QUICK
 
 POLL_S = 0.01

@@ -16,7 +16,7 @@ from phyblock.models.batches.ledger import BatchFiles, Ledger
 from phyblock.models.batches.openai import OpenAIBatches
 from phyblock.models.batches.results import Results, custom_id
 from phyblock.models.batches.waiting import waiting_keys
-from phyblock.records import BatchLine
+from phyblock.records.record import BatchLine
 
 TOKEN = "pb0"
 keys = st.lists(st.sampled_from("abcdef"), unique=True, min_size=1)

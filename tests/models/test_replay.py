@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 
 from phyblock.config.models import ModelConfig
-from phyblock.errors import DataError, RefusedError, SampleError
+from phyblock.errors import DataError, RefusedError, SampleError, StoreError
 from phyblock.models import Gate, Model, Reply, Usage, build_model
 from tests.models.factory import ask, make_request
+from tests.records.damage import lines_before, plan_record
 
 STEPS = "Step1: Move block with index 3"
 
@@ -23,7 +24,7 @@ def replay(folder: Path, model: str = "m") -> Model:
 
 
 def answer(model: Model, key: str, seed: int = 0) -> Reply | None:
-    return asyncio.run(model.ask(make_request(key, seed)))
+    return asyncio.run(model.ask(replace(make_request(key, seed), track="full_planning")))
 
 
 def test_a_reply_is_found_by_key_whatever_the_seed(tmp_path: Path) -> None:
@@ -83,8 +84,9 @@ def record(model: str, scene: str, seed: int, **fields: object) -> str:
         cost_usd=0.5,
         seed_sent=False,
     ).model_dump()
+    named = {"sample": f"full_planning/{model}/{scene}/s{seed}", "scene": scene}
     whole = {"model": model, "key": scene, "seed": seed, "reply": reply, "error": None}
-    return json.dumps({**whole, **fields}) + "\n"
+    return json.dumps({**plan_record(), **named, **whole, **fields}) + "\n"
 
 
 def test_a_run_of_our_own_is_matched_by_model_key_and_seed(tmp_path: Path) -> None:
@@ -116,9 +118,10 @@ def test_a_run_of_our_own_is_matched_by_model_key_and_seed(tmp_path: Path) -> No
 
 
 def test_a_run_of_several_tracks_answers_each_with_its_own(tmp_path: Path) -> None:
+    asked = json.loads(lines_before()[2])
     (tmp_path / "records.jsonl").write_text(
-        record("m", "007", 1, track="full_planning", reply=Reply(text="a plan").model_dump())
-        + record("m", "007", 1, track="step_planning", reply=Reply(text="a move").model_dump())
+        record("m", "007", 1, reply=Reply(text="a plan").model_dump())
+        + json.dumps({**asked, "model": "m", "key": "007", "seed": 1})
     )
     asked = [replace(make_request("007", 1), track=name) for name in ("full_planning", "other")]
     plan, nothing = ask(replay(tmp_path), *asked)
@@ -160,7 +163,7 @@ def test_the_only_model_of_a_run_needs_no_name_and_others_do(tmp_path: Path) -> 
 @pytest.mark.parametrize("line", ["{", "[]", '{"model": "m"}', "7"])
 def test_a_broken_record_is_an_error_at_its_line(tmp_path: Path, line: str) -> None:
     (tmp_path / "records.jsonl").write_text(record("m", "007", 1) + line + "\n")
-    with pytest.raises(DataError, match=r"records\.jsonl:2(:\d+)?: (\w+: )?is not a record"):
+    with pytest.raises(StoreError, match=r"records\.jsonl:2(:\d+)?: (\w+: )?is not a record"):
         replay(tmp_path)
 
 

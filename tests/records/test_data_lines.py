@@ -14,8 +14,7 @@ from phyblock.data import Dataset, QuestionSet, read_builtin, read_questions
 from phyblock.data.questions import StoredQuestion
 from phyblock.data.scenes import StoredScene
 from phyblock.errors import DataError
-from phyblock.records import Line
-from phyblock.records.line import validated
+from phyblock.records.line import Line, validated
 from phyblock.resources import bundled
 from tests.data.broken import Raw, sound_scene, with_value, without
 from tests.data.test_builtin_laws import as_json, tasks

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from phyblock.config.yaml import YamlBounds, load_yaml
 from phyblock.errors import StoreError
-from phyblock.records import MANIFEST, read_manifest
 from phyblock.records.line import shown
+from phyblock.records.manifest import MANIFEST, read_manifest
 from tests.records.damage import YAML_TEXTS
 
 # A path that is not UTF-8 is text with halves of characters.

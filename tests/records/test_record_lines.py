@@ -14,9 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.errors import StoreError
-from phyblock.records import Reply, Usage, lines
-from phyblock.records.known import known_records
-from phyblock.records.reading import any_records, newest_starts
+from phyblock.records import files
+from phyblock.records.files import RecordLines, known_records, newest_starts
+from phyblock.records.reply import Reply, Usage
 from phyblock.report import load_run
 from tests.records.damage import DAMAGED, lines_before, plan_record, with_value
 from tests.report.factory import manifest
@@ -80,7 +80,7 @@ def test_any_bytes_are_read_or_refused(
     folder = folder_with(tmp_path_factory.mktemp("run"), damaged, sound)
     found = []
     with contextlib.suppress(StoreError):
-        found += [record for _, record in any_records(folder)]
+        found += [record for _, record in RecordLines(folder)]
     assert len(found) in (0, 2)
     json.dumps([record.fields() for record in found], ensure_ascii=False).encode()
 
@@ -91,15 +91,15 @@ def test_only_what_a_kill_cut_short_is_passed_over(tmp_path: Path, name: str) ->
     with (folder / "records.jsonl").open("ab") as file:
         file.write(DAMAGED[name][0])
     with pytest.raises(StoreError, match=r"records\.jsonl:2"):
-        list(any_records(folder))
+        list(RecordLines(folder))
 
 
 def test_a_line_without_end_is_refused_and_not_taken_for_a_cut_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(lines, "_LONGEST_LINE_BYTES", 3000)
+    monkeypatch.setattr(files, "_LONGEST_LINE_BYTES", 3000)
     folder = folder_with(tmp_path, lines_before()[0], b'"' + b"x" * 5000, lines_before()[0])
-    found = any_records(folder)
+    found = RecordLines(folder)
     with pytest.raises(StoreError, match=r"records\.jsonl:2: is not a record: longer than"):
         list(found)
     assert not found.is_cut
@@ -109,7 +109,7 @@ def test_a_line_without_end_is_refused_and_not_taken_for_a_cut_one(
 def test_what_is_no_file_is_refused(tmp_path: Path, make: Callable[[Path], None]) -> None:
     make(tmp_path / "records.jsonl")
     with pytest.raises(StoreError, match=r"is not a regular file|Is a directory"):
-        list(any_records(tmp_path))
+        list(RecordLines(tmp_path))
 
 
 def test_text_that_no_output_could_hold_is_read_without_it(tmp_path: Path) -> None:
@@ -125,7 +125,7 @@ def test_lines_that_end_as_on_other_systems_are_read(tmp_path: Path) -> None:
 
 def test_a_sample_is_taken_from_its_last_line(tmp_path: Path) -> None:
     first, last = lines_before()[0], with_value("reply.text", "later")
-    records = any_records(folder_with(tmp_path, first, last))
+    records = RecordLines(folder_with(tmp_path, first, last))
     starts = newest_starts(records)
     assert list(starts.values()) == [len(first) + 1]
     (newest,) = records.at(starts.values())

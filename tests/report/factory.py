@@ -11,8 +11,8 @@ import yaml
 from hypothesis import settings
 from hypothesis import strategies as st
 
-from phyblock.records import Manifest
-from phyblock.records.known import known_records
+from phyblock.records.files import known_records
+from phyblock.records.manifest import Manifest
 from phyblock.report import Run, read_design
 from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES
 from phyblock.tables.load import Frames, frames_of

@@ -6,7 +6,7 @@ import pandas as pd
 from hypothesis import given
 
 from phyblock.cli.tally import Tally
-from phyblock.records.known import known_records
+from phyblock.records.files import known_records
 from phyblock.report import coverage_frame
 from phyblock.run.standing import Summary
 from phyblock.tables.coverage import coverage_view

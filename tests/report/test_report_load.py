@@ -139,7 +139,7 @@ def test_a_run_without_records_is_empty(tmp_path: Path) -> None:
         ('{"sample": "x', ":14", ""),
         ("\0\0\0", ":1", ""),
         ("[1, 2]", "", ""),
-        ("{}", "", "sample"),
+        ("{}", "", "track"),
         (json.dumps(record() | {"seed": "first"}), "", "seed"),
         (json.dumps(record() | {"scores": [{"criterion": "aov"}]}), "", "scores[0].setting"),
         (json.dumps(record() | {"scores": [7]}), "", "scores[0]"),

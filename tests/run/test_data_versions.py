@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from phyblock.data import UNNUMBERED, VERSION_FILE, read_version
 from phyblock.errors import DataError, SpecError
-from phyblock.records import read_manifest
+from phyblock.records.manifest import read_manifest
 from phyblock.report.alike import check_alike
 from phyblock.report.compare import compare_runs
 from phyblock.tables.load import load_run

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from aiohttp import web
 
-from phyblock.records import STOPPED, read_stopped
+from phyblock.records.files import STOPPED, read_stopped
 from tests.servers.chassis import ISSUE_MIX, Faults, Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Raw, Workspace

@@ -12,7 +12,9 @@ from aiohttp import web
 
 from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
-from phyblock.records import STOPPED, Line, Record
+from phyblock.records.files import STOPPED
+from phyblock.records.line import Line
+from phyblock.records.record import Record
 from phyblock.run.appending import AppendFile
 from phyblock.run.events import RunEvent, SampleDone, Stopping
 from phyblock.run.execute import Cause

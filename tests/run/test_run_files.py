@@ -17,8 +17,8 @@ from phyblock.config.models import ModelConfig
 from phyblock.config.suite import load_suite
 from phyblock.errors import StoreError
 from phyblock.models import Image, Message
-from phyblock.records import Manifest, PromptLines, TurnLines
-from phyblock.records.reading import collect_turns
+from phyblock.records.files import PromptLines, TurnLines, collect_turns
+from phyblock.records.manifest import Manifest
 from phyblock.run.appending import AppendFile
 from phyblock.run.plan import make_plan
 from phyblock.run.prompts import PromptFile, read_prompts
@@ -163,10 +163,9 @@ def test_a_prompt_is_kept_once_without_its_pictures(tmp_path: Path) -> None:
     messages = (Message("system", ("Be brief.",)), Message("user", (picture, "Which?")))
     path = tmp_path / "prompts.jsonl"
     for _ in range(2):
-        known = PromptLines(tmp_path)
-        list(known)
+        known = {line.sha256 for _, line in PromptLines(tmp_path)}
         file = AppendFile(path)
-        prompts = PromptFile(file, known.digests)
+        prompts = PromptFile(file, known)
         digests = {prompts.keep(messages) for _ in range(3)}
         file.close()
     (digest,) = digests

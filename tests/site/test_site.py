@@ -15,8 +15,8 @@ import pytest
 
 from phyblock.bundle import bundle_run
 from phyblock.errors import SpecError, StoreError
-from phyblock.records import Record
-from phyblock.records.known import known_records
+from phyblock.records.files import known_records
+from phyblock.records.record import Record
 from phyblock.report.html.ranked import rank_texts
 from phyblock.report.html.sources import Sources
 from phyblock.site import write as site_write

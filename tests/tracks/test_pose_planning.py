@@ -21,7 +21,7 @@ from phyblock.errors import InputError, StoreError
 from phyblock.models.base import Image as SentPicture
 from phyblock.parsing.poses import pose_form
 from phyblock.parsing.text import READER_VERSION
-from phyblock.records.known import known_records
+from phyblock.records.files import known_records
 from phyblock.resources import bundled
 from phyblock.run.records import begun, judged
 from phyblock.run.rescore import rescore

@@ -33,8 +33,7 @@ from phyblock.domain.scene import Block, CandidateSet, Scene
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.making.checks import LEVEL_LIMITS, OURS_IN_HASTE, CheckName, SceneFacts, findings_of
 from phyblock.making.scenes.sketch import Palette, scene_of
-from phyblock.records import Line
-from phyblock.records.line import validated
+from phyblock.records.line import Line, validated
 
 _GEOMETRY: tuple[CheckName, ...] = ("overlap", "floating", "order", "candidates")
 _STANDING: tuple[CheckName, ...] = ("unstable step", "unstable")

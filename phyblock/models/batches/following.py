@@ -15,7 +15,7 @@ from phyblock.models.batches.results import Results
 from phyblock.models.batches.sending import Sender
 from phyblock.models.events import Tell
 from phyblock.models.retry import RetryPolicy
-from phyblock.records import BATCHES
+from phyblock.records.files import BATCHES
 
 __all__ = ["Follower"]
 

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from phyblock.files import writing
 from phyblock.models.batches.results import Results
-from phyblock.records.others import BatchEvent, BatchLine
+from phyblock.records.record import BatchEvent, BatchLine
 
 __all__ = ["Batch", "BatchFiles", "Ledger", "new_token", "remove_unfinished", "under_way"]
 

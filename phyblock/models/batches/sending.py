@@ -22,7 +22,7 @@ from phyblock.models.batches.results import Results, custom_id
 from phyblock.models.batches.wording import Written
 from phyblock.models.events import Tell
 from phyblock.models.retry import RetryPolicy, with_retries
-from phyblock.records import BATCHES
+from phyblock.records.files import BATCHES
 from phyblock.text import counted
 
 __all__ = ["Draft", "Sender", "UnsureError"]

@@ -10,7 +10,7 @@ from phyblock.models.batches.choice import batch_protocol
 from phyblock.models.batches.ledger import Batch, BatchFiles, Ledger
 from phyblock.models.batches.results import Results
 from phyblock.models.http_client import Answer
-from phyblock.records.others import BatchLine
+from phyblock.records.record import BatchLine
 
 __all__ = ["waiting_keys"]
 

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from phyblock.records import PromptMessage, Record, Reply
-from phyblock.records import Score as StoredScore
+from phyblock.records.record import PromptMessage, Record
+from phyblock.records.record import Score as StoredScore
+from phyblock.records.reply import Reply
 from phyblock.report.export.rows import newest_records, prompt_text
 from phyblock.resources import needs
 from phyblock.run.prompts import read_prompts

@@ -6,9 +6,8 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from phyblock.records import PictureMark, PromptMessage, Record
-from phyblock.records.known import record_types
-from phyblock.records.reading import read_records
+from phyblock.records.files import read_records, record_types
+from phyblock.records.record import PictureMark, PromptMessage, Record
 from phyblock.run.prompts import read_prompts
 from phyblock.tables.load import Run
 from phyblock.tracks.estimates import numbers_of, stored_counts

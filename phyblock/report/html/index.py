@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from phyblock.records import Record
-from phyblock.records.reading import run_records
+from phyblock.records.files import run_records
+from phyblock.records.record import Record
 from phyblock.tables.design import Design
 from phyblock.tables.listing import Listing
 from phyblock.tracks.kind import kind_of, kinds

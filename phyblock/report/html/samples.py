@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from phyblock.data import AssemblyTask
-from phyblock.records import PromptLines, Record, Score, SentPrompt
-from phyblock.records.reading import any_records
+from phyblock.records.files import PromptLines, RecordLines
+from phyblock.records.record import Record, Score, SentPrompt
 from phyblock.report.html.index import Item, Place, SampleIndex
 from phyblock.report.html.pack import Pack
 from phyblock.sim.pictures import PictureStyle
@@ -99,7 +99,7 @@ def items_shown(
 
 
 def _records(folder: Path, places: Iterable[Place]) -> Iterable[Record]:
-    return any_records(folder).at(place.start for place in places)
+    return RecordLines(folder).at(place.start for place in places)
 
 
 def _entry(

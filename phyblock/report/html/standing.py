@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from phyblock.records import read_stopped
+from phyblock.records.files import read_stopped
 from phyblock.tables.coverage import coverage_frame
 from phyblock.tables.load import Run
 from phyblock.tables.outcomes import WITHOUT_REPLY

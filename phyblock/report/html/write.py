@@ -13,7 +13,8 @@ from typing import Any
 
 from phyblock.data import AssemblyTask
 from phyblock.files import OutFolder, writing
-from phyblock.records import MANIFEST, PROMPTS, RECORDS, STOPPED
+from phyblock.records.files import PROMPTS, RECORDS, STOPPED
+from phyblock.records.manifest import MANIFEST
 from phyblock.report.figures import figure_titles, write_figures
 from phyblock.report.html.headline import headlines
 from phyblock.report.html.index import Item, Place, SampleIndex, read_places

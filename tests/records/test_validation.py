@@ -11,33 +11,25 @@ from typing import Any
 import pytest
 
 from phyblock.errors import StoreError
-from phyblock.records import Belonging, Manifest, Turn
-from phyblock.records.known import known_records
+from phyblock.records.files import Validation, known_records
+from phyblock.records.manifest import Manifest
+from phyblock.records.record import Turn
 from phyblock.report import load_run
 from phyblock.run.rescore import rescore
 from tests.records.damage import Raw, plan_record
 from tests.workspace import Workspace
 
 IDENTITY = "5eed" * 16
-PROMPT = plan_record()["prompt"]
 
 
 def facts(**changes: Any) -> Manifest:
-    """The manifest of the run that `plan_record` belongs to."""
-    record = plan_record()
-    version = record["prompt"]["version"]
-    fields = {
-        "identity": IDENTITY,
-        "suite": {"tracks": ["full_planning"], "seeds": [0, 1]},
-        "models": [{"name": "random"}],
-        "tracks": {"full_planning": {"prompt": {"name": "default", "version": version}}},
-    }
-    return Manifest.model_validate({**fields, **changes})
+    """The manifest of the run that `plan_record` is of."""
+    return Manifest.model_validate({"identity": IDENTITY, **changes})
 
 
-def differs(belonging: Belonging, record: Raw) -> str | None:
+def differs(validation: Validation, record: Raw) -> str | None:
     """The field that shows that a record is of another run."""
-    problem = belonging.problem("records.jsonl:7", known_records().validate_python(record))
+    problem = validation.problem("records.jsonl:7", known_records().validate_python(record))
     if problem is None:
         return None
     assert problem.where == "records.jsonl:7"
@@ -51,55 +43,37 @@ def renamed(**changes: Any) -> Raw:
     return {**record, "sample": "/".join(parts)}
 
 
-def test_a_run_takes_its_own_records_old_and_new_and_those_scored_again() -> None:
-    old, new = plan_record(), {**plan_record(), "run": IDENTITY[:16]}
-    samples = {old["sample"]}
+def test_a_run_takes_its_own_records_and_those_scored_elsewhere() -> None:
+    plain, signed = plan_record(), {**plan_record(), "run": IDENTITY[:16]}
+    samples = {plain["sample"]}
     for identity in (IDENTITY, f"{IDENTITY} scored by official, paper"):
-        for record in (old, new):
-            assert differs(Belonging.of(facts(identity=identity), samples), record) is None
+        for record in (plain, signed):
+            assert differs(Validation(facts(identity=identity), samples), record) is None
 
 
 @pytest.mark.parametrize(
     ("record", "field"),
     [
         ({**plan_record(), "run": "0" * 16}, "run"),
-        (renamed(model="oracle"), "model"),
-        (renamed(seed=2), "seed"),
-        (renamed(seed=1), "sample"),
+        (renamed(model="oracle"), "sample"),
+        (renamed(seed=2), "sample"),
         (renamed(key="another"), "sample"),
+        (renamed(track="pose_planning") | {"track": "full_planning"}, "sample"),
         ({**plan_record(), "seed": 1}, "sample"),
-        (
-            {**plan_record(), "prompt": PROMPT | {"version": "0"}},
-            "prompt.version",
-        ),
+        ({**plan_record(), "model": "oracle"}, "sample"),
     ],
 )
 def test_a_foreign_record_is_known_by_what_differs(record: Raw, field: str) -> None:
-    assert differs(Belonging.of(facts(), {plan_record()["sample"]}), record) == field
-
-
-def test_a_track_that_was_not_asked_is_foreign() -> None:
-    suite = {"tracks": ["vqa"], "seeds": [0]}
-    assert differs(Belonging.of(facts(suite=suite)), plan_record()) == "track"
-
-
-def test_older_records_of_one_item_show_the_same_pictures() -> None:
-    models = [{"name": name} for name in ("random", "oracle")]
-    belonging = Belonging.of(facts(models=models))
-    assert differs(belonging, plan_record()) is None
-    other = renamed(model="oracle")
-    assert differs(belonging, other) is None
-    other["prompt"]["images"][0]["sha256"] = "0" * 64
-    assert differs(belonging, other) == "prompt.images"
+    assert differs(Validation(facts(), {plan_record()["sample"]}), record) == field
 
 
 def test_a_turn_of_another_run_is_foreign() -> None:
     reply = {"text": "", "usage": {"prompt_tokens": 1, "completion_tokens": 1}}
     fields = {"sample": "s", "turn": 0, "reply": {**reply, "cost_usd": None, "cached": False}}
-    belonging = Belonging.of(facts(), {"s"})
-    assert belonging.problem("turns.jsonl:1", Turn.model_validate(fields)) is None
+    validation = Validation(facts(), {"s"})
+    assert validation.problem("turns.jsonl:1", Turn.model_validate(fields)) is None
     for changes in ({"sample": "t"}, {"run": "0" * 16}):
-        problem = belonging.problem("turns.jsonl:1", Turn.model_validate({**fields, **changes}))
+        problem = validation.problem("turns.jsonl:1", Turn.model_validate({**fields, **changes}))
         assert problem is not None
         assert problem.field in changes
 

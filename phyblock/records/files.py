@@ -1,0 +1,296 @@
+"""The files of JSON lines in a run folder, read one line at a time and within bounds.
+
+They only ever grow: a later record of a sample replaces an earlier one, and a last line that a kill
+cut short is not there. Every other line that is not what its file holds, or is not of the run that
+it should be of, is an error that names file, line and field.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import operator
+from collections.abc import Collection, Container, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
+
+from pydantic import Field, TypeAdapter, ValidationError, create_model
+
+from phyblock.errors import Problem, StoreError, reason_of
+from phyblock.files import NotRegularError, open_regular, read_bytes
+from phyblock.records.line import Line, decode, problems_of
+from phyblock.records.manifest import Manifest, read_manifest
+from phyblock.records.record import BatchLine, Prompt, Record, Stopped, Turn
+from phyblock.records.reply import Reply
+from phyblock.registry import known_tracks
+
+RECORDS = "records.jsonl"
+TURNS = "turns.jsonl"
+PROMPTS = "prompts.jsonl"
+BATCHES = "batches.jsonl"
+STOPPED = "stopped.json"
+_LONGEST_LINE_BYTES = 256 * 1024 * 1024
+LineT = TypeVar("LineT", bound=Line)
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Shows that records and turns are those of a run, by its digest and their names.
+
+    `samples` are all ids of the run, where its plan is known.
+    """
+
+    manifest: Manifest
+    samples: Collection[str] | None = None
+
+    def problem(self, where: str, line: Line) -> Problem | None:
+        """Return what shows that a record or turn is of another run, or None."""
+        if not isinstance(line, Record | Turn):
+            return None
+        field, found, allowed = "sample", line.sample, line.sample
+        if line.run not in ("", self.manifest.run):
+            field, found, allowed = "run", line.run, self.manifest.run
+        elif isinstance(line, Record) and found != line.named:
+            allowed = line.named
+        elif self.samples is None or found in self.samples:
+            return None
+        else:
+            allowed = "a sample of the suite as it is run"
+        hint = (
+            "records of different runs are never counted together: take out the lines that are not "
+            "of this run, or restore the file from a copy; nothing was changed"
+        )
+        return Problem(where, "is of another run", field, found, allowed, hint)
+
+
+class Lines(Generic[LineT]):
+    """Every line of a file with where it stands, one at a time, oldest first.
+
+    A last line without its newline counts all the same when it is whole; else, as a kill leaves it
+    behind, it ends the iteration: `is_cut` is then set. `lacks_newline` says that the last one
+    needs one. `whole_bytes` is the size of the lines passed so far, `start_bytes` where the last of
+    them begins.
+    """
+
+    file: ClassVar[str]
+    noun: ClassVar[str]
+    hint: ClassVar[str]
+    skip: ClassVar[int] = 0
+    """Parts of a place in a line that name the model by which it was read."""
+
+    def __init__(
+        self, folder: Path, adapter: TypeAdapter[LineT], validation: Validation | None = None
+    ) -> None:
+        """Without a `validation` lines of any run are taken."""
+        self.path = folder / self.file
+        self.is_cut = False
+        self.lacks_newline = False
+        self.start_bytes = 0
+        self.whole_bytes = 0
+        self._adapter = adapter
+        self._validation = validation
+
+    def __iter__(self) -> Iterator[tuple[str, LineT]]:
+        self.whole_bytes = 0
+        try:
+            with open_regular(self.path) as file:
+                number = 0
+                while data := file.readline(_LONGEST_LINE_BYTES + 1):
+                    number += 1
+                    where = f"{self.path}:{number}"
+                    self.lacks_newline = not data.endswith(b"\n")
+                    if self.lacks_newline and _is_cut(data):
+                        self.is_cut = True
+                        return
+                    line = self._read(where, data)
+                    problem = self._validation and self._validation.problem(where, line)
+                    if problem:
+                        raise StoreError(problem)
+                    self.start_bytes = self.whole_bytes
+                    self.whole_bytes += len(data)
+                    yield where, line
+        except FileNotFoundError:
+            return
+        except OSError as error:
+            raise StoreError(
+                Problem(str(self.path), f"cannot be read: {error.strerror}")
+            ) from error
+        except NotRegularError as error:
+            raise StoreError(Problem(str(self.path), str(error))) from error
+
+    def at(self, starts: Iterable[int]) -> Iterator[LineT]:
+        """Yield the lines that begin at these places [bytes], which were passed before."""
+        if self.path.exists():
+            with open_regular(self.path) as file:
+                for start in starts:
+                    file.seek(start)
+                    yield self._read(f"{self.path} (byte {start})", file.readline())
+
+    def _read(self, where: str, data: bytes) -> LineT:
+        is_not = f"is not a {self.noun}"
+        if len(data) > _LONGEST_LINE_BYTES:
+            message = f"{is_not}: longer than {_LONGEST_LINE_BYTES // 1024**2} MB"
+            raise StoreError(Problem(where, message, hint=self.hint))
+        try:
+            read: LineT = decode(self._adapter, data)
+        except json.JSONDecodeError as error:
+            problem = Problem(f"{where}:{error.colno}", f"{is_not}: {error.msg}", hint=self.hint)
+            raise StoreError(problem) from error
+        except UnicodeDecodeError as error:
+            raise StoreError(Problem(where, f"{is_not}: not UTF-8", hint=self.hint)) from error
+        except ValidationError as error:
+            problems = problems_of(error, where, Record, is_not, self.hint, self.skip)
+            raise StoreError(next(problems)) from error
+        except ValueError as error:
+            raise StoreError(Problem(where, f"{is_not}: it {error}", hint=self.hint)) from error
+        return read
+
+
+def _is_cut(line: bytes) -> bool:
+    """True if a line is no JSON, as one that a kill cut short; one out of bounds is whole."""
+    try:
+        if len(line) <= _LONGEST_LINE_BYTES:
+            json.loads(line)
+    except (json.JSONDecodeError, UnicodeDecodeError):
+        return True
+    except (ValueError, RecursionError):
+        return False
+    return False
+
+
+class RecordLines(Lines[Record]):
+    """The records of a run folder, each read by the model of its track."""
+
+    file = RECORDS
+    noun = "record"
+    hint = "restore the file from a copy, or remove this line: its sample is then run again"
+    skip = 1
+
+    def __init__(self, folder: Path, validation: Validation | None = None) -> None:
+        super().__init__(folder, known_records(), validation)
+
+
+class TurnLines(Lines[Turn]):
+    """The answered turns of a run folder's episodes, finished or not."""
+
+    file = TURNS
+    noun = "turn"
+    hint = (
+        "restore the file from a copy, or remove this line and those of the same sample below it: "
+        "these turns are then asked again"
+    )
+
+    def __init__(self, folder: Path, validation: Validation | None = None) -> None:
+        super().__init__(folder, TypeAdapter(Turn), validation)
+
+
+class PromptLines(Lines[Prompt]):
+    """The prompts of a run folder."""
+
+    file = PROMPTS
+    noun = "prompt"
+    hint = "remove this line: reports then show the sample without its prompt"
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder, TypeAdapter(Prompt))
+
+
+class BatchLines(Lines[BatchLine]):
+    """The history of the batches of a run."""
+
+    file = BATCHES
+    noun = "line about a batch"
+    hint = (
+        "restore the file from a copy, or remove all lines of the same batch: its questions are "
+        "then asked again"
+    )
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder, TypeAdapter(BatchLine))
+
+
+def record_types() -> tuple[type[Record], ...]:
+    """Return the model of every track's records; plain for a track that adds nothing of its own."""
+    kinds = known_tracks().values()
+    return tuple(kind.record if kind.record is not None else _plain(kind.name) for kind in kinds)
+
+
+def known_records() -> TypeAdapter[Record]:
+    """Return what reads a record by the model of its track."""
+    return _adapter(record_types())
+
+
+@functools.cache
+def _adapter(types: tuple[type[Record], ...]) -> TypeAdapter[Record]:
+    union: Any = functools.reduce(operator.or_, types)
+    return TypeAdapter(Annotated[union, Field(discriminator="track")])
+
+
+@functools.cache
+def _plain(track: str) -> type[Record]:
+    tag: Any = Literal[track]
+    return create_model("Record", __base__=Record, track=(tag, ...))
+
+
+def run_records(
+    folder: Path, manifest: Manifest | None = None, samples: Collection[str] | None = None
+) -> RecordLines:
+    """Return the records of a run folder; any that are not the run's own are a StoreError.
+
+    `manifest` is that of the folder, read where it is not given; `samples` are the ids of its
+    plan, where that is known.
+    """
+    return RecordLines(folder, Validation(manifest or read_manifest(folder), samples))
+
+
+def read_records(folder: Path, manifest: Manifest | None = None) -> Iterator[Record]:
+    """Yield the newest record of every sample, in order of first appearance, one at a time.
+
+    Raises StoreError for a line that is no record of the run before the first is given.
+    """
+    lines = run_records(folder, manifest)
+    return lines.at(newest_starts(lines).values())
+
+
+def newest_starts(lines: RecordLines, tracks: Collection[str] | None = None) -> dict[str, int]:
+    """Return where the newest record of every sample begins [bytes], in order of appearance.
+
+    Only samples of `tracks` are taken, of all where it is None.
+    """
+    starts: dict[str, int] = {}
+    for _, record in lines:
+        if tracks is None or record.track in tracks:
+            starts[record.sample] = lines.start_bytes
+    return starts
+
+
+def collect_turns(
+    lines: Iterable[tuple[str, Turn]], without: Container[str] = ()
+) -> dict[str, list[Reply]]:
+    """Return the replies of every episode that has begun, by sample id, in order of its turns.
+
+    Samples `without` are left out. Raises StoreError where a turn is missing.
+    """
+    by_sample: dict[str, dict[int, Reply]] = {}
+    for where, line in lines:
+        if line.sample in without:
+            continue
+        turns = by_sample.setdefault(line.sample, {})
+        if not 0 <= line.turn <= len(turns):
+            message = f"is turn {line.turn} of a sample of which {len(turns)} turns are there"
+            raise StoreError(Problem(where, message, "turn", hint=TurnLines.hint))
+        turns[line.turn] = line.reply
+    return {sample: [turns[n] for n in sorted(turns)] for sample, turns in by_sample.items()}
+
+
+def read_stopped(folder: Path) -> Stopped:
+    """Return what stopped a run: nothing where it was not stopped."""
+    path = folder / STOPPED
+    try:
+        return Stopped.model_validate_json(read_bytes(path))
+    except FileNotFoundError:
+        return Stopped()
+    except (OSError, ValueError) as error:
+        message, hint = f"cannot be read: {reason_of(error)}", "remove it: it is made again"
+        raise StoreError(Problem(str(path), message, hint=hint)) from error
