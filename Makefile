@@ -17,7 +17,7 @@ KILLS ?= 36
 
 $(RUNS): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; \
-	  sys.exit(0 if v >= (3, 10) else "phyblock needs Python 3.10 or newer, found %d.%d: make PYTHON=python3.13" % v)'
+	  sys.exit(0 if v >= (3, 11) else "phyblock needs Python 3.11 or newer, found %d.%d: make PYTHON=python3.13" % v)'
 	$(PYTHON) -m venv $(VENV)
 	$(PIP) --require-hashes --requirement requirements.lock
 	$(PIP) --no-deps --editable .
@@ -54,7 +54,7 @@ docs: $(TESTS)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
 	$(BIN)/python -m pytest -n 2 -q -m '' tests/docs
 
-LOCK := $(BIN)/uv pip compile pyproject.toml --universal --python-version 3.10 \
+LOCK := $(BIN)/uv pip compile pyproject.toml --universal --python-version 3.11 \
 	  --generate-hashes --no-emit-index-url --no-emit-find-links --no-annotate --no-header --quiet
 
 lock: $(TESTS)

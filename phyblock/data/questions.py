@@ -8,10 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, StrictInt, Tag
-from typing_extensions import Self
 
 from phyblock.data.base import Dataset, QuestionSet, QuestionTask, read_lines, read_text
 from phyblock.data.scenes import (

@@ -10,7 +10,7 @@ import functools
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import (
     AliasChoices,
@@ -18,7 +18,6 @@ from pydantic import (
     StrictInt,
     WithJsonSchema,
 )
-from typing_extensions import Self
 
 from phyblock.data.base import AssemblyTask, Dataset, read_lines, read_text
 from phyblock.domain.aov import AOVGraph, CycleError

@@ -102,7 +102,7 @@ class HttpClient:
         exchange = self._exchange(method, url, body, headers, tls, progress, sink)
         try:
             return await asyncio.wait_for(exchange, self._timeout_s)
-        except asyncio.TimeoutError:
+        except TimeoutError:
             within = f"within {self._timeout_s:g} s"
             if progress.has_begun:
                 raise RetryableError(f"no whole answer {within}", sent="maybe") from None

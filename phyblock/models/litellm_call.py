@@ -70,7 +70,7 @@ class LitellmTransport(GuardedTransport):
             return read_completion(_plain(response), latency_s, exchange.answered().status)
         except ModelError:
             raise
-        except asyncio.TimeoutError:
+        except TimeoutError:
             raise RetryableError("no answer in time") from None
         except Exception as error:
             raise self._failure(call, error, exchange) from None

@@ -6,7 +6,7 @@ import email.utils
 import math
 import re
 from collections.abc import Mapping
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from typing import Any
 
 from phyblock.errors import (
@@ -146,8 +146,8 @@ def _until(date: str) -> float | None:
         then = email.utils.parsedate_to_datetime(date)
     except (ValueError, OverflowError):
         return None
-    then = then if then.tzinfo else then.replace(tzinfo=timezone.utc)
-    return max(0.0, (then - datetime.now(timezone.utc)).total_seconds())
+    then = then if then.tzinfo else then.replace(tzinfo=UTC)
+    return max(0.0, (then - datetime.now(UTC)).total_seconds())
 
 
 def _error_in_success(answer: Answer, text: str, wish_s: float | None) -> ModelError:

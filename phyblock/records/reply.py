@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, TypeVar
-
-from typing_extensions import Self
+from typing import Literal, Self, TypeVar
 
 from phyblock.records.line import LARGEST_WHOLE, Amount, Line, Usd, Whole, encodable
 from phyblock.types import Finish

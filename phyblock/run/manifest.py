@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import platform
 from collections.abc import Mapping, Sequence
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -46,7 +46,7 @@ def make_manifest(
     scenes = [task.scene for task in dataset.tasks]
     fields = {
         "identity": identity_of(inputs),
-        "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
         **inputs,
         "suite": suite.model_dump(mode="json"),
         "models": [

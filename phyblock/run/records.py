@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from typing import Any
 
 from phyblock.errors import ModelError, RefusedError, RetryableError, SampleError
@@ -39,7 +39,7 @@ def begun(
         "prompt": None,
         "parse": None,
         "scores": (),
-        "time": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        "time": datetime.now(UTC).isoformat(timespec="seconds"),
     }
 
 

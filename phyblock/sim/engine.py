@@ -199,7 +199,7 @@ ENGINES: Mapping[str, KnownEngine] = {
         "BulletEngine",
         "pybullet",
         "pybullet",
-        "PyBullet has wheels for Python 3.10 and 3.11 on Linux, x86-64",
+        "PyBullet has wheels for Python 3.11 on Linux, x86-64",
     ),
     "mujoco": KnownEngine(
         "phyblock.sim.mujoco",

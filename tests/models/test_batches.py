@@ -7,7 +7,7 @@ import itertools
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from datetime import datetime, timedelta, timezone
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -362,7 +362,7 @@ def test_an_answer_costs_what_the_day_of_its_sending_asked_for(disk: Disk) -> No
         assert isinstance(stopped, UnavailableError)
         assert disk.lines[0].most_usd
         assert not list(disk.folder.rglob("*.requests"))
-        sent = datetime.now(timezone.utc) - timedelta(days=1)
+        sent = datetime.now(UTC) - timedelta(days=1)
         time = sent.strftime("%Y-%m-%dT%H:%M:%SZ")
         disk.lines = [line.model_copy(update={"time": time}) for line in disk.lines]
         (reply,) = run_command(config, disk, requests_of(1))

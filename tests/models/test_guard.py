@@ -55,7 +55,7 @@ class Nested(GuardedTransport):
         MemoryError(),
         UnicodeDecodeError("utf-8", KEY.encode(), 0, 1, KEY),
         StopAsyncIteration(),
-        asyncio.TimeoutError(),
+        TimeoutError(),
     ],
     ids=lambda error: type(error).__name__,
 )

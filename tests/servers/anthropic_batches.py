@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from typing import Any
 
 from aiohttp import web
@@ -76,7 +76,7 @@ class AnthropicBatches(BatchServer, AnthropicMessages):
             name: kinds.count(name) for name in ("succeeded", "errored", "canceled", "expired")
         }
         counts["processing"] = len(made.requests) - sum(counts.values())
-        created = datetime.fromtimestamp(made.created_s, timezone.utc)
+        created = datetime.fromtimestamp(made.created_s, UTC)
         return {
             "id": made.id,
             "type": "message_batch",

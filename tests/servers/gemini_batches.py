@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from typing import Any
 
 from aiohttp import web
@@ -87,7 +87,7 @@ class GeminiBatches(BatchServer, GeminiGenerate):
     def told(self, made: Made) -> dict[str, Any]:
         state = _WORDS.get(made.state, made.state.upper())
         has_results = made.state in ("ended", "cancelled") and made.lines
-        created = datetime.fromtimestamp(made.created_s, timezone.utc).isoformat()
+        created = datetime.fromtimestamp(made.created_s, UTC).isoformat()
         output = {"responsesFile": f"files/out-{made.id}"}
         return {
             "name": f"batches/{made.id}",

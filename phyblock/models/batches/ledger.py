@@ -12,7 +12,7 @@ import re
 import secrets
 from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import dataclass, field
-from datetime import date, datetime, timezone
+from datetime import UTC, date, datetime
 from pathlib import Path
 
 from phyblock.files import writing
@@ -95,7 +95,7 @@ class Batch:
     def created(self) -> datetime:
         """When it was about to be sent, in UTC."""
         time = datetime.strptime(self.intent.time, "%Y-%m-%dT%H:%M:%SZ")
-        return time.replace(tzinfo=timezone.utc)
+        return time.replace(tzinfo=UTC)
 
     @property
     def created_s(self) -> float:
@@ -208,4 +208,4 @@ def under_way(lines: Iterable[BatchLine]) -> dict[str, str]:
 
 
 def _now() -> str:
-    return datetime.now(timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
+    return datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
