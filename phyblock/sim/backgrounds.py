@@ -146,7 +146,8 @@ def _to_floor(camera: Camera, size_px: int) -> tuple[NDArray[np.float32], NDArra
     """For each pixel the downward part of its ray, and its distance [m], 0 above the horizon."""
     down = -camera.ray_component(2, size_px)
     below = np.where(down > 1e-6, down, np.float32(np.inf))
-    return down, np.float32(camera.eye_m[2]) / below
+    distance: NDArray[np.float32] = np.divide(np.float32(camera.eye_m[2]), below)
+    return down, distance
 
 
 @dataclass(frozen=True)
@@ -192,7 +193,7 @@ def floor(background: Background, camera: Camera, size_px: int) -> NDArray[np.fl
         for axis in (0, 1)
     )
     wide = distance * np.float32(camera.width_m(1.0) / size_px)
-    footprint = wide / np.sqrt(np.maximum(down, np.float32(1e-6)))
+    footprint: NDArray[np.float32] = np.divide(wide, np.sqrt(np.maximum(down, np.float32(1e-6))))
     footprint[distance <= 0] = PERIOD_M
     return sample(background, x, y, footprint)
 
