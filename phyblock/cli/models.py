@@ -181,7 +181,9 @@ def _show_retiring(console: Console, configs: Sequence[ModelConfig]) -> None:
 
 
 def _config(name: str, known: dict[str, ModelConfig]) -> ModelConfig:
-    return to_config(name, known.get(name), Suite(name="models", models=(name,)))
+    return to_config(
+        name, known.get(name, ModelConfig(name=name)), Suite(name="models", models=(name,))
+    )
 
 
 def _row(name: str, config: ModelConfig) -> tuple[str, ...]:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import ipaddress
-import math
+import json
 import os
 import re
 import urllib.parse
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from datetime import date
 from itertools import pairwise
 from pathlib import Path
@@ -17,20 +16,16 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import (
     AfterValidator,
     BeforeValidator,
-    Discriminator,
     Field,
     JsonValue,
-    Tag,
     TypeAdapter,
     ValidationError,
     model_validator,
 )
 
 from phyblock.config.validation import (
-    MOST_HINTS,
     Count,
     Flag,
-    MaxTokens,
     ModelName,
     Section,
     Temperature,
@@ -39,17 +34,18 @@ from phyblock.config.validation import (
     Unique,
     check,
     check_unique,
-    find_secrets,
-    merge_problems,
+    joined,
     refuse,
 )
-from phyblock.config.yaml import YamlSource, expand, read_yaml, show, sort_problems
+from phyblock.config.yaml import YamlSource, expand, read_yaml, show
 from phyblock.errors import Problem, SpecError
 from phyblock.registry import baseline_names
+from phyblock.text import did_you_mean
 from phyblock.types import BATCH_PROVIDERS, ImageDetail, SendMode, TransportName
 
 Kind = Literal["litellm", "replay", "baseline", "human"]
-Effort = Literal["none", "minimal", "low", "medium", "high", "xhigh", "max"]
+Text = Annotated[str, Field(min_length=1)]
+UsdPerMillion = Annotated[float, Field(strict=True, ge=0, le=1e9, allow_inf_nan=False)]
 
 RECORDED = "recorded"
 """The word that stands for every folder of recorded replies."""
@@ -77,60 +73,39 @@ _DETAILS: Mapping[str, tuple[str, ...]] = {
     "anthropic": (),
 }
 """Values of `image_detail` by provider; of all others nothing is known."""
-_WITH_REPLAY = {"name", "groups", "replay", "published", "size_b"}
 _OWN_BODY = ("model", "messages", "n", "stream", "max_tokens", "max_completion_tokens")
 """Fields of a request's body that phyblock writes: others in their place would cost unforeseen."""
 
 
-@dataclass(frozen=True)
-class AddressFault:
-    """Why an address is refused, a way out, and whether a secret may stand in it."""
-
-    message: str
-    hint: str
-    may_hold_secret: bool
-
-
-def address_fault(url: str) -> AddressFault | None:
-    """Return why a model cannot be called at this address; None where it can.
+def address_fault(url: str) -> tuple[str, str] | None:
+    """Return why a model cannot be called at this address, and a way out; None where it can.
 
     An address stands in run folders, in the reply cache and in messages. So it may hold nothing
     that is worth hiding, and no fault of one is described by showing it.
     """
     scheme, mark, rest = url.partition("://")
     host = re.split(r"[/?#\\]", rest if mark else url, maxsplit=1)[0]
-    by_variable = "put the key alone into an environment variable and name that in api_key_env"
+    hint = "put the key alone into an environment variable and name that in api_key_env"
     if "@" in host:
-        return AddressFault("holds a user name or a password", by_variable, may_hold_secret=True)
+        return "holds a user name or a password", hint
     if "?" in url or "#" in url:
-        message = "holds a query or a fragment, where keys are often written"
-        return AddressFault(message, by_variable, may_hold_secret=True)
+        return "holds a query or a fragment, where keys are often written", hint
+    hint = "for example http://localhost:8000/v1"
     if not mark or scheme.lower() not in ("http", "https"):
-        message = "is not the address of a server"
-    elif len(url) > 1_000 or "\\" in url or any(not "!" <= c <= "~" for c in rest[len(host) :]):
-        message = "is too long, or holds characters that must be escaped in an address"
-    elif not _is_host(host):
-        message = "names no host, or one that cannot be read"
-    else:
-        return None
-    example = "for example http://localhost:8000/v1"
-    return AddressFault(message, example, may_hold_secret="@" in url)
-
-
-def _is_host(host: str) -> bool:
-    """True if `host` is a name or an IP address, with or without a port."""
-    if any(character.isspace() or not character.isprintable() for character in host):
-        return False
+        return "is not the address of a server", hint
+    if len(url) > 1_000 or "\\" in url or any(not "!" <= c <= "~" for c in rest[len(host) :]):
+        return "is too long, or holds characters that must be escaped in an address", hint
     try:
         parts = urllib.parse.urlsplit(f"//{host}")
         name = parts.hostname or ""
-        if parts.port == 0:
-            return False
-        if host.startswith("[") or ":" in name:
-            return ipaddress.ip_address(name.partition("%")[0]).version == 6
-        return len(name.encode("idna")) > 0
-    except ValueError:  # UnicodeError, of a label that is empty or too long, is one
-        return False
+        is_host = parts.port != 0 and host.isprintable() and not re.search(r"\s", host)
+        if ":" in name or host.startswith("["):
+            is_host &= bool(ipaddress.IPv6Address(name.partition("%")[0]))
+        else:
+            is_host &= bool(name.encode("idna"))
+    except ValueError:
+        is_host = False
+    return None if is_host else ("names no host, or one that cannot be read", hint)
 
 
 def host_of(url: str) -> str:
@@ -146,51 +121,56 @@ def host_of(url: str) -> str:
     return shown if port is None else f"{shown}:{port}"
 
 
-UsdPerMillion = Annotated[float, Field(strict=True, ge=0, le=1e9, allow_inf_nan=False)]
+def _one_or_list(value: object) -> object:
+    if value == []:
+        raise refuse("is empty", allowed="at least one")
+    return () if value is None else value if isinstance(value, list | tuple) else (value,)
 
 
-def _read_day(value: object) -> date:
-    if isinstance(value, date):
-        return value
+def _say_one_or_list(schema: dict[str, Any]) -> None:
+    """Say in a JSON Schema that one item may stand without brackets."""
+    several = {key: schema.pop(key) for key in ("type", "items", "uniqueItems") if key in schema}
+    schema.pop("default", None)
+    schema["anyOf"] = [several["items"], {**several, "minItems": 1}, {"type": "null"}]
+
+
+def _check_day(value: object) -> date:
     try:
         if isinstance(value, str) and re.fullmatch(r"\d{4}-\d\d-\d\d", value):
             return date.fromisoformat(value)
     except ValueError:
         pass
+    if isinstance(value, date):
+        return value
     raise refuse("is no day", allowed="a day such as 2026-12-01")
 
 
 class BatchRateSpec(Section):
     """What tokens cost in the provider's batches."""
 
-    input: UsdPerMillion = Field(description="Prompt tokens [USD per million].")
-    output: UsdPerMillion = Field(description="Reply tokens [USD per million].")
-    cached: UsdPerMillion | None = Field(
-        default=None,
-        description="Prompt tokens that the provider has in its cache [USD per million]; null: as "
-        "the others.",
-    )
-    cache_write: UsdPerMillion | None = Field(
-        default=None,
-        description="Prompt tokens that it puts into its cache [USD per million]; null: as the "
-        "others.",
-    )
+    input: UsdPerMillion
+    """Prompt tokens [USD per million]."""
+    output: UsdPerMillion
+    """Reply tokens [USD per million]."""
+    cached: UsdPerMillion | None = None
+    """Prompt tokens that the provider has in its cache [USD per million]; null: as the others."""
+    cache_write: UsdPerMillion | None = None
+    """Prompt tokens that it puts into its cache [USD per million]; null: as the others."""
 
 
 class RateSpec(BatchRateSpec):
     """What tokens cost."""
 
-    batch: BatchRateSpec | None = Field(
-        default=None,
-        description="What they cost in batches; null: half at OpenAI's, Anthropic's and Google's "
-        "own addresses, and at others as outside of batches.",
-    )
+    batch: BatchRateSpec | None = None
+    """What they cost in batches; null: half at OpenAI's, Anthropic's and Google's own addresses,
+    and at others as outside of batches."""
 
 
 class TierSpec(RateSpec):
     """What tokens cost in calls with long prompts."""
 
-    above: Count = Field(description="Prompts of more tokens than this.")
+    above: Count
+    """Prompts of more tokens than this."""
 
 
 def _check_rising(tiers: tuple[TierSpec, ...]) -> tuple[TierSpec, ...]:
@@ -204,15 +184,11 @@ def _check_rising(tiers: tuple[TierSpec, ...]) -> tuple[TierSpec, ...]:
 class PriceSpec(RateSpec):
     """What a model costs, where litellm's price map does not know it or is wrong."""
 
-    since: Annotated[date, BeforeValidator(_read_day)] | None = Field(
-        default=None,
-        alias="from",
-        description="Day from which this holds (UTC). Before the first one that is named, "
-        "litellm's price map does.",
-    )
-    tiers: Annotated[tuple[TierSpec, ...], AfterValidator(_check_rising)] = Field(
-        default=(), description="Other prices of calls with long prompts, by rising `above`."
-    )
+    since: Annotated[date, BeforeValidator(_check_day)] | None = Field(default=None, alias="from")
+    """Day from which this holds (UTC). Before the first one that is named, litellm's price map
+    does."""
+    tiers: Annotated[tuple[TierSpec, ...], AfterValidator(_check_rising)] = ()
+    """Other prices of calls with long prompts, by rising `above`."""
 
 
 def _check_days(prices: tuple[PriceSpec, ...]) -> tuple[PriceSpec, ...]:
@@ -224,16 +200,6 @@ def _check_days(prices: tuple[PriceSpec, ...]) -> tuple[PriceSpec, ...]:
             message, allowed = "is not later than the one before it", f"a day after {price.since}"
             raise refuse(message, at=(index, "from"), allowed=allowed)
     return prices
-
-
-PriceSpecs = Annotated[
-    Annotated[PriceSpec, Tag("one")]
-    | Annotated[
-        tuple[PriceSpec, ...], Field(min_length=1), AfterValidator(_check_days), Tag("list")
-    ],
-    Discriminator(lambda value: "list" if isinstance(value, list | tuple) else "one"),
-]
-"""One price, or several that follow on one another."""
 
 
 def _check_id(model_id: str) -> str:
@@ -248,32 +214,10 @@ def _check_id(model_id: str) -> str:
 
 
 def _check_address(url: str) -> str:
-    fault = address_fault(url)
-    if fault is None:
+    if (fault := address_fault(url)) is None:
         return url
     allowed = "http://... or https://..., without user, password, query and fragment"
-    raise refuse(fault.message, allowed=allowed, hint=fault.hint, hides=fault.may_hold_secret)
-
-
-def _as_list(value: object) -> object:
-    if value == []:
-        raise refuse("is empty", allowed="at least one address")
-    if value is None or isinstance(value, str):
-        return () if value is None else (value,)
-    if isinstance(value, list | tuple):
-        return value
-    raise refuse("has the wrong type", allowed="text, the address of a server, or a list of them")
-
-
-Address = Annotated[str, AfterValidator(_check_address)]
-
-
-def _either(schema: dict[str, Any]) -> None:
-    """Say in the schema that one address may stand without brackets."""
-    one = {"type": "string", "pattern": "^https?://"}
-    several = {"type": schema.pop("type"), "items": one, "minItems": 1, "uniqueItems": True}
-    schema |= {"anyOf": [one, several, {"type": "null"}]}
-    del schema["items"], schema["default"]
+    raise refuse(fault[0], allowed=allowed, hint=fault[1], hides=True)
 
 
 def _check_body(body: dict[str, JsonValue]) -> dict[str, JsonValue]:
@@ -281,29 +225,22 @@ def _check_body(body: dict[str, JsonValue]) -> dict[str, JsonValue]:
         if key in _OWN_BODY:
             hint = "set max_tokens beside extra_body" if "tokens" in key else "take it out"
             raise refuse("is not for extra_body to say", at=(key,), key=True, hint=hint)
-    stack: list[tuple[tuple[str | int, ...], JsonValue]] = [((), body)]
-    while stack:
-        path, value = stack.pop()
-        if isinstance(value, float) and not math.isfinite(value):
-            raise refuse("is not a number that JSON can carry", at=path)
-        if isinstance(value, int) and abs(value) >= 2**64:
-            allowed = "whole numbers of 64 bits"
-            raise refuse("is larger than servers can read", at=path, allowed=allowed, hides=True)
-        if isinstance(value, dict):
-            stack.extend(((*path, key), item) for key, item in value.items())
-        elif isinstance(value, list):
-            stack.extend(((*path, index), item) for index, item in enumerate(value))
+    try:
+        json.dumps(body, allow_nan=False)
+    except ValueError:
+        raise refuse("holds a number that JSON cannot carry") from None
     return body
 
 
 class SamplingSpec(Section):
     """Sampling parameters for models that say nothing of their own."""
 
-    temperature: Temperature | None = Field(default=0.0, description="0 to 2; null: not sent.")
-    top_p: TopP | None = Field(default=None, description="Above 0, at most 1; null: not sent.")
-    max_tokens: MaxTokens | None = Field(
-        default=4096, description="Limit of a reply, thinking included [tokens]; null: not sent."
-    )
+    temperature: Temperature | None = 0.0
+    """0 to 2; null: not sent."""
+    top_p: TopP | None = None
+    """Above 0, at most 1; null: not sent."""
+    max_tokens: Count | None = 4096
+    """Limit of a reply, thinking included [tokens]; null: not sent."""
 
 
 class ModelConfig(Section):
@@ -320,136 +257,112 @@ class ModelConfig(Section):
         str,
         AfterValidator(_check_id),
         Field(json_schema_extra={"pattern": r"^[A-Za-z0-9_.-]+/\S+$"}),
-    ] = Field(default="", description="litellm id with its provider: openai/gpt-4o-2024-08-06.")
+    ] = ""
+    """litellm id with its provider: openai/gpt-4o-2024-08-06."""
     addresses: Annotated[
-        tuple[Address, ...], AfterValidator(check_unique), BeforeValidator(_as_list)
-    ] = Field(
-        default=(),
-        alias="api_base",
-        description="Address of an OpenAI-compatible server (vLLM, Ollama, LM Studio), such as "
-        "http://localhost:8000/v1; a list where several serve the same model. The one with the "
-        "least to do is asked, one that is gone is left out and tried again.",
-        json_schema_extra=_either,
+        tuple[
+            Annotated[
+                str,
+                AfterValidator(_check_address),
+                Field(json_schema_extra={"pattern": "^https?://"}),
+            ],
+            ...,
+        ],
+        AfterValidator(check_unique),
+        BeforeValidator(_one_or_list),
+    ] = Field(default=(), alias="api_base", json_schema_extra=_say_one_or_list)
+    """Address of an OpenAI-compatible server (vLLM, Ollama, LM Studio), such as
+    http://localhost:8000/v1; a list where several serve the same model. The one with the least to
+    do is asked, one that is gone is left out and tried again."""
+    revision: Annotated[str, Field(min_length=1, max_length=100)] | None = None
+    """Which weights answer, where the id does not say it. An address does not tell models apart:
+    one id on two servers is one model, unless revisions differ."""
+    api_key_env: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")] | None = None
+    """Name of the environment variable that holds the key, where it is not the provider's usual
+    one. Never the key itself."""
+    transport: TransportName = "auto"
+    """litellm: through the library. direct: straight HTTP, for servers that speak the OpenAI chat
+    protocol. auto: direct where it can."""
+    batch: Flag = False
+    """Send requests in the provider's batches (OpenAI and servers with its /files and /batches,
+    Anthropic, Gemini): slower, by up to a day, and cheaper. How a model is asked is no part of a
+    run: it may change when the run goes on."""
+    max_concurrency: Count = 64
+    """Calls to this model under way at once. Left out: the suite's."""
+    rpm: Count | None = None
+    """Requests a minute at most."""
+    tpm: Count | None = None
+    """Tokens a minute at most."""
+    temperature: Temperature | None = None
+    """0 to 2. Left out: the suite's; null: not sent."""
+    top_p: TopP | None = None
+    """Above 0, at most 1. Left out: the suite's; null: not sent."""
+    max_tokens: Count | None = None
+    """Limit of a reply [tokens]. Left out: the suite's; null: not sent."""
+    reasoning_effort: Literal["none", "minimal", "low", "medium", "high", "xhigh", "max"] | None = (
+        None
     )
-    revision: Annotated[str, Field(min_length=1, max_length=100)] | None = Field(
-        default=None,
-        description="Which weights answer, where the id does not say it. An address does not tell "
-        "models apart: one id on two servers is one model, unless revisions differ.",
-    )
-    api_key_env: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")] | None = Field(
-        default=None,
-        description="Name of the environment variable that holds the key, where it is not the "
-        "provider's usual one. Never the key itself.",
-    )
-    transport: TransportName = Field(
-        default="auto",
-        description="litellm: through the library. direct: straight HTTP, for servers that speak "
-        "the OpenAI chat protocol. auto: direct where it can.",
-    )
-    batch: Flag = Field(
-        default=False,
-        description="Send requests in the provider's batches (OpenAI and servers with its /files "
-        "and /batches, Anthropic, Gemini): slower, by up to a day, and cheaper. How a "
-        "model is asked is no part of a run: it may change when the run goes on.",
-    )
-    max_concurrency: Count = Field(
-        default=64, description="Calls to this model under way at once. Left out: the suite's."
-    )
-    rpm: Count | None = Field(default=None, description="Requests a minute at most.")
-    tpm: Count | None = Field(default=None, description="Tokens a minute at most.")
-    temperature: Temperature | None = Field(
-        default=None, description="0 to 2. Left out: the suite's; null: not sent."
-    )
-    top_p: TopP | None = Field(
-        default=None, description="Above 0, at most 1. Left out: the suite's; null: not sent."
-    )
-    max_tokens: MaxTokens | None = Field(
-        default=None,
-        description="Limit of a reply [tokens]. Left out: the suite's; null: not sent.",
-    )
-    reasoning_effort: Effort | None = Field(
-        default=None, description="How much a reasoning model thinks; null: not sent."
-    )
-    image_detail: ImageDetail | None = Field(
-        default=None,
-        description="How closely pictures are looked at: the `detail` of OpenAI and compatible "
-        "servers (auto, low, high, original), the media resolution of Gemini (low, medium, high, "
-        "ultra_high); null: as the provider does where nothing is said.",
-    )
+    """How much a reasoning model thinks; null: not sent."""
+    image_detail: ImageDetail | None = None
+    """How closely pictures are looked at: the `detail` of OpenAI and compatible servers (auto, low,
+    high, original), the media resolution of Gemini (low, medium, high, ultra_high); null: as the
+    provider does where nothing is said."""
     extra_body: Annotated[dict[str, JsonValue], AfterValidator(_check_body)] = Field(
-        default_factory=dict,
-        description=f"Further fields of the request body, sent as they are; not "
-        f"{', '.join(_OWN_BODY)}.",
+        default_factory=dict
     )
-    price: PriceSpecs | None = Field(
-        default=None,
-        description="Price, or a list of prices by the day from which they hold; null: litellm's "
-        "price map, or unknown.",
-    )
-    seed: SendMode = Field(
-        default="auto",
-        description="auto: seeds are sent until the provider refuses one, then repeats are "
-        "independent. always: a refused seed is an error. never: none is sent.",
-    )
-    response_format: SendMode = Field(
-        default="auto",
-        description="With answer_format: json_schema in the suite. auto: the schema is sent where "
-        "litellm knows the model to take one, and to OpenAI-compatible servers named by api_base. "
-        "always, never: whatever is known. The prompt says the form all the same.",
-    )
-    timeout_s: TimeoutS = Field(
-        default=300.0,
-        description="Longest wait for one reply, to the last of its bytes [s]. Left out: the "
-        "suite's.",
-    )
-    published: Annotated[str, Field(min_length=1)] | None = Field(
-        default=None, description="Name of its row in the paper's tables."
-    )
-    size_b: Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)] | None = Field(
-        default=None, description="Parameters [billions], where known."
-    )
-    groups: Unique[Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]{0,39}$")]] = Field(
-        default=(),
-        description="Groups that it belongs to: group:NAME in a suite or after --models stands for "
-        "all of a group, in the order of this file.",
-    )
-    replay: Annotated[str, Field(min_length=1)] | None = Field(
-        default=None,
-        description="Folder of recorded replies that stands in for the model (then no id), "
-        "relative to this file.",
-    )
+    """Further fields of the request body, sent as they are; not model, messages, n, stream,
+    max_tokens, max_completion_tokens."""
+    prices: Annotated[
+        tuple[PriceSpec, ...], AfterValidator(_check_days), BeforeValidator(_one_or_list)
+    ] = Field(default=(), alias="price", json_schema_extra=_say_one_or_list)
+    """Price, or a list of prices by the day from which they hold; null: litellm's price map, or
+    unknown."""
+    seed: SendMode = "auto"
+    """auto: seeds are sent until the provider refuses one, then repeats are independent. always: a
+    refused seed is an error. never: none is sent."""
+    response_format: SendMode = "auto"
+    """With answer_format: json_schema in the suite. auto: the schema is sent where litellm knows
+    the model to take one, and to OpenAI-compatible servers named by api_base. always, never:
+    whatever is known. The prompt says the form all the same."""
+    timeout_s: TimeoutS = 300.0
+    """Longest wait for one reply, to the last of its bytes [s]. Left out: the suite's."""
+    published: Text | None = None
+    """Name of its row in the paper's tables."""
+    size_b: Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)] | None = None
+    """Parameters [billions], where known."""
+    groups: Unique[Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]{0,39}$")]] = ()
+    """Groups that it belongs to: group:NAME in a suite or after --models stands for all of a group,
+    in the order of this file."""
+    replay: Text | None = None
+    """Folder of recorded replies that stands in for the model (then no id), relative to this
+    file."""
 
     @model_validator(mode="after")
     def _check_fields(self) -> Self:
         provider = self.provider
         if self.replay is not None:
-            for key in sorted(self.model_fields_set - _WITH_REPLAY):
-                allowed = ", ".join(sorted(_WITH_REPLAY - {"name"}))
+            with_replay = ("groups", "published", "replay", "size_b")
+            for key in sorted(self.model_fields_set - {"name", *with_replay}):
                 at = (type(self).model_fields[key].alias or key,)
                 message, hint = "has no meaning for a replay", "keep either id or replay"
-                raise refuse(message, at=at, key=True, allowed=allowed, hint=hint)
-            return self
-        if self.transport == "direct" and not self.has_address and provider != "openai":
+                raise refuse(message, at=at, key=True, allowed=", ".join(with_replay), hint=hint)
+        elif self.transport == "direct" and not self.has_address and provider != "openai":
             # A direct call would take the provider's key to OpenAI.
-            raise refuse(
-                f"needs the address of the server that speaks for {provider}",
-                at=("transport",),
-                allowed="direct with an api_base, else auto or litellm",
-                hint="add api_base, or take the line out",
-            )
+            message = f"needs the address of the server that speaks for {provider}"
+            allowed = "direct with an api_base, else auto or litellm"
+            hint = "add api_base, or take the line out"
+            raise refuse(message, at=("transport",), allowed=allowed, hint=hint)
         known = _DETAILS.get(provider)
         if self.image_detail is not None and known is not None and self.image_detail not in known:
             # It would be ignored, or refused with every request.
             allowed = ", ".join(known) or f"none: {provider} has no such choice"
             raise refuse(f"is not known to {provider}", at=("image_detail",), allowed=allowed)
         if self.batch and provider not in BATCH_PROVIDERS:
-            raise refuse(
-                f"is not possible: phyblock does not speak the batches of {provider}",
-                at=("batch",),
-                allowed=", ".join(f"{name}/..." for name in BATCH_PROVIDERS),
-                hint="where the provider has the /files and /batches of OpenAI, use openai/... "
-                "with its api_base; else take the line out",
-            )
+            message = f"is not possible: phyblock does not speak the batches of {provider}"
+            allowed = ", ".join(f"{name}/..." for name in BATCH_PROVIDERS)
+            hint = "where the provider has the /files and /batches of OpenAI, use openai/... with "
+            hint += "its api_base; else take the line out"
+            raise refuse(message, at=("batch",), allowed=allowed, hint=hint)
         if self.batch and len(self.addresses) > 1:
             message = "is not possible with a list of servers: a batch lies at one"
             raise refuse(message, at=("batch",), hint="give one api_base, or take the line out")
@@ -520,11 +433,6 @@ class ModelConfig(Section):
         params = {name: value for name in names if (value := getattr(self, name)) is not None}
         return {**params, "extra_body": self.extra_body} if self.extra_body else params
 
-    @property
-    def prices(self) -> tuple[PriceSpec, ...]:
-        """Its own prices in the order of their days."""
-        return (self.price,) if isinstance(self.price, PriceSpec) else self.price or ()
-
     def with_defaults(self, values: Mapping[str, Any]) -> Self:
         """Return the model with values for those fields that its entry leaves out."""
         missing = {name: v for name, v in values.items() if name not in self.model_fields_set}
@@ -566,20 +474,17 @@ def load_models(path: Path) -> dict[str, ModelConfig]:
     models: dict[str, ModelConfig] = {}
     problems: list[Problem] = []
     for name, entry in data.items():
-        problems += _check_name(name, source)
-        config, of_entry = _read_entry(name, entry, source, max(0, MOST_HINTS - len(problems)))
-        problems += of_entry
+        config, of_entry = _read_entry(name, entry, source)
+        problems += [*_check_name(name, source), *of_entry]
         if config is not None:
             models[name] = config
-    secrets = list(find_secrets(data, source))
-    merged = merge_problems(source.problems, secrets, problems)
-    if merged:
-        raise SpecError(sort_problems(merged))
+    if problems or source.problems:
+        raise SpecError(joined(source, problems))
     return models
 
 
 def _read_entry(
-    name: str, entry: Any, source: YamlSource, hints: int
+    name: str, entry: Any, source: YamlSource
 ) -> tuple[ModelConfig | None, list[Problem]]:
     if not isinstance(entry, str | dict):
         wrong = Problem(source.where((name,)), "has the wrong type", name, show(entry),
@@ -589,7 +494,7 @@ def _read_entry(
     if unknown := [key for key in ("name", "most_body_bytes") if key in fields]:
         where = source.where((name, unknown[0]), key=True)
         return None, [Problem(where, "is not a known key", f"{name}.{unknown[0]}")]
-    config, problems = check(ModelConfig, fields, source, (name,), hints)
+    config, problems = check(ModelConfig, fields, source, (name,))
     if config is None:
         return None, problems
     where = source.where((name,))
@@ -598,10 +503,11 @@ def _read_entry(
         return None, [Problem(where, message, name, show(entry), hint=hint)]
     variable = f"{config.provider.upper()}_API_BASE"
     if config.provider in _SELF_HOSTED and not (config.has_address or os.environ.get(variable)):
+        # litellm would send prompts to a public provider.
         message = "is behind a server of your own: it needs an address"
         hint = f"add api_base: http://localhost:8000/v1, or set {variable}"
-        field = f"{name}.id"
-        return None, [Problem(source.where((name, "id")), message, field, config.id, hint=hint)]
+        where = source.where((name, "id"))
+        return None, [Problem(where, message, f"{name}.id", config.id, hint=hint)]
     if config.replay is None:
         return config.model_copy(update={"name": name}), []
     try:
@@ -613,21 +519,21 @@ def _read_entry(
 
 
 def _check_name(name: str, source: YamlSource) -> list[Problem]:
-    where, hint = source.where((name,), key=True), "choose another name"
     own = (*baseline_names(), RECORDED)
     if name in own:
-        allowed = f"not {', '.join(own)}"
-        return [Problem(where, "is a name of phyblock's own", name, allowed=allowed, hint=hint)]
-    for prefix, named in ((GROUP, "groups"), (HUMAN, "people")):
-        if name.startswith(prefix):
-            message = f"begins with {prefix}, which names {named}"
-            return [Problem(where, message, name, show(name), hint=hint)]
-    try:
-        TypeAdapter(ModelName).validate_python(name)
-    except ValidationError:
-        allowed = "up to 80 letters, digits and . _ : + -, starting with a letter or digit"
-        return [Problem(where, "is not a usable name", name, show(name), allowed)]
-    return []
+        message, allowed = "is a name of phyblock's own", f"not {', '.join(own)}"
+    elif prefix := next((one for one in (GROUP, HUMAN) if name.startswith(one)), ""):
+        message, allowed = f"begins with {prefix}, which names others", ""
+    else:
+        try:
+            TypeAdapter(ModelName).validate_python(name)
+        except ValidationError:
+            message = "is not a usable name"
+            allowed = "up to 80 letters, digits and . _ : + -, starting with a letter or digit"
+        else:
+            return []
+    where = source.where((name,), key=True)
+    return [Problem(where, message, name, show(name), allowed, "choose another name")]
 
 
 def group_names(known: Mapping[str, ModelConfig]) -> tuple[str, ...]:
@@ -637,21 +543,38 @@ def group_names(known: Mapping[str, ModelConfig]) -> tuple[str, ...]:
 
 def with_members(names: Sequence[str], known: Mapping[str, ModelConfig]) -> tuple[str, ...]:
     """Return the names with the members of a group in its place; an unknown group stays."""
-    groups = group_names(known)
     members: dict[str, None] = {}
     for name in names:
-        group = name.removeprefix(GROUP)
-        if name.startswith(GROUP) and group in groups:
-            members |= {n: None for n, config in known.items() if group in config.groups}
-        else:
-            members[name] = None
+        group = name.removeprefix(GROUP) if name.startswith(GROUP) else None
+        of_group = [n for n, config in known.items() if group in config.groups]
+        members |= dict.fromkeys(of_group or [name])
     return tuple(members)
 
 
-def unknown_model(name: str) -> str:
-    """Return what is wrong with a name that is neither a model nor a group."""
-    if name.startswith(GROUP):
-        return "is no group of the models file"
-    if name.startswith(HUMAN):
-        return "is a person, who answers in `phyblock play`"
-    return "is neither in the models file nor a built-in baseline"
+def resolve_models(
+    names: Sequence[str], known: Mapping[str, ModelConfig], where: Callable[[int], str]
+) -> dict[str, ModelConfig]:
+    """Return the models of these names in their order, those of a group in its place.
+
+    Raises SpecError for each name that is neither a model, a group nor a built-in baseline, at the
+    place of its index.
+    """
+    built_in = {name: ModelConfig(name=name) for name in baseline_names()}
+    allowed = [*built_in, *known, *(GROUP + name for name in group_names(known))]
+    problems = []
+    for index, name in enumerate(names):
+        if name in allowed:
+            continue
+        message = "is neither in the models file nor a built-in baseline"
+        if name.startswith(GROUP):
+            message = "is no group of the models file"
+        elif name.startswith(HUMAN):
+            message = "is a person, who answers in `phyblock play`"
+        hint = did_you_mean(name, allowed) or "list them: phyblock models"
+        shown = ", ".join(allowed) if len(allowed) <= 12 else ""
+        place = where(index)
+        field = "" if place == "--models" else f"models[{index}]"
+        problems.append(Problem(place, message, field, name, shown, hint))
+    if problems:
+        raise SpecError(problems[:100])
+    return {name: {**built_in, **known}[name] for name in with_members(names, known)}

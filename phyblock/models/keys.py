@@ -191,9 +191,8 @@ def server_address(model_id: str) -> str | None:
     for name in _ADDRESS_VARIABLES.get(model_id.partition("/")[0], ()):
         if value := os.environ.get(name):
             if (fault := address_fault(value)) is not None:
-                raise SpecError(
-                    Problem(f"environment variable {name}", fault.message, hint=fault.hint)
-                )
+                message, hint = fault
+                raise SpecError(Problem(f"environment variable {name}", message, hint=hint))
             return value
     return None
 

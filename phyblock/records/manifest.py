@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import functools
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
-import yaml
 from pydantic import AfterValidator, Field, ValidationError
 
-from phyblock.config.yaml import TooMuchError, YamlBounds, load_yaml
-from phyblock.errors import Problem, StoreError
+from phyblock.config.yaml import parse_yaml
+from phyblock.errors import Problem, SpecError, StoreError
 from phyblock.files import read_text
 from phyblock.records.line import Line, encodable, problems_of
 
@@ -21,7 +21,6 @@ MANIFEST = "run.yaml"
 _HINT = "run.yaml is written by `phyblock run` and never edited: restore it from a copy"
 _DIGITS = 16
 _LARGEST_BYTES = 2 * 1024 * 1024
-_BOUNDS = YamlBounds(values=100_000, depth=64)
 """Far above what a suite of the largest allowed size comes to."""
 
 
@@ -135,18 +134,14 @@ def read_manifest(folder: Path) -> Manifest:
     path = folder / MANIFEST
     where = str(path)
     try:
-        return _manifest(read_text(path, _LARGEST_BYTES))
+        return _manifest(read_text(path, _LARGEST_BYTES), str(path))
     except (FileNotFoundError, NotADirectoryError) as error:
         allowed = "a folder that phyblock run wrote"
         raise StoreError(Problem(str(folder), f"holds no {MANIFEST}", allowed=allowed)) from error
     except OSError as error:
         raise StoreError(Problem(where, f"cannot be read: {error.strerror}")) from error
-    except (yaml.YAMLError, TooMuchError) as error:
-        message, allowed, mark = "is not YAML", "", getattr(error, "problem_mark", None)
-        if isinstance(error, TooMuchError):
-            message, allowed, mark = error.message, error.allowed, error.mark
-        where += f":{mark.line + 1}:{mark.column + 1}" if mark else ""
-        raise StoreError(Problem(where, message, allowed=allowed, hint=_HINT)) from error
+    except SpecError as error:
+        raise StoreError(replace(problem, hint=_HINT) for problem in error.problems) from error
     except ValidationError as error:
         is_not = "is not a run manifest"
         raise StoreError(problems_of(error, where, Manifest, is_not, _HINT)) from error
@@ -155,6 +150,9 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 @functools.lru_cache(maxsize=2)
-def _manifest(text: str) -> Manifest:
-    """A manifest, which one command reads several times; raises as `load_yaml` and pydantic do."""
-    return Manifest.model_validate(load_yaml(text, _BOUNDS))
+def _manifest(text: str, where: str) -> Manifest:
+    """Return a manifest, which one command reads several times; SpecError for what is not YAML."""
+    source = parse_yaml(text, where, most_bytes=_LARGEST_BYTES, halves=True)
+    if source.problems:
+        raise SpecError(source.problems)
+    return Manifest.model_validate(source.data)

@@ -12,7 +12,6 @@ from phyblock.data import recorded_models
 from phyblock.errors import DataError
 from phyblock.records.manifest import Manifest
 from phyblock.run.plan import RunPlan
-from phyblock.tracks import kind_of
 from phyblock.tracks.opening import template_prompt
 from phyblock.tracks.prompts import FORM_FACTS
 
@@ -31,7 +30,6 @@ def asking_remarks(suite: Suite, plan: RunPlan) -> list[str]:
     }
     own = [*_recorded(called, suite)]
     own += [_named(track, path, one) for (track, path), one in used.items()]
-    own += [_unused(track, path, suite) for track, path in suite.files.unused.items()]
     if plan.extractor is not None:
         own.append(f"replies that cannot be read are sent to {plan.extractor.name}, as text")
     if suite.answer_format == "text":
@@ -82,18 +80,6 @@ def _named(track: str, path: Path, suite: Suite) -> str:
     line = prompt.unsent_line
     lost = "" if line is None else f"; the text outside of its blocks (line {line}) is NOT sent"
     return f"prompt of {track}: {path}{more}{lost}"
-
-
-def _unused(track: str, path: Path, suite: Suite) -> str:
-    form = suite.answer_format
-    used = suite.files.templates.get(track)
-    kind = kind_of(track)
-    bundled = kind.template if form == "text" else kind.json_template
-    name = f"{bundled.name}, which is the bundled one" if bundled else "another one"
-    return (
-        f"{path} is NOT used: answers are asked for as {form}, and the prompt of {track} is "
-        f"{name if used is None else used}"
-    )
 
 
 def _says(track: str, suite: Suite) -> bool:

@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from phyblock.config.models import (
-    GROUP,
-    RECORDED,
-    ModelConfig,
-    group_names,
-    unknown_model,
-    with_members,
-)
-from phyblock.config.suite import Suite, resolve_models
+from phyblock.config.models import RECORDED, ModelConfig, resolve_models
+from phyblock.config.suite import Suite
 from phyblock.data import recorded_models
 from phyblock.data.published_names import match_published
 from phyblock.errors import Problem, SpecError
 from phyblock.models import server_address, takes_format
 from phyblock.records.files import RECORDS, RecordLines
 from phyblock.records.record import Record
-from phyblock.registry import baseline_names
 from phyblock.text import did_you_mean
 from phyblock.types import AnswerFormat, CandidateOrder
 
@@ -48,19 +40,18 @@ def plan_models(
     """
     if suite.models == RECORDED:
         folders = recorded_models(suite.files.dataset)
-        missing = f"is not among the recordings: {', '.join(folders)}"
-        _check_known(only, list(folders), lambda _: missing)
+        message, allowed = "is not among the recordings", ", ".join(folders)
+        if unknown := [name for name in only if name not in folders]:
+            raise SpecError(Problem("--models", message, "", one, allowed) for one in unknown)
         return tuple(
             PlannedModel(name, _replay(name, folders[name]), match_published(name))
             for name in dict.fromkeys(only) or folders
         )
     if only:
-        names = [*baseline_names(), *known, *(GROUP + name for name in group_names(known))]
-        _check_known(only, names, unknown_model)
-        specs = {name: known.get(name) for name in with_members(only, known)}
+        models = resolve_models(only, known, lambda _: "--models")
     else:
-        specs = resolve_models(suite, known)
-    return tuple(_planned(name, spec, suite) for name, spec in specs.items())
+        models = resolve_models(suite.models, known, lambda at: suite.where("models", at))
+    return tuple(_planned(name, config, suite) for name, config in models.items())
 
 
 def plan_extractor(suite: Suite, known: Mapping[str, ModelConfig]) -> ModelConfig | None:
@@ -102,27 +93,14 @@ def _recorded(folder: Path) -> Iterator[Record]:
         yield from (record for _, record in RecordLines(folder) if not record.variant)
 
 
-def _check_known(names: Sequence[str], known: Sequence[str], message: Callable[[str], str]) -> None:
-    problems = [
-        Problem("--models", message(name), "", name, hint=did_you_mean(name, known))
-        for name in names
-        if name not in known
-    ]
-    if problems:
-        raise SpecError(problems)
-
-
-def _planned(name: str, known: ModelConfig | None, suite: Suite) -> PlannedModel:
+def _planned(name: str, known: ModelConfig, suite: Suite) -> PlannedModel:
     config = to_config(name, known, suite)
     published = config.published or match_published(name)
     return PlannedModel(name, config, published, config.size_b)
 
 
-def to_config(name: str, known: ModelConfig | None, suite: Suite) -> ModelConfig:
-    """A model as a suite asks it; None stands for a built-in baseline."""
-    if known is None:
-        assert name in baseline_names(), name
-        return ModelConfig(name=name)
+def to_config(name: str, known: ModelConfig, suite: Suite) -> ModelConfig:
+    """A model as a suite asks it."""
     if known.kind != "litellm":
         return known
     limits = suite.limits.model_dump(include={"timeout_s", "max_concurrency"})

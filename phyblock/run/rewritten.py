@@ -6,8 +6,7 @@ import json
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-import yaml
-
+from phyblock.config.yaml import dump_yaml
 from phyblock.files import atomic_write, writing
 from phyblock.records.files import RECORDS
 from phyblock.records.manifest import MANIFEST, Manifest
@@ -30,7 +29,7 @@ def write_run(folder: Path, manifest: Manifest, records: Iterable[Record]) -> No
 
 def manifest_text(manifest: Manifest) -> str:
     """`run.yaml`."""
-    return yaml.safe_dump(manifest.fields(), sort_keys=False, allow_unicode=True, width=100)
+    return dump_yaml(manifest.fields())
 
 
 def record_lines(records: Iterable[Record]) -> Iterator[str]:

@@ -159,7 +159,7 @@ def examples_of(
             )
             for at, name in lacking
         )
-    examples = Examples(kept, n, named, suite.seeds[0], sort_of, stand_ins)
+    examples = Examples(kept, n, named, min(suite.seeds), sort_of, stand_ins)
     examples.check(items, noun, where)
     return examples
 

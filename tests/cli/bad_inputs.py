@@ -126,7 +126,7 @@ OPTIONS: tuple[Bad, ...] = (
     Bad(
         "set-long",
         options("--set", "seeds=[0x" + "f" * 90_000 + "]"),
-        ("seeds[0]: is too long a number",),
+        ("seeds[0]: is too large a number",),
     ),
     Bad("set-deep", options("--set", "a." * 9_000 + "a=1"), ("key=value",)),
     Bad("init", command("init", "."), ("models.yaml", "is already there")),
@@ -167,7 +167,7 @@ MODELS: tuple[Bad, ...] = (
         ("mine.j2:2: ", "'lipsum' is undefined"), writes=("fresh",)),
     Bad("jinja-pipe", pipe("mine.j2", *FRESH, "--set", "prompt=mine.j2"), ("no such file",)),
     Bad("hex", models_text("a:\n  id: openai/x\n  extra_body: {k: 0x" + "f" * 90_000 + "}\n"),
-        ("models.yaml:3:19: a.extra_body.k: is too long a number", "90,002 digits")),
+        ("models.yaml:3:19: a.extra_body.k: is too large a number", "90,002 digits")),
     Bad("no-user", template("Build it."), ("mine.j2", "has no user block")),
     Bad("no-template", template(None), ("suite.yaml", "prompt", "no such file")),
     Bad("secret", models_text(f"mine:\n  id: openai/x\n  api_key: {FAKE_KEY}\n"),

@@ -73,17 +73,6 @@ def test_a_prompt_is_rendered_before_anything_is_asked(
     assert not (asked.root / "results").exists()
 
 
-def test_one_template_twice_is_no_factor(asked: Workspace) -> None:
-    asked.write_models("http://127.0.0.1:9", "alpha")
-    text = "{% block user %}Which of the {{ n_candidates }}?{% endblock %}"
-    own_prompt(asked).write_text(text, encoding="utf-8")
-    own = "prompts/full_planning.j2"
-    asked.write_suite(models=["alpha"], seeds=[0], vary={"prompt": ["default", own]})
-    done = asked.phyblock("validate", "suite.yaml")
-    assert done.code == 2
-    assert "is the same file as" in done.err
-
-
 @pytest.mark.parametrize("suite", ["quick", "steps", "vqa", "sensitivity"])
 def test_what_init_lays_out_is_sound_and_its_prompts_are_used(
     workspace: Workspace, suite: str
@@ -101,23 +90,3 @@ def test_what_init_lays_out_is_sound_and_its_prompts_are_used(
     )
     assert told.code == 0, told.err
     assert f"prompts/{prompt.name}" in told.out.replace("\n", "")
-
-
-@pytest.mark.parametrize(
-    ("edited", "asked_as"),
-    [("full_planning.j2", "json_schema"), ("full_planning_json.j2", "text")],
-)
-@pytest.mark.parametrize("verb", ["validate", "run"])
-def test_an_edited_template_of_the_other_form_is_said_not_to_be_used(
-    asked: Workspace, edited: str, asked_as: str, verb: str
-) -> None:
-    asked.write_models("http://127.0.0.1:9", "alpha")
-    for name in ("full_planning.j2", "full_planning_json.j2"):
-        (asked.root / "prompts" / name).write_bytes(bundled("prompts", name).read_bytes())
-    words = (verb, "suite.yaml", "--set", f"answer_format={asked_as}")
-    more = ("--dry-run",) if verb == "run" else ()
-    assert "NOT used" not in asked.phyblock(*words, *more).out
-    with (asked.root / "prompts" / edited).open("a", encoding="utf-8") as file:
-        file.write("\n")
-    told = asked.phyblock(*words, *more).out.replace("\n", "")
-    assert f"{edited} is NOT used: answers are asked for as {asked_as}" in told

@@ -1,7 +1,8 @@
-"""The suites and the models file that come with the project."""
+"""The suites, the models file and the JSON Schemas that come with the project."""
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import os
@@ -9,14 +10,19 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+from hypothesis import given
 from jsonschema import Draft202012Validator
+from pydantic import ValidationError
 
-from phyblock.config.models import SamplingSpec, load_models
-from phyblock.config.suite import load_suite, resolve_models
+from phyblock.config.models import SamplingSpec, load_models, resolve_models
+from phyblock.config.schema import models_schema, render, suite_schema
+from phyblock.config.suite import load_suite, suite_model
 from phyblock.config.yaml import read_yaml
 from phyblock.errors import SpecError
+from tests.config.strategies import SUITES as DRAWN
 
 ROOT = Path(__file__).parents[2]
 SUITES = sorted((ROOT / "benchmarks").glob("*.yaml"))
@@ -52,7 +58,7 @@ def test_a_shipped_suite_loads_and_its_models_are_known(path: Path, tmp_path: Pa
     assert loaded.name == path.stem
     assert loaded.description
     if loaded.models != "recorded":
-        assert resolve_models(loaded, load_models(ROOT / "models.yaml"))
+        assert resolve_models(loaded.models, load_models(ROOT / "models.yaml"), str)
 
 
 @pytest.mark.parametrize("name", sorted(OFFICIAL_ONLY))
@@ -140,3 +146,114 @@ def test_litellm_takes_the_parameters_of_every_model() -> None:
         env={**os.environ, "LITELLM_LOCAL_MODEL_COST_MAP": "True"},
     )
     assert json.loads(done.stdout.splitlines()[-1]) == {}
+
+
+SUITE_MODEL = suite_model()
+SCHEMAS = ROOT / "benchmarks" / "schemas"
+SUITE = Draft202012Validator(suite_schema())
+MODELS = Draft202012Validator(models_schema())
+
+
+@pytest.mark.parametrize("schema", [suite_schema(), models_schema()])
+def test_a_schema_is_a_schema(schema: dict[str, Any]) -> None:
+    Draft202012Validator.check_schema(schema)
+
+
+@pytest.mark.parametrize(("name", "make"), [("suite", suite_schema), ("models", models_schema)])
+def test_the_committed_schema_is_the_generated_one(name: str, make: Any) -> None:
+    committed = (ROOT / "benchmarks" / "schemas" / f"{name}.schema.json").read_text(
+        encoding="utf-8"
+    )
+    assert committed == render(make()), "rewrite it: python -m phyblock.config"
+
+
+def test_the_module_writes_both(tmp_path: Path) -> None:
+    subprocess.run([sys.executable, "-m", "phyblock.config", str(tmp_path)], check=True)
+    for name in ("suite.schema.json", "models.schema.json"):
+        assert (tmp_path / name).read_bytes() == (
+            ROOT / "benchmarks" / "schemas" / name
+        ).read_bytes()
+
+
+def _properties(schema: Any) -> list[tuple[str, dict[str, Any]]]:
+    found = []
+    for definition in (schema, *schema["$defs"].values()):
+        found += list(definition.get("properties", {}).items())
+    return found
+
+
+@pytest.mark.parametrize("schema", [suite_schema(), models_schema()])
+def test_every_key_is_described(schema: dict[str, Any]) -> None:
+    told = {f"#/$defs/{name}" for name, part in schema["$defs"].items() if part.get("description")}
+    silent = [
+        name
+        for name, field in _properties(schema)
+        if not field.get("description") and field.get("$ref") not in told
+    ]
+    assert silent == []
+
+
+@given(raw=DRAWN)
+def test_valid_suites_are_valid_by_the_schema(raw: dict[str, Any]) -> None:
+    assert SUITE.is_valid(raw)
+    assert SUITE.is_valid(SUITE_MODEL.model_validate(raw).model_dump(mode="json"))
+
+
+BROKEN = [
+    ("levls", [1]),
+    ("name", "A B"),
+    ("models", []),
+    ("models", "oracle"),
+    ("models", ["a", "a"]),
+    ("levels", [5]),
+    ("levels", [True]),
+    ("settings", "A"),
+    ("seeds", [-1]),
+    ("prompt", "oficial"),
+    ("images", {"size_px": 100}),
+    ("images", {"order": ["goal", "goal"]}),
+    ("scoring", {"level1": "x"}),
+    ("sampling", {"top_p": 0}),
+    ("limits", {"max_cost_usd": -1}),
+    ("tables", ["table9"]),
+    ("dataset", {"path": ""}),
+]
+
+
+@pytest.mark.parametrize(("key", "value"), BROKEN)
+def test_what_the_reader_refuses_the_schema_refuses(key: str, value: object) -> None:
+    good = {"name": "s", "models": ["oracle"]}
+    assert SUITE.is_valid(good)
+    bad = {**good, key: value}
+    assert not SUITE.is_valid(bad)
+    with pytest.raises(ValidationError):
+        SUITE_MODEL.model_validate(bad)
+
+
+@pytest.mark.parametrize(
+    ("entry", "good"),
+    [
+        ("openai/gpt-4o", True),
+        ("gpt-4o", False),
+        ({"id": "openai/gpt-4o", "temperature": None}, True),
+        ({"replay": "x", "published": "GPT-4o"}, True),
+        ({"id": "a/b", "replay": "x"}, False),
+        ({}, False),
+        ({"id": "a/b", "rpm": 0}, False),
+        ({"id": "a/b", "price": {"input": 1}}, False),
+        ({"id": "a/b", "api_key": "x"}, False),
+        ({"id": "a/b", "api_base": "localhost"}, False),
+        (5, False),
+    ],
+)
+def test_models_by_the_schema_and_by_the_reader(tmp_path: Path, entry: Any, good: bool) -> None:
+    assert MODELS.is_valid({"m": entry}) is good
+    path = tmp_path / "m.yaml"
+    path.write_text(json.dumps({"m": entry}))
+    with contextlib.nullcontext() if good else pytest.raises(SpecError):
+        assert load_models(path)
+
+
+@pytest.mark.parametrize("name", ["random", "oracle", "recorded", "a b", ""])
+def test_names_that_models_may_not_have(name: str) -> None:
+    assert not MODELS.is_valid({name: "openai/gpt-4o"})

@@ -1,0 +1,64 @@
+"""Bad files, and what is said of them: the tables `bad_suites.yaml` and `bad_models.yaml`."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from phyblock.config.models import load_models
+from phyblock.config.suite import load_suite
+from phyblock.errors import SpecError
+
+
+def table(name: str) -> list[dict[str, Any]]:
+    """The entries of a table."""
+    text = Path(__file__).with_name(name).read_text(encoding="utf-8")
+    entries: list[dict[str, Any]] = yaml.safe_load(text)
+    return entries
+
+
+def told(folder: Path, kind: str, text: str, sets: Sequence[str] = ()) -> str:
+    """All that is said of a bad file, which lies in the working directory, without the folder."""
+    (folder / "data" / "phyblock-400").mkdir(parents=True, exist_ok=True)
+    (folder / "brief.j2").write_text("{% block user %}go{% endblock %}", encoding="utf-8")
+    path = folder / f"{kind}.yaml"
+    path.write_text(text, encoding="utf-8")
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
+        if kind == "models":
+            load_models(path)
+        else:
+            load_suite(path, sets, data_dir=folder / "data")
+    except SpecError as error:
+        return str(error).replace(f"{folder}/", "") + "\n"
+    finally:
+        os.chdir(before)
+    raise AssertionError(f"nothing is wrong with {text}")
+
+
+def rewrite(name: str, kind: str) -> None:
+    """Write what is said today into a table: `python -m tests.config.tables`."""
+    path = Path(__file__).with_name(name)
+    lines = [path.read_text(encoding="utf-8").splitlines()[0]]
+    for entry in table(name):
+        with tempfile.TemporaryDirectory() as folder:
+            says = told(Path(folder), kind, entry[kind], entry.get("set", ()))
+        block = {kind: entry[kind], "says": says}
+        for field, text in block.items():
+            lines.append(f"{'- ' if field == kind else '  '}{field}: |")
+            lines += [f"    {line}" for line in text.splitlines()]
+            if field == kind and "set" in entry:
+                lines.append(f"  set: {json.dumps(entry['set'])}")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    rewrite("bad_suites.yaml", "suite")
+    rewrite("bad_models.yaml", "models")

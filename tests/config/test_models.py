@@ -1,0 +1,292 @@
+"""Models files: each bad one is told in words at its place; secrets, addresses, groups."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from phyblock.config.models import (
+    ModelConfig,
+    SamplingSpec,
+    address_fault,
+    host_of,
+    load_models,
+    resolve_models,
+)
+from phyblock.errors import SpecError
+from phyblock.models import server_address
+from phyblock.registry import baseline_names
+from tests.config.tables import table, told
+from tests.fuzz.strategies import MODELS_FILES
+from tests.servers.chassis import Running
+from tests.servers.openai_chat import OpenAIChat
+from tests.workspace import Workspace
+
+BAD = table("bad_models.yaml")
+
+
+def load(folder: Path, text: str) -> dict[str, ModelConfig]:
+    path = folder / "m.yaml"
+    path.write_text(text, encoding="utf-8")
+    return load_models(path)
+
+
+@pytest.mark.parametrize("entry", BAD, ids=range(len(BAD)))
+def test_all_that_is_wrong_is_told_in_the_order_of_the_file(
+    tmp_path: Path, entry: dict[str, Any]
+) -> None:
+    says = told(tmp_path, "models", entry["models"])
+    assert says == entry["says"], "if this is meant: python -m tests.config.tables"
+
+
+def test_one_line_is_enough_and_a_mapping_says_more(tmp_path: Path) -> None:
+    text = """
+gpt-4o: openai/gpt-4o-2024-08-06
+on: a/b
+1e-3: a/b
+old: {replay: replies/old, published: GPT-4o}
+m:
+  id: hosted_vllm/Qwen/Qwen2.5-VL-7B-Instruct
+  api_base: [http://h:1/v1, http://h:2/v1]
+  extra_body: {top_k: 1, chat_template_kwargs: {enable_thinking: false}}
+  price: {input: 0, output: 1.5}
+"""
+    models = load(tmp_path, text)
+    assert list(models) == ["gpt-4o", "on", "1e-3", "old", "m"]
+    assert models["gpt-4o"] == ModelConfig(name="gpt-4o", id="openai/gpt-4o-2024-08-06")
+    assert models["old"].recording == tmp_path / "replies" / "old"
+    assert [model.kind for model in models.values()] == ["litellm"] * 3 + ["replay", "litellm"]
+    assert models["m"].addresses == ("http://h:1/v1", "http://h:2/v1")
+    assert models["m"].api_base is None
+    assert [(price.input, price.output) for price in models["m"].prices] == [(0.0, 1.5)]
+    assert load(tmp_path, "# none yet\n") == {}
+
+
+def test_an_address_may_be_named_by_the_environment(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOSTED_VLLM_API_BASE", "http://localhost:8000/v1")
+    assert load(tmp_path, "m: hosted_vllm/x\n")["m"].addresses == ()
+
+
+def test_a_parameter_left_out_is_the_suites_and_null_is_not_sent(tmp_path: Path) -> None:
+    defaults = SamplingSpec(temperature=0.5, top_p=0.9, max_tokens=100).model_dump()
+    models = load(tmp_path, "a: {id: x/y, temperature: null, max_tokens: 7}\nb: x/y\n")
+    assert models["a"].with_defaults(defaults).params == {"top_p": 0.9, "max_tokens": 7}
+    assert models["b"].with_defaults(defaults).params == defaults
+
+
+OPTIONS = st.fixed_dictionaries(
+    {"id": st.just("openai/m")},
+    optional={
+        "temperature": st.none() | st.floats(0, 2),
+        "max_tokens": st.none() | st.integers(1, 10**6),
+        "api_base": st.just("http://h") | st.just(["http://h", "http://i"]),
+        "seed": st.sampled_from(["auto", "always", "never"]),
+        "price": st.just({"input": 1.0, "output": 2.0}),
+        "extra_body": st.dictionaries(st.sampled_from("abc"), st.booleans() | st.none()),
+        "published": st.sampled_from(["GPT-4o", "é"]),
+    },
+)
+
+
+@given(options=st.dictionaries(st.from_regex(r"m[a-z0-9.-]{0,8}", fullmatch=True), OPTIONS))
+def test_a_dumped_file_loads_equal(
+    tmp_path_factory: pytest.TempPathFactory, options: dict[str, dict[str, object]]
+) -> None:
+    folder = tmp_path_factory.getbasetemp()
+    models = load(folder, json.dumps(options))
+    dump = {"mode": "json", "exclude_unset": True, "by_alias": True}
+    dumped = {name: model.model_dump(**dump) for name, model in models.items()}
+    assert load(folder, json.dumps(dumped)) == models
+
+
+@settings(deadline=None, max_examples=40)
+@given(data=MODELS_FILES)
+def test_any_models_file_is_read_or_refused(
+    data: bytes, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "law-models.yaml"
+    path.write_bytes(data)
+    with contextlib.suppress(SpecError):
+        for model in load_models(path).values():
+            assert json.dumps(model.identity(), allow_nan=False)
+
+
+GROUPED = "b: {id: x/b, groups: [big, all]}\na: {id: x/a, groups: [all]}\nc: x/c\n"
+
+
+def test_names_and_groups_stand_for_models_in_the_order_of_the_file(tmp_path: Path) -> None:
+    known = load(tmp_path, GROUPED)
+    found = resolve_models(["oracle", "group:all", "a", "c", "group:big"], known, str)
+    assert list(found) == ["oracle", "b", "a", "c"]
+    assert found["a"] is known["a"]
+    assert [found["oracle"].kind, found["oracle"].id] == ["baseline", ""]
+    assert list(resolve_models(baseline_names(), {}, str)) == list(baseline_names())
+    with pytest.raises(SpecError) as caught:
+        resolve_models(["group:al", "c", "orcale", "human:x"], known, str)
+    assert [(p.where, p.message, p.hint) for p in caught.value.problems] == [
+        ("0", "is no group of the models file", "did you mean group:all?"),
+        ("2", "is neither in the models file nor a built-in baseline", "did you mean oracle?"),
+        ("3", "is a person, who answers in `phyblock play`", "list them: phyblock models"),
+    ]
+
+
+SECRETS = [
+    "sk-proj-Abcdefghijkl1234567890",
+    "sk-ant-api03-Abcdefghijkl1234567890",
+    "AIzaSyAbcdefghijklmnopqrstuvwxyz0123456",
+    "gsk_Abcdefghijklmnopqrstuvwx",
+    "hf_Abcdefghijklmnopqrstuvwx",
+    "xai-Abcdefghijklmnopqrstuvwx",
+    "AKIAABCDEFGHIJKLMNOP",
+    "Bearer abcdefgh12345678",
+]
+PLACES = [
+    "m: {id: a/b, api_key: SECRET}\n",
+    "m: {id: a/b, api_key_env: SECRET}\n",
+    "m: {id: a/b, extra_body: {x: [SECRET]}}\n",
+    "m: {id: a/b, api_base: 'http://h/v1?k=SECRET'}\n",
+    "m: a/SECRET\n",
+    "m: {id: a/b, note: SECRET}\n",
+]
+
+
+@pytest.mark.parametrize("secret", SECRETS)
+@pytest.mark.parametrize("place", PLACES)
+def test_a_key_in_the_file_is_refused_and_not_repeated(
+    tmp_path: Path, place: str, secret: str
+) -> None:
+    says = told(tmp_path, "models", place.replace("SECRET", secret))
+    assert "looks like a key" in says
+    assert "api_key_env" in says
+    assert secret[8:] not in says
+
+
+@pytest.mark.parametrize("model_id", ["openai/task-abc-def", "azure/risk-big", "a/disk-12345678"])
+def test_ordinary_names_are_not_taken_for_keys(tmp_path: Path, model_id: str) -> None:
+    assert load(tmp_path, f"m: {model_id}\n")["m"].id == model_id
+
+
+SECRET = "hunter2-5ecret"
+GOOD = [
+    "http://localhost:8000/v1",
+    "https://api.openai.com/v1",
+    "HTTP://10.0.0.1",
+    "http://[::1]:8000/v1",
+    "http://[fe80::1%25eth0]/v1",
+    "https://b\u00fccher.example/v1",
+    "https://api.cloudflare.com/client/v4/accounts/1/ai/run/@cf/meta",
+    "http://my_server/v1",
+]
+SECRETIVE = [
+    f"http://me:{SECRET}@host/v1",
+    f"http://{SECRET}@host/v1",
+    f"https://host/v1?api_key={SECRET}",
+    f"https://host/v1#{SECRET}",
+    f"https://host/v1;x?{SECRET}",
+    f"me:{SECRET}@host/v1",
+    f"http://me:{SECRET}/x@host/v1",
+    f"http://host\\@{SECRET}",
+    f"http://[::1/v1?k={SECRET}",
+]
+MALFORMED = [
+    "",
+    "localhost:8000",
+    "ftp://host/v1",
+    "http://",
+    "http:///v1",
+    "http://[::1/v1",
+    "http://::1/v1",
+    "http://[1.2.3.4]/v1",
+    "http://host:port/v1",
+    "http://host:99999/v1",
+    "http://host:0/v1",
+    "http://a..b/v1",
+    f"http://{'a' * 64}.example/v1",
+    "http://ho st/v1",
+    "http://host/v1\n",
+    "http://host/\x00",
+    "http://host/\ud800",
+    f"http://host/{'a' * 2_000}",
+]
+
+
+@pytest.mark.parametrize("url", GOOD)
+def test_an_address_is_one(url: str) -> None:
+    assert address_fault(url) is None
+
+
+@pytest.mark.parametrize("url", [*SECRETIVE, *MALFORMED])
+def test_what_is_none_is_refused_without_being_shown(
+    url: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    fault = address_fault(url)
+    assert fault is not None
+    assert SECRET not in "".join(fault)
+    if url and "\x00" not in url and "\ud800" not in url:
+        says = told(tmp_path, "models", f"m: {{id: openai/m, api_base: {json.dumps(url)}}}\n")
+        assert "m.api_base" in says
+        assert SECRET not in says
+        monkeypatch.setenv("HOSTED_VLLM_API_BASE", url)
+        with pytest.raises(SpecError, match="variable HOSTED_VLLM_API_BASE") as refused:
+            server_address("hosted_vllm/m")
+        assert SECRET not in str(refused.value)
+
+
+@given(st.text(min_size=1), st.text(), st.sampled_from(["http", "https"]))
+def test_no_user_gets_through(user: str, rest: str, scheme: str) -> None:
+    url = f"{scheme}://{user.translate({ord(c): 'x' for c in '/?#'})}@host/{rest}"
+    assert address_fault(url) is not None
+
+
+@given(st.text())
+def test_any_text_is_an_address_or_refused(url: str) -> None:
+    assert address_fault(url) is not None or url.lower().startswith(("http://", "https://"))
+    assert "/" not in host_of(url)
+
+
+def test_a_host_is_shown_without_what_stands_around_it() -> None:
+    assert host_of(f"https://me:{SECRET}@host:8443/v1?key={SECRET}#x") == "host:8443"
+    assert host_of("http://[::1]:80/v1") == "[::1]:80"
+    assert host_of("http://[::1/v1") == host_of("/v1") == "an unreadable address"
+
+
+@pytest.mark.parametrize("url", [SECRETIVE[0], "http://[::1/v1"])
+def test_a_bad_address_in_the_environment_ends_before_anything_is_written(
+    workspace: Workspace, url: str
+) -> None:
+    workspace.write_yaml("models.yaml", {"m": "hosted_vllm/m"})
+    workspace.write_suite(models=["m"])
+    before = workspace.files()
+    variable = {"HOSTED_VLLM_API_BASE": url}
+    for done in (
+        workspace.run(env=variable),
+        workspace.phyblock("validate", "suite.yaml", env=variable),
+    ):
+        assert done.code == 2
+        assert "variable HOSTED_VLLM_API_BASE" in done.err
+        assert SECRET not in done.out + done.err
+    assert workspace.files() == before
+
+
+def test_a_key_that_no_header_can_carry_is_named_before_anything_is_sent(
+    workspace: Workspace,
+) -> None:
+    with Running(OpenAIChat()) as running:
+        workspace.write_models(running.url, "m", api_key_env="MY_KEY")
+        workspace.write_suite(models=["m"], seeds=[0])
+        done = workspace.run(env={"MY_KEY": f"{SECRET}\nand-more"})
+        assert done.code == 2
+        assert "MY_KEY holds a line break" in done.err
+        assert SECRET not in done.err
+        assert running.server.requests == 0
+        done = workspace.run("--yes", env={"MY_KEY": f" {SECRET}\r\n"})
+    assert (done.code, done.err) == (0, "")
+    assert {seen.key for seen in running.server.seen} == {SECRET}

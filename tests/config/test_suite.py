@@ -1,0 +1,225 @@
+"""Suites: each bad one is told in words at its place; laws of those that are sound."""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import json
+import re
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from phyblock.config.suite import (
+    FACTORS,
+    REPEAT,
+    Suite,
+    Variant,
+    VarySpec,
+    load_suite,
+    suite_model,
+)
+from phyblock.config.yaml import dump_yaml
+from phyblock.errors import SpecError
+from phyblock.types import BACKGROUNDS
+from tests.config.strategies import FIELDS, REQUIRED, SECTIONS, SUITES
+from tests.config.tables import table, told
+from tests.fuzz.strategies import OVERRIDES as OVERRIDE_TEXTS
+from tests.fuzz.strategies import SUITES as ANY_SUITES
+
+SUITE_MODEL = suite_model()
+HEAD = "name: s\nmodels: [oracle]\n"
+BAD = table("bad_suites.yaml")
+JARGON = r"pydantic|Input should|valid (dictionary|tuple|string)|_type\b|extra_forbidden|Spec\b"
+
+
+@pytest.mark.parametrize("entry", BAD, ids=range(len(BAD)))
+def test_all_that_is_wrong_is_told_in_the_order_of_the_file(
+    tmp_path: Path, entry: dict[str, Any]
+) -> None:
+    says = told(tmp_path, "suite", entry["suite"], entry.get("set", ()))
+    assert says == entry["says"], "if this is meant: python -m tests.config.tables"
+    assert not re.search(JARGON, says)
+
+
+def test_many_problems_are_told_in_part(tmp_path: Path) -> None:
+    says = told(tmp_path, "suite", HEAD + "".join(f"sede{i}: 1\n" for i in range(3_000)))
+    assert says.count("is not a known key") == 100
+    assert "suite.yaml:102:1: and 2,900 more problems" in says
+    says = told(
+        tmp_path, "suite", HEAD + "? " + "k" * 90_000 + "\n: 1\n", ["seeds=" + "x" * 90_000]
+    )
+    assert len(says) < 9_000
+    says = told(tmp_path, "suite", HEAD + '"\\e[2J\\u202e": 1\n')
+    assert not re.search("[\x1b\u202e]", says)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("suites")
+    (folder / "data" / "phyblock-400").mkdir(parents=True)
+    (folder / "official").mkdir()
+    (folder / "brief.j2").write_text("{% block user %}go{% endblock %}", encoding="utf-8")
+    return folder
+
+
+def load(folder: Path, text: str, *overrides: str) -> Suite:
+    path = folder / "s.yaml"
+    path.write_text(text, encoding="utf-8")
+    return load_suite(path, overrides, data_dir=folder / "data")
+
+
+@given(raw=SUITES)
+def test_a_dumped_suite_loads_equal(folder: Path, raw: dict[str, Any]) -> None:
+    suite = SUITE_MODEL.model_validate(raw)
+    dumped = suite.model_dump(mode="json")
+    for text in (dump_yaml(dumped), json.dumps(dumped), json.dumps(raw)):
+        assert load(folder, text).model_dump() == suite.model_dump()
+
+
+@given(raw=SUITES, data=st.data())
+def test_identity_is_json_without_bounds_places_and_order(
+    raw: dict[str, Any], data: st.DataObject
+) -> None:
+    identity = SUITE_MODEL.model_validate(raw).identity()
+    json.dumps(identity, allow_nan=False)
+    shuffled = {
+        key: data.draw(st.permutations(value)) if key in ("seeds", "levels", "settings") else value
+        for key, value in raw.items()
+    }
+    moved = {"dataset": {**raw.get("dataset", {}), "path": "/b"}, "limits": {"max_attempts": 3}}
+    same = {**shuffled, **moved, "name": "another", "description": "x", "tables": []}
+    assert SUITE_MODEL.model_validate(same).identity() == identity
+    one, other = ({**raw, "prompt": prompt} for prompt in ("a.j2", "b/c.j2"))
+    identities = [SUITE_MODEL.model_validate(suite).identity() for suite in (one, other)]
+    assert identities[0] == identities[1] != identity
+
+
+CHANGES = st.one_of(
+    st.fixed_dictionaries({}, optional={**FIELDS, **REQUIRED}),
+    st.fixed_dictionaries(
+        {},
+        optional={
+            f"{section}.{name}": values
+            for section, fields in SECTIONS.items()
+            for name, values in fields.items()
+        },
+    ),
+    st.fixed_dictionaries({}, optional={"levls": st.just(1), "images.x": st.just(1)}),
+)
+
+
+def outcome(folder: Path, raw: dict[str, Any], *overrides: str) -> object:
+    """The suite, or the set of what is wrong with which field."""
+    try:
+        return load(folder, json.dumps(raw), *overrides).model_dump()
+    except SpecError as error:
+        return {(problem.field, problem.message) for problem in error.problems}
+
+
+@given(raw=SUITES, changes=CHANGES)
+def test_overrides_equal_editing_the_file(
+    folder: Path, raw: dict[str, Any], changes: dict[str, Any]
+) -> None:
+    edited = copy.deepcopy(raw)
+    for key, value in changes.items():
+        section, _, name = key.rpartition(".")
+        (edited.setdefault(section, {}) if section else edited)[name] = value
+    texts = [f"{key}={json.dumps(value)}" for key, value in changes.items()]
+    assert outcome(folder, raw, *texts) == outcome(folder, edited)
+
+
+def test_paths_start_at_the_file_or_for_overrides_at_the_working_directory(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PHYBLOCK_TEST_ROOT", str(folder))
+    monkeypatch.setenv("HOME", str(folder))
+    official = "dataset.format=official"
+    for path in ("$PHYBLOCK_TEST_ROOT/official", "${PHYBLOCK_TEST_ROOT}/official", "~/official"):
+        suite = load(folder, HEAD, official, f"dataset.path={path}")
+        assert suite.files.dataset == folder / "official"
+    text = "dataset: {format: official, path: ./official}\nprompt: brief.j2\n"
+    suite = load(folder, HEAD + text)
+    assert suite.files.dataset == folder / "official"
+    assert suite.files.templates == {"full_planning": folder / "brief.j2"}
+    assert suite.where("dataset", "path") == f"{folder / 's.yaml'}:3:35"
+    monkeypatch.chdir(folder / "data")
+    assert load(folder, HEAD, official, "dataset.path=../official").files.dataset == (
+        folder / "official"
+    )
+    assert load(folder, HEAD).files.dataset == folder / "data" / "phyblock-400"
+    assert load(folder, HEAD, "seeds=[1]", "seeds=[2]", "levels=[1]").seeds == (2,)
+
+
+def test_a_suite_made_in_python_obeys_the_rules_between_fields() -> None:
+    with pytest.raises(ValidationError, match="recorded replies come with the official data"):
+        SUITE_MODEL.model_validate({"name": "s", "models": "recorded"})
+
+
+def levels(*values: Any) -> st.SearchStrategy[tuple[Any, ...]]:
+    some = st.permutations(values).flatmap(
+        lambda order: st.integers(2, len(order)).map(lambda n: tuple(order[:n]))
+    )
+    return st.just(()) | some
+
+
+VARIED = st.fixed_dictionaries(
+    {
+        "prompt": levels("default", "a/one.j2", "two.j2"),
+        "background": levels(*BACKGROUNDS[:3]),
+        "view": levels("oblique", "top", "front"),
+        "candidate_order": levels("file", "shuffled"),
+        "layout": levels("composite", "separate"),
+        "examples": levels(0, 2, 5),
+        REPEAT: st.integers(1, 3),
+        "design": st.sampled_from(["crossed", "one_at_a_time"]),
+    }
+)
+
+
+@given(section=VARIED)
+def test_variants_are_all_choices_once_and_the_reference_is_the_first(
+    section: dict[str, Any],
+) -> None:
+    vary = VarySpec.model_validate({name: found for name, found in section.items() if found})
+    shown = [len(section[name]) or 1 for name in FACTORS if name != REPEAT]
+    crossed = section["design"] == "crossed"
+    ways = prod(shown) if crossed else 1 + sum(n - 1 for n in shown)
+    keys = [variant.key for variant in vary.variants]
+    assert len(keys) == len(set(keys)) == vary.n_variants == ways * section[REPEAT]
+    assert keys[0] == ""
+    assert all(one.repeat == n % section[REPEAT] + 1 for n, one in enumerate(vary.variants))
+    assert {one.shown.key for one in vary.variants} <= set(keys)
+    if not crossed:
+        assert all(len(one.shown.levels) <= 1 for one in vary.variants)
+
+
+def test_a_variant_is_the_suite_with_other_values_in_its_fields(folder: Path) -> None:
+    text = HEAD + (
+        "vary:\n  background: [lawn, white]\n  candidate_order: [file, shuffled]\n"
+        "  prompt: [brief.j2, default]\n  repeats: 2\n"
+    )
+    suite = load(folder, text)
+    assert suite.files.templates == {"full_planning": folder / "brief.j2"}
+    for variant in suite.vary.variants:
+        one, chosen = suite.at(variant), dict(variant.levels)
+        assert one.images.background == chosen.get("background", "lawn")
+        assert one.candidates.order == chosen.get("candidate_order", "file")
+        assert bool(one.files.templates) == ("prompt" not in chosen)
+    plain = load(folder, HEAD)
+    assert plain.at(Variant()) == plain
+
+
+@settings(deadline=None, max_examples=40)
+@given(data=ANY_SUITES, override=st.none() | OVERRIDE_TEXTS)
+def test_any_suite_is_read_or_refused(folder: Path, data: bytes, override: str | None) -> None:
+    (folder / "law.yaml").write_bytes(data)
+    with contextlib.suppress(SpecError):
+        overrides = () if override is None else (override,)
+        suite = load_suite(folder / "law.yaml", overrides, data_dir=folder / "data")
+        assert json.dumps(suite.identity(), allow_nan=False)
