@@ -21,12 +21,10 @@ import functools
 import math
 from collections.abc import Sequence
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse  # type: ignore[import-untyped]
-from scipy.optimize import linprog, nnls  # type: ignore[import-untyped]
 
 from phyblock.domain.blocks import FRICTION, SHAPES, BlockType, euler_deg_to_matrix
 from phyblock.domain.scene import Block
@@ -100,6 +98,9 @@ def surely_falls(blocks: Sequence[Block]) -> bool:
     solution. Its unknown shifts are those of all long blocks and of all others, each anywhere in
     the octagon round the margin, so that it has every balance that is asked about and some more.
     """
+    # SciPy takes a third of a second to import, which a run that asks nobody does without.
+    from scipy import sparse  # type: ignore[import-untyped]
+
     forces = _forces(blocks, FRICTIONS[1])
     if not forces.size:
         return bool(blocks)
@@ -131,6 +132,8 @@ def _bears(forces: NDArray[np.float64], weights: NDArray[np.float64]) -> bool:
     """Whether some sum of the forces, each as large as need be, balances all weights."""
     if not forces.size:
         return not weights.size
+    from scipy.optimize import nnls  # type: ignore[import-untyped]
+
     try:
         pushes, _ = nnls(forces, weights)
     except RuntimeError:  # It found no end, which says nothing of whether there is a balance.
@@ -148,13 +151,16 @@ def _least_residual(
     unknown: NDArray[np.float64],
     target: NDArray[np.float64],
     bounds: Sequence[tuple[float | None, float | None]] | None = None,
-    at_most_zero: sparse.spmatrix | None = None,
+    at_most_zero: Any = None,
 ) -> float:
     """The least sum of what is left of a target, by linear programming, which always ends.
 
     Unknowns are not negative, or within their bounds, and such that the rows of `at_most_zero` are.
     Raises PhyblockError where it does not end.
     """
+    from scipy import sparse
+    from scipy.optimize import linprog
+
     rows, count = unknown.shape
     left_over = sparse.identity(rows)
     slack = [(0.0, None)] * (2 * rows)
