@@ -23,5 +23,5 @@ def test_a_server_without_an_address_is_an_error_before_anything_is_asked(
     workspace.write_suite(models=["mine"])
     done = workspace.run()
     assert done.code == 2
-    assert "model mine: api_base: is behind a server of your own" in done.err
+    assert "models.yaml:1:7: mine.id: is behind a server of your own" in done.err
     assert not (workspace.out / "records.jsonl").exists()
