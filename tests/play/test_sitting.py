@@ -329,7 +329,7 @@ def check_as_of_any_model(workspace: Workspace, run: Path) -> None:
     ]
     workspace.write_yaml("models.yaml", {"human:ada": {"replay": "./ada"}})
     again = workspace.root / "again"
-    words = ("--models", "human:ada", "--set", "seeds=[3]", "--out", again, "--no-report")
+    words = ("--models", "ada", "--set", "seeds=[3]", "--out", again, "--no-report")
     done = workspace.phyblock("run", "suite.yaml", *words)
     assert done.code == 0, done.err
     replayed = {(record["track"], record["key"]): record for record in answered(again)}
