@@ -327,7 +327,7 @@ def check_as_of_any_model(workspace: Workspace, run: Path) -> None:
     assert [strip(one) for one in map(json.loads, before.splitlines())] == [
         strip(one) for one in answered(run)
     ]
-    workspace.write_yaml("models.yaml", {"human:ada": {"replay": "./ada"}})
+    workspace.write_yaml("models.yaml", {"ada": {"replay": "./ada"}})
     again = workspace.root / "again"
     words = ("--models", "ada", "--set", "seeds=[3]", "--out", again, "--no-report")
     done = workspace.phyblock("run", "suite.yaml", *words)
