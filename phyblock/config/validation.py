@@ -328,7 +328,8 @@ def _homes(root: type[BaseModel], above: tuple[str, ...] = ()) -> Iterator[tuple
 
 def _inner(section: type[BaseModel], name: str) -> type[BaseModel] | None:
     """Return the model behind a field, if it holds one."""
-    field = section.model_fields.get(name)
+    fields = {field.alias or key: field for key, field in section.model_fields.items()}
+    field = fields.get(name) or section.model_fields.get(name)
     stack: list[Any] = [] if field is None else [field.annotation]
     while stack:
         annotation = stack.pop()

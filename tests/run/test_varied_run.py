@@ -144,7 +144,8 @@ def check_tables(workspace: Workspace, records: list[Raw]) -> None:
     assert factors == ["prompt", "background", "candidate_order", "repeats", "items"]
     ranks = table(workspace, "sensitivity_ranks")
     assert {row["pairs"] for row in ranks} == {"1"}
-    assert yaml.safe_load((workspace.out / "run.yaml").read_text())["suite"]["vary"] == VARY
+    vary = yaml.safe_load((workspace.out / "run.yaml").read_text())["suite"]["vary"]
+    assert {factor: vary[factor] for factor in VARY} == VARY
 
 
 def pooled(records: list[Raw], chosen: dict[str, str | None]) -> float:
