@@ -6,8 +6,7 @@ from pathlib import Path
 
 import click
 
-from phyblock.bundle import opened_bundle
-from phyblock.bundle.verify import FELL
+from phyblock.bundle import FELL, opened_bundle
 from phyblock.cli.bundle import how_whole
 from phyblock.cli.console import make_console, shown_path
 from phyblock.cli.paths import UserPath

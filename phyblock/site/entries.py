@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from phyblock.bundle.portable import portable_manifest
+from phyblock.bundle import portable_manifest
 from phyblock.records.manifest import ManifestModel
 from phyblock.site.runs import SiteRun
 

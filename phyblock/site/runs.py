@@ -7,8 +7,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from phyblock.bundle import opened_bundle
-from phyblock.bundle.naming import named
+from phyblock.bundle import named, opened_bundle
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.report.html.sources import Sources, open_sources
 from phyblock.tables.load import Run, load_run

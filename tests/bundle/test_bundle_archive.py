@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.bundle.archive import MEMBERS, pack, unpack
+from phyblock.bundle import MEMBERS, pack, unpack
 from phyblock.errors import StoreError
 
 CONTENTS = {name: f"{name} holds this\n".encode() * 50 for name in MEMBERS}

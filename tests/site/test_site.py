@@ -325,7 +325,7 @@ def test_a_bundle_that_does_not_verify_is_refused_by_the_command(
     first["scores"][0]["tp"] += 1
     text = "\n".join([json.dumps(first), *lines[1:]]) + "\n"
     (copy / "records.jsonl").write_text(text, encoding="utf-8")
-    with pytest.raises(StoreError, match="scored again, records come out otherwise"):
+    with pytest.raises(StoreError, match="records: does not verify"):
         bundle_run(copy, tmp_path / "b.zip")
     whole = (made.root / "later.zip").read_bytes()
     (made.root / "cut.zip").write_bytes(whole[:-100])
