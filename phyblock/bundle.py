@@ -39,12 +39,11 @@ from phyblock.report.write import write_tables
 from phyblock.resources import bundled
 from phyblock.run.data import recorded_dataset
 from phyblock.run.folder import run_folder
-from phyblock.run.reopen import reopen_tracks
-from phyblock.run.rescore import judged_anew, recorded_suite
+from phyblock.run.rescore import judged_anew, recorded_suite, reopen_tracks
 from phyblock.run.rewritten import manifest_text, record_lines, write_run
 from phyblock.tables.design import read_design
 from phyblock.text import some_of
-from phyblock.tracks.kind import kind_of, kinds_with_physics
+from phyblock.tracks.kind import kinds_with_physics
 
 BUNDLE_FILE = "bundle.zip"
 """Its name in the run's folder, unless another place is named."""
@@ -183,7 +182,7 @@ def opened_bundle(path: Path, data: Sequence[Path] = (), name: str = "") -> Iter
         if wrong:
             found = f"{len(wrong):,} records, at lines {some_of(wrong)} of {RECORDS}"
             raise _otherwise(where, about, "records", found)
-        for field in ("floors", "items", "scenes", "scenes_by_level"):
+        for field in ("items", "scenes", "scenes_by_level"):
             if getattr(manifest, field) != getattr(judged, field):
                 raise _otherwise(where, about, field)
         write_run(again, manifest, ())
@@ -272,8 +271,7 @@ def _localized(folder: Path, manifest: Manifest, data: Sequence[Path], where: st
             try:
                 dataset = recorded_dataset(folder, here, levels, None)
                 if part == "questions":
-                    names = [one for one in suite.tracks if kind_of(one).own_root(here) is not None]
-                    for track in reopen_tracks(folder, here, suite, names, dataset).values():
+                    for track in reopen_tracks(folder, here, suite, dataset).values():
                         track.close()
             except (DataError, SpecError):
                 continue

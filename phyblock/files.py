@@ -236,18 +236,21 @@ def make_folder(path: Path, hint: str = "") -> None:
         path.mkdir(parents=True, exist_ok=True)
 
 
-def atomic_write(path: Path, data: bytes | str, *, sync: bool = False) -> None:
+def atomic_write(path: Path, data: bytes | str | Iterable[bytes], *, sync: bool = False) -> None:
     """Write a whole file, or leave what was there and nothing beside it.
 
-    Text is written as UTF-8, with question marks for halves of characters. Where `path` is a link,
-    the link is replaced and its target stays as it is. With `sync` the file survives the death of
-    the machine. Raises OSError where the disk refuses: see `writing`.
+    Pieces of data are written as they come. Text is written as UTF-8, with question marks for
+    halves of characters. Where `path` is a link, the link is replaced and its target stays as it
+    is. With `sync` the file survives the death of the machine. Raises OSError where the disk
+    refuses: see `writing`.
     """
     # A name of its own: two processes may write the same file at the same time.
     partial = path.with_name(f".{uuid4().hex}.part")
     try:
         with partial.open("xb") as file:
-            file.write(data.encode("utf-8", "replace") if isinstance(data, str) else data)
+            if isinstance(data, (bytes, str)):
+                data = [data.encode("utf-8", "replace") if isinstance(data, str) else data]
+            file.writelines(data)
             if sync:
                 file.flush()
                 os.fsync(file.fileno())

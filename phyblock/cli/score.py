@@ -31,7 +31,8 @@ def command(
     """Read and score the stored replies of the folder RUN again, and count every measure again.
     Calls no model.
 
-    Writes the new scores to RUN/scores/PARSER-MATCHER (or --out), and leaves RUN as it is.
+    The new scores replace the records of RUN in one step. With another parser or matcher they go
+    to RUN/scores/PARSER-MATCHER, or to --out, and RUN stays as it is.
     """
     chosen = cast("PlanParser | None", parser), cast("Matcher | None", matcher)
     show_tables(rescore(run, *chosen, out, data, _tell, _Progress()), data)

@@ -22,7 +22,6 @@ from phyblock.files import NotRegularError, open_regular, read_bytes
 from phyblock.records.line import Line, decode, problems_of
 from phyblock.records.manifest import Manifest, read_manifest
 from phyblock.records.record import BatchLine, Prompt, Record, Stopped, Turn
-from phyblock.records.reply import Reply
 from phyblock.registry import known_tracks
 
 RECORDS = "records.jsonl"
@@ -267,12 +266,12 @@ def newest_starts(lines: RecordLines, tracks: Collection[str] | None = None) -> 
 
 def collect_turns(
     lines: Iterable[tuple[str, Turn]], without: Container[str] = ()
-) -> dict[str, list[Reply]]:
-    """Return the replies of every episode that has begun, by sample id, in order of its turns.
+) -> dict[str, list[Turn]]:
+    """Return the turns of every episode that has begun, by sample id, in their order.
 
     Samples `without` are left out. Raises StoreError where a turn is missing.
     """
-    by_sample: dict[str, dict[int, Reply]] = {}
+    by_sample: dict[str, dict[int, Turn]] = {}
     for where, line in lines:
         if line.sample in without:
             continue
@@ -280,7 +279,7 @@ def collect_turns(
         if not 0 <= line.turn <= len(turns):
             message = f"is turn {line.turn} of a sample of which {len(turns)} turns are there"
             raise StoreError(Problem(where, message, "turn", hint=TurnLines.hint))
-        turns[line.turn] = line.reply
+        turns[line.turn] = line
     return {sample: [turns[n] for n in sorted(turns)] for sample, turns in by_sample.items()}
 
 

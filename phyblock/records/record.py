@@ -289,6 +289,8 @@ class Turn(Line):
     """The reply, as in a record."""
     run: str = ""
     """Digest of the run that it belongs to; older turns have none."""
+    messages: str = ""
+    """Digest of what was asked, which stands in `prompts.jsonl`; empty where nothing was sent."""
 
 
 class PictureMark(Line):

@@ -15,6 +15,7 @@ from phyblock.run.extraction import extraction_prompt
 from phyblock.run.models import PlannedModel
 from phyblock.stable import hex_digest
 from phyblock.tracks import AnyTrack
+from phyblock.tracks.base import READER
 
 Inputs = Mapping[str, Any]
 """Data that decides the results, but for the version of the readers."""
@@ -35,7 +36,7 @@ def inputs_of(
         "suite": suite.identity(),
         "models": [{"name": m.name, **_model(m)} for m in models],
         "dataset": _dataset(dataset, data_version),
-        "tracks": {track.name: track.identity() for track in variants[Variant()]},
+        "tracks": {track.name: _track(track) for track in variants[Variant()]},
         "limit": limit,
     }
     if extractor is not None:
@@ -43,7 +44,7 @@ def inputs_of(
         inputs["extractor"] = {**extractor.identity(), "prompt": version}
     if suite.vary.factors:
         inputs["variants"] = {
-            variant.key: {track.name: track.identity() for track in of_variant}
+            variant.key: {track.name: _track(track) for track in of_variant}
             for variant, of_variant in variants.items()
             if variant == variant.shown
         }
@@ -55,6 +56,11 @@ def identity_of(inputs: Inputs) -> str:
     by_name = sorted(inputs["models"], key=lambda model: str(model["name"]))
     canonical = json.dumps({**inputs, "models": by_name}, sort_keys=True, separators=(",", ":"))
     return hex_digest(canonical)
+
+
+def _track(track: AnyTrack) -> dict[str, Any]:
+    """What decides what a track asks; replies are judged again when its reader changes."""
+    return {name: value for name, value in track.identity().items() if name != READER}
 
 
 def _dataset(dataset: Dataset, data_version: int) -> dict[str, object]:

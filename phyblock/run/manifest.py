@@ -20,10 +20,10 @@ from phyblock.sim.engine import ENGINES, described_engine
 from phyblock.tracks import AnyTrack, kind_of
 from phyblock.tracks.kind import kinds_with_physics
 
-__all__ = ["make_manifest"]
+__all__ = ["code_versions", "make_manifest"]
 
 _ENGINES = (engine.distribution for engine in ENGINES.values())
-_LIBRARIES = ("phyblock", "litellm", *_ENGINES, "numpy", "pillow", "jinja2")
+_LIBRARIES = ("litellm", *_ENGINES, "numpy", "pillow", "jinja2")
 """Of the physics engines, one or both may be there."""
 
 
@@ -67,11 +67,16 @@ def make_manifest(
         },
         "versions": {
             "python": platform.python_version(),
-            "readers": str(READER_VERSION),
             **_versions(),
+            **code_versions(),
         },
     }
     return Manifest.model_validate(fields)
+
+
+def code_versions() -> dict[str, str]:
+    """Return the versions of what judges replies."""
+    return {"phyblock": version("phyblock"), "readers": str(READER_VERSION)}
 
 
 def _place(model: PlannedModel) -> dict[str, object]:

@@ -1,197 +1,125 @@
-"""Judging stored replies again with today's code: no model is called."""
+"""Judging stored replies again with today's code: nobody is asked anything."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Collection, Mapping, Sequence
-from contextlib import nullcontext
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from itertools import takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from pydantic import ValidationError
 
-from phyblock.config.suite import Suite, suite_model
-from phyblock.data import AssemblyTask, Dataset
+from phyblock.config.suite import Suite, SuiteFiles, suite_model
+from phyblock.config.yaml import YamlSource
+from phyblock.data import Dataset
 from phyblock.errors import DataError, Problem, SpecError, StoreError
 from phyblock.parsing.plan import reader_version
-from phyblock.parsing.text import READER_VERSION
 from phyblock.records.files import run_records
 from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
 from phyblock.records.record import Record
-from phyblock.run.data import asked_about, recorded_dataset
+from phyblock.records.reply import StoredError
+from phyblock.run.data import CHANGED, asked_about, recorded_dataset
+from phyblock.run.extraction import read_extraction
 from phyblock.run.folder import check_place, locked, run_folder
-from phyblock.run.judged_again import Tell, judged_again, untold
-from phyblock.run.reopen import reopen_tracks
+from phyblock.run.judging import judged_apart
+from phyblock.run.manifest import code_versions
+from phyblock.run.records import about_item, judged
 from phyblock.run.rewritten import write_run
-from phyblock.tracks import AnyTrack, kind_of
-from phyblock.tracks.counting import counts_samples
+from phyblock.text import counted
+from phyblock.tracks import AnyTrack, EpisodeTrack, Item, kind_of, open_tracks, shown_item
+from phyblock.tracks.base import CARRYING, ENGINE, READER
+from phyblock.tracks.kind import Opening
 from phyblock.types import Matcher, PlanParser
 
-if TYPE_CHECKING:
-    from phyblock.run.floors import FloorValues
+__all__ = ["judged_anew", "recorded_suite", "reopen_tracks", "rescore"]
+
+_RESTORE = "restore the file from a copy"
 
 
 def rescore(
     folder: Path,
-    parser: PlanParser | None,
-    matcher: Matcher | None,
-    out: Path | None,
+    parser: PlanParser | None = None,
+    matcher: Matcher | None = None,
+    out: Path | None = None,
     data: Path | None = None,
-    tell: Tell = untold,
+    tell: Callable[[str], object] = lambda _: None,
     watch: Callable[[int], object] = lambda _: None,
 ) -> Path:
-    """Judge every stored reply of a run again with today's code; nobody is asked.
+    """Judge every stored reply of a run again and return the folder that holds the scores.
 
-    Without parser, matcher and `out` the records of the run itself are replaced in one step. Else
-    they go to a run folder of their own (`<run>/scores/<parser>-<matcher>` when `out` is None), so
-    that tables and notebooks read them like any run. Parser and matcher are those of plans.
-    `data` is where the data set is now, if it has moved. `tell` is called with what could not be
-    judged again and stays as it was, `watch` with the number of samples that are done.
+    Without `out`, another parser or another headline matcher, these replace the records of the run
+    in one step. Else they become a run folder of their own, `<run>/scores/<parser>-<matcher>` when
+    `out` is None. `data` is where the data set is now, if it has moved. An episode in which today's
+    code would ask something else stays as it was and is no longer final: `tell` is called with how
+    many there are, `watch` with the number of records that are done.
     Raises SpecError for a parser that cannot read what was asked for, StoreError for a folder that
     is no run or cannot be written, DataError when the data are not what the run was made on.
     """
     manifest = read_manifest(folder)
     suite = recorded_suite(folder, manifest, parser, matcher)
-    in_place = parser is None and matcher is None and out is None
-    name = f"scores/{suite.parser}-{suite.scoring.matchers[0]}"
-    target = folder if in_place else out or folder / name
-    identity = manifest.identity
+    headline = suite.scoring.matchers[0]
+    changes: dict[str, Any] = {}
+    in_place = out is None and suite == recorded_suite(folder, manifest)
+    target = folder
     if not in_place:
-        by = f"{suite.parser} {reader_version(suite.parser)}, {suite.scoring.matchers[0]}"
-        identity = f"{manifest.identity} scored by {by}"
+        target = out or folder / f"scores/{suite.parser}-{headline}"
+        by = f"{suite.parser} {reader_version(suite.parser)}, {headline}"
+        changes["identity"] = f"{manifest.identity} scored by {by}"
+        changes["suite"] = suite.model_dump(mode="json")
         if out is None:
-            run_folder(folder).check([f"{name}/"])
-        _check_target(target, identity)
+            run_folder(folder).check([f"{target.relative_to(folder)}/"])
+        check_place(target)
+        if (target / MANIFEST).exists() and read_manifest(target).identity != changes["identity"]:
+            hint = "choose another folder with --out"
+            raise StoreError(Problem(str(target), "holds another run", hint=hint))
     dataset = recorded_dataset(folder, manifest, suite.levels, data)
-    stayed: list[str] = []
-    names = [name for name in suite.tracks if kind_of(name).rescored or counts_samples(name)]
-    names += _read_anew(folder, manifest, suite, names, dataset, stayed.append)
-    scored = _scored(folder, manifest, suite, names, dataset, stayed.append, watch=watch)
-    changes = {
-        "identity": identity,
-        "suite": suite.model_dump(mode="json"),
-        "floors": scored.floors,
-        "versions": {**manifest.versions, "readers": str(READER_VERSION)},
-    }
-    again = manifest.model_copy(update=changes)
-    with locked(folder) if in_place else nullcontext():
-        # Lines that later ones replaced stay: what they cost counts against the limit.
-        replaced = _replaced(folder, manifest) if in_place else []
-        write_run(target, again, [*replaced, *scored.records])
-    for text in stayed:
-        tell(text)
+    tracks = _by_condition(folder, manifest, suite, dataset)
+    changes["versions"] = {**manifest.versions, **code_versions()}
+    diverged: Counter[str] = Counter()
+
+    def records() -> Iterator[Record]:
+        for done, (record, again) in enumerate(_judged(folder, manifest, tracks, strict=False)):
+            watch(done)
+            diverged[record.track] += again.error is not None and record.error is None
+            yield again
+
+    with locked(folder):
+        write_run(target, manifest.model_copy(update=changes), records())
+    for name, count in diverged.items():
+        if count:
+            tell(
+                f"{kind_of(name).title}: in {counted(count, 'episode')} this version would have "
+                "asked something else; phyblock run asks on from there"
+            )
     return target
 
 
-def _replaced(folder: Path, manifest: Manifest) -> list[Record]:
-    """Return the records of a run that later records of the same sample replaced."""
-    newest: dict[str, Record] = {}
-    earlier = []
-    for _, record in run_records(folder, manifest):
-        if record.sample in newest:
-            earlier.append(newest[record.sample])
-        newest[record.sample] = record
-    return earlier
-
-
 def judged_anew(folder: Path) -> tuple[Manifest, list[Record]]:
-    """The manifest and the newest records of a run, made again of its replies and its data.
+    """Return manifest and records of a run, made again of its replies and its data.
 
-    All tracks are judged, and what records say of their items is taken from the data, as is how
-    much was to be asked. Physics is not carried out: what became of blocks that were let go is
-    taken from the records. Nothing is written.
-    Raises as `rescore`.
+    What records say of their items is taken from the data, as is how much was to be asked. Physics
+    is not carried out: what became of blocks that were let go is taken from the records. Nothing is
+    written. Raises as `rescore`, and StoreError for an episode that would go otherwise.
     """
     manifest = read_manifest(folder)
     suite = recorded_suite(folder, manifest)
     dataset = recorded_dataset(folder, manifest, suite.levels, None)
-    scored = _scored(folder, manifest, suite, suite.tracks, dataset, untold, anew=True)
-    scenes = [task.scene for task in scored.asked]
+    tracks = _by_condition(folder, manifest, suite, dataset)
+    records = {
+        record.sample: again for record, again in _judged(folder, manifest, tracks, strict=True)
+    }
+    scenes = [task.scene for task in asked_about(manifest, suite.levels, dataset).tasks]
     changes = {
-        "floors": scored.floors,
-        "items": scored.items,
+        "items": {name: len(track.items) for name, track in tracks[""].items()},
         "scenes": len(scenes),
         "scenes_by_level": {
             level: sum(level in scene.levels for scene in scenes) for level in suite.levels
         },
     }
-    return manifest.model_copy(update=changes), scored.records
-
-
-@dataclass(frozen=True)
-class _Scored:
-    """Records judged again; what floors reach, the scenes asked about, and items of each track that
-    was judged.
-    """
-
-    records: list[Record]
-    floors: FloorValues
-    asked: Sequence[AssemblyTask]
-    items: Mapping[str, int]
-
-
-def _scored(
-    folder: Path,
-    manifest: Manifest,
-    suite: Suite,
-    names: Collection[str],
-    dataset: Dataset,
-    tell: Tell,
-    *,
-    anew: bool = False,
-    watch: Callable[[int], object] = lambda _: None,
-) -> _Scored:
-    """The records of a run, those of the tracks in `names` judged again; see `judged_again`."""
-
-    # Values of floors are computed in frames of pandas.
-    from phyblock.run.floors import floor_values
-
-    def reopened(name: str, one: Suite) -> AnyTrack:
-        return reopen_tracks(folder, manifest, one, [name], dataset)[name]
-
-    tracks = {
-        variant.key: reopen_tracks(folder, manifest, suite.at(variant), names, dataset)
-        for variant in dict.fromkeys(variant.shown for variant in suite.vary.variants)
-    }
-    records = asyncio.run(judged_again(folder, manifest, tracks, tell, anew=anew, watch=watch))
-    changes = {"suite": suite.model_dump(mode="json")}
-    floors = floor_values(manifest.model_copy(update=changes), suite, reopened)
-    asked = asked_about(manifest, suite.levels, dataset).tasks
-    items = {name: len(track.items) for name, track in tracks[""].items()}
-    return _Scored(records, floors, asked, items)
-
-
-def _read_anew(
-    folder: Path,
-    manifest: Manifest,
-    suite: Suite,
-    known: Collection[str],
-    dataset: Dataset,
-    tell: Tell,
-) -> list[str]:
-    """The tracks beside `known` whose replies can be read again: they are asked one by one, about
-    data that are still those of the run.
-    """
-    names: list[str] = []
-    for name in suite.tracks:
-        if name in known or kind_of(name).plays:
-            continue
-        try:
-            reopen_tracks(folder, manifest, suite, [name], dataset)
-        except (DataError, SpecError) as error:
-            tell(f"{kind_of(name).title}: replies stay as they were read: {error}")
-        else:
-            names.append(name)
-    return names
-
-
-def _check_target(target: Path, identity: str) -> None:
-    """Raise StoreError unless `target` is new, empty or holds these scores."""
-    check_place(target)
-    if (target / MANIFEST).exists() and read_manifest(target).identity != identity:
-        hint = "choose another folder with --out"
-        raise StoreError(Problem(str(target), "holds another run", hint=hint))
+    return manifest.model_copy(update=changes), list(records.values())
 
 
 def recorded_suite(
@@ -200,19 +128,13 @@ def recorded_suite(
     parser: PlanParser | None = None,
     matcher: Matcher | None = None,
 ) -> Suite:
-    """The suite of the run in `folder`, with parser and headline matcher replaced where named.
+    """Return the suite of the run in `folder`, with parser and headline matcher where named.
 
     Raises StoreError for a suite that is none, SpecError for a parser that cannot read what was
     asked for.
     """
     try:
         suite = suite_model().model_validate(manifest.suite)
-        matchers = suite.scoring.matchers
-        if matcher is not None:
-            matchers = (matcher, *(name for name in matchers if name != matcher))
-        scoring = suite.scoring.model_copy(update={"matchers": matchers})
-        changed = {"scoring": scoring, "parser": parser or suite.parser}
-        suite = suite.model_copy(update=changed)
     except ValidationError as error:
         hint = "run.yaml is written by `phyblock run` and is never edited"
         problem = Problem(str(folder / MANIFEST), "is missing or wrong", "suite", hint=hint)
@@ -220,4 +142,137 @@ def recorded_suite(
     if parser == "official" and suite.answer_format == "json_schema":
         message = "asked for JSON, which the official expression does not read"
         raise SpecError(Problem(str(folder), message, "--parser", parser, "steps"))
-    return suite
+    matchers = suite.scoring.matchers
+    if matcher is not None:
+        matchers = (matcher, *(name for name in matchers if name != matcher))
+    scoring = suite.scoring.model_copy(update={"matchers": matchers})
+    return suite.model_copy(update={"scoring": scoring, "parser": parser or suite.parser})
+
+
+def reopen_tracks(
+    folder: Path, manifest: Manifest, suite: Suite, dataset: Dataset
+) -> dict[str, AnyTrack]:
+    """Return the tracks of the run in `folder`, known to ask what was asked; nobody is.
+
+    `dataset` is the run's. Raises DataError for other data of a track than those that the run was
+    made on.
+    """
+    path = folder / MANIFEST
+    roots = {name: kind_of(name).own_root(manifest) for name in suite.tracks}
+    folders = {name: Path(root) for name, root in roots.items() if root is not None}
+    suite = suite.with_files(SuiteFiles(path, dataset.root, YamlSource(str(path)), folders))
+    opening = Opening(suite, dataset, manifest.limit, with_prompts=False)
+    tracks = {track.name: track for track in open_tracks(opening, suite.tracks)}
+    for name, track in tracks.items():
+        stored = manifest.tracks.get(name, {})
+        for key, value in track.identity().items():
+            # A track that asks nobody has no prompts and pictures; engines and readers ask nothing.
+            if key not in (CARRYING, ENGINE, READER) and value not in (None, stored.get(key)):
+                root, field = folders.get(name, dataset.root), f"tracks.{name}.{key}"
+                was = str(stored.get(key))
+                raise DataError(Problem(str(root), CHANGED, field, str(value), was))
+    return tracks
+
+
+def _by_condition(
+    folder: Path, manifest: Manifest, suite: Suite, dataset: Dataset
+) -> dict[str, dict[str, AnyTrack]]:
+    """The tracks of a run by the key of the condition in which they asked, and by name."""
+    conditions = dict.fromkeys(variant.shown for variant in suite.vary.variants)
+    return {one.key: reopen_tracks(folder, manifest, suite.at(one), dataset) for one in conditions}
+
+
+def _judged(
+    folder: Path,
+    manifest: Manifest,
+    tracks: Mapping[str, Mapping[str, AnyTrack]],
+    *,
+    strict: bool,
+) -> Iterator[tuple[Record, Record]]:
+    """Every record of the run in `folder`, as it is stored and judged again.
+
+    With `strict`, an episode that would go otherwise is a StoreError.
+    """
+    items = {(name, item.key): item for name, track in tracks[""].items() for item in track.items}
+    # The thread of a notebook has a loop already.
+    with ThreadPoolExecutor(1) as thread:
+        loop = asyncio.new_event_loop()
+        try:
+            for where, record in run_records(folder, manifest):
+                condition = record.way.shown.key
+                if condition not in tracks:
+                    message = "was asked in a condition that the run does not have"
+                    raise StoreError(Problem(where, message, "variant", condition, hint=_RESTORE))
+                track = tracks[condition].get(record.track)
+                item = items.get((record.track, record.item))
+                if track is None or item is None:
+                    message = "names an item that the run does not have"
+                    raise StoreError(Problem(where, message, "key", record.item, hint=_RESTORE))
+                shown = shown_item(track, item, record.seed)
+                work = _judged_again(track, shown, record, where, strict=strict)
+                yield record, thread.submit(loop.run_until_complete, work).result()
+        finally:
+            for of_condition in tracks.values():
+                for track in of_condition.values():
+                    track.close()
+            loop.close()
+
+
+async def _judged_again(
+    track: AnyTrack, item: Item, record: Record, where: str, *, strict: bool
+) -> Record:
+    given = {**record.as_given(), **about_item(item), **track.about(item)}
+    if "engine" in record.model_fields_set:
+        # Nothing is let go again: what fell stands in the record, and so does what let it fall.
+        given["engine"] = record.as_given()["engine"]
+    if not isinstance(track, EpisodeTrack):
+        earlier: Record | None = record
+        if not record.is_judged:
+            # No plan was carried out of which it could tell.
+            given["error"] = earlier = None
+        text = None if record.reply is None else record.reply.text
+        again = await judged_apart(track, item, text, given, earlier)
+        if again.outcome != "parse_failure" or record.extraction is None:
+            return again
+        return await read_extraction(track, item, again, record.extraction, earlier)
+    episode, asked = track.again(item, record), record.asked_turns
+    for turn in asked:
+        request = await episode.request()
+        if request is None:
+            break
+        episode.take(request, turn.reply)
+    # What the last reply comes to shows when the next is asked for: blocks are let go.
+    goes_on = await episode.request() is not None
+    went = episode.fields()["turns"]
+    pairs = list(zip(asked, went, strict=False))
+    same = sum(1 for _ in takewhile(lambda pair: _led_on(*pair), pairs))
+    if same == len(asked) and not (goes_on and record.error is None):
+        turns = [{**was.fields(), **now} for was, now in pairs]
+        return judged(given, item, episode, {"turns": turns})
+    if strict:
+        message = "goes otherwise than it did, in another version"
+        hint = "the version of phyblock that made the run plays it as it went"
+        raise StoreError(Problem(where, message, "turns", record.sample, hint=hint))
+    message = f"this version asks something else from turn {same + 2} on"
+    error = StoredError(kind="retryable", message=message)
+    return record.model_copy(update={"error": error, "outcome": "api_error"})
+
+
+def _led_on(was: Any, now: Mapping[str, Any]) -> bool:
+    """True if a stored turn came to what it comes to now, by whichever rule it was read."""
+    fields = was.fields()
+    return all(
+        _is_same({**fields[name], "rule": None}, {**value, "rule": None})
+        if isinstance(value, Mapping) and isinstance(fields.get(name), Mapping)
+        else _is_same(fields.get(name), value)
+        for name, value in now.items()
+    )
+
+
+def _is_same(was: object, now: object) -> bool:
+    """True if two values say the same; a missing part is null."""
+    if isinstance(was, Mapping) and isinstance(now, Mapping):
+        return all(_is_same(was.get(name), now.get(name)) for name in was.keys() | now.keys())
+    if isinstance(was, (list, tuple)) and isinstance(now, (list, tuple)):
+        return len(was) == len(now) and all(map(_is_same, was, now))
+    return was == now

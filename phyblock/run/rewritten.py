@@ -18,13 +18,14 @@ __all__ = ["manifest_text", "record_lines", "write_run"]
 
 def write_run(folder: Path, manifest: Manifest, records: Iterable[Record]) -> None:
     """Write manifest and records of a run; raises StoreError where the disk refuses."""
-    texts = {MANIFEST: manifest_text(manifest), RECORDS: "".join(record_lines(records))}
-    # Where a run is replaced, a kill between the two leaves one whose records are to be scored.
+    lines = (line.encode("utf-8", "replace") for line in record_lines(records))
+    files: dict[str, str | Iterator[bytes]] = {RECORDS: lines, MANIFEST: manifest_text(manifest)}
+    # Where a run is replaced, a kill between the two leaves one that has to be scored again.
     names = (RECORDS, MANIFEST) if (folder / MANIFEST).exists() else (MANIFEST, RECORDS)
     run_folder(folder).claim([])
-    with writing(folder):
-        for name in names:
-            atomic_write(folder / name, texts[name], sync=True)
+    for name in names:
+        with writing(folder / name):
+            atomic_write(folder / name, files[name], sync=True)
 
 
 def manifest_text(manifest: Manifest) -> str:

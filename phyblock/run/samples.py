@@ -69,7 +69,7 @@ class Sample:
 class SampleRunner:
     """Turns samples into records; answered turns of episodes are on disk before the next is asked.
 
-    `earlier` are the replies of episodes that an earlier command began, by sample id; `run` is the
+    `earlier` are the turns of episodes that an earlier command began, by sample id; `run` is the
     digest that shows whose the records are; `extractor` is asked what unread replies say.
     """
 
@@ -78,7 +78,7 @@ class SampleRunner:
         turns: RecordWriter,
         prompts: PromptFile,
         halt: Halt,
-        earlier: Mapping[str, Sequence[Reply]],
+        earlier: Mapping[str, Sequence[Turn]],
         run: str,
         extractor: Extractor | None = None,
     ) -> None:
@@ -162,15 +162,25 @@ class SampleRunner:
         while (wanted := await self._next(episode)) is not None:
             request = sample.asking(wanted)
             asked = _asked(config, request)
-            turn = {"prompt": self._prompt(track, request)}
-            if len(replies) < len(earlier):
-                answer = earlier[len(replies)]
+            prompt = self._prompt(track, request)
+            turn = {"prompt": prompt}
+            digest = "" if prompt is None else prompt.messages
+            known = earlier[len(replies)] if len(replies) < len(earlier) else None
+            # Where earlier replies led elsewhere, as another version read them, it asks anew.
+            if known is not None and known.messages == digest != "":
+                answer = known.reply
             else:
                 answer = await _answer(_ask_now(model, request))
                 if isinstance(answer, Reply):
                     number, reply = len(replies), answer.storable()
                     await self._turns.put(
-                        Turn(sample=sample.id, turn=number, reply=reply, run=self._run)
+                        Turn(
+                            sample=sample.id,
+                            turn=number,
+                            reply=reply,
+                            run=self._run,
+                            messages=digest,
+                        )
                     )
             if not isinstance(answer, Reply):
                 break

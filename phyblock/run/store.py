@@ -30,10 +30,10 @@ from phyblock.records.files import (
 )
 from phyblock.records.line import Line
 from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
-from phyblock.records.record import Stopped
-from phyblock.records.reply import Reply
+from phyblock.records.record import Stopped, Turn
 from phyblock.run.appending import AppendFile
 from phyblock.run.folder import check_place, locked, run_folder
+from phyblock.run.manifest import code_versions
 from phyblock.run.prompts import PromptFile
 from phyblock.run.rewritten import manifest_text
 from phyblock.run.standing import Standing
@@ -123,8 +123,8 @@ class RunStore:
         else:
             folder.remove([STOPPED])
 
-    def begun_turns(self, done: Container[str]) -> dict[str, list[Reply]]:
-        """The replies of episodes that have begun and are not `done`, by sample id."""
+    def begun_turns(self, done: Container[str]) -> dict[str, list[Turn]]:
+        """The turns of episodes that have begun and are not `done`, by sample id."""
         return collect_turns(TurnLines(self._folder, self._validation), done)
 
     def _open(
@@ -163,23 +163,29 @@ def held_run(folder: Path, manifest: Manifest) -> Manifest | None:
     if not (folder / MANIFEST).exists():
         return None
     found = read_manifest(folder)
-    if found.identity == manifest.identity and _readers(found) == _readers(manifest):
-        return found
     paid: tuple[Lines[Any], ...] = (RecordLines(folder), TurnLines(folder), BatchLines(folder))
     if all(next(iter(lines), None) is None for lines in paid):
         return None
     if found.identity == manifest.identity:
-        message = f"was begun by another version, whose readers are {_readers(found)}"
-        hint = f"phyblock score {folder} judges its replies again and asks nobody; then it goes on"
-        raise StoreError(Problem(str(folder), message, allowed=_readers(manifest), hint=hint))
+        _check_versions(folder, found, manifest)
+        return found
     names = _changed(found, manifest)
     changed = f"different: {', '.join(names) or 'how phyblock asks, draws or reads'}"
     hint = "; ".join((*_reasons(found, manifest), _HINT))
     raise StoreError(Problem(str(folder), "holds another run", found=changed, hint=hint))
 
 
-def _readers(manifest: Manifest) -> str:
-    return manifest.versions.get("readers", "1")
+def _check_versions(folder: Path, found: Manifest, wanted: Manifest) -> None:
+    """Raise StoreError where the code that judged a run's replies is not the one here."""
+    differ = [name for name in code_versions() if found.versions.get(name) != wanted.versions[name]]
+    if differ:
+        made, here = (
+            ", ".join(f"{name} {one.versions.get(name, 'unknown')}" for name in differ)
+            for one in (found, wanted)
+        )
+        message = "was judged by another version of phyblock"
+        hint = f"phyblock score {folder} first: it judges the replies again and asks nobody"
+        raise StoreError(Problem(str(folder), message, found=made, allowed=here, hint=hint))
 
 
 def _reasons(found: Manifest, wanted: Manifest) -> Iterator[str]:

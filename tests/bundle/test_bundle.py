@@ -180,16 +180,11 @@ def _asked_about_less(records: list[Raw], manifest: Raw) -> None:
     manifest["scenes"] = 1
 
 
-def _floor(_: list[Raw], manifest: Raw) -> None:
-    floors = manifest["floors"]["full_planning"]["all-candidates"]
-    floors.update(dict.fromkeys(floors, 0.0))
-
-
 @pytest.mark.parametrize(
     "change",
     [
         *(_score, _answer, _subtask, _level, _parents, _turn, _plan, _twice),
-        *(_floor, _asked_about_less),
+        _asked_about_less,
     ],
 )
 def test_what_does_not_follow_from_the_replies_is_refused(

@@ -256,6 +256,8 @@ FOLDERS: tuple[Bad, ...] = (
         writes=("out/tables",), bytes_left=100),
     Bad("full-scores", command("score", "out", "--parser", "official"),
         ("out/scores", "cannot be written"), writes=("out/scores",), bytes_left=100),
+    Bad("full-records", command("score", "out"), ("out/records.jsonl", "cannot be written"),
+        bytes_left=100),
     Bad("full-init", command("init", "new"), ("new", "cannot be written"),
         writes=("new",), bytes_left=100),
 )  # fmt: skip

@@ -130,7 +130,7 @@ def turn_lines(folder: Path, *numbers: int) -> None:
 
 def test_turns_are_read_in_their_order_and_a_later_line_counts(tmp_path: Path) -> None:
     turn_lines(tmp_path, 0, 1, 0, 2)
-    assert [reply.text for reply in collect_turns(TurnLines(tmp_path))["s"]] == [
+    assert [turn.reply.text for turn in collect_turns(TurnLines(tmp_path))["s"]] == [
         "Move(0)",
         "Move(1)",
         "Move(2)",

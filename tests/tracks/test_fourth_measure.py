@@ -175,7 +175,7 @@ def test_scoring_again_counts_in_every_track(
     assert len({tuple(now["sampled"]) for now in counts_now.values()}) == 2
 
 
-def test_an_episode_that_goes_otherwise_stays_as_it_was(
+def test_an_episode_that_would_have_asked_otherwise_is_no_longer_final(
     here: Workspace, request: pytest.FixtureRequest
 ) -> None:
     here.write_suite(tracks=["step_planning"], steps={"physics": "off"}, levels=[3])
@@ -188,6 +188,8 @@ def test_an_episode_that_goes_otherwise_stays_as_it_was(
     lines[0]["turns"][0]["reply"]["text"] = "Done"
     path.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
     told: list[str] = []
-    again = here.records(rescore(here.out, None, None, here.root / "scored", tell=told.append))
-    assert again[0] == lines[0]
-    assert "1 episode would take another course" in told[0]
+    first, *others = here.records(rescore(here.out, out=here.root / "scored", tell=told.append))
+    assert [text.partition(" this")[0] for text in told] == ["Step planning: in 1 episode"]
+    assert (first["outcome"], first["error"]["kind"]) == ("api_error", "retryable")
+    assert first["turns"] == lines[0]["turns"]
+    assert not any(line["error"] for line in others)

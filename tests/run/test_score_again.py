@@ -1,0 +1,159 @@
+"""A run that another version of phyblock judged: refused until it is scored, then gone on with."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from phyblock.cli.main import phyblock
+from phyblock.errors import StoreError
+from phyblock.parsing.move import parse_move
+from phyblock.parsing.plan import parse_plan
+from phyblock.records.manifest import read_manifest
+from phyblock.registry import known_tracks
+from phyblock.run import manifest, rescore, rewritten
+from tests.run.test_step_runs import by_sample
+from tests.servers.chassis import Faults, Running, Seen
+from tests.servers.step_agent import StepAgent
+from tests.workspace import Raw, Workspace
+
+EARLIER = 5
+
+
+class Stopping(StepAgent):
+    """Takes no key any more once it has given so many answers; `answered` names their requests."""
+
+    def __init__(self, answers: int) -> None:
+        super().__init__()
+        self.answers = answers
+        self.answered: list[str] = []
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        self.answered.append(seen.sample)
+        if len(self.answered) >= self.answers:
+            self.faults = Faults(mode="401")
+        return super().reply(seen, ending)
+
+
+def call(*args: object) -> int:
+    return phyblock.main([str(arg) for arg in args], standalone_mode=False) or 0
+
+
+def run(out: str, *args: object) -> int:
+    return call("run", "suite.yaml", "--out", out, "--no-report", "--yes", "--no-cache", *args)
+
+
+def read_earlier(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read as readers of an earlier version, which did not read all numbers."""
+    monkeypatch.setattr(manifest, "READER_VERSION", EARLIER)
+    plan, move = parse_plan, parse_move
+    earlier = {
+        "parse_plan": lambda text, *rest: plan(unread(text), *rest),
+        "parse_move": lambda text: move(unread(text)),
+    }
+    known_tracks()
+    for path, module in list(sys.modules.items()):
+        for name, read in earlier.items():
+            if path.startswith("phyblock.tracks") and hasattr(module, name):
+                monkeypatch.setattr(module, name, read)
+
+
+def unread(text: str) -> str:
+    return re.sub(r"\(2\)|\(4\)|(?<=index )3", "?", text)
+
+
+@pytest.fixture
+def begun(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stopping]:
+    """A run of two tracks that earlier readers began, stopped in the middle of episodes; the
+    server, which answers again.
+    """
+    monkeypatch.chdir(workspace.root)
+    monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
+    monkeypatch.setattr(sys, "argv", ["phyblock"])
+    server = Stopping(22)
+    with Running(server) as running:
+        workspace.write_models(running.url, "alpha", max_tokens=100)
+        workspace.write_suite(
+            tracks=["full_planning", "step_planning"],
+            models=["random", "alpha"],
+            images={"size_px": 128, "layout": "separate"},
+            limits={"max_concurrency": 3},
+            steps={"physics": "off", "max_steps": 4},
+        )
+        with monkeypatch.context() as earlier:
+            read_earlier(earlier)
+            assert run("out") == 1
+        server.faults, server.answers = Faults(), 10**6
+        yield server
+
+
+def newest(workspace: Workspace, folder: str) -> dict[str, Raw]:
+    """The newest record of every sample, but for what differs between two runs."""
+    return by_sample(workspace.records(workspace.root / folder))
+
+
+def test_it_is_refused_until_it_is_scored_and_then_ends_as_if_today_had_begun_it(
+    begun: Stopping, workspace: Workspace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before, earlier = newest(workspace, "out"), read_manifest(workspace.out)
+    files = workspace.files()
+    for args in ((), ("--dry-run",)):
+        with pytest.raises(StoreError, match="judged by another version") as refused:
+            run("out", *args)
+        (problem,) = refused.value.problems
+        assert problem.found.startswith(f"readers {EARLIER}")
+        assert problem.hint.startswith("phyblock score out first")
+    assert workspace.files() == files
+    asked = len(begun.seen)
+    capsys.readouterr()
+    assert call("score", "out") == 0
+    assert len(begun.seen) == asked
+    scored = newest(workspace, "out")
+    diverged = {name for name, one in scored.items() if one["error"] and not before[name]["error"]}
+    assert f"in {len(diverged)} episodes this version would have asked" in capsys.readouterr().err
+    assert {scored[name]["model"] for name in diverged} == {"random", "alpha"}
+    assert any(scored[name]["scores"] != one["scores"] for name, one in before.items())
+    now = read_manifest(workspace.out)
+    assert (now.identity, now.created) == (earlier.identity, earlier.created)
+
+    answered = len(begun.answered)
+    assert run("out") == 0
+    assert max(Counter(begun.answered).values()) == 1, "a reply that still holds was asked again"
+    assert len(begun.answered) > answered
+    assert run("fresh") == 0
+    assert newest(workspace, "out") == newest(workspace, "fresh")
+
+
+@pytest.mark.usefixtures("begun")
+@pytest.mark.parametrize("writes", [1, 2])
+def test_killed_before_either_file_is_replaced_it_is_scored_again(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, writes: int
+) -> None:
+    shutil.copytree(workspace.out, workspace.root / "whole")
+    assert call("score", "whole") == 0
+    before = (workspace.out / "records.jsonl").read_bytes()
+    left, write = writes, rewritten.atomic_write
+
+    def dying(*args: Any, **options: Any) -> None:
+        nonlocal left
+        left -= 1
+        if not left:
+            raise KeyboardInterrupt
+        write(*args, **options)
+
+    with monkeypatch.context() as dies:
+        dies.setattr(rewritten, "atomic_write", dying)
+        with pytest.raises(KeyboardInterrupt):
+            rescore.rescore(workspace.out)
+    assert ((workspace.out / "records.jsonl").read_bytes() == before) == (writes == 1)
+    with pytest.raises(StoreError, match="judged by another version"):
+        run("out")
+    assert call("score", "out") == 0
+    assert newest(workspace, "out") == newest(workspace, "whole")
+    assert run("out") == 0
