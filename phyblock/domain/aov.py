@@ -12,8 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["AOVGraph", "CycleError"]
-
 
 class CycleError(ValueError):
     """The dependencies hold a cycle; `vertices` are those on it, in order."""

@@ -24,18 +24,6 @@ from phyblock.domain.blocks import (
 )
 from phyblock.domain.scene import Block
 
-__all__ = [
-    "SYMMETRIES",
-    "Symmetry",
-    "angles_deg",
-    "canonical_form",
-    "fingerprint",
-    "image_deg",
-    "image_m",
-    "pose_class",
-    "turned_form",
-]
-
 Matrix = NDArray[np.float64]
 _MIRROR = np.diag([-1.0, 1.0, 1.0])
 """Every block type is its own mirror image across the plane x = 0 of its body frame."""

@@ -1,14 +1,14 @@
-"""Whether blocks can stand as they are, by statics alone, and with how much to spare.
+"""Statics: can blocks stand as they are, and with how much to spare.
 
 Blocks stand when forces in their contacts can bear every weight: each force inside the cone of
 friction, all forces and moments of a block in balance. That is a set of linear equations in
 forces that only push, each cone as a pyramid of four edges. Where such forces exist, rigid bodies
 may stand; where none exist, they cannot.
 
-Non-negative least squares (Lawson and Hanson, 1974) look for the forces. What they say is checked,
-for a solver may stop early and may misstate what is left over: forces that it gives are put into
-the equations, and that there are none is believed only where what is left over proves it (Farkas'
-lemma). Linear programming settles the rest.
+Non-negative least squares (Lawson and Hanson, 1974) look for the forces. The result is checked, for
+a solver may stop early and may misstate what is left over: forces that it gives are put into the
+equations, and that there are none is believed only where the residual proves it (Farkas' lemma).
+Linear programming settles the rest.
 
 `surely_stands` and `surely_falls` ask so with all weights off by up to `MARGIN_M` to any side and
 long blocks heavier or lighter by `MASS_FACTORS`, with all that lies between, so that no verdict
@@ -20,8 +20,8 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from itertools import combinations
-from typing import Any, NamedTuple
+from itertools import combinations, product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,16 +34,15 @@ from phyblock.sim.contact import (
     bounds_m,
     boxes_near,
     contact_corners_m,
-    cross,
     pieces_of,
     separating_axes,
 )
-from phyblock.sim.geometry import ConvexPiece
+from phyblock.sim.geometry import cross
 
-__all__ = ["FRICTIONS", "MARGIN_M", "MASSES", "is_balanced", "surely_falls", "surely_stands"]
+Floats = NDArray[np.float64]
 
 MARGIN_M = 0.005
-"""How far off its place every weight may be [m]."""
+"""Distance by which every weight may be off its place [m]."""
 FRICTIONS = (0.28, 0.45)
 """The least and the most friction that a verdict has to hold under."""
 Masses = tuple[tuple[BlockType, float], ...]
@@ -57,28 +56,19 @@ MASSES: tuple[Masses, ...] = tuple(
 """Factors of mass at the ends of that range: long blocks heavier, and lighter."""
 _SIDES = np.array([(math.cos(a), math.sin(a)) for a in np.arange(8) * math.pi / 4])
 _CORNER_M = MARGIN_M / math.cos(math.pi / 8)
-"""How far out the corners of an octagon are that has all shifts of `MARGIN_M` inside [m]."""
+"""Distance of the corners of an octagon that has all shifts of `MARGIN_M` inside [m]."""
 _LEAST_VERTICAL = 0.15
 _TOLERANCE = 1e-5
 _PROOF = 1e4
-"""What is left over is a proof for forces that add up to so many times all weights, no more."""
+"""A residual is a proof for forces that add up to so many times all weights, no more."""
 _UP = np.array([0.0, 0.0, 1.0])
 _STEEP = 0.9
 _SAME_GAP_M = 1e-4
 _KEPT = 2048
 
 
-class _Contact(NamedTuple):
-    """Places (k, 3) [m] where `below` (None: the ground) pushes `above` along `normal`."""
-
-    below: int | None
-    above: int
-    corners_m: NDArray[np.float64]
-    normal: NDArray[np.float64]
-
-
 def surely_stands(blocks: Sequence[Block]) -> bool:
-    """Whether blocks stand with weights off by up to `MARGIN_M`, little friction, any masses.
+    """True if blocks stand with weights off by up to `MARGIN_M`, little friction, any masses.
 
     Asked at the corners of an octagon of shifts, at both ends of the range of masses. What lies
     between two shifts, or two masses, that can be borne is borne by the mean of their forces.
@@ -92,7 +82,7 @@ def surely_stands(blocks: Sequence[Block]) -> bool:
 
 
 def surely_falls(blocks: Sequence[Block]) -> bool:
-    """Whether blocks fall with weights off by up to `MARGIN_M`, much friction, any masses.
+    """True if blocks fall with weights off by up to `MARGIN_M`, much friction, any masses.
 
     One linear program has forces, shifts and the mass of long blocks as its unknowns, and no
     solution. Its unknown shifts are those of all long blocks and of all others, each anywhere in
@@ -119,17 +109,15 @@ def surely_falls(blocks: Sequence[Block]) -> bool:
 
 
 def is_balanced(blocks: Sequence[Block], friction: float = FRICTION, margin_m: float = 0.0) -> bool:
-    """Whether contacts can bear all weights as they are, or, with a margin, all of them moved by so
-    much to each of four sides.
-    """
+    """True if contacts can bear all weights, or, with a margin, all moved to each of four sides."""
     forces = _forces(blocks, friction)
     sides = _SIDES[::2] if margin_m else _SIDES[:1]
     shifts = ((margin_m * x, margin_m * y) for x, y in sides)
     return all(_bears(forces, _weights(blocks, shift, ())) for shift in shifts)
 
 
-def _bears(forces: NDArray[np.float64], weights: NDArray[np.float64]) -> bool:
-    """Whether some sum of the forces, each as large as need be, balances all weights."""
+def _bears(forces: Floats, weights: Floats) -> bool:
+    """True if some sum of the forces, each as large as need be, balances all weights."""
     if not forces.size:
         return not weights.size
     from scipy.optimize import nnls  # type: ignore[import-untyped]
@@ -148,12 +136,12 @@ def _bears(forces: NDArray[np.float64], weights: NDArray[np.float64]) -> bool:
 
 
 def _least_residual(
-    unknown: NDArray[np.float64],
-    target: NDArray[np.float64],
+    unknown: Floats,
+    target: Floats,
     bounds: Sequence[tuple[float | None, float | None]] | None = None,
     at_most_zero: Any = None,
 ) -> float:
-    """The least sum of what is left of a target, by linear programming, which always ends.
+    """The least residual of a target, as a sum, by linear programming, which always ends.
 
     Unknowns are not negative, or within their bounds, and such that the rows of `at_most_zero` are.
     Raises PhyblockError where it does not end.
@@ -179,17 +167,15 @@ def _least_residual(
     return float(solution.fun)
 
 
-def _weights(
-    blocks: Sequence[Block], shift_m: tuple[float, float], masses: Masses
-) -> NDArray[np.float64]:
+def _weights(blocks: Sequence[Block], shift_m: tuple[float, float], masses: Masses) -> Floats:
     """The force up that each block needs, and its moment, shape (6 n,), of a whole weight of 1."""
     factors = dict(masses)
     weights = np.array([SHAPES[b.type].mass_kg * factors.get(b.type, 1.0) for b in blocks])
     return _needs(blocks, weights / weights.sum(), shift_m)
 
 
-def _loads(blocks: Sequence[Block], chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """What the chosen blocks need, and how much more for `MARGIN_M` along x, and y: (6 n, 3)."""
+def _loads(blocks: Sequence[Block], chosen: NDArray[np.bool_]) -> Floats:
+    """Needs of the chosen blocks, and their growth for `MARGIN_M` along x, and y: (6 n, 3)."""
     weights = np.array([SHAPES[block.type].mass_kg for block in blocks])
     weights = np.where(chosen, weights, 0.0) / weights.sum()
     needs = _needs(blocks, weights)
@@ -199,9 +185,9 @@ def _loads(blocks: Sequence[Block], chosen: NDArray[np.bool_]) -> NDArray[np.flo
 
 def _needs(
     blocks: Sequence[Block],
-    weights: NDArray[np.float64],
+    weights: Floats,
     shift_m: tuple[float, float] = (0.0, 0.0),
-) -> NDArray[np.float64]:
+) -> Floats:
     """The force up that each block of some weight needs, and its moment, shape (6 n,)."""
     if not blocks:
         return np.empty(0)
@@ -216,73 +202,64 @@ def _needs(
     return _wrenches(centers, np.outer(weights, _UP)).ravel()
 
 
-def _forces(blocks: Sequence[Block], friction: float) -> NDArray[np.float64]:
-    """What a unit of force along each edge of each cone does to each block, shape (6 n, k)."""
+def _forces(blocks: Sequence[Block], friction: float) -> Floats:
+    """Effect of a unit of force along each edge of each cone on each block, shape (6 n, k).
+
+    A contact is who pushes (None: the ground), who is pushed, the corners [m], and the normal.
+    """
+    contacts: list[tuple[int | None, int, Floats, Floats]] = [
+        (None, i, corners, _UP) for i, b in enumerate(blocks) for corners in _on_floor(b)
+    ]
+    for (below, one), (above, other) in combinations(enumerate(blocks), 2):
+        contacts += [(below, above, *place) for place in _between(one, other)]
     columns = []
-    for contact in _contacts(blocks):
-        helper = _UP if abs(contact.normal[2]) < _STEEP else np.array([1.0, 0.0, 0.0])
-        side = cross(contact.normal, helper)
+    for pusher, pushed, corners_m, normal in contacts:
+        helper = _UP if abs(normal[2]) < _STEEP else np.array([1.0, 0.0, 0.0])
+        side = cross(normal, helper)
         side /= np.linalg.norm(side)
-        across = cross(contact.normal, side)
-        edges = contact.normal + friction * np.stack([side, -side, across, -across])
-        places = np.repeat(contact.corners_m, len(edges), axis=0)
-        wrenches = _wrenches(places, np.tile(edges, (len(contact.corners_m), 1)))
+        across = cross(normal, side)
+        edges = normal + friction * np.stack([side, -side, across, -across])
+        places = np.repeat(corners_m, len(edges), axis=0)
+        wrenches = _wrenches(places, np.tile(edges, (len(corners_m), 1)))
         column = np.zeros((len(wrenches), len(blocks), 6))
-        column[:, contact.above] = wrenches
-        if contact.below is not None:
-            column[:, contact.below] = -wrenches
+        column[:, pushed] = wrenches
+        if pusher is not None:
+            column[:, pusher] = -wrenches
         columns.append(column.reshape(len(wrenches), -1))
     return np.concatenate(columns).T if columns else np.empty((0, 0))
 
 
-def _wrenches(at_m: NDArray[np.float64], force: NDArray[np.float64]) -> NDArray[np.float64]:
+def _wrenches(at_m: Floats, force: Floats) -> Floats:
     """Forces (k, 3) and their moments about the origin in decimeters, shape (k, 6)."""
     return np.hstack([force, 10 * cross(at_m, force)])
 
 
-def _contacts(blocks: Sequence[Block]) -> list[_Contact]:
-    contacts = [
-        _Contact(None, i, place, _UP) for i, b in enumerate(blocks) for place in _on_floor(b)
-    ]
-    for (below, one), (above, other) in combinations(enumerate(blocks), 2):
-        contacts += [_Contact(below, above, *place) for place in _between(one, other)]
-    return contacts
-
-
 @functools.lru_cache(maxsize=_KEPT)
-def _on_floor(block: Block) -> tuple[NDArray[np.float64], ...]:
-    """Where a block stands on the ground; empty where it does not."""
+def _on_floor(block: Block) -> tuple[Floats, ...]:
+    """Corners of a block's contact with the ground; empty where there is none."""
     points = np.vstack([piece.vertices_m for piece in pieces_of(block)])
     if points[:, 2].min() >= CONTACT_TOLERANCE_M:
         return ()
-    return (_outline(points[points[:, 2] < points[:, 2].min() + CONTACT_TOLERANCE_M]),)
+    foot = points[points[:, 2] < points[:, 2].min() + CONTACT_TOLERANCE_M]
+    # The points that lie farthest out in sixteen directions.
+    angles = np.arange(16) * math.pi / 8 + 0.01
+    reach = foot[:, :2] @ np.stack([np.cos(angles), np.sin(angles)])
+    return (foot[sorted(set(reach.argmax(axis=0).tolist()))],)
 
 
 @functools.lru_cache(maxsize=_KEPT)
-def _between(
-    one: Block, other: Block
-) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64]], ...]:
+def _between(one: Block, other: Block) -> tuple[tuple[Floats, Floats], ...]:
     """Corners and normal of each contact of two blocks, the normal from the first on."""
     if not boxes_near(bounds_m(one), bounds_m(other), CONTACT_TOLERANCE_M):
         return ()
-    met = [_touching(a, b) for a in pieces_of(one) for b in pieces_of(other)]
-    return tuple(contact for contact in met if contact is not None)
-
-
-def _touching(
-    first: ConvexPiece, second: ConvexPiece
-) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    axes = separating_axes(first, second)
-    if not -2 * CONTACT_TOLERANCE_M <= axes.gap_m <= CONTACT_TOLERANCE_M:
-        return None
-    best = axes.directions[axes.gaps_m > axes.gap_m - _SAME_GAP_M]
-    direction = best[int(np.argmax(np.abs(best[:, 2])))]
-    corners = contact_corners_m(first, second, direction)
-    return (corners, direction) if abs(direction[2]) >= _LEAST_VERTICAL and len(corners) else None
-
-
-def _outline(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The points of a flat set that lie farthest out in sixteen directions."""
-    angles = np.arange(16) * math.pi / 8 + 0.01
-    reach = points[:, :2] @ np.stack([np.cos(angles), np.sin(angles)])
-    return points[sorted(set(reach.argmax(axis=0).tolist()))]
+    met = []
+    for first, second in product(pieces_of(one), pieces_of(other)):
+        axes = separating_axes(first, second)
+        if not -2 * CONTACT_TOLERANCE_M <= axes.gap_m <= CONTACT_TOLERANCE_M:
+            continue
+        best = axes.directions[axes.gaps_m > axes.gap_m - _SAME_GAP_M]
+        direction = best[int(np.argmax(np.abs(best[:, 2])))]
+        corners = contact_corners_m(first, second, direction)
+        if abs(direction[2]) >= _LEAST_VERTICAL and len(corners):
+            met.append((corners, direction))
+    return tuple(met)

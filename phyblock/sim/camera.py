@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 from phyblock.sim.geometry import dot, rounded, turned
 from phyblock.types import View
 
-__all__ = ["FIELD_OF_VIEW_DEG", "FULL_WINDOW", "VIEWS", "Camera", "Window", "frame", "view_axes"]
-
 
 def _half_tangent(angle_deg: float) -> float:
     return round(math.tan(math.radians(angle_deg / 2)), 12)

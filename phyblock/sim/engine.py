@@ -1,10 +1,10 @@
 """Physics engines behind one protocol, in terms of blocks on a floor, and the choice of one.
 
 A `PhysicsEngine` opens simulations; a `Simulation` holds blocks and moves them; a `World` is a
-simulation that knows its blocks. The floor is the plane z = 0. Simulations name blocks by number,
-`FLOOR` (0) is the floor's. Poses are those of body frames (`phyblock.domain.blocks`). Engines take
-what a block is made of from `SHAPES` (center of mass), `Physics.mass_kg` and
-`phyblock.sim.geometry` (`collision_pieces`, `solid_mesh` with its inertia).
+simulation that knows its blocks. The floor is the plane z = 0. Simulations name blocks by number.
+Poses are those of body frames (`phyblock.domain.blocks`). Engines take the material of a block from
+`SHAPES` (center of mass), `Physics.mass_kg` and `phyblock.sim.geometry` (`collision_pieces`,
+`solid_mesh` with its inertia).
 
 Blocks are let go in PyBullet where it is installed, in MuJoCo elsewhere; the environment variable
 `PHYBLOCK_PHYSICS` chooses by name, also for the processes that are started. Nothing is imported
@@ -40,8 +40,6 @@ from phyblock.errors import InputError, Problem, SimulationError
 
 Vector = tuple[float, float, float]
 """x, y and z in the world."""
-FLOOR = 0
-"""The floor's number among the blocks."""
 GRAVITY_M_S2 = 9.81
 _POSITION_DIGITS = 4
 _ANGLE_DIGITS = 2
@@ -116,19 +114,6 @@ class Velocity(NamedTuple):
     angular_rad_s: Vector
 
 
-class Contact(NamedTuple):
-    """A point where two bodies touch: their numbers, `first` below `second`.
-
-    `normal` is a unit vector from the first to the second; `distance_m` is the gap between them
-    [m], negative where they overlap.
-    """
-
-    first: int
-    second: int
-    normal: Vector
-    distance_m: float
-
-
 class Simulation(Protocol):
     """Rigid blocks on a floor; callers name only blocks that are there.
 
@@ -152,9 +137,6 @@ class Simulation(Protocol):
 
     def set_velocity(self, number: int, velocity: Velocity) -> None:
         """Make a block move like this from now on, as far as contacts and gravity let it."""
-
-    def contacts(self) -> tuple[Contact, ...]:
-        """List where bodies touched in the last time step; empty before the first step."""
 
 
 class PhysicsEngine(Protocol):
@@ -278,11 +260,6 @@ class World:
         self._opened = None
         self._blocks.clear()
         self._stack.close()
-
-    @property
-    def orders(self) -> tuple[int, ...]:
-        """Orders of the blocks in the world, as they were placed."""
-        return tuple(self._blocks)
 
     def place(self, *blocks: Block) -> None:
         """Put blocks at their goal poses, at rest; SimulationError if an order is taken."""

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from phyblock.domain.blocks import SHAPES, BlockType, quat_xyzw_to_matrix
 from phyblock.errors import SimulationError
-from phyblock.sim.engine import FLOOR, Contact, Physics, Pose, Velocity
+from phyblock.sim.engine import Physics, Pose, Velocity
 from phyblock.sim.geometry import collision_pieces, solid_mesh
 
 _SUBSTEPS = 4
@@ -104,7 +104,6 @@ class MujocoSimulation:
         self._bodies: dict[int, _Body] = {}
         self._model: Any = None
         self._data: Any = None
-        self._contacts: tuple[Contact, ...] | None = ()
 
     def add(self, number: int, block_type: BlockType, pose: Pose) -> None:
         """Put a block at a pose, at rest."""
@@ -126,7 +125,6 @@ class MujocoSimulation:
             return
         self._begin()
         self._mujoco.mj_step(self._model, self._data, _SUBSTEPS * n)
-        self._contacts = None
         if any(warning.number for warning in self._data.warning):
             raise SimulationError("MuJoCo found no way on: forces or contacts beyond all bounds")
 
@@ -148,15 +146,8 @@ class MujocoSimulation:
         body.motion[:3] = velocity.linear_m_s - np.cross(spin, body.center_m)
         body.motion[3:] = body.rotation.T @ spin
 
-    def contacts(self) -> tuple[Contact, ...]:
-        """List where bodies touched in the last time step."""
-        if self._contacts is None:
-            self._contacts = tuple(sorted(self._measured()))
-        return self._contacts
-
     def _interrupt(self) -> None:
         """Let go of the data, as other blocks are to come or go."""
-        self._contacts = self.contacts()
         for body in self._bodies.values():
             body.place, body.motion = body.place.copy(), body.motion.copy()
         self._model = self._data = None
@@ -172,18 +163,6 @@ class MujocoSimulation:
         for place, motion, body in zip(places, motions, self._bodies.values(), strict=True):
             place[:], motion[:] = body.place, body.motion
             body.place, body.motion = place, motion
-
-    def _measured(self) -> Iterator[Contact]:
-        """The contacts of the last substep."""
-        numbers = (FLOOR, *self._bodies)
-        bodies = self._model.geom_bodyid
-        for point in self._data.contact:
-            first, second = (numbers[bodies[geom]] for geom in point.geom)
-            normal = point.frame[:3]
-            if second < first:
-                first, second, normal = second, first, -normal
-            insets = 1 if first == FLOOR else 2
-            yield Contact(first, second, _vector(normal), float(point.dist) - insets * _INSET_M)
 
 
 def _vector(values: Floats) -> tuple[float, float, float]:

@@ -1,4 +1,4 @@
-"""What follows when a block is taken away, pushed or put down: settled poses, and who moved.
+"""Outcomes of taking a block away, pushing one or putting one down: settled poses, and who moved.
 
 An outcome counts only where every setting names the same blocks, and names them clearly: each
 either stayed where it was or moved far. Time step, solver, friction and masses all vary, because
@@ -10,30 +10,27 @@ every simulation and stays on many a table.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from phyblock.domain.scene import Block
 from phyblock.sim.balance import FRICTIONS, MASSES
 from phyblock.sim.dynamics import groups, moments, wait
 from phyblock.sim.engine import GRAVITY_M_S2, Physics, Pose, World
 
-__all__ = [
-    "DEFAULT_LIMITS",
-    "LEAN_DEG",
-    "OUTCOME_SETTINGS",
-    "Limits",
-    "Outcome",
-    "Push",
-    "after",
-    "after_removal",
-    "holds",
-]
-
 LEAN_DEG = 2.0
-"""How much the floor leans [degrees]; blocks begin to slide at 15, where friction is least."""
+"""Slope of the floor [degrees]; blocks begin to slide at 15, where friction is least."""
+STILL_M, STILL_DEG = 0.004, 4.0
+MOVED_M, MOVED_DEG = 0.02, 20.0
+"""A block stayed within the former limits, or it moved past the latter; what lies between is not
+clear, and no question is asked about it.
+"""
+_LONGEST_S = 5.0
+_PATIENCE = 4.0
+"""A push is kept up this many times as long as without friction."""
+_DOWN_M = 0.008
+_SAME_M, _SAME_DEG = 0.015, 15.0
+_AS_FAR_M, _STRAIGHT_DEG = 0.005, 10.0
 
 
 def _leaning(physics: Physics, downhill: tuple[float, float]) -> Physics:
@@ -50,30 +47,7 @@ OUTCOME_SETTINGS: tuple[Physics, ...] = (
     _leaning(Physics(1 / 300, 80, FRICTIONS[0], mass_factors=MASSES[1]), (_ACROSS, -0.5)),
     _leaning(Physics(1 / 480, 100, 0.35), (-_ACROSS, -0.5)),
 )
-"""What every outcome is tried under; the first gives the settled poses."""
-
-_LONGEST_S = 5.0
-_PATIENCE = 4.0
-"""How much longer than without friction a push is kept up."""
-_DOWN_M = 0.008
-_SAME_M, _SAME_DEG = 0.015, 15.0
-_AS_FAR_M, _STRAIGHT_DEG = 0.005, 10.0
-
-
-@dataclass(frozen=True)
-class Limits:
-    """A block stayed within `still_m` [m] and `still_deg` [degrees], or it moved past the others.
-
-    What lies between is not clear, and no question is asked about it.
-    """
-
-    still_m: float = 0.004
-    still_deg: float = 4.0
-    moved_m: float = 0.02
-    moved_deg: float = 20.0
-
-
-DEFAULT_LIMITS = Limits()
+"""Settings that every outcome is tried under; the first gives the settled poses."""
 
 
 @dataclass(frozen=True)
@@ -93,10 +67,10 @@ class Push:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What followed: `moved` are the orders of the blocks that did not stay.
+    """Result of a removal or push: `moved` are the orders of the blocks that did not stay.
 
     `settled` are all blocks at their final poses under the first setting, rounded to 0.1 mm and
-    0.01 degrees. `is_clear` says whether all settings agree, with a margin, and all came to rest;
+    0.01 degrees. `is_clear` is true where all settings agree, with a margin, and all came to rest;
     where it is False the rest means nothing.
     """
 
@@ -112,17 +86,18 @@ def after(
     blocks: Sequence[Block],
     push: Push | None = None,
     settings: Sequence[Physics] = OUTCOME_SETTINGS,
-    limits: Limits = DEFAULT_LIMITS,
 ) -> Outcome:
     """Let blocks go where they are, or push one of them, and see what follows."""
     agreed: tuple[int, ...] | None = None
     first: dict[int, Pose] = {}
     for setting in settings:
-        poses = _settle(blocks, setting, push)
-        if poses is None:
-            return _UNCLEAR
-        moved = _moved_orders(blocks, poses, limits)
-        if moved is None or moved != (moved if agreed is None else agreed):
+        with World(setting) as world:
+            world.place(*blocks)
+            if push is not None:
+                _push(world, push)
+            poses = world.poses() if wait(world, _LONGEST_S) else None
+        moved = None if poses is None else _moved_orders(blocks, poses)
+        if poses is None or moved is None or moved != (moved if agreed is None else agreed):
             return _UNCLEAR
         agreed, first = moved, first or poses
         if push is not None and not _went_alike(blocks, push, first, poses):
@@ -133,12 +108,12 @@ def after(
 
 
 def after_removal(blocks: Sequence[Block], order: int) -> Outcome:
-    """What follows when the block with this order is taken away at once."""
+    """The outcome of taking the block with this order away at once."""
     return after([block for block in blocks if block.order != order])
 
 
 def holds(blocks: Sequence[Block], about: int) -> bool | None:
-    """Whether all blocks stay where they are; None where the settings, or the limits, differ.
+    """True if all blocks stay where they are; None where the settings, or the limits, differ.
 
     Quicker than `after`: a trial ends as soon as a block has clearly left its place, and only the
     blocks in reach of the one with the order `about` are tried, for the others stand anyway.
@@ -146,46 +121,40 @@ def holds(blocks: Sequence[Block], about: int) -> bool | None:
     near = next(group for group in groups(blocks) if any(b.order == about for b in group))
     verdicts = set()
     for setting in OUTCOME_SETTINGS:
-        verdicts.add(_holds(near, setting, DEFAULT_LIMITS))
+        verdicts.add(_holds(near, setting))
         if len(verdicts) > 1 or None in verdicts:
             return None
     return verdicts.pop()
 
 
+def _holds(blocks: Sequence[Block], setting: Physics) -> bool | None:
+    with World(setting) as world:
+        world.place(*blocks)
+        for is_at_rest in moments(world, _LONGEST_S):
+            poses = world.poses()
+            if _moved_orders(blocks, poses, MOVED_M, MOVED_DEG):
+                return False
+            if is_at_rest:
+                return True if _moved_orders(blocks, poses) == () else None
+    return None
+
+
 def _moved_orders(
-    blocks: Sequence[Block], poses: dict[int, Pose], limits: Limits = DEFAULT_LIMITS
+    blocks: Sequence[Block],
+    poses: Mapping[int, Pose],
+    still_m: float = STILL_M,
+    still_deg: float = STILL_DEG,
 ) -> tuple[int, ...] | None:
     """Orders of the blocks that `poses` has elsewhere; None where one lies between the limits."""
     moved = []
     for block in blocks:
         start, end = Pose.goal(block), poses[block.order]
         distance_m, angle_deg = end.distance_m(start), end.angle_deg(start)
-        if distance_m > limits.moved_m or angle_deg > limits.moved_deg:
+        if distance_m > MOVED_M or angle_deg > MOVED_DEG:
             moved.append(block.order)
-        elif distance_m > limits.still_m or angle_deg > limits.still_deg:
+        elif distance_m > still_m or angle_deg > still_deg:
             return None
     return tuple(moved)
-
-
-def _settle(blocks: Sequence[Block], setting: Physics, push: Push | None) -> dict[int, Pose] | None:
-    """Poses once all is at rest; None when that takes too long."""
-    with World(setting) as world:
-        world.place(*blocks)
-        if push is not None:
-            _push(world, push)
-        return world.poses() if wait(world, _LONGEST_S) else None
-
-
-def _holds(blocks: Sequence[Block], setting: Physics, limits: Limits) -> bool | None:
-    loose = Limits(limits.moved_m, limits.moved_deg, limits.moved_m, limits.moved_deg)
-    with World(setting) as world:
-        world.place(*blocks)
-        for is_at_rest in moments(world, _LONGEST_S):
-            if _moved_orders(blocks, world.poses(), loose):
-                return False
-            if is_at_rest:
-                return True if _moved_orders(blocks, world.poses(), limits) == () else None
-    return None
 
 
 def _push(world: World, push: Push) -> None:
@@ -202,9 +171,9 @@ def _push(world: World, push: Push) -> None:
 
 
 def _went_alike(
-    blocks: Sequence[Block], push: Push, first: dict[int, Pose], poses: dict[int, Pose]
+    blocks: Sequence[Block], push: Push, first: Mapping[int, Pose], poses: Mapping[int, Pose]
 ) -> bool:
-    """Whether a push ends alike in two settings, and as a person would tell it.
+    """True if a push ends alike in two settings, and as a person would tell it.
 
     The same blocks came down; the pushed one, where it only slid, went as far as it was pushed and
     turned little, and ends near the same place in both.
@@ -222,10 +191,9 @@ def _went_alike(
 
 
 def _gone_m(push: Push, start: Pose, end: Pose) -> float:
-    """How far the pushed block went in the direction of the push [m]."""
-    x, y = push.direction
-    way = np.asarray(end.position_m) - np.asarray(start.position_m)
-    return float(way[0] * x + way[1] * y)
+    """Distance that the pushed block went in the direction of the push [m]."""
+    way = end.position_m - start.position_m
+    return float(way[0] * push.direction[0] + way[1] * push.direction[1])
 
 
 def _came_down(start: Pose, end: Pose) -> bool:

@@ -282,7 +282,7 @@ def candidates_png(candidates: CandidateSet, style: PictureStyle) -> bytes:
 def composite_png(goal: bytes, candidates: bytes) -> bytes:
     """PNG with the goal on the left and the candidates on the right of a narrow white gap."""
     with Image.open(io.BytesIO(goal)) as left, Image.open(io.BytesIO(candidates)) as right:
-        gap = _gap_px(left.height)
+        gap = gap_px(left.height)
         joined = Image.new("RGB", (left.width + gap + right.width, left.height), "white")
         joined.paste(left.convert("RGB"), (0, 0))
         joined.paste(right.convert("RGB"), (left.width + gap, 0))
@@ -291,10 +291,11 @@ def composite_png(goal: bytes, candidates: bytes) -> bytes:
 
 def joined_size_px(side_px: int) -> tuple[int, int]:
     """Width and height of two squares side by side, as in the composite."""
-    return 2 * side_px + _gap_px(side_px), side_px
+    return 2 * side_px + gap_px(side_px), side_px
 
 
-def _gap_px(height_px: int) -> int:
+def gap_px(height_px: int) -> int:
+    """Width of the gap between pictures of this height on one sheet."""
     return max(2, round(height_px * _GAP))
 
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from phyblock.domain.blocks import SHAPES, BlockType, quat_xyzw_to_matrix
 from phyblock.errors import SimulationError
-from phyblock.sim.engine import FLOOR, Contact, Physics, Pose, Velocity
+from phyblock.sim.engine import Physics, Pose, Velocity
 from phyblock.sim.geometry import collision_pieces, solid_mesh
 
 _MESH_MARGIN_M = 0.001
@@ -92,8 +92,7 @@ class BulletSimulation:
             physicsClientId=client,
         )
         plane = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=client)
-        self._floor = int(bullet.createMultiBody(0, plane, physicsClientId=client))
-        self._set_friction(self._floor)
+        self._set_friction(bullet.createMultiBody(0, plane, physicsClientId=client))
 
     def add(self, number: int, block_type: BlockType, pose: Pose) -> None:
         """Put a block at a pose, at rest."""
@@ -148,19 +147,6 @@ class BulletSimulation:
             velocity.angular_rad_s,
             physicsClientId=self._client,
         )
-
-    def contacts(self) -> tuple[Contact, ...]:
-        """List where bodies touched in the last time step."""
-        numbers = {body.id: number for number, body in self._bodies.items()}
-        numbers[self._floor] = FLOOR
-        contacts = []
-        for point in self._bullet.getContactPoints(physicsClientId=self._client):
-            # Bullet's normal points from its second body to its first one.
-            second, first, (x, y, z) = numbers[point[1]], numbers[point[2]], point[7]
-            if second < first:
-                first, second, x, y, z = second, first, -x, -y, -z
-            contacts.append(Contact(first, second, (x, y, z), point[8]))
-        return tuple(sorted(contacts))
 
     def _set_friction(self, body: int) -> None:
         self._bullet.changeDynamics(

@@ -1,7 +1,10 @@
-"""The pictures of questions: a recipe to a PNG, and the key that it caches under.
+"""The pictures of questions: a recipe to a PNG, its key, its marks, and what can be told from it.
 
 As with goal pictures, the same recipe and style give the same bytes in every process of one
-machine, and the key names everything that the bytes depend on.
+machine, and the key names everything that the bytes depend on. A mark is a small target on the
+surface, a line, and a label at its end: white discs with a dark rim and a dark letter read on every
+floor and are unlike any block. Pictures are compared as they are drawn at 256 pixels, before floor
+and smoothing, which add nothing that tells two of them apart.
 """
 
 from __future__ import annotations
@@ -10,26 +13,28 @@ import functools
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import fields, replace
-from itertools import product
+from dataclasses import astuple, replace
+from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from phyblock.domain.blocks import SHAPES
 from phyblock.domain.question import Mark, QuestionPicture
 from phyblock.domain.scene import Block, Scene
 from phyblock.files import decode_picture
-from phyblock.sim.camera import Camera, Window, frame, view_axes
+from phyblock.sim.backgrounds import DARK_INK, LIGHT_INK
+from phyblock.sim.camera import Camera, Window
 from phyblock.sim.pictures import (
     RENDER_VERSION,
     DrawnBlock,
     PictureStyle,
     Shot,
     camera_for,
+    close_camera,
     drawn,
+    gap_px,
     on_the_floor,
     picture,
     pixel_versions,
@@ -40,87 +45,20 @@ from phyblock.stable import hex_digest
 
 QUESTION_RENDER_VERSION = 2
 """Raised whenever the same recipe gives other pixels, so that stored pictures are made again."""
+LETTERED_VERSION = 1
+"""Raised whenever the same pictures give another sheet, so that stored sheets are made again."""
 BLOCK_LABEL = "block"
 """The label of a picture that shows one block by itself."""
+SEEN_PX = 256
+"""Side of the pictures that are compared."""
+MARKS_APART_PX = 18.0
+"""Targets are this far apart at the least, in pixels of `SEEN_PX`."""
 
 _BLOCK_WINDOW = Window(-0.52, 0.52, -0.52, 0.52)
-_LARGEST_DIAGONAL_M = 0.16
-_SIZE_CUE = 0.25
-
-
-def question_png(picture_recipe: QuestionPicture, style: PictureStyle) -> bytes:
-    """PNG of a question's picture, square; its view, and background if any, replace the style's.
-
-    Raises DataError for a recipe with nothing to frame, ValueError for a view that a
-    `PictureStyle` does not allow.
-    """
-    camera = question_camera(picture_recipe, style)
-    ground = picture_recipe.background or style.background
-    image = picture(drawn_blocks(picture_recipe), camera, ground, style.size_px)
-    return to_png(draw_marks(image, picture_recipe.marks, camera))
-
-
-def question_camera(picture_recipe: QuestionPicture, style: PictureStyle) -> Camera:
-    """The camera of a question's picture; raises as `question_png`.
-
-    A block shown by itself (label `block`) fills a like share of its picture whatever its type,
-    larger ones a little more, as in the pictures of candidates.
-    """
-    azimuth_deg, elevation_deg = picture_recipe.view_deg
-    seen = replace(style, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
-    shown = drawn_blocks(picture_recipe)
-    framed = drawn(picture_recipe.framed) or shown
-    if _is_alone(picture_recipe):
-        framed = shown
-        shape = SHAPES[framed[0].type]
-        share = math.dist(shape.low_m, shape.high_m) / _LARGEST_DIAGONAL_M
-        window = _BLOCK_WINDOW.scaled(share**_SIZE_CUE)
-        return frame(framed[0].vertices_m, view_axes(azimuth_deg, elevation_deg), window)
-    return camera_for(framed, seen, picture_recipe.label, shown)
-
-
-def drawn_blocks(picture_recipe: QuestionPicture) -> list[DrawnBlock]:
-    """The blocks as they are drawn; one shown by itself (label `block`) lies on the floor."""
-    blocks = drawn(picture_recipe.blocks)
-    if _is_alone(picture_recipe):
-        return [on_the_floor(blocks[0].type, blocks[0].color, blocks[0].euler_deg)]
-    return blocks
-
-
-def state_picture(scene: Scene, blocks: Sequence[Block], style: PictureStyle) -> QuestionPicture:
-    """The recipe of a picture of blocks on the ground, seen exactly as the goal picture is."""
-    view_deg = (style.azimuth_deg, style.elevation_deg)
-    return QuestionPicture("current", tuple(blocks), view_deg, framed=scene.blocks)
-
-
-def question_key(picture_recipe: QuestionPicture, style: PictureStyle) -> str:
-    """SHA-256 [hex] of all that the picture depends on; of the style, not its own view.
-
-    A label counts only where it changes the framing, so that equal pictures share a file.
-    """
-    parts = {
-        "kind": "question",
-        "render_version": [RENDER_VERSION, QUESTION_RENDER_VERSION],
-        **pixel_versions(),
-        "style": [style.size_px, picture_recipe.background or style.background],
-        "view": list(picture_recipe.view_deg),
-        "alone": _is_alone(picture_recipe),
-        "blocks": _field_values(drawn_blocks(picture_recipe)),
-        "framed": _field_values(drawn(picture_recipe.framed)),
-        "marks": [[mark.letter, *mark.position_m] for mark in picture_recipe.marks],
-    }
-    return hex_digest(json.dumps(parts, sort_keys=True, allow_nan=False))
-
-
-def _is_alone(picture_recipe: QuestionPicture) -> bool:
-    return picture_recipe.label == BLOCK_LABEL and len(picture_recipe.blocks) == 1
-
-
-def _field_values(blocks: Sequence[DrawnBlock]) -> list[list[object]]:
-    """All fields of each block; `astuple` would copy what is in them as well."""
-    return [[getattr(block, field.name) for field in fields(block)] for block in blocks]
-
-
+_STYLE = PictureStyle(SEEN_PX)
+_LEAST_DEPTH_PX = 4
+_VISIBLE_STEP = 24
+_EDGE = 0.97
 _SUPERSAMPLE = 4
 _TARGET_RADIUS_M = 0.007
 _DOT_SHARE = 0.38
@@ -133,74 +71,146 @@ _DISTANCES = (2.1, 2.8, 3.6, 4.6)
 _ROUNDS = 4
 _DARK, _LIGHT = (18, 20, 26, 255), (255, 255, 255, 255)
 _BLOCKED = 1000.0
+_COLUMNS = 2
+_BADGE = 0.11
+_MARGIN = 0.02
 
 Point = tuple[float, float]
 
 
-class _Spot(NamedTuple):
-    """A target: its center and the outline of its ring, in pixels."""
+def question_png(recipe: QuestionPicture, style: PictureStyle) -> bytes:
+    """PNG of a question's picture, square; its view, and background if any, replace the style's.
 
-    letter: str
-    center: Point
-    ring: NDArray[np.float64]
+    Raises DataError for a recipe with nothing to frame, ValueError for a view that a
+    `PictureStyle` does not allow.
+    """
+    camera = question_camera(recipe, style)
+    ground = recipe.background or style.background
+    image = picture(drawn_blocks(recipe), camera, ground, style.size_px)
+    return to_png(_with_marks(image, recipe.marks, camera))
 
 
-def draw_marks(image: Image.Image, marks: Sequence[Mark], camera: Camera) -> Image.Image:
+def question_camera(recipe: QuestionPicture, style: PictureStyle) -> Camera:
+    """The camera of a question's picture; raises as `question_png`.
+
+    A block shown by itself (label `block`) fills a like share of its picture whatever its type,
+    larger ones a little more, as in the pictures of candidates.
+    """
+    azimuth_deg, elevation_deg = recipe.view_deg
+    seen_from = replace(style, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
+    shown = drawn_blocks(recipe)
+    if _is_alone(recipe):
+        return close_camera(shown[0], seen_from, _BLOCK_WINDOW)
+    return camera_for(drawn(recipe.framed) or shown, seen_from, recipe.label, shown)
+
+
+def drawn_blocks(recipe: QuestionPicture) -> list[DrawnBlock]:
+    """The blocks as they are drawn; one shown by itself (label `block`) lies on the floor."""
+    blocks = drawn(recipe.blocks)
+    if _is_alone(recipe):
+        return [on_the_floor(blocks[0].type, blocks[0].color, blocks[0].euler_deg)]
+    return blocks
+
+
+def _is_alone(recipe: QuestionPicture) -> bool:
+    return recipe.label == BLOCK_LABEL and len(recipe.blocks) == 1
+
+
+def state_picture(scene: Scene, blocks: Sequence[Block], style: PictureStyle) -> QuestionPicture:
+    """The recipe of a picture of blocks on the ground, seen exactly as the goal picture is."""
+    view_deg = (style.azimuth_deg, style.elevation_deg)
+    return QuestionPicture("current", tuple(blocks), view_deg, framed=scene.blocks)
+
+
+def question_key(recipe: QuestionPicture, style: PictureStyle) -> str:
+    """SHA-256 [hex] of all that the picture depends on; of the style, not its own view.
+
+    A label counts only where it changes the framing, so that equal pictures share a file.
+    """
+    parts = {
+        "kind": "question",
+        "render_version": [RENDER_VERSION, QUESTION_RENDER_VERSION],
+        **pixel_versions(),
+        "style": [style.size_px, recipe.background or style.background],
+        "view": list(recipe.view_deg),
+        "alone": _is_alone(recipe),
+        "blocks": [astuple(block) for block in drawn_blocks(recipe)],
+        "framed": [astuple(block) for block in drawn(recipe.framed)],
+        "marks": [[mark.letter, *mark.position_m] for mark in recipe.marks],
+    }
+    return hex_digest(json.dumps(parts, sort_keys=True, allow_nan=False))
+
+
+def _with_marks(image: Image.Image, marks: Sequence[Mark], camera: Camera) -> Image.Image:
     """The picture (square, RGB) with each mark's target, line and label drawn over it."""
     if not marks:
         return image
     size_px = image.width
-    spots = [_spot(mark, camera, size_px) for mark in marks]
+    angles = np.linspace(0, 2 * math.pi, 25)[:-1]
+    circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))], axis=1)
+    places = [np.array(mark.position_m) for mark in marks]
+    centers = [tuple(camera.to_pixels(place[None], size_px)[0].tolist()) for place in places]
     radius = max(_LABEL_RADIUS * size_px, _LEAST_LABEL_PX)
-    labels = _places(spots, radius, size_px)
+    labels = _label_places(centers, radius, size_px)
     layer = Image.new("RGBA", (size_px * _SUPERSAMPLE,) * 2)
     draw = ImageDraw.Draw(layer)
     rim = max(_RIM * size_px, 1.0) * _SUPERSAMPLE
-    for spot, label in zip(spots, labels, strict=True):
-        _draw_line(draw, spot.center, label, rim)
-    for spot in spots:
-        _draw_target(draw, spot, rim)
-    for spot, label in zip(spots, labels, strict=True):
-        _draw_label(draw, spot.letter, label, radius * _SUPERSAMPLE, rim)
+
+    def scaled(point: Sequence[float]) -> Point:
+        return point[0] * _SUPERSAMPLE, point[1] * _SUPERSAMPLE
+
+    for center, label in zip(centers, labels, strict=True):
+        ends = [scaled(center), scaled(label)]
+        draw.line(ends, fill=_DARK, width=round(2.6 * rim))
+        draw.line(ends, fill=_LIGHT, width=max(1, round(1.1 * rim)))
+    for center, place in zip(centers, places, strict=True):
+        ring = camera.to_pixels(place + _TARGET_RADIUS_M * circle, size_px)
+        for reach, color in ((1.0, _DARK), (0.8, _LIGHT), (_DOT_SHARE, _DARK)):
+            outline = np.array(center) + reach * (ring - np.array(center))
+            draw.polygon([scaled(corner) for corner in outline.tolist()], fill=color)
+        outer = [scaled(corner) for corner in ring.tolist()]
+        draw.line([*outer, outer[0]], fill=_DARK, width=max(1, round(0.6 * rim)))
+    font = ImageFont.load_default(size=_LETTER * radius * _SUPERSAMPLE)
+    for mark, label in zip(marks, labels, strict=True):
+        x, y = scaled(label)
+        outer_px = radius * _SUPERSAMPLE
+        for reach_px, color in ((outer_px, _DARK), (outer_px - rim, _LIGHT)):
+            draw.ellipse((x - reach_px, y - reach_px, x + reach_px, y + reach_px), fill=color)
+        low = draw.textbbox((0, 0), mark.letter, font=font)
+        left, top = x - (low[0] + low[2]) / 2, y - (low[1] + low[3]) / 2
+        draw.text((left, top), mark.letter, fill=_DARK, font=font)
     small = layer.reduce(_SUPERSAMPLE)
     return Image.alpha_composite(image.convert("RGBA"), small).convert("RGB")
 
 
-def _spot(mark: Mark, camera: Camera, size_px: int) -> _Spot:
-    angles = np.linspace(0, 2 * math.pi, 25)[:-1]
-    circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))], axis=1)
-    place = np.array(mark.position_m)
-    center = camera.to_pixels(place[None], size_px)[0]
-    ring = camera.to_pixels(place + _TARGET_RADIUS_M * circle, size_px)
-    return _Spot(mark.letter, (float(center[0]), float(center[1])), ring)
+def _label_places(centers: Sequence[Point], radius: float, size_px: int) -> list[Point]:
+    """The labels' centers: each in turn at its best place, until none moves.
 
+    They stand off from their targets, where they cover neither a target nor one another.
+    """
 
-def _places(spots: Sequence[_Spot], radius: float, size_px: int) -> list[Point]:
-    """Where the labels' centers go: each in turn to its best place, until none moves."""
-    chosen = [_moved(spot.center, 90, 2.1 * radius) for spot in spots]
+    def beside(center: Point, angle_deg: float, distance: float) -> Point:
+        angle, far = math.radians(angle_deg), distance * radius
+        return center[0] + far * math.cos(angle), center[1] - far * math.sin(angle)
+
+    chosen = [beside(center, 90, 2.1) for center in centers]
     for _ in range(_ROUNDS):
         before = list(chosen)
-        for number, spot in enumerate(spots):
-            others = [place for i, place in enumerate(chosen) if i != number]
-            rest = [other.center for i, other in enumerate(spots) if i != number]
-            options = [
-                (_cost(spot.center, place, others, rest, radius, size_px) + extra, place)
-                for extra, place in _options(spot.center, radius)
-            ]
+        for number, center in enumerate(centers):
+            labels = [place for i, place in enumerate(chosen) if i != number]
+            targets = [other for i, other in enumerate(centers) if i != number]
+            options = []
+            for (far, distance), (index, angle) in product(
+                enumerate(_DISTANCES), enumerate(_ANGLES_DEG)
+            ):
+                place = beside(center, angle, distance)
+                cost = _cost(center, place, labels, targets, radius, size_px)
+                # It costs to be far from the target, or not above it.
+                options.append((cost + (10 * far + index), place))
             chosen[number] = min(options)[1]
         if chosen == before:
             break
     return chosen
-
-
-def _options(center: Point, radius: float) -> list[tuple[float, Point]]:
-    """Places round a target, each with what it costs to be far from it or not above it."""
-    return [
-        (10 * far + index, _moved(center, angle, distance * radius))
-        for (far, distance), (index, angle) in product(
-            enumerate(_DISTANCES), enumerate(_ANGLES_DEG)
-        )
-    ]
 
 
 def _cost(
@@ -211,77 +221,26 @@ def _cost(
     radius: float,
     size_px: int,
 ) -> float:
-    """How bad a label's place is: over an edge, a label, a target, or a line over either."""
+    """Cost of a label's place over an edge, a label or a target, or with a line over either."""
+
+    def from_line(point: Point) -> float:
+        """Distance from the line between target and label."""
+        along = (place[0] - center[0], place[1] - center[1])
+        length = math.hypot(*along)
+        inside = (point[0] - center[0]) * along[0] + (point[1] - center[1]) * along[1]
+        share = min(1.0, max(0.0, inside / length**2))
+        return math.dist(point, (center[0] + share * along[0], center[1] + share * along[1]))
+
     cost = 0.0
     if not all(1.2 * radius <= one <= size_px - 1.2 * radius for one in place):
         cost += 4 * _BLOCKED
     for label in labels:
-        if math.dist(place, label) < 2.5 * radius:
-            cost += 3 * _BLOCKED
-        if _line_distance(center, place, label) < 1.3 * radius:
-            cost += 2 * _BLOCKED
+        cost += 3 * _BLOCKED * (math.dist(place, label) < 2.5 * radius)
+        cost += 2 * _BLOCKED * (from_line(label) < 1.3 * radius)
     for target in targets:
-        if math.dist(place, target) < 1.9 * radius:
-            cost += 2 * _BLOCKED
-        if _line_distance(center, place, target) < 0.7 * radius:
-            cost += _BLOCKED
+        cost += 2 * _BLOCKED * (math.dist(place, target) < 1.9 * radius)
+        cost += _BLOCKED * (from_line(target) < 0.7 * radius)
     return cost
-
-
-def _line_distance(start: Point, end: Point, point: Point) -> float:
-    """Distance of a point from a segment."""
-    along = (end[0] - start[0], end[1] - start[1])
-    length = math.hypot(*along)
-    inside = (point[0] - start[0]) * along[0] + (point[1] - start[1]) * along[1]
-    share = min(1.0, max(0.0, inside / length**2))
-    return math.dist(point, (start[0] + share * along[0], start[1] + share * along[1]))
-
-
-def _moved(point: Point, angle_deg: float, distance: float) -> Point:
-    angle = math.radians(angle_deg)
-    return point[0] + distance * math.cos(angle), point[1] - distance * math.sin(angle)
-
-
-def _scaled(point: Sequence[float]) -> Point:
-    return point[0] * _SUPERSAMPLE, point[1] * _SUPERSAMPLE
-
-
-def _draw_line(draw: ImageDraw.ImageDraw, start: Point, end: Point, rim: float) -> None:
-    ends = [_scaled(start), _scaled(end)]
-    draw.line(ends, fill=_DARK, width=round(2.6 * rim))
-    draw.line(ends, fill=_LIGHT, width=max(1, round(1.1 * rim)))
-
-
-def _draw_target(draw: ImageDraw.ImageDraw, spot: _Spot, rim: float) -> None:
-    center = np.array(spot.center)
-    for reach, color in ((1.0, _DARK), (0.8, _LIGHT), (_DOT_SHARE, _DARK)):
-        outline = center + reach * (spot.ring - center)
-        draw.polygon([_scaled(corner) for corner in outline.tolist()], fill=color)
-    outer = [_scaled(corner) for corner in spot.ring.tolist()]
-    draw.line([*outer, outer[0]], fill=_DARK, width=max(1, round(0.6 * rim)))
-
-
-def _draw_label(
-    draw: ImageDraw.ImageDraw, letter: str, place: Point, radius: float, rim: float
-) -> None:
-    x, y = _scaled(place)
-    draw.ellipse((x - radius, y - radius, x + radius, y + radius), fill=_DARK)
-    inner = radius - rim
-    draw.ellipse((x - inner, y - inner, x + inner, y + inner), fill=_LIGHT)
-    font = ImageFont.load_default(size=_LETTER * radius)
-    low = draw.textbbox((0, 0), letter, font=font)
-    left, top = x - (low[0] + low[2]) / 2, y - (low[1] + low[3]) / 2
-    draw.text((left, top), letter, fill=_DARK, font=font)
-
-
-LETTERED_VERSION = 1
-"""Raised whenever the same pictures give another sheet, so that stored sheets are made again."""
-
-_COLUMNS = 2
-_GAP = 0.016
-_BADGE = 0.11
-_MARGIN = 0.02
-_DARK_LETTERED, _LIGHT_LETTERED = (20, 24, 32), (255, 255, 255)
 
 
 def lettered_sheet_png(pictures: Sequence[bytes], letters: str, side_px: int) -> bytes:
@@ -290,56 +249,30 @@ def lettered_sheet_png(pictures: Sequence[bytes], letters: str, side_px: int) ->
     A dark letter on a white badge stands in the upper left corner of each.
     """
     sheet = Image.new("RGB", sheet_size_px(len(pictures), side_px), "white")
-    step = side_px + _gap_px(side_px)
+    step = side_px + gap_px(side_px)
+    side, start = max(18, round(side_px * _BADGE)), round(side_px * _MARGIN)
+    font = ImageFont.load_default(size=0.78 * side)
     for number, (data, letter) in enumerate(zip(pictures, letters, strict=True)):
         row, column = divmod(number, _COLUMNS)
-        with decode_picture(data, f"picture {letter}") as picture:
-            cell = picture.convert("RGB").resize((side_px, side_px), Image.Resampling.LANCZOS)
-        _draw_badge(cell, letter)
+        with decode_picture(data, f"picture {letter}") as one:
+            cell = one.convert("RGB").resize((side_px, side_px), Image.Resampling.LANCZOS)
+        draw, box = ImageDraw.Draw(cell), (start, start, start + side, start + side)
+        rim = max(1, side // 24)
+        draw.rounded_rectangle(box, side // 5, fill=LIGHT_INK, outline=DARK_INK, width=rim)
+        middle = (start + side / 2, start + side / 2)
+        draw.text(middle, letter, DARK_INK, font=font, anchor="mm")
         sheet.paste(cell, (column * step, row * step))
     return to_png(sheet)
 
 
 def sheet_size_px(n: int, side_px: int) -> tuple[int, int]:
-    """Width and height of a sheet of `n` pictures."""
-    columns, rows = min(n, _COLUMNS), -(-n // _COLUMNS)
-    gap = _gap_px(side_px)
+    """Width and height of a lettered sheet of `n` pictures."""
+    columns, rows, gap = min(n, _COLUMNS), -(-n // _COLUMNS), gap_px(side_px)
     return columns * side_px + (columns - 1) * gap, rows * side_px + (rows - 1) * gap
 
 
-def _gap_px(side_px: int) -> int:
-    return max(2, round(side_px * _GAP))
-
-
-def _draw_badge(cell: Image.Image, letter: str) -> None:
-    side = max(18, round(cell.width * _BADGE))
-    start = round(cell.width * _MARGIN)
-    draw = ImageDraw.Draw(cell)
-    box = (start, start, start + side, start + side)
-    draw.rounded_rectangle(
-        box,
-        radius=side // 5,
-        fill=_LIGHT_LETTERED,
-        outline=_DARK_LETTERED,
-        width=max(1, side // 24),
-    )
-    font = ImageFont.load_default(size=0.78 * side)
-    middle = (start + side / 2, start + side / 2)
-    draw.text(middle, letter, _DARK_LETTERED, font=font, anchor="mm")
-
-
-SEEN_PX = 256
-"""Side of the pictures that are compared."""
-MARKS_APART_PX = 18.0
-"""Targets are this far apart at the least, in pixels of `SEEN_PX`."""
-_LEAST_DEPTH_PX = 4
-_VISIBLE_STEP = 24
-_EDGE = 0.97
-_STYLE = PictureStyle(SEEN_PX)
-
-
 class Top(NamedTuple):
-    """A point of a block's surface [m], rounded to 0.1 mm, and where it lies on the block.
+    """A point of a block's surface [m], rounded to 0.1 mm.
 
     `rise` is the z of the surface's unit normal, `off_center_m` how far the point is from the
     vertical line through the middle of the block.
@@ -350,9 +283,10 @@ class Top(NamedTuple):
     off_center_m: float
 
 
+@functools.lru_cache(maxsize=48)
 def seen(recipe: QuestionPicture) -> Shot:
     """The blocks of a picture by its camera, `SEEN_PX` squared, with no floor and no marks."""
-    return _seen(recipe)
+    return shoot(drawn_blocks(recipe), _camera(recipe), SEEN_PX)
 
 
 @functools.lru_cache(maxsize=48)
@@ -360,42 +294,42 @@ def _camera(recipe: QuestionPicture) -> Camera:
     return question_camera(recipe, _STYLE)
 
 
-@functools.lru_cache(maxsize=48)
-def _seen(recipe: QuestionPicture) -> Shot:
-    return shoot(drawn_blocks(recipe), _camera(recipe), SEEN_PX)
-
-
 def differing_pixels(one: Shot, other: Shot) -> int:
-    """How many pixels of the two differ by more than a tenth of the scale in some channel."""
+    """Number of pixels that differ by more than a tenth of the scale in some channel."""
     return int(changed_pixels(one, other).sum())
 
 
 def changed_pixels(one: Shot, other: Shot) -> NDArray[np.bool_]:
-    """Where the two differ by more than a tenth of the scale in some channel, shape of both."""
+    """The pixels that differ by more than a tenth of the scale in some channel, shape of both."""
     step = np.abs(_colors(one) - _colors(other)) > _VISIBLE_STEP
     changed: NDArray[np.bool_] = step[..., 0] | step[..., 1] | step[..., 2]
     return changed
 
 
+@functools.lru_cache(maxsize=48)
+def _colors(shot: Shot) -> NDArray[np.int16]:
+    """Colors with every pixel of the floor white."""
+    colors = shot.rgb.astype(np.int16)
+    colors[shot.block < 0] = 255
+    return colors
+
+
 def least_difference(shots: Sequence[Shot]) -> int:
     """The fewest pixels in which any two pictures differ; two at least must be given."""
-    return min(
-        differing_pixels(one, other) for i, one in enumerate(shots) for other in shots[i + 1 :]
-    )
+    return min(differing_pixels(one, other) for one, other in combinations(shots, 2))
 
 
 def shown_pixels(recipe: QuestionPicture, shot: Shot) -> dict[int, int]:
-    """For each block's order, how many pixels show it."""
+    """For each block's order, the number of pixels that show it."""
     counts = np.bincount(shot.block[shot.block >= 0], minlength=len(recipe.blocks))
     return {b.order: int(n) for b, n in zip(recipe.blocks, counts, strict=True)}
 
 
 def is_inside(recipe: QuestionPicture) -> bool:
-    """Whether no block or mark comes near the picture's edge."""
-    camera = _camera(recipe)
+    """True if no block or mark comes near the picture's edge."""
     points = [block.vertices_m for block in drawn_blocks(recipe)]
     points += [np.array([mark.position_m]) for mark in recipe.marks]
-    return bool(np.abs(camera.project(np.vstack(points))).max() < _EDGE)
+    return bool(np.abs(_camera(recipe).project(np.vstack(points))).max() < _EDGE)
 
 
 def block_mark(recipe: QuestionPicture, shot: Shot, order: int, letter: str) -> Mark | None:
@@ -405,11 +339,18 @@ def block_mark(recipe: QuestionPicture, shot: Shot, order: int, letter: str) -> 
     shows; that is four pixels of `SEEN_PX` at the least.
     """
     vertex = next(i for i, block in enumerate(recipe.blocks) if block.order == order)
-    pixel, depth = _deepest(shot.block == vertex)
+    # The pixels that last longest as the mask is eaten from its edge.
+    depth, last, left = 0, shot.block == vertex, shot.block == vertex
+    while left.any():
+        depth, last = depth + 1, left
+        wide = np.pad(left, 1)
+        left = left & wide[2:, 1:-1] & wide[:-2, 1:-1] & wide[1:-1, 2:] & wide[1:-1, :-2]
     if depth < _LEAST_DEPTH_PX:
         return None
-    block = drawn_blocks(recipe)[vertex]
-    hit = _hit(block, _camera(recipe), pixel)
+    rows, columns = np.nonzero(last)
+    middle = np.argmin((rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2)
+    pixel = (int(rows[middle]), int(columns[middle]))
+    hit = _hit(drawn_blocks(recipe)[vertex], _camera(recipe), pixel)
     return None if hit is None else Mark(letter, hit.position_m)
 
 
@@ -421,12 +362,10 @@ def visible_tops(recipe: QuestionPicture, shot: Shot, step_px: int, least_rise: 
     """
     camera, blocks = _camera(recipe), drawn_blocks(recipe)
     tops = []
-    for row in range(step_px // 2, SEEN_PX - 2, step_px):
-        for column in range(step_px // 2, SEEN_PX - 2, step_px):
-            around = shot.block[max(row - 2, 0) : row + 3, max(column - 2, 0) : column + 3]
-            vertex = int(around[0, 0])
-            if vertex < 0 or (around != vertex).any():
-                continue
+    for row, column in product(range(step_px // 2, SEEN_PX - 2, step_px), repeat=2):
+        around = shot.block[max(row - 2, 0) : row + 3, max(column - 2, 0) : column + 3]
+        vertex = int(around[0, 0])
+        if vertex >= 0 and (around == vertex).all():
             hit = _hit(blocks[vertex], camera, (row, column))
             if hit is not None and hit.rise >= least_rise:
                 tops.append(hit)
@@ -435,8 +374,7 @@ def visible_tops(recipe: QuestionPicture, shot: Shot, step_px: int, least_rise: 
 
 def mark_pixel(recipe: QuestionPicture, position_m: tuple[float, float, float]) -> tuple[int, int]:
     """The pixel (row, column) of `SEEN_PX` at a point of the world, the nearest one inside."""
-    camera = _camera(recipe)
-    column, row = camera.to_pixels(np.array([position_m]), SEEN_PX)[0]
+    column, row = _camera(recipe).to_pixels(np.array([position_m]), SEEN_PX)[0]
     return int(np.clip(row, 0, SEEN_PX - 1)), int(np.clip(column, 0, SEEN_PX - 1))
 
 
@@ -448,48 +386,14 @@ def seen_order(
     return recipe.blocks[vertex].order if vertex >= 0 else None
 
 
-def surface_at(
-    recipe: QuestionPicture, shot: Shot, position_m: tuple[float, float, float]
-) -> Top | None:
-    """The point of a block's surface that shows at a point of the world; None for the floor."""
-    pixel = mark_pixel(recipe, position_m)
-    vertex = int(shot.block[pixel])
-    if vertex < 0:
-        return None
-    return _hit(drawn_blocks(recipe)[vertex], _camera(recipe), pixel)
-
-
 def is_apart(
     recipe: QuestionPicture, mark: Mark, others: Sequence[Mark], least_px: float = MARKS_APART_PX
 ) -> bool:
-    """Whether a mark's target is so many pixels of `SEEN_PX` away from all the others'."""
-    camera = _camera(recipe)
+    """True if a mark's target is so many pixels of `SEEN_PX` away from all the others'."""
     places = np.array([one.position_m for one in (mark, *others)])
-    pixels = camera.to_pixels(places, SEEN_PX)
+    pixels = _camera(recipe).to_pixels(places, SEEN_PX)
     apart = np.linalg.norm(pixels[1:] - pixels[0], axis=1)
     return bool(apart.min(initial=np.inf) >= least_px)
-
-
-@functools.lru_cache(maxsize=48)
-def _colors(shot: Shot) -> NDArray[np.int16]:
-    """Colors with every pixel of the floor white."""
-    colors = shot.rgb.astype(np.int16)
-    colors[shot.block < 0] = 255
-    return colors
-
-
-def _deepest(mask: NDArray[np.bool_]) -> tuple[tuple[int, int], int]:
-    """The pixel (row, column) that lasts longest as a mask is eaten from its edge, and how long."""
-    depth, last, left = 0, mask, mask
-    while left.any():
-        depth, last = depth + 1, left
-        wide = np.pad(left, 1)
-        left = left & wide[2:, 1:-1] & wide[:-2, 1:-1] & wide[1:-1, 2:] & wide[1:-1, :-2]
-    if depth == 0:
-        return (0, 0), 0
-    rows, columns = np.nonzero(last)
-    middle = np.argmin((rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2)
-    return (int(rows[middle]), int(columns[middle])), depth
 
 
 def _hit(block: DrawnBlock, camera: Camera, pixel: tuple[int, int]) -> Top | None:

@@ -17,7 +17,6 @@ from phyblock.scoring.pose import blocks_reached, overlap_volume, placed
 from phyblock.sim.contact import VOXEL_M, filled_voxels, find_overlaps, voxel_iou
 from phyblock.sim.dynamics import DEFAULT_TRIAL, ExecutionLimits, execute
 from phyblock.sim.engine import (
-    Contact,
     Physics,
     PhysicsEngine,
     Pose,
@@ -158,9 +157,6 @@ class CreepingSimulation:
         return Velocity((0.01, 0.0, 0.0), (0.0, 0.0, 0.0))
 
     def set_velocity(self, number: int, velocity: Velocity) -> None:
-        raise NotImplementedError
-
-    def contacts(self) -> tuple[Contact, ...]:
         raise NotImplementedError
 
     def step(self, n: int) -> None:

@@ -16,7 +16,6 @@ from phyblock.errors import InputError
 from phyblock.sim.dynamics import settle
 from phyblock.sim.engine import (
     ENGINES,
-    FLOOR,
     GRAVITY_M_S2,
     Physics,
     PhysicsEngine,
@@ -98,23 +97,6 @@ def test_a_block_on_the_floor_stands(simulation: Simulation, block_type: BlockTy
     simulation.step(120)
     assert simulation.pose(1).distance_m(Pose.goal(one)) < 0.001
     assert simulation.pose(1).angle_deg(Pose.goal(one)) < 1.0
-
-
-def test_contacts_tell_who_rests_on_whom(simulation: Simulation) -> None:
-    stack, aside = tower(2), block(3, "arch", (0.3, 0.0, 0.025))
-    add_all(simulation, [*stack, aside])
-    assert simulation.contacts() == ()
-    simulation.step(10)
-    contacts = simulation.contacts()
-    assert {(contact.first, contact.second) for contact in contacts} == {
-        *((FLOOR, 1), (1, 2), (FLOOR, 3))
-    }
-    for contact in contacts:
-        assert_allclose(contact.normal, (0.0, 0.0, 1.0), atol=0.02)
-        assert abs(contact.distance_m) < 0.002
-    simulation.remove(2)
-    simulation.step(1)
-    assert {contact.second for contact in simulation.contacts()} == {1, 3}
 
 
 def test_a_velocity_is_the_one_that_was_set(simulation: Simulation) -> None:

@@ -17,7 +17,7 @@ from phyblock.making.questions.selection import pick
 from phyblock.making.questions.wording import fill, wording_ids
 from phyblock.sim.contact import whole_bounds_m
 from phyblock.sim.engine import Pose
-from phyblock.sim.outcomes import DEFAULT_LIMITS
+from phyblock.sim.outcomes import MOVED_DEG, MOVED_M, STILL_DEG, STILL_M
 from phyblock.sim.pictures import Shot
 from phyblock.sim.question_pictures import (
     changed_pixels,
@@ -101,9 +101,9 @@ def moved_between(
             raise UnfairError(f"picture {picture.label} shows a block that the scene has not")
         start, end = Pose.goal(before), Pose.goal(block)
         distance_m, angle_deg = end.distance_m(start), end.angle_deg(start)
-        if distance_m > DEFAULT_LIMITS.moved_m or angle_deg > DEFAULT_LIMITS.moved_deg:
+        if distance_m > MOVED_M or angle_deg > MOVED_DEG:
             moved.append(block.order)
-        elif distance_m > DEFAULT_LIMITS.still_m or angle_deg > DEFAULT_LIMITS.still_deg:
+        elif distance_m > STILL_M or angle_deg > STILL_DEG:
             raise UnfairError(f"picture {picture.label} shows block {block.order} hardly moved")
     gone = set(goal) - {block.order for block in picture.blocks}
     return tuple(sorted(gone)), tuple(sorted(moved))
