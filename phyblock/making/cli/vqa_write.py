@@ -22,8 +22,8 @@ from phyblock.making.cli.working import seed_option
 from phyblock.making.questions.rewording import Paraphrase, stems_of, write_wordings
 from phyblock.models import Breakers, Gate, ReplyCache, RetryPolicy, build_model
 from phyblock.resources import bundled, reply_cache_file
-from phyblock.run.finding import find_models_file
 from phyblock.run.models import to_config
+from phyblock.run.preflight import find_models_file
 from phyblock.text import counted, did_you_mean
 from phyblock.tracks import TemplatePrompt
 
