@@ -216,7 +216,7 @@ def end_fork_server() -> None:
 def serve(orders: socket.socket) -> None:
     import phyblock.cli
     import phyblock.making.cli
-    from phyblock.models.litellm_call import _litellm
+    from phyblock.models.litellm_client import _litellm
 
     for package in (phyblock.cli, phyblock.making.cli):
         for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):

@@ -31,11 +31,12 @@ from phyblock.models import (
     prices_of,
     today,
 )
+from phyblock.models.litellm_client import be_quiet
 from phyblock.registry import baseline_names
 from phyblock.report import NO_VALUE
 from phyblock.run.check import check_model
+from phyblock.run.finding import find_models_file
 from phyblock.run.models import to_config
-from phyblock.run.preflight import find_models_file
 from phyblock.text import counted, did_you_mean
 
 __all__ = ["command"]
@@ -133,6 +134,7 @@ def check(known: dict[str, ModelConfig], name: str) -> int:
     code = 0
     for server, one in _servers(name, config):
         try:
+            be_quiet()
             reply = asyncio.run(check_model(one))
         except ModelError as error:
             console.print(f"{server} does not answer:", style="red", end=" ")

@@ -6,7 +6,6 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 from phyblock.run.events import ModelNotice
-from phyblock.text import counted
 
 __all__ = ["Remarks"]
 
@@ -23,23 +22,17 @@ class _Trouble:
 
     retries: Counter[int | None] = field(default_factory=Counter)
     longest_wait_s: float = 0.0
-    limit: int = 0
     last: str = ""
 
     def line(self, model: str) -> str:
-        parts = []
-        if self.retries:
-            total = sum(self.retries.values())
-            kinds = ", ".join(
-                f"{number} for {_WORDS.get(status, f'HTTP {status}')}"
-                for status, number in self.retries.most_common()
-            )
-            times = "once" if total == 1 else f"{total} times"
-            wait = f"waiting up to {self.longest_wait_s:.0f} s"
-            parts.append(f"asking again {times} ({kinds}), {wait}; last: {self.last}")
-        if self.limit:
-            parts.append(f"slowed down to {counted(self.limit, 'call')} at once")
-        return f"{model}: {'; '.join(parts)}"
+        total = sum(self.retries.values())
+        kinds = ", ".join(
+            f"{number} for {_WORDS.get(status, f'HTTP {status}')}"
+            for status, number in self.retries.most_common()
+        )
+        times = "once" if total == 1 else f"{total} times"
+        wait = f"waiting up to {self.longest_wait_s:.0f} s"
+        return f"{model}: asking again {times} ({kinds}), {wait}; last: {self.last}"
 
 
 class Remarks:
@@ -54,15 +47,12 @@ class Remarks:
 
     def add(self, notice: ModelNotice, now_s: float) -> list[str]:
         """Take note, and give the lines that are due."""
-        if notice.kind not in ("retry", "slow_down"):
+        if notice.kind != "retry":
             return [f"{notice.model}: {notice.text}"]
         trouble = self._troubles.setdefault(notice.model, _Trouble())
-        if notice.kind == "slow_down":
-            trouble.limit = notice.limit
-        else:
-            trouble.retries[notice.status] += 1
-            trouble.longest_wait_s = max(trouble.longest_wait_s, notice.wait_s)
-            trouble.last = notice.text
+        trouble.retries[notice.status] += 1
+        trouble.longest_wait_s = max(trouble.longest_wait_s, notice.wait_s)
+        trouble.last = notice.text
         return self.due(now_s)
 
     def due(self, now_s: float) -> list[str]:

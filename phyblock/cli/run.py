@@ -19,21 +19,23 @@ from phyblock.cli.progress import ProgressView
 from phyblock.cli.report import show_made
 from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
+from phyblock.models.litellm_client import be_quiet
 from phyblock.report.made import names_to_write
 from phyblock.resources import bundled
-from phyblock.run.estimate import estimate, spending_refused, unlimited_spending
+from phyblock.run.asking import asking_remarks, moved_remarks
+from phyblock.run.consent import spending_refused, unlimited_spending
+from phyblock.run.estimate import estimate
 from phyblock.run.execute import Cause, RunResult
-from phyblock.run.plan import RunPlan, make_plan
-from phyblock.run.preflight import (
-    asking_remarks,
+from phyblock.run.finding import (
     bundled_suites,
     find_models_file,
     find_suite,
-    moved_remarks,
     prompt_dirs,
 )
+from phyblock.run.folder import run_folder
+from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.session import Session, check_ready
-from phyblock.run.store import held_run, run_folder
+from phyblock.run.store import held_run
 from phyblock.text import counted, one_line
 
 __all__ = ["command"]
@@ -112,6 +114,7 @@ def command(
         console.print("Nothing was asked.")
         return 1
     view = ProgressView(console, plan.suite.name)
+    be_quiet()
     session = Session(plan, folder, view, use_cache=not no_cache, retry_failed=retry_failed)
     result = asyncio.run(_run(session, view))
     show_made(folder, plan.suite.tables, page=not no_report)

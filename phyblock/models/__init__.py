@@ -3,17 +3,13 @@
 Importing this package imports neither litellm nor aiohttp: the first call through one of them does.
 """
 
-from phyblock.models.base import AskLaterError, GatheringModel, Image, Message, Model, Request
 from phyblock.models.batches import BatchFiles, remove_unfinished, under_way, waiting_keys
-from phyblock.models.breaker import Breakers
 from phyblock.models.build import build_model
 from phyblock.models.cache import CacheStats, ReplyCache, reply_key
 from phyblock.models.costs import Budget, Estimate, estimate, most_usd
-from phyblock.models.events import ModelEvent, Observer, Tell
-from phyblock.models.formats import takes_format
-from phyblock.models.halt import Halt, HaltedError
 from phyblock.models.keys import KeyStatus, api_key_status, server_address
-from phyblock.models.limits import Gate
+from phyblock.models.litellm_client import known_providers
+from phyblock.models.model import ModelEvent, Observer, RetryPolicy, Tell, takes_format
 from phyblock.models.prices import (
     Price,
     Prices,
@@ -26,21 +22,25 @@ from phyblock.models.prices import (
     reply_cost_usd,
     today,
 )
-from phyblock.models.providers import known_providers
 from phyblock.models.replay import read_raw_reply
-from phyblock.models.retry import RetryPolicy
+from phyblock.models.request import (
+    AskLaterError,
+    GatheringModel,
+    HaltedError,
+    Image,
+    Message,
+    Model,
+    Request,
+)
 from phyblock.records.reply import Reply, Usage
 
 __all__ = [
     "AskLaterError",
     "BatchFiles",
-    "Breakers",
     "Budget",
     "CacheStats",
     "Estimate",
-    "Gate",
     "GatheringModel",
-    "Halt",
     "HaltedError",
     "Image",
     "KeyStatus",

@@ -6,7 +6,7 @@ import numpy as np
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import Problem, SpecError
-from phyblock.models.base import Request
+from phyblock.models.request import Request
 from phyblock.records.reply import Reply, Usage
 from phyblock.registry import baseline_names, baseline_rules
 from phyblock.stable import drawn_bytes

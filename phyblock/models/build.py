@@ -2,86 +2,97 @@
 
 from __future__ import annotations
 
+import asyncio
+import re
+
 from phyblock.config.models import ModelConfig
-from phyblock.models.base import Model
+from phyblock.errors import Problem, SpecError
 from phyblock.models.baselines import BaselineModel
 from phyblock.models.batches import BatchFiles, BatchModel, BatchParts, batch_protocol
-from phyblock.models.breaker import Breakers
 from phyblock.models.cache import ReplyCache
-from phyblock.models.chat import ChatModel, ChatParts
+from phyblock.models.client import Client, HttpClient
 from phyblock.models.costs import Budget
-from phyblock.models.direct_call import DirectTransport
-from phyblock.models.events import Observer, ignore_event
-from phyblock.models.halt import Halt
-from phyblock.models.http_client import Client
 from phyblock.models.keys import secrets_of
-from phyblock.models.limits import Gate, ModelLimiter
-from phyblock.models.litellm_call import LitellmTransport
+from phyblock.models.limits import Limits
+from phyblock.models.litellm_client import LitellmClient
+from phyblock.models.model import ChatModel, Observer, RetryPolicy, Tell
+from phyblock.models.openai_client import OpenAIClient
 from phyblock.models.prices import prices_of, require_prices
 from phyblock.models.replay import open_replay
-from phyblock.models.replicas import Replicas
-from phyblock.models.retry import RetryPolicy
-from phyblock.models.transport import Transport
-
-__all__ = ["build_model"]
+from phyblock.models.request import Model
+from phyblock.models.servers import Server, Servers
 
 
 def build_model(
     config: ModelConfig,
     *,
     cache: ReplyCache | None,
-    overall: Gate,
+    overall: asyncio.Semaphore | None = None,
     budget: Budget | None = None,
-    observer: Observer = ignore_event,
+    observer: Observer = lambda _: None,
+    tell: Tell = lambda _: None,
     policy: RetryPolicy | None = None,
-    breakers: Breakers | None = None,
-    halt: Halt | None = None,
     batches: BatchFiles | None = None,
 ) -> Model:
-    """The model that a configuration describes; nothing is imported or sent before it is asked.
+    """Return the model that a configuration describes; nothing is imported or sent before it asks.
 
-    `overall` bounds what all models of a run have under way together, `breakers` are those of their
-    servers, `halt` ends their waits. `batches` is where a model that is asked so keeps them. Raises
-    SpecError for an unknown baseline, a model without a price under a budget, a list of servers
-    that cannot be used or a provider without batches, DataError for missing recordings.
+    `overall` bounds what all models of a run have under way together; `observer` hears of the
+    model, `tell` of its servers. `batches` is where a model that is asked so keeps them. Raises
+    SpecError for an unknown baseline, a model without a price under a budget or a provider without
+    batches, DataError for missing recordings.
     """
     if config.kind == "baseline":
         return BaselineModel(config)
     if config.kind == "replay":
         return open_replay(config)
-    secrets = secrets_of(config)
+    if not config.provider:
+        hint = "for example openai/gpt-4o-2024-08-06"
+        raise SpecError(
+            Problem(f"model {config.name}", "needs a provider", "id", config.id, hint=hint)
+        )
     policy = policy or RetryPolicy()
-
-    def transport(at: ModelConfig, client: Client | None = None) -> Transport:
-        kind = DirectTransport if at.is_direct else LitellmTransport
-        return kind(at, secrets, client)
-
     prices = prices_of(config) if budget is None else require_prices(config)
-    halt = halt or Halt()
+
+    def client(at: ModelConfig, http: HttpClient | None = None) -> Client:
+        return (OpenAIClient if at.is_direct else LitellmClient)(at, http)
+
     if config.batch:
         assert batches is not None, "batches are kept in a run"
         batch_parts = BatchParts(
-            protocol=batch_protocol(config, secrets),
-            transport=lambda client: transport(config, client),
+            protocol=batch_protocol(config, secrets_of(config)),
+            client=lambda http: client(config, http),
             files=batches,
             cache=cache,
             budget=budget,
             prices=prices,
             policy=policy,
             observer=observer,
-            halt=halt,
         )
         return BatchModel(config, batch_parts)
-    replicas = Replicas(config, transport, breakers or Breakers(policy))
-    parts = ChatParts(
-        replicas=replicas,
-        limiter=ModelLimiter(replicas.width, overall, config.rpm, config.tpm),
+    at_each = [config.at(address) for address in config.addresses or (None,)]
+    servers = Servers([Server(_name_of(at), client(at)) for at in at_each], policy, tell)
+    limits = Limits(
+        config.max_concurrency,
+        overall or asyncio.Semaphore(config.max_concurrency),
+        config.rpm,
+        config.tpm,
+        rest_s=servers.rest_s,
+        clock=policy.clock,
+    )
+    return ChatModel(
+        config,
+        servers,
+        limits,
         cache=cache,
         budget=budget,
         prices=prices,
         policy=policy,
-        secrets=secrets,
         observer=observer,
-        halt=halt,
     )
-    return ChatModel(config, parts)
+
+
+def _name_of(config: ModelConfig) -> str:
+    """Return scheme, host and port of a model's address; the provider where none is given."""
+    if config.api_base is None:
+        return config.provider
+    return re.split(r"(?<=[^/:])[/?#]", config.api_base, maxsplit=1)[0].lower()

@@ -14,17 +14,15 @@ import json
 import re
 import sqlite3
 import time
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import Problem, StoreError, reason_of
-from phyblock.models.base import Image, Message, Request
-from phyblock.models.events import Tell
-from phyblock.models.payload import wire_params
 from phyblock.models.replay import token_count
+from phyblock.models.request import Image, Message, Request, wire_params
 from phyblock.records.reply import Reply
 from phyblock.stable import hex_digest
 
@@ -94,7 +92,7 @@ class ReplyCache:
     be read is missing.
     """
 
-    def __init__(self, path: Path, tell: Tell | None = None) -> None:
+    def __init__(self, path: Path, tell: Callable[[str], None] | None = None) -> None:
         self.path = path
         self._tell = tell
         self._is_off = False

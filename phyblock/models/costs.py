@@ -12,9 +12,8 @@ from datetime import date, timedelta
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import BudgetReachedError, ModelError
-from phyblock.models.base import Image, Request
-from phyblock.models.payload import wire_params
 from phyblock.models.prices import Prices, map_entry
+from phyblock.models.request import Image, Request, wire_params
 from phyblock.records.reply import Reply, Usage
 from phyblock.types import ImageDetail
 

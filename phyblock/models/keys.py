@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
+import base64
+import functools
+import html
+import json
 import os
 import re
+import urllib.parse
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from phyblock.config.models import ModelConfig, address_fault
 from phyblock.errors import Problem, SpecError, UnavailableError
-from phyblock.models.masks import hidden
-
-__all__ = [
-    "KEYLESS",
-    "KeyStatus",
-    "api_key",
-    "api_key_status",
-    "environment_secrets",
-    "hidden",
-    "secrets_of",
-    "server_address",
-]
 
 _KEY_VARIABLES: Mapping[str, tuple[str, ...]] = {
     "cloudflare": ("CLOUDFLARE_API_KEY",),
@@ -31,6 +24,15 @@ _KEY_VARIABLES: Mapping[str, tuple[str, ...]] = {
     "together_ai": ("TOGETHERAI_API_KEY", "TOGETHER_API_KEY", "TOGETHER_AI_API_KEY"),
 }
 """Where the name is not `<PROVIDER>_API_KEY`, in the order in which they are looked for."""
+
+_ADDRESS_VARIABLES: Mapping[str, tuple[str, ...]] = {
+    "anthropic": ("ANTHROPIC_API_BASE", "ANTHROPIC_BASE_URL"),
+    "fireworks_ai": ("FIREWORKS_API_BASE",),
+    "mistral": ("MISTRAL_AZURE_API_BASE", "MISTRAL_API_BASE"),
+    "ollama_chat": ("OLLAMA_API_BASE",),
+    "openai": ("OPENAI_BASE_URL", "OPENAI_API_BASE"),
+}
+"""Where litellm looks for a server's address, if not in `<PROVIDER>_API_BASE`, in its order."""
 
 _OWN_CREDENTIALS = (
     "azure",
@@ -46,101 +48,28 @@ _OWN_CREDENTIALS = (
 KEYLESS = ("hosted_vllm", "lm_studio", "llamafile", "ollama", "ollama_chat")
 """Local servers, which take a key but need none."""
 
-_ADDRESS_VARIABLES: Mapping[str, tuple[str, ...]] = {
-    "anthropic": ("ANTHROPIC_API_BASE", "ANTHROPIC_BASE_URL"),
-    "fireworks_ai": ("FIREWORKS_API_BASE",),
-    "mistral": ("MISTRAL_AZURE_API_BASE", "MISTRAL_API_BASE"),
-    "ollama_chat": ("OLLAMA_API_BASE",),
-    "openai": ("OPENAI_BASE_URL", "OPENAI_API_BASE"),
-    **{
-        provider: (f"{provider.upper()}_API_BASE",)
-        for provider in (
-            "azure",
-            "azure_ai",
-            "dashscope",
-            "deepseek",
-            "gemini",
-            "groq",
-            "hosted_vllm",
-            "llamafile",
-            "lm_studio",
-            "meta",
-            "moonshot",
-            "novita",
-            "ollama",
-            "openrouter",
-            "together_ai",
-            "xai",
-            "zai",
-        )
-    },
-}
-"""Where litellm looks for a server's address when it is given none, in its order."""
-
-_AWS = (
-    "AWS_ACCESS_KEY_ID",
-    "AWS_BEARER_TOKEN_BEDROCK",
-    "AWS_SECRET_ACCESS_KEY",
-    "AWS_SESSION_TOKEN",
-)
-_AZURE = (
-    "AZURE_AD_TOKEN",
-    "AZURE_CLIENT_SECRET",
-    "AZURE_OPENAI_API_KEY",
-    "AZURE_PASSWORD",
-)
-_VERTEX = ("VERTEXAI_CREDENTIALS", "VERTEX_CREDENTIALS")
-_WATSONX = (
-    "WATSONX_API_KEY",
-    "WATSONX_APIKEY",
-    "WATSONX_TOKEN",
-    "WATSONX_ZENAPIKEY",
-    "WX_API_KEY",
-)
-_SECRET_VARIABLES: Mapping[str, tuple[str, ...]] = {
-    "anthropic": ("ANTHROPIC_API_KEY", "ANTHROPIC_AUTH_TOKEN"),
-    "azure": _AZURE,
-    "azure_ai": _AZURE,
-    "azure_text": _AZURE,
-    "bedrock": _AWS,
-    "bedrock_converse": _AWS,
-    "bedrock_mantle": (*_AWS, "BEDROCK_MANTLE_API_KEY"),
-    "cohere": ("COHERE_API_KEY", "CO_API_KEY"),
-    "cohere_chat": ("COHERE_API_KEY", "CO_API_KEY"),
-    "databricks": ("DATABRICKS_API_KEY", "DATABRICKS_CLIENT_SECRET", "DATABRICKS_TOKEN"),
-    "datarobot": ("DATAROBOT_API_TOKEN",),
-    "fireworks_ai": ("FIREWORKSAI_API_KEY", "FIREWORKS_AI_TOKEN"),
-    "friendliai": ("FRIENDLIAI_API_KEY", "FRIENDLI_TOKEN"),
-    "gigachat": ("GIGACHAT_ACCESS_TOKEN", "GIGACHAT_CREDENTIALS", "GIGACHAT_PASSWORD"),
-    "huggingface": ("HF_TOKEN", "HUGGINGFACE_API_KEY"),
-    "mistral": ("MISTRAL_AZURE_API_KEY",),
-    "openrouter": ("OR_API_KEY",),
-    "replicate": ("REPLICATE_API_KEY", "REPLICATE_API_TOKEN"),
-    "sagemaker": _AWS,
-    "sagemaker_chat": _AWS,
-    "snowflake": ("SNOWFLAKE_JWT",),
-    "together_ai": ("TOGETHER_AI_TOKEN",),
-    "vertex_ai": _VERTEX,
-    "vertex_ai_beta": _VERTEX,
-    "volcengine": ("ARK_API_KEY",),
-    "watsonx": _WATSONX,
-    "watsonx_text": _WATSONX,
-}
-"""Variables beside those of the key in which litellm looks for what it signs in with."""
-
 _PLACEHOLDER = "no-key"
-_CALLED_SECRET = re.compile("KEY|TOKEN|SECRET|PASSW|CREDENTIAL", re.IGNORECASE)
-_SHORTEST_SECRET = 4
 _PLACEHOLDERS = (_PLACEHOLDER, "empty", "none", "null", "dummy", "test")
 """What people write where a server needs no key, in lower case: no secrets."""
+
+_CALLED_SECRET = re.compile(
+    r"(?:^|_|API)(?:KEY|TOKEN|SECRET|PASSW(?:OR)?D|CREDENTIALS?|JWT)(?:_|$)", re.IGNORECASE
+)
+_SHORTEST_KEY = 4
+_SHORT = 8
+_MASK = "[key]"
+_LOOKS_SECRET = re.compile(
+    r"(?:\bsk-[\w-]{6,}|\bAIza[\w-]{10,}|(?<=Bearer )[\w.~+/-]{6,}|(?<=Basic )[\w+/=-]{6,}"
+    r"|(?<=[?&]key=)[^&\s'\"]+|(?<=://)[^/\s@]+(?=@))"
+)
 
 
 @dataclass(frozen=True)
 class KeyStatus:
-    """Whether a model can be called as far as keys go.
+    """What is known of a model's key.
 
-    `variables` are the environment variables looked at, in order; `is_set` whether one holds a
-    key; `is_needed` whether calls fail without; `fault` what keeps the key that is set from being
+    `variables` are the environment variables looked at, in order; `is_set` is True if one holds a
+    key, `is_needed` if calls fail without; `fault` is what keeps the key that is set from being
     sent, or "".
     """
 
@@ -151,7 +80,7 @@ class KeyStatus:
 
 
 def api_key_status(config: ModelConfig) -> KeyStatus:
-    """Whether the model's key is set; looks at the environment alone."""
+    """Look in the environment for the model's key."""
     if config.kind != "litellm":
         return KeyStatus((), is_set=False, is_needed=False)
     variables = _variables(config)
@@ -159,12 +88,14 @@ def api_key_status(config: ModelConfig) -> KeyStatus:
         config.has_address or config.provider in KEYLESS + _OWN_CREDENTIALS
     )
     found = _found(variables)
-    fault = _fault(*found) if found is not None else ""
-    return KeyStatus(variables, found is not None, is_needed, fault)
+    if found is None or all(" " <= character <= "~" for character in found[1]):
+        return KeyStatus(variables, found is not None, is_needed)
+    fault = f"{found[0]} holds a line break or another character that no HTTP header can carry"
+    return KeyStatus(variables, is_set=True, is_needed=is_needed, fault=fault)
 
 
 def api_key(config: ModelConfig) -> str | None:
-    """The key to send; None leaves it to litellm (providers with credentials of their own).
+    """Return the key to send; None leaves it to litellm (providers with their own credentials).
 
     A server named by `api_base` gets a placeholder when no key is set, as clients insist on one.
     Raises UnavailableError when a key is needed and not set, or when no header can carry it.
@@ -183,12 +114,14 @@ def api_key(config: ModelConfig) -> str | None:
 
 
 def server_address(model_id: str) -> str | None:
-    """Address of the model's server that the environment names, or None.
+    """Return the address of the model's server that the environment names, or None.
 
     litellm would find it too, but unseen: replies of two servers must not pass for one another's.
     Raises SpecError for what is no address, or may hold a key or a password: it is kept and shown.
     """
-    for name in _ADDRESS_VARIABLES.get(model_id.partition("/")[0], ()):
+    provider = model_id.partition("/")[0]
+    usual = f"{provider.upper().replace('-', '_')}_API_BASE"
+    for name in _ADDRESS_VARIABLES.get(provider, (usual,)):
         if value := os.environ.get(name):
             if (fault := address_fault(value)) is not None:
                 message, hint = fault
@@ -198,32 +131,21 @@ def server_address(model_id: str) -> str | None:
 
 
 def secrets_of(config: ModelConfig) -> tuple[str, ...]:
-    """Values that no stored text may hold: all secrets that calls to this model could carry.
+    """Return the values that no stored text may hold, the longest first.
 
-    A value of fewer than 4 characters, or a usual word for "no key", is none: to take it out of all
-    text would ruin the text and hide nothing.
+    They are the model's key, and whatever the environment calls a key, token, secret, password or
+    credential: litellm signs in with many of them. Values of fewer than 4 characters (8, where they
+    are not the model's key) and usual words for "no key" are none: to take them out of all text
+    would ruin the text and hide nothing.
     """
-    variables = (*_variables(config), *_SECRET_VARIABLES.get(config.provider, ()))
-    return _secret_values(variables)
-
-
-def environment_secrets() -> tuple[str, ...]:
-    """Values of all variables that are called keys, tokens, secrets, passwords or credentials.
-
-    Programs of the user's that are started here have all of them, whichever model they are for.
-    """
-    return _secret_values(name for name in os.environ if _CALLED_SECRET.search(name))
-
-
-def _secret_values(variables: Iterable[str]) -> tuple[str, ...]:
-    values = {os.environ.get(name, "").strip() for name in variables}
-    return tuple(
-        sorted(
-            value
-            for value in values
-            if len(value) >= _SHORTEST_SECRET and value.lower() not in _PLACEHOLDERS
-        )
-    )
+    values = {os.environ.get(name, "").strip() for name in _variables(config)}
+    values |= {
+        value.strip()
+        for name, value in os.environ.items()
+        if _CALLED_SECRET.search(name) and len(value.strip()) >= _SHORT
+    }
+    secrets = {v for v in values if len(v) >= _SHORTEST_KEY and v.lower() not in _PLACEHOLDERS}
+    return tuple(sorted(secrets, key=lambda value: (-len(value), value)))
 
 
 def _variables(config: ModelConfig) -> tuple[str, ...]:
@@ -234,13 +156,63 @@ def _variables(config: ModelConfig) -> tuple[str, ...]:
 
 
 def _found(variables: tuple[str, ...]) -> tuple[str, str] | None:
-    """The first variable that holds a key, and that key without white space around it."""
+    """Return the first variable that holds a key, and that key without white space around it."""
     values = ((name, os.environ.get(name, "").strip()) for name in variables)
     return next((found for found in values if found[1]), None)
 
 
-def _fault(variable: str, value: str) -> str:
-    """What keeps a key from standing in an HTTP header, without the key."""
-    if all(" " <= character <= "~" for character in value):
-        return ""
-    return f"{variable} holds a line break or another character that no HTTP header can carry"
+def hidden(text: str, secrets: Iterable[str], *, guess: bool = True) -> str:
+    """Return `text` with every secret masked, whether plain or escaped (JSON, HTML, URL, base64).
+
+    A secret of fewer than 8 characters is masked where it stands as a word: as part of a longer
+    word it is chance. With `guess`, which is for messages and not for replies, what looks like a
+    key goes too, and the beginning of a secret at the very end of the text, where it was cut.
+    """
+    known = tuple(secrets)
+    for form in _forms(known):
+        if form in text:
+            exact = re.escape(form)
+            word = rf"(?<![^\W_]){exact}(?![^\W_])" if len(form) < _SHORT else exact
+            text = re.sub(word, _MASK, text)
+    if not guess:
+        return text
+    for form in _forms(known):
+        for length in range(len(form) - 1, _SHORTEST_KEY - 1, -1):
+            if text.endswith(form[:length]):
+                text = text[:-length] + _MASK
+                break
+    return _LOOKS_SECRET.sub(_MASK, text)
+
+
+@functools.lru_cache(maxsize=64)
+def _forms(secrets: tuple[str, ...]) -> tuple[str, ...]:
+    """List every way in which a server, a library or a log may write one of the secrets.
+
+    The longest come first, as one may begin another. In base64 a secret stands wherever it is in
+    the encoded bytes, `user:key` included; the characters at either end that also depend on its
+    neighbours are left out.
+    """
+    forms: set[str] = set()
+    for secret in secrets:
+        quoted = urllib.parse.quote(secret, safe="")
+        escaped = json.dumps(secret)[1:-1]
+        forms |= {
+            secret,
+            " ".join(secret.split()),
+            escaped,
+            escaped.replace("/", "\\/"),
+            repr(secret)[1:-1],
+            secret.replace("'", "\\'"),
+            html.escape(secret),
+            urllib.parse.quote(secret),
+            quoted,
+            urllib.parse.quote_plus(secret),
+            re.sub("%..", lambda match: match[0].lower(), quoted),
+        }
+        for before in range(3):
+            data = bytes(before) + secret.encode()
+            inside = slice((before * 8 + 5) // 6, len(data) * 8 // 6)
+            for encode in (base64.b64encode, base64.urlsafe_b64encode):
+                encoded = encode(data).decode()[inside]
+                forms |= {encoded} if len(encoded) >= _SHORT else set()
+    return tuple(sorted(forms, key=lambda form: (-len(form), form)))

@@ -13,7 +13,7 @@ from typing import Any
 from phyblock.config.models import ModelConfig
 from phyblock.errors import DataError, Problem, RefusedError, SampleError, reason_of
 from phyblock.files import load_json, read_text
-from phyblock.models.base import Request
+from phyblock.models.request import Request
 from phyblock.records.files import RECORDS, RecordLines
 from phyblock.records.record import Record
 from phyblock.records.reply import Reply, Usage

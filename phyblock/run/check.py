@@ -8,7 +8,6 @@ from PIL import Image as PillowImage
 
 from phyblock.config.models import ModelConfig
 from phyblock.models import (
-    Gate,
     Image,
     Message,
     Reply,
@@ -36,7 +35,6 @@ async def check_model(config: ModelConfig) -> Reply:
     model = build_model(
         config.model_copy(update={"seed": "never", "batch": False}),
         cache=None,
-        overall=Gate(1),
         policy=RetryPolicy(attempts=1, retry_for_s=0.0),
     )
     try:

@@ -15,14 +15,17 @@ from enum import Enum, auto
 from typing import Any
 
 from phyblock.errors import BudgetReachedError, UnavailableError
-from phyblock.models import AskLaterError, GatheringModel, Halt, HaltedError, Model
-from phyblock.run.events import ModelStopped, SampleDone, Stopping, Summary, Watcher
+from phyblock.models import AskLaterError, GatheringModel, HaltedError, Model
+from phyblock.run.events import ModelStopped, SampleDone, Stopping, Watcher
 from phyblock.run.extraction import Extractor
+from phyblock.run.halt import Halt
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan
 from phyblock.run.samples import Sample, SampleRunner
 from phyblock.run.shielded import to_its_end
-from phyblock.run.store import RecordWriter, RunStore
+from phyblock.run.standing import Summary
+from phyblock.run.store import RunStore
+from phyblock.run.writer import RecordWriter
 
 __all__ = ["Cause", "Executor", "RunResult", "Stop"]
 
@@ -81,7 +84,7 @@ class Executor:
         retry_failed: bool = False,
         extractor: Extractor | None = None,
     ) -> None:
-        """`halt` is the switch that `models` were built with; `retry_failed` asks again also where
+        """`halt` is the switch that ends calls; `retry_failed` asks again also where
         a request was rejected for good; `extractor` is asked what unread replies say.
         """
         self.settled: Mapping[str, Summary] = {
@@ -103,7 +106,7 @@ class Executor:
         settled = self.settled.values()
         self.result.failed = sum(not summary.is_answered for summary in settled)
         self.result.unjudged = sum(not summary.is_judged for summary in settled)
-        self._in_flight = 0
+        self._is_over = False
         self._failure: Exception | None = None
 
     @property
@@ -149,8 +152,12 @@ class Executor:
 
     async def _end(self, workers: list[asyncio.Task[None]]) -> None:
         """Give up what is still under way, and wait until what was answered is on disk."""
-        for worker in workers:
-            worker.cancel()
+        self._is_over = True
+        for _ in range(2):
+            # Once, and a call that is under way still returns its answer.
+            for worker in workers:
+                worker.cancel()
+            await asyncio.sleep(0)
         await asyncio.gather(*workers, return_exceptions=True)
         await self._writer.drain()
         await self._turns.drain()
@@ -177,7 +184,7 @@ class Executor:
             taken: deque[Sample] = deque()
             later: deque[Sample] = deque()
             gathering = self._gather(planned, model, queue, taken)
-            await self._guarded(planned, gathering, is_call=False)
+            await self._guarded(planned, gathering)
             await asyncio.gather(
                 *(self._work(planned, taken, later) for _ in range(min(width, len(taken))))
             )
@@ -191,7 +198,8 @@ class Executor:
         taken: deque[Sample],
     ) -> None:
         """Have a round's requests sent; those that belong to it are `taken` from the queue."""
-        await model.begin()
+        with self._halt.giving_up():
+            await model.begin()
         count = len(queue)
         is_full = False
 
@@ -200,7 +208,8 @@ class Executor:
             while queue and not is_full and self._goes_on(planned):
                 sample = queue.popleft()
                 request = await self._samples.request(sample, planned.config)
-                is_taken = await model.gather(request, anew=sample.id in self._recorded)
+                with self._halt.giving_up():
+                    is_taken = await model.gather(request, anew=sample.id in self._recorded)
                 is_full = is_full or not is_taken
                 (taken if is_taken else left).append(sample)
 
@@ -217,13 +226,11 @@ class Executor:
             raise BudgetReachedError("what is left may cost more than is left of max_cost_usd")
 
     def _goes_on(self, planned: PlannedModel) -> bool:
-        return not self.stopping and planned.name not in self.result.stopped
+        is_stopped = self.stopping or planned.name in self.result.stopped
+        return not (is_stopped or self._is_over)
 
-    async def _guarded(
-        self, planned: PlannedModel, work: Coroutine[Any, Any, None], *, is_call: bool = True
-    ) -> None:
+    async def _guarded(self, planned: PlannedModel, work: Coroutine[Any, Any, None]) -> None:
         """Do a part of the work on a model; what keeps it from going on stops it, or the run."""
-        self._in_flight += is_call
         try:
             await work
         except UnavailableError as error:
@@ -238,14 +245,11 @@ class Executor:
             # A mistake of our own is no reason to lose what others have paid for.
             self._failure = self._failure or error
             self._stop(Stop(Cause.ERROR, "an error that the run cannot go on with"))
-        finally:
-            self._in_flight -= is_call
 
     def _stop(self, stop: Stop) -> None:
         if self.result.stop is None:
             self.result.stop = stop
-            # Some wait for others, and have no call under way.
-            under_way = max(0, self._in_flight - self._halt.waiting)
+            under_way = sum(getattr(model, "under_way", 0) for model in self._models.values())
             self._halt.set()
             self._watch(Stopping(stop.reason, under_way))
 

@@ -12,7 +12,7 @@ from typing import Any
 from phyblock.config.models import ModelConfig
 from phyblock.errors import BudgetReachedError, ModelError
 from phyblock.models import AskLaterError, HaltedError, Model, Request
-from phyblock.models.base import Message
+from phyblock.models.request import Message
 from phyblock.records.record import Extraction, Record
 from phyblock.records.reply import Reply
 from phyblock.resources import bundled

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from phyblock.errors import ModelError, RefusedError, RetryableError, SampleError
-from phyblock.models.base import Image, Message, Request
+from phyblock.models.request import Image, Message, Request
 from phyblock.records.files import known_records
 from phyblock.records.record import Record, SentImage, SentPrompt
 from phyblock.records.reply import Reply, StoredError

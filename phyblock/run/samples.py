@@ -10,14 +10,16 @@ from typing import Any, TypeVar
 from phyblock.config.models import ModelConfig
 from phyblock.config.suite import Variant
 from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
-from phyblock.models import AskLaterError, Halt, Model, Request
+from phyblock.models import AskLaterError, Model, Request
 from phyblock.records.record import Record, SentPrompt, Turn
 from phyblock.records.reply import Reply, Usage
 from phyblock.run.extraction import Extractor
+from phyblock.run.halt import Halt
 from phyblock.run.judging import judged_apart
+from phyblock.run.prompts import PromptFile
 from phyblock.run.records import about_prompt, begun, judged
 from phyblock.run.shielded import to_its_end
-from phyblock.run.store import PromptFile, RecordWriter
+from phyblock.run.writer import RecordWriter
 from phyblock.stable import drawn_bytes, plain_sum
 from phyblock.tracks import (
     AnyTrack,
@@ -124,7 +126,8 @@ class SampleRunner:
         config: ModelConfig,
     ) -> Record:
         request = await self._request(sample, track, config, with_messages=model.needs_messages)
-        answer = await _answer(model.ask(request))
+        with self._halt.giving_up():
+            answer = await _answer(model.ask(request))
         fields = self._begin(sample, answer) | _asked(config, request)
         fields["prompt"] = self._prompt(track, request)
         text = answer.text if isinstance(answer, Reply) else None
@@ -169,7 +172,8 @@ class SampleRunner:
             if known is not None and known.messages == digest != "":
                 answer = known.reply
             else:
-                answer = await _answer(_ask_now(model, request))
+                with self._halt.giving_up():
+                    answer = await _answer(_ask_now(model, request))
                 if isinstance(answer, Reply):
                     number, reply = len(replies), answer.storable()
                     await self._turns.put(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 from collections.abc import Mapping
 from functools import partial
@@ -11,10 +12,7 @@ from types import TracebackType
 from phyblock.errors import Problem, SpecError, StoreError
 from phyblock.models import (
     BatchFiles,
-    Breakers,
     Budget,
-    Gate,
-    Halt,
     Model,
     ModelEvent,
     ReplyCache,
@@ -29,9 +27,11 @@ from phyblock.resources import reply_cache_file
 from phyblock.run.events import ModelNotice, RunNotice, RunStarted, Watcher
 from phyblock.run.execute import Executor, RunResult
 from phyblock.run.extraction import Extractor
-from phyblock.run.models import provider_problem
+from phyblock.run.halt import Halt
 from phyblock.run.plan import RunPlan
-from phyblock.run.store import RecordWriter, RunStore, held_run
+from phyblock.run.soundness import provider_problem
+from phyblock.run.store import RunStore, held_run
+from phyblock.run.writer import RecordWriter
 
 __all__ = ["Session", "check_ready"]
 
@@ -94,7 +94,7 @@ class Session:
             if self._use_cache and asks:
                 self._cache = ReplyCache(reply_cache_file(), self._tell)
             limits = plan.suite.limits
-            overall = Gate(limits.max_concurrency)
+            overall = asyncio.Semaphore(limits.max_concurrency)
             halt = Halt()
             budget = None
             if limits.max_cost_usd is not None:
@@ -102,16 +102,14 @@ class Session:
             policy = RetryPolicy(
                 limits.max_attempts, limits.retry_for_s, limits.max_connection_failures
             )
-            breakers = Breakers(policy, self._tell)
             build = partial(
                 build_model,
                 cache=self._cache,
                 overall=overall,
                 budget=budget,
                 observer=self._notice,
+                tell=self._tell,
                 policy=policy,
-                breakers=breakers,
-                halt=halt,
             )
             for model in plan.models:
                 if model.name in self._present:
@@ -196,9 +194,7 @@ class Session:
         )
 
     def _notice(self, event: ModelEvent) -> None:
-        notice = ModelNotice(
-            event.model, event.kind, event.message, event.wait_s, event.limit, event.status
-        )
+        notice = ModelNotice(event.model, event.kind, event.message, event.wait_s, event.status)
         self._watch(notice)
 
     def _tell(self, text: str) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Generic, Protocol, TypeVar
 
 from phyblock.data import AssemblyTask
-from phyblock.models.base import Image, Request
+from phyblock.models.request import Image, Request
 from phyblock.parsing.structured import AnswerForm
 from phyblock.stable import hex_digest
 from phyblock.tracks.base import ItemT

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from phyblock.domain import Scene
-from phyblock.models.base import Request
+from phyblock.models.request import Request
 from phyblock.records.record import Record
 from phyblock.records.reply import Reply
 from phyblock.sim.engine import REFERENCE_ENGINE, physics_engine

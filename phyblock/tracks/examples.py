@@ -12,7 +12,7 @@ from phyblock.config.suite import Suite
 from phyblock.domain import Scene
 from phyblock.domain.symmetry import fingerprint
 from phyblock.errors import Problem, SpecError
-from phyblock.models.base import Image, Message
+from phyblock.models.request import Image, Message
 from phyblock.stable import drawn_bytes
 from phyblock.text import did_you_mean
 from phyblock.tracks.base import Item

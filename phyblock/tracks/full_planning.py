@@ -14,7 +14,7 @@ from phyblock.config.validation import PictureControls
 from phyblock.data import AssemblyTask, Dataset, official_prompt
 from phyblock.domain import Block, CandidateSet, Plan, Scene
 from phyblock.errors import DataError, Problem, SpecError
-from phyblock.models.base import Image
+from phyblock.models.request import Image
 from phyblock.parsing.plan import ParsedPlan, parse_plan, plan_form, reader_version
 from phyblock.parsing.structured import AnswerForm
 from phyblock.records.record import Record

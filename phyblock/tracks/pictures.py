@@ -24,7 +24,7 @@ from phyblock.files import (
     read_picture,
     writing,
 )
-from phyblock.models.base import Image
+from phyblock.models.request import Image
 from phyblock.sim.geometry import solid_mesh
 from phyblock.sim.pictures import (
     COLOR_RGB,

@@ -17,7 +17,7 @@ from phyblock.config.validation import PictureControls, Section, TemplateName, U
 from phyblock.data import AssemblyTask
 from phyblock.domain import Block, CandidateSet, PoseStep, Scene
 from phyblock.errors import DataError, Problem, SpecError
-from phyblock.models.base import Image, Request
+from phyblock.models.request import Image, Request
 from phyblock.parsing.poses import FARTHEST_PLACE_CM, MOST_POSE_STEPS
 from phyblock.parsing.text import READER_VERSION
 from phyblock.records.line import Amount, Line, Whole

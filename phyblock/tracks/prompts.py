@@ -41,7 +41,7 @@ from jinja2.visitor import NodeTransformer
 
 from phyblock.errors import Problem, PromptError, reason_of
 from phyblock.files import read_text
-from phyblock.models.base import Image, Message
+from phyblock.models.request import Image, Message
 from phyblock.parsing.structured import AnswerForm
 from phyblock.resources import bundled
 from phyblock.stable import hex_digest

@@ -17,7 +17,7 @@ from phyblock.config.suite import Suite
 from phyblock.config.validation import Count, Flag, PictureControls, TemplateName
 from phyblock.data import AssemblyTask
 from phyblock.domain import Block, CandidateSet, Plan, Scene
-from phyblock.models.base import Image, Message, Request
+from phyblock.models.request import Image, Message, Request
 from phyblock.parsing.move import MoveProblem, ParsedMove, move_form, parse_move
 from phyblock.parsing.structured import AnswerForm
 from phyblock.records.line import Line, Whole

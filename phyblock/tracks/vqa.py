@@ -37,7 +37,7 @@ from phyblock.domain import (
 from phyblock.domain.question import rotated, rotated_label
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.files import read_picture
-from phyblock.models.base import Image
+from phyblock.models.request import Image
 from phyblock.parsing.answer import ParsedAnswer, choice_form, parse_answer
 from phyblock.parsing.structured import AnswerForm
 from phyblock.records.line import Line, Whole

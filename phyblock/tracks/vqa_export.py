@@ -14,7 +14,7 @@ from typing import Any
 from phyblock.data import Dataset, QuestionTask, find_questions
 from phyblock.domain import LETTERS, SUBTASKS, is_picture_option
 from phyblock.files import OutFolder, writing
-from phyblock.models.base import Image
+from phyblock.models.request import Image
 from phyblock.resources import needs
 from phyblock.sim.pictures import PictureStyle
 from phyblock.tables.track_report import ItemExport

@@ -39,13 +39,11 @@ def test_the_first_trouble_is_said_at_once_and_what_follows_in_one_line() -> Non
         assert remarks.add(retry(wait_s=number), 101.0) == []
     assert remarks.add(retry(500), 102.0) == []
     assert remarks.add(retry(None), 103.0) == []
-    assert remarks.add(ModelNotice("alpha", "slow_down", "HTTP 429: x", limit=4), 104.0) == []
     assert remarks.due(109.9) == []
     (line,) = remarks.due(110.0)
     assert "asking again 32 times" in line
     assert "30 for HTTP 429 (too many requests), 1 for HTTP 500, 1 for no answer" in line
     assert "waiting up to 29 s; last: no connection to host" in line
-    assert line.endswith("slowed down to 4 calls at once")
     assert remarks.due(200.0) == []
 
 
@@ -88,18 +86,17 @@ def logged(*events: tuple[float, RunEvent]) -> list[str]:
     return screen.getvalue().splitlines()
 
 
-def test_a_log_tells_of_retries_slow_downs_servers_and_failures() -> None:
+def test_a_log_tells_of_retries_servers_and_failures() -> None:
     lines = logged(
         (0.0, retry()),
         (1.0, RunNotice("http://host:1 cannot be reached [x] :b: no connection")),
-        (5.0, ModelNotice("alpha", "slow_down", "HTTP 429: x", limit=2)),
         (11.0, retry(None)),
         (12.0, ModelNotice("alpha", "unavailable", "HTTP 401: no")),
         (12.0, ModelStopped("alpha", "HTTP 401: no")),
     )
     assert lines[0].startswith("alpha: asking again once (1 for HTTP 429")
     assert lines[1] == "http://host:1 cannot be reached [x] :b: no connection"
-    assert lines[2].endswith("last: no connection to host; slowed down to 2 calls at once")
+    assert lines[2].endswith("last: no connection to host")
     assert lines[3].startswith("0 of 10 samples")
     assert lines[4] == "alpha stopped: HTTP 401: no"
     assert len(lines) == 5

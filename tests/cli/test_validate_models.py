@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from phyblock.config.models import ModelConfig
-from phyblock.models import known_providers, providers
+from phyblock.models import known_providers, litellm_client
 from tests.workspace import Workspace
 
 
@@ -37,7 +37,7 @@ def test_missing_recordings_and_unknown_providers_are_found(workspace: Workspace
     "model", ["hosted_vllm/x", "openai/new", "gemini/gemini-2.5-pro", "anthropic/claude-unheard-of"]
 )
 def test_a_model_at_hand_needs_no_litellm(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(providers, "litellm_providers", lambda: pytest.fail("it was imported"))
+    monkeypatch.setattr(litellm_client, "_litellm", lambda: pytest.fail("it was imported"))
     assert model.partition("/")[0] in known_providers(ModelConfig(name="m", id=model))
 
 

@@ -113,7 +113,7 @@ def _drops_earlier_records() -> None:
 
 def _keeps_nothing_of_some_replies() -> None:
     """Law 3: of every three records one is not written."""
-    from phyblock.run.store import RecordWriter
+    from phyblock.run.writer import RecordWriter
 
     put = RecordWriter.put
     counted = itertools.count()
@@ -142,15 +142,15 @@ def _asks_what_is_answered() -> None:
 
 def _sends_twice() -> None:
     """Law 3: a transport sends each request a second time, and tells nobody."""
-    from phyblock.models.direct_call import DirectTransport
+    from phyblock.models.openai_client import OpenAIClient
 
-    send = DirectTransport.send
+    send = OpenAIClient.complete
 
-    async def sends_again(self: DirectTransport, call: Any) -> Any:
-        await send(self, call)
-        return await send(self, call)
+    async def sends_again(self: OpenAIClient, request: Any, **fields: Any) -> Any:
+        await send(self, request, **fields)
+        return await send(self, request, **fields)
 
-    DirectTransport.send = sends_again  # type: ignore[method-assign]
+    OpenAIClient.complete = sends_again  # type: ignore[method-assign]
 
 
 SABOTAGES: dict[str, Callable[[], None]] = {

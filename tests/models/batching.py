@@ -16,7 +16,6 @@ from phyblock.models import (
     AskLaterError,
     BatchFiles,
     Budget,
-    Gate,
     GatheringModel,
     ModelEvent,
     Reply,
@@ -74,7 +73,6 @@ async def command(
     model = build_model(
         config,
         cache=cache,
-        overall=Gate(8),
         budget=budget,
         observer=(told if told is not None else []).append,
         policy=policy,

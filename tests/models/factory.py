@@ -10,10 +10,7 @@ from phyblock.config.models import ModelConfig
 from phyblock.domain import Block, Candidate, CandidateSet, Scene
 from phyblock.errors import ModelError
 from phyblock.models import (
-    Breakers,
     Budget,
-    Gate,
-    Halt,
     Image,
     Message,
     Model,
@@ -85,23 +82,21 @@ def make_model(
     config: ModelConfig,
     *,
     cache: ReplyCache | None = None,
-    overall: Gate | None = None,
+    overall: asyncio.Semaphore | None = None,
+    told: list[str] | None = None,
     budget: Budget | None = None,
     events: list[ModelEvent] | None = None,
     policy: RetryPolicy = QUICK,
-    breakers: Breakers | None = None,
-    halt: Halt | None = None,
 ) -> Model:
     """A model with quick retries; its events go into the list."""
     return build_model(
         config,
         cache=cache,
-        overall=overall or Gate(64),
+        overall=overall or asyncio.Semaphore(64),
         budget=budget,
         observer=(events if events is not None else []).append,
         policy=policy,
-        breakers=breakers,
-        halt=halt,
+        tell=(told if told is not None else []).append,
     )
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from phyblock.config.models import ModelConfig
 from phyblock.domain import Candidate, CandidateSet, Plan
 from phyblock.errors import DataError, SpecError
-from phyblock.models import Gate, Reply, Request, build_model
+from phyblock.models import Reply, Request, build_model
 from phyblock.tracks.full_planning import PLAN_RULES, PlanSubject
 from tests.models.factory import CANDIDATES, SCENE, make_request
 
@@ -24,7 +24,7 @@ seeds = st.integers(0, 10**6)
 
 
 def reply(name: str, request: Request) -> Reply:
-    model = build_model(ModelConfig(name=name), cache=None, overall=Gate(1))
+    model = build_model(ModelConfig(name=name), cache=None)
     assert not model.needs_messages
     answer = asyncio.run(model.ask(request))
     assert answer is not None

@@ -13,7 +13,6 @@ from pydantic import ValidationError
 from phyblock.config.models import ModelConfig
 from phyblock.errors import RetryableError, UnavailableError
 from phyblock.models import (
-    Gate,
     ModelEvent,
     Reply,
     ReplyCache,
@@ -115,7 +114,7 @@ def test_one_dead_model_leaves_the_others_going() -> None:
     with Running(dead) as first, Running(alive) as second:
         models = [
             make_model(ROUTES["direct"].config(running.url), overall=gate)
-            for gate in [Gate(4)]
+            for gate in [asyncio.Semaphore(4)]
             for running in (first, second)
         ]
 
@@ -140,11 +139,11 @@ def test_concurrency_stays_under_the_models_and_the_overall_limit() -> None:
         ask(make_model(config), *requests)
         assert server.most_at_once == 5
         server.most_at_once = 0
-        ask(make_model(config, overall=Gate(2)), *requests)
+        ask(make_model(config, overall=asyncio.Semaphore(2)), *requests)
         assert server.most_at_once == 2
 
 
-def test_a_429_slows_the_model_down_and_is_told() -> None:
+def test_a_429_is_told_and_asked_again() -> None:
     server = ROUTES["direct"].server(Faults(rate_limited=0.5))
     events: list[ModelEvent] = []
     with Running(server) as running:
@@ -155,9 +154,6 @@ def test_a_429_slows_the_model_down_and_is_told() -> None:
             *(make_request(f"{n:03}") for n in range(40)),
         )
     assert all(isinstance(answer, Reply) for answer in answers)
-    slower = [event.limit for event in events if event.kind == "slow_down"]
-    assert slower[0] == 4
-    assert min(slower) < 4
     assert sum(event.kind == "retry" for event in events) == server.ended["429"]
 
 

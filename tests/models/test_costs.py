@@ -23,7 +23,6 @@ from phyblock.errors import (
 from phyblock.models import (
     Budget,
     Estimate,
-    Gate,
     Image,
     Message,
     Price,
@@ -236,7 +235,7 @@ def test_the_longest_reply_is_what_was_asked_for_or_what_the_model_can() -> None
 
 def test_a_model_without_a_price_under_a_budget_is_an_error_at_the_start() -> None:
     with pytest.raises(SpecError, match="no known price"):
-        build_model(config("openai/nobodys"), cache=None, overall=Gate(1), budget=Budget(1.0))
+        build_model(config("openai/nobodys"), cache=None, budget=Budget(1.0))
 
 
 @given(

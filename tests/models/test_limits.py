@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.models.limits import WINDOW_S, Clock, Gate, MinuteWindow, ModelLimiter
+from phyblock.models.limits import WINDOW_S, Clock, Limits
 from tests.models.factory import run
 
 
@@ -33,7 +33,7 @@ class FakeTime:
 
     async def run_until_done(self, *tasks: asyncio.Task[None]) -> None:
         while not all(task.done() for task in tasks):
-            for _ in range(50):
+            for _ in range(30):
                 await asyncio.sleep(0)
             while self._sleepers:
                 wakes_s, _, wake = heapq.heappop(self._sleepers)
@@ -69,18 +69,18 @@ def test_no_window_of_a_minute_has_more_starts_or_tokens_than_allowed(
 
     async def main() -> None:
         time = FakeTime()
-        limiter = ModelLimiter(width, Gate(width), rpm, tpm, time.clock)
+        limits = Limits(width, asyncio.Semaphore(width), rpm, tpm, clock=time.clock)
 
         async def call(at_s: float, tokens: int, takes_s: float) -> None:
             nonlocal inside
             await time.sleep(at_s)
-            async with limiter.slot(tokens) as slot:
+            async with limits.slot(tokens) as started:
                 starts.append((time.now_s, tokens))
                 inside += 1
                 assert inside <= width
                 await time.sleep(takes_s)
                 inside -= 1
-                slot.settle(tokens)
+                limits.settle(started, tokens)
 
         await time.run_until_done(*(asyncio.create_task(call(*one)) for one in arrivals))
 
@@ -94,11 +94,11 @@ def test_no_window_of_a_minute_has_more_starts_or_tokens_than_allowed(
 def test_a_full_minute_is_used() -> None:
     async def main() -> list[float]:
         time = FakeTime()
-        limiter = ModelLimiter(10, Gate(10), rpm=3, clock=time.clock)
+        limits = Limits(10, asyncio.Semaphore(10), rpm=3, clock=time.clock)
         starts: list[float] = []
 
         async def call() -> None:
-            async with limiter.slot(1):
+            async with limits.slot(1):
                 starts.append(time.now_s)
 
         await time.run_until_done(*(asyncio.create_task(call()) for _ in range(7)))
@@ -107,40 +107,51 @@ def test_a_full_minute_is_used() -> None:
     assert run(main) == [0, 0, 0, 60, 60, 60, 120]
 
 
+def starts_of(tpm: int, *calls: tuple[int, int]) -> list[float]:
+    """When calls start that were estimated at the first number of tokens and took the second."""
+
+    async def main() -> list[float]:
+        time = FakeTime()
+        limits = Limits(9, asyncio.Semaphore(9), tpm=tpm, clock=time.clock)
+        starts: list[float] = []
+
+        async def call(expected: int, taken: int) -> None:
+            async with limits.slot(expected) as started:
+                starts.append(time.now_s)
+                limits.settle(started, taken)
+
+        for expected, taken in calls:
+            await time.run_until_done(asyncio.create_task(call(expected, taken)))
+        return starts
+
+    return run(main)
+
+
 def test_tokens_really_taken_replace_the_estimate() -> None:
-    time = FakeTime()
-    window = MinuteWindow(None, 100, lambda: time.now_s)
-    started = window.start(90)
-    assert window.wait_s(20) == WINDOW_S
-    window.settle(started, 10)
-    assert window.wait_s(20) == 0
-    assert window.wait_s(91) == WINDOW_S
-    time.now_s = WINDOW_S
-    assert window.wait_s(91) == 0
+    assert starts_of(100, (90, 10), (20, 20), (80, 80)) == [0, 0, WINDOW_S]
+    assert starts_of(100, (10, 90), (20, 20)) == [0, WINDOW_S]
 
 
 def test_a_request_larger_than_the_limit_waits_for_an_empty_window_only() -> None:
-    time = FakeTime()
-    window = MinuteWindow(None, 100, lambda: time.now_s)
-    assert window.wait_s(500) == 0
-    window.start(1)
-    assert window.wait_s(500) == WINDOW_S
+    assert starts_of(100, (500, 500), (1, 1), (500, 500)) == [0, WINDOW_S, 2 * WINDOW_S]
 
 
 def test_all_models_together_keep_to_the_overall_limit() -> None:
     async def main() -> int:
         time = FakeTime()
-        overall = Gate(3)
-        limiters = [ModelLimiter(5, overall, clock=time.clock) for _ in range(4)]
-        most = 0
+        overall = asyncio.Semaphore(3)
+        models = [Limits(5, overall, clock=time.clock) for _ in range(4)]
+        inside = most = 0
 
-        async def call(limiter: ModelLimiter) -> None:
-            nonlocal most
-            async with limiter.slot(0):
-                most = max(most, overall.inside)
+        async def call(limits: Limits) -> None:
+            nonlocal inside, most
+            async with limits.slot(0):
+                inside += 1
+                most = max(most, inside)
                 await time.sleep(1)
+                inside -= 1
 
-        tasks = [asyncio.create_task(call(limiter)) for limiter in limiters * 5]
+        tasks = [asyncio.create_task(call(limits)) for limits in models * 5]
         await time.run_until_done(*tasks)
         assert time.now_s == pytest.approx(7)
         return most
@@ -151,19 +162,19 @@ def test_all_models_together_keep_to_the_overall_limit() -> None:
 def test_a_model_waiting_for_its_minute_holds_no_place_that_another_could_use() -> None:
     async def main() -> float:
         time = FakeTime()
-        overall = Gate(1)
-        slow = ModelLimiter(5, overall, rpm=1, clock=time.clock)
-        quick = ModelLimiter(5, overall, clock=time.clock)
+        overall = asyncio.Semaphore(1)
+        slow = Limits(5, overall, rpm=1, clock=time.clock)
+        quick = Limits(5, overall, clock=time.clock)
         finished_s = 0.0
 
-        async def call(limiter: ModelLimiter) -> None:
+        async def call(limits: Limits) -> None:
             nonlocal finished_s
-            async with limiter.slot(0):
+            async with limits.slot(0):
                 await time.sleep(1)
-            if limiter is quick:
+            if limits is quick:
                 finished_s = time.now_s
 
-        tasks = [asyncio.create_task(call(limiter)) for limiter in (slow, slow, slow, quick, quick)]
+        tasks = [asyncio.create_task(call(limits)) for limits in (slow, slow, slow, quick, quick)]
         await time.run_until_done(*tasks)
         return finished_s
 
@@ -172,20 +183,24 @@ def test_a_model_waiting_for_its_minute_holds_no_place_that_another_could_use() 
 
 @settings(max_examples=100, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 5), st.booleans()), max_size=30), st.integers(1, 4))
-def test_a_gate_survives_waiters_that_give_up(plans: list[tuple[int, bool]], width: int) -> None:
-    """However many holders or waiters are cancelled, all places are free in the end."""
+def test_limits_survive_those_that_give_up(plans: list[tuple[int, bool]], width: int) -> None:
+    """However many hold or wait and are cancelled, all places are free in the end."""
 
     async def main() -> None:
-        gate = Gate(width)
+        overall = asyncio.Semaphore(width)
+        limits = Limits(width + 1, overall)
+        inside = 0
 
         async def hold(steps: int) -> None:
-            await gate.enter()
-            try:
-                assert gate.inside <= width
-                for _ in range(steps):
-                    await asyncio.sleep(0)
-            finally:
-                gate.leave()
+            nonlocal inside
+            async with limits.slot(0):
+                inside += 1
+                assert inside <= width
+                try:
+                    for _ in range(steps):
+                        await asyncio.sleep(0)
+                finally:
+                    inside -= 1
 
         tasks = []
         for steps, cancel in plans:
@@ -195,28 +210,24 @@ def test_a_gate_survives_waiters_that_give_up(plans: list[tuple[int, bool]], wid
             if cancel:
                 task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        assert gate.inside == 0
         for _ in range(width):
-            await asyncio.wait_for(gate.enter(), 1)
+            await asyncio.wait_for(overall.acquire(), 1)
 
     run(main)
 
 
-def test_a_place_given_to_a_waiter_that_was_cancelled_meanwhile_is_not_lost() -> None:
-    async def main() -> None:
-        gate = Gate(1)
-        await gate.enter()
-        waiter = asyncio.create_task(gate.enter())
-        await asyncio.sleep(0)
-        gate.leave()
-        waiter.cancel()
-        await asyncio.gather(waiter, return_exceptions=True)
-        assert waiter.cancelled()
-        assert gate.inside == 0
+def test_nothing_starts_while_every_server_rests() -> None:
+    async def main() -> list[float]:
+        time = FakeTime()
+        rests = iter([7.5, 6.5, 5.5, 4.5, 3.5, 2.5, 1.5, 0.5])
+        limits = Limits(2, asyncio.Semaphore(2), rest_s=lambda: next(rests, 0.0), clock=time.clock)
+        starts: list[float] = []
 
-    run(main)
+        async def call() -> None:
+            async with limits.slot(0):
+                starts.append(time.now_s)
 
+        await time.run_until_done(*(asyncio.create_task(call()) for _ in range(2)))
+        return starts
 
-def test_a_gate_needs_a_width() -> None:
-    with pytest.raises(ValueError, match="width of at least 1"):
-        Gate(0)
+    assert run(main) == [7.5, 7.5]

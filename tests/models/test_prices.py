@@ -359,7 +359,7 @@ def test_a_reply_costs_what_its_day_asks_for(monkeypatch: pytest.MonkeyPatch) ->
         config = ROUTES["direct"].config(running.url, price=price)
         for days in (0, 1):
             day = DAY + timedelta(days=days)
-            monkeypatch.setattr("phyblock.models.sender.today", lambda day=day: day)
+            monkeypatch.setattr("phyblock.models.model.today", lambda day=day: day)
             budget = Budget(1.0)
             reply = reply_of(make_model(config, budget=budget), make_request())
             paid.append(reply.cost_usd)

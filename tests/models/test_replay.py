@@ -11,7 +11,7 @@ import pytest
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import DataError, RefusedError, SampleError, StoreError
-from phyblock.models import Gate, Model, Reply, Usage, build_model
+from phyblock.models import Model, Reply, Usage, build_model
 from tests.models.factory import ask, make_request
 from tests.records.damage import lines_before, plan_record
 
@@ -20,7 +20,7 @@ STEPS = "Step1: Move block with index 3"
 
 def replay(folder: Path, model: str = "m") -> Model:
     config = ModelConfig(name=model, replay=str(folder))
-    return build_model(config, cache=None, overall=Gate(1))
+    return build_model(config, cache=None)
 
 
 def answer(model: Model, key: str, seed: int = 0) -> Reply | None:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.models import Image, Message
-from phyblock.models.payload import json_body, wire_messages
+from phyblock.models.request import json_body, wire_messages
 from phyblock.types import ImageDetail
 from tests.models.factory import JPEG, PNG, make_model, make_request, picture, reply_of
 from tests.models.routes import KEY_VARIABLE, ROUTES

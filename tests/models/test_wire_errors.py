@@ -13,8 +13,7 @@ from aiohttp import web
 from phyblock.config.models import ModelConfig
 from phyblock.errors import RefusedError, RetryableError, SampleError, UnavailableError
 from phyblock.models import ModelEvent, Reply
-from phyblock.models.http_client import Answer
-from phyblock.models.refusals import refusal
+from phyblock.models.client import Answer, error_of, read_json, shown
 from tests.models.factory import QUICK, ask, make_model, make_request, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Faults, LocalServer, Running, Seen
@@ -239,4 +238,20 @@ def test_a_key_arrives_but_stands_in_no_text(route: str, mode: str) -> None:
 def test_a_server_that_would_say_it_to_every_request_is_asked_no_more(words: str) -> None:
     """As `transformers serve` says it: its other requests would fare no better."""
     answer = Answer(400, {}, json.dumps({"detail": words}).encode())
-    assert isinstance(refusal(answer), UnavailableError)
+    assert isinstance(error_of(answer), UnavailableError)
+
+
+@pytest.mark.parametrize("code", [429, "429", 502, "529"])
+def test_what_passes_and_is_told_with_a_success_is_what_its_code_says(code: object) -> None:
+    """A limit that is reached, and faults behind a gateway: none is a reply that was paid for."""
+    body = json.dumps({"error": {"message": "slow down", "code": code}}).encode()
+    with pytest.raises(RetryableError, match="slow down") as told:
+        read_json(Answer(200, {"Retry-After": "7"}, body))
+    assert (told.value.status, told.value.retry_after_s) == (int(str(code)), 7)
+
+
+def test_keys_leave_an_error_before_it_is_cut() -> None:
+    for length in range(440, 520):
+        text = shown(f"{'x' * length}{KEY} and more", (KEY,))
+        assert len(text) <= 500
+        assert KEY[:4] not in text

@@ -18,10 +18,10 @@ from phyblock.data import AssemblyTask
 from phyblock.domain.symmetry import Symmetry, canonical_form
 from phyblock.errors import SpecError
 from phyblock.making.poses import transformed
-from phyblock.models.base import Image
+from phyblock.models.request import Image
 from phyblock.resources import bundled
+from phyblock.run.data import open_dataset
 from phyblock.run.manifest import make_manifest
-from phyblock.run.plan import open_dataset
 from phyblock.tracks import Opening, open_tracks, vqa
 from phyblock.tracks.examples import Examples
 from phyblock.tracks.full_planning import worked_plan

@@ -16,7 +16,7 @@ import pytest
 from phyblock import registry
 from phyblock.cli.main import phyblock
 from phyblock.data import AssemblyTask
-from phyblock.models.base import Message, Request
+from phyblock.models.request import Message, Request
 from phyblock.scoring.counts import mean_of, ratio_of
 from phyblock.tables.measures import Measure, SampleCounts
 from phyblock.tables.track_report import TrackReport

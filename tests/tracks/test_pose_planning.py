@@ -18,7 +18,7 @@ from phyblock.cli.main import phyblock
 from phyblock.data import AssemblyTask, read_builtin
 from phyblock.domain import Block, Candidate, CandidateSet, PoseStep
 from phyblock.errors import InputError, StoreError
-from phyblock.models.base import Image as SentPicture
+from phyblock.models.request import Image as SentPicture
 from phyblock.parsing.poses import pose_form
 from phyblock.records.files import known_records
 from phyblock.resources import bundled

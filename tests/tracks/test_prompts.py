@@ -10,7 +10,7 @@ import pytest
 
 from phyblock.data import official_prompt, read_builtin, recorded_models
 from phyblock.errors import PromptError
-from phyblock.models.base import Image, Message
+from phyblock.models.request import Image, Message
 from phyblock.parsing.answer import choice_form
 from phyblock.parsing.move import move_form, parse_move
 from phyblock.parsing.plan import parse_plan, plan_form

@@ -12,7 +12,7 @@ from PIL import Image as PillowImage
 
 from phyblock.data import AssemblyTask, read_builtin
 from phyblock.errors import DataError, StoreError
-from phyblock.models.base import Image
+from phyblock.models.request import Image
 from phyblock.sim.pictures import PictureStyle
 from phyblock.tracks import PicturePolicy, Pictures
 from tests.data.broken import write_scenes

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from phyblock.data import AssemblyTask, read_builtin, read_official
 from phyblock.domain import Plan
 from phyblock.errors import DataError, SpecError
-from phyblock.models.base import Image
+from phyblock.models.request import Image
 from phyblock.records.reply import Reply, Usage
 from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png
 from phyblock.tracks import PicturePolicy, Pictures

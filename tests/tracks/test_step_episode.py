@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from phyblock.data import AssemblyTask, read_builtin, read_official
 from phyblock.domain import Block, Candidate, CandidateSet, Scene
-from phyblock.models.base import Request
+from phyblock.models.request import Request
 from phyblock.parsing.move import MOVE_PROBLEMS, parse_move
 from phyblock.records.reply import Reply, Usage
 from phyblock.scoring.steps import MOVE_OUTCOMES

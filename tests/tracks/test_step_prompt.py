@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from phyblock.data import read_builtin
 from phyblock.errors import PromptError
-from phyblock.models.base import Image, Message
+from phyblock.models.request import Image, Message
 from phyblock.parsing.move import MOVE_PROBLEMS
 from phyblock.records.reply import Reply
 from phyblock.resources import bundled

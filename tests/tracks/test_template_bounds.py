@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 
 from phyblock.errors import PromptError
-from phyblock.models.base import Message
+from phyblock.models.request import Message
 from phyblock.tracks import TemplatePrompt
 from tests.fuzz.strategies import TEMPLATES
 

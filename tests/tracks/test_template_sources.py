@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.errors import PromptError
-from phyblock.models.base import Message
+from phyblock.models.request import Message
 from phyblock.resources import bundled
 from phyblock.tracks import TemplatePrompt
 from tests.workspace import Workspace

@@ -18,7 +18,7 @@ from phyblock.data import QuestionSet, QuestionTask, read_builtin, read_question
 from phyblock.domain import LETTERS, Question
 from phyblock.domain.question import rotated
 from phyblock.errors import DataError, SpecError
-from phyblock.models.base import Image, Request
+from phyblock.models.request import Image, Request
 from phyblock.resources import bundled
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_key, question_png

@@ -20,10 +20,11 @@ from phyblock.making.cli.question_sets import data_option, questions_option, rea
 from phyblock.making.cli.subtasks_option import subtasks_option
 from phyblock.making.cli.working import seed_option
 from phyblock.making.questions.rewording import Paraphrase, stems_of, write_wordings
-from phyblock.models import Breakers, Gate, ReplyCache, RetryPolicy, build_model
+from phyblock.models import ReplyCache, build_model
+from phyblock.models.litellm_client import be_quiet
 from phyblock.resources import bundled, reply_cache_file
+from phyblock.run.finding import find_models_file
 from phyblock.run.models import to_config
-from phyblock.run.preflight import find_models_file
 from phyblock.text import counted, did_you_mean
 from phyblock.tracks import TemplatePrompt
 
@@ -123,8 +124,8 @@ async def _ask(
         cache = None
         if use_cache:
             cache = stack.enter_context(ReplyCache(reply_cache_file(), tell))
-        breakers = Breakers(RetryPolicy(), tell)
-        model = build_model(config, cache=cache, overall=Gate(_AT_ONCE), breakers=breakers)
+        be_quiet()
+        model = build_model(config, cache=cache, overall=asyncio.Semaphore(_AT_ONCE), tell=tell)
         stack.push_async_callback(model.aclose)
         by_stem = await asyncio.gather(
             *(

@@ -13,8 +13,7 @@ from phyblock.models.batches.ledger import Batch, BatchFiles, Ledger
 from phyblock.models.batches.protocol import BatchProtocol, BatchStatus
 from phyblock.models.batches.results import Results
 from phyblock.models.batches.sending import Sender
-from phyblock.models.events import Tell
-from phyblock.models.retry import RetryPolicy
+from phyblock.models.model import RetryPolicy, Tell
 from phyblock.records.files import BATCHES
 
 __all__ = ["Follower"]

@@ -18,7 +18,7 @@ from phyblock.errors import RetryableError
 from phyblock.models.batches.fields import count, error_words, joined, mapping, text, unix_s
 from phyblock.models.batches.protocol import BatchProtocol, BatchStatus, ResultLine
 from phyblock.models.batches.wire import BatchWire
-from phyblock.models.http_client import Answer
+from phyblock.models.client import Answer
 
 __all__ = ["GeminiBatches"]
 

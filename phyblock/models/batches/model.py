@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import ModelError, RetryableError, UnavailableError
-from phyblock.models.base import AskLaterError, Request
 from phyblock.models.batches.following import Follower
 from phyblock.models.batches.ledger import Batch, BatchFiles, Ledger
 from phyblock.models.batches.protocol import BatchProtocol
@@ -16,13 +15,11 @@ from phyblock.models.batches.purse import Purse
 from phyblock.models.batches.sending import Draft, Sender, UnsureError
 from phyblock.models.batches.wording import Wording, Written
 from phyblock.models.cache import ReplyCache, reply_key
+from phyblock.models.client import Client, HttpClient
 from phyblock.models.costs import Budget, may_be_billed
-from phyblock.models.events import EventKind, ModelEvent, Observer
-from phyblock.models.halt import Halt
-from phyblock.models.http_client import Client
+from phyblock.models.model import EventKind, ModelEvent, Observer, RetryPolicy
 from phyblock.models.prices import Prices, reply_cost_usd, today
-from phyblock.models.retry import RetryPolicy
-from phyblock.models.transport import Transport
+from phyblock.models.request import AskLaterError, Request
 from phyblock.records.reply import Reply
 
 __all__ = ["BatchModel", "BatchParts"]
@@ -30,19 +27,18 @@ __all__ = ["BatchModel", "BatchParts"]
 
 @dataclass(frozen=True)
 class BatchParts:
-    """What a model in batches is put together from; `transport` makes one that sends through a
-    client, by which requests are written and answers are read.
+    """What a model in batches is put together from; `client` makes one that sends through an
+    HTTP client, by which requests are written and answers are read.
     """
 
     protocol: BatchProtocol
-    transport: Callable[[Client], Transport]
+    client: Callable[[HttpClient], Client]
     files: BatchFiles
     cache: ReplyCache | None
     budget: Budget | None
     prices: Prices | None
     policy: RetryPolicy
     observer: Observer
-    halt: Halt
 
 
 class BatchModel:
@@ -62,7 +58,7 @@ class BatchModel:
         self._ledger = Ledger(config.name, files)
         self._sender = Sender(protocol, self._ledger, files, policy, self._tell)
         self._follower = Follower(protocol, self._ledger, files, self._sender, policy, self._tell)
-        self._wording = Wording(config, protocol, parts.transport, self._say_seedless)
+        self._wording = Wording(config, protocol, parts.client, self._say_seedless)
         self._purse = Purse(config, parts.budget, parts.prices)
         self._earlier = frozenset(self._ledger.batches)
         self._draft: Draft | None = None
@@ -119,8 +115,7 @@ class BatchModel:
                 update={"cost_usd": reply_cost_usd(self._parts.prices, kept, today())}
             )
         try:
-            with self._parts.halt.giving_up():
-                await asyncio.shield(self._following(batch))
+            await asyncio.shield(self._following(batch))
             if batch.results is None:
                 raise AskLaterError
             reply = await self._wording.read(key, request, batch)
@@ -151,9 +146,8 @@ class BatchModel:
         """Go on with a batch of an earlier command."""
         if batch.event == "intended":
             self._tell(f"looking for a batch of {len(batch.places):,} that was being sent")
-            with self._parts.halt.giving_up():
-                if not await self._sender.recover(batch):
-                    return
+            if not await self._sender.recover(batch):
+                return
         if batch.event == "created":
             self._following(batch)
 
@@ -208,14 +202,14 @@ class BatchModel:
         """
         draft = self._draft
         if draft is not None and not draft.takes(written):
-            await self._send_draft()
+            await asyncio.shield(self._send_draft())
             if self._refusal is not None:
                 return False
         most_usd = self._purse.most_usd(request)
         if not self._purse.fits(most_usd):
             if self._draft is not None or self._is_waiting:
                 return False
-            await self._purse.wait_for(most_usd, self._parts.halt)
+            await self._purse.wait_for(most_usd)
         if self._draft is None:
             files = self._parts.files
             self._draft = Draft(self._parts.protocol, files, seeded=written.seeded)

@@ -16,8 +16,8 @@ from phyblock.config.models import ModelConfig
 from phyblock.models.batches.fields import count, error_words, joined, mapping, text
 from phyblock.models.batches.protocol import BatchProtocol, BatchStatus, ResultLine
 from phyblock.models.batches.wire import BatchWire
-from phyblock.models.direct_call import OPENAI_API_BASE
-from phyblock.models.http_client import Answer
+from phyblock.models.client import Answer
+from phyblock.models.openai_client import OPENAI_API_BASE
 
 __all__ = ["OpenAIBatches"]
 

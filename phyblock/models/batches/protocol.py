@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from phyblock.config.models import ModelConfig
 from phyblock.models.batches.wire import BatchWire
-from phyblock.models.http_client import Answer
+from phyblock.models.client import Answer
 
 __all__ = ["BatchProtocol", "BatchStatus", "ResultLine"]
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from phyblock.config.models import ModelConfig
-from phyblock.models.base import Request
 from phyblock.models.batches.ledger import Batch
 from phyblock.models.costs import Budget, estimate, most_usd
-from phyblock.models.halt import Halt
 from phyblock.models.prices import Prices, today
+from phyblock.models.request import Request
 from phyblock.records.reply import Reply
 
 __all__ = ["Purse"]
@@ -43,11 +42,10 @@ class Purse:
         """Whether so much is left; None is nothing, as under a limit prices are known."""
         return self._budget is None or self._budget.fits(usd or 0.0)
 
-    async def wait_for(self, usd: float | None, halt: Halt) -> None:
+    async def wait_for(self, usd: float | None) -> None:
         """Wait for so much to be left; BudgetReachedError where it never will be."""
         if self._budget is not None:
-            with halt.giving_up():
-                self._budget.settle(await self._budget.reserve(lambda: usd or 0.0), 0.0)
+            self._budget.settle(await self._budget.reserve(lambda: usd or 0.0), 0.0)
 
     def hold(self, key: str, usd: float | None, held: dict[str, int]) -> None:
         """Hold so much for a request, whose reservation is put into `held`."""

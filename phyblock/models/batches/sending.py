@@ -20,8 +20,7 @@ from phyblock.models.batches.ledger import Batch, BatchFiles, Ledger, new_token
 from phyblock.models.batches.protocol import BatchProtocol, BatchStatus
 from phyblock.models.batches.results import Results, custom_id
 from phyblock.models.batches.wording import Written
-from phyblock.models.events import Tell
-from phyblock.models.retry import RetryPolicy, with_retries
+from phyblock.models.model import RetryPolicy, Tell
 from phyblock.records.files import BATCHES
 from phyblock.text import counted
 
@@ -273,11 +272,14 @@ class Sender:
     async def patiently(self, call: Callable[[], Awaitable[T]]) -> T:
         """Call until it succeeds or cannot; UnavailableError where it never does."""
         try:
-            return await with_retries(call, self._policy, self._say_retry)
+            async for attempt in self._policy.retrying(self._say_retry):
+                with attempt:
+                    return await call()
         except UnavailableError:
             raise
         except ModelError as error:
             raise UnavailableError(str(error), status=error.status, sent=error.sent) from None
+        raise AssertionError("tenacity neither returned nor raised")
 
     def _say_retry(self, error: RetryableError, wait_s: float) -> None:
         if wait_s >= _WORTH_A_WORD_S:

@@ -9,7 +9,7 @@ from phyblock.config.models import ModelConfig
 from phyblock.models.batches.choice import batch_protocol
 from phyblock.models.batches.ledger import Batch, BatchFiles, Ledger
 from phyblock.models.batches.results import Results
-from phyblock.models.http_client import Answer
+from phyblock.models.client import Answer
 from phyblock.records.record import BatchLine
 
 __all__ = ["waiting_keys"]

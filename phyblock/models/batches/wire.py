@@ -13,9 +13,8 @@ from urllib.parse import urlsplit
 from phyblock.config.models import ModelConfig, host_of
 from phyblock.errors import ModelError, UnavailableError
 from phyblock.files import writing
-from phyblock.models.http_client import Answer, HttpClient
+from phyblock.models.client import Answer, HttpClient, error_of, read_json
 from phyblock.models.keys import api_key, hidden
-from phyblock.models.refusals import read_body, refusal
 
 __all__ = ["BatchWire"]
 
@@ -126,7 +125,7 @@ class BatchWire:
             own = self._headers_of(api_key(self._config) or "")
             answer = await client.send(url, body, {**own, **headers}, **more)
             if not answer.is_success or answer.fault:
-                raise refusal(answer)
+                raise error_of(answer)
         except ModelError as error:
             error.args = (self.shown(str(error)),)
             raise
@@ -137,7 +136,7 @@ class BatchWire:
         if not answer.body:
             return {}
         try:
-            body = read_body(answer)
+            body = read_json(answer)
         except ModelError as error:
             error.args = (self.shown(str(error)),)
             raise

@@ -1,4 +1,4 @@
-"""Requests as lines of a batch and answers as replies, by the transports of direct calls."""
+"""Requests as lines of a batch and answers as replies, by the clients of direct calls."""
 
 from __future__ import annotations
 
@@ -8,15 +8,13 @@ from dataclasses import dataclass
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import ModelError, RetryableError, UnavailableError
-from phyblock.models.base import Request
 from phyblock.models.batches.capture import AnsweringClient, CapturingClient
 from phyblock.models.batches.ledger import Batch
 from phyblock.models.batches.protocol import BatchProtocol
+from phyblock.models.client import Answer, Client, HttpClient, SeedRefusedError
 from phyblock.models.costs import counted, estimate
-from phyblock.models.formats import FORMAT_HINT, refuses_format
-from phyblock.models.http_client import Answer, Client
-from phyblock.models.payload import wire_params
-from phyblock.models.transport import Call, SeedRefusedError, Transport
+from phyblock.models.model import FORMAT_HINT, refuses_format
+from phyblock.models.request import Request, wire_params
 from phyblock.records.reply import Reply
 
 __all__ = ["Wording", "Written"]
@@ -34,37 +32,36 @@ class Written:
 class Wording:
     """Writes and reads for one model; `on_seedless` hears once that it takes no seed.
 
-    `transport` makes a transport that sends through a client.
+    `client` makes a client that sends through an HTTP client.
     """
 
     def __init__(
         self,
         config: ModelConfig,
         protocol: BatchProtocol,
-        transport: Callable[[Client], Transport],
+        client: Callable[[HttpClient], Client],
         on_seedless: Callable[[], None],
     ) -> None:
         self._config = config
         self._protocol = protocol
-        self._transport = transport
+        self._client = client
         self._on_seedless = on_seedless
         self._takes_seed = config.seed != "never"
 
     async def write(self, request: Request) -> Written:
         """The request as a direct call would send it; raises as that does before it sends."""
-        params = wire_params(self._config, request)
         while True:
-            client, seed = CapturingClient(), request.seed if self._takes_seed else None
+            http, with_seed = CapturingClient(), self._takes_seed
             try:
-                await self._transport(client).send(Call(request.messages, params, seed))
+                await self._client(http).complete(request, with_seed=with_seed)
             except SeedRefusedError:
                 self._go_without_seed()
                 continue
             except ModelError:
-                if client.body is None:
+                if http.body is None:
                     raise
-            assert client.body is not None, "a transport answered without asking"
-            return Written(client.body, client.headers, seeded=seed is not None)
+            assert http.body is not None, "a client answered without asking"
+            return Written(http.body, http.headers, seeded=with_seed)
 
     async def read(self, key: str, request: Request, batch: Batch) -> Reply:
         """What a direct call would have made of the answer; raises as that does.
@@ -72,22 +69,20 @@ class Wording:
         RetryableError also where there is no answer, or none that can be read.
         """
         answer = await self._answer(key, batch)
-        params = wire_params(self._config, request)
-        call = Call(request.messages, params, request.seed if batch.intent.seeded else None)
+        with_seed = batch.intent.seeded
+        client = self._client(AnsweringClient(answer))
         try:
-            reply = await self._transport(AnsweringClient(answer)).send(call)
+            reply = await client.complete(request, with_seed=with_seed)
         except SeedRefusedError:
             self._go_without_seed()
             raise RetryableError("the provider takes no seed", sent="answered") from None
         except ModelError as error:
-            if "response_format" in params and refuses_format(error):
+            if "response_format" in wire_params(self._config, request) and refuses_format(error):
                 why = f"{error} ({FORMAT_HINT})"
                 raise UnavailableError(why, status=error.status, sent=error.sent) from None
             raise
         reply = counted(reply, estimate(self._config, request))
-        return reply.model_copy(
-            update={"seed_sent": call.seed is not None, "latency_s": 0.0, "batched": True}
-        )
+        return reply.model_copy(update={"latency_s": 0.0, "batched": True})
 
     async def _answer(self, key: str, batch: Batch) -> Answer:
         assert batch.results is not None, "the batch has ended"

@@ -1,0 +1,278 @@
+"""Calls through litellm, by its public arguments: one request each, its own retries off.
+
+litellm is given the client that it sends with, over our HTTP client: what it sends follows no
+redirect, is read up to the same limit, and is sent once. Its settings, loggers and classes stay as
+they are. It takes seconds to import, so it is imported by the first call and never by a run whose
+replies are all cached, recorded or made by baselines. The only module that imports it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import importlib.util
+import logging
+import os
+import time
+from collections.abc import Mapping
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from functools import cache
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+from phyblock.config.models import DIRECT_PROVIDERS, ModelConfig
+from phyblock.errors import DataError, RefusedError, RetryableError, UnavailableError
+from phyblock.models.client import (
+    Answer,
+    Client,
+    HttpClient,
+    error_of,
+    malformed,
+    read_completion,
+    read_json,
+)
+from phyblock.models.keys import KEYLESS, api_key
+from phyblock.models.prices import map_entry, mapped_providers
+from phyblock.models.replay import read_raw_reply
+from phyblock.models.request import Request, wire_messages, wire_params
+from phyblock.records.reply import Reply, Usage
+
+if TYPE_CHECKING:
+    import types
+
+    import httpx
+
+_GRACE_S = 10.0
+"""What litellm's own work may take beyond the time for the exchange, which our client keeps."""
+
+_WHILE_IMPORTED = {
+    "LITELLM_LOCAL_MODEL_COST_MAP": "True",  # else the import fetches the price map
+    "LITELLM_MODE": "PRODUCTION",  # else the import reads keys from any .env file above
+    "MAX_BASE64_LENGTH_FOR_LOGGING": "0",  # else a regex goes over every picture for its log
+}
+_OWN_CLIENTS = (
+    "aiohttp_openai",
+    "amazon_nova",
+    "cloudflare",
+    "cohere",
+    "cohere_chat",
+    "maritalk",
+    "nlp_cloud",
+    "oobabooga",
+    "petals",
+    "predibase",
+    "replicate",
+)
+"""Providers whose code in litellm sends with an HTTP client of its own. They are called all the
+same: litellm then decides about redirects, sizes and what is sent twice.
+"""
+
+
+@dataclass
+class _Exchange:
+    """What one call put on the wire: the last answer, or why there is none that may be read."""
+
+    http: HttpClient
+    answer: Answer | None = None
+    failure: Exception | None = None
+    posted: set[str] = field(default_factory=set)
+
+
+_CURRENT: ContextVar[_Exchange] = ContextVar("phyblock_exchange")
+
+
+class LitellmClient(Client):
+    """`litellm.acompletion`, for every provider it knows, over our HTTP client."""
+
+    _sender: Any = None
+
+    async def _complete(self, request: Request, *, with_seed: bool) -> Reply:
+        config = self.config
+        litellm = _litellm()
+        if self._sender is None:
+            self._sender = _sender(config)
+        seed = request.seed if with_seed else None
+        optional = {"api_key": api_key(config), "api_base": config.api_base, "seed": seed}
+        exchange = _Exchange(self.http)
+        token = _CURRENT.set(exchange)
+        started_s = time.perf_counter()
+        try:
+            response = await asyncio.wait_for(
+                litellm.acompletion(
+                    **wire_params(config, request),
+                    model=config.id,
+                    messages=wire_messages(request.messages, config.image_detail),
+                    timeout=config.timeout_s,
+                    num_retries=0,
+                    max_retries=0,
+                    client=self._sender,
+                    **{"no-log": True},
+                    **{name: value for name, value in optional.items() if value is not None},
+                ),
+                config.timeout_s + _GRACE_S,
+            )
+        except TimeoutError:
+            raise RetryableError("no answer in time", sent="maybe") from None
+        except Exception as error:
+            return self._after(error, exchange, time.perf_counter() - started_s)
+        finally:
+            _CURRENT.reset(token)
+        latency_s = time.perf_counter() - started_s
+        body = {
+            "choices": [
+                {"finish_reason": choice.finish_reason, "message": choice.message.model_dump()}
+                for choice in response.choices
+            ],
+            "usage": response.usage.model_dump() if getattr(response, "usage", None) else None,
+            "model": response.model,
+        }
+        return read_completion(body, latency_s, exchange.answer.status if exchange.answer else 200)
+
+    def _after(self, error: Exception, exchange: _Exchange, latency_s: float) -> Reply:
+        """Raise the error of a call that litellm gave up, by what was on the wire; or return the
+        reply where it failed on a good one, as on counts that are no numbers.
+
+        litellm gives whatever went wrong a class of its own, which says less; but it knows more of
+        the words by which providers refuse for their policy.
+        """
+        if exchange.failure is not None:
+            raise exchange.failure from None
+        answer = exchange.answer
+        said = f"{type(error).__name__}: {str(error).partition('Traceback (most recent')[0]}"
+        if answer is None and self.config.provider in _OWN_CLIENTS:
+            status = getattr(error, "status_code", None) or 500
+            raise error_of(Answer(status, {}, said.encode())) from None
+        if answer is None:
+            # A package, a credential or a setting is missing here: no request would fare better.
+            raise UnavailableError(said, sent="no") from None
+        if not answer.is_success:
+            failure = error_of(answer)
+            if isinstance(error, _litellm().ContentPolicyViolationError):
+                failure = RefusedError(str(failure), status=answer.status)
+            raise failure from None
+        body = read_json(answer)
+        if isinstance(body, Mapping) and {"choices", "content", "candidates"} & body.keys():
+            with contextlib.suppress(DataError):
+                reply = read_raw_reply(body, "")
+                if reply.text:
+                    return reply.model_copy(update={"usage": Usage(), "latency_s": latency_s})
+        raise malformed(answer.status, said) from None
+
+
+def _sender(config: ModelConfig) -> Any:
+    """Return the client that litellm sends with for this model.
+
+    It takes one of the OpenAI SDK for some providers and its own handler for others; this is both.
+    """
+    import httpx
+    import openai
+    from litellm.llms.custom_httpx.http_handler import AsyncHTTPHandler
+
+    class Wire(httpx.AsyncBaseTransport):
+        """Sends through the exchange of the task; ReadError stands for every failure, after which
+        litellm sends nothing again.
+        """
+
+        async def handle_async_request(self, request: httpx.Request) -> httpx.Response:
+            exchange = _CURRENT.get()
+            try:
+                answer = await _send(exchange, config, request)
+            except Exception as failure:
+                exchange.failure = failure
+                # Its own words may hold what litellm must not log.
+                raise httpx.ReadError("the call failed", request=request) from None
+            exchange.answer = answer
+            unpacked = ("content-encoding", "content-length", "transfer-encoding")
+            headers = [(k, v) for k, v in answer.headers.items() if k.lower() not in unpacked]
+            return httpx.Response(
+                answer.status, headers=headers, content=answer.body, request=request
+            )
+
+    client = httpx.AsyncClient(transport=Wire(), trust_env=False, follow_redirects=False)
+    fields: dict[str, Any] = {"http_client": client, "max_retries": 0, "timeout": config.timeout_s}
+    if config.provider == "azure":
+        return openai.AsyncAzureOpenAI(
+            api_key=api_key(config),
+            azure_ad_token=os.environ.get("AZURE_AD_TOKEN"),
+            azure_endpoint=config.api_base or "",
+            api_version=os.environ.get("AZURE_API_VERSION") or _litellm().AZURE_DEFAULT_API_VERSION,
+            **fields,
+        )
+
+    class Sender(AsyncHTTPHandler):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__(timeout=config.timeout_s)
+            self.client = client
+            self._sdk: Any = None
+
+        def __getattr__(self, name: str) -> Any:
+            if name.startswith("__"):
+                raise AttributeError(name)
+            if self.__dict__.get("_sdk") is None:
+                self.__dict__["_sdk"] = openai.AsyncOpenAI(
+                    api_key=api_key(config), base_url=config.api_base, **fields
+                )
+            return getattr(self.__dict__["_sdk"], name)
+
+    return Sender()
+
+
+async def _send(exchange: _Exchange, config: ModelConfig, request: httpx.Request) -> Answer:
+    """Send what litellm wants to send, if it goes to the model's server, and once."""
+    url, method = str(request.url), request.method
+    if config.api_base is not None and urlsplit(url)[:2] != urlsplit(config.api_base)[:2]:
+        why = f"nothing is sent to {urlsplit(url).hostname}, which is not the model's server"
+        raise UnavailableError(why, sent="no")
+    if method == "POST" and url in exchange.posted:
+        raise exchange.failure or UnavailableError("litellm would send the request twice")
+    exchange.posted.add(url)
+    ours = ("accept-encoding", "connection", "content-length", "host", "transfer-encoding")
+    headers = {name: value for name, value in request.headers.items() if name not in ours}
+    answer = await exchange.http.send(url, await request.aread(), headers, method=method)
+    if answer.fault or answer.is_success:
+        read_json(answer)
+    return answer
+
+
+@cache
+def _litellm() -> types.ModuleType:
+    """Import litellm; the environment is as it was when that is done."""
+    before = {name: os.environ.get(name) for name in _WHILE_IMPORTED}
+    os.environ.update(_WHILE_IMPORTED)
+    try:
+        import litellm
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+    if _is_quiet:
+        litellm.suppress_debug_info = True
+        for name in ("LiteLLM", "LiteLLM Router", "LiteLLM Proxy"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+    module: types.ModuleType = litellm
+    return module
+
+
+_is_quiet = False
+
+
+def be_quiet() -> None:
+    """Keep litellm from printing: for a program of which phyblock is the whole, as its commands."""
+    global _is_quiet
+    _is_quiet = True
+
+
+def known_providers(config: ModelConfig) -> frozenset[str]:
+    """Return providers of which a model's is one, if it is known; else all that are known.
+
+    litellm is imported only where its map has neither the model nor another of its provider.
+    """
+    at_hand = frozenset((*DIRECT_PROVIDERS, *KEYLESS))
+    if config.provider in at_hand or map_entry(config) or config.provider in mapped_providers():
+        return frozenset((config.provider,))
+    if importlib.util.find_spec("litellm") is None:
+        return at_hand
+    return at_hand | {str(getattr(one, "value", one)) for one in _litellm().provider_list}

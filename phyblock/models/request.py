@@ -1,0 +1,214 @@
+"""Requests, the seam of all that answers them, and the JSON of the OpenAI chat protocol.
+
+`wire_messages` gives messages as litellm takes them, `json_body` a whole request body as bytes;
+both say the same. Pictures make up nearly all of a body, so they enter it without passing through
+the JSON encoder: base64 has nothing to escape.
+"""
+
+from __future__ import annotations
+
+import base64
+import functools
+import json
+import secrets
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol, runtime_checkable
+
+from phyblock.config.models import ModelConfig
+from phyblock.errors import DataError, PhyblockError, Problem
+from phyblock.records.reply import Reply
+from phyblock.stable import hex_digest
+from phyblock.types import ImageDetail, Role
+
+_MAGIC = (
+    (b"\x89PNG\r\n\x1a\n", "image/png"),
+    (b"\xff\xd8\xff", "image/jpeg"),
+    (b"GIF8", "image/gif"),
+)
+
+
+@dataclass(frozen=True)
+class Image:
+    """An encoded picture as sent; `label` says what it shows ("goal", "candidates", ...)."""
+
+    data: bytes = field(repr=False)
+    label: str
+    width_px: int
+    height_px: int
+
+    @functools.cached_property
+    def sha256(self) -> str:
+        """Hex digest of the encoded bytes."""
+        return hex_digest(self.data)
+
+
+@dataclass(frozen=True)
+class Message:
+    """One chat message: text and pictures in the order in which they are sent."""
+
+    role: Role
+    parts: tuple[str | Image, ...]
+
+
+@dataclass(frozen=True)
+class Request:
+    """One question to a model.
+
+    `key` names the question inside its `track` (a scene id for full planning): by both a recording
+    is looked up; `seed` is the sample's seed, which also tells repeats apart;
+    `params` are sampling parameters by their OpenAI names; `prompt_version` hashes the template.
+    `response_format` asks for an answer as JSON, as the OpenAI protocol does; None asks for text.
+    `examples` are the keys of worked examples that `messages` show before the question.
+    `subject` is what the question is about, of the type that its track says: only the rules of
+    baselines look at it.
+    """
+
+    key: str
+    seed: int
+    messages: tuple[Message, ...]
+    params: Mapping[str, object]
+    prompt_version: str
+    subject: object
+    response_format: Mapping[str, object] | None = None
+    track: str = ""
+    examples: tuple[str, ...] = ()
+
+
+class Model(Protocol):
+    """Anything that answers requests: a provider, a recording, a baseline."""
+
+    @property
+    def name(self) -> str:
+        """The name the tables use."""
+
+    @property
+    def needs_messages(self) -> bool:
+        """True if prompts and pictures must be made for it.
+
+        False for recordings, which are looked up by a request's key (what was asked when they were
+        made is not known), and for baselines, which look at the request's subject alone.
+        """
+
+    async def ask(self, request: Request) -> Reply | None:
+        """Answer, or None when a recording holds no reply for the request.
+
+        Raises RetryableError when all attempts failed, SampleError or RefusedError when this
+        request cannot succeed, UnavailableError when the model cannot answer at all,
+        BudgetReachedError when the call does not fit; a person HaltedError, a model that gathers
+        requests AskLaterError.
+
+        Cancelled while it waits for its turn, it gives up at once. Cancelled while a request is
+        under way, which is paid for, it returns the answer; a second cancellation gives it up too.
+        """
+
+    async def aclose(self) -> None:
+        """Release connections; the model is not used afterwards."""
+
+
+class HaltedError(PhyblockError):
+    """The run was ended before this request was sent."""
+
+
+class AskLaterError(PhyblockError):
+    """The request has to be gathered once more: its answer failed, or it was not sent yet."""
+
+
+@runtime_checkable
+class GatheringModel(Model, Protocol):
+    """A model whose requests are gathered, sent together and only then asked for, in rounds.
+
+    A round is `begin`, `gather` of each request that is not answered yet, `dispatch`, `ask` of each
+    that was gathered; those whose `ask` raises AskLaterError belong to the next round.
+    """
+
+    async def begin(self) -> None:
+        """Begin a round. Raises UnavailableError where nothing more can be sent."""
+
+    async def gather(self, request: Request, *, anew: bool = False) -> bool:
+        """Take a request in, unless its answer is here or on its way; False where there is no room
+        for it in this round.
+
+        `anew` says that its failure has been recorded, so that it is asked again. Raises
+        BudgetReachedError where it alone could pass the cost limit.
+        """
+
+    async def dispatch(self) -> None:
+        """Send what was gathered."""
+
+
+def mime_type(image: Image) -> str:
+    """Return the MIME type by the bytes themselves: providers refuse a label that they do not bear
+    out.
+
+    Raises DataError when the picture is none of PNG, JPEG, GIF and WebP.
+    """
+    for magic, name in _MAGIC:
+        if image.data.startswith(magic):
+            return name
+    if image.data[:4] == b"RIFF" and image.data[8:12] == b"WEBP":
+        return "image/webp"
+    where = f"picture {image.label!r}"
+    found = repr(image.data[:8])
+    raise DataError(Problem(where, "is no picture", "", found, "PNG, JPEG, GIF or WebP"))
+
+
+def data_uri(image: Image) -> str:
+    """Return the picture as a `data:` URI."""
+    return f"data:{mime_type(image)};base64,{base64.b64encode(image.data).decode('ascii')}"
+
+
+def wire_messages(
+    messages: tuple[Message, ...], detail: ImageDetail | None
+) -> list[dict[str, Any]]:
+    """Return chat messages, texts and pictures in the order given; a lone text is a plain string.
+
+    `detail` is how closely pictures are looked at; None leaves it to the provider.
+    """
+    return _messages(messages, data_uri, detail)
+
+
+def json_body(
+    fields: Mapping[str, Any], messages: tuple[Message, ...], detail: ImageDetail | None
+) -> bytes:
+    """Return a request body: `messages` in place of that field, beside all others."""
+    pictures: list[bytes] = []
+
+    def placeholder(image: Image) -> str:
+        pictures.append(f"data:{mime_type(image)};base64,".encode() + base64.b64encode(image.data))
+        return mark
+
+    mark = secrets.token_hex(16)
+    body = {**fields, "messages": _messages(messages, placeholder, detail)}
+    first, *others = json.dumps(body, allow_nan=False).encode().split(mark.encode())
+    pieces = [first]
+    for picture, piece in zip(pictures, others, strict=True):
+        pieces += [picture, piece]
+    return b"".join(pieces)
+
+
+def wire_params(config: ModelConfig, request: Request) -> dict[str, Any]:
+    """Return what to send beside the messages: the request's sampling parameters, overridden by
+    the model's, and the format of the answer where the model takes one; None is not sent.
+    """
+    merged = {**request.params, **config.params}
+    if config.sends_format and request.response_format is not None:
+        merged["response_format"] = request.response_format
+    return {name: value for name, value in merged.items() if value is not None}
+
+
+def _messages(
+    messages: tuple[Message, ...], url_of: Callable[[Image], str], detail: ImageDetail | None
+) -> list[dict[str, Any]]:
+    def part(part: str | Image) -> dict[str, Any]:
+        if isinstance(part, str):
+            return {"type": "text", "text": part}
+        looked_at = {} if detail is None else {"detail": detail}
+        return {"type": "image_url", "image_url": {"url": url_of(part), **looked_at}}
+
+    def content(message: Message) -> str | list[dict[str, Any]]:
+        if len(message.parts) == 1 and isinstance(message.parts[0], str):
+            return message.parts[0]
+        return [part(each) for each in message.parts]
+
+    return [{"role": message.role, "content": content(message)} for message in messages]

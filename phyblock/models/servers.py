@@ -1,0 +1,168 @@
+"""The servers of one model: the least loaded is asked, one that fails rests for a while.
+
+What a server says itself, an error 500 or a 429 too, shows that it is there. No connection, a lost
+one, or a gateway that finds nothing behind it (502, 503, 504) shows that it is not. So does a
+success that holds no reply, as long as no reply ever came: the page of a proxy while the model is
+loaded. An answer that does not come in time shows neither: some requests are slow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from phyblock.errors import ModelError, RetryableError, UnavailableError
+
+if TYPE_CHECKING:
+    from phyblock.models.client import Client
+    from phyblock.models.model import RetryPolicy
+
+FAILURES_TO_REST = 5
+_REQUESTS_TO_REST = 2
+"""One request that a server cannot survive is no outage."""
+_LONGEST_REST_S = 15.0
+_WORTH_A_WORD_S = 10.0
+_GATEWAY = (502, 503, 504)
+_TOO_MUCH = (429, 529)
+"""Too many requests; overloaded, as Anthropic says it."""
+
+
+@dataclass(eq=False)
+class Server:
+    """One server, and what is known of it.
+
+    `failures` in a row show that it is not there, of the requests `failed`, the first at
+    `down_since_s`; since then it has rested `rests` times, until `rests_until_s`. `refusal` is why
+    it is asked no more: what it says to every request, or that it was away for too long.
+    """
+
+    name: str
+    client: Client
+    under_way: int = 0
+    sent: int = 0
+    failures: int = 0
+    failed: set[Hashable] = field(default_factory=set)
+    down_since_s: float = 0.0
+    rests: int = 0
+    rested_at_s: float = float("-inf")
+    rests_until_s: float = float("-inf")
+    was_heard: bool = False
+    has_replied: bool = False
+    refusal: UnavailableError | None = None
+
+
+class Servers:
+    """Chooses among the servers of a model; asyncio, one loop. `tell` hears what befalls them."""
+
+    def __init__(
+        self, servers: Sequence[Server], policy: RetryPolicy, tell: Callable[[str], None]
+    ) -> None:
+        self.all = tuple(servers)
+        self._policy = policy
+        self._tell = tell
+
+    def rest_s(self) -> float:
+        """Return the seconds until some server may be asked.
+
+        Raises UnavailableError when none is left.
+        """
+        usable = self.usable()
+        return max(0.0, min(s.rests_until_s for s in usable) - self._policy.clock.now())
+
+    def usable(self) -> list[Server]:
+        """List the servers that are not given up; raises UnavailableError when there is none."""
+        usable = [server for server in self.all if server.refusal is None]
+        if not usable:
+            refusal = self.all[-1].refusal
+            assert refusal is not None
+            more = f" (so it is with all {len(self.all)} servers)" if len(self.all) > 1 else ""
+            raise UnavailableError(f"{refusal}{more}", status=refusal.status, sent=refusal.sent)
+        return usable
+
+    def pick(self, failed: Server | None = None) -> Server:
+        """Return the server to ask: one that does not rest and has the fewest requests under way.
+
+        One that just `failed` the request is asked only where there is no other. One that was away
+        is asked by a single request at a time, until it answers.
+        """
+        now_s = self._policy.clock.now()
+        chosen = min(
+            self.usable(),
+            key=lambda s: (max(0.0, s.rests_until_s - now_s), s is failed, s.under_way, s.sent),
+        )
+        if chosen.rests:
+            chosen.rests_until_s = now_s + self._rest_of(chosen)
+        return chosen
+
+    def replied(self, server: Server) -> None:
+        """Note that a server gave a reply."""
+        server.has_replied = True
+        self._heard(server)
+
+    def failed(self, server: Server, error: ModelError, request: Hashable, sent_s: float) -> bool:
+        """Note that a request that was sent at `sent_s` failed; True if that is the server's fault,
+        so that another attempt is free.
+
+        What becomes of requests that were sent before a server began to rest says nothing new.
+        """
+        if isinstance(error, UnavailableError):
+            is_first, server.refusal = server.refusal is None, error
+            is_left = any(other.refusal is None for other in self.all)
+            if is_first and is_left:
+                self._tell(f"{server.name} is asked no more: {error}")
+            return is_left
+        is_page = not server.has_replied and 200 <= (error.status or 0) < 300
+        if error.status is not None and not is_page:
+            server.was_heard = True
+        is_away = error.sent in ("no", "lost") or error.status in _GATEWAY or is_page
+        if not isinstance(error, RetryableError) or not is_away:
+            if error.sent == "answered":
+                self._heard(server)
+            return False
+        now_s = self._policy.clock.now()
+        server.down_since_s = server.down_since_s if server.failures else now_s
+        server.failures += 1
+        server.failed.add(request)
+        if server.rests and sent_s <= server.rested_at_s:
+            return True
+        if server.failures < FAILURES_TO_REST or len(server.failed) < _REQUESTS_TO_REST:
+            return False
+        server.rests += 1
+        server.rested_at_s = now_s
+        wait_s = max(self._rest_of(server), self._policy.followed_s(error))
+        server.rests_until_s = now_s + wait_s
+        lasted_s = now_s - server.down_since_s
+        tries = FAILURES_TO_REST + server.rests - 1
+        fault = "gives no reply that can be read" if is_page else "cannot be reached"
+        if not is_page and self._policy.gives_up(error, server.rests, lasted_s):
+            why = f"{server.name} could not be reached for {lasted_s:.0f} s: {error}"
+            server.refusal = UnavailableError(why, sent="no")
+        elif not server.was_heard and tries >= self._policy.max_connection_failures:
+            never = "never gave a reply that can be read" if is_page else "never answered"
+            why = f"{server.name} {never}, {tries} times in a row: {error}"
+            server.refusal = UnavailableError(why, sent="no")
+        elif server.rests == 1:
+            self._tell(f"{server.name} {fault}, trying now and then: {error}")
+        elif wait_s >= _WORTH_A_WORD_S:
+            self._tell(f"{server.name} still {fault}: tried {tries} times, for {lasted_s:.0f} s")
+        return True
+
+    def pause(self, server: Server, error: RetryableError, wait_s: float) -> None:
+        """Ask a server that says that it has too much to do no more for a while."""
+        if error.status in _TOO_MUCH:
+            until_s = self._policy.clock.now() + wait_s
+            server.rests_until_s = max(server.rests_until_s, until_s)
+
+    def _heard(self, server: Server) -> None:
+        if server.rests:
+            lasted_s = self._policy.clock.now() - server.down_since_s
+            self._tell(f"{server.name} answers again after {lasted_s:.0f} s: going on")
+            server.rests_until_s = float("-inf")
+        server.was_heard = True
+        server.failures = server.rests = 0
+        server.failed.clear()
+
+    def _rest_of(self, server: Server) -> float:
+        most_s = min(_LONGEST_REST_S, self._policy.max_wait_s)
+        return min(most_s, self._policy.base_s * 2.0 ** min(server.rests, 60))

@@ -1,0 +1,296 @@
+"""Calls through litellm: over our HTTP client or not at all, and its settings stay as they are."""
+
+from __future__ import annotations
+
+import logging
+import os
+import socket
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from aiohttp import web
+
+from phyblock.config.models import ModelConfig
+from phyblock.errors import ModelError, RetryableError, UnavailableError
+from phyblock.models import Message, Reply, RetryPolicy
+from phyblock.models.client import Answer, HttpClient
+from tests.models.factory import ask, make_model, make_request
+from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.servers.chassis import Faults, Running
+from tests.servers.openai_chat import OpenAIChat
+
+ROOT = Path(__file__).parents[2]
+OWN_CLIENT = ["amazon_nova/m", "cohere_chat/m", "maritalk/m", "oobabooga/m", "petals/m"]
+PROVIDERS = [
+    *OWN_CLIENT,
+    "azure/m",
+    "bedrock/converse/amazon.nova-pro-v1:0",
+    "codestral/m",
+    "dashscope/m",
+    "databricks/m",
+    "deepseek/m",
+    "gigachat/m",
+    "groq/m",
+    "huggingface/a/m",
+    "mistral/m",
+    "ollama/m",
+    "ollama_chat/m",
+    "openrouter/m",
+    "watsonx_text/m",
+    "xai/m",
+]
+NO_PARAMS = {"temperature": None, "top_p": None, "max_tokens": None}
+TEXT = replace(make_request(**NO_PARAMS), messages=(Message("user", ("Which blocks?",)),))
+
+
+class AnyPath(OpenAIChat):
+    """Answers every path alike and counts what arrives."""
+
+    def __init__(self, status: int, body: bytes) -> None:
+        super().__init__()
+        self.status, self.body = status, body
+        self.hits = 0
+
+    def add_routes(self, app: web.Application) -> None:
+        app.router.add_route("*", "/{tail:.*}", self._answer)
+
+    async def _answer(self, _: web.Request) -> web.Response:
+        self.hits += 1
+        return web.Response(status=self.status, body=self.body, content_type="application/json")
+
+
+@pytest.fixture
+def sends(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The addresses to which our client sends."""
+    found: list[str] = []
+    send = HttpClient.send
+
+    async def counted(self: HttpClient, url: str, *args: Any, **fields: Any) -> Answer:
+        found.append(url)
+        return await send(self, url, *args, **fields)
+
+    monkeypatch.setattr(HttpClient, "send", counted)
+    return found
+
+
+@pytest.fixture
+def hosts(monkeypatch: pytest.MonkeyPatch) -> set[str]:
+    """The hosts that anything in the process looks up; none but this machine is found."""
+    found: set[str] = set()
+    look_up = socket.getaddrinfo
+
+    def noted(host: Any, *args: Any, **fields: Any) -> Any:
+        name = host.decode() if isinstance(host, bytes) else str(host)
+        if name == "127.0.0.1":
+            return look_up(host, *args, **fields)
+        found.add(name)
+        raise socket.gaierror(socket.EAI_NONAME, "no host but this one")
+
+    monkeypatch.setattr(socket, "getaddrinfo", noted)
+    return found
+
+
+@pytest.fixture(autouse=True)
+def _environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in {
+        KEY_VARIABLE: "sk-not-a-real-key-1234",
+        "NO_PROXY": "*",
+        "AWS_EC2_METADATA_DISABLED": "true",
+        "AWS_REGION": "eu-west-1",
+        "AWS_ACCESS_KEY_ID": "AKIANOTAREALKEY",
+        "AWS_SECRET_ACCESS_KEY": "not-a-real-secret",
+        "NO_GCE_CHECK": "true",
+        "WATSONX_PROJECT_ID": "p",
+    }.items():
+        monkeypatch.setenv(name, value)
+
+
+def answer_of(model_id: str, **fields: Any) -> Reply | ModelError | None:
+    known: Mapping[str, Any] = {"seed": "never", "timeout_s": 10.0, "transport": "litellm"}
+    config = ModelConfig(name="m", id=model_id, **{**known, **fields})
+    (answer,) = ask(make_model(config, policy=RetryPolicy(1, 0.0)), TEXT)
+    return answer
+
+
+@pytest.mark.parametrize("model_id", PROVIDERS)
+def test_a_provider_sends_through_our_client_to_its_server_or_not_at_all(
+    model_id: str, sends: list[str], hosts: set[str]
+) -> None:
+    server = AnyPath(500, b'{"x": 1}')
+    with Running(server) as running:
+        answer = answer_of(model_id, api_base=running.url, api_key_env=KEY_VARIABLE)
+    assert isinstance(answer, ModelError), answer
+    assert server.hits == (len(sends) or int(model_id in OWN_CLIENT))
+    assert all(url.startswith(running.url) for url in sends)
+    # Where it signs in, and what it asks about models of any provider, with no key and no prompt.
+    signs_in = {"ngw.devices.sberbank.ru", "iam.cloud.ibm.com"}
+    assert hosts <= {*signs_in, "huggingface.co", "localhost"}
+    if signs_in & hosts:
+        assert isinstance(answer, UnavailableError), answer
+    else:
+        assert isinstance(answer, RetryableError), answer
+        assert (answer.status, server.hits) == (500, 1)
+
+
+@pytest.mark.parametrize("model_id", OWN_CLIENT)
+def test_a_provider_with_a_client_of_its_own_is_called_and_its_refusals_are_read(
+    model_id: str,
+) -> None:
+    with Running(AnyPath(429, b'{"x": 1}')) as running:
+        answer = answer_of(model_id, api_base=running.url, api_key_env=KEY_VARIABLE)
+    assert isinstance(answer, RetryableError), answer
+    assert answer.status == 429
+
+
+def test_a_reply_through_a_client_of_litellm_is_a_reply() -> None:
+    body = b'{"choices": [{"message": {"role": "assistant", "content": "Step1"}}]}'
+    with Running(AnyPath(200, body)) as running:
+        answer = answer_of("amazon_nova/m", api_base=running.url, api_key_env=KEY_VARIABLE)
+    assert isinstance(answer, Reply), answer
+    assert answer.text == "Step1"
+
+
+def test_what_is_missing_on_this_machine_is_no_outage(
+    monkeypatch: pytest.MonkeyPatch, hosts: set[str]
+) -> None:
+    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "AWS_PROFILE", "HOME"):
+        monkeypatch.delenv(name, raising=False)
+    for model_id in ("vertex_ai/gemini-2.0-flash", "sagemaker/m", "bedrock/m"):
+        answer = answer_of(model_id)
+        assert isinstance(answer, UnavailableError), answer
+        assert answer.sent == "no"
+    # Where litellm looks for what it knows of a model, with no key and no prompt.
+    assert hosts <= {"huggingface.co"}
+
+
+@pytest.mark.parametrize("extra", [{"tools": 5}, {"logit_bias": "yes"}, {"stop": {"a": 1}}])
+def test_arguments_that_litellm_chokes_on_end_a_call_and_no_run(extra: dict[str, object]) -> None:
+    with Running(OpenAIChat()) as running:
+        config = ROUTES["openai"].config(running.url)
+        request = replace(TEXT, params=extra)
+        (answer,) = ask(make_model(config, policy=RetryPolicy(1, 0.0)), request)
+    assert isinstance(answer, ModelError | Reply), answer
+
+
+def settings_of(litellm: Any) -> dict[str, object]:
+    """What a program may have set: the module's values, its loggers and the environment."""
+    kinds = (bool, int, float, str, type(None), tuple)
+    found: dict[str, object] = {
+        name: value for name, value in vars(litellm).items() if isinstance(value, kinds)
+    }
+    found["callbacks"] = [
+        list(getattr(litellm, name))
+        for name in ("callbacks", "success_callback", "failure_callback", "_async_success_callback")
+    ]
+    for name in ("LiteLLM", "LiteLLM Router", "LiteLLM Proxy", "openai", "httpx"):
+        logger = logging.getLogger(name)
+        found[name] = (logger.level, logger.disabled, logger.propagate, list(logger.handlers))
+    return {**found, "environment": dict(os.environ)}
+
+
+def methods() -> dict[str, object]:
+    """The methods of the HTTP libraries that litellm and others send with."""
+    import aiohttp
+    import httpx
+    import openai
+    from litellm.llms.custom_httpx.http_handler import AsyncHTTPHandler, HTTPHandler
+
+    owners = (
+        httpx.AsyncClient, httpx.Client, httpx.AsyncHTTPTransport, httpx.HTTPTransport,
+        AsyncHTTPHandler, HTTPHandler, aiohttp.ClientSession, openai.AsyncOpenAI,
+    )  # fmt: skip
+    return {f"{owner.__name__}.{k}": v for owner in owners for k, v in vars(owner).items()}
+
+
+@pytest.mark.parametrize("mode", ["ok", "429", "401", "cut", "seed"])
+def test_calls_change_no_setting_logger_variable_or_class_of_the_callers_libraries(
+    mode: str,
+) -> None:
+    import litellm
+
+    litellm.suppress_debug_info = True
+    # What a first call of anybody sets, as caches and flags inside, is no matter of ours.
+    for name in ("openai", "vllm", "anthropic"):
+        for faults in (Faults(), Faults(mode=mode)):
+            server = ROUTES[name].server(faults)
+            with Running(server) as running:
+                config = ROUTES[name].config(running.url)
+                before, known = settings_of(litellm), methods()
+                ask(make_model(config, policy=RetryPolicy(1, 0.0)), make_request())
+    assert methods() == known
+    after = settings_of(litellm)
+    changed = {name for name in before if before[name] != after.get(name, "gone")}
+    assert not changed, {name: (before[name], after[name]) for name in changed}
+
+
+FIRST = """
+import asyncio, os, sys
+from phyblock.models import RetryPolicy, build_model
+from phyblock.config.models import ModelConfig
+from tests.models.factory import make_request
+os.chdir(sys.argv[1])
+before = dict(os.environ)
+config = ModelConfig(name="m", id="gemini/gemini-2.5-flash", api_base=sys.argv[2])
+model = build_model(config, cache=None, policy=RetryPolicy(attempts=1, retry_for_s=0.0))
+async def main():
+    try:
+        print((await model.ask(make_request())).usage.prompt_tokens)
+    except Exception as error:
+        print(error)
+    await model.aclose()
+asyncio.run(main())
+# litellm itself names the folder of its tokenizer there.
+os.environ.pop("TIKTOKEN_CACHE_DIR", None)
+print(dict(os.environ) == before, os.environ.get("FROM_DOTENV"))
+import litellm
+print(litellm.suppress_debug_info, litellm.drop_params, litellm.num_retries)
+"""
+
+
+def test_the_first_call_imports_litellm_quietly_and_reads_no_key_file(tmp_path: Path) -> None:
+    (tmp_path / ".env").write_text("FROM_DOTENV=1\nGEMINI_API_KEY=sk-from-a-file-12345\n")
+    # In its mode "DEV", litellm would read keys from any .env file above.
+    environment = {"PYTHONPATH": str(ROOT), "PATH": "", "LITELLM_MODE": "DEV"}
+    with Running(ROUTES["gemini"].server()) as running:
+        command = [sys.executable, "-W", "error", "-c", FIRST, str(tmp_path), running.url]
+        done = subprocess.run(
+            command, capture_output=True, text=True, check=True, cwd=ROOT, env=environment
+        )
+    assert done.stdout == "1000\nTrue None\nFalse False None\n"
+    assert done.stderr == ""
+    assert [seen.key for seen in running.server.seen] == ["no-key"]
+
+
+def test_two_calls_of_the_caller_and_of_ours_do_not_meet(monkeypatch: pytest.MonkeyPatch) -> None:
+    """litellm's own calls in the same task go past our client and are as they were."""
+    import asyncio
+
+    import litellm
+
+    async def both() -> tuple[Any, Any]:
+        ours = make_model(ROUTES["openai"].config(running.url))
+        message = {"role": "user", "content": "?"}
+
+        async def theirs() -> Any:
+            return await litellm.acompletion(
+                "openai/m", [message], api_base=f"{running.url}/v1", api_key="sk-another-key"
+            )
+
+        found = await asyncio.gather(theirs(), ours.ask(make_request()), theirs())
+        await ours.aclose()
+        return found[0], found[2]
+
+    monkeypatch.setenv("NO_PROXY", "*")
+    with Running(OpenAIChat()) as running:
+        first, second = asyncio.run(both())
+    assert first.choices[0].message.content == second.choices[0].message.content
+    assert sorted(seen.key for seen in running.server.seen) == [
+        "sk-another-key",
+        "sk-another-key",
+        "sk-not-a-real-key-1234",
+    ]

@@ -1,0 +1,272 @@
+"""What is sent again, how often, how long, after which waits; what a cancellation ends."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phyblock.errors import (
+    ModelError,
+    RefusedError,
+    RetryableError,
+    SampleError,
+    StoreError,
+    UnavailableError,
+)
+from phyblock.models import Budget, Reply, ReplyCache, RetryPolicy, reply_key
+from phyblock.models.limits import Clock
+from tests.models.factory import make_model, make_request, run
+from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.servers.chassis import Faults, Running
+
+
+class Script:
+    """Raises the given errors one by one, each after `takes_s`, then answers; sleeps are jumps."""
+
+    def __init__(self, *errors: Exception, takes_s: float = 0.0) -> None:
+        self.errors = list(errors)
+        self.takes_s = takes_s
+        self.now_s = 0.0
+        self.failed_at: list[float] = []
+        self.calls = 0
+        self.waits: list[float] = []
+        self.told: list[float] = []
+
+    async def send(self) -> str:
+        self.calls += 1
+        self.now_s += self.takes_s
+        if self.errors:
+            self.failed_at.append(self.now_s)
+            raise self.errors.pop(0)
+        return "answer"
+
+    async def sleep(self, seconds: float) -> None:
+        self.waits.append(seconds)
+        self.now_s += seconds
+
+    def run(self, **policy: float) -> str:
+        clock = Clock(lambda: self.now_s, self.sleep)
+        rules = RetryPolicy(clock=clock, **policy)  # type: ignore[arg-type]
+
+        async def main() -> str:
+            async for attempt in rules.retrying(lambda _, wait_s: self.told.append(wait_s)):
+                with attempt:
+                    return await self.send()
+            raise AssertionError
+
+        return asyncio.run(main())
+
+
+def test_errors_that_may_pass_are_repeated() -> None:
+    script = Script(RetryableError("a"), RetryableError("b"))
+    assert script.run() == "answer"
+    assert script.calls == 3
+    assert script.told == script.waits
+    assert len(script.waits) == 2
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        SampleError("bad"),
+        RefusedError("no"),
+        UnavailableError("gone"),
+        StoreError([]),
+        ModelError("x"),
+        ZeroDivisionError(),
+        asyncio.CancelledError(),
+    ],
+)
+def test_all_others_are_not(error: Exception) -> None:
+    script = Script(error)
+    with pytest.raises(type(error)):
+        script.run()
+    assert script.calls == 1
+    assert script.waits == []
+
+
+def test_after_the_last_attempt_its_error_comes_out() -> None:
+    errors = [RetryableError(str(n)) for n in range(20)]
+    script = Script(*errors)
+    with pytest.raises(RetryableError, match=r"^7$"):
+        script.run(retry_for_s=0.0)
+    assert script.calls == 8
+    assert len(script.waits) == 7
+
+
+statuses = st.sampled_from([None, 408, 429, 500, 502, 503])
+
+
+@given(
+    st.lists(statuses, min_size=1, max_size=8),
+    st.integers(1, 12),
+    st.floats(0, 600, allow_nan=False),
+    st.floats(0, 400, allow_nan=False),
+)
+def test_a_request_is_given_up_when_both_number_and_time_are_over(
+    found: list[int | None], attempts: int, retry_for_s: float, takes_s: float
+) -> None:
+    errors = (RetryableError("x", status=status) for status in found * 400)
+    script = Script(*errors, takes_s=takes_s)
+    with pytest.raises(RetryableError):
+        script.run(attempts=attempts, retry_for_s=retry_for_s, base_s=2.0)
+    lasted = [now_s - script.failed_at[0] for now_s in script.failed_at]
+    is_over = [n >= attempts and s >= retry_for_s for n, s in enumerate(lasted, 1)]
+    assert is_over[-1]
+    assert not any(is_over[:-1])
+
+
+@pytest.mark.parametrize("status", [200, 201, 204])
+def test_answers_that_were_paid_for_and_cannot_be_read_are_bounded_by_number_alone(
+    status: int,
+) -> None:
+    script = Script(*(RetryableError("malformed", status=status) for _ in range(20)))
+    with pytest.raises(RetryableError, match="malformed"):
+        script.run(attempts=3)
+    assert script.calls == 3
+
+
+@given(st.lists(st.none() | st.floats(0, 500, allow_nan=False), min_size=1, max_size=7))
+def test_waits_keep_to_retry_after_and_to_their_bounds(wishes: list[float | None]) -> None:
+    script = Script(*(RetryableError("429", status=429, retry_after_s=wish) for wish in wishes))
+    assert script.run() == "answer"
+    assert len(script.waits) == len(wishes)
+    for number, (wish, wait) in enumerate(zip(wishes, script.waits, strict=True)):
+        floor = min(wish or 0.0, 120.0)
+        assert floor <= wait <= floor + min(60.0, 0.5 * 2**number)
+
+
+def test_waits_are_jittered() -> None:
+    waits = set()
+    for _ in range(20):
+        script = Script(RetryableError("a"))
+        script.run()
+        waits.add(script.waits[0])
+    assert len(waits) > 10
+
+
+@pytest.fixture
+def _key(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+
+
+@pytest.mark.usefixtures("_key")
+@pytest.mark.parametrize("route", ["direct", "openai"])
+@pytest.mark.parametrize("cancels", [1, 2])
+def test_a_request_under_way_is_answered_and_a_second_cancellation_gives_it_up(
+    tmp_path: Path, route: str, cancels: int
+) -> None:
+    server = ROUTES[route].server(Faults(latency_s=0.2))
+    budget = Budget(100.0)
+
+    async def main(url: str) -> tuple[object, bool]:
+        config = ROUTES[route].config(url, price={"input": 1, "output": 1})
+        with ReplyCache(tmp_path / "c.sqlite") as cache:
+            model = make_model(config, cache=cache, budget=budget)
+            asked = asyncio.create_task(model.ask(make_request()))
+            while not server.requests:
+                await asyncio.sleep(0.001)
+            for _ in range(cancels):
+                asked.cancel()
+                await asyncio.sleep(0.01)
+            (answer,) = await asyncio.gather(asked, return_exceptions=True)
+            await model.aclose()
+            return answer, (reply_key(config, make_request()) in cache)
+
+    with Running(server) as running:
+        answer, is_kept = run(lambda: main(running.url))
+    assert server.requests == 1
+    if cancels == 1:
+        assert isinstance(answer, Reply), answer
+        assert is_kept
+        assert budget.spent_usd == answer.billed_usd == answer.cost_usd
+    else:
+        assert isinstance(answer, asyncio.CancelledError)
+        assert budget.spent_usd > 0, "it may be billed"
+    assert budget.fits(100.0 - budget.spent_usd), "nothing is held"
+
+
+@pytest.mark.usefixtures("_key")
+@pytest.mark.parametrize("where", ["slot", "minute", "budget", "retry", "rest"])
+def test_whatever_is_waited_for_a_cancellation_ends_the_wait_and_nothing_is_sent(
+    where: str,
+) -> None:
+    mode = {"retry": "429", "rest": "429"}.get(where, "slow")
+    server = ROUTES["direct"].server(Faults(mode=mode, retry_after="100"))
+    fields = {"slot": {"max_concurrency": 1}, "minute": {"rpm": 1}}.get(where, {})
+
+    async def main(url: str) -> list[object]:
+        price = {"input": 0, "output": 1e6}
+        config = ROUTES["direct"].config(url, price=price, seed="never", **fields)
+        budget = Budget(200.0) if where == "budget" else None
+        model = make_model(config, budget=budget, policy=RetryPolicy())
+        asked = [asyncio.create_task(model.ask(make_request("000")))]
+        while not (server.requests if where != "retry" else server.ended["429"]):
+            await asyncio.sleep(0.001)
+        await asyncio.sleep(0.05)
+        if where != "retry":
+            asked.append(asyncio.create_task(model.ask(make_request("001"))))
+            await asyncio.sleep(0.05)
+        asked[-1].cancel()
+        (answer,) = await asyncio.gather(asked[-1], return_exceptions=True)
+        for _ in range(2):
+            asked[0].cancel()
+            await asyncio.sleep(0.01)
+        await asyncio.gather(*asked, return_exceptions=True)
+        await model.aclose()
+        return [answer]
+
+    with Running(server) as running:
+        (answer,) = run(lambda: main(running.url))
+    assert isinstance(answer, asyncio.CancelledError), answer
+    assert server.requests == 1
+
+
+@pytest.mark.usefixtures("_key")
+def test_a_bug_of_ours_is_neither_sent_again_nor_charged(monkeypatch: pytest.MonkeyPatch) -> None:
+    from phyblock.models.client import HttpClient
+
+    calls = 0
+
+    async def broken(*_: object, **__: object) -> None:
+        nonlocal calls
+        calls += 1
+        raise KeyError("choices")
+
+    monkeypatch.setattr(HttpClient, "send", broken)
+    for route in ROUTES.values():
+        calls, budget = 0, Budget(100.0)
+        config = route.config("http://127.0.0.1:9", price={"input": 1, "output": 1}, seed="never")
+
+        async def main() -> None:
+            model = make_model(config, budget=budget)  # noqa: B023
+            with pytest.raises(KeyError):
+                await model.ask(make_request())
+            await model.aclose()
+
+        run(main)
+        assert (calls, budget.spent_usd) == (1, 0.0)
+
+
+@pytest.mark.usefixtures("_key")
+def test_after_a_429_all_wait_as_long_as_the_server_says() -> None:
+    server = ROUTES["direct"].server(Faults(mode="429", retry_after="100"))
+
+    async def main(url: str) -> None:
+        model = make_model(ROUTES["direct"].config(url, max_concurrency=2), policy=RetryPolicy())
+        asked = [asyncio.create_task(model.ask(make_request(f"{n:03}"))) for n in range(20)]
+        while not server.ended["429"]:
+            await asyncio.sleep(0.001)
+        await asyncio.sleep(0.3)
+        for task in asked:
+            task.cancel()
+        await asyncio.gather(*asked, return_exceptions=True)
+        await model.aclose()
+
+    with Running(server) as running:
+        run(lambda: main(running.url))
+    assert server.requests <= 2

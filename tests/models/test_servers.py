@@ -1,0 +1,473 @@
+"""The servers of a model: the load is even, outages lose nothing and cost few attempts."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter
+from contextlib import ExitStack
+from typing import Any
+
+import pytest
+from aiohttp import web
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from phyblock.config.models import ModelConfig
+from phyblock.errors import (
+    ModelError,
+    RetryableError,
+    SampleError,
+    Sent,
+    UnavailableError,
+    UnreachableError,
+)
+from phyblock.models import Model, Reply, Request, RetryPolicy
+from phyblock.models.limits import Limits
+from phyblock.models.model import ChatModel
+from phyblock.models.servers import FAILURES_TO_REST, Server, Servers
+from tests.models.factory import QUICK, ask, make_model, make_request, run, with_fields
+from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.models.test_limits import FakeTime
+from tests.servers.chassis import Faults, Running, Seen, kill, start
+from tests.servers.openai_chat import OpenAIChat
+
+REFUSED = UnreachableError("connection refused")
+LOST = RetryableError("connection refused", sent="lost")
+PAGE = RetryableError("HTTP 200: malformed reply", status=200)
+
+
+@pytest.fixture(autouse=True)
+def _key(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+
+
+class Outage:
+    """A client whose server is away from `begins_s` until `ends_s`; calls take `takes_s`."""
+
+    def __init__(
+        self,
+        time: FakeTime,
+        begins_s: float,
+        ends_s: float,
+        takes_s: float,
+        error: RetryableError = LOST,
+    ) -> None:
+        self.time = time
+        self.error = error
+        self.begins_s, self.ends_s, self.takes_s = begins_s, ends_s, takes_s
+        self.failed = self.answered = 0
+
+    def is_away(self) -> bool:
+        return self.begins_s <= self.time.now_s < self.ends_s
+
+    async def complete(self, _: Request, *, with_seed: bool) -> Reply:
+        assert with_seed
+        was_away = self.is_away()
+        if not was_away:
+            await self.time.sleep(self.takes_s)
+        if was_away or self.is_away():
+            self.failed += 1
+            raise RetryableError(str(self.error), status=self.error.status, sent=self.error.sent)
+        self.answered += 1
+        return Reply(text="Step1: Move block with index 1")
+
+    async def aclose(self) -> None:
+        pass
+
+
+def ask_through(
+    client: Outage, time: FakeTime, *, samples: int, width: int, most_failures: int = 20
+) -> tuple[list[Reply | ModelError], list[str]]:
+    """Ask as a run does, `width` samples at once, a stopped model no more."""
+    answers: list[Reply | ModelError] = []
+    told: list[str] = []
+
+    async def main() -> None:
+        policy = RetryPolicy(clock=time.clock, max_connection_failures=most_failures)
+        servers = Servers([Server("http://gone:1", client)], policy, told.append)  # type: ignore[arg-type]
+        overall = asyncio.Semaphore(width)
+        limits = Limits(width, overall, rest_s=servers.rest_s, clock=time.clock)
+        more: dict[str, Any] = {"cache": None, "budget": None, "prices": None}
+        config = ModelConfig(name="m", id="openai/m", api_base="http://gone:1/v1")
+        model = ChatModel(config, servers, limits, policy=policy, observer=lambda _: None, **more)
+        queue = [make_request(f"{n:03}") for n in range(samples)]
+
+        async def work() -> None:
+            while queue:
+                request = queue.pop(0)
+                try:
+                    answers.append(await model.ask(request))
+                except UnavailableError as error:
+                    queue.clear()
+                    answers.append(error)
+                except ModelError as error:
+                    answers.append(error)
+
+        await time.run_until_done(*(asyncio.create_task(work()) for _ in range(width)))
+
+    run(main)
+    return answers, told
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.floats(0, 30, allow_nan=False),
+    st.floats(1, 280, allow_nan=False),
+    st.floats(0.1, 20, allow_nan=False),
+    st.integers(1, 12),
+)
+def test_an_outage_loses_nothing_and_costs_few_attempts(
+    begins_s: float, lasts_s: float, takes_s: float, width: int
+) -> None:
+    time = FakeTime()
+    client = Outage(time, begins_s, begins_s + lasts_s, takes_s)
+    # The outage may begin before the first answer: that is waited for here, too.
+    answers, _ = ask_through(client, time, samples=40, width=width, most_failures=10**6)
+    assert [type(answer) for answer in answers] == [Reply] * 40
+    assert client.answered == 40
+    # Those under way, those that begin the rest, and single ones at growing distances.
+    assert client.failed <= 2 * width + FAILURES_TO_REST + 30
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(1, 100, allow_nan=False), st.floats(0.1, 20, allow_nan=False), st.integers(2, 64))
+def test_pages_that_a_proxy_shows_while_the_model_is_loaded_lose_nothing(
+    lasts_s: float, takes_s: float, width: int
+) -> None:
+    time = FakeTime()
+    client = Outage(time, 0.0, lasts_s, takes_s, PAGE)
+    answers, _ = ask_through(client, time, samples=80, width=width)
+    assert [type(answer) for answer in answers] == [Reply] * 80
+    assert client.failed <= 2 * width + FAILURES_TO_REST + 30
+
+
+@pytest.mark.parametrize("width", [2, 8, 32])
+@pytest.mark.parametrize(
+    ("error", "fault", "never"),
+    [
+        (LOST, "cannot be reached", "never answered"),
+        (PAGE, "gives no reply that can be read", "never gave a reply that can be read"),
+    ],
+)
+def test_a_wrong_address_stops_the_model_after_few_attempts_and_leaves_its_samples(
+    width: int, error: RetryableError, fault: str, never: str
+) -> None:
+    time = FakeTime()
+    client = Outage(time, 0.0, float("inf"), 1.0, error)
+    answers, told = ask_through(client, time, samples=500, width=width)
+    assert {type(answer) for answer in answers} == {UnavailableError}
+    assert len(answers) == width
+    assert f"http://gone:1 {never}, 20 times in a row: {error}" in str(answers[0])
+    assert client.failed <= width + FAILURES_TO_REST + 30
+    first, *later = told
+    assert first.startswith(f"http://gone:1 {fault}, trying now and then: {error}")
+    assert 100 <= time.now_s < 220
+    # A log is never silent for long, and says that it gets worse.
+    assert time.now_s / 20 <= len(later) <= time.now_s / 10
+    assert all(f"still {fault}: tried " in text for text in later)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(30, 60, allow_nan=False), st.integers(2, 12))
+def test_a_server_that_has_answered_is_tried_for_as_long_as_the_policy_says(
+    begins_s: float, width: int
+) -> None:
+    time = FakeTime()
+    client = Outage(time, begins_s, float("inf"), 5.0)
+    answers, _ = ask_through(client, time, samples=500, width=width)
+    replies = [answer for answer in answers if isinstance(answer, Reply)]
+    assert len(replies) == client.answered > 0
+    assert "http://gone:1 could not be reached for 3" in str(answers[-1])
+    assert begins_s + 290 <= time.now_s < begins_s + 420
+
+
+def test_all_go_on_soon_when_a_server_answers_again() -> None:
+    time = FakeTime()
+    client = Outage(time, 0.0, 100.0, 1.0)
+    answers, told = ask_through(client, time, samples=16, width=16)
+    assert len(answers) == 16
+    assert time.now_s < 100 + 15 + 5 * 1.0
+    *while_away, back = told[1:]
+    assert all("still cannot be reached" in text for text in while_away)
+    assert back.partition(" after")[0] == "http://gone:1 answers again"
+
+
+def servers_of(count: int, policy: RetryPolicy | None = None) -> Servers:
+    made = [Server(f"http://replica:{n}", None) for n in range(count)]  # type: ignore[arg-type]
+    return Servers(made, policy or RetryPolicy(), lambda _: None)
+
+
+def break_off(servers: Servers, server: Server, error: ModelError = REFUSED) -> None:
+    for number in range(FAILURES_TO_REST):
+        servers.failed(server, error, number, servers._policy.clock.now())
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.integers(1, 6),
+    st.lists(st.tuples(st.booleans(), st.integers(0, 50)), max_size=60),
+    st.data(),
+)
+def test_whoever_is_asked_is_there_and_has_no_more_to_do_than_any_other_that_is(
+    count: int, events: list[tuple[bool, int]], data: st.DataObject
+) -> None:
+    servers = servers_of(count, RetryPolicy(clock=FakeTime().clock))
+    gone = data.draw(st.sets(st.integers(0, count - 1), max_size=count - 1))
+    for number in gone:
+        break_off(servers, servers.all[number])
+    there = [server for number, server in enumerate(servers.all) if number not in gone]
+    assert servers.rest_s() == 0.0
+    held: list[Server] = []
+    for begins, number in events:
+        if begins:
+            server = servers.pick()
+            assert server in there
+            assert server.under_way == min(one.under_way for one in there)
+            server.under_way += 1
+            held.append(server)
+        elif held:
+            held.pop(number % len(held)).under_way -= 1
+
+
+def test_what_failed_at_one_server_is_sent_to_another() -> None:
+    servers = servers_of(2)
+    first = servers.pick()
+    second = servers.pick(failed=first)
+    assert second is not first
+    first.under_way = 2
+    assert servers.pick(failed=second) is first
+    alone = servers_of(1)
+    assert alone.pick(failed=alone.pick()) is alone.all[0]
+
+
+@pytest.mark.parametrize("status", [429, 500, 529, 400, None])
+def test_what_a_server_says_itself_and_what_is_late_is_no_outage(status: int | None) -> None:
+    servers = servers_of(1)
+    for number in range(50):
+        error = RetryableError("x", status=status, sent="answered" if status else "maybe")
+        assert not servers.failed(servers.all[0], error, number, 0.0)
+    assert not servers.failed(servers.all[0], SampleError("no key", status=400), 1, 0.0)
+    assert servers.rest_s() == 0.0
+
+
+@pytest.mark.parametrize(
+    ("status", "sent"),
+    [(None, "no"), (None, "lost"), (502, None), (503, None), (504, None)],
+)
+def test_failures_of_one_request_alone_are_no_outage(status: int | None, sent: Sent | None) -> None:
+    servers = servers_of(1)
+    error = RetryableError("x", status=status, sent=sent)
+    for _ in range(50):
+        assert not servers.failed(servers.all[0], error, "poison", 0.0)
+    assert servers.rest_s() == 0.0
+    assert servers.failed(servers.all[0], error, "another", 0.0)
+    assert servers.rest_s() > 0
+
+
+def test_an_answer_between_failures_keeps_a_server_in_use() -> None:
+    servers = servers_of(1)
+    for number in range(50):
+        for nth in range(FAILURES_TO_REST - 1):
+            servers.failed(servers.all[0], REFUSED, (number, nth), 0.0)
+        servers.replied(servers.all[0])
+    assert servers.rest_s() == 0.0
+
+
+@given(st.none() | st.floats(0, 1000), st.integers(0, 20))
+def test_the_next_try_waits_as_long_as_the_server_asks(asked_s: float | None, tries: int) -> None:
+    time = FakeTime()
+    policy = RetryPolicy(clock=time.clock, max_connection_failures=10**6)
+    servers = servers_of(1, policy)
+    error = RetryableError("overloaded", status=503, retry_after_s=asked_s)
+    break_off(servers, servers.all[0], error)
+    least_s = min(asked_s or 0.0, policy.max_retry_after_s)
+    for number in range(tries):
+        try:
+            rest_s = servers.rest_s()
+        except UnavailableError:
+            return
+        assert least_s - 1e-6 <= rest_s <= max(15.0, least_s) + 1e-6
+        time.now_s += rest_s
+        assert servers.rest_s() == 0.0
+        server = servers.pick()
+        # Until it answers or fails, nobody else tries.
+        assert servers.rest_s() > 0.0
+        servers.failed(server, error, f"try {number}", time.now_s)
+
+
+@given(st.sampled_from([429, 529]), st.floats(0.1, 200))
+def test_after_a_429_nobody_asks_before_the_server_wants(status: int, wait_s: float) -> None:
+    time = FakeTime()
+    servers = servers_of(2, RetryPolicy(clock=time.clock))
+    error = RetryableError("slow down", status=status)
+    servers.pause(servers.all[0], error, wait_s)
+    assert servers.rest_s() == 0.0
+    assert servers.pick() is servers.all[1]
+    servers.pause(servers.all[1], error, 2 * wait_s)
+    servers.replied(servers.all[1])
+    assert servers.rest_s() == pytest.approx(wait_s)
+
+
+def at(*urls: str, route: str = "direct", **fields: object) -> ModelConfig:
+    """The model of a route at all these addresses."""
+    config = ROUTES[route].config(urls[0], **fields)
+    return with_fields(config, api_base=tuple(url + ROUTES[route].path for url in urls))
+
+
+async def answers_of(model: Model, *names: str) -> list[object]:
+    asked = (model.ask(make_request(name)) for name in names)
+    return list(await asyncio.gather(*asked, return_exceptions=True))
+
+
+def names(count: int) -> list[str]:
+    return [f"{n:03}" for n in range(count)]
+
+
+def test_four_servers_of_one_request_at_a_time_share_the_work() -> None:
+    servers = [OpenAIChat(Faults(latency_s=0.02), width=1) for _ in range(4)]
+    with ExitStack() as stack:
+        urls = [stack.enter_context(Running(server)).url for server in servers]
+        replies = ask(make_model(at(*urls, max_concurrency=8)), *map(make_request, names(80)))
+    assert [type(reply) for reply in replies] == [Reply] * 80
+    assert [server.most_at_once for server in servers] == [1] * 4
+    assert sum(server.requests for server in servers) == 80
+    assert all(15 <= server.requests <= 25 for server in servers), [s.requests for s in servers]
+
+
+@pytest.mark.parametrize("route", ["direct", pytest.param("openai", marks=pytest.mark.slow)])
+def test_servers_that_die_in_the_middle_lose_nothing(route: str) -> None:
+    servers = [OpenAIChat(Faults(latency_s=0.01), width=1) for _ in range(4)]
+    told: list[str] = []
+
+    async def main() -> list[object]:
+        started = [await start(server, 0) for server in servers]
+        config = at(*(f"http://127.0.0.1:{port}" for _, port in started), route=route)
+        policy = RetryPolicy(base_s=0.01, max_wait_s=0.05)
+        model = make_model(config, policy=policy, told=told)
+        asking = asyncio.create_task(answers_of(model, *names(120)))
+        while sum(server.ended["ok"] for server in servers) < 40:
+            await asyncio.sleep(0.005)
+        await kill(*(runner for runner, _ in started[1:]))
+        answers = await asking
+        await model.aclose()
+        await started[0][0].cleanup()
+        return answers
+
+    answers = run(main)
+    assert [type(answer) for answer in answers] == [Reply] * 120
+    # No sample was sent again but those that were under way at a server that died.
+    asked: Counter[str] = sum((server.by_sample for server in servers), Counter())
+    assert len(asked) == 120
+    # What one loses may come to the next before that dies.
+    assert sum(asked.values()) - 120 <= 120
+    assert sum(asked.values()) <= sum(a.attempts for a in answers if isinstance(a, Reply))
+    gone = {text.partition(" cannot")[0] for text in told if "cannot be reached" in text}
+    assert len(gone) == 3
+
+
+@pytest.mark.parametrize("route", ["direct", "openai"])
+def test_a_server_that_restarts_loses_nothing_over_a_real_wire(route: str) -> None:
+    server = ROUTES[route].server(Faults(latency_s=0.02))
+    policy = RetryPolicy(base_s=0.01, max_wait_s=0.05)
+
+    async def main() -> list[object]:
+        runner, port = await start(server, 0)
+        config = ROUTES[route].config(f"http://127.0.0.1:{port}", max_concurrency=8)
+        model = make_model(config, policy=policy)
+        asking = asyncio.create_task(answers_of(model, *names(60)))
+        while server.ended["ok"] < 20:
+            await asyncio.sleep(0.005)
+        await runner.cleanup()
+        # Each sample would use up its eight attempts in this time.
+        await asyncio.sleep(0.5)
+        runner, _ = await start(server, port)
+        answers = await asking
+        await model.aclose()
+        await runner.cleanup()
+        return answers
+
+    assert [type(answer) for answer in run(main)] == [Reply] * 60
+
+
+@pytest.mark.parametrize("route", ["direct", "openai"])
+def test_servers_that_are_all_gone_for_good_stop_the_model(route: str) -> None:
+    config = at("http://127.0.0.1:9", "http://127.0.0.1:10", max_concurrency=4, route=route)
+    answers = ask(make_model(config, policy=QUICK), *map(make_request, names(50)))
+    assert {type(answer) for answer in answers} == {UnavailableError}
+    assert "could not be reached" in str(answers[0])
+    assert "all 2 servers" in str(answers[0])
+
+
+def test_a_server_that_refuses_everything_is_left_out_and_the_last_one_stops_the_model() -> None:
+    told: list[str] = []
+    wrong, right = OpenAIChat(Faults(mode="404")), OpenAIChat()
+    with Running(wrong) as first, Running(right) as second:
+        config = at(first.url, second.url, max_concurrency=4)
+        replies = ask(make_model(config, told=told), *map(make_request, names(30)))
+        assert [type(reply) for reply in replies] == [Reply] * 30
+        assert right.ended == {"ok": 30}
+        assert wrong.requests <= 4
+        (text,) = told
+        assert text.startswith(f"{first.url} is asked no more: ")
+        right.faults = Faults(mode="404")
+        stopped = ask(make_model(config), *map(make_request, names(30)))
+    assert {type(answer) for answer in stopped} == {UnavailableError}
+    assert wrong.requests + right.ended["404"] <= 3 * 4
+
+
+def test_a_failure_counts_as_an_attempt_wherever_it_happened() -> None:
+    with ExitStack() as stack:
+        servers = [OpenAIChat(Faults(mode="500")) for _ in range(3)]
+        urls = [stack.enter_context(Running(server)).url for server in servers]
+        (answer,) = ask(make_model(at(*urls), policy=QUICK), make_request())
+    assert isinstance(answer, RetryableError)
+    assert sum(server.requests for server in servers) == QUICK.attempts
+    assert all(server.requests >= 2 for server in servers)
+
+
+@pytest.mark.parametrize("page", ["html", "cut", "empty"])
+def test_who_never_gives_a_reply_that_can_be_read_is_asked_no_more(page: str) -> None:
+    told: list[str] = []
+    wrong, right = OpenAIChat(Faults(mode=page)), OpenAIChat()
+    few = QUICK.max_connection_failures + 10
+    with Running(wrong) as first, Running(right) as second:
+        alone = ask(make_model(at(first.url, max_concurrency=3)), *map(make_request, names(30)))
+        assert wrong.requests <= few
+        beside = at(first.url, second.url, max_concurrency=4)
+        answers = ask(make_model(beside, told=told), *map(make_request, names(60)))
+        assert wrong.requests <= 2 * few
+        # One that has given a reply is there, whatever follows.
+        wrong.faults = Faults()
+        model = make_model(at(first.url))
+
+        async def main() -> list[object]:
+            first_of_all = await answers_of(model, "first")
+            wrong.faults = Faults(mode=page)
+            answers = first_of_all + await answers_of(model, *names(4))
+            await model.aclose()
+            return answers
+
+        later = run(main)
+    assert {type(answer) for answer in alone} <= {RetryableError, UnavailableError}
+    assert f"{first.url} never gave a reply that can be read, " in str(alone[-1])
+    assert [type(answer) for answer in answers] == [Reply] * 60
+    assert told[0].startswith(f"{first.url} gives no reply that can be read, trying now and then")
+    assert [type(answer) for answer in later] == [Reply, *[RetryableError] * 4]
+
+
+class SlowAtHead(OpenAIChat):
+    """Never answers about the scenes whose names begin with "slow"."""
+
+    async def _end(self, seen: Seen, ending: str, request: web.Request) -> web.StreamResponse:
+        is_slow = any(isinstance(part, str) and "Scene slow" in part for part in seen.parts)
+        return await super()._end(seen, "slow" if is_slow else ending, request)
+
+
+@pytest.mark.parametrize("route", ["direct", "openai"])
+def test_slow_requests_at_the_head_end_alone_and_the_rest_goes_on(route: str) -> None:
+    asked = [f"slow {n}" for n in range(8)] + names(12)
+    with Running(SlowAtHead()) as running:
+        policy = RetryPolicy(2, 0.0, base_s=0.001, max_wait_s=0.002)
+        config = ROUTES[route].config(running.url, timeout_s=0.5, max_concurrency=8)
+        answers = ask(make_model(config, policy=policy), *map(make_request, asked))
+    assert [type(answer) for answer in answers] == [RetryableError] * 8 + [Reply] * 12
