@@ -1,4 +1,4 @@
-"""Steps and blocks as the rigid bodies that are scored."""
+"""Records of plans with poses, their judgement by geometry and physics, and what is counted."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import threading
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from phyblock.domain import (
     BlockType,
     Candidate,
     CandidateSet,
-    Euler,
     Plan,
     PosePlan,
     PoseStep,
@@ -29,6 +28,8 @@ from phyblock.domain import (
 from phyblock.parsing.poses import ParsedPoses, parse_poses, pose_form
 from phyblock.parsing.structured import AnswerForm
 from phyblock.parsing.text import READER_VERSION
+from phyblock.records.line import Amount, Line, Whole
+from phyblock.records.record import Course, Record
 from phyblock.scoring.plan import AssemblyScorer, Score
 from phyblock.scoring.pose import (
     POSE_ERRORS,
@@ -46,25 +47,19 @@ from phyblock.scoring.pose_matching import TOLERANCES_CM, TURN_TOLERANCE_DEG
 from phyblock.sim.balance import MARGIN_M, is_balanced
 from phyblock.sim.contact import voxel_iou
 from phyblock.sim.dynamics import (
-    DEFAULT_TRIAL,
     ExecutedStep,
-    Execution,
     ExecutionLimits,
-    depth_cm,
-    end_of,
     execute,
     groups,
-    moved_between,
     settle,
 )
 from phyblock.sim.engine import Pose, described_engine
 from phyblock.sim.geometry import center_cm, collision_pieces, origin_m, put
 from phyblock.stable import plain_sum
 from phyblock.tables.measures import SampleCounts
-from phyblock.tracks.plans import score_fields
+from phyblock.tracks.plans import PLAN_COLUMNS, PlanParse, plan_row, score_fields
 from phyblock.tracks.showing import file_plan
 from phyblock.types import (
-    REFUSED_ENDS,
     SETTINGS,
     STEP_ENDS,
     AnswerFormat,
@@ -75,17 +70,135 @@ from phyblock.types import (
 )
 
 
-@functools.cache
-def pieces_of(block_type: BlockType) -> tuple[Piece, ...]:
-    """The convex pieces of a block in its body frame."""
-    return tuple(Piece(p.vertices_m, p.face_normals) for p in collision_pieces(block_type))
+class GivenStep(Line):
+    """A step as it was read."""
+
+    block: int
+    """Number of the candidate, as it was shown."""
+    center_cm: tuple[Amount, Amount, Amount]
+    """x, y and z of the middle of the block's box [cm]."""
+    euler_deg: tuple[Amount, Amount, Amount] | None = None
+    """Its rotation, extrinsic x-y-z angles [degrees]; null: as the candidate is shown."""
 
 
-def laid(step: PoseStep, candidate: Candidate) -> Laid:
-    """A step as a rigid body; without a rotation of its own it has that of its candidate."""
-    euler = candidate.euler_deg if step.euler_deg is None else step.euler_deg
-    place = origin_m(candidate.type, euler, step.center_cm)
-    return Laid(step.candidate, place, euler)
+class PoseParse(PlanParse):
+    """The plan with poses that was read in a reply; `plan` leaves out numbers that no candidate
+    has.
+    """
+
+    steps: tuple[GivenStep, ...] = ()
+    """The steps with their poses, those included that name no candidate."""
+
+
+class CarryTolerances(Line):
+    """By what a plan was judged when it was carried out."""
+
+    overlap_cm: Amount
+    """Farthest that a block was moved out of others [cm]."""
+    stand_cm: Amount
+    """Farthest that a block moved and still stood [cm]."""
+    stand_deg: Amount
+    """Farthest that it turned [degrees]."""
+    reached_cm: Amount
+    """Farthest from its place that a block of the goal was reached [cm]."""
+    reached_deg: Amount
+    """Farthest that it was turned [degrees]."""
+
+
+class RestingBlock(Line):
+    """Where a block came to lie."""
+
+    step: Whole
+    """Number of the step, from 1, that put it."""
+    center_cm: tuple[Amount, Amount, Amount]
+    """x, y and z of the middle of its box [cm]."""
+    euler_deg: tuple[Amount, Amount, Amount]
+    """Its rotation, extrinsic x-y-z angles [degrees]."""
+
+
+class StepOutcome(Line):
+    """What a step is worth by geometry, and how it ended when it was carried out."""
+
+    vertex: Whole | None
+    """The goal block, from 0, that it stands for; null: none."""
+    position_cm: Amount | None = None
+    """How far its center of mass is from that block's [cm]."""
+    sideways_cm: Amount | None = None
+    """The same over the floor [cm]."""
+    up_cm: Amount | None = None
+    """The same in height, above zero where it is too high [cm]."""
+    turn_deg: Amount | None = None
+    """How far it is turned, up to the block's symmetry [degrees]."""
+    iou: Amount | None = None
+    """Volume that both share, of the volume of both together."""
+    end: StepEnd
+    """How it ended."""
+    moved_cm: Amount = 0.0
+    """How far the block came to lie from where it was to be [cm]."""
+    turned_deg: Amount = 0.0
+    """How far it was turned [degrees]."""
+    gap_cm: Amount = 0.0
+    """How far it was above what it would fall on when it was let go [cm]."""
+    overlap_cm: Amount = 0.0
+    """How far it was moved out of others, or how deep it was refused [cm]."""
+    knocked: tuple[Whole, ...] = ()
+    """Numbers of the steps, from 1, whose blocks it moved."""
+    error: PoseError | None = None
+    """What was wrong, null where nothing was."""
+    rests: tuple[RestingBlock, ...] | None = None
+    """The blocks that lie elsewhere after it than before, its own than where it was put, by more
+    than 1 mm or 1 degree; null: not kept."""
+
+
+class PoseOutcome(Line):
+    """What a plan with poses is worth."""
+
+    rotation: PoseRotation
+    """Whether candidates keep their orientation or steps bring one."""
+    right: dict[str, tuple[Whole, ...]]
+    """By frame, `absolute` or `aligned`: right steps within 0.5, 1, 2 and 4 cm."""
+    shift_cm: tuple[Amount, Amount]
+    """The shift that aligns it, after the turn [cm]."""
+    turn_deg: Amount
+    """The turn about the vertical that aligns it [degrees]."""
+    steps: tuple[StepOutcome, ...]
+    """What became of each step."""
+    reached: Whole
+    """Blocks of the goal that stand where they should in the end."""
+    iou: Amount
+    """Intersection over union of all that stands and the goal, in voxels of 5 mm by 64 points."""
+    completed: bool
+    """Whether all of the goal was reached, and nothing else lies about."""
+    limits: CarryTolerances
+    """The tolerances."""
+    engine: str
+    """The physics engine, with its version."""
+
+
+class PoseRecord(Record):
+    """A plan with poses for a scene."""
+
+    track: Literal["pose_planning"]
+    """`pose_planning`."""
+    parse: PoseParse | None = None
+    """The plan that was read."""
+    pose: PoseOutcome | None = None
+    """What it is worth."""
+
+    columns: ClassVar[Mapping[str, str]] = PLAN_COLUMNS
+
+    def row(self) -> Mapping[str, Any]:
+        """The plan in both numberings."""
+        return plan_row(self.parse, self.shown)
+
+    def course(self, matcher: str) -> Course | None:
+        """What was wrong with each step, and how many blocks of the goal were not reached."""
+        if self.pose is None or self.parse is None:
+            return super().course(matcher)
+        names = (str(step.block) for step in self.parse.steps)
+        errors = (step.error for step in self.pose.steps)
+        blocks = next((score.tp + score.fn for score in self.scores), self.pose.reached)
+        return Course(tuple(zip(names, errors, strict=True)), blocks - self.pose.reached)
 
 
 def _right(_: Any, judged: Any) -> tuple[int, ...]:
@@ -104,7 +217,7 @@ def _fits(_: Any, judged: Any) -> tuple[float, ...]:
     )
 
 
-def _carried(_: Any, judged: Any) -> tuple[float, ...]:
+def _carried_counts(_: Any, judged: Any) -> tuple[float, ...]:
     ended = judged.ended
     ends = Counter(step.end for step in ended.steps)
     whole = (ended.reached, judged.poses[0].n_blocks, ended.iou, ended.completed, 1)
@@ -136,7 +249,7 @@ FITS = SampleCounts("fits", ("position_cm", "turn_deg", "iou", "n"), sample=_fit
 CARRIED = SampleCounts(
     "carried",
     (*STEP_ENDS, "steps", "reached", "blocks", "iou", "completed", "plans"),
-    sample=_carried,
+    sample=_carried_counts,
 )
 ERRORS = SampleCounts("pose_errors", (*POSE_ERRORS, "steps"), sample=_errors)
 PLANS = {setting: _plan(setting) for setting in SETTINGS}
@@ -144,45 +257,39 @@ COUNTED = (RIGHT, FITS, CARRIED, ERRORS, *PLANS.values())
 
 
 _STILL_M, _STILL_DEG = 0.001, 1.0
-"""Within these, what was said of a block before is still true."""
-_DIGITS = 2
-
-
-@dataclass(frozen=True)
-class Rest:
-    """Where the block of a step, from 1, came to lie: the middle of its box [cm], its rotation."""
-
-    step: int
-    center_cm: tuple[float, float, float]
-    euler_deg: Euler
+"""A block that moved by no more lies where it did before."""
 
 
 def rests_of(
     put: Sequence[Block | None], worlds: Sequence[Sequence[Block]]
-) -> tuple[tuple[Rest, ...], ...]:
-    """For each step the blocks that lie elsewhere after it than before, its own than where it was
-    put, by more than 1 mm or 1 degree.
+) -> tuple[tuple[RestingBlock, ...], ...]:
+    """Return for each step the blocks that lie elsewhere after it than before, its own than where
+    it was put, by more than 1 mm or 1 degree.
 
     `worlds` are the blocks after each step, with the numbers of their steps as orders.
     """
-    return tuple(_moved(put, worlds))
-
-
-def _moved(
-    put: Sequence[Block | None], worlds: Sequence[Sequence[Block]]
-) -> Iterator[tuple[Rest, ...]]:
-    known = {number: block for number, block in enumerate(put, 1) if block is not None}
+    poses = {n: Pose.goal(block) for n, block in enumerate(put, 1) if block is not None}
+    rests = []
     for world in worlds:
-        moved = [block for block in world if not _is_still(known[block.order], block)]
-        known |= {block.order: block for block in moved}
-        yield tuple(_rest(block) for block in moved)
+        moved = []
+        for block in world:
+            before, after = poses[block.order], Pose.goal(block)
+            if before.distance_m(after) > _STILL_M or before.angle_deg(after) > _STILL_DEG:
+                poses[block.order] = after
+                x, y, z = (round(part, 2) + 0.0 for part in center_cm(block))
+                rest = RestingBlock(
+                    step=block.order, center_cm=(x, y, z), euler_deg=block.euler_deg
+                )
+                moved.append(rest)
+        rests.append(tuple(moved))
+    return tuple(rests)
 
 
 def worlds_of(
-    put: Sequence[Block | None], stays: Sequence[bool], rests: Sequence[Sequence[Rest]]
+    put: Sequence[Block | None], stays: Sequence[bool], rests: Sequence[Sequence[RestingBlock]]
 ) -> tuple[tuple[Block, ...], ...]:
-    """The blocks after each step, to within 1 mm and 1 degree; `stays` says whose block was not
-    refused.
+    """Return the blocks after each step, to within 1 mm and 1 degree; `stays` says whose block was
+    not refused.
     """
     lying: dict[int, Block] = {}
     worlds = []
@@ -190,148 +297,286 @@ def worlds_of(
         if block is not None and is_put:
             lying[number] = replace(block, order=number)
         for rest in moved:
-            lying[rest.step] = _lying(lying[rest.step], rest)
+            one = lying[rest.step]
+            place = origin_m(one.type, rest.euler_deg, rest.center_cm)
+            lying[rest.step] = replace(one, position_m=place, euler_deg=rest.euler_deg)
         worlds.append(tuple(lying.values()))
     return tuple(worlds)
 
 
-def _is_still(before: Block, after: Block) -> bool:
-    start, end = Pose.goal(before), Pose.goal(after)
-    return start.distance_m(end) <= _STILL_M and start.angle_deg(end) <= _STILL_DEG
+CARRY_VERSION = 2
+"""Version of how plans are carried out and of how what stands in the end is measured; it goes up
+where some plan may end otherwise. Before 2 everything in the world was let go together, for 5 s
+where it crept, and voxels were whole or empty.
+"""
+_ONE_AT_A_TIME = threading.Lock()
+_KEPT = 32
+_DIGITS = 4
+_PARSER = "poses"
 
 
-def _rest(block: Block) -> Rest:
-    x, y, z = (round(part, _DIGITS) + 0.0 for part in center_cm(block))
-    return Rest(block.order, (x, y, z), block.euler_deg)
+@dataclass(frozen=True)
+class PoseRules:
+    """How replies are read, scored and carried out; the first matcher is the headline."""
 
+    rotation: PoseRotation
+    settings: tuple[Setting, ...]
+    matchers: tuple[Matcher, ...]
+    limits: ExecutionLimits
+    reached_cm: float
+    reached_deg: float
+    answer_format: AnswerFormat = "text"
 
-def _lying(block: Block, rest: Rest) -> Block:
-    place = origin_m(block.type, rest.euler_deg, rest.center_cm)
-    return replace(block, position_m=place, euler_deg=rest.euler_deg)
+    @property
+    def is_free(self) -> bool:
+        """Whether steps bring a rotation."""
+        return self.rotation == "free"
 
+    @property
+    def told(self) -> dict[str, float]:
+        """The tolerances of what is carried out, as records tell them."""
+        return {
+            **asdict(self.limits),
+            "reached_cm": self.reached_cm,
+            "reached_deg": self.reached_deg,
+        }
 
-_CM = 100.0
-_DIGITS_ENDED, _IOU_DIGITS = 3, 4
-_SLACK_CM, _SLACK_DEG, _SLACK_IOU = 0.2, 2.0, 0.15
-_SET_BACK_CM = DEFAULT_TRIAL.limit_m * _CM + _SLACK_CM
-_SET_BACK_DEG = DEFAULT_TRIAL.limit_deg + _SLACK_DEG
-"""Where all stands, blocks are set back by up to this much, and their steps tell from where."""
+    def form(self, item: AssemblyTask) -> AnswerForm[Any] | None:
+        """The form in which a plan for a scene is asked for; None where that is text."""
+        if self.answer_format == "text":
+            return None
+        return pose_form(len(item.candidates), free=self.is_free)
 
 
 @dataclass(frozen=True)
 class Ended:
-    """What became of a plan that was carried out: its steps, what each of them moved (None where
-    that was not kept), the blocks of the goal that were reached, all that stands beside the goal,
-    whether that is the whole goal and nothing else, and the engine with its version.
+    """Result of a plan that was executed: its steps, the blocks that each of them moved (None where
+    that was not kept), the blocks of the goal that were reached, the IoU of all that stands with
+    the goal, True if that is the whole goal and nothing else, and the engine with its version.
     """
 
     steps: tuple[ExecutedStep, ...]
-    rests: tuple[tuple[Rest, ...] | None, ...]
+    rests: tuple[tuple[RestingBlock, ...] | None, ...]
     reached: int
     iou: float
     completed: bool
     engine: str
 
 
-def borne_out(
-    put: Sequence[Block | None],
-    goal: Sequence[Block],
-    ended: Ended,
-    limits: ExecutionLimits,
-    reached: tuple[float, float],
-) -> Ended:
-    """What became of a plan, where it was kept what each step moved; as it was said where not.
+@dataclass(frozen=True)
+class PoseJudgement:
+    """What a reply was read as, and what that is worth.
 
-    `put` are the blocks as steps put them; `reached` says how near [cm, degrees] to its place a
-    block of the goal is reached.
+    `fits` and `errors` have an entry for each step that was read, `kept` are those that name a
+    candidate.
     """
-    rests = [step for step in ended.rests if step is not None]
-    if len(rests) != len(put) or len(ended.steps) != len(put):
-        return ended
-    ends = [_refused(block, step, limits) for block, step in zip(put, ended.steps, strict=True)]
-    stays = [step.end not in REFUSED_ENDS for step in ends]
-    moved = _lying_alone(stays, rests)
-    worlds = worlds_of(put, stays, moved)
+
+    parsed: ParsedPoses
+    kept: tuple[PoseStep, ...]
+    in_file: tuple[int, ...] | None
+    scores: tuple[Score, ...]
+    poses: tuple[PoseScore, ...]
+    fits: tuple[PoseFit | None, ...]
+    errors: tuple[PoseError | None, ...]
+    ended: Ended
+    rules: PoseRules
+
+    @property
+    def steps(self) -> tuple[int, ...]:
+        """The candidates that were named, in order."""
+        return tuple(step.candidate for step in self.kept)
+
+    @property
+    def is_read(self) -> bool:
+        """Whether a rule matched."""
+        return self.parsed.rule is not None
+
+    def fields(self) -> dict[str, Any]:
+        """`parse`, `scores` and `pose` of the record (docs/results.md)."""
+        given = self.parsed.plan.steps
+        kept = set(self.kept)
+        dropped = [step.candidate for step in given if step not in kept]
+        return {
+            "parse": {
+                "parser": _PARSER,
+                "rule": self.parsed.rule,
+                "plan": list(self.steps),
+                "file_plan": self.in_file,
+                "dropped": dropped,
+                "version": READER_VERSION,
+                "problem": self.parsed.problem,
+                "steps": [_given(step) for step in given],
+            },
+            "scores": [score_fields(score) for score in self.scores],
+            "pose": self._outcome(),
+        }
+
+    def _outcome(self) -> dict[str, Any]:
+        motion = self.poses[-1].motion
+        whole = zip(self.fits, self.ended.steps, self.ended.rests, self.errors, strict=True)
+        return {
+            "rotation": self.rules.rotation,
+            "right": {score.frame: list(score.right) for score in self.poses},
+            "shift_cm": [round(part, _DIGITS) + 0.0 for part in motion.shift_cm],
+            "turn_deg": round(math.degrees(motion.turn_rad), _DIGITS) + 0.0,
+            "steps": [_step_fields(*step) for step in whole],
+            "reached": self.ended.reached,
+            "iou": self.ended.iou,
+            "completed": self.ended.completed,
+            "limits": self.rules.told,
+            "engine": self.ended.engine,
+        }
+
+
+def judge_poses(
+    item: AssemblyTask, text: str | None, rules: PoseRules, earlier: PoseRecord | None = None
+) -> PoseJudgement:
+    """Read, score and carry out a reply; None, where there is no reply, is an empty plan.
+
+    A plan that an `earlier` record holds, executed with the same tolerances, ended as it did.
+    """
+    parsed = ParsedPoses(PosePlan(), None)
+    if text is not None:
+        parsed = parse_poses(text, len(item.candidates), free=rules.is_free)
+    given = parsed.plan.steps
+    n = len(item.candidates)
+    kept = tuple(step for step in given if 1 <= step.candidate <= n)
+    scorer = _scorer(item.scene, item.candidates, "B" if rules.is_free else "A")
+    poses = scorer.score([laid(step, item.candidates[step.candidate]) for step in kept])
+    blocks = [put(step, item.candidates) for step in given]
+    ended = _ended_before(earlier, given, rules) or _carried(item, blocks, rules)
+    found = iter(poses[0].fits)
+    fits = tuple(next(found) if 1 <= step.candidate <= n else None for step in given)
+    numbers, ends = [step.candidate for step in given], [step.end for step in ended.steps]
+    return PoseJudgement(
+        parsed,
+        kept,
+        file_plan(item, [step.candidate for step in kept]),
+        _plan_scores(item, kept, rules),
+        poses,
+        fits,
+        pose_errors(scorer.goal, numbers, fits, ends),
+        ended,
+        rules,
+    )
+
+
+def _ended_before(
+    record: PoseRecord | None, given: Sequence[PoseStep], rules: PoseRules
+) -> Ended | None:
+    """Return the result that a record holds of the same steps under the same rules, else None."""
+    if record is None or record.pose is None or record.parse is None:
+        return None
+    pose = record.pose
+    known = [PoseStep(s.block, s.center_cm, s.euler_deg) for s in record.parse.steps]
+    if (known, pose.limits.fields()) != (list(given), rules.told) or len(pose.steps) != len(given):
+        return None
     steps = tuple(
-        _step(step, number, put[number - 1], worlds[:number][-2:], limits)
-        for number, step in enumerate(ends, 1)
+        ExecutedStep(s.end, s.moved_cm, s.turned_deg, s.gap_cm, s.overlap_cm, s.knocked)
+        for s in pose.steps
     )
-    world = worlds[-1] if worlds else ()
-    cm, deg = reached
-    near, far = (
-        blocks_reached(goal, world, max(0.0, cm + by * _SLACK_CM), max(0.0, deg + by * _SLACK_DEG))
-        for by in (-1, 1)
-    )
-    count = ended.reached
-    if not near <= count <= far:
-        count = blocks_reached(goal, world, cm, deg)
-    iou, by_rests = ended.iou, voxel_iou(goal, world)
-    if abs(iou - by_rests) > _SLACK_IOU:
-        iou = round(by_rests, _IOU_DIGITS)
-    return Ended(steps, moved, count, iou, count == len(goal) == len(world), ended.engine)
+    rests = tuple(step.rests for step in pose.steps)
+    return Ended(steps, rests, pose.reached, pose.iou, pose.completed, pose.engine)
 
 
-def _lying_alone(
-    stays: Sequence[bool], rests: Sequence[Sequence[Rest]]
-) -> tuple[tuple[Rest, ...], ...]:
-    """What each step moved, without blocks that were not there."""
-    return tuple(
-        tuple(rest for rest in moved if 1 <= rest.step <= number and stays[rest.step - 1])
-        for number, moved in enumerate(rests, 1)
-    )
+def _carried(item: AssemblyTask, blocks: Sequence[Block | None], rules: PoseRules) -> Ended:
+    # An engine has no more than one plan at a time, whichever thread asks.
+    with _ONE_AT_A_TIME:
+        done = execute(blocks, rules.limits)
+    goal = item.scene.blocks
+    reached = blocks_reached(goal, done.blocks, rules.reached_cm, rules.reached_deg)
+    is_whole = reached == len(goal) == len(done.blocks)
+    iou = round(voxel_iou(goal, done.blocks), _DIGITS)
+    rests = rests_of(blocks, done.worlds)
+    return Ended(done.steps, rests, reached, iou, is_whole, described_engine())
 
 
-def _refused(block: Block | None, step: ExecutedStep, limits: ExecutionLimits) -> ExecutedStep:
-    """The step, refused where there is no block or no room above the floor, and only there."""
-    end: StepEnd = "overlaps" if step.end == "overlaps" else "stands"
-    if block is None:
-        end = "no_block"
-    elif depth_cm(block) > limits.overlap_cm:
-        end = "under_floor"
-    is_alike = end == step.end or (end == "stands" and step.end not in REFUSED_ENDS)
-    return step if is_alike else replace(step, end=end)
+@functools.cache
+def pieces_of(block_type: BlockType) -> tuple[Piece, ...]:
+    """Return the convex pieces of a block in its body frame."""
+    return tuple(Piece(p.vertices_m, p.face_normals) for p in collision_pieces(block_type))
 
 
-def _step(
-    step: ExecutedStep,
-    number: int,
-    block: Block | None,
-    worlds: Sequence[Sequence[Block]],
-    limits: ExecutionLimits,
-) -> ExecutedStep:
-    """How a step ended, by the worlds before and after it, of which the first is left out."""
-    if block is None or step.end in REFUSED_ENDS:
-        return step
-    before = _poses(worlds[0]) if len(worlds) > 1 else {}
-    after = _poses(worlds[-1])
-    way = moved_between(Pose.goal(block), after[number])
-    ways = {order: moved_between(pose, after[order]) for order, pose in before.items()}
-    knocked = tuple(
-        order for order, far in ways.items() if _is_past(far, order in step.knocked, limits)
-    )
-    is_past = _is_past(way, step.end != "stands", limits)
-    end = end_of(knocked, not is_past)
-    told = {}
-    if abs(step.moved_cm - way[0]) > _SET_BACK_CM:
-        told["moved_cm"] = round(way[0], _DIGITS_ENDED)
-    if abs(step.turned_deg - way[1]) > _SET_BACK_DEG:
-        told["turned_deg"] = round(way[1], _DIGITS_ENDED)
-    return replace(step, end=end, knocked=knocked, **told)
+def laid(step: PoseStep, candidate: Candidate) -> Laid:
+    """Return a step as a rigid body; without a rotation of its own it has its candidate's."""
+    euler = candidate.euler_deg if step.euler_deg is None else step.euler_deg
+    return Laid(step.candidate, origin_m(candidate.type, euler, step.center_cm), euler)
 
 
-def _poses(world: Sequence[Block]) -> Mapping[int, Pose]:
-    return {block.order: Pose.goal(block) for block in world}
+@functools.lru_cache(maxsize=_KEPT)
+def _scorer(scene: Scene, candidates: CandidateSet, setting: Setting) -> PoseScorer:
+    return PoseScorer(scene, candidates, setting, pieces_of)
 
 
-def _is_past(way: tuple[float, float], said: bool, limits: ExecutionLimits) -> bool:
-    """Whether a block moved past the limits of standing; as it was said where that is near."""
-    allowed = (limits.stand_cm, limits.stand_deg)
-    slack = (_SET_BACK_CM, _SET_BACK_DEG)
-    if any(far > most + by for far, most, by in zip(way, allowed, slack, strict=True)):
-        return True
-    if all(far <= most - by for far, most, by in zip(way, allowed, slack, strict=True)):
-        return False
-    return said
+def _plan_scores(
+    item: AssemblyTask, kept: Sequence[PoseStep], rules: PoseRules
+) -> tuple[Score, ...]:
+    """The plan without its poses, under every setting and matcher."""
+    numbers, candidates = [step.candidate for step in kept], item.candidates
+    if rules.is_free:
+        numbers, candidates = _as_candidates(item, kept)
+    scorer = AssemblyScorer(item.scene, candidates, rules.settings)
+    return scorer.score(Plan(tuple(numbers)), rules.matchers, None)
+
+
+def _as_candidates(item: AssemblyTask, kept: Sequence[PoseStep]) -> tuple[list[int], CandidateSet]:
+    """Steps with rotations as candidates that are turned so.
+
+    One that is within the tolerance of how some block of the goal is turned is turned just so.
+    """
+    numbers: list[int] = []
+    found: dict[Candidate, int] = {}
+    for step in kept:
+        one = item.candidates[step.candidate]
+        turned = replace(one, euler_deg=step.euler_deg or one.euler_deg)
+        near = [
+            (_apart_deg(turned, block.euler_deg), place, block.euler_deg)
+            for place, block in enumerate(item.scene.blocks)
+            if block.kind == one.kind
+        ]
+        if near and min(near)[0] <= TURN_TOLERANCE_DEG:
+            turned = replace(one, euler_deg=min(near)[2])
+        numbers.append(found.setdefault(turned, len(found) + 1))
+    return numbers, CandidateSet(tuple(found))
+
+
+def _apart_deg(one: Candidate, euler_deg: tuple[float, float, float]) -> float:
+    rotations = [np.array(euler_deg_to_matrix(euler)) for euler in (one.euler_deg, euler_deg)]
+    return turn_deg(one.type, rotations[0], rotations[1])
+
+
+def _given(step: PoseStep) -> dict[str, Any]:
+    turned = {} if step.euler_deg is None else {"euler_deg": list(step.euler_deg)}
+    return {"block": step.candidate, "center_cm": list(step.center_cm), **turned}
+
+
+def _step_fields(
+    fit: PoseFit | None,
+    end: ExecutedStep,
+    rests: tuple[RestingBlock, ...] | None,
+    error: PoseError | None,
+) -> dict[str, Any]:
+    told: dict[str, Any] = {"vertex": None}
+    if fit is not None:
+        told = {
+            "vertex": fit.vertex,
+            "position_cm": fit.position_cm,
+            "sideways_cm": fit.sideways_cm,
+            "up_cm": fit.up_cm,
+            "turn_deg": fit.turn_deg,
+            "iou": fit.iou,
+        }
+    return {
+        **told,
+        "end": end.end,
+        "moved_cm": end.moved_cm,
+        "turned_deg": end.turned_deg,
+        "gap_cm": end.gap_cm,
+        "overlap_cm": end.overlap_cm,
+        "knocked": list(end.knocked),
+        "error": error,
+        **({} if rests is None else {"rests": [rest.fields() for rest in rests]}),
+    }
 
 
 _MOST_TRIED = 200
@@ -393,252 +638,3 @@ class _Search:
         """The blocks that hang together with the last one."""
         blocks = [replace(self._blocks[v], order=place) for place, v in enumerate(order)]
         return next(group for group in groups(blocks) if blocks[-1] in group)
-
-
-CARRY_VERSION = 2
-"""Version of how plans are carried out and of how what stands in the end is measured; it goes up
-where some plan may end otherwise. Before 2 everything in the world was let go together, for 5 s
-where it crept, and voxels were whole or empty.
-"""
-_ONE_AT_A_TIME = threading.Lock()
-_KEPT = 32
-_DIGITS_JUDGING = 4
-_PARSER = "poses"
-
-
-@dataclass(frozen=True)
-class PoseRules:
-    """How replies are read, scored and carried out; the first matcher is the headline."""
-
-    rotation: PoseRotation
-    settings: tuple[Setting, ...]
-    matchers: tuple[Matcher, ...]
-    limits: ExecutionLimits
-    reached_cm: float
-    reached_deg: float
-    answer_format: AnswerFormat = "text"
-
-    @property
-    def is_free(self) -> bool:
-        """Whether steps bring a rotation."""
-        return self.rotation == "free"
-
-    @property
-    def told(self) -> dict[str, float]:
-        """The tolerances of what is carried out, as records tell them."""
-        return {
-            **asdict(self.limits),
-            "reached_cm": self.reached_cm,
-            "reached_deg": self.reached_deg,
-        }
-
-    def form(self, item: AssemblyTask) -> AnswerForm[Any] | None:
-        """The form in which a plan for a scene is asked for; None where that is text."""
-        if self.answer_format == "text":
-            return None
-        return pose_form(len(item.candidates), free=self.is_free)
-
-
-@dataclass(frozen=True)
-class Earlier:
-    """A plan that was carried out before, by which tolerances, and what became of it."""
-
-    steps: tuple[PoseStep, ...]
-    limits: Mapping[str, float]
-    ended: Ended
-
-    def is_of(self, steps: Sequence[PoseStep], rules: PoseRules) -> bool:
-        """Whether this is what became of these steps under these rules."""
-        is_whole = len(self.ended.steps) == len(steps)
-        return is_whole and (self.steps, self.limits) == (tuple(steps), rules.told)
-
-
-@dataclass(frozen=True)
-class PoseJudgement:
-    """What a reply was read as, and what that is worth.
-
-    `fits` and `errors` have an entry for each step that was read, `kept` are those that name a
-    candidate.
-    """
-
-    parsed: ParsedPoses
-    kept: tuple[PoseStep, ...]
-    in_file: tuple[int, ...] | None
-    scores: tuple[Score, ...]
-    poses: tuple[PoseScore, ...]
-    fits: tuple[PoseFit | None, ...]
-    errors: tuple[PoseError | None, ...]
-    ended: Ended
-    rules: PoseRules
-
-    @property
-    def steps(self) -> tuple[int, ...]:
-        """The candidates that were named, in order."""
-        return tuple(step.candidate for step in self.kept)
-
-    @property
-    def is_read(self) -> bool:
-        """Whether a rule matched."""
-        return self.parsed.rule is not None
-
-    def fields(self) -> dict[str, Any]:
-        """`parse`, `scores` and `pose` of the record (docs/results.md)."""
-        given = self.parsed.plan.steps
-        kept = set(self.kept)
-        dropped = [step.candidate for step in given if step not in kept]
-        return {
-            "parse": {
-                "parser": _PARSER,
-                "rule": self.parsed.rule,
-                "plan": list(self.steps),
-                "file_plan": self.in_file,
-                "dropped": dropped,
-                "version": READER_VERSION,
-                "problem": self.parsed.problem,
-                "steps": [_given(step) for step in given],
-            },
-            "scores": [score_fields(score) for score in self.scores],
-            "pose": self._outcome(),
-        }
-
-    def _outcome(self) -> dict[str, Any]:
-        motion = self.poses[-1].motion
-        whole = zip(self.fits, self.ended.steps, self.ended.rests, self.errors, strict=True)
-        return {
-            "rotation": self.rules.rotation,
-            "right": {score.frame: list(score.right) for score in self.poses},
-            "shift_cm": [round(part, _DIGITS_JUDGING) + 0.0 for part in motion.shift_cm],
-            "turn_deg": round(math.degrees(motion.turn_rad), _DIGITS_JUDGING) + 0.0,
-            "steps": [_step_judging(*step) for step in whole],
-            "reached": self.ended.reached,
-            "iou": self.ended.iou,
-            "completed": self.ended.completed,
-            "limits": self.rules.told,
-            "engine": self.ended.engine,
-        }
-
-
-def judge_poses(
-    item: AssemblyTask, text: str | None, rules: PoseRules, earlier: Earlier | None = None
-) -> PoseJudgement:
-    """Read, score and carry out a reply; None, where there is no reply, is an empty plan.
-
-    A plan that is the `earlier` one ended as it did, as far as that is borne out by where its
-    blocks came to lie.
-    """
-    parsed = ParsedPoses(PosePlan(), None)
-    if text is not None:
-        parsed = parse_poses(text, len(item.candidates), free=rules.is_free)
-    given = parsed.plan.steps
-    n = len(item.candidates)
-    kept = tuple(step for step in given if 1 <= step.candidate <= n)
-    scorer = _scorer(item.scene, item.candidates, "B" if rules.is_free else "A")
-    poses = scorer.score([laid(step, item.candidates[step.candidate]) for step in kept])
-    blocks = [put(step, item.candidates) for step in given]
-    if earlier is not None and earlier.is_of(given, rules):
-        reached = (rules.reached_cm, rules.reached_deg)
-        ended = borne_out(blocks, item.scene.blocks, earlier.ended, rules.limits, reached)
-    else:
-        ended = _carried_judging(item, blocks, rules)
-    found = iter(poses[0].fits)
-    fits = tuple(next(found) if 1 <= step.candidate <= n else None for step in given)
-    numbers, ends = [step.candidate for step in given], [step.end for step in ended.steps]
-    return PoseJudgement(
-        parsed,
-        kept,
-        file_plan(item, [step.candidate for step in kept]),
-        _plan_scores(item, kept, rules),
-        poses,
-        fits,
-        pose_errors(scorer.goal, numbers, fits, ends),
-        ended,
-        rules,
-    )
-
-
-def _carried_judging(item: AssemblyTask, blocks: Sequence[Block | None], rules: PoseRules) -> Ended:
-    # An engine has no more than one plan at a time, whichever thread asks.
-    with _ONE_AT_A_TIME:
-        done: Execution = execute(blocks, rules.limits)
-    goal = item.scene.blocks
-    reached = blocks_reached(goal, done.blocks, rules.reached_cm, rules.reached_deg)
-    is_whole = reached == len(goal) == len(done.blocks)
-    iou = round(voxel_iou(goal, done.blocks), _DIGITS_JUDGING)
-    rests = rests_of(blocks, done.worlds)
-    return Ended(done.steps, rests, reached, iou, is_whole, described_engine())
-
-
-@functools.lru_cache(maxsize=_KEPT)
-def _scorer(scene: Scene, candidates: CandidateSet, setting: Setting) -> PoseScorer:
-    return PoseScorer(scene, candidates, setting, pieces_of)
-
-
-def _plan_scores(
-    item: AssemblyTask, kept: Sequence[PoseStep], rules: PoseRules
-) -> tuple[Score, ...]:
-    """The plan without its poses, under every setting and matcher."""
-    numbers, candidates = [step.candidate for step in kept], item.candidates
-    if rules.is_free:
-        numbers, candidates = _as_candidates(item, kept)
-    scorer = AssemblyScorer(item.scene, candidates, rules.settings)
-    return scorer.score(Plan(tuple(numbers)), rules.matchers, None)
-
-
-def _as_candidates(item: AssemblyTask, kept: Sequence[PoseStep]) -> tuple[list[int], CandidateSet]:
-    """Steps with rotations as candidates that are turned so.
-
-    One that is within the tolerance of how some block of the goal is turned is turned just so.
-    """
-    numbers: list[int] = []
-    found: dict[Candidate, int] = {}
-    for step in kept:
-        one = item.candidates[step.candidate]
-        turned = replace(one, euler_deg=step.euler_deg or one.euler_deg)
-        near = [
-            (_apart_deg(turned, block.euler_deg), place, block.euler_deg)
-            for place, block in enumerate(item.scene.blocks)
-            if block.kind == one.kind
-        ]
-        if near and min(near)[0] <= TURN_TOLERANCE_DEG:
-            turned = replace(one, euler_deg=min(near)[2])
-        numbers.append(found.setdefault(turned, len(found) + 1))
-    return numbers, CandidateSet(tuple(found))
-
-
-def _apart_deg(one: Candidate, euler_deg: tuple[float, float, float]) -> float:
-    rotations = [np.array(euler_deg_to_matrix(euler)) for euler in (one.euler_deg, euler_deg)]
-    return turn_deg(one.type, rotations[0], rotations[1])
-
-
-def _given(step: PoseStep) -> dict[str, Any]:
-    turned = {} if step.euler_deg is None else {"euler_deg": list(step.euler_deg)}
-    return {"block": step.candidate, "center_cm": list(step.center_cm), **turned}
-
-
-def _step_judging(
-    fit: PoseFit | None,
-    end: ExecutedStep,
-    rests: tuple[Rest, ...] | None,
-    error: PoseError | None,
-) -> dict[str, Any]:
-    told: dict[str, Any] = {"vertex": None}
-    if fit is not None:
-        told = {
-            "vertex": fit.vertex,
-            "position_cm": fit.position_cm,
-            "sideways_cm": fit.sideways_cm,
-            "up_cm": fit.up_cm,
-            "turn_deg": fit.turn_deg,
-            "iou": fit.iou,
-        }
-    return {
-        **told,
-        "end": end.end,
-        "moved_cm": end.moved_cm,
-        "turned_deg": end.turned_deg,
-        "gap_cm": end.gap_cm,
-        "overlap_cm": end.overlap_cm,
-        "knocked": list(end.knocked),
-        "error": error,
-        **({} if rests is None else {"rests": [asdict(rest) for rest in rests]}),
-    }

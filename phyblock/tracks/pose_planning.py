@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, get_args
+from typing import Annotated, Any, get_args
 
 import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, Tag
@@ -20,13 +20,12 @@ from phyblock.errors import DataError, Problem, SpecError
 from phyblock.models.request import Image, Request
 from phyblock.parsing.poses import FARTHEST_PLACE_CM, MOST_POSE_STEPS
 from phyblock.parsing.text import READER_VERSION
-from phyblock.records.line import Amount, Line, Whole
-from phyblock.records.record import Course, Record
+from phyblock.records.record import Record
 from phyblock.resources import bundled
-from phyblock.scoring.pose import POSE_ERRORS, PoseError
+from phyblock.scoring.pose import POSE_ERRORS
 from phyblock.scoring.pose_matching import TOLERANCES_CM
 from phyblock.sim.camera import VIEWS
-from phyblock.sim.dynamics import ExecutedStep, ExecutionLimits
+from phyblock.sim.dynamics import ExecutionLimits
 from phyblock.sim.geometry import box_height_cm, center_cm, upright
 from phyblock.sim.pictures import PictureStyle, goal_style
 from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
@@ -44,22 +43,20 @@ from phyblock.tracks.opening import (
     template_prompt,
 )
 from phyblock.tracks.pictures import Drawing, Studio, Workshop
-from phyblock.tracks.plans import PLAN_COLUMNS, PlanParse, plan_row
 from phyblock.tracks.pose_judging import (
     CARRY_VERSION,
     COUNTED,
     RIGHT,
-    Earlier,
-    Ended,
     PoseJudgement,
+    PoseRecord,
     PoseRules,
-    Rest,
+    buildable_order,
     judge_poses,
 )
 from phyblock.tracks.prompts import Prompt
 from phyblock.tracks.selection import select_tasks
 from phyblock.tracks.showing import ShownTask, TaskShowing
-from phyblock.types import PoseRotation, StepEnd, View
+from phyblock.types import PoseRotation, View
 
 _LIMITS = ExecutionLimits()
 MOST_VIEWS = 4
@@ -139,144 +136,6 @@ class PoseSpec(PictureControls):
     )
 
 
-class GivenStep(Line):
-    """A step as it was read."""
-
-    block: int
-    """Number of the candidate, as it was shown."""
-    center_cm: tuple[Amount, Amount, Amount]
-    """x, y and z of the middle of the block's box [cm]."""
-    euler_deg: tuple[Amount, Amount, Amount] | None = None
-    """Its rotation, extrinsic x-y-z angles [degrees]; null: as the candidate is shown."""
-
-
-class PoseParse(PlanParse):
-    """The plan with poses that was read in a reply; `plan` leaves out numbers that no candidate
-    has.
-    """
-
-    steps: tuple[GivenStep, ...] = ()
-    """The steps with their poses, those included that name no candidate."""
-
-
-class CarryTolerances(Line):
-    """By what a plan was judged when it was carried out."""
-
-    overlap_cm: Amount
-    """Farthest that a block was moved out of others [cm]."""
-    stand_cm: Amount
-    """Farthest that a block moved and still stood [cm]."""
-    stand_deg: Amount
-    """Farthest that it turned [degrees]."""
-    reached_cm: Amount
-    """Farthest from its place that a block of the goal was reached [cm]."""
-    reached_deg: Amount
-    """Farthest that it was turned [degrees]."""
-
-
-class RestingBlock(Line):
-    """Where a block came to lie."""
-
-    step: Whole
-    """Number of the step, from 1, that put it."""
-    center_cm: tuple[Amount, Amount, Amount]
-    """x, y and z of the middle of its box [cm]."""
-    euler_deg: tuple[Amount, Amount, Amount]
-    """Its rotation, extrinsic x-y-z angles [degrees]."""
-
-
-class StepOutcome(Line):
-    """What a step is worth by geometry, and how it ended when it was carried out."""
-
-    vertex: Whole | None
-    """The goal block, from 0, that it stands for; null: none."""
-    position_cm: Amount | None = None
-    """How far its center of mass is from that block's [cm]."""
-    sideways_cm: Amount | None = None
-    """The same over the floor [cm]."""
-    up_cm: Amount | None = None
-    """The same in height, above zero where it is too high [cm]."""
-    turn_deg: Amount | None = None
-    """How far it is turned, up to the block's symmetry [degrees]."""
-    iou: Amount | None = None
-    """Volume that both share, of the volume of both together."""
-    end: StepEnd
-    """How it ended."""
-    moved_cm: Amount = 0.0
-    """How far the block came to lie from where it was to be [cm]."""
-    turned_deg: Amount = 0.0
-    """How far it was turned [degrees]."""
-    gap_cm: Amount = 0.0
-    """How far it was above what it would fall on when it was let go [cm]."""
-    overlap_cm: Amount = 0.0
-    """How far it was moved out of others, or how deep it was refused [cm]."""
-    knocked: tuple[Whole, ...] = ()
-    """Numbers of the steps, from 1, whose blocks it moved."""
-    error: PoseError | None = None
-    """What was wrong, null where nothing was."""
-    rests: tuple[RestingBlock, ...] | None = None
-    """The blocks that lie elsewhere after it than before, its own than where it was put, by more
-    than 1 mm or 1 degree; null: not kept."""
-
-
-def kept_rests(step: StepOutcome) -> tuple[Rest, ...] | None:
-    """What a step moved, None where that was not kept."""
-    if step.rests is None:
-        return None
-    return tuple(Rest(one.step, one.center_cm, one.euler_deg) for one in step.rests)
-
-
-class PoseOutcome(Line):
-    """What a plan with poses is worth."""
-
-    rotation: PoseRotation
-    """Whether candidates keep their orientation or steps bring one."""
-    right: dict[str, tuple[Whole, ...]]
-    """By frame, `absolute` or `aligned`: right steps within 0.5, 1, 2 and 4 cm."""
-    shift_cm: tuple[Amount, Amount]
-    """The shift that aligns it, after the turn [cm]."""
-    turn_deg: Amount
-    """The turn about the vertical that aligns it [degrees]."""
-    steps: tuple[StepOutcome, ...]
-    """What became of each step."""
-    reached: Whole
-    """Blocks of the goal that stand where they should in the end."""
-    iou: Amount
-    """Intersection over union of all that stands and the goal, in voxels of 5 mm by 64 points."""
-    completed: bool
-    """Whether all of the goal was reached, and nothing else lies about."""
-    limits: CarryTolerances
-    """The tolerances."""
-    engine: str
-    """The physics engine, with its version."""
-
-
-class PoseRecord(Record):
-    """A plan with poses for a scene."""
-
-    track: Literal["pose_planning"]
-    """`pose_planning`."""
-    parse: PoseParse | None = None
-    """The plan that was read."""
-    pose: PoseOutcome | None = None
-    """What it is worth."""
-
-    columns: ClassVar[Mapping[str, str]] = PLAN_COLUMNS
-
-    def row(self) -> Mapping[str, Any]:
-        """The plan in both numberings."""
-        return plan_row(self.parse, self.shown)
-
-    def course(self, matcher: str) -> Course | None:
-        """What was wrong with each step, and how many blocks of the goal were not reached."""
-        if self.pose is None or self.parse is None:
-            return super().course(matcher)
-        names = (str(step.block) for step in self.parse.steps)
-        errors = (step.error for step in self.pose.steps)
-        blocks = next((score.tp + score.fn for score in self.scores), self.pose.reached)
-        return Course(tuple(zip(names, errors, strict=True)), blocks - self.pose.reached)
-
-
 _RIGHT = tuple(RIGHT.columns.index(f"absolute_{cm:g}") for cm in TOLERANCES_CM)
 _STEPS, _BLOCKS = (RIGHT.columns.index(name) for name in ("steps", "blocks"))
 
@@ -338,9 +197,6 @@ def _built(
     blocks, layers = subject.scene.blocks, subject.scene.graph.layers
     drawn = rng.random(len(blocks)).tolist()
     wanted = sorted(range(len(blocks)), key=lambda vertex: (layers[vertex], drawn[vertex]))
-    # It needs scipy, which takes a while to import: only those who build pay for it.
-    from phyblock.tracks.pose_judging import buildable_order
-
     order = buildable_order(subject.scene, wanted)
     return written(_step(subject, blocks[v], move(blocks[v], center_cm(blocks[v]))) for v in order)
 
@@ -590,25 +446,11 @@ class PosePlanning(WholePlanTrack[PoseRules, PosePictures]):
 
         A plan that an earlier record holds is not carried out again.
         """
-        work = partial(judge_poses, item, text, self.rules, _earlier(earlier))
+        known = earlier if isinstance(earlier, PoseRecord) else None
+        work = partial(judge_poses, item, text, self.rules, known)
         if self._pictures is None:
             return await asyncio.to_thread(work)
         return await self._pictures.work_out(work)
-
-
-def _earlier(record: Record | None) -> Earlier | None:
-    """A plan that was carried out, as its record holds it; None where it says nothing of it."""
-    if not isinstance(record, PoseRecord) or record.pose is None or record.parse is None:
-        return None
-    given = tuple(PoseStep(s.block, s.center_cm, s.euler_deg) for s in record.parse.steps)
-    steps = tuple(
-        ExecutedStep(s.end, s.moved_cm, s.turned_deg, s.gap_cm, s.overlap_cm, s.knocked)
-        for s in record.pose.steps
-    )
-    rests = tuple(kept_rests(step) for step in record.pose.steps)
-    pose = record.pose
-    ended = Ended(steps, rests, pose.reached, pose.iou, pose.completed, pose.engine)
-    return Earlier(given, pose.limits.fields(), ended)
 
 
 def open_pose_planning(opening: Opening) -> PosePlanning:

@@ -50,14 +50,20 @@ from phyblock.text import counted
 from phyblock.tracks.base import CARRYING, ENGINE, FIRST_CARRYING
 from phyblock.tracks.estimates import track_estimates
 from phyblock.tracks.figures import Part, curves, inference, share_bars
-from phyblock.tracks.pose_judging import CARRIED, ERRORS, FITS, PLANS, RIGHT, worlds_of
-from phyblock.tracks.pose_planning import (
-    LISTED_IN_C,
-    POSE_FLOORS,
+from phyblock.tracks.pose_judging import (
+    CARRIED,
+    ERRORS,
+    FITS,
+    PLANS,
+    RIGHT,
     PoseOutcome,
     PoseRecord,
     StepOutcome,
-    kept_rests,
+    worlds_of,
+)
+from phyblock.tracks.pose_planning import (
+    LISTED_IN_C,
+    POSE_FLOORS,
 )
 from phyblock.types import REFUSED_ENDS, Setting, StepEnd
 
@@ -474,7 +480,7 @@ def _kept_worlds(
     blocks: Sequence[Block | None], steps: Sequence[StepOutcome]
 ) -> tuple[tuple[Block, ...], ...] | None:
     """The blocks after each step, None where that was not kept."""
-    kept = [rests for step in steps if (rests := kept_rests(step)) is not None]
+    kept = [step.rests for step in steps if step.rests is not None]
     if len(kept) < len(steps):
         return None
     return worlds_of(blocks, [step.end not in REFUSED_ENDS for step in steps], kept)

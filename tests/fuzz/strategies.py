@@ -197,16 +197,16 @@ QUESTIONS = broken(st.just(sound_question()), JSON_TOKENS) | NOISE
 
 _PIECES = (
     *("{{", "}}", "{%", "%}", "{#", "#}", "\n", " ", "x", "1", "'a'", "|", ".", "(", ")", "[", "]"),
-    *("{% for i in range(99999) %}", "{% endfor %}", "{% if n %}", "{% endif %}", "{{ i }}"),
+    *("{% for i in range(9) %}", "{% endfor %}", "{% if n %}", "{% endif %}", "{{ i }}"),
     *(
         "{% macro m(n) %}",
         "{{ m(n) }}",
         "{% endmacro %}",
         "{% set x = x ~ x %}",
-        "{{ x * 999999 }}",
+        "{{ x * 9 }}",
     ),
-    *("{{ lipsum() }}", "{{ 'x'|center(10**9) }}", "{{ '%1000000000d' % 1 }}", "{{ 9 ** 9 ** 9 }}"),
-    *("{{ '{:>1000000000}'.format(1) }}", "{{ n_candidates }}", "{{ pictures | join(', ') }}"),
+    *("{{ 'x'|center(9) }}", "{{ '%9d' % 1 }}", "{{ 9 ** 9 }}", "{{ '{:>9}'.format(1) }}"),
+    *("{{ n_candidates }}", "{{ pictures | join(', ') }}"),
     *("{{ self.user() }}", "{% set x = [x, x] %}", "{{ x }}", "{% raw %}", "{% include 'x' %}"),
     *("{% set x = 'xxxxxxxxxx' %}", "{{ ''.join(x) }}", "{{ x.__class__ }}", "{{ 1 // 0 }}"),
 )

@@ -32,15 +32,12 @@ from phyblock.sim.geometry import center_cm, put
 from phyblock.tracks import pose_judging as judging
 from phyblock.tracks import pose_planning as pose_track
 from phyblock.tracks.full_planning import FullPlanning, PlanningRules
-from phyblock.tracks.pose_judging import PoseRules, worlds_of
+from phyblock.tracks.pose_judging import PoseRecord, PoseRules, worlds_of
 from phyblock.tracks.pose_planning import (
     POSE_RULES,
-    PoseOutcome,
     PosePlanning,
-    PoseRecord,
     PoseSpec,
     PoseSubject,
-    kept_rests,
     written,
 )
 from phyblock.tracks.pose_planning_results import pose_film, pose_table
@@ -158,26 +155,6 @@ def test_a_reply_is_read_scored_and_carried_out(
     assert judged({**fields, **track.about(task)}, task, again) == record
 
 
-def forgeries(pose: PoseOutcome) -> list[dict[str, Any]]:
-    """Changes of what became of a plan that nobody would call rounding."""
-    steps = [step.fields() for step in pose.steps]
-    fell = [step["moved_cm"] > 2 and step["end"] not in REFUSED_ENDS for step in steps]
-    stand = {"end": "stands", "moved_cm": 0.0, "turned_deg": 0.0, "knocked": []}
-    upright = [{**one, **stand} if is_one else one for one, is_one in zip(steps, fell, strict=True)]
-    absent = [*steps[:-1], {**steps[-1], "rests": [*(steps[-1]["rests"] or []), ASTRAY]}]
-    return [
-        {"reached": pose.reached + 3},
-        {"completed": not pose.completed},
-        {"iou": 0.0 if pose.iou > 0.5 else 1.0},
-        {"steps": absent},
-        {"steps": [{**one, "end": "no_block"} for one in steps]},
-        *([{"steps": upright}] if any(fell) else []),
-    ]
-
-
-ASTRAY = {"step": 99, "center_cm": (0.0, 0.0, 0.0), "euler_deg": (0.0, 0.0, 0.0)}
-
-
 @pytest.mark.parametrize("baseline", ["oracle-noise-1cm", "stack", "oracle-2d"])
 def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(
     built_in: list[AssemblyTask], baseline: str
@@ -192,7 +169,7 @@ def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(
     record = judged(begun("s", track.name, "m", item, 0, None), item, found)
     assert isinstance(record, PoseRecord)
     assert record.pose is not None
-    kept = [kept_rests(step) or () for step in record.pose.steps]
+    kept = [step.rests or () for step in record.pose.steps]
     stays = [step.end not in REFUSED_ENDS for step in record.pose.steps]
     for world, again in zip(worlds, worlds_of(blocks, stays, kept), strict=True):
         assert [block.order for block in again] == [block.order for block in world]
@@ -202,14 +179,6 @@ def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(
             assert start.angle_deg(end) < 1.1
     last = list(pose_film(record, item))[-1].blocks
     assert [block.order for block in last] == [block.order for block in worlds[-1]]
-    # What is said of a plan must be borne out by it.
-    about = begun("s", track.name, "m", item, 0, None)
-    assert judged(about, item, asyncio.run(track.judge_apart(item, text, record))) == record
-    for change in forgeries(record.pose):
-        pose = {**record.fields()["pose"], **change}
-        forged = known_records().validate_python({**record.fields(), "pose": pose})
-        again = judged(about, item, asyncio.run(track.judge_apart(item, text, forged)))
-        assert again.fields()["pose"] != pose, change
 
 
 @settings(max_examples=12, deadline=None)

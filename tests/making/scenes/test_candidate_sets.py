@@ -19,13 +19,12 @@ from phyblock.making.scenes.candidate_sets import NEEDED, make_candidates
 from phyblock.making.scenes.scene_production import Group, Request, draw, shares
 from phyblock.scoring.counts import micro
 from phyblock.scoring.plan import Goal, match_plan
-from phyblock.tracks.goal_blind import CONSTANT, FREQUENCIES, goal_blind_plans
+from phyblock.tracks.goal_blind import goal_blind_plans
 from phyblock.types import SETTINGS, Setting
 from tests.designs.scenes import designed_scene
 
 BUILT_IN = Path(__file__).parents[3] / "benchmarks" / "data" / "phyblock-400"
 EVERY_LOOK = [(kind, euler) for kind in KIT_PALETTE for euler in POSES[kind[0]].values()]
-LEARNERS = FREQUENCIES
 GAIN = 0.02
 """What a learner may win without seeing the goal: what is left is chance."""
 DEVIATIONS = 4.0
@@ -160,9 +159,9 @@ def gain(tasks: Tasks, setting: Setting, repeats: bool) -> float:
     named again, over that of naming all of them equally often.
     """
     goals, sets = [scene for scene, _ in tasks], {scene.id: offered for scene, offered in tasks}
-    learned = goal_blind_plans(goals, sets, setting, LEARNERS, repeats)
+    learned = goal_blind_plans(goals, sets, setting, repeats=repeats)
     every = {name: Plan(tuple(range(1, len(one) + 1))) for name, one in sets.items()}
-    plain = goal_blind_plans(goals, sets, setting, [CONSTANT]) if repeats else every
+    plain = goal_blind_plans(goals, sets, setting, [lambda _: None]) if repeats else every
     best, least = (
         micro(
             match_plan(Goal(scene, offered, setting), plans[scene.id], "optimal").counts

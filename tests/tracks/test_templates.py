@@ -1,7 +1,9 @@
-"""Templates of several files: what they include is read once, counted, bounded and named."""
+"""Templates of several files: what they include is read once, sandboxed and named."""
 
 from __future__ import annotations
 
+import contextlib
+import os
 from pathlib import Path
 
 import pytest
@@ -12,9 +14,10 @@ from phyblock.errors import PromptError
 from phyblock.models.request import Message
 from phyblock.resources import bundled
 from phyblock.tracks import TemplatePrompt
+from tests.fuzz.strategies import TEMPLATES
 from tests.workspace import Workspace
 
-FACTS = {"pictures": ["goal"], "n_candidates": 16}
+FACTS = {"pictures": ["goal", "candidates"], "n_candidates": 16}
 MACROS = "{% macro twice(x) %}{{ x }}{{ x }}{% endmacro %}{% set rules = 'R' %}"
 
 
@@ -75,9 +78,6 @@ def test_what_is_edited_later_is_not_said(tmp_path: Path) -> None:
     assert made.messages((), FACTS) == (Message("user", ("old",)),)
 
 
-LOOP = "{% for i in range(9999) %}{% include 'part.j2' %}{% endfor %}"
-
-
 @pytest.mark.parametrize(
     ("body", "part", "where", "said"),
     [
@@ -86,12 +86,12 @@ LOOP = "{% for i in range(9999) %}{% include 'part.j2' %}{% endfor %}"
         ("{% include '../mine.j2' %}", "", "mine.j2:1", "of another folder"),
         ("{% include '/etc/hostname' %}", "", "mine.j2:1", "of another folder"),
         ("{% include 'a/../../b' %}", "", "mine.j2:1", "of another folder"),
-        ("{% include 'link.j2' %}", "", "mine.j2:1", "leads out of its folder"),
-        ("{% include 'below/link.j2' %}", "", "mine.j2:1", "leads out of its folder"),
+        ("{% include 'link.j2' %}", "", "mine.j2:1", "no template"),
+        ("{% include 'below/link.j2' %}", "", "mine.j2:1", "no template"),
         ("{% include '.env' %}", "", "mine.j2:1", "no template"),
         ("{% include 'keys.txt' %}", "", "mine.j2:1", "no template"),
         ("{% include '.below/part.j2' %}", "", "mine.j2:1", "no template"),
-        ("{% include 'inside.j2' %}", "", "mine.j2:1", "a link to what is no template"),
+        ("{% include 'inside.j2' %}", "", "mine.j2:1", "no template"),
         ("{% set n_candidates = 4 %}{% block user %}a{% endblock %}", "", "mine.j2:1",
          "n_candidates, set outside of the blocks, is a fact"),
         ("{% macro pictures() %}{% endmacro %}{% block user %}a{% endblock %}", "", "mine.j2:1",
@@ -106,10 +106,7 @@ LOOP = "{% for i in range(9999) %}{% include 'part.j2' %}{% endfor %}"
         ("{% import 'part.j2' as p %}{{ p.f() }}",
          "{% macro f() %}\n{{ 1 // 0 }}{% endmacro %}", "part.j2:2", "division"),
         ("{% include 'part.j2' %}", "{% include 'part.j2' %}", "part.j2:1",
-         "include one another without an end, part.j2 -> part.j2"),
-        ("{% set x %}" + LOOP + "{% endset %}", "x" * 900, "", "more than 500,000 steps"),
-        (LOOP, "x" * 900, "", "longer than 200,000 characters"),
-        ("{% include 'part.j2' %}", "{{ 'x' * 10**9 }}", "part.j2:1", "more than 500,000 steps"),
+         "nested too deeply"),
         ("{% include 'part.j2' %}", "{{ pictures.__class__ }}", "part.j2:1", "is unsafe"),
         ("{% include 'part.j2' %}", "x" * 300_000, "part.j2", "cannot be read"),
     ],
@@ -142,13 +139,6 @@ def test_a_macro_that_sees_no_facts_is_told_how(tmp_path: Path) -> None:
     assert str(FACTS["n_candidates"]) in str(told.messages((), FACTS)[-1].parts[-1])
 
 
-def test_no_more_than_some_files_are_included(tmp_path: Path) -> None:
-    files = {f"part{n}": f"{{% include 'part{n + 1}.j2' %}}" for n in range(40)}
-    with pytest.raises(PromptError) as caught:
-        prompt(tmp_path, "{% include 'part0.j2' %}", **files)
-    assert "more than 32 files" in str(caught.value)
-
-
 def test_validate_names_what_is_included(workspace: Workspace) -> None:
     folder = workspace.root / "prompts"
     folder.mkdir()
@@ -160,3 +150,72 @@ def test_validate_names_what_is_included(workspace: Workspace) -> None:
     done = workspace.phyblock("validate", "suite.yaml")
     assert done.code == 0, done.err
     assert "full_planning.j2 (with rules.j2)" in done.out.replace("\n", "")
+
+
+UNREADABLE = {
+    "digits": "{{ " + "9" * 10_000 + " }}",
+    "hex": "{{ 0x" + "f" * 10_000 + " }}",
+    "brackets": "{{ " + "(" * 5_000 + "1" + ")" * 5_000 + " }}",
+    "chain": "{{ 1" + " + 1" * 20_000 + " }}",
+    "loops": "{% for i in x %}" * 60 + "{% endfor %}" * 60,
+    "ifs": "{% if x %}" * 2_000 + "{% endif %}" * 2_000,
+    "open": "{{ " * 9_000,
+    "large": "x" * 300_000,
+    "bytes": b"{% block user %}\xff{% endblock %}",
+}
+
+
+@pytest.mark.parametrize("body", UNREADABLE.values(), ids=UNREADABLE)
+def test_a_template_that_cannot_be_compiled_is_refused(tmp_path: Path, body: str | bytes) -> None:
+    path = tmp_path / "mine.j2"
+    path.write_bytes(
+        body if isinstance(body, bytes) else f"{{% block user %}}{body}{{% endblock %}}".encode()
+    )
+    with pytest.raises(PromptError) as caught:
+        TemplatePrompt(path, "mine").text("user", FACTS)
+    (problem,) = caught.value.problems
+    assert not problem.message.rstrip().endswith(":")
+
+
+HONEST = {
+    "{{ pictures | join(', then ') }}": "goal, then candidates",
+    "{% for p in pictures %}{{ loop.index }}/{{ loop.length }} {{ p }};{% endfor %}":
+        "1/2 goal;2/2 candidates;",
+    "{% for k, v in {'a': 1, 'b': 5000}.items() %}{{ k ~ v }}{% endfor %}": "a1b5000",
+    "{{ x | default(4096) }}": "4096",
+    "{% set n = n_candidates * 2 %}{{ '%03d' % n }} {{ '{:>4}'.format(n) }}": "032   32",
+    "{{ pictures[:1] + ['x'] }}": "['goal', 'x']",
+    "{{ 5000 | tojson }} {{ 2.345 | round(1) }} {{ pictures | map('upper') | first }}":
+        "5000 2.3 GOAL",
+    "{% macro m(a, b=2) %}<{{ a }}{{ b }}{{ caller() }}>{% endmacro %}"
+    "{% call m(1) %}!{% endcall %}": "<12!>",
+    "{{ 'yes' if 'goal' in pictures and n_candidates is divisibleby(4) else 'no' }}": "yes",
+    "{% for i in [1, [2]] recursive %}{{ loop(i) if i is iterable else i }}{% endfor %}": "12",
+    "{% for p in pictures if p != 'goal' %}{{ p }}{% else %}none{% endfor %}": "candidates",
+    "{{ none }} {{ (1, 2) }} {{ -n_candidates }} {{ 2 ** 10 }} {{ 7 // 2 }}":
+        "None (1, 2) -16 1024 3",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("body", HONEST)
+def test_expressions_of_jinja_can_be_used(tmp_path: Path, body: str) -> None:
+    text = prompt(tmp_path, body).text("user", FACTS)
+    assert text == HONEST[body]
+
+
+def test_a_template_that_is_no_file(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.j2")
+    with pytest.raises(PromptError, match="cannot be read: it is not a regular file"):
+        TemplatePrompt(tmp_path / "pipe.j2", "mine")
+
+
+@settings(deadline=None, max_examples=40)
+@given(TEMPLATES)
+def test_any_bytes_are_a_prompt_or_a_prompt_error(
+    tmp_path_factory: pytest.TempPathFactory, data: bytes
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "law.j2"
+    path.write_bytes(data)
+    with contextlib.suppress(PromptError):
+        (message,) = TemplatePrompt(path, "mine").messages((), FACTS)
+        assert isinstance(message, Message)
