@@ -8,11 +8,11 @@ import re
 from phyblock.config.models import ModelConfig
 from phyblock.errors import Problem, SpecError
 from phyblock.models.baselines import BaselineModel
-from phyblock.models.batches import BatchFiles, BatchModel, BatchParts, batch_protocol
+from phyblock.models.batch import BatchModel
+from phyblock.models.batch_ledger import BatchFiles
 from phyblock.models.cache import ReplyCache
 from phyblock.models.client import Client, HttpClient
 from phyblock.models.costs import Budget
-from phyblock.models.keys import secrets_of
 from phyblock.models.limits import Limits
 from phyblock.models.litellm_client import LitellmClient
 from phyblock.models.model import ChatModel, Observer, RetryPolicy, Tell
@@ -58,8 +58,8 @@ def build_model(
 
     if config.batch:
         assert batches is not None, "batches are kept in a run"
-        batch_parts = BatchParts(
-            protocol=batch_protocol(config, secrets_of(config)),
+        return BatchModel(
+            config=config,
             client=lambda http: client(config, http),
             files=batches,
             cache=cache,
@@ -68,7 +68,6 @@ def build_model(
             policy=policy,
             observer=observer,
         )
-        return BatchModel(config, batch_parts)
     at_each = [config.at(address) for address in config.addresses or (None,)]
     servers = Servers([Server(_name_of(at), client(at)) for at in at_each], policy, tell)
     limits = Limits(

@@ -3,25 +3,43 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 from pathlib import Path
 from typing import Any
 
-from hypothesis import example, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.config.models import ModelConfig
-from phyblock.models.batches.fields import joined
-from phyblock.models.batches.ledger import BatchFiles, Ledger
-from phyblock.models.batches.openai import OpenAIBatches
-from phyblock.models.batches.results import Results, custom_id
-from phyblock.models.batches.waiting import waiting_keys
+from phyblock.models.batch_ledger import (
+    Answers,
+    Batch,
+    BatchFiles,
+    Ledger,
+    custom_id,
+    waiting_keys,
+)
+from phyblock.models.batch_providers import PROVIDERS, UNREADABLE, _joined
 from phyblock.records.record import BatchLine
 
 TOKEN = "pb0"
 keys = st.lists(st.sampled_from("abcdef"), unique=True, min_size=1)
 fates = st.sampled_from(["intended", "created", "lost", "ended"])
 values = st.none() | st.integers() | st.text()
+WORDS = (
+    *("id", "name", "status", "processing_status", "request_counts", "total", "metadata", "state"),
+    *("batchStats", "requestCount", "response", "output", "responsesFile", "error", "code", "body"),
+    *("custom_id", "key", "result", "type", "message", "status_code", "created_at", "createTime"),
+    *("data", "has_more", "operations", "nextPageToken", "errors", "output_file_id"),
+)
+json_values = st.recursive(
+    values | st.booleans() | st.floats() | st.just("2026-11-23T10:00:00Z"),
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from(WORDS), inner, max_size=6)
+    ),
+    max_leaves=12,
+)
 
 
 @given(st.lists(st.tuples(keys, fates)))
@@ -42,9 +60,9 @@ def test_a_request_is_in_the_last_batch_that_was_not_lost(
         ]
         for batch, (_, fate) in zip(made, batches, strict=True):
             if fate in ("created", "ended"):
-                await ledger.tell(batch, "created", id=f"id-{batch.token}")
+                await ledger.note(batch, "created", id=f"id-{batch.token}")
             if fate in ("lost", "ended"):
-                await ledger.tell(batch, fate)  # type: ignore[arg-type]
+                await ledger.note(batch, fate)  # type: ignore[arg-type]
         return ledger
 
     async def nowhere(_: BatchLine) -> None: ...
@@ -77,9 +95,8 @@ def result_lines(draw: st.DrawFn) -> list[tuple[str, Any]]:
 
 @given(lines=result_lines(), requests=st.integers(0, 4))
 def test_the_first_whole_line_of_a_request_answers_it(
-    lines: list[tuple[str, bool]], requests: int, tmp_path_factory: Any
+    lines: list[tuple[str, bool]], requests: int
 ) -> None:
-    path = tmp_path_factory.getbasetemp() / "results.jsonl"
     whole = [
         json.dumps({"custom_id": name, "response": {"status_code": 200, "body": {"n": n}}})
         for n, (name, _) in enumerate(lines)
@@ -87,23 +104,31 @@ def test_the_first_whole_line_of_a_request_answers_it(
     kept = [
         text if is_whole else text[:-9] for text, (_, is_whole) in zip(whole, lines, strict=True)
     ]
-    path.write_text("\n\n".join(kept), encoding="utf-8")
-    protocol = OpenAIBatches(ModelConfig(name="m", id="openai/m"), ())
-    results = Results(path, protocol, TOKEN, requests)
+    keys = tuple(str(place) for place in range(requests))
+    intent = BatchLine(batch=TOKEN, model="m", event="intended", time="", keys=keys)
+    provider = PROVIDERS["openai"](ModelConfig(name="m", id="openai/m"))
+    answers = Answers("\n\n".join(kept).encode(), provider, Batch(intent))
     for place in range(requests):
         name = custom_id(TOKEN, place)
         first = [n for n, (found, is_whole) in enumerate(lines) if found == name and is_whole]
-        line = results.of(place)
-        assert (line is not None) == bool(first)
-        if line is not None:
-            assert json.loads(line.answer.body) == {"n": first[0]}  # type: ignore[union-attr]
-    assert len(results) + sum(results.faults.values()) == len(lines)
+        answer = answers.found.get(place)
+        assert (answer is not None) == bool(first)
+        if answer is not None:
+            assert json.loads(answer.body) == {"n": first[0]}  # type: ignore[union-attr]
+    assert len(answers.found) + sum(answers.faults.values()) == len(lines)
 
 
-@example({"0": None, "": 0}, "0", None)
+@given(st.sampled_from(["openai", "anthropic", "gemini"]), json_values)
+def test_any_line_and_any_status_is_read_or_has_not_its_form(name: str, raw: Any) -> None:
+    provider = PROVIDERS[name](ModelConfig(name="m", id=f"{name}/m"))
+    for read in (provider.read, provider._read_status, provider._read_page):
+        with contextlib.suppress(*UNREADABLE):
+            read(raw)
+
+
 @given(st.dictionaries(st.text(), values, max_size=3), st.text(min_size=1), values)
 def test_bodies_stand_in_lines_as_they_are(fields: dict[str, Any], name: str, body: Any) -> None:
-    data = json.dumps(body).encode()
-    line = joined(fields, name, data)
-    assert json.loads(line) == {**{k: v for k, v in fields.items() if k != name}, name: body}
+    fields.pop(name, None)
+    line = _joined(fields, name, json.dumps(body).encode())
+    assert json.loads(line) == {**fields, name: body}
     assert b"\n" not in line

@@ -30,10 +30,9 @@ from phyblock.models import (
     today,
     waiting_keys,
 )
-from phyblock.models.batches import batch_protocol
-from phyblock.models.batches.ledger import new_token
-from phyblock.models.batches.protocol import BatchProtocol
-from phyblock.models.batches.sending import UnsureError
+from phyblock.models.batch import UnsureError
+from phyblock.models.batch_ledger import new_token
+from phyblock.models.batch_providers import PROVIDERS, BatchProvider
 from phyblock.models.limits import Clock
 from tests.models.batching import Disk, Killing, command, run_command
 from tests.models.factory import QUICK, ask, make_model, make_request, with_fields
@@ -311,7 +310,8 @@ def test_a_key_in_an_answer_is_not_kept(disk: Disk) -> None:
 def test_what_does_not_fit_goes_out_in_further_batches(
     route: str, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    kind = type(batch_protocol(config_at(route, "http://localhost:9"), ()))
+    config = config_at(route, "http://localhost:9")
+    kind = type(PROVIDERS[config.provider](config))
     monkeypatch.setattr(kind, "most_requests", 2)
     server, ended = served(route, disk, requests_of(5), BatchFaults())
     assert len(texts(ended)) == 5
@@ -323,7 +323,7 @@ def test_what_does_not_fit_goes_out_in_further_batches(
     sizes: list[int] = []
     upload, create = kind.upload, kind.create
 
-    async def sized(self: BatchProtocol, token: str, path: Path, *more: Any) -> Any:
+    async def sized(self: BatchProvider, token: str, path: Path, *more: Any) -> Any:
         sizes.append(path.stat().st_size)
         return await (create if more else upload)(self, token, path, *more)
 
@@ -466,10 +466,10 @@ def test_a_kill_at_any_moment_loses_nothing_and_asks_nothing_twice(
             disk.moment, server.moment = None, lambda *_: None
             # What a process leaves that has no time to tidy up, beside what a person put there.
             files = disk.files()
-            files.folder.mkdir(parents=True, exist_ok=True)
+            files.requests("").parent.mkdir(parents=True, exist_ok=True)
             for token in (new_token(), *(line.batch for line in disk.lines)):
                 files.requests(token).write_bytes(b"{}")
-            own = files.folder / "pb0.requests"
+            own = files.requests("mine")
             own.write_text("mine")
             again = run_command(config, disk, requests, budget=Budget(1e9))
             assert len(texts(again)) == 2

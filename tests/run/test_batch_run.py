@@ -143,39 +143,6 @@ def test_a_run_that_waits_is_stopped_and_goes_on_by_the_same_command(workspace: 
         assert counted_once(server, 10)
 
 
-@pytest.mark.slow
-def test_a_run_asked_singly_asks_all_that_is_free_before_it_waits_for_a_batch(
-    workspace: Workspace,
-) -> None:
-    with Running(OpenAIBatches(batch=BatchFaults(looks=10**6))) as running:
-        server = running.server
-        assert isinstance(server, OpenAIBatches)
-        limits = {**POLLING, "max_concurrency": 1}
-        prepare(workspace, running.url, limit=2, limits=limits, seeds=[0])
-        waits = threading.Event()
-        server.moment = lambda _, name: waits.set() if name == "look done" else None
-        with workspace.start("--yes") as first:
-            assert waits.wait(60)
-            prepare(workspace, running.url, limits=limits, seeds=[0])
-            text = (workspace.root / "models.yaml").read_text()
-            (workspace.root / "models.yaml").write_text(text.replace("batch: true", "batch: false"))
-            workspace.out = workspace.root / "singly"
-            with workspace.start("--yes") as second:
-                written = workspace.out / "records.jsonl"
-                free, end_s = 0, time.monotonic() + 20
-                while free < 3 and time.monotonic() < end_s:
-                    time.sleep(0.02)
-                    free = written.read_bytes().count(b"\n") if written.exists() else 0
-                server.batch_faults = BatchFaults()
-                out, err = second.communicate()
-            first.communicate()
-        assert (second.returncode, err) == (0, "")
-        assert free == 3
-        assert "--no-cache asks at once, and pays again" in out
-        batched = [record["reply"].get("batched", False) for record in workspace.records()]
-        assert batched == [False] * 3 + [True] * 2
-
-
 def killed_at(workspace: Workspace, server: BatchServer, number: int, extra_s: float) -> bool:
     """Kill a run at a moment of its server, or a little later; whether it was reached."""
     reached = threading.Event()
@@ -221,7 +188,7 @@ def test_kills_of_the_process_lose_nothing_and_ask_nothing_twice(workspace: Work
         server = running.server
         assert isinstance(server, OpenAIBatches)
         prepare(workspace, running.url)
-        for number, name in ((3, "create"), (6, "results")):
+        for number, name in ((3, "create"), (5, "results")):
             assert killed_at(workspace, server, number, 0.0)
             assert server.calls[-1] == name
             assert not workspace.records()

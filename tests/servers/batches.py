@@ -122,6 +122,8 @@ class BatchServer(LocalServer):
         """A page of batches, the newest first, and whether there are more."""
         end = start + self.page
         newest = self.made[::-1][start:end]
+        for made in newest:
+            self.look(made)
         return [self.told(made) for made in newest], end < len(self.made)
 
     def after(self, batch_id: str | None) -> int:

@@ -1,0 +1,601 @@
+"""A model asked in a provider's batches: slower, cheaper where the provider says so, never twice.
+
+A request is in the draft of a batch, or in the newest batch that the ledger has it in. Between the
+call that makes a batch and its id on disk nobody knows whether there is one. It is looked for under
+our name; where the provider tells no names, among the batches of that time with as many requests,
+by what the answers of each say that they answer.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import Counter
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any, BinaryIO, TypeVar
+
+from phyblock.config.models import ModelConfig
+from phyblock.errors import ModelError, RetryableError, UnavailableError
+from phyblock.files import atomic_write, writing
+from phyblock.models.batch_ledger import Answers, Batch, BatchFiles, Ledger, custom_id, new_token
+from phyblock.models.batch_providers import PROVIDERS, BatchProvider, BatchStatus
+from phyblock.models.cache import ReplyCache, reply_key
+from phyblock.models.client import Answer, Client, HttpClient, SeedRefusedError
+from phyblock.models.costs import Budget, counted, estimate, may_be_billed, most_usd
+from phyblock.models.model import (
+    FORMAT_HINT,
+    EventKind,
+    ModelEvent,
+    Observer,
+    RetryPolicy,
+    refuses_format,
+)
+from phyblock.models.prices import Prices, reply_cost_usd, today
+from phyblock.models.request import AskLaterError, Request, wire_params
+from phyblock.records.files import BATCHES
+from phyblock.records.reply import Reply
+
+T = TypeVar("T")
+
+_FIRST_PAUSE_S = 5.0
+_CLOCKS_APART_S = 3600.0
+_HINT = "free some space and give the same command again: nothing of this batch was sent"
+
+
+class UnsureError(UnavailableError):
+    """It is not known whether the provider has a batch."""
+
+
+@dataclass(eq=False, kw_only=True)
+class BatchModel:
+    """A GatheringModel over a provider's batches.
+
+    `client` makes a client that sends through an HTTP client: by it requests are written and
+    answers are read as those of direct calls. `_again` are requests whose answer in the newest
+    batch failed, `_failures` how often; `_given` those whose answer a sample of this command has,
+    `_billed_usd` what a limit counted for each. `_strangers` are batches known not to be ours.
+    """
+
+    config: ModelConfig
+    client: Callable[[HttpClient], Client]
+    files: BatchFiles
+    cache: ReplyCache | None
+    budget: Budget | None
+    prices: Prices | None
+    policy: RetryPolicy
+    observer: Observer
+    needs_messages: bool = field(default=True, init=False)
+    _draft: _Draft | None = field(default=None, init=False)
+    _refusal: UnavailableError | None = field(default=None, init=False)
+    _has_begun: bool = field(default=False, init=False)
+
+    def __post_init__(self) -> None:
+        self.name = self.config.name
+        self._provider = PROVIDERS[self.config.provider](self.config)
+        self._ledger = Ledger(self.name, self.files)
+        self._earlier = {key for batch in self._ledger.batches.values() for key in batch.places}
+        self._drafting = asyncio.Lock()
+        self._takes_seed = self.config.seed != "never"
+        self._again: set[str] = set()
+        self._failures: Counter[str] = Counter()
+        self._given: set[str] = set()
+        self._billed_usd: dict[str, float] = {}
+        self._strangers: set[str] = set()
+
+    # A round: begin, gather, dispatch, ask.
+
+    async def begin(self) -> None:
+        """See GatheringModel; the first round takes up the batches of earlier commands."""
+        if self._refusal is not None:
+            raise self._refusal
+        if self._has_begun:
+            return
+        self._has_begun = True
+        for batch in tuple(self._ledger.batches.values()):
+            if batch.event == "intended":
+                self._tell(f"looking for a batch of {len(batch.places):,} that was being sent")
+                # A call that was cut off may still be worked on over there.
+                status = await self._find(batch, time.time() + 2 * self.files.poll_s)
+                if status is None:
+                    await self._ledger.note(batch, "lost", words="not found at the provider")
+                else:
+                    await self._ledger.note(batch, "created", id=status.id)
+            if batch.event == "created":
+                self._following(batch)
+
+    async def gather(self, request: Request, *, anew: bool = False) -> bool:
+        """See GatheringModel."""
+        key = reply_key(self.config, request)
+        async with self._drafting:
+            is_drafted = self._draft is not None and key in self._draft.keys
+            if is_drafted or await self._is_answered(key, request, anew=anew):
+                return True
+            if self._refusal is not None:
+                return False
+            return await self._add(key, request)
+
+    async def dispatch(self) -> None:
+        """See GatheringModel. What keeps a batch from being sent is raised by the next `begin`."""
+        async with self._drafting:
+            await self._send_draft()
+
+    async def ask(self, request: Request) -> Reply:
+        """Return the answer of the newest batch with the request, else the cached reply.
+
+        Raises what the model seam says, AskLaterError where the request belongs to the next round.
+        """
+        key = reply_key(self.config, request)
+        batch = self._ledger.newest(key)
+        if batch is None or batch.event == "intended" or key in self._again:
+            kept = None if self.cache is None else self.cache.get(key)
+            if kept is None:
+                raise AskLaterError
+            cost_usd = reply_cost_usd(self.prices, kept, today())
+            return kept.model_copy(update={"cost_usd": cost_usd})
+        try:
+            await asyncio.shield(self._following(batch))
+            if batch.answers is None:
+                raise AskLaterError
+            reply = await self._read(key, request, batch)
+        except UnavailableError:
+            # No more is heard in this command of what is under way: it counts as spent.
+            for each in self._ledger.batches.values():
+                self._settle_all(each.held, None)
+            raise
+        except ModelError as error:
+            self._settle(key, batch, None if may_be_billed(error) else 0.0)
+            error.billed_usd = self._billed_usd.get(key)
+            if isinstance(error, RetryableError):
+                self._again.add(key)
+                self._failures[key] += 1
+                if self._failures[key] < self.policy.attempts or not batch.is_complete:
+                    raise AskLaterError from None
+            raise
+        cost_usd = reply_cost_usd(self.prices, reply, batch.created.date())
+        if key in self._given:
+            # A second sample that asks the same.
+            update = {"cost_usd": cost_usd, "cached": True, "attempts": 0}
+            return reply.model_copy(update=update)
+        self._given.add(key)
+        self._settle(key, batch, cost_usd)
+        if self.budget is not None:
+            self.budget.learn(self.name, estimate(self.config, request), reply.usage)
+        billed_usd, attempts = self._billed_usd.get(key), self._failures[key] + 1
+        reply = reply.model_copy(
+            update={"cost_usd": cost_usd, "billed_usd": billed_usd, "attempts": attempts}
+        )
+        if self.cache is not None:
+            self.cache.put(key, self.config.id, reply)
+        return reply
+
+    async def aclose(self) -> None:
+        """Release connections; batches go on at the provider."""
+        followings = [b.following for b in self._ledger.batches.values() if b.following is not None]
+        for following in followings:
+            following.cancel()
+        await asyncio.gather(*followings, return_exceptions=True)
+        if self._draft is not None:
+            self._draft.drop()
+        await self._provider.aclose()
+
+    # The draft, and what it holds of the budget.
+
+    async def _is_answered(self, key: str, request: Request, *, anew: bool) -> bool:
+        """Return whether `ask` has an answer to a request, or will have when a batch ends."""
+        batch = self._ledger.newest(key)
+        if batch is not None and key not in self._again:
+            if key in self._earlier and self.budget is not None:
+                # Held once, however often it is gathered.
+                self._earlier.discard(key)
+                batch.held[key] = self.budget.hold(batch.most_usd(key))
+            if batch.event != "ended":
+                return True
+            await asyncio.shield(self._following(batch))
+            try:
+                await self._read(key, request, batch)
+            except ModelError as error:
+                if not anew and not isinstance(error, RetryableError):
+                    return True
+                # Where it was recorded, it was counted, too.
+                self._settle(key, batch, None if may_be_billed(error) and not anew else 0.0)
+                self._again.add(key)
+            else:
+                return True
+        return self.cache is not None and self.cache.get(key) is not None
+
+    async def _add(self, key: str, request: Request) -> bool:
+        """Put a request into the draft, or a new one; return whether the budget had room for it."""
+        http, seeded = await self._written(request)
+        usd = self._most_usd(request)
+        held: int | None = None
+        if self.budget is not None:
+            # Under a limit prices are known.
+            most = usd or 0.0
+            if self.budget.fits(most):
+                held = self.budget.hold(most)
+            elif self._draft or any(b.event == "created" for b in self._ledger.batches.values()):
+                return False
+            else:
+                held = await self.budget.reserve(lambda: most)
+        if self._draft is not None and not self._draft.add(key, http, usd, held, seeded=seeded):
+            sending = asyncio.ensure_future(self._send_draft())
+            try:
+                await asyncio.shield(sending)
+            except asyncio.CancelledError:
+                await sending
+                raise
+            if self._refusal is not None:
+                self._settle_all({} if held is None else {key: held}, 0.0)
+                return False
+        if self._draft is None:
+            self._draft = _Draft(self._provider, self.files, seeded=seeded)
+            self._draft.add(key, http, usd, held, seeded=seeded)
+        return True
+
+    def _most_usd(self, request: Request) -> float | None:
+        """Return the most that a request can cost, also without a limit, as the command that reads
+        the answer may have one; None where no price is known.
+        """
+        day, prices = today(), self.prices
+        if prices is None or prices.on(day) is None:
+            return None
+        expected = estimate(self.config, request)
+        if self.budget is None:
+            return most_usd(prices, expected, day, batched=True)
+        return self.budget.most_usd(self.name, prices, expected, day, batched=True)
+
+    def _settle(self, key: str, batch: Batch, usd: float | None) -> None:
+        """Count what a request cost, once; None is all that it can have cost."""
+        if self.budget is not None and key in batch.held:
+            spent_usd = self.budget.settle(batch.held.pop(key), usd)
+            self._billed_usd[key] = self._billed_usd.get(key, 0.0) + spent_usd
+
+    def _settle_all(self, held: dict[str, int], usd: float | None) -> None:
+        while self.budget is not None and held:
+            self.budget.settle(held.popitem()[1], usd)
+
+    # Sending, and finding again what an earlier process was sending.
+
+    async def _send_draft(self) -> None:
+        draft, self._draft = self._draft, None
+        if draft is None:
+            return
+        try:
+            batch = await self._send(draft)
+        except UnavailableError as error:
+            # What happened to one of which that is not known, the next command finds out.
+            self._refusal = error
+            self._settle_all(draft.held, None if isinstance(error, UnsureError) else 0.0)
+            return
+        finally:
+            draft.drop()
+        self._again.difference_update(batch.places)
+        requests = "1 request" if len(batch.places) == 1 else f"{len(batch.places):,} requests"
+        self._tell(f"sent batch {batch.shown}: {requests}")
+        self._following(batch)
+
+    async def _send(self, draft: _Draft) -> Batch:
+        """Send a draft; return the batch, which the provider has, with its id on disk.
+
+        Raises UnavailableError where it cannot be sent, and nothing was asked; UnsureError where
+        that is not known.
+        """
+        draft.close()
+        known = [usd for usd in draft.keys.values() if usd is not None]
+        costs = known if len(known) == len(draft.keys) else []
+        batch = await self._ledger.intend(draft.token, draft.keys, costs, seeded=draft.seeded)
+        batch.held = draft.held
+
+        async def create() -> BatchStatus:
+            try:
+                return await self._provider.create(batch.token, draft.path, file)
+            except RetryableError as error:
+                if error.sent == "no" or error.status == 429:
+                    raise
+                known = await self._find(batch, time.time() + self.files.poll_s)
+                if known is None:
+                    raise
+                return known
+
+        try:
+            file = await self._patiently(lambda: self._provider.upload(batch.token, draft.path))
+            status = await self._patiently(create)
+        except UnsureError:
+            raise
+        except UnavailableError as error:
+            await self._ledger.note(batch, "lost", words=str(error))
+            why = f"a batch could not be sent: {error}"
+            raise UnavailableError(why, status=error.status, sent=error.sent) from None
+        await self._ledger.note(batch, "created", id=status.id)
+        return batch
+
+    async def _find(self, batch: Batch, until_s: float) -> BatchStatus | None:
+        """Return the batch that was being sent; None where there is none until then.
+
+        Those without a name that may be it are waited for, as none can be told before it has ended.
+        Raises UnsureError where the list or the answers of one cannot be read.
+        """
+        earliest_s = batch.created.timestamp() - _CLOCKS_APART_S
+        ours = {one.id for one in self._ledger.batches.values()}
+        unread: dict[str, str] = {}
+        is_told = False
+
+        async def recent() -> list[BatchStatus]:
+            found = []
+            async for status in self._provider.listed():
+                if status.created_s is not None and status.created_s < earliest_s:
+                    break
+                found.append(status)
+            return found
+
+        while True:
+            try:
+                listed = await self._patiently(recent)
+            except UnavailableError as error:
+                why = f"whether a batch was sent cannot be found out: {error}"
+                raise UnsureError(why, status=error.status, sent=error.sent) from None
+            running = []
+            for status in sorted(listed, key=lambda status: status.token != batch.token):
+                if status.token == batch.token:
+                    return status
+                is_like = status.total in (None, 0, len(batch.places)) and status.state != "refused"
+                if status.token is not None or not is_like:
+                    continue
+                if status.id in ours | self._strangers | unread.keys():
+                    continue
+                if status.state == "running":
+                    running.append(status.id)
+                    continue
+                try:
+                    lines = await self._results(status)
+                except ModelError as error:
+                    unread[status.id] = str(error)
+                    continue
+                if (await asyncio.to_thread(Answers, lines, self._provider, batch)).found:
+                    return status
+                self._strangers.add(status.id)
+            if running and not is_told:
+                is_told = True
+                self._tell(
+                    f"whether one of the batches {', '.join(running)} is the one that was being "
+                    "sent shows when it has ended: waiting for that"
+                )
+            elif not running and unread:
+                said = "; ".join(f"{name}: {why}" for name, why in unread.items())
+                raise UnsureError(
+                    f"a batch of {len(batch.places):,} that was being sent may be one whose "
+                    f"answers cannot be read ({said}). If it is not, remove the lines of "
+                    f"{batch.token} from {BATCHES}: its questions are then asked again, and billed "
+                    "again if it is"
+                )
+            elif not running and time.time() >= until_s:
+                return None
+            left_s = max(0.01, until_s - time.time())
+            await asyncio.sleep(self.files.poll_s if running else min(self.files.poll_s, left_s))
+
+    async def _results(self, status: BatchStatus) -> bytes:
+        return await self._patiently(lambda: self._provider.results(status))
+
+    async def _patiently(self, call: Callable[[], Awaitable[T]]) -> T:
+        """Call until it succeeds or cannot; UnavailableError where it never does."""
+
+        def on_retry(error: RetryableError, wait_s: float) -> None:
+            # A log would fall silent over a long wait.
+            if wait_s >= 2.0:
+                self._tell(f"trying again in {wait_s:.0f} s: {error}")
+
+        try:
+            async for attempt in self.policy.retrying(on_retry):
+                with attempt:
+                    return await call()
+        except UnavailableError:
+            raise
+        except ModelError as error:
+            raise UnavailableError(str(error), status=error.status, sent=error.sent) from None
+        raise AssertionError("tenacity neither returned nor raised")
+
+    # Following a batch to its end.
+
+    def _following(self, batch: Batch) -> asyncio.Future[None]:
+        if batch.following is None:
+            batch.following = asyncio.ensure_future(self._follow(batch))
+        return batch.following
+
+    async def _follow(self, batch: Batch) -> None:
+        """Return when the batch has ended and its answers are here, or when it is lost: refused as
+        a whole, so that nothing was asked.
+
+        Raises UnavailableError where nothing can be learned of it now: it is left as it is.
+        """
+        path = self.files.answers(batch.token)
+        if batch.event == "created":
+            try:
+                status = await self._end(batch)
+                if status.state == "ended":
+                    lines = await self._results(status)
+                    with writing(path):
+                        path.parent.mkdir(parents=True, exist_ok=True)
+                        await asyncio.to_thread(atomic_write, path, lines, sync=True)
+            except ModelError as error:
+                # An error of its requests is another thing: these are asked again, or recorded.
+                why = f"no answers of batch {batch.shown}, which stays at the provider: {error}"
+                raise UnavailableError(why, status=error.status, sent=error.sent) from None
+            words = self._provider.shown(status.words)
+            if status.state == "refused":
+                await self._ledger.note(batch, "lost", words=words)
+                self._refusal = UnavailableError(f"batch {batch.shown} was refused: {words}")
+                self._settle_all(batch.held, 0.0)
+                return
+            await self._ledger.note(batch, "ended", words=words, is_complete=status.is_complete)
+            if not status.is_complete:
+                self._refusal = UnavailableError(
+                    f"batch {batch.shown} was taken back before all of it was asked: give the same "
+                    "command again to ask the rest"
+                )
+        if not path.exists():
+            raise UnavailableError(
+                f"the answers of batch {batch.shown} are gone ({path}): without its lines in "
+                f"{BATCHES} its questions are asked again"
+            )
+        lines = await asyncio.to_thread(path.read_bytes)
+        batch.answers = await asyncio.to_thread(Answers, lines, self._provider, batch)
+        if faults := batch.answers.faults:
+            said = ", ".join(f"{n} {what}" for what, n in sorted(faults.items()))
+            self._tell(f"batch {batch.shown} holds lines {said}")
+
+    async def _end(self, batch: Batch) -> BatchStatus:
+        """Look at a batch now and then; return what the provider says when it has ended."""
+        pause_s, failures = min(_FIRST_PAUSE_S, self.files.poll_s), 0
+        told = ""
+        since = datetime.fromtimestamp(batch.created.timestamp()).strftime("%d %b %H:%M")
+        while True:
+            try:
+                status = await self._provider.status(batch.id)
+                failures, said = 0, self._provider.shown(status.words)
+                if status.state != "running":
+                    self._tell(f"batch {batch.shown} has ended: {said}")
+                    return status
+            except RetryableError as error:
+                failures += 1
+                if failures >= self.policy.max_connection_failures:
+                    raise
+                said = f"cannot be looked at now ({error})"
+            if said != told:
+                self._tell(f"waiting for batch {batch.shown} since {since}: {said}")
+                told = said
+            await asyncio.sleep(pause_s)
+            pause_s = min(self.files.poll_s, 1.5 * pause_s)
+
+    # Requests as lines and answers as replies, by the client of direct calls.
+
+    async def _written(self, request: Request) -> tuple[_NoConnection, bool]:
+        """Return what a direct call would send, and whether with a seed; raises as that does before
+        it sends.
+        """
+        while True:
+            http, with_seed = _NoConnection(), self._takes_seed
+            try:
+                await self.client(http).complete(request, with_seed=with_seed)
+            except SeedRefusedError:
+                self._go_without_seed()
+            except ModelError:
+                if not http.body:
+                    raise
+                return http, with_seed
+
+    async def _read(self, key: str, request: Request, batch: Batch) -> Reply:
+        """Return what a direct call would have made of the answer; raises as that does.
+
+        RetryableError also where there is no answer, or none that can be read.
+        """
+        assert batch.answers is not None, "the batch has ended"
+        answer = batch.answers.found.get(batch.places[key])
+        if answer is None and not (batch.answers.found or batch.answers.faults):
+            raise RetryableError(f"batch {batch.shown} ended with no answers", sent="no")
+        if answer is None:
+            why = f"batch {batch.shown} holds no answer that can be read"
+            raise RetryableError(why, status=200)
+        if isinstance(answer, str):
+            why = f"batch {batch.shown} ended before this was asked: {answer}"
+            raise RetryableError(self._provider.shown(why), sent="no")
+        client = self.client(_NoConnection(answer))
+        try:
+            reply = await client.complete(request, with_seed=batch.intent.seeded)
+        except SeedRefusedError:
+            self._go_without_seed()
+            raise RetryableError("the provider takes no seed", sent="answered") from None
+        except ModelError as error:
+            if "response_format" in wire_params(self.config, request) and refuses_format(error):
+                why = f"{error} ({FORMAT_HINT})"
+                raise UnavailableError(why, status=error.status, sent=error.sent) from None
+            raise
+        reply = counted(reply, estimate(self.config, request))
+        return reply.model_copy(update={"latency_s": 0.0, "batched": True})
+
+    def _go_without_seed(self) -> None:
+        if self.config.seed == "always":
+            raise UnavailableError("the provider takes no seed, and seed is `always`")
+        if self._takes_seed:
+            self._takes_seed = False
+            self._tell("takes no seed: seeds are independent repeats", "seed_unsupported")
+
+    def _tell(self, text: str, kind: EventKind = "batch") -> None:
+        self.observer(ModelEvent(self.name, kind, text))
+
+
+class _NoConnection(HttpClient):
+    """Keeps what would be sent, and gives an answer that is here already."""
+
+    def __init__(self, answer: Answer | None = None) -> None:
+        self.body = b""
+        self.headers: Mapping[str, str] = {}
+        self._answer = answer
+
+    async def send(
+        self, url: str, body: bytes | BinaryIO, headers: Mapping[str, str], **_: Any
+    ) -> Answer:
+        """Return the answer; RetryableError where there is none: nothing was sent."""
+        assert isinstance(body, bytes)
+        self.body, self.headers = body, headers
+        if self._answer is None:
+            raise RetryableError(f"a request to {url} is kept for a batch", sent="no")
+        return self._answer
+
+    async def aclose(self) -> None:
+        """Nothing is open."""
+
+
+class _Draft:
+    """A batch that is being written into a file; `keys` are its requests with the most that each
+    can cost [US dollars], None where no price is known; `held` are their reservations in the
+    budget.
+    """
+
+    def __init__(self, provider: BatchProvider, files: BatchFiles, *, seeded: bool) -> None:
+        self.seeded = seeded
+        self.token = new_token()
+        self.path = files.requests(self.token)
+        self.keys: dict[str, float | None] = {}
+        self.held: dict[str, int] = {}
+        self._provider = provider
+        self._bytes = 0
+        head, self._between, self._tail = provider.frame(self.token)
+        with writing(self.path, _HINT):
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = self.path.open("wb")
+        self._write(head)
+
+    def add(
+        self, key: str, http: _NoConnection, usd: float | None, held: int | None, *, seeded: bool
+    ) -> bool:
+        """Write a request; return False where it does not fit, by the provider's limits and as all
+        ask with a seed or without.
+        """
+        name, provider = custom_id(self.token, len(self.keys)), self._provider
+        line = (self._between if self.keys else b"") + provider.line(name, http.body, http.headers)
+        size = self._bytes + len(line) + len(self._tail)
+        is_full = len(self.keys) >= provider.most_requests or size > provider.most_bytes
+        if self.keys and (is_full or seeded != self.seeded):
+            return False
+        self._write(line)
+        self.keys[key] = usd
+        if held is not None:
+            self.held[key] = held
+        return True
+
+    def close(self) -> None:
+        """End the file."""
+        self._write(self._tail)
+        with writing(self.path, _HINT):
+            self._file.close()
+
+    def drop(self) -> None:
+        """Remove the file: the batch is there, or nothing was asked."""
+        self._file.close()
+        self.path.unlink(missing_ok=True)
+
+    def _write(self, data: bytes) -> None:
+        with writing(self.path, _HINT):
+            self._bytes += self._file.write(data)

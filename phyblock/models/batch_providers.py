@@ -1,0 +1,464 @@
+"""Batches of OpenAI, Anthropic and Gemini: how each is written, sent, watched and read.
+
+Sources, read in November 2026. OpenAI, guide "Batch API" (format of lines, 50,000 requests and 200
+MB a file, states, `batch_expired`) and API reference of files and batches. Anthropic, guide "Batch
+processing" (100,000 requests or 256 MB, results in any order, errors and requests that expired are
+not billed) and API references of message batches and of errors. Google, Gemini API guide "Batch
+API" (lines with `key` and `request`, an input file of at most 2 GB, no results of what expired) and
+references of batches and of files (resumable uploads); google.rpc.Code.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from abc import ABC, abstractmethod
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any, BinaryIO, ClassVar, Literal, TypeVar
+from urllib.parse import urlsplit
+
+from phyblock.config.models import ModelConfig, host_of
+from phyblock.errors import ModelError, RetryableError, UnavailableError
+from phyblock.files import load_json
+from phyblock.models.client import Answer, HttpClient, error_of, malformed, shown
+from phyblock.models.keys import api_key, hidden, secrets_of
+from phyblock.models.openai_client import OPENAI_API_BASE
+
+T = TypeVar("T")
+
+UNREADABLE = (AttributeError, KeyError, TypeError, ValueError)
+"""Errors of reading what does not have the form that its provider documents."""
+
+_CALL_S = 60.0
+_TRANSFER_S = 3600.0
+_LARGEST_RESULTS_BYTES = 1024**3
+
+
+@dataclass(frozen=True)
+class BatchStatus:
+    """How a batch is, as its provider says.
+
+    A `refused` batch asked nothing of anyone. `token` is the name that we gave it, None where the
+    provider does not tell. `total` counts requests, None where it does not say, `created_s` is a
+    Unix time. `results` are the addresses of the answers; with `is_complete` False some were not
+    asked, as the batch was cancelled. `words` are its own, with counts and what went wrong.
+    """
+
+    id: str
+    state: Literal["running", "ended", "refused"]
+    words: str
+    token: str | None
+    total: int | None
+    created_s: float | None
+    results: tuple[str, ...]
+    is_complete: bool
+
+
+class BatchProvider(ABC):
+    """One provider's batches; its methods raise ModelErrors, in which no key stands.
+
+    `most_requests` and `most_bytes` bound an upload. Everything is sent with `headers`, in which
+    the model's key is put, to the model's server alone. A batch is at `url` and its id, their list
+    at `first_page`.
+    """
+
+    most_requests: int
+    most_bytes: int
+    headers: ClassVar[Mapping[str, str]]
+
+    def __init__(self, config: ModelConfig, base: str, url: str, first_page: str) -> None:
+        self._config = config
+        self._base = base
+        self._url = url
+        self._first_page = first_page
+        self._secrets = secrets_of(config)
+        limits = {"timeout_s": _TRANSFER_S, "most_body_bytes": _LARGEST_RESULTS_BYTES}
+        self._calls = HttpClient(config.model_copy(update={"timeout_s": _CALL_S}))
+        self._transfers = HttpClient(config.model_copy(update=limits))
+
+    def frame(self, token: str) -> tuple[bytes, bytes, bytes]:  # noqa: ARG002
+        """Return what stands before, between and after the lines of an upload."""
+        return b"", b"\n", b""
+
+    @abstractmethod
+    def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:
+        """Return the line of a request with the body, and of the headers, of a direct call."""
+
+    async def upload(self, token: str, path: Path) -> str:  # noqa: ARG002
+        """Send the file, which begins nothing yet; return its name at the provider, "" for none."""
+        return ""
+
+    @abstractmethod
+    async def create(self, token: str, path: Path, file: str) -> BatchStatus:
+        """Begin the batch. After a RetryableError it may have begun all the same."""
+
+    async def status(self, batch_id: str) -> BatchStatus:
+        """Ask how a batch is now."""
+        return await self._call(self._read_status, f"{self._url}/{batch_id}")
+
+    async def listed(self) -> AsyncIterator[BatchStatus]:
+        """Yield all batches of the account, the newest first."""
+        url = self._first_page
+        while url:
+            batches, url = await self._call(self._read_page, url)
+            for batch in batches:
+                yield batch
+
+    async def results(self, status: BatchStatus) -> bytes:
+        """Return the lines of a batch's results, without keys."""
+        answers = [await self._send(self._transfers, url) for url in status.results]
+        text = b"\n".join(answer.body for answer in answers).decode("utf-8", "surrogateescape")
+        return hidden(text, self._secrets, guess=False).encode("utf-8", "surrogateescape")
+
+    @abstractmethod
+    def read(self, line: Any) -> tuple[str, Answer | str]:
+        """Return whom a line of the results answers, and the answer as a server would have given
+        it, or why the request was never asked. Raises one of UNREADABLE for what is no such line.
+        """
+
+    def shown(self, text: str) -> str:
+        """Return a text for messages and files, without keys."""
+        return shown(text, self._secrets)
+
+    async def aclose(self) -> None:
+        """Close all connections."""
+        await self._calls.aclose()
+        await self._transfers.aclose()
+
+    @abstractmethod
+    def _read_status(self, batch: Any) -> BatchStatus:
+        """Read what the provider says of a batch; raises one of UNREADABLE."""
+
+    def _read_page(self, page: Any, after: str = "after") -> tuple[Sequence[BatchStatus], str]:
+        """Return the batches on a page of the list, and the address of the next one or ""."""
+        batches = [self._read_status(batch) for batch in page["data"]]
+        more = page.get("has_more") and batches
+        return batches, f"{self._first_page}&{after}={batches[-1].id}" if more else ""
+
+    async def _call(
+        self,
+        read: Callable[[Any], T],
+        url: str,
+        body: Any = None,
+        headers: Mapping[str, str] | None = None,
+    ) -> T:
+        """Send an object as JSON, or a file while it is read; read the object that is answered."""
+        if isinstance(body, Path):
+            with body.open("rb") as file:
+                answer = await self._send(self._transfers, url, file, headers)
+        else:
+            data = None if body is None else json.dumps(body).encode()
+            answer = await self._send(self._calls, url, data, headers)
+        with self._masked():
+            try:
+                found: Any = load_json(answer.body)
+                # A batch that failed holds its error beside its name.
+                if found.get("error") and not found.keys() & {"id", "name"}:
+                    raise error_of(answer)
+                return read(found)
+            except UNREADABLE as error:
+                why = f"{type(error).__name__}: {error}"
+                raise malformed(answer.status, why) from None
+
+    async def _send(
+        self,
+        http: HttpClient,
+        url: str,
+        body: bytes | BinaryIO | None = None,
+        headers: Mapping[str, str] | None = None,
+    ) -> Answer:
+        with self._masked():
+            if urlsplit(url)[:2] != urlsplit(self._base)[:2]:
+                why = f"nothing is sent to {host_of(url)}, which is not the model's server"
+                raise UnavailableError(why, sent="no")
+            key = api_key(self._config) or ""
+            own = {name: value.replace("{key}", key) for name, value in self.headers.items()}
+            told = {"Content-Type": "application/json", **own, **(headers or {})}
+            method = "GET" if body is None else "POST"
+            answer = await http.send(url, body or b"", told, method=method)
+            if answer.fault or not answer.is_success:
+                raise error_of(answer)
+            return answer
+
+    @contextlib.contextmanager
+    def _masked(self) -> Iterator[None]:
+        try:
+            yield
+        except ModelError as error:
+            error.args = (self.shown(str(error)),)
+            raise
+
+
+class _OpenAI(BatchProvider):
+    """`{api_base}/files` and `{api_base}/batches`, of OpenAI and of servers that have both.
+
+    A file of requests is uploaded with the purpose `batch`, then a batch is made of it; answers are
+    in its output file, errors and what expired in its error file.
+    """
+
+    most_requests = 50_000
+    most_bytes = 200 * 1000**2
+    headers: ClassVar[Mapping[str, str]] = {"Authorization": "Bearer {key}"}
+
+    def __init__(self, config: ModelConfig) -> None:
+        base = (config.api_base or OPENAI_API_BASE).rstrip("/")
+        super().__init__(config, base, f"{base}/batches", f"{base}/batches?limit=100")
+
+    def frame(self, token: str) -> tuple[bytes, bytes, bytes]:
+        start = (
+            f'--{token}\r\nContent-Disposition: form-data; name="purpose"\r\n\r\nbatch\r\n'
+            f'--{token}\r\nContent-Disposition: form-data; name="file"; '
+            f'filename="phyblock-{token}.jsonl"\r\nContent-Type: application/jsonl\r\n\r\n'
+        )
+        return start.encode(), b"\n", f"\r\n--{token}--\r\n".encode()
+
+    def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:  # noqa: ARG002
+        fields = {"custom_id": custom_id, "method": "POST", "url": "/v1/chat/completions"}
+        return _joined(fields, "body", body)
+
+    async def upload(self, token: str, path: Path) -> str:
+        form = {"Content-Type": f"multipart/form-data; boundary={token}"}
+        return await self._call(lambda made: str(made["id"]), f"{self._base}/files", path, form)
+
+    async def create(self, token: str, path: Path, file: str) -> BatchStatus:  # noqa: ARG002
+        body = {
+            "input_file_id": file,
+            "endpoint": "/v1/chat/completions",
+            "completion_window": "24h",
+            "metadata": {"phyblock": token},
+        }
+        return await self._call(self._read_status, self._url, body)
+
+    def read(self, line: Any) -> tuple[str, Answer | str]:
+        response, error = line.get("response") or {}, line.get("error") or {}
+        if isinstance(response.get("body"), Mapping):
+            return line["custom_id"], _answer(int(response["status_code"]), response["body"])
+        if error.get("code") in ("batch_expired", "batch_cancelled"):
+            return line["custom_id"], _words(error["code"], error)
+        return line["custom_id"], _answer(500, {"error": error})
+
+    def _read_status(self, batch: Any) -> BatchStatus:
+        word, counts = batch["status"], batch.get("request_counts") or {}
+        total, done, failed = (_count(counts.get(n)) for n in ("total", "completed", "failed"))
+        files = [batch[name] for name in ("output_file_id", "error_file_id") if batch.get(name)]
+        # Taken for empty, a batch whose files are not there yet would be asked again.
+        ends = {"expired": "ended", "cancelled": "ended", "failed": "refused"}
+        state: Any = "ended" if word == "completed" and files else ends.get(word, "running")
+        return BatchStatus(
+            _name(batch["id"]),
+            state,
+            _words(word, *((batch.get("errors") or {}).get("data") or ()), n=(total, done, failed)),
+            (batch.get("metadata") or {}).get("phyblock"),
+            total,
+            _count(batch.get("created_at")),
+            tuple(f"{self._base}/files/{file}/content" for file in files),
+            word != "cancelled",
+        )
+
+
+class _Anthropic(BatchProvider):
+    """`/v1/messages/batches`: one call carries all requests, and answers come as JSON lines.
+
+    A batch has no name of ours, so that one whose making was cut off is found by what its answers
+    answer.
+    """
+
+    most_requests = 100_000
+    most_bytes = 256 * 1000**2
+    headers: ClassVar[Mapping[str, str]] = {"anthropic-version": "2023-06-01", "x-api-key": "{key}"}
+
+    def __init__(self, config: ModelConfig) -> None:
+        base = (config.api_base or "https://api.anthropic.com").rstrip("/")
+        # As litellm takes an address, with or without the path of the messages.
+        for end in ("/messages", "/v1"):
+            base = base.removesuffix(end)
+        url = f"{base}/v1/messages/batches"
+        super().__init__(config, base, url, f"{url}?limit=100")
+        self._betas: set[str] = set()
+
+    def frame(self, token: str) -> tuple[bytes, bytes, bytes]:  # noqa: ARG002
+        return b'{"requests":[', b",", b"]}"
+
+    def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:
+        # The batch asks for the betas that any of its requests needs.
+        betas = next((v for name, v in headers.items() if name.lower() == "anthropic-beta"), "")
+        self._betas |= {name.strip() for name in betas.split(",") if name.strip()}
+        return _joined({"custom_id": custom_id}, "params", body)
+
+    async def create(self, token: str, path: Path, file: str) -> BatchStatus:  # noqa: ARG002
+        betas = {"anthropic-beta": ",".join(sorted(self._betas))} if self._betas else {}
+        return await self._call(self._read_status, self._url, path, betas)
+
+    async def status(self, batch_id: str) -> BatchStatus:
+        def read(batch: Any) -> BatchStatus:
+            if batch.get("archived_at"):
+                raise UnavailableError("it is archived, and its results are no longer there")
+            return self._read_status(batch)
+
+        return await self._call(read, f"{self._url}/{batch_id}")
+
+    def read(self, line: Any) -> tuple[str, Answer | str]:
+        result = line["result"]
+        if result["type"] in ("canceled", "expired"):
+            return line["custom_id"], result["type"]
+        if result["type"] == "succeeded":
+            return line["custom_id"], _answer(200, result["message"])
+        # The error stands in an error response, or alone.
+        error = result["error"].get("error") or result["error"]
+        status = _ANTHROPIC_STATUSES.get(error.get("type"), 500)
+        return line["custom_id"], _answer(status, {"type": "error", "error": error})
+
+    def _read_status(self, batch: Any) -> BatchStatus:
+        word = batch["processing_status"]
+        counts = {name: int(number or 0) for name, number in batch["request_counts"].items()}
+        failed = sum(counts.get(name, 0) for name in ("errored", "expired", "canceled"))
+        total, done, has_ended = sum(counts.values()), counts.get("succeeded", 0), word == "ended"
+        return BatchStatus(
+            _name(batch["id"]),
+            "ended" if has_ended else "running",
+            _words(word, n=(total, done, failed)),
+            None,
+            total,
+            _unix_s(batch.get("created_at")),
+            # Not `results_url`, which behind a gateway is the provider's own and out of reach.
+            (f"{self._url}/{batch['id']}/results",) if has_ended else (),
+            not (has_ended and counts.get("canceled")),
+        )
+
+    def _read_page(self, page: Any, after: str = "after_id") -> tuple[Sequence[BatchStatus], str]:
+        return super()._read_page(page, after)
+
+
+class _Gemini(BatchProvider):
+    """`/v1beta/models/{model}:batchGenerateContent` and `/v1beta/batches`: a file of requests is
+    uploaded, then a batch is made of it by our name.
+
+    The provider bounds no number of requests; ours keeps an index in memory.
+    """
+
+    most_requests = 100_000
+    most_bytes = 2 * 1000**3
+    headers: ClassVar[Mapping[str, str]] = {"x-goog-api-key": "{key}"}
+
+    def __init__(self, config: ModelConfig) -> None:
+        base = config.api_base or "https://generativelanguage.googleapis.com"
+        base = base.rstrip("/").removesuffix("/v1beta")
+        # The name of a batch holds the rest of the path.
+        super().__init__(config, base, f"{base}/v1beta", f"{base}/v1beta/batches?pageSize=100")
+
+    def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:  # noqa: ARG002
+        return _joined({"key": custom_id}, "request", body)
+
+    async def upload(self, token: str, path: Path) -> str:
+        announced = {
+            "X-Goog-Upload-Protocol": "resumable",
+            "X-Goog-Upload-Command": "start",
+            "X-Goog-Upload-Header-Content-Length": str(path.stat().st_size),
+            "X-Goog-Upload-Header-Content-Type": "application/jsonl",
+        }
+        named = json.dumps({"file": {"display_name": token}}).encode()
+        url = f"{self._base}/upload/v1beta/files"
+        answer = await self._send(self._calls, url, named, announced)
+        told = {name.lower(): value for name, value in answer.headers.items()}
+        if not (url := told.get("x-goog-upload-url", "")):
+            raise RetryableError("no address for an upload was answered", status=answer.status)
+        sent = {"X-Goog-Upload-Offset": "0", "X-Goog-Upload-Command": "upload, finalize"}
+        return await self._call(lambda made: str(made["file"]["name"]), url, path, sent)
+
+    async def create(self, token: str, path: Path, file: str) -> BatchStatus:  # noqa: ARG002
+        batch = {"display_name": token, "input_config": {"file_name": file}}
+        url = f"{self._url}/models/{self._config.provider_model}:batchGenerateContent"
+        return await self._call(self._read_status, url, {"batch": batch})
+
+    def read(self, line: Any) -> tuple[str, Answer | str]:
+        if isinstance(line.get("response"), Mapping):
+            return line["key"], _answer(200, line["response"])
+        error = line.get("error") or {}
+        code = int(error.get("code") or 13)
+        if code == 1:  # cancelled
+            return line["key"], _words("cancelled", error)
+        status = _GOOGLE_STATUSES.get(code, 500) if code < 100 else code
+        return line["key"], _answer(status, {"error": {**error, "code": status}})
+
+    def _read_status(self, batch: Any) -> BatchStatus:
+        facts = batch.get("metadata") or {}
+        # BATCH_STATE_... or JOB_STATE_..., by version.
+        word = (facts.get("state") or "").rpartition("STATE_")[2].lower()
+        ends = dict.fromkeys(("succeeded", "expired", "cancelled"), "ended") | {"failed": "refused"}
+        state: Any = ends.get(word, "running")
+        stats = facts.get("batchStats") or {}
+        names = ("requestCount", "successfulRequestCount", "failedRequestCount")
+        total, done, failed = (_count(stats.get(name)) for name in names)
+        output = batch.get("response") or facts.get("output") or {}
+        file = output.get("responsesFile")
+        return BatchStatus(
+            _name(batch["name"]),
+            state,
+            _words(word or "begun", batch.get("error"), n=(total, done, failed)),
+            facts.get("displayName") or None,
+            total,
+            _unix_s(facts.get("createTime")),
+            (f"{self._base}/download/v1beta/{file}:download?alt=media",) if file else (),
+            word != "cancelled",
+        )
+
+    def _read_page(self, page: Any, after: str = "pageToken") -> tuple[Sequence[BatchStatus], str]:
+        token = page.get("nextPageToken")
+        batches = [self._read_status(batch) for batch in page.get("operations") or ()]
+        return batches, f"{self._first_page}&{after}={token}" if token else ""
+
+
+PROVIDERS: Mapping[str, Callable[[ModelConfig], BatchProvider]] = {
+    "openai": _OpenAI,
+    "hosted_vllm": _OpenAI,
+    "anthropic": _Anthropic,
+    "gemini": _Gemini,
+}
+"""By the prefix of a model's id; models of others are refused with their file."""
+
+_ANTHROPIC_STATUSES: Mapping[str, int] = {
+    "invalid_request_error": 400, "authentication_error": 401, "billing_error": 402,
+    "permission_error": 403, "not_found_error": 404, "request_too_large": 413,
+    "rate_limit_error": 429, "timeout_error": 504, "overloaded_error": 529,
+}  # fmt: skip
+_GOOGLE_STATUSES: Mapping[int, int] = {
+    3: 400, 4: 504, 5: 404, 7: 403, 8: 429, 9: 400, 13: 500, 14: 503, 16: 401,
+}  # fmt: skip
+
+
+def _joined(fields: Mapping[str, Any], name: str, body: bytes) -> bytes:
+    """Return an object as JSON with the JSON `body` under a further name, as it is."""
+    return json.dumps({**fields, name: None}).encode().removesuffix(b"null}") + body + b"}"
+
+
+def _answer(status: int, body: Mapping[str, Any]) -> Answer:
+    return Answer(status, {}, json.dumps(body).encode())
+
+
+def _name(value: Any) -> str:
+    """Return the name of a batch; ValueError where it has none."""
+    if not (isinstance(value, str) and value):
+        raise ValueError("a batch without a name")
+    return value
+
+
+def _count(value: Any) -> int | None:
+    """Return a number, also one that is written as a text, as Google does."""
+    return None if value is None else int(value)
+
+
+def _unix_s(time: str | None) -> float | None:
+    """Return a time as RFC 3339 writes it as Unix time."""
+    return None if time is None else datetime.fromisoformat(time).timestamp()
+
+
+def _words(state: str, *errors: Any, n: tuple[int | None, ...] = (None, None, None)) -> str:
+    """Return state, numbers (of all, answered and failed requests) and errors in words."""
+    total, done, failed = n
+    counts = f", {done or 0:,} of {total:,} answered" if total else ""
+    bad = f", {failed:,} failed" if total and failed else ""
+    said = [str(e[key]) for e in errors if e for key in ("code", "message") if e.get(key)]
+    return f"{state}{counts}{bad}{': ' if said else ''}{' '.join(said)}"
