@@ -37,10 +37,9 @@ from phyblock.records.reply import Reply
 from phyblock.report.inputs import digest_of_file
 from phyblock.report.write import write_tables
 from phyblock.resources import bundled
-from phyblock.run.data import recorded_dataset
-from phyblock.run.folder import run_folder
+from phyblock.run.plan import recorded_dataset
 from phyblock.run.rescore import judged_anew, recorded_suite, reopen_tracks
-from phyblock.run.rewritten import manifest_text, record_lines, write_run
+from phyblock.run.store import manifest_text, record_lines, run_folder, write_run
 from phyblock.tables.design import read_design
 from phyblock.text import some_of
 from phyblock.tracks.kind import kinds_with_physics

@@ -18,11 +18,11 @@ from phyblock.api.suites import Suite, load_suite
 from phyblock.config.models import load_models
 from phyblock.errors import Problem, SpecError
 from phyblock.report.notebook import LoadedRun, load_run
-from phyblock.run.consent import spending_refused, unlimited_spending
+from phyblock.run.estimate import spending_refused, unlimited_spending
 from phyblock.run.events import RunEvent, Stopping
 from phyblock.run.execute import RunResult
-from phyblock.run.finding import find_models_file
 from phyblock.run.plan import make_plan
+from phyblock.run.preflight import find_models_file
 from phyblock.run.session import Session, check_ready
 from phyblock.text import counted
 

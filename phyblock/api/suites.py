@@ -15,8 +15,8 @@ from phyblock.config.suite import load_suite as read_suite
 from phyblock.data import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.resources import bundled
-from phyblock.run.data import open_dataset
-from phyblock.run.finding import find_suite, prompt_dirs
+from phyblock.run.plan import open_dataset
+from phyblock.run.preflight import find_suite, prompt_dirs
 from phyblock.text import counted, did_you_mean
 from phyblock.tracks.selection import select_tasks
 

@@ -15,7 +15,7 @@ from phyblock.files import write_named
 from phyblock.records.files import RECORDS, newest_starts, run_records
 from phyblock.records.manifest import MANIFEST, read_manifest
 from phyblock.records.record import Record
-from phyblock.run.data import recorded_dataset
+from phyblock.run.plan import recorded_dataset
 from phyblock.sim.film import episode_gif, episode_images, episode_sheet
 from phyblock.sim.pictures import PictureStyle
 from phyblock.tables.design import read_design

@@ -12,7 +12,7 @@ from phyblock.cli.paths import UserPath
 from phyblock.config.suite import suite_tracks
 from phyblock.files import check_free, writing
 from phyblock.resources import bundled
-from phyblock.run.finding import bundled_suites, find_suite
+from phyblock.run.preflight import bundled_suites, find_suite
 from phyblock.tracks import kind_of
 
 __all__ = ["command"]

@@ -35,8 +35,8 @@ from phyblock.models.litellm_client import be_quiet
 from phyblock.registry import baseline_names
 from phyblock.report import NO_VALUE
 from phyblock.run.check import check_model
-from phyblock.run.finding import find_models_file
 from phyblock.run.models import to_config
+from phyblock.run.preflight import find_models_file
 from phyblock.text import counted, did_you_mean
 
 __all__ = ["command"]

@@ -30,11 +30,10 @@ from phyblock.play.sitting import Sitting, report_files
 from phyblock.report.made import names_to_write
 from phyblock.resources import bundled
 from phyblock.run.execute import RunResult
-from phyblock.run.finding import bundled_suites, find_suite, prompt_dirs
-from phyblock.run.folder import run_folder
 from phyblock.run.plan import RunPlan
+from phyblock.run.preflight import bundled_suites, find_suite, prompt_dirs
 from phyblock.run.session import Session
-from phyblock.run.store import held_run
+from phyblock.run.store import held_run, run_folder
 from phyblock.text import counted
 
 __all__ = ["command"]

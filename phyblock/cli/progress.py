@@ -26,8 +26,8 @@ from phyblock.run.events import (
     RunStarted,
     SampleDone,
     Stopping,
+    Summary,
 )
-from phyblock.run.standing import Summary
 from phyblock.text import counted, one_line
 
 __all__ = ["ProgressView"]

@@ -22,20 +22,19 @@ from phyblock.config.suite import load_suite
 from phyblock.models.litellm_client import be_quiet
 from phyblock.report.made import names_to_write
 from phyblock.resources import bundled
-from phyblock.run.asking import asking_remarks, moved_remarks
-from phyblock.run.consent import spending_refused, unlimited_spending
-from phyblock.run.estimate import estimate
+from phyblock.run.estimate import estimate, spending_refused, unlimited_spending
 from phyblock.run.execute import Cause, RunResult
-from phyblock.run.finding import (
+from phyblock.run.plan import RunPlan, make_plan
+from phyblock.run.preflight import (
+    asking_remarks,
     bundled_suites,
     find_models_file,
     find_suite,
+    moved_remarks,
     prompt_dirs,
 )
-from phyblock.run.folder import run_folder
-from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.session import Session, check_ready
-from phyblock.run.store import held_run
+from phyblock.run.store import held_run, run_folder
 from phyblock.text import counted, one_line
 
 __all__ = ["command"]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from phyblock.report import NO_VALUE
-from phyblock.run.standing import Summary
+from phyblock.run.events import Summary
 from phyblock.scoring.counts import Counts
 from phyblock.tables.outcomes import FAILURES
 

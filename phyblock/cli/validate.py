@@ -17,10 +17,9 @@ from phyblock.data import SCENES_FILE, Dataset, read_builtin, read_official
 from phyblock.errors import InputError, Problem, SpecError
 from phyblock.files import read_bytes
 from phyblock.resources import bundled
-from phyblock.run.asking import asking_remarks
-from phyblock.run.finding import find_models_file, find_suite, prompt_dirs
+from phyblock.run.models import model_problems
 from phyblock.run.plan import make_plan
-from phyblock.run.soundness import model_problems
+from phyblock.run.preflight import asking_remarks, find_models_file, find_suite, prompt_dirs
 from phyblock.text import counted
 
 __all__ = ["command"]

@@ -16,7 +16,7 @@ from phyblock.files import NotRegularError, read_bytes
 from phyblock.report.inputs import digest_of_file
 from phyblock.report.terminal import Terminal
 from phyblock.run.code import code_digest
-from phyblock.run.folder import run_folder
+from phyblock.run.store import run_folder
 
 if TYPE_CHECKING:
     from phyblock.report.html.write import PageWritten

@@ -30,7 +30,7 @@ from phyblock.report.sensitivity_view import (
     ranks_lines,
     ranks_view,
 )
-from phyblock.run.folder import run_folder
+from phyblock.run.store import run_folder
 from phyblock.tables.cost import cost_frame, cost_view
 from phyblock.tables.coverage import coverage_frame, coverage_in_terminal, coverage_view
 from phyblock.tables.csv_text import to_csv

@@ -10,12 +10,14 @@ from datetime import date, timedelta
 from pathlib import Path
 
 from phyblock.config.suite import Variant
+from phyblock.errors import Problem, SpecError
 from phyblock.models import Estimate as CallEstimate
 from phyblock.models import (
     Prices,
     ReplyCache,
     Request,
     Tariff,
+    is_billed,
     most_usd,
     prices_of,
     reply_key,
@@ -30,9 +32,6 @@ from phyblock.run.plan import RunPlan
 from phyblock.run.samples import Sample
 from phyblock.run.store import held_run
 from phyblock.tracks import AnyTrack, Item, shown_item
-
-__all__ = ["Estimate", "estimate"]
-
 
 _ENOUGH_REPLIES = 20
 """Replies whose mean length stands for those to come."""
@@ -301,3 +300,30 @@ def _add(
 def _kind(track: str, variant: Variant) -> str:
     """What replies of one length have in common."""
     return f"{track} {variant.shown.key}".strip()
+
+
+def unlimited_spending(
+    plan: RunPlan, folder: Path, *, use_cache: bool, retry_failed: bool = False
+) -> Sequence[Estimate]:
+    """What every model would take, where one that is billed may cost something and no limit of the
+    suite holds it; nothing where there is nothing to agree to.
+    """
+    billed = _billed(plan)
+    if plan.suite.limits.max_cost_usd is not None or not billed:
+        return ()
+    estimated = estimate(plan, folder, use_cache=use_cache, retry_failed=retry_failed)
+    return estimated if any(row.may_cost and row.model in billed for row in estimated) else ()
+
+
+def spending_refused(
+    plan: RunPlan, estimated: Sequence[Estimate], message: str, hint: str
+) -> SpecError:
+    """The error that names the models that may cost money."""
+    billed = _billed(plan)
+    found = ", ".join(row.model for row in estimated if row.may_cost and row.model in billed)
+    return SpecError(Problem(f"suite {plan.suite.name}", message, found=found, hint=hint))
+
+
+def _billed(plan: RunPlan) -> set[str]:
+    """The models whose calls somebody may be billed for."""
+    return {model.name for model in plan.models if is_billed(model.config)}

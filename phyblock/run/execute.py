@@ -16,16 +16,14 @@ from typing import Any
 
 from phyblock.errors import BudgetReachedError, UnavailableError
 from phyblock.models import AskLaterError, GatheringModel, HaltedError, Model
-from phyblock.run.events import ModelStopped, SampleDone, Stopping, Watcher
+from phyblock.run.events import ModelStopped, SampleDone, Stopping, Summary, Watcher
 from phyblock.run.extraction import Extractor
 from phyblock.run.halt import Halt
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan
 from phyblock.run.samples import Sample, SampleRunner
 from phyblock.run.shielded import to_its_end
-from phyblock.run.standing import Summary
-from phyblock.run.store import RunStore
-from phyblock.run.writer import RecordWriter
+from phyblock.run.store import RecordWriter, RunStore
 
 __all__ = ["Cause", "Executor", "RunResult", "Stop"]
 

@@ -16,10 +16,9 @@ from phyblock.records.reply import Reply, Usage
 from phyblock.run.extraction import Extractor
 from phyblock.run.halt import Halt
 from phyblock.run.judging import judged_apart
-from phyblock.run.prompts import PromptFile
 from phyblock.run.records import about_prompt, begun, judged
 from phyblock.run.shielded import to_its_end
-from phyblock.run.writer import RecordWriter
+from phyblock.run.store import PromptFile, RecordWriter
 from phyblock.stable import drawn_bytes, plain_sum
 from phyblock.tracks import (
     AnyTrack,

@@ -28,10 +28,9 @@ from phyblock.run.events import ModelNotice, RunNotice, RunStarted, Watcher
 from phyblock.run.execute import Executor, RunResult
 from phyblock.run.extraction import Extractor
 from phyblock.run.halt import Halt
+from phyblock.run.models import provider_problem
 from phyblock.run.plan import RunPlan
-from phyblock.run.soundness import provider_problem
-from phyblock.run.store import RunStore, held_run
-from phyblock.run.writer import RecordWriter
+from phyblock.run.store import RecordWriter, RunStore, held_run
 
 __all__ = ["Session", "check_ready"]
 

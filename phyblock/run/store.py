@@ -7,17 +7,29 @@ sample replaces an earlier one.
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
+import fcntl
 import json
 import os
-from collections.abc import Callable, Collection, Container, Iterator, Mapping
+import re
+import threading
+from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from io import FileIO
 from pathlib import Path
 from typing import Any, TypeVar
 
+from phyblock.config.yaml import dump_yaml
 from phyblock.errors import Problem, StoreError
-from phyblock.files import atomic_write, writing
+from phyblock.files import LIST, OutFolder, append_whole, atomic_write, sync_folder, writing
+from phyblock.models.request import Image, Message
 from phyblock.records.files import (
+    BATCHES,
+    PROMPTS,
+    RECORDS,
     STOPPED,
+    TURNS,
     BatchLines,
     Lines,
     PromptLines,
@@ -28,19 +40,14 @@ from phyblock.records.files import (
     read_stopped,
     run_records,
 )
-from phyblock.records.line import Line
+from phyblock.records.line import Line, encodable
 from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
-from phyblock.records.record import Stopped, Turn
-from phyblock.run.appending import AppendFile
-from phyblock.run.folder import check_place, locked, run_folder
+from phyblock.records.record import PictureMark, Prompt, PromptMessage, Record, Stopped, Turn
+from phyblock.run.events import Standing
 from phyblock.run.manifest import code_versions
-from phyblock.run.prompts import PromptFile
-from phyblock.run.rewritten import manifest_text
-from phyblock.run.standing import Standing
 from phyblock.sim.engine import PHYSICS_VARIABLE, REFERENCE_ENGINE
+from phyblock.stable import hex_digest
 from phyblock.tracks.base import CARRYING, ENGINE
-
-__all__ = ["RunStore", "held_run"]
 
 _LABELS = ("published", "served_at", "size_b")
 LineT = TypeVar("LineT", bound=Line)
@@ -241,3 +248,197 @@ def _decisive(manifest: Manifest) -> list[dict[str, Any]]:
     """What decides the models' replies, in the order of their names."""
     models = sorted(manifest.models, key=lambda model: model.name)
     return [{k: v for k, v in m.fields().items() if k not in _LABELS} for m in models]
+
+
+_HINT_APPENDING = "free some space and give the same command again: it goes on from here"
+
+
+class AppendFile:
+    """Lines that are on disk when `append` returns; safe to call from several threads.
+
+    The file is made with the first line.
+    """
+
+    def __init__(self, path: Path, *, sync: bool = True) -> None:
+        """Without `sync` lines survive the death of the process, not that of the machine."""
+        self._path = path
+        self._sync = sync
+        self._writing = threading.Lock()
+        self._file: FileIO | None = None
+
+    def append(self, lines: Iterable[Mapping[str, Any]]) -> None:
+        """Write objects, a line each, and wait until they are on disk.
+
+        Raises StoreError when the disk refuses; what was written before stays whole.
+        """
+        data = b"".join(_line(line) for line in lines)
+        with self._writing:
+            self._append(data)
+
+    def end_line(self) -> None:
+        """Write the newline that the last line lacks."""
+        with FileIO(self._path, "a") as file:
+            file.write(b"\n")
+
+    def close(self) -> None:
+        """Close the file, once what is being written is written."""
+        with self._writing:
+            if self._file is not None:
+                self._file.close()
+                self._file = None
+
+    def _append(self, data: bytes) -> None:
+        with writing(self._path, _HINT_APPENDING):
+            if self._file is None:
+                # Unbuffered: a write that failed must not be tried again behind our back.
+                self._file = FileIO(self._path, "a")
+                if self._sync:
+                    sync_folder(self._path.parent)
+            append_whole(self._file.fileno(), data, sync=self._sync)
+
+
+def _line(line: Mapping[str, Any]) -> bytes:
+    text = json.dumps(line, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    return text.encode("utf-8", "replace") + b"\n"
+
+
+LOCK = ".lock"
+_OWN = (MANIFEST, RECORDS, TURNS, PROMPTS, BATCHES, "batches", LOCK, LIST)
+_BEGUN = re.compile(rf"{re.escape(LOCK)}|{re.escape(LIST)}|\.[0-9a-f]{{32}}\.part")
+"""What a run that was killed before it had a manifest leaves behind."""
+
+
+def run_folder(path: Path) -> OutFolder:
+    """A run's folder, to write into what can be made again from its records."""
+    return OutFolder(path)
+
+
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold the lock of a run folder, which one process writes; StoreError where another does."""
+    with (folder / LOCK).open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            hint = "wait for it to end, or choose another folder with --out"
+            message = "is being written by another phyblock run"
+            raise StoreError(Problem(str(folder), message, hint=hint)) from error
+        yield
+
+
+def check_place(folder: Path) -> None:
+    """Raise StoreError unless `folder` is new, empty or a run's; nothing is written.
+
+    A folder without our manifest that holds anything is somebody's: a run makes names of its own
+    in it. What a run grows must be files of the folder itself, no links to others.
+    """
+    with writing(folder, _HINT):
+        try:
+            os.lstat(folder)
+        except FileNotFoundError:
+            return
+        names = {entry.name for entry in os.scandir(folder)}
+    strangers = sorted(name for name in names if not _BEGUN.fullmatch(name))
+    if MANIFEST not in names and strangers:
+        found = ", ".join(strangers[:3]) + (", ..." if len(strangers) > 3 else "")
+        message = f"is not empty and holds no run (no {MANIFEST})"
+        hint = "name a new or an empty folder with --out"
+        raise StoreError(Problem(str(folder), message, found=found, hint=hint))
+    links = [folder / name for name in _OWN if (folder / name).is_symlink()]
+    if links:
+        message = "is a link, and a run writes nowhere but in its own folder"
+        raise StoreError([Problem(str(path), message, hint=_HINT) for path in links])
+
+
+def write_run(folder: Path, manifest: Manifest, records: Iterable[Record]) -> None:
+    """Write manifest and records of a run; raises StoreError where the disk refuses."""
+    lines = (line.encode("utf-8", "replace") for line in record_lines(records))
+    files: dict[str, str | Iterator[bytes]] = {RECORDS: lines, MANIFEST: manifest_text(manifest)}
+    # Where a run is replaced, a kill between the two leaves one that has to be scored again.
+    names = (RECORDS, MANIFEST) if (folder / MANIFEST).exists() else (MANIFEST, RECORDS)
+    run_folder(folder).claim([])
+    for name in names:
+        with writing(folder / name):
+            atomic_write(folder / name, files[name], sync=True)
+
+
+def manifest_text(manifest: Manifest) -> str:
+    """`run.yaml`."""
+    return dump_yaml(manifest.fields())
+
+
+def record_lines(records: Iterable[Record]) -> Iterator[str]:
+    """`records.jsonl`, line by line: the same text for the same records."""
+    for record in records:
+        yield json.dumps(record.fields(), ensure_ascii=False, separators=(",", ":")) + "\n"
+
+
+class RecordWriter:
+    """Appends records off the event loop; `put` returns when its record is synced."""
+
+    def __init__(self, file: AppendFile) -> None:
+        self._file = file
+        self._waiting: list[tuple[Line, asyncio.Future[None]]] = []
+        self._flusher: asyncio.Task[None] | None = None
+
+    async def put(self, record: Line) -> None:
+        """Append a record and wait until it is on disk; StoreError when the disk refuses."""
+        written: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._waiting.append((record, written))
+        if self._flusher is None:
+            self._flusher = asyncio.create_task(self._flush())
+        await written
+
+    async def drain(self) -> None:
+        """Wait until everything that was put is on disk or refused."""
+        if self._flusher is not None:
+            await self._flusher
+
+    async def _flush(self) -> None:
+        while self._waiting:
+            batch, self._waiting = self._waiting, []
+            failure: Exception | None = None
+            try:
+                await asyncio.to_thread(self._file.append, [line.fields() for line, _ in batch])
+            except Exception as error:
+                # Whatever it is, those who wait must hear of it, or they wait for ever.
+                failure = error
+            # A waiter that was cancelled has a future that is already done.
+            for written in (future for _, future in batch if not future.done()):
+                if failure is None:
+                    written.set_result(None)
+                else:
+                    written.set_exception(failure)
+        self._flusher = None
+
+
+class PromptFile:
+    """Prompts on their way to disk, each once."""
+
+    def __init__(self, file: AppendFile, known: set[str]) -> None:
+        self._file = file
+        self._known = known
+
+    def keep(self, messages: Sequence[Message]) -> str:
+        """Write a prompt unless it is there; its digest. Raises StoreError as the file does."""
+        content = tuple(_content(message) for message in messages)
+        fields = [message.fields() for message in content]
+        canonical = json.dumps(fields, sort_keys=True, separators=(",", ":"))
+        digest = hex_digest(canonical)
+        if digest not in self._known:
+            self._known.add(digest)
+            self._file.append([Prompt(sha256=digest, messages=content).fields()])
+        return digest
+
+
+def read_prompts(folder: Path) -> dict[str, tuple[PromptMessage, ...]]:
+    """The messages of every prompt of a run folder, by digest."""
+    return {line.sha256: line.messages for _, line in PromptLines(folder)}
+
+
+def _content(message: Message) -> PromptMessage:
+    parts = (
+        PictureMark(image=part.label) if isinstance(part, Image) else encodable(part)
+        for part in message.parts
+    )
+    return PromptMessage(role=message.role, parts=tuple(parts))

@@ -113,7 +113,7 @@ def _drops_earlier_records() -> None:
 
 def _keeps_nothing_of_some_replies() -> None:
     """Law 3: of every three records one is not written."""
-    from phyblock.run.writer import RecordWriter
+    from phyblock.run.store import RecordWriter
 
     put = RecordWriter.put
     counted = itertools.count()

@@ -8,7 +8,7 @@ from hypothesis import given
 from phyblock.cli.tally import Tally
 from phyblock.records.files import known_records
 from phyblock.report import coverage_frame
-from phyblock.run.standing import Summary
+from phyblock.run.events import Summary
 from phyblock.tables.coverage import coverage_view
 from phyblock.tables.outcomes import HEADINGS, OUTCOMES
 from phyblock.tables.text_table import NO_VALUE

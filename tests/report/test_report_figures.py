@@ -14,7 +14,7 @@ from PIL import Image
 
 from phyblock.errors import StoreError
 from phyblock.report.figures import Wanted, figure_names, write_figures, write_paper_figures
-from phyblock.run.folder import run_folder
+from phyblock.run.store import run_folder
 from phyblock.tables.drawing import COLORS, GRID, MUTED, PAGE_LOOK, PALE
 from phyblock.tables.load import load_run
 from phyblock.tracks.figures import HATCHES, Part, stack

@@ -15,12 +15,11 @@ from phyblock.config.suite import load_suite
 from phyblock.records.files import STOPPED
 from phyblock.records.line import Line
 from phyblock.records.record import Record
-from phyblock.run.appending import AppendFile
 from phyblock.run.events import RunEvent, SampleDone, Stopping
 from phyblock.run.execute import Cause
 from phyblock.run.plan import make_plan
 from phyblock.run.session import Session
-from phyblock.run.writer import RecordWriter
+from phyblock.run.store import AppendFile, RecordWriter
 from phyblock.tracks.full_planning import FullPlanning
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat

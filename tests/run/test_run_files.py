@@ -19,10 +19,8 @@ from phyblock.errors import StoreError
 from phyblock.models import Image, Message
 from phyblock.records.files import PromptLines, TurnLines, collect_turns
 from phyblock.records.manifest import Manifest
-from phyblock.run.appending import AppendFile
 from phyblock.run.plan import make_plan
-from phyblock.run.prompts import PromptFile, read_prompts
-from phyblock.run.store import RunStore
+from phyblock.run.store import AppendFile, PromptFile, RunStore, read_prompts
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace

@@ -17,7 +17,7 @@ from phyblock.parsing.move import parse_move
 from phyblock.parsing.plan import parse_plan
 from phyblock.records.manifest import read_manifest
 from phyblock.registry import known_tracks
-from phyblock.run import manifest, rescore, rewritten
+from phyblock.run import manifest, rescore, store
 from tests.run.test_step_runs import by_sample
 from tests.servers.chassis import Faults, Running, Seen
 from tests.servers.step_agent import StepAgent
@@ -138,7 +138,7 @@ def test_killed_before_either_file_is_replaced_it_is_scored_again(
     shutil.copytree(workspace.out, workspace.root / "whole")
     assert call("score", "whole") == 0
     before = (workspace.out / "records.jsonl").read_bytes()
-    left, write = writes, rewritten.atomic_write
+    left, write = writes, store.atomic_write
 
     def dying(*args: Any, **options: Any) -> None:
         nonlocal left
@@ -148,7 +148,7 @@ def test_killed_before_either_file_is_replaced_it_is_scored_again(
         write(*args, **options)
 
     with monkeypatch.context() as dies:
-        dies.setattr(rewritten, "atomic_write", dying)
+        dies.setattr(store, "atomic_write", dying)
         with pytest.raises(KeyboardInterrupt):
             rescore.rescore(workspace.out)
     assert ((workspace.out / "records.jsonl").read_bytes() == before) == (writes == 1)

@@ -12,7 +12,7 @@ from phyblock.parsing.move import parse_move
 from phyblock.parsing.plan import parse_plan
 from phyblock.parsing.poses import parse_poses
 from phyblock.resources import bundled
-from phyblock.run.data import open_dataset
+from phyblock.run.plan import open_dataset
 from phyblock.sim.pictures import joined_size_px
 from phyblock.tracks.by_hand import Picking, Spot, picks_of
 from phyblock.tracks.full_planning import PlanSubject, pick_plan

@@ -20,8 +20,8 @@ from phyblock.errors import SpecError
 from phyblock.making.poses import transformed
 from phyblock.models.request import Image
 from phyblock.resources import bundled
-from phyblock.run.data import open_dataset
 from phyblock.run.manifest import make_manifest
+from phyblock.run.plan import open_dataset
 from phyblock.tracks import Opening, open_tracks, vqa
 from phyblock.tracks.examples import Examples
 from phyblock.tracks.full_planning import worked_plan

@@ -23,8 +23,8 @@ from phyblock.making.questions.rewording import Paraphrase, stems_of, write_word
 from phyblock.models import ReplyCache, build_model
 from phyblock.models.litellm_client import be_quiet
 from phyblock.resources import bundled, reply_cache_file
-from phyblock.run.finding import find_models_file
 from phyblock.run.models import to_config
+from phyblock.run.preflight import find_models_file
 from phyblock.text import counted, did_you_mean
 from phyblock.tracks import TemplatePrompt
 

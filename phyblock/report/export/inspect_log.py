@@ -12,7 +12,7 @@ from phyblock.records.record import Score as StoredScore
 from phyblock.records.reply import Reply
 from phyblock.report.export.rows import newest_records, prompt_text
 from phyblock.resources import needs
-from phyblock.run.prompts import read_prompts
+from phyblock.run.store import read_prompts
 from phyblock.scoring.counts import Counts
 from phyblock.stable import hex_digest
 from phyblock.tables.load import Run

@@ -8,7 +8,7 @@ from typing import Any
 
 from phyblock.records.files import read_records, record_types
 from phyblock.records.record import PictureMark, PromptMessage, Record
-from phyblock.run.prompts import read_prompts
+from phyblock.run.store import read_prompts
 from phyblock.tables.load import Run
 from phyblock.tracks.estimates import numbers_of, stored_counts
 

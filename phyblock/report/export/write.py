@@ -8,7 +8,7 @@ from pathlib import Path
 from phyblock.files import OutFolder, writing
 from phyblock.report.export.flat import EXPORTS
 from phyblock.report.export.inspect_log import to_inspect
-from phyblock.run.folder import run_folder
+from phyblock.run.store import run_folder
 from phyblock.tables.load import Run
 
 __all__ = ["FORMATS", "export_run"]

@@ -17,8 +17,8 @@ from phyblock.report.figures.forest import difference_forest
 from phyblock.report.figures.kit import block_kit
 from phyblock.report.figures.perturbations import perturbation_strip
 from phyblock.report.figures.sensitivity import moved_dots
-from phyblock.run.data import recorded_dataset
-from phyblock.run.folder import run_folder
+from phyblock.run.plan import recorded_dataset
+from phyblock.run.store import run_folder
 from phyblock.tables.drawing import (
     PAGE_LOOK,
     Look,

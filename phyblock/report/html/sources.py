@@ -11,7 +11,7 @@ from pathlib import Path
 
 from phyblock.data import AssemblyTask, Dataset
 from phyblock.errors import DataError
-from phyblock.run.data import recorded_dataset
+from phyblock.run.plan import recorded_dataset
 from phyblock.tables.load import Run
 from phyblock.tables.track_report import PageItems
 from phyblock.tracks.kind import kind_of

@@ -34,7 +34,7 @@ from phyblock.report.html.sources import Sources, open_sources
 from phyblock.report.html.standing import cautions, samples_done, shortfalls
 from phyblock.report.made import PAGE
 from phyblock.report.write import TablesWritten
-from phyblock.run.folder import run_folder
+from phyblock.run.store import run_folder
 from phyblock.tables.load import Run
 from phyblock.tracks.opening import picture_policy
 from phyblock.tracks.pictures import kit, scene_entry
