@@ -24,7 +24,7 @@ import numpy as np
 
 from phyblock.data import read_builtin, read_questions
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.question_production import problem_of
+from phyblock.making.questions.production import problem_of
 from phyblock.resources import bundled
 from phyblock.sim.dynamics import settle
 from phyblock.sim.engine import PHYSICS_VARIABLE, described_engine, installed_engines

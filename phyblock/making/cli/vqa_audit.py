@@ -41,10 +41,7 @@ def command(questions: str, data: str, no_text_probe: bool, no_pictures: bool) -
             SUBTASK_NAMES[one.subtask],
             str(one.n),
             str(one.base_scenes),
-            *(
-                f"{100 * sum(n for answer, n in one.letters.items() if answer[0] == x) / one.n:.0f}"
-                for x in LETTERS
-            ),
+            *(f"{100 * one.letters[letter] / one.n:.0f}" for letter in LETTERS),
             f"{100 * one.chance:.0f}",
             *map(_shown, (one.majority, one.text, one.pictures)),
         )

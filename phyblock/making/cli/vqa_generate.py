@@ -14,8 +14,8 @@ from phyblock.domain import SUBTASKS, Subtask
 from phyblock.making.cli.question_sets import data_option
 from phyblock.making.cli.subtasks_option import subtasks_option
 from phyblock.making.cli.working import jobs_option, ray_option, seed_option, tell_simulators
-from phyblock.making.questions.question_files import check_place, write_questions
-from phyblock.making.questions.question_production import PER_SUBTASK, make_questions
+from phyblock.making.questions.files import check_place, write_questions
+from phyblock.making.questions.production import PER_SUBTASK, make_questions
 from phyblock.making.workers import open_workers
 from phyblock.text import counted
 

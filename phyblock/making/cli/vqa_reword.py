@@ -14,8 +14,8 @@ from phyblock.domain import Question
 from phyblock.errors import DataError, Problem
 from phyblock.making.cli.question_sets import data_option, questions_option
 from phyblock.making.cli.working import jobs_option, seed_option, tracked
-from phyblock.making.questions.question_files import check_place, write_questions
-from phyblock.making.questions.question_production import verify_questions
+from phyblock.making.questions.files import check_place, write_questions
+from phyblock.making.questions.production import verify_questions
 from phyblock.making.questions.rewording import read_wordings, reword
 from phyblock.making.workers import open_workers
 from phyblock.text import counted

@@ -19,9 +19,6 @@ from numpy.typing import NDArray
 
 from phyblock.domain.question import LETTERS, SUBTASKS, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block
-from phyblock.making.questions.picture_view import shares
-from phyblock.making.questions.question_draft import UnfairError
-from phyblock.making.questions.referring import resolve
 from phyblock.making.questions.selection import BALANCE
 from phyblock.sim.pictures import COLOR_RGB, Shot
 from phyblock.sim.question_pictures import changed_pixels, seen
@@ -31,8 +28,6 @@ Floats = NDArray[np.float64]
 
 GUESSABLE = 0.35
 """Accuracy that no probe of a sound set exceeds beyond its interval."""
-LEAST_SEEN = 0.25
-"""Share of itself that a block named in words has to show."""
 _DARKEST_FACE = 60
 _EDGE_STEP = 40
 _FEWEST = 12
@@ -64,9 +59,9 @@ class Probe:
 class SubtaskAudit:
     """Facts about the questions of one subtask.
 
-    `letters` counts right answers by letter (ordering: by permutation). `ambiguous` questions have
-    options that read alike, `repeats` ask the same as an earlier one, `hidden` name a block that
-    shows less than `LEAST_SEEN` of itself. Probes are None where they have nothing to go by.
+    `letters` counts right answers by letter (ordering: by the letter that comes first), `repeats`
+    are questions that ask the same as an earlier one. Probes are None where they have nothing to
+    go by.
     """
 
     subtask: Subtask
@@ -77,23 +72,13 @@ class SubtaskAudit:
     majority: Probe
     text: Probe | None
     pictures: Probe | None
-    ambiguous: tuple[str, ...]
     repeats: tuple[str, ...]
-    hidden: tuple[str, ...]
-
-    @property
-    def letter_shares(self) -> tuple[float, float]:
-        """Smallest and largest share of a letter (ordering: of a first picture)."""
-        counts = Counter(dict.fromkeys(LETTERS, 0))
-        for answer, count in self.letters.items():
-            counts[answer[0]] += count
-        return min(counts.values()) / self.n, max(counts.values()) / self.n
 
     @property
     def is_balanced(self) -> bool:
-        """True if every letter is right about as often as the others; orders are not judged."""
-        low, high = self.letter_shares
-        return self.subtask == "OR" or (BALANCE[0] <= low and high <= BALANCE[1])
+        """True if every letter is right about as often as the others (not asked of ordering)."""
+        shares = [count / self.n for count in self.letters.values()]
+        return self.subtask == "OR" or (BALANCE[0] <= min(shares) and max(shares) <= BALANCE[1])
 
     def findings(self) -> Iterator[str]:
         """Yield what is wrong, a sentence each."""
@@ -104,9 +89,7 @@ class SubtaskAudit:
         for name, probe in probes.items():
             if probe is not None and probe.interval[0] > max(GUESSABLE, self.chance):
                 yield f"{self.subtask}: the {name} probe reaches {100 * probe.accuracy:.0f} %"
-        yield from (f"{name}: options read alike" for name in self.ambiguous)
         yield from (f"{name}: asks what an earlier question asks" for name in self.repeats)
-        yield from (f"{name}: names a block that can hardly be seen" for name in self.hidden)
 
 
 def audit_questions(
@@ -123,20 +106,17 @@ def audit_questions(
         if not mine:
             continue
         chances = [1 / math.factorial(4) if subtask == "OR" else 1 / len(q.options) for q in mine]
+        letters = Counter(q.answer_letters[0] for q in mine)
         yield SubtaskAudit(
             subtask=subtask,
             n=len(mine),
             base_scenes=len({base for q in mine for base in q.scene.parents or (q.scene.id,)}),
-            letters=dict(sorted(Counter(q.answer_letters for q in mine).items())),
+            letters={letter: letters[letter] for letter in LETTERS},
             chance=math.fsum(chances) / len(chances),
             majority=_guessed("majority", mine, guesses),
             text=_guessed("text-only", mine, guesses) if with_texts else None,
             pictures=picture_probe(mine, folds) if with_pictures else None,
-            ambiguous=tuple(q.id for q in mine if _reads_alike(q)),
             repeats=tuple(q.id for q in mine if q.id in repeated),
-            hidden=tuple(
-                q.id for q in mine if any(share < LEAST_SEEN for share in referents(q).values())
-            ),
         )
 
 
@@ -151,27 +131,6 @@ def duplicates_of(questions: Sequence[Question]) -> dict[str, str]:
         if earlier != question.id:
             repeats[question.id] = earlier
     return repeats
-
-
-def referents(question: Question) -> dict[int, float]:
-    """Return the visible share of each block that question or options name in words, by order.
-
-    Only static questions name blocks: where marks or pictures say which block is meant, none is
-    named. An option that names a block begins with "the".
-    """
-    picture = question.pictures[0] if question.pictures else None
-    if picture is None or picture.label != "scene":
-        return {}
-    slots = map(str, question.evidence.get("slots", {}).values())
-    named: set[int] = set()
-    for text in (*slots, *(option for option in question.options if option.startswith("the "))):
-        try:
-            orders = resolve(text.lower(), picture)
-        except UnfairError:  # Not every slot is an expression that names a block.
-            continue
-        named.update(orders if len(orders) == 1 else ())
-    seen_shares = shares(picture) if named else {}
-    return {order: seen_shares[order] for order in sorted(named)}
 
 
 def picture_probe(questions: Sequence[Question], folds: Folds) -> Probe | None:
@@ -272,11 +231,6 @@ def _color_shares(shot: Shot) -> Floats:
     hues /= np.linalg.norm(hues, axis=1, keepdims=True)
     counts = np.bincount((faces @ hues.T).argmax(axis=1), minlength=len(hues)).astype(np.float64)
     return np.asarray(counts / max(counts.sum(), 1.0))
-
-
-def _reads_alike(question: Question) -> bool:
-    plain = {" ".join(option.lower().split()) for option in question.options}
-    return len(plain) < len(question.options)
 
 
 def _content(question: Question) -> str:

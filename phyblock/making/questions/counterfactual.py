@@ -12,41 +12,47 @@ import functools
 import itertools
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from phyblock.domain.blocks import Color
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.annexes import with_annex
-from phyblock.making.questions.picture_view import (
+from phyblock.making.questions.draft import (
+    Draft,
+    Maker,
+    UnfairError,
+    draft,
+    only_index,
+    pick,
+    right_first,
+    shuffled,
+    slots_of,
+)
+from phyblock.making.questions.pictured import (
+    LEAST_PIXELS,
+    TAKEN,
+    are_told_apart,
+    four_alike,
+    marked_order,
+    of_kind,
+    option_pictures,
+    picture_of,
+)
+from phyblock.making.questions.structures import group_of, is_sure, with_annex
+from phyblock.making.questions.view import (
     COUNTED,
     NAMED,
     are_seen,
     center_m,
     drawn_view,
+    orders_of,
     require_seen,
     shares,
 )
-from phyblock.making.questions.pictured_drafts import (
-    LEAST_PIXELS,
-    are_told_apart,
-    draft,
-    four_alike,
-    of_kind,
-    only_index,
-    option_pictures,
-    picture_of,
-)
-from phyblock.making.questions.question_draft import Draft, UnfairError
-from phyblock.making.questions.referring import TAKEN, marked_order
-from phyblock.making.questions.selection import pick, shuffled
-from phyblock.making.questions.wording import slots_of
-from phyblock.sim.balance import is_balanced, surely_falls, surely_stands
+from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.contact import support_graph
-from phyblock.sim.dynamics import groups
 from phyblock.sim.outcomes import Outcome, after_removal
 from phyblock.sim.pictures import Shot
 from phyblock.sim.question_pictures import block_mark, seen
@@ -64,7 +70,7 @@ _VIEWS_TRIED = 3
 _REMOVALS_TRIED = 6
 _Sort = tuple[bool, bool]
 _SORTS: tuple[_Sort, ...] = ((False, False), (False, True), (True, False), (True, True))
-"""Whether it holds that what rests on the block goes with it, or what rests on nothing else."""
+"""True where what rests on the block goes with it, and where what rests on nothing else does."""
 _SHARES = (0.35, 0.25, 0.25, 0.15)
 """How often removals of each sort are looked for: each rule is right in four cases of ten."""
 _STAYS_ASKED = 0.25
@@ -72,7 +78,7 @@ _COLORED = 0.5
 
 
 class _Case(NamedTuple):
-    """A removal: what is shown, which block goes, and whether anything falls.
+    """A removal: what is shown, the block that goes, and whether anything falls.
 
     `resting` are the blocks that rest on it, directly or not, `only` those that rest on nothing
     else. Whether anything falls is what statics alone say; a simulation decides.
@@ -86,20 +92,18 @@ class _Case(NamedTuple):
 
     @property
     def sort(self) -> _Sort:
-        """Whether what rests on the block goes with it, and what rests on it alone."""
+        """True or False for each rule: all that rests on the block goes with it; or on it alone."""
         return (bool(self.resting) is self.falls, bool(self.only) is self.falls)
 
     def is_as_expected(self, moved: Collection[int]) -> bool:
-        """Whether both rules hold, or fail, as they were thought to."""
+        """True if both rules hold, or fail, as they were thought to."""
         return self.sort == (set(moved) == self.resting, set(moved) == self.only)
 
 
-class CounterfactualMaker:
+class CounterfactualMaker(Maker):
     """Kinds: `cf-count` (texts) and `cf-color` (what moves, by colors)."""
 
     subtask: Subtask = "CF"
-    scenes_tried = 400
-    drafts_a_scene = 1
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Drafts about removals from the scene, or from a part of it with an annex."""
@@ -150,7 +154,7 @@ def _drafts_of(
     for _ in range(_VIEWS_TRIED):
         plain = QuestionPicture("scene", case.blocks, drawn_view(rng))
         mark = block_mark(plain, seen(plain), case.order, TAKEN)
-        orders = [block.order for block in case.blocks]
+        orders = orders_of(case.blocks)
         if mark and are_seen(plain, (case.order,), NAMED) and are_seen(plain, orders, _ALL_SEEN):
             break
     else:
@@ -162,7 +166,7 @@ def _drafts_of(
     is_rare = not outcome.moved and rng.random() > _STAYS_ASKED
     if is_rare or not are_seen(plain, outcome.moved, COUNTED):
         return
-    facts = {
+    facts: dict[str, Any] = {
         "removed": case.order,
         "moved": list(outcome.moved),
         "resting": sorted(case.resting),
@@ -171,12 +175,12 @@ def _drafts_of(
     if is_colored:
         colored, slots, value = colored_options(plain, case.order, outcome.moved, rng)
         if colored:
-            yield draft(scene, rng, "cf-color", colored, shown, value, slots, facts)
+            yield draft(scene, rng, "cf-color", colored, shown, value, slots, **facts)
         return
     number = min(len(outcome.moved), len(OUTCOME_TEXTS) - 1)
-    others = [text for text in OUTCOME_TEXTS if text != OUTCOME_TEXTS[number]]
-    options = [OUTCOME_TEXTS[number], *shuffled(rng, others)]
-    yield draft(scene, rng, "cf-count", options, shown, str(number), {}, facts)
+    right = OUTCOME_TEXTS[number]
+    options = [right, *shuffled(rng, right_first(right, OUTCOME_TEXTS)[1:])]
+    yield draft(scene, rng, "cf-count", options, shown, str(number), {}, **facts)
 
 
 Lot = frozenset[int]
@@ -202,13 +206,14 @@ def colored_options(
 ) -> tuple[list[QuestionPicture], dict[str, str], str]:
     """Four pictures, the right one first, and the slots of the text; none where they are too few.
 
-    With whether the right one has more colored than most, and lower.
+    The last tells if the right one has more colored than most, and lower.
 
     `plain` has no marks; `moved` are the orders of the blocks that move when `taken` is gone.
     """
     lots = [frozenset(moved), *_other_lots(plain, taken, frozenset(moved), rng)]
     shot = seen(plain)
-    pixels = dict(zip((b.order for b in plain.blocks), _pixels(plain, shot), strict=True))
+    counts = np.bincount(shot.block[shot.block >= 0], minlength=len(plain.blocks))
+    pixels = dict(zip(orders_of(plain.blocks), counts, strict=True))
     unlike = np.array([[sum(pixels[o] for o in a ^ b) for b in lots] for a in lots], dtype=float)
     measures = np.array([_looks(plain, shot, taken, lot) for lot in lots])
     four = four_alike(measures, unlike >= LEAST_PIXELS, rng, unlike=unlike)
@@ -282,11 +287,6 @@ def _looks(plain: QuestionPicture, shot: Shot, taken: int, lot: Lot) -> tuple[fl
     )
 
 
-def _pixels(plain: QuestionPicture, shot: Shot) -> NDArray[np.int64]:
-    """How many pixels show each block."""
-    return np.bincount(shot.block[shot.block >= 0], minlength=len(plain.blocks))
-
-
 def _colored(
     plain: QuestionPicture, taken: int, moved: Lot, colors: Sequence[Color]
 ) -> QuestionPicture:
@@ -315,24 +315,6 @@ def resting_on(blocks: Sequence[Block], order: int, *, only: bool = False) -> fr
 def _below(blocks: tuple[Block, ...]) -> Mapping[int, frozenset[int]]:
     """The support graph, which is asked again for every block of a structure."""
     return support_graph(blocks)
-
-
-def group_of(blocks: Sequence[Block], order: int) -> tuple[Block, ...]:
-    """The blocks in reach of one, itself among them."""
-    return next(group for group in groups(blocks) if any(b.order == order for b in group))
-
-
-def is_sure(left: Sequence[Block], moved: Collection[int]) -> bool:
-    """Whether blocks just left to themselves surely do what a simulation says.
-
-    Those that stay stand without those that go, and each lot of those that go cannot be borne
-    by those that stay: with every weight 5 mm off to any side, other masses, and friction to spare.
-    """
-    still = [block for block in left if block.order not in moved]
-    falling = groups([block for block in left if block.order in moved])
-    return all(surely_stands(group) for group in groups(still)) and all(
-        surely_falls([*still, *lot]) for lot in falling
-    )
 
 
 def sure_removal(blocks: Sequence[Block], order: int) -> Outcome | None:

@@ -1,9 +1,9 @@
-"""Number: how many blocks of a color, a shape or both there are; every one can be seen."""
+"""NU, OC, LC, TC: how many blocks, layers or shapes there are, as far as the picture tells."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,39 +11,53 @@ import numpy as np
 from phyblock.domain.blocks import BLOCK_TYPES, COLORS
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.measures import layers_of, sure_blocks
-from phyblock.making.questions.picture_view import (
+from phyblock.making.questions.draft import (
+    Draft,
+    UnfairError,
+    draft,
+    index_of,
+    pick,
+    shuffled,
+    stem_of,
+)
+from phyblock.making.questions.referring import SHAPE_WORDS, plain_names, resolve_one, shape_word
+from phyblock.making.questions.view import (
     COUNTED,
     NAMED,
+    StaticMaker,
     View,
     are_seen,
     goal_picture,
+    orders_of,
+    recolored,
     require_seen,
     require_shapes_seen,
-    shown_picture,
-)
-from phyblock.making.questions.properties import recolored
-from phyblock.making.questions.question_draft import Draft, UnfairError
-from phyblock.making.questions.referring import SHAPE_WORDS, names, resolve_one, shape_word
-from phyblock.making.questions.selection import pick, shuffled
-from phyblock.making.questions.static_drafts import (
-    StaticMaker,
-    draft,
-    index_of,
     seen_blocks,
-    window,
+    shares,
 )
-from phyblock.making.questions.wording import slots_of, stem_of
-from phyblock.sim.contact import GROUND, support_graph
+from phyblock.sim.contact import GROUND, bounds_m, support_graph
 
-_PLURALS = {word: f"{word}es" if word == "arch" else f"{word}s" for word in SHAPE_WORDS}
-_TYPES_OF = {_PLURALS[word]: types for word, types in SHAPE_WORDS.items()}
-
+Slots = Mapping[str, str]
+_TYPES_OF = {
+    f"{word}es" if word == "arch" else f"{word}s": types for word, types in SHAPE_WORDS.items()
+}
+"""The types that each plural names."""
 _MOST = 13
+_MOST_BLOCKS = 22
+_WEDGED_M = 0.005
 
 
-def _orders(blocks: Sequence[Block]) -> list[int]:
-    return [block.order for block in blocks]
+def window(rng: np.random.Generator, values: Sequence[int], right: int) -> tuple[int, ...] | None:
+    """Four neighbors among the allowed values that hold the right one, in a place drawn evenly.
+
+    The right one stands first. None where it is not allowed, or the place drawn does not exist.
+    """
+    if right not in values:
+        return None
+    start = values.index(right) - int(rng.integers(4))
+    if start < 0 or start + 4 > len(values):
+        return None
+    return (right, *(value for value in values[start : start + 4] if value != right))
 
 
 class NumberMaker(StaticMaker):
@@ -55,39 +69,31 @@ class NumberMaker(StaticMaker):
     def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Of all that can be counted in a scene whose blocks all show enough."""
         picture = goal_picture(scene, view)
-        if not are_seen(picture, _orders(scene.blocks), COUNTED):
+        if not are_seen(picture, orders_of(scene.blocks), COUNTED):
             return
         colors = [color for color in COLORS if any(b.color == color for b in scene.blocks)]
         kinds = [(f"{color} blocks", "color") for color in colors]
-        kinds += [(word, "shape") for word in _TYPES_OF]
-        kinds += [(f"{color} {word}", "both") for color in colors for word in _TYPES_OF]
-        if not _shapes_are_seen(picture):
-            kinds = [(what, kind) for what, kind in kinds if kind == "color"]
+        try:
+            require_shapes_seen(picture)
+            kinds += [(word, "shape") for word in _TYPES_OF]
+            kinds += [(f"{color} {word}", "both") for color in colors for word in _TYPES_OF]
+        except UnfairError:
+            pass  # Colors can be counted where shapes cannot.
         for what, kind in shuffled(rng, kinds):
             counted = _fitting(what, scene.blocks)
             values = window(rng, range(1, _MOST), len(counted))
             if values is not None:
-                options = [str(value) for value in values]
-                evidence = {"counted": _orders(counted)}
-                slots = {"what": what}
-                yield draft(scene, picture, rng, "nu", slots, options, options[0], kind, **evidence)
+                options, slots, orders = list(map(str, values)), {"what": what}, orders_of(counted)
+                yield draft(
+                    scene, rng, "nu", options, [picture], options[0], slots, kind, counted=orders
+                )
 
-    def rederive(self, question: Question) -> tuple[int, ...]:
-        """Counts the blocks that fit the words."""
-        picture = shown_picture(question)
-        require_seen(picture, _orders(picture.blocks), COUNTED)
-        what = slots_of(question)["what"]
-        if not what.endswith(" blocks"):
+    def answer(self, question: Question, picture: QuestionPicture, slots: Slots) -> tuple[int, ...]:
+        """Count the blocks that fit the words."""
+        require_seen(picture, orders_of(picture.blocks), COUNTED)
+        if not slots["what"].endswith(" blocks"):
             require_shapes_seen(picture)
-        return index_of(question, str(len(_fitting(what, picture.blocks))))
-
-
-def _shapes_are_seen(picture: QuestionPicture) -> bool:
-    try:
-        require_shapes_seen(picture)
-    except UnfairError:
-        return False
-    return True
+        return index_of(question, str(len(_fitting(slots["what"], picture.blocks))))
 
 
 def _fitting(what: str, blocks: Sequence[Block]) -> list[Block]:
@@ -96,31 +102,23 @@ def _fitting(what: str, blocks: Sequence[Block]) -> list[Block]:
     color, noun = (first, rest) if first in COLORS else ("", what)
     if noun not in (*_TYPES_OF, "blocks"):
         raise UnfairError(f"{what!r} cannot be counted")
-    types = _TYPES_OF.get(noun)
-    return [
-        block
-        for block in blocks
-        if color in ("", block.color) and (types is None or block.type in types)
-    ]
-
-
-Slots = Mapping[str, str]
-_MOST_BLOCKS = 22
-_RECOLORED = ("other", "pair", "kinds", "block")
-"""Ways of counting in which the kit's colors would tell too much, or too few blocks have names."""
+    types = _TYPES_OF.get(noun, BLOCK_TYPES)
+    return [block for block in blocks if color in ("", block.color) and block.type in types]
 
 
 @dataclass(frozen=True)
 class Tally:
     """One way of counting.
 
-    `slots` are those that a text about a picture can have; `count` says how many there are, and
-    raises UnfairError where that cannot be told from the picture; `values` are those offered.
+    `count` says how many there are, and raises UnfairError where that cannot be told from the
+    picture; `values` are those offered; `slots` are those that a text about a picture can have.
+    `is_recolored` where the kit's colors would tell too much, or too few blocks have names.
     """
 
-    slots: Callable[[QuestionPicture], Sequence[Slots]]
     count: Callable[[QuestionPicture, Slots], int]
     values: Sequence[int]
+    slots: Callable[[QuestionPicture], Sequence[Slots]] = lambda _: ({},)
+    is_recolored: bool = False
 
 
 class TallyMaker(StaticMaker):
@@ -131,66 +129,99 @@ class TallyMaker(StaticMaker):
 
     def __init__(self, subtask: Subtask) -> None:
         self.subtask = subtask
-        prefix = f"{subtask.lower()}-"
-        self._stems = tuple(stem for stem in TALLIES if stem.startswith(prefix))
+        self._stems = tuple(stem for stem in TALLIES if stem.startswith(f"{subtask.lower()}-"))
 
     def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """One way of counting after another, as far as the picture allows it."""
         colored = recolored(scene, rng)
         for stem in shuffled(rng, self._stems):
-            shown = colored if stem.split("-")[1] in _RECOLORED else scene
+            tally = TALLIES[stem]
+            shown = colored if tally.is_recolored else scene
             picture = goal_picture(shown, view)
-            made = _one(shown, picture, stem, rng)
-            if made is not None:
-                yield made
+            possible = tally.slots(picture)
+            if not possible:
+                continue
+            slots = pick(rng, possible)
+            try:
+                right = tally.count(picture, slots)
+            except UnfairError:
+                continue
+            values = window(rng, tally.values, right)
+            if values is None:
+                continue
+            options, kind = list(map(str, values)), stem
+            evidence: dict[str, object] = {"count": right}
+            if stem == "oc-hidden":
+                in_sight = orders_of(seen_blocks(picture, COUNTED))
+                hidden = set(orders_of(shown.blocks)) - set(in_sight)
+                evidence["inferred"] = sorted(hidden)
+                kind = f"{stem}-{len(hidden)}"
+            yield draft(shown, rng, stem, options, [picture], options[0], slots, kind, **evidence)
 
-    def rederive(self, question: Question) -> tuple[int, ...]:
-        """Counts anew."""
-        picture, slots = shown_picture(question), slots_of(question)
+    def answer(self, question: Question, picture: QuestionPicture, slots: Slots) -> tuple[int, ...]:
+        """Count again."""
         stem = stem_of(question.wording)
         if stem not in self._stems:
             raise UnfairError(f"the wording {question.wording!r} counts nothing")
         return index_of(question, str(TALLIES[stem].count(picture, slots)))
 
 
-def _one(
-    scene: Scene, picture: QuestionPicture, stem: str, rng: np.random.Generator
-) -> Draft | None:
-    tally = TALLIES[stem]
-    possible = tally.slots(picture)
-    if not possible:
-        return None
-    slots = pick(rng, possible)
-    try:
-        right = tally.count(picture, slots)
-    except UnfairError:
-        return None
-    values = window(rng, tally.values, right)
-    if values is None:
-        return None
-    options = [str(value) for value in values]
-    evidence: dict[str, object] = {"count": right}
-    kind = stem
-    if stem == "oc-hidden":
-        evidence["inferred"] = sorted(set(_orders_tallies(picture)) - set(_in_sight(picture)))
-        kind = f"{stem}-{len(evidence['inferred'])}"  # type: ignore[arg-type]
-    return draft(scene, picture, rng, stem, slots, options, options[0], kind, **evidence)
+def layers_of(blocks: Sequence[Block]) -> Mapping[int, int]:
+    """The layer of each block, by order: one more than that of the highest block it rests on.
+
+    UnfairError where that is not what the picture tells: a block that is wedged between two
+    slopes rests on them, and yet it looks as if it were beside them.
+    """
+    below = support_graph(blocks)
+    top = {block.order: bounds_m(block)[1, 2] for block in blocks} | {GROUND: 0.0}
+    bottom = {block.order: bounds_m(block)[0, 2] for block in blocks}
+    plain = {
+        order: {other for other in others if bottom[order] > top[other] - _WEDGED_M} or {GROUND}
+        for order, others in below.items()
+    }
+    counted = _longest(below)
+    if counted != _longest(plain):
+        raise UnfairError("some block rests on others and stands lower than they reach")
+    return counted
 
 
-def _in_sight(picture: QuestionPicture) -> list[int]:
-    return [block.order for block in seen_blocks(picture, COUNTED)]
+def _longest(below: Mapping[int, Collection[int]]) -> dict[int, int]:
+    layer = {GROUND: 0}
+    while len(layer) <= len(below):
+        ready = [o for o in below if o not in layer and below[o] and set(below[o]) <= layer.keys()]
+        if not ready:
+            raise UnfairError("some block rests on nothing, or on itself")
+        layer.update({order: 1 + max(layer[other] for other in below[order]) for order in ready})
+    return {order: number for order, number in layer.items() if order != GROUND}
 
 
-def _orders_tallies(picture: QuestionPicture) -> list[int]:
-    return [block.order for block in picture.blocks]
+def sure_blocks(picture: QuestionPicture) -> int:
+    """How many blocks there have to be at the least, going by what the picture shows.
+
+    Every block shows at least `COUNTED` of itself, but one at the most that shows less. That
+    one is sure to be there, whatever it is, where a block that shows `NAMED` of itself rests on it
+    alone: without it, that block would float. One is enough, for one is there. UnfairError where
+    more are hidden, or nothing tells of it.
+    """
+    seen = shares(picture)
+    hidden = [order for order, share in seen.items() if share < COUNTED]
+    if len(hidden) > 1:
+        raise UnfairError("several blocks are hidden")
+    below = support_graph(picture.blocks)
+    for order in hidden:
+        if not any(seen[o] >= NAMED and below[o] == {order} for o in below):
+            raise UnfairError(f"nothing that can be seen rests on block {order} alone")
+    return len(picture.blocks)
 
 
-def _all_seen(picture: QuestionPicture) -> Sequence[Block]:
-    require_seen(picture, _orders_tallies(picture), COUNTED)
+def _all(picture: QuestionPicture) -> Sequence[Block]:
+    """The blocks, each of which shows enough to be counted; else UnfairError."""
+    require_seen(picture, orders_of(picture.blocks), COUNTED)
     return picture.blocks
 
 
-def _all_shapes_seen(picture: QuestionPicture) -> Sequence[Block]:
+def _shaped(picture: QuestionPicture) -> Sequence[Block]:
+    """The blocks, each of which shows its shape; else UnfairError."""
     require_shapes_seen(picture)
     return picture.blocks
 
@@ -200,30 +231,25 @@ def _on_ground(blocks: Sequence[Block]) -> list[Block]:
     return [block for block in blocks if GROUND in below[block.order]]
 
 
-def _of_colors(picture: QuestionPicture, colors: Sequence[str]) -> int:
-    return sum(block.color in colors for block in _all_seen(picture))
+def _of_colors(picture: QuestionPicture, *colors: str) -> int:
+    return sum(block.color in colors for block in _all(picture))
 
 
 def _types(blocks: Sequence[Block]) -> Counter[str]:
     return Counter(block.type for block in blocks)
 
 
-def _in_layers(picture: QuestionPicture, numbers: Callable[[int], bool]) -> int:
-    return sum(map(numbers, layers_of(_all_seen(picture)).values()))
+def _in_layers(picture: QuestionPicture, fits: Callable[[int], bool]) -> int:
+    return sum(map(fits, layers_of(_all(picture)).values()))
 
 
 def _layer_of_block(picture: QuestionPicture, slots: Slots) -> int:
     block = resolve_one(slots["block"], picture)
     layers = layers_of(picture.blocks)
-    under = [o for o in _orders_tallies(picture) if layers[o] < layers[block.order]]
     require_seen(picture, [block.order], NAMED)
+    under = [o for o in orders_of(picture.blocks) if layers[o] < layers[block.order]]
     require_seen(picture, under, COUNTED)
     return layers[block.order]
-
-
-def _no_slots(picture: QuestionPicture) -> Sequence[Slots]:
-    del picture
-    return ({},)
 
 
 def _colors(picture: QuestionPicture) -> Sequence[Slots]:
@@ -241,49 +267,36 @@ def _layer_numbers(picture: QuestionPicture) -> Sequence[Slots]:
 
 
 def _named(picture: QuestionPicture) -> Sequence[Slots]:
-    found = [names(block, picture, ("color", "type")) for block in seen_blocks(picture, NAMED)]
-    return [{"block": expressions[0]} for expressions in found if expressions]
+    return [{"block": name} for name in plain_names(picture).values()]
 
 
 TALLIES: Mapping[str, Tally] = {
-    "oc-all": Tally(_no_slots, lambda p, _: len(_all_seen(p)), range(2, _MOST_BLOCKS + 3)),
-    "oc-hidden": Tally(_no_slots, lambda p, _: sure_blocks(p), range(2, _MOST_BLOCKS + 3)),
-    "oc-ground": Tally(_no_slots, lambda p, _: len(_on_ground(_all_seen(p))), range(1, 13)),
-    "oc-raised": Tally(
-        _no_slots, lambda p, _: len(_all_seen(p)) - len(_on_ground(p.blocks)), range(1, 17)
-    ),
+    "oc-all": Tally(lambda p, _: len(_all(p)), range(2, _MOST_BLOCKS + 3)),
+    "oc-hidden": Tally(lambda p, _: sure_blocks(p), range(2, _MOST_BLOCKS + 3)),
+    "oc-ground": Tally(lambda p, _: len(_on_ground(_all(p))), range(1, 13)),
+    "oc-raised": Tally(lambda p, _: len(_all(p)) - len(_on_ground(p.blocks)), range(1, 17)),
     "oc-other": Tally(
-        _colors, lambda p, s: len(p.blocks) - _of_colors(p, [s["color"]]), range(1, 19)
+        lambda p, s: len(p.blocks) - _of_colors(p, s["color"]), range(1, 19), _colors, True
     ),
     "oc-pair": Tally(
-        _color_pairs, lambda p, s: _of_colors(p, [s["color"], s["other"]]), range(1, 15)
+        lambda p, s: _of_colors(p, s["color"], s["other"]), range(1, 15), _color_pairs, True
     ),
-    "lc-all": Tally(_no_slots, lambda p, _: max(layers_of(_all_seen(p)).values()), range(1, 9)),
-    "lc-block": Tally(_named, _layer_of_block, range(1, 9)),
+    "lc-all": Tally(lambda p, _: max(layers_of(_all(p)).values()), range(1, 9)),
+    "lc-block": Tally(_layer_of_block, range(1, 9), _named, True),
     "lc-in": Tally(
-        _layer_numbers, lambda p, s: _in_layers(p, lambda n: n == int(s["layer"])), range(1, 12)
+        lambda p, s: _in_layers(p, lambda n: n == int(s["layer"])), range(1, 12), _layer_numbers
     ),
     "lc-above": Tally(
-        _layer_numbers, lambda p, s: _in_layers(p, lambda n: n > int(s["layer"])), range(1, 12)
+        lambda p, s: _in_layers(p, lambda n: n > int(s["layer"])), range(1, 12), _layer_numbers
     ),
-    "tc-all": Tally(
-        _no_slots, lambda p, _: len(_types(_all_shapes_seen(p))), range(1, len(BLOCK_TYPES) + 1)
-    ),
+    "tc-all": Tally(lambda p, _: len(_types(_shaped(p))), range(1, len(BLOCK_TYPES) + 1)),
     "tc-shapes": Tally(
-        _no_slots,
-        lambda p, _: len({shape_word(block.type) for block in _all_shapes_seen(p)}),
-        range(1, len(SHAPE_WORDS) + 1),
+        lambda p, _: len({shape_word(b.type) for b in _shaped(p)}), range(1, len(SHAPE_WORDS) + 1)
     ),
-    "tc-once": Tally(
-        _no_slots,
-        lambda p, _: sum(n == 1 for n in _types(_all_shapes_seen(p)).values()),
-        range(0, 7),
-    ),
-    "tc-ground": Tally(
-        _no_slots, lambda p, _: len(_types(_on_ground(_all_shapes_seen(p)))), range(1, 8)
-    ),
+    "tc-once": Tally(lambda p, _: sum(n == 1 for n in _types(_shaped(p)).values()), range(0, 7)),
+    "tc-ground": Tally(lambda p, _: len(_types(_on_ground(_shaped(p)))), range(1, 8)),
     "tc-kinds": Tally(
-        _no_slots, lambda p, _: len({b.kind for b in _all_shapes_seen(p)}), range(2, 15)
+        lambda p, _: len({b.kind for b in _shaped(p)}), range(2, 15), is_recolored=True
     ),
 }
 """By stem of the wordings."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,21 +20,28 @@ from numpy.typing import NDArray
 from phyblock.domain.blocks import Color
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Scene
-from phyblock.making.questions.picture_view import COUNTED, are_seen, drawn_view, require_seen
-from phyblock.making.questions.pictured_drafts import (
-    are_told_apart,
+from phyblock.making.questions.draft import (
+    Draft,
+    Maker,
+    UnfairError,
     draft,
+    pick,
+    slots_of,
+)
+from phyblock.making.questions.pictured import (
+    are_told_apart,
     of_kind,
     option_pictures,
     same_blocks,
-    state,
 )
-from phyblock.making.questions.question_draft import Draft, UnfairError
-from phyblock.making.questions.selection import pick
-from phyblock.making.questions.wording import slots_of
+from phyblock.making.questions.view import (
+    COUNTED,
+    are_seen,
+    drawn_view,
+    orders_of,
+    require_seen,
+)
 from phyblock.sim.question_pictures import seen
-
-__all__ = ["OrderingMaker"]
 
 _STAGES = 4
 _LEAST_BLOCKS = 6
@@ -52,32 +60,30 @@ _PAIRS: tuple[tuple[Color, Color], ...] = (
 Stages = tuple[frozenset[int], ...]
 
 
-class OrderingMaker:
+class OrderingMaker(Maker):
     """Kinds: `or-build` and `or-apart`."""
 
     subtask: Subtask = "OR"
     scenes_tried = 240
-    drafts_a_scene = 1
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """One draft, of either kind, of a structure of which every block can be seen."""
         if len(scene) < _LEAST_BLOCKS:
             return
         for _ in range(_VIEWS_TRIED):
-            view = drawn_view(rng)
-            plain = state(scene, scene.blocks, view)
-            if are_seen(plain, [b.order for b in scene.blocks], COUNTED):
+            plain = QuestionPicture("scene", scene.blocks, drawn_view(rng), framed=scene.blocks)
+            if are_seen(plain, orders_of(scene.blocks), COUNTED):
                 yield from _draft_from(scene, plain, rng)
                 return
 
     def rederive(self, question: Question) -> tuple[int, ...]:
-        """By which stage holds a block that rests on one of another: one order must follow."""
+        """By the stages that hold blocks resting on those of others: one order must follow."""
         slots, scene = slots_of(question), question.scene
         options = option_pictures(question)
         stages = tuple(_stage_in(scene, option, slots) for option in options)
         if sorted(itertools.chain(*stages)) != sorted(b.order for b in scene.blocks):
             raise UnfairError("the stages do not hold every block once")
-        require_seen(options[0], [b.order for b in scene.blocks], COUNTED)
+        require_seen(options[0], orders_of(scene.blocks), COUNTED)
         order = _only_order(scene, stages)
         if order is None:
             raise UnfairError("what rests on what leaves more than one order, or none")
@@ -91,11 +97,14 @@ def _draft_from(scene: Scene, plain: QuestionPicture, rng: np.random.Generator) 
             continue
         kind, pair = pick(rng, ("or-build", "or-apart")), pick(rng, _PAIRS)
         in_order = stages if kind == "or-build" else stages[::-1]
-        options = [_highlighted(plain, stage, pair) for stage in in_order]
+        options = []
+        for stage in in_order:
+            blocks = (replace(b, color=pair[b.order not in stage]) for b in plain.blocks)
+            options.append(replace(plain, blocks=tuple(blocks)))
         if are_told_apart(options):
             slots: dict[str, str] = {"color": pair[0], "other": pair[1]}
-            facts = {"stages": [sorted(stage) for stage in stages]}
-            yield draft(scene, rng, kind, options, [], kind, slots, facts)
+            facts: dict[str, Any] = {"stages": [sorted(stage) for stage in stages]}
+            yield draft(scene, rng, kind, options, [], kind, slots, **facts)
             return
 
 
@@ -130,13 +139,6 @@ def _only_order(scene: Scene, stages: Stages) -> tuple[int, ...] | None:
     return fitting[0] if len(fitting) == 1 else None
 
 
-def _highlighted(
-    plain: QuestionPicture, stage: frozenset[int], pair: tuple[Color, Color]
-) -> QuestionPicture:
-    blocks = tuple(replace(b, color=pair[b.order not in stage]) for b in plain.blocks)
-    return replace(plain, blocks=blocks)
-
-
 def _stage_in(scene: Scene, option: QuestionPicture, slots: Mapping[str, str]) -> frozenset[int]:
     """Orders of the blocks that a picture highlights; UnfairError when it shows another scene."""
     goal = {block.order: block for block in scene.blocks}
@@ -149,7 +151,7 @@ def _stage_in(scene: Scene, option: QuestionPicture, slots: Mapping[str, str]) -
 
 
 def _is_sorted_by_eye(plain: QuestionPicture, stages: Stages) -> bool:
-    """Whether size or height of what is highlighted, either way round, gives the order."""
+    """True if size or height of what is highlighted, either way round, gives the order."""
     shown = seen(plain).block
     columns = zip(*(_looks(plain, shown, stage) for stage in stages), strict=True)
     return any(list(one) in (sorted(one), sorted(one)[::-1]) for one in columns)

@@ -1,36 +1,49 @@
-"""Relative position: where one block is from another, and which block is outermost or nearest."""
+"""RP, AP, RD: where blocks are to one another, how far, and which of them rests on which.
+
+Scenes are recolored so that most blocks have a name.
+"""
 
 from __future__ import annotations
 
+import functools
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
+from phyblock.domain.blocks import SHAPES
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.measures import offset_m, top_m
-from phyblock.making.questions.picture_view import (
+from phyblock.making.questions.draft import (
+    Draft,
+    UnfairError,
+    draft,
+    index_of,
+    only_index,
+    pick,
+    right_first,
+    shuffled,
+    stem_of,
+)
+from phyblock.making.questions.referring import plain_names, resolve_one
+from phyblock.making.questions.view import (
     NAMED,
+    StaticMaker,
     View,
     center_m,
     goal_picture,
+    length_axis,
+    orders_of,
     outermost,
     picture_axes,
+    recolored,
     require_seen,
-    shown_picture,
+    seen_blocks,
 )
-from phyblock.making.questions.properties import recolored
-from phyblock.making.questions.question_draft import Draft, UnfairError
-from phyblock.making.questions.referring import Feature, names, resolve_one
-from phyblock.making.questions.selection import pick, shuffled
-from phyblock.making.questions.static_drafts import StaticMaker, draft, index_of, seen_blocks
-from phyblock.making.questions.wording import slots_of, stem_of
-from phyblock.sim.contact import bounds_m
+from phyblock.sim.contact import GROUND, bounds_m, support_graph
 
-__all__ = ["PositionMaker"]
-
-_PLAIN: tuple[Feature, ...] = ("color", "type")
+Names = Mapping[int, str]
 _CORNERS: tuple[str, ...] = (
     "in front and to the left",
     "in front and to the right",
@@ -46,8 +59,6 @@ _UPRIGHT: tuple[str, ...] = (
 _CLEAR_M = 0.03
 _ABOVE_M = 0.015
 _LEVEL_M = 0.005
-_TRIES = 5
-_FOURS = 6
 _SIDES = ("farthest left", "farthest right")
 _RANKED = ("highest", "lowest", "front", "back")
 """Told by wordings of their own, because they are not about the picture but about the ground."""
@@ -57,68 +68,58 @@ _NEARER = 0.75
 
 
 class PositionMaker(StaticMaker):
-    """RP: as seen in the picture; scenes are recolored so that most blocks have a name."""
+    """RP: where one block is from another as seen in the picture; the outermost, the nearest."""
 
     subtask: Subtask = "RP"
     drafts_a_view = 16
 
     def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Pairs of blocks, and choices of one of four."""
-        for _ in range(_TRIES):
+        for _ in range(5):
             shown = recolored(scene, rng)
             picture = goal_picture(shown, view)
-            named = {
-                block.order: expressions[0]
-                for block in seen_blocks(picture, NAMED)
-                if (expressions := names(block, picture, _PLAIN))
-            }
-            for _ in range(_FOURS):
+            named = plain_names(picture)
+            for _ in range(6):
                 yield from _of_four(shown, picture, named, rng)
             yield from _of_pairs(shown, picture, named, rng)
 
-    def rederive(self, question: Question) -> tuple[int, ...]:
-        """From the places of the blocks that the text or the options name."""
-        picture, slots = shown_picture(question), slots_of(question)
-        if "block" not in slots:
-            named = [resolve_one(option, picture) for option in question.options]
-            anchor = resolve_one(slots["other"], picture) if "other" in slots else None
-            seen = [*named, anchor] if anchor else named
-            require_seen(picture, [block.order for block in seen], NAMED)
-            if anchor:
-                return (named.index(_nearest(anchor, named)),)
-            kind = slots.get("extreme") or stem_of(question.wording).removeprefix("rp-")
-            return (named.index(_extreme(kind, named, picture)),)
-        one, other = (resolve_one(slots[name], picture) for name in ("block", "other"))
-        require_seen(picture, [one.order, other.order], NAMED)
-        corners = set(question.options) == set(_CORNERS)
-        right = (_corner if corners else _upright)(one, other, picture.view_deg)
-        return index_of(question, right)
+    def answer(
+        self, question: Question, picture: QuestionPicture, slots: Mapping[str, str]
+    ) -> tuple[int, ...]:
+        """By the places of the blocks that the text or the options name."""
+        if "block" in slots:
+            one, other = (resolve_one(slots[name], picture) for name in ("block", "other"))
+            require_seen(picture, orders_of([one, other]), NAMED)
+            rule = _corner if set(question.options) == set(_CORNERS) else _upright
+            return index_of(question, rule(one, other, picture.view_deg))
+        named = [resolve_one(option, picture) for option in question.options]
+        anchor = [resolve_one(slots["other"], picture)] if "other" in slots else []
+        require_seen(picture, orders_of([*named, *anchor]), NAMED)
+        if anchor:
+            return (named.index(_nearest(anchor[0], named)),)
+        kind = slots.get("extreme") or stem_of(question.wording).removeprefix("rp-")
+        return (named.index(_extreme(kind, named, picture)),)
 
 
 def _of_pairs(
-    scene: Scene, picture: QuestionPicture, named: dict[int, str], rng: np.random.Generator
+    scene: Scene, picture: QuestionPicture, named: Names, rng: np.random.Generator
 ) -> Iterator[Draft]:
     blocks = [block for block in scene.blocks if block.order in named]
     pairs = shuffled(rng, list(itertools.permutations(blocks, 2)))[:2]
     for one, other in pairs:
         slots = {"block": named[one.order], "other": named[other.order]}
-        for stem, words, rule in (
-            ("corner", _CORNERS, _corner),
-            ("upright", _UPRIGHT, _upright),
-        ):
+        for kind, words, rule in (("corner", _CORNERS, _corner), ("upright", _UPRIGHT, _upright)):
             try:
                 right = rule(one, other, picture.view_deg)
             except UnfairError:
                 continue
-            options = [right, *(word for word in words if word != right)]
-            offset = [round(float(x), 6) for x in offset_m(one, other, picture.view_deg)]
-            yield draft(
-                scene, picture, rng, f"rp-{stem}", slots, options, right, stem, offset_m=offset
-            )
+            stem, options = f"rp-{kind}", right_first(right, words)
+            offset = [round(float(x), 6) for x in _offset_m(one, other, picture.view_deg)]
+            yield draft(scene, rng, stem, options, [picture], right, slots, kind, offset_m=offset)
 
 
 def _of_four(
-    scene: Scene, picture: QuestionPicture, named: dict[int, str], rng: np.random.Generator
+    scene: Scene, picture: QuestionPicture, named: Names, rng: np.random.Generator
 ) -> Iterator[Draft]:
     blocks = [block for block in scene.blocks if block.order in named]
     chosen = shuffled(rng, blocks)[:5]
@@ -126,24 +127,28 @@ def _of_four(
         return
     anchor, four = chosen[0], chosen[1:]
     kind = pick(rng, (*_SIDES, *_RANKED, "nearest"))
+    is_near, is_side = kind == "nearest", kind in _SIDES
     try:
-        is_near = kind == "nearest"
         right = _nearest(anchor, four) if is_near else _extreme(kind, four, picture)
     except UnfairError:
         return
-    ranked = [right, *(block for block in four if block is not right)]
+    ranked = right_first(right, four)
     options = [f"the {named[block.order]}" for block in ranked]
-    slots = {"other": named[anchor.order]} if is_near else {}
-    if kind in _SIDES:
-        slots = {"extreme": kind}
-    stem = "extreme" if kind in _SIDES else kind
-    orders = {"ranked": [block.order for block in ranked]}
-    yield draft(scene, picture, rng, f"rp-{stem}", slots, options, right.type, kind, **orders)
+    slots = {"other": named[anchor.order]} if is_near else {"extreme": kind} if is_side else {}
+    stem, orders = "rp-extreme" if is_side else f"rp-{kind}", orders_of(ranked)
+    yield draft(scene, rng, stem, options, [picture], right.type, slots, kind, ranked=orders)
+
+
+def _offset_m(block: Block, other: Block, view: View) -> NDArray[np.float64]:
+    """From `other` to `block`: to the right of the picture, away from the viewer, up [m], (3,)."""
+    right, away = picture_axes(view)
+    step = center_m(block) - center_m(other)
+    return np.array([step @ right, step @ away, step[2]])
 
 
 def _corner(one: Block, other: Block, view: View) -> str:
-    """Which quarter of the floor round `other` holds `one`, as the viewer sees it."""
-    across, away, _ = offset_m(one, other, view)
+    """The quarter of the floor round `other` that holds `one`, as the viewer sees it."""
+    across, away, _ = _offset_m(one, other, view)
     if min(abs(across), abs(away)) < _CLEAR_M:
         raise UnfairError("is neither clearly to a side nor clearly in front or behind")
     depth = "behind" if away > 0 else "in front"
@@ -152,7 +157,7 @@ def _corner(one: Block, other: Block, view: View) -> str:
 
 def _upright(one: Block, other: Block, view: View) -> str:
     """Over or under it, or beside it at its height; UnfairError for all that lies between."""
-    across, away, _ = offset_m(one, other, view)
+    across, away, _ = _offset_m(one, other, view)
     low, high = bounds_m(one)[:, 2] - bounds_m(other)[::-1, 2]
     if max(abs(across), abs(away)) < _ABOVE_M and (low > -_LEVEL_M or high < _LEVEL_M):
         return "above it" if low > -_LEVEL_M else "below it"
@@ -178,7 +183,7 @@ def _extreme(extreme: str, blocks: Sequence[Block], picture: QuestionPicture) ->
         upright = extreme in ("highest", "lowest")
         sign = -1.0 if extreme in ("highest", "back") else 1.0
         reach = {
-            b.order: sign * (top_m(b) if upright else float(center_m(b) @ away)) for b in blocks
+            b.order: sign * (_top_m(b) if upright else float(center_m(b) @ away)) for b in blocks
         }
         ranked = sorted(blocks, key=lambda block: reach[block.order])
         if reach[ranked[1].order] - reach[ranked[0].order] < _GAP_M:
@@ -186,8 +191,295 @@ def _extreme(extreme: str, blocks: Sequence[Block], picture: QuestionPicture) ->
         return ranked[0]
     if extreme not in _SIDES:
         raise UnfairError(f"{extreme!r} is no place")
-    orders = [block.order for block in blocks]
-    order = outermost(orders, picture, to_left=extreme == "farthest left")
+    order = outermost(orders_of(blocks), picture, to_left=extreme == "farthest left")
     if order is None:
         raise UnfairError(f"two blocks are about the {extreme}")
-    return blocks[orders.index(order)]
+    return next(block for block in blocks if block.order == order)
+
+
+def _top_m(block: Block) -> float:
+    """Height of a block's highest point above the ground [m]."""
+    return float(bounds_m(block)[1, 2])
+
+
+_SIDE_M = 0.001
+_EXACT_CM = 0.1
+
+
+def grid_cm(length_m: float) -> float:
+    """The length in centimeters where it is a multiple of 2.5 cm; else UnfairError."""
+    steps = round(length_m * 100 / 2.5)
+    if abs(length_m * 100 - 2.5 * steps) > _EXACT_CM:
+        raise UnfairError(f"{length_m * 100:.1f} cm is no multiple of 2.5 cm")
+    return 2.5 * steps
+
+
+def _apart(one: Block, other: Block, blocks: Sequence[Block]) -> float:
+    x, y, _ = np.abs(center_m(one) - center_m(other)).tolist()
+    if min(x, y) > _SIDE_M:
+        raise UnfairError("the blocks stand askew, so that their distance cannot be counted")
+    _require_joined(one, other, blocks)
+    return float(max(x, y))
+
+
+def _gap(one: Block, other: Block, blocks: Sequence[Block]) -> float:
+    """The clear way between two boxes that face each other, with nothing between them."""
+    if any(not SHAPES[block.type].is_box or block.euler_deg[2] % 90 for block in (one, other)):
+        raise UnfairError("the blocks do not face each other with flat sides")
+    _require_joined(one, other, blocks)
+    low = np.minimum(bounds_m(one)[1], bounds_m(other)[1])
+    high = np.maximum(bounds_m(one)[0], bounds_m(other)[0])
+    open_axes = [axis for axis in (0, 1) if high[axis] - low[axis] > _SIDE_M]
+    if len(open_axes) != 1 or any(
+        low[axis] - high[axis] < 0.5 * np.diff(bounds_m(one), axis=0)[0, axis]
+        for axis in range(3)
+        if axis not in open_axes
+    ):
+        raise UnfairError("the blocks do not face each other")
+    start, end = np.minimum(low, high) + _SIDE_M, np.maximum(low, high) - _SIDE_M
+    for block in blocks:
+        its_low, its_high = bounds_m(block)
+        if block not in (one, other) and np.all(its_low < end) and np.all(its_high > start):
+            raise UnfairError("another block stands in the gap")
+    return float(high[open_axes[0]] - low[open_axes[0]])
+
+
+LENGTHS: Mapping[str, Callable[[Block, Block, Sequence[Block]], float]] = {
+    "top": lambda one, *_: _top_m(one),
+    "bottom": lambda one, *_: float(bounds_m(one)[0, 2]),
+    "apart": _apart,
+    "rise": lambda one, other, _: abs(_top_m(one) - _top_m(other)),
+    "gap": _gap,
+}
+"""By kind, of a block, another, and all blocks; UnfairError for what cannot be told."""
+
+
+def _require_joined(one: Block, other: Block, blocks: Sequence[Block]) -> None:
+    """UnfairError unless the two belong to one structure, by what rests on what."""
+    reached, waiting = {one.order}, [one.order]
+    while waiting:
+        order = waiting.pop()
+        touching = {b.order for b in blocks if order in b.depend}
+        touching.update(*(b.depend for b in blocks if b.order == order))
+        waiting += sorted(touching - reached)
+        reached |= touching
+    if other.order not in reached:
+        raise UnfairError("the blocks are parts of structures that stand apart")
+
+
+Values = tuple[float, ...]
+"""A length, or how far along and across [cm]."""
+_SCALES: Mapping[str, str] = {
+    "cube": "the edges of a cube are 5 cm long",
+    "cylinder": "a cylinder is 10 cm long and 5 cm thick",
+    "arch": "an arch is 10 cm long, 5 cm wide and 5 cm high",
+}
+_STEP_CM, _LONGEST_CM, _PLACE_STEP_CM = 2.5, 50.0, 5.0
+_APART = (1.2, 2.0)
+"""Values that are options together: each at least and at most so many times the one before."""
+_KINDS: Mapping[str, str] = {
+    "top": "height",
+    "bottom": "height",
+    "rise": "rise",
+    "apart": "apart",
+    "gap": "gap",
+    "place": "place",
+}
+"""Wordings, and the sorts of questions whose shares are even: heights are one of five."""
+PAIRED = ("apart", "rise", "gap", "place")
+"""Kinds that are asked of two blocks."""
+_FEW_A_SCENE = ("gap", "place")
+"""Kinds of which hardly any scene has four values that could be offered together."""
+
+
+class DistanceMaker(StaticMaker):
+    """AP: heights, distances and places in centimeters, on the blocks' grid.
+
+    A block of known size, named in the text, stands in the picture as the scale.
+    """
+
+    subtask: Subtask = "AP"
+    views_a_scene = 2
+    drafts_a_view = 20
+
+    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+        """Heights of blocks and distances of pairs, as far as they are on the grid."""
+        for _ in range(3):
+            shown = recolored(scene, rng)
+            picture = goal_picture(shown, view)
+            types = {block.type for block in seen_blocks(picture, NAMED)}
+            scales = [text for kind, text in _SCALES.items() if kind in types]
+            if scales:
+                yield from _distances(shown, picture, pick(rng, scales), rng)
+
+    def answer(
+        self, question: Question, picture: QuestionPicture, slots: Mapping[str, str]
+    ) -> tuple[int, ...]:
+        """By the places of the blocks that the text names."""
+        named = [resolve_one(slots[name], picture) for name in ("block", "other") if name in slots]
+        require_seen(picture, orders_of(named), NAMED)
+        if slots["scale"] not in [_SCALES.get(b.type) for b in seen_blocks(picture, NAMED)]:
+            raise UnfairError("the block that gives the scale cannot be seen")
+        rule = stem_of(question.wording).removeprefix("ap-")
+        if rule not in _KINDS or (rule in PAIRED) != (len(named) == 2):
+            raise UnfairError(f"the wording {question.wording!r} asks for no length")
+        right_cm = _values_cm(rule, named[0], named[-1], picture)
+        if rule != "place":
+            try:
+                values = sorted(float(option.removesuffix(" cm")) for option in question.options)
+            except ValueError as error:
+                raise UnfairError("some option is no length in centimeters") from error
+            if any(high < _APART[0] * low for low, high in itertools.pairwise(values)):
+                raise UnfairError("two values are less than 20 % apart")
+        return index_of(question, _text_of(right_cm))
+
+
+def _distances(
+    scene: Scene, picture: QuestionPicture, scale: str, rng: np.random.Generator
+) -> Iterator[Draft]:
+    """One draft of each kind, as far as there are four values to offer."""
+    named = plain_names(picture)
+    blocks = [block for block in scene.blocks if block.order in named]
+    pairs = shuffled(rng, list(itertools.permutations(blocks, 2)))[:90]
+    for rule in shuffled(rng, list(_KINDS)):
+        found: dict[Values, list[tuple[Block, Block]]] = {}
+        for one, other in pairs if rule in PAIRED else [(block, block) for block in blocks]:
+            try:
+                found.setdefault(_values_cm(rule, one, other, picture), []).append((one, other))
+            except UnfairError:
+                continue
+        values = _four_values(rule, found, rng)
+        if not values:
+            continue
+        one, other = pick(rng, found[values[0]])
+        slots = {"block": named[one.order], "scale": scale}
+        if rule in PAIRED:
+            slots["other"] = named[other.order]
+        stem, options, kind = f"ap-{rule}", list(map(_text_of, values)), _KINDS[rule]
+        right = options[0]
+        yield draft(scene, rng, stem, options, [picture], right, slots, kind, right=right)
+
+
+def _values_cm(rule: str, one: Block, other: Block, picture: QuestionPicture) -> Values:
+    """The length asked for, or steps along and across the length of `other`; or UnfairError."""
+    if rule != "place":
+        return (grid_cm(LENGTHS[rule](one, other, picture.blocks)),)
+    _require_joined(one, other, picture.blocks)
+    axis, step = length_axis(other), np.abs(center_m(one) - center_m(other))
+    return grid_cm(float(step[axis])), grid_cm(float(step[1 - axis]))
+
+
+def _four_values(
+    rule: str, found: Collection[Values], rng: np.random.Generator
+) -> Sequence[Values]:
+    """Four values, the right one first; none where no four stand together.
+
+    All four are true of something in the picture, and which one is asked for is drawn, so that a
+    length that is frequent is not right more often than the others beside it. Where no scene has
+    four, as of `_FEW_A_SCENE`, one that is true stands beside others, and chance drops most of
+    these (`keeping_odds`).
+    """
+    fours: Sequence[Sequence[Values]] = _squares(found) if rule == "place" else _ladders()
+    whole = [four for four in fours if set(four) <= set(found)]
+    if whole:
+        four = pick(rng, whole)
+        return right_first(pick(rng, four), four)
+    if rule not in _FEW_A_SCENE or not found:
+        return ()
+    right = pick(rng, sorted(found))
+    beside = [four for four in fours if right in four]
+    return right_first(right, pick(rng, beside)) if beside else ()
+
+
+@functools.cache
+def _ladders() -> Sequence[Sequence[Values]]:
+    """All sets of four lengths on the grid that may stand together, rising."""
+    grid = [_STEP_CM * n for n in range(1, round(_LONGEST_CM / _STEP_CM) + 1)]
+    return [
+        [(length,) for length in four]
+        for four in itertools.combinations(grid, 4)
+        if all(_APART[0] * a <= b <= _APART[1] * a for a, b in itertools.pairwise(four))
+    ]
+
+
+def _squares(found: Collection[Values]) -> Sequence[Sequence[Values]]:
+    """Places 5 cm from one another along and across, four at a time, one of them among `found`."""
+    step = _PLACE_STEP_CM
+    corners = {(a - x, b - y) for a, b in found for x in (0, step) for y in (0, step)}
+    return [
+        [(a + x, b + y) for x in (0, step) for y in (0, step)]
+        for a, b in sorted(corners)
+        if min(a, b) >= 0
+    ]
+
+
+def _text_of(values_cm: Values) -> str:
+    if len(values_cm) == 1:
+        return f"{values_cm[0]:g} cm"
+    along, across = values_cm
+    return f"{along:g} cm along and {across:g} cm across"
+
+
+Below = Mapping[int, frozenset[int]]
+"""The orders that each block rests on, by its order."""
+_RELATIONS: Mapping[str, Callable[[int, int, Below], bool]] = {
+    "on": lambda block, anchor, below: anchor in below[block],
+    "under": lambda block, anchor, below: block in below[anchor],
+    "needed": lambda block, anchor, below: block in _all_below(anchor, below),
+    "carried": lambda block, anchor, below: anchor in _all_below(block, below),
+}
+
+
+class DependencyMaker(StaticMaker):
+    """RD: exactly one of four blocks has the relation; contacts are found in the geometry."""
+
+    subtask: Subtask = "RD"
+    drafts_a_view = 16
+
+    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+        """One block to ask about and four to choose from, drawn again and again."""
+        below = support_graph(scene.blocks)
+        types = {block.order: block.type for block in scene.blocks}
+        for _ in range(12):
+            shown = recolored(scene, rng)
+            picture = goal_picture(shown, view)
+            named = plain_names(picture)
+            if len(named) < 5:
+                continue
+            anchor = pick(rng, list(named))
+            for rule in shuffled(rng, list(_RELATIONS))[:2]:
+                rest = [order for order in named if order != anchor]
+                right = [order for order in rest if _RELATIONS[rule](order, anchor, below)]
+                wrong = shuffled(rng, [order for order in rest if order not in right])[:3]
+                if right and len(wrong) == 3:
+                    chosen = [pick(rng, right), *wrong]
+                    options, slots = [f"the {named[o]}" for o in chosen], {"block": named[anchor]}
+                    contacts = {str(o): sorted(below[o]) for o in (anchor, *chosen)}
+                    stem, value = f"rd-{rule}", types[chosen[0]]
+                    yield draft(
+                        *(shown, rng, stem, options, [picture], value, slots, rule),
+                        rests_on=contacts,
+                    )
+
+    def answer(
+        self, question: Question, picture: QuestionPicture, slots: Mapping[str, str]
+    ) -> tuple[int, ...]:
+        """By the contacts of the blocks that the text and the options name."""
+        anchor = resolve_one(slots["block"], picture)
+        named = [resolve_one(option, picture) for option in question.options]
+        require_seen(picture, orders_of([anchor, *named]), NAMED)
+        rule = question.wording.split("-")[1] if question.wording else ""
+        if rule not in _RELATIONS or anchor in named:
+            raise UnfairError("asks about no dependency, or a block about itself")
+        below = support_graph(picture.blocks)
+        return only_index([_RELATIONS[rule](b.order, anchor.order, below) for b in named])
+
+
+def _all_below(order: int, below: Below) -> set[int]:
+    below_it: set[int] = set()
+    waiting = [order]
+    while waiting:
+        for other in below[waiting.pop()] - {GROUND} - below_it:
+            below_it.add(other)
+            waiting.append(other)
+    return below_it

@@ -6,44 +6,81 @@ there it is not. Right and wrong places are drawn alike, all over the structure.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import product
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.affordance import lowered, stays_round, verdict
-from phyblock.making.questions.annexes import with_annex
-from phyblock.making.questions.counterfactual import group_of, is_sure
-from phyblock.making.questions.picture_view import COUNTED, View, are_seen, drawn_view
-from phyblock.making.questions.pictured_drafts import (
-    AREA,
-    alike_wrong,
-    are_told_apart,
+from phyblock.making.questions.draft import (
+    Draft,
+    Maker,
+    UnfairError,
     draft,
-    of_kind,
     only_index,
+    pick,
+    shuffled,
+    slots_of,
+)
+from phyblock.making.questions.pictured import (
+    LEAST_PIXELS,
+    MOST_OFF,
+    TAKEN,
+    WRONG,
+    are_told_apart,
+    marked_order,
+    of_kind,
     option_pictures,
     picture_of,
+    ranks_among,
     same_blocks,
-    state,
-    story_of,
-    with_room,
 )
-from phyblock.making.questions.question_draft import Draft, UnfairError
-from phyblock.making.questions.referring import TAKEN, marked_order
-from phyblock.making.questions.selection import pick, shuffled
-from phyblock.making.questions.wording import slots_of
+from phyblock.making.questions.structures import (
+    group_of,
+    is_sure,
+    lowered,
+    stays_round,
+    verdict,
+    with_annex,
+)
+from phyblock.making.questions.view import COUNTED, are_seen, drawn_view
 from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.camera import view_axes
-from phyblock.sim.contact import bounds_m, boxes_near
+from phyblock.sim.contact import bounds_m, boxes_near, whole_bounds_m
 from phyblock.sim.dynamics import groups
-from phyblock.sim.outcomes import OUTCOME_SETTINGS, Outcome, Push, after
-from phyblock.sim.question_pictures import block_mark, seen, shown_pixels
+from phyblock.sim.engine import Pose
+from phyblock.sim.outcomes import (
+    MOVED_DEG,
+    MOVED_M,
+    OUTCOME_SETTINGS,
+    STILL_DEG,
+    STILL_M,
+    Outcome,
+    Push,
+    after,
+)
+from phyblock.sim.pictures import Shot
+from phyblock.sim.question_pictures import (
+    block_mark,
+    changed_pixels,
+    differing_pixels,
+    is_inside,
+    seen,
+    shown_pixels,
+)
 from phyblock.stable import plain_sum
 
+_LEVEL_M, _DOWN_M = 0.004, 0.008
+_ROOM_M = 0.06
+_MOST_POOL = 11
+_HELD_OFF = 0.5
+AREA = 0
+"""Place of the measure how much is colored."""
 _STAGES_TRIED = 3
 _ANNEXED = 0.5
 _MOST_LEFT = 6
@@ -52,6 +89,7 @@ _STEP_M, _MOST_STEPS = 0.0125, 6
 _LEAST_HEIGHT_M = 0.02
 _LEAST_SHOWN = 250
 _ELEVATIONS_DEG = (34, 48)
+"""High enough to tell what lies behind from what lies above."""
 RINGS_M = (0.0025, 0.005, 0.01)
 """The verdict on a next step holds all round it, this far off [m]."""
 _ABOVE_M = 0.03
@@ -71,8 +109,9 @@ def next_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         stage, block = _stage(scene, rng)
         if not stage:
             return
-        framed = with_room(stage, _ABOVE_M)
-        shown = QuestionPicture("scene", stage, _view(rng), framed=framed)
+        low, high = _ELEVATIONS_DEG
+        view = (drawn_view(rng)[0], float(rng.integers(low, high + 1)))
+        shown = QuestionPicture("scene", stage, view, framed=with_room(stage, _ABOVE_M))
         staying, falling = _places(shown, block, rng)
         if len(falling) < _ENOUGH:
             continue
@@ -82,14 +121,18 @@ def next_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
             if not all(are_seen(one, (block.order,), COUNTED) for one in (right, *wrong)):
                 continue
             options = [right, *wrong]
-            if wrong and _are_sure(stage, options):
-                facts = {"placed": [one.order for one in stage], "next": block.order}
-                yield draft(scene, rng, "pd-next", options, [shown], f"area {rank}", facts=facts)
+            is_sure_of = (_stays(stage, one.blocks[-1]) is (one is right) for one in options)
+            if wrong and all(is_sure_of):
+                facts: dict[str, Any] = {
+                    "placed": [one.order for one in stage],
+                    "next": block.order,
+                }
+                yield draft(scene, rng, "pd-next", options, [shown], f"area {rank}", {}, **facts)
                 return
 
 
 def can_follow(shown: QuestionPicture, option: QuestionPicture) -> bool:
-    """Whether one block was added so that all stays; UnfairError when that is not sure."""
+    """True if one block was added so that all stays; UnfairError when that is not sure."""
     placed = {block.order for block in shown.blocks}
     added = [block for block in option.blocks if block.order not in placed]
     kept = [block for block in option.blocks if block.order in placed]
@@ -147,19 +190,8 @@ def _places(
     return shuffled(rng, found[True]), found[False]
 
 
-def _view(rng: np.random.Generator) -> View:
-    """A view from high enough to tell what lies behind from what lies above."""
-    low, high = _ELEVATIONS_DEG
-    return (drawn_view(rng)[0], float(rng.integers(low, high + 1)))
-
-
-def _are_sure(stage: Sequence[Block], options: Sequence[QuestionPicture]) -> bool:
-    """Whether, by simulation too, the first stays and the others do not."""
-    return all(_stays(stage, one.blocks[-1]) is (i == 0) for i, one in enumerate(options))
-
-
 def _stays(stage: Sequence[Block], put: Block) -> bool | None:
-    """Whether a block put down stays, by simulation too, and likewise up to 1 cm off; or None."""
+    """True if a block put down stays, by simulation too, and likewise up to 1 cm off; or None."""
     stays = stays_round(put, stage, RINGS_M)
     return stays if verdict((*stage, put), put.order) is stays else None
 
@@ -193,12 +225,12 @@ def push_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
             continue
         right = replace(right, blocks=outcome.settled)
         if are_told_apart([right, *(picture for _, picture in told)]):
-            facts = {"pushed": order, "moved": list(outcome.moved)}
+            facts: dict[str, Any] = {"pushed": order, "moved": list(outcome.moved)}
             options = [right, *(picture for _, picture in told)]
             shown = [replace(plain, marks=(mark,))]
             value = "falls" if len(outcome.moved) > 1 else "slides"
             slots = {"direction": direction}
-            yield draft(scene, rng, "pd-push", options, shown, value, slots, facts)
+            yield draft(scene, rng, "pd-push", options, shown, value, slots, **facts)
             return
 
 
@@ -207,7 +239,7 @@ def _shown_whole(scene: Scene, rng: np.random.Generator) -> QuestionPicture | No
     low, high = _ELEVATIONS_DEG_PUSHES
     for front_deg in shuffled(rng, _FRONTS_DEG):
         view = (front_deg, float(rng.integers(low, high + 1)))
-        plain = replace(state(scene, scene.blocks, view), framed=with_room(scene.blocks))
+        plain = QuestionPicture("scene", scene.blocks, view, framed=with_room(scene.blocks))
         if min(shown_pixels(plain, seen(plain)).values()) >= _LEAST_SHOWN_PUSHES:
             return plain
     return None
@@ -221,7 +253,7 @@ def meant_push(picture: QuestionPicture, order: int, direction: str) -> Push:
 
 
 def sure_push(blocks: Sequence[Block], push: Push) -> Outcome | None:
-    """What surely follows a push; None where settings, or statics if none came down, doubt it."""
+    """The sure outcome of a push; None where settings, or statics if none came down, doubt it."""
     outcome = after(blocks, push)
     if not outcome.is_clear or push.order not in outcome.moved:
         return None
@@ -234,7 +266,7 @@ def sure_push(blocks: Sequence[Block], push: Push) -> Outcome | None:
 def what_happened(
     blocks: Sequence[Block], picture: QuestionPicture, push: Push
 ) -> tuple[tuple[int, ...], tuple[int, ...], frozenset[int], frozenset[int]]:
-    """What a picture says happened, in words that two settled scenes can be compared by.
+    """The story of a picture, in words that two settled scenes can be compared by.
 
     Who is gone, who moved, who came down, and who went the way of the push. UnfairError as
     `story_of`.
@@ -255,7 +287,7 @@ def _pushes(plain: QuestionPicture, order: int, rng: np.random.Generator) -> lis
     """Pushes of a block and of those that it touches, to either side, in an order drawn."""
     boxes = {block.order: bounds_m(block) for block in plain.blocks}
     touching = [one for one, box in boxes.items() if boxes_near(box, boxes[order], _TOUCH_M)]
-    return shuffled(rng, list(product(touching, _DIRECTIONS)))[:_PUSHES_TRIED]
+    return shuffled(rng, list(itertools.product(touching, _DIRECTIONS)))[:_PUSHES_TRIED]
 
 
 def _told_apart(
@@ -300,12 +332,11 @@ _PUSHED = 0.55
 """How often a push is looked for, which fewer scenes allow than a next step."""
 
 
-class PredictiveMaker:
+class PredictiveMaker(Maker):
     """Kinds: `pd-next` (the next step) and `pd-push` (the settled scene after a push)."""
 
     subtask: Subtask = "PD"
     scenes_tried = 340
-    drafts_a_scene = 1
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """A push or a next step, as drawn, where one is fair."""
@@ -325,3 +356,133 @@ class PredictiveMaker:
             raise UnfairError("it is not sure what follows the push")
         expected = what_happened(before, replace(shown, blocks=outcome.settled), push)
         return only_index([what_happened(before, one, push) == expected for one in options])
+
+
+def with_room(blocks: Sequence[Block], above_m: float = 0.0) -> tuple[Block, ...]:
+    """The blocks to frame a picture on for floor all round them, and some air above [m]."""
+    low, high = whole_bounds_m(blocks)
+    first = max(block.order for block in blocks) + 1
+    height_m = round(float(high[2]) + above_m, 4) if above_m else 0.0125
+    corners = [
+        Block(first + i, "cuboid1", "red", (x, y, height_m), (0.0, 0.0, 0.0), (), 1)
+        for i, (x, y) in enumerate(
+            (round(float(x), 4), round(float(y), 4))
+            for x in (low[0] - _ROOM_M, high[0] + _ROOM_M)
+            for y in (low[1] - _ROOM_M, high[1] + _ROOM_M)
+        )
+    ]
+    return (*blocks, *corners)
+
+
+def moved_between(
+    scene: Scene, picture: QuestionPicture
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Orders of the scene's blocks that a picture lacks, and of those that it shows elsewhere.
+
+    UnfairError when it shows others, or a block neither at its place nor clearly elsewhere.
+    """
+    goal = {block.order: block for block in scene.blocks}
+    moved = []
+    for block in picture.blocks:
+        before = goal.get(block.order)
+        if before is None or before.kind != block.kind:
+            raise UnfairError(f"picture {picture.label} shows a block that the scene has not")
+        start, end = Pose.goal(before), Pose.goal(block)
+        distance_m, angle_deg = end.distance_m(start), end.angle_deg(start)
+        if distance_m > MOVED_M or angle_deg > MOVED_DEG:
+            moved.append(block.order)
+        elif distance_m > STILL_M or angle_deg > STILL_DEG:
+            raise UnfairError(f"picture {picture.label} shows block {block.order} hardly moved")
+    gone = set(goal) - {block.order for block in picture.blocks}
+    return tuple(sorted(gone)), tuple(sorted(moved))
+
+
+def story_of(
+    blocks: Sequence[Block], picture: QuestionPicture
+) -> tuple[tuple[int, ...], tuple[int, ...], frozenset[int]]:
+    """Orders of those gone, moved, and come down, by which two pictures can be compared.
+
+    UnfairError as `moved_between`, and where it is hard to tell whether a block came down.
+    """
+    gone, moved = moved_between(Scene("", (1,), tuple(blocks), ()), picture)
+    before = {block.order: block.position_m[2] for block in blocks}
+    after = {block.order: block.position_m[2] for block in picture.blocks}
+    down_m = {order: before[order] - after[order] for order in moved}
+    if any(_LEVEL_M < abs(height) < _DOWN_M for height in down_m.values()):
+        raise UnfairError(f"picture {picture.label} shows a block hardly lower than before")
+    return gone, moved, frozenset(order for order, height in down_m.items() if height >= _DOWN_M)
+
+
+def alike_wrong(
+    first: QuestionPicture,
+    right: QuestionPicture,
+    pool: Sequence[QuestionPicture],
+    rng: np.random.Generator,
+    held: Mapping[int, int] = MappingProxyType({}),
+) -> list[QuestionPicture]:
+    """Three of the pool, told apart from one another and the rest, or none.
+
+    `held` gives ranks that hold exactly, by measure: `AREA`.
+    """
+    whole = [one for one in (right, *pool) if is_inside(one)][: 1 + _MOST_POOL]
+    if not whole or whole[0] is not right:
+        return []
+    start, shots = seen(first), [seen(one) for one in whole]
+    together = [start, *shots]
+    apart = np.zeros((len(together), len(together)), dtype=np.bool_)
+    for (i, one), (j, other) in itertools.combinations(enumerate(together), 2):
+        # A picture like the first one is none that could be chosen.
+        is_worth_it = i == 0 or (apart[0, i] and apart[0, j])
+        apart[i, j] = apart[j, i] = is_worth_it and differing_pixels(one, other) >= LEAST_PIXELS
+        if (i, j) == (0, 1) and not apart[i, j]:
+            return []
+    measures = np.array([looks(start, shot) for shot in shots])
+    chosen = ranked_as_drawn(measures, apart[1:, 1:], rng, held)
+    return [whole[i] for i in chosen]
+
+
+def ranked_as_drawn(
+    measures: NDArray[np.float64],
+    apart: NDArray[np.bool_],
+    rng: np.random.Generator,
+    held: Mapping[int, int] = MappingProxyType({}),
+) -> tuple[int, ...]:
+    """Three rows after the first, all apart, among which the first has about the ranks drawn.
+
+    `measures` has shape (n, k), `apart` (n, n). `held` gives ranks that hold exactly for some of
+    the k measures. Empty where no three come near enough.
+    """
+    wanted = np.array(rng.integers(WRONG + 1, size=measures.shape[1]), dtype=np.int64)
+    fixed = sorted(held)
+    for one in fixed:
+        wanted[one] = held[one]
+    best: tuple[float, tuple[int, ...]] = (MOST_OFF, ())
+    for chosen in itertools.combinations(range(1, len(measures)), WRONG):
+        if all(apart[a, b] for a, b in itertools.combinations((0, *chosen), 2)):
+            off = np.abs(ranks_among(measures, 0, np.array([chosen]))[0] - wanted)
+            if (off[fixed] <= _HELD_OFF).all():
+                best = min(best, (float(off.mean()), chosen))
+    return best[1]
+
+
+def looks(first: Shot, shot: Shot) -> tuple[float, ...]:
+    """Eight measures of a picture, most of them shares of its side or of what is colored.
+
+    What is colored: how much, its middle across and down, its width and its top. What changed
+    against the first picture: how much, and its middle across and down.
+    """
+    rows, columns = np.nonzero(shot.block >= 0)
+    side, area = len(shot.block), max(int((first.block >= 0).sum()), 1)
+    changed_rows, changed_columns = np.nonzero(changed_pixels(first, shot))
+    if not len(changed_rows):
+        changed_rows, changed_columns = rows, columns
+    return (
+        5 * len(rows) / area,
+        10 * float(columns.mean()) / side,
+        10 * float(rows.mean()) / side,
+        5 * float(np.ptp(columns)) / side,
+        5 * float(rows.min()) / side,
+        2 * len(changed_rows) / area,
+        2 * float(changed_columns.mean()) / side,
+        2 * float(changed_rows.mean()) / side,
+    )

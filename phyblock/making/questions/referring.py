@@ -9,16 +9,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
+
+import numpy as np
 
 from phyblock.domain.blocks import COLORS, SHAPES, BlockType, Color
 from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block
-from phyblock.making.questions.picture_view import outermost, shows_profile
-from phyblock.making.questions.question_draft import UnfairError
+from phyblock.making.questions.draft import UnfairError, pick
+from phyblock.making.questions.view import NAMED, outermost, seen_blocks, shows_profile
 from phyblock.sim.contact import bounds_m
-from phyblock.sim.question_pictures import seen, seen_order
 
 Feature = Literal["color", "type", "size", "layer", "side", "support"]
 """What an expression may speak of; `size` tells rectangular prisms apart by their length."""
@@ -39,6 +40,8 @@ _NOUNS: dict[str, tuple[BlockType, ...]] = {
 }
 _SIDES = ("leftmost", "rightmost", "topmost")
 _TOP_GAP_M = 0.02
+_NAMES_DRAWN_FROM = 3
+_PLAIN: tuple[Feature, ...] = ("color", "type")
 _SIMPLE = rf"(?:(?:{'|'.join(COLORS)}) )?(?:{'|'.join(_NOUNS)})"
 _PATTERN = re.compile(
     rf"(?:(?P<side>{'|'.join(_SIDES)}) )?(?:(?P<color>{'|'.join(COLORS)}) )?"
@@ -118,12 +121,30 @@ def names(block: Block, picture: QuestionPicture, features: Sequence[Feature]) -
     return tuple(expression.text for expression in shortest)
 
 
+def drawn_name(
+    rng: np.random.Generator, block: Block, picture: QuestionPicture, features: Sequence[Feature]
+) -> str | None:
+    """One of the shortest expressions that fit a block alone, or None when nothing does."""
+    expressions = names(block, picture, features)
+    return pick(rng, expressions[:_NAMES_DRAWN_FROM]) if expressions else None
+
+
+def plain_names(picture: QuestionPicture) -> dict[int, str]:
+    """The shortest name by color and type of each block that shows enough, by order."""
+    found = ((b.order, names(b, picture, _PLAIN)) for b in seen_blocks(picture, NAMED))
+    return {order: expressions[0] for order, expressions in found if expressions}
+
+
 def _expressions(
     block: Block, picture: QuestionPicture, features: Sequence[Feature]
 ) -> Iterator[_Expression]:
     """All that is true of a block, the simple before the long."""
     colors: list[Color | None] = [block.color, None] if "color" in features else [None]
-    nouns = _nouns(block, features)
+    nouns = ["block"]
+    if "type" in features:
+        nouns.append(shape_word(block.type))
+    if "size" in features:
+        nouns += [noun for noun, types in _SIZED.items() if block.type in types]
     simple = [_Expression(noun, color) for noun in nouns for color in colors]
     yield from sorted(simple, key=lambda one: len(one.text.split()))
     for one in simple:
@@ -140,17 +161,8 @@ def _expressions(
                 yield _Expression(one.noun, one.color, support=name)
 
 
-def _nouns(block: Block, features: Sequence[Feature]) -> list[str]:
-    nouns = ["block"]
-    if "type" in features:
-        nouns.append(shape_word(block.type))
-    if "size" in features:
-        nouns += [noun for noun, types in _SIZED.items() if block.type in types]
-    return nouns
-
-
 def _is_part(shorter: _Expression, longer: _Expression) -> bool:
-    """Whether the longer says the same and more."""
+    """True if the longer says the same and more."""
     pairs = (
         (shorter.color, longer.color),
         (shorter.layer, longer.layer),
@@ -186,17 +198,3 @@ def _outermost(fitting: list[Block], picture: QuestionPicture, side: str) -> lis
         return ranked[:1] if is_clear else []
     order = outermost([b.order for b in fitting], picture, to_left=side == "leftmost")
     return [block for block in fitting if block.order == order]
-
-
-TAKEN = "X"
-"""The letter of the block that is taken away or pushed."""
-
-
-def marked_order(picture: QuestionPicture, letter: str) -> int:
-    """Order of the block that shows at a mark; UnfairError when there is none."""
-    for mark in picture.marks:
-        if mark.letter == letter:
-            order = seen_order(picture, seen(replace(picture, marks=())), mark.position_m)
-            if order is not None:
-                return order
-    raise UnfairError(f"no block is marked {letter}")

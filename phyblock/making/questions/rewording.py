@@ -26,9 +26,8 @@ from phyblock.data.scenes import Name
 from phyblock.domain import LETTERS, Question, Subtask, is_picture_option
 from phyblock.errors import DataError, Problem
 from phyblock.files import load_json
-from phyblock.making.questions.question_production import problem_of
-from phyblock.making.questions.selection import pick
-from phyblock.making.questions.wording import WORDINGS, fill_template, stem_of, wording_ids
+from phyblock.making.questions.draft import WORDINGS, fill_template, pick, stem_of, wording_ids
+from phyblock.making.questions.production import problem_of
 from phyblock.models import Message, Model, Request
 from phyblock.parsing.answer import parse_answer
 from phyblock.records.line import Fault, Line, refuse, shown, validated

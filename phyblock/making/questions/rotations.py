@@ -1,11 +1,11 @@
-"""Quarter turns about upright and level axes: which one takes one orientation to another."""
+"""RR: the quarter turn that takes one orientation to another, about upright and level axes."""
 
 from __future__ import annotations
 
 import functools
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,37 +20,43 @@ from phyblock.domain.blocks import (
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import angles_deg
-from phyblock.making.questions.measures import (
-    length_axis,
-    put_beside,
-    turned_about_vertical,
-    vertical_turns_deg,
+from phyblock.making.questions.draft import (
+    Draft,
+    UnfairError,
+    draft,
+    only_index,
+    pick,
+    right_first,
+    shuffled,
+    stem_of,
 )
-from phyblock.making.questions.picture_view import (
+from phyblock.making.questions.referring import resolve_one, shape_word
+from phyblock.making.questions.view import (
     NAMED,
     STUDIED,
+    StaticMaker,
     View,
     are_seen,
+    center_m,
     goal_picture,
+    length_axis,
+    orders_of,
     require_seen,
-    shown_picture,
+    seen_blocks,
+    with_own_colors,
 )
-from phyblock.making.questions.pictured_drafts import only_index
-from phyblock.making.questions.properties import with_own_colors
-from phyblock.making.questions.question_draft import Draft, UnfairError
-from phyblock.making.questions.referring import resolve_one, shape_word
-from phyblock.making.questions.selection import pick, shuffled
-from phyblock.making.questions.static_drafts import StaticMaker, draft, seen_blocks
-from phyblock.making.questions.wording import slots_of, stem_of
 from phyblock.sim.contact import (
     FIT_TOLERANCE_M,
     bounds_m,
+    boxes_near,
     drop_height_m,
     find_overlaps,
     support_graph,
+    whole_bounds_m,
 )
 from phyblock.sim.outcomes import holds
 
+_STEP_DEG = 15
 AXIS_TURNS: tuple[str, ...] = (
     "no turn at all",
     "a quarter turn about an upright axis",
@@ -111,9 +117,76 @@ def _about(axis: int, angle_deg: float) -> np.ndarray[tuple[int, ...], np.dtype[
     return matrix
 
 
+def vertical_turns_deg(block: Block, other: Block) -> tuple[int, ...]:
+    """Turns about the vertical, -165 to 180 degrees, that take `other` to how `block` is oriented.
+
+    In steps of 15 degrees, the least first, counterclockwise seen from above when positive; none
+    when the two are of different types, or one has to be tipped over as well. Up to the blocks'
+    own symmetry: orientations count as equal when no one can tell them apart.
+    """
+    if block.type != other.type:
+        return ()
+    return _vertical(block.type, block.euler_deg, other.euler_deg)
+
+
+@functools.lru_cache(maxsize=4096)
+def _vertical(block_type: BlockType, euler_deg: Euler, other_deg: Euler) -> tuple[int, ...]:
+    wanted = np.array(orientation_class(block_type, euler_deg))
+    roll, pitch, yaw = other_deg
+    turns = sorted(range(-180 + _STEP_DEG, 181, _STEP_DEG), key=lambda turn: (abs(turn), -turn))
+    distinct = []
+    for turn in turns:
+        turned = orientation_class(block_type, (roll, pitch, _yaw_deg(yaw, turn)))
+        if np.abs(wanted - np.array(turned)).max() < _SAME:
+            distinct.append(turn)
+    return tuple(distinct)
+
+
+def turned_about_vertical(block: Block, angle_deg: float) -> Block:
+    """The block turned about the vertical line through the middle of its bounding box."""
+    about = center_m(block)
+    cosine, sine = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
+    turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    x, y, z = (about + turn @ (np.array(block.position_m) - about)).tolist()
+    roll, pitch, yaw = block.euler_deg
+    euler_deg = (roll, pitch, _yaw_deg(yaw, angle_deg))
+    return replace(block, position_m=(round(x, 6), round(y, 6), round(z, 6)), euler_deg=euler_deg)
+
+
+def _yaw_deg(yaw_deg: float, turn_deg: float) -> float:
+    return round((yaw_deg + turn_deg) % 360, 6)
+
+
+_CLEAR_M = 0.02
+_STEP_M = 0.01
+
+
+def put_beside(block: Block, blocks: Sequence[Block], rng: np.random.Generator) -> Block:
+    """The block, as it is oriented, on the ground in a direction drawn from the blocks' middle.
+
+    It gets an order that none of them has, and stands as near to them as leaves 2 cm free.
+    """
+    low, high = whole_bounds_m(blocks)
+    middle = (low + high) / 2
+    angle = float(rng.uniform(0, 2 * math.pi))
+    direction = np.array([math.cos(angle), math.sin(angle)])
+    loose = replace(block, order=max(b.order for b in blocks) + 1, depend=(), layer=1)
+    box = bounds_m(loose)
+    distance = 0.0
+    while True:
+        place_m = middle[:2] + distance * direction
+        step = np.array([*(place_m - box.mean(axis=0)[:2]), -box[0, 2]])
+        x, y, z = (round(float(part), 4) for part in np.array(loose.position_m) + step)
+        placed = replace(loose, position_m=(x, y, z))
+        near = (boxes_near(bounds_m(placed), bounds_m(other), _CLEAR_M) for other in blocks)
+        if not any(near):
+            return placed
+        distance += _STEP_M
+
+
 @dataclass(frozen=True)
 class _Rule:
-    """One way of telling how a block is turned, compared with another of its type.
+    """One way to tell the turn of a block, compared with another of its type.
 
     `phrases` are those of the options that are true of the two.
     """
@@ -129,34 +202,32 @@ def _angle(turn_deg: int) -> str:
 
 
 def _turn(turn_deg: int) -> str:
-    direction = "" if turn_deg in (0, 180) else f" {_direction(turn_deg)}"
-    return f"{abs(turn_deg)} degrees{direction}"
+    if turn_deg in (0, 180):
+        return _angle(turn_deg)
+    return f"{_angle(turn_deg)} {'counterclockwise' if turn_deg > 0 else 'clockwise'}"
 
 
-def _direction(turn_deg: int) -> str:
-    return "counterclockwise" if turn_deg > 0 else "clockwise"
-
-
-def _angles(block: Block, other: Block) -> Sequence[str]:
-    if vertical_turns_deg(block, block) != (0, 180):
+def _vertical_phrases(
+    block: Block, other: Block, own: tuple[int, ...], text_of: Callable[[int], str]
+) -> Sequence[str]:
+    """The turns between two blocks that the turns `own` about the vertical map to themselves."""
+    if vertical_turns_deg(block, block) != own:
         return ()
-    return [_angle(turn) for turn in vertical_turns_deg(block, other)]
+    return [text_of(turn) for turn in vertical_turns_deg(block, other)]
 
 
-def _turns_rotations(block: Block, other: Block) -> Sequence[str]:
-    if vertical_turns_deg(block, block) != (0,):
-        return ()
-    return [_turn(turn) for turn in vertical_turns_deg(block, other)]
-
-
-_RULES: tuple[_Rule, ...] = (
-    # A block that a half turn about the vertical maps to itself,
-    _Rule("angle", "vertical", tuple(map(_angle, (0, 30, 60, 90))), _angles),
-    # one without such a symmetry,
-    _Rule("turn", "vertical", tuple(map(_turn, (0, 90, -90, 180))), _turns_rotations),
-    # and one with a length, which may roll over or stand on end as well.
-    _Rule("axis", "axis", AXIS_TURNS, axis_turns),
+_ANGLE = _Rule(
+    *("angle", "vertical", tuple(map(_angle, (0, 30, 60, 90)))),
+    lambda block, other: _vertical_phrases(block, other, (0, 180), _angle),
 )
+"""Of a block that a half turn about the vertical maps to itself."""
+_TURN = _Rule(
+    *("turn", "vertical", tuple(map(_turn, (0, 90, -90, 180)))),
+    lambda block, other: _vertical_phrases(block, other, (0,), _turn),
+)
+"""Of one without such a symmetry."""
+_AXIS = _Rule("axis", "axis", AXIS_TURNS, axis_turns)
+"""Of one with a length, which may roll over or stand on end as well."""
 _PAIRS = 6
 _LOOSE = 4
 _PLACES = 6
@@ -185,17 +256,19 @@ class RotationMaker(StaticMaker):
             for one, other in itertools.permutations(seen_blocks(picture, NAMED), 2)
             if one.type == other.type and one.order not in carrying
         ]
-        for one, other in shuffled(rng, pairs)[:_PAIRS]:
-            for rule in _RULES[:2]:
-                yield from _on_the_spot(view, scene, (one, other), rule, rng)
+        for pair in shuffled(rng, pairs)[:_PAIRS]:
+            for rule in (_ANGLE, _TURN):
+                yield from _on_the_spot(view, scene, pair, rule, rng)
 
-    def rederive(self, question: Question) -> tuple[int, ...]:
-        """From the orientations in the picture, up to the symmetry of the type."""
-        picture, slots = shown_picture(question), slots_of(question)
-        one, other = (resolve_one(slots[name], picture) for name in ("block", "other"))
-        require_seen(picture, [one.order, other.order], STUDIED)
-        rule = next((r for r in _RULES if stem_of(question.wording) == f"rr-{r.stem}"), None)
-        true = rule.phrases(one, other) if rule else ()
+    def answer(
+        self, question: Question, picture: QuestionPicture, slots: Mapping[str, str]
+    ) -> tuple[int, ...]:
+        """By the orientations in the picture, up to the symmetry of the type."""
+        pair = [resolve_one(slots[name], picture) for name in ("block", "other")]
+        require_seen(picture, orders_of(pair), STUDIED)
+        stem = stem_of(question.wording)
+        rule = next((r for r in (_ANGLE, _TURN, _AXIS) if stem == f"rr-{r.stem}"), None)
+        true = rule.phrases(*pair) if rule else ()
         if not true:
             raise UnfairError("are not of one type, or not turned as the wording asks")
         return only_index([option in true for option in question.options])
@@ -208,14 +281,13 @@ def _about_some_axis(
 
     None where some turn cannot be told from another, which would tell what is asked.
     """
-    rule = _RULES[2]
     try:
-        images = [(one, rule.phrases(one, other)) for one in tipped_over(other)]
+        images = [(one, axis_turns(one, other)) for one in tipped_over(other)]
     except UnfairError:
         return
-    if any(all(true != (phrase,) for _, true in images) for phrase in rule.options):
+    if any(all(true != (phrase,) for _, true in images) for phrase in AXIS_TURNS):
         return
-    phrase = pick(rng, rule.options)
+    phrase = pick(rng, AXIS_TURNS)
     turned = [one for one, true in images if true == (phrase,)]
     for _ in range(_PLACES):
         loose = put_beside(pick(rng, turned), scene.blocks, rng)
@@ -225,7 +297,7 @@ def _about_some_axis(
         if are_seen(picture, both, STUDIED) and holds(every.blocks, loose.order):
             colored = replace(every, blocks=every.blocks[:-1])
             its = next(block for block in colored.blocks if block.order == other.order)
-            yield from _drafted(colored, picture, (every.blocks[-1], its), rule, phrase, rng)
+            yield from _drafted(colored, picture, (every.blocks[-1], its), _AXIS, phrase, rng)
             return
 
 
@@ -234,14 +306,14 @@ def _on_the_spot(
 ) -> Iterator[Draft]:
     """The first of two is turned about the vertical so that a phrase drawn is true."""
     phrase = pick(rng, rule.options)
-    colored = with_own_colors(scene, [block.order for block in pair], rng)
+    colored = with_own_colors(scene, orders_of(pair), rng)
     mine, its = (next(b for b in colored.blocks if b.order == x.order) for x in pair)
     for turn in shuffled(rng, range(0, 360, 15)):
         moved = turned_about_vertical(mine, turn) if turn else mine
         if phrase in rule.phrases(moved, its)[:1]:
             blocks = tuple(moved if b.order == mine.order else b for b in colored.blocks)
             picture = goal_picture(replace(colored, blocks=blocks), view)
-            if _is_sound(picture, moved, mine, its):
+            if _fits(picture, moved, mine) and are_seen(picture, orders_of([moved, its]), STUDIED):
                 yield from _drafted(colored, picture, (mine, its), rule, phrase, rng)
                 return
 
@@ -255,36 +327,28 @@ def _drafted(
     rng: np.random.Generator,
 ) -> Iterator[Draft]:
     """The draft, where color and shape are names that fit both blocks as they are seen."""
-    options = [phrase, *(option for option in rule.options if option != phrase)]
-    noun = shape_word(pair[0].type)
-    slots = {"block": f"{pair[0].color} {noun}", "other": f"{pair[1].color} {noun}"}
+    one, other = (f"{block.color} {shape_word(block.type)}" for block in pair)
     try:
-        for name in slots.values():
-            resolve_one(name, picture)
+        resolve_one(one, picture)
+        resolve_one(other, picture)
     except UnfairError:
         return
-    stem = f"rr-{rule.stem}"
-    yield draft(scene, picture, rng, stem, slots, options, phrase, rule.kind, turned=phrase)
+    slots, options = {"block": one, "other": other}, right_first(phrase, rule.options)
+    stem, kind = f"rr-{rule.stem}", rule.kind
+    yield draft(scene, rng, stem, options, [picture], phrase, slots, kind, turned=phrase)
 
 
-def _is_sound(picture: QuestionPicture, moved: Block, before: Block, other: Block) -> bool:
-    """Whether the moved block fits, rests on what it rested on, and both show enough."""
-    near = [b for b in picture.blocks if b is not moved and _is_near(b, moved, before)]
+def _fits(picture: QuestionPicture, moved: Block, before: Block) -> bool:
+    """True if the moved block overlaps nothing and rests on what it rested on."""
+    boxes = [bounds_m(block) for block in (moved, before)]
+    near = [
+        block
+        for block in picture.blocks
+        if block is not moved and any(boxes_near(bounds_m(block), box, _NEAR_M) for box in boxes)
+    ]
     if drop_height_m(moved, near) > FIT_TOLERANCE_M:
         return False
     if any(moved.order in (o.first, o.second) for o in find_overlaps([*near, moved])):
         return False
-    rests_on = [support_graph([*near, block])[moved.order] for block in (moved, before)]
-    if rests_on[0] != rests_on[1]:
-        return False
-    return are_seen(picture, (moved.order, other.order), STUDIED)
-
-
-def _is_near(block: Block, *others: Block) -> bool:
-    """Whether the box round a block comes close to that round one of the others."""
-    low, high = bounds_m(block)
-    for other in others:
-        its_low, its_high = bounds_m(other)
-        if bool(np.all(low <= its_high + _NEAR_M) and np.all(its_low <= high + _NEAR_M)):
-            return True
-    return False
+    now, then = (support_graph([*near, block])[moved.order] for block in (moved, before))
+    return now == then

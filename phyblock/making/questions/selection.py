@@ -2,7 +2,7 @@
 
 Drafts of each sort are taken in turns from all scenes, so that none counts for more than another.
 Of these, chance leaves out some until the texts of those kept tell nothing of what is right
-(`answer_odds`). Of those the greedy choice takes, out of a hundred or so at a time, the one that
+(`keeping_odds`). Of those the greedy choice takes, out of a hundred or so at a time, the one that
 evens out best what was taken so far. Where options are texts it goes by what the text itself says
 alone, sort, wording and set of options: to choose by the scene as well would choose answers, for
 large scenes have larger numbers, and to even out answers would make what is right often in some
@@ -15,13 +15,12 @@ import math
 from collections import Counter, defaultdict
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain.question import LETTERS
-from phyblock.making.questions.question_draft import Draft
+from phyblock.making.questions.draft import Draft
 from phyblock.tracks.guesses import text_features
 
 _LOOKED_AT = 100
@@ -32,35 +31,11 @@ _SPARE = 2
 _WEIGHTS = {"kind": 6.0, "wording": 2.0, "options": 0.2, "value": 4.0, "scene": 3.0, "level": 0.3}
 
 
-@dataclass(frozen=True)
-class Pooled:
-    """A draft in the pool; `identity` is equal for questions that ask the same of one scene."""
-
-    draft: Draft
-    option_texts: tuple[str, ...]
-
-    @property
-    def identity(self) -> Hashable:
-        """Scene, colors, what is asked about and pictures, but not the words around them."""
-        draft = self.draft
-        colors = tuple(block.color for block in draft.scene.blocks)
-        slots = tuple(sorted((name, str(slot)) for name, slot in _slots(draft).items()))
-        options = frozenset(o for o in draft.options if not isinstance(o, str))
-        return (draft.scene.id, colors, draft.kind, slots, draft.pictures, options)
-
-    @property
-    def texts(self) -> Texts:
-        """What a reader without pictures sees."""
-        scene = self.draft.scene
-        group = (scene.parents or (scene.id,))[0]
-        return Texts(group, self.draft.kind, self.draft.text, self.option_texts, self.draft.looks)
-
-
-def select(pool: Sequence[Pooled], count: int, rng: np.random.Generator) -> list[Pooled]:
+def select(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[Draft]:
     """At most `count` drafts of the pool, no two the same question about the same scene."""
     left = _kept(_spread(pool, count, rng), count, rng)
     tally = _Tally(left)
-    taken: list[Pooled] = []
+    taken: list[Draft] = []
     keys: set[Hashable] = set()
     while left and len(taken) < count:
         size = min(_LOOKED_AT, len(left))
@@ -69,29 +44,29 @@ def select(pool: Sequence[Pooled], count: int, rng: np.random.Generator) -> list
         chosen = left[best]
         left[best] = left[-1]
         left.pop()
-        if chosen.identity not in keys:
-            keys.add(chosen.identity)
+        if (key := _identity(chosen)) not in keys:
+            keys.add(key)
             taken.append(chosen)
             tally.add(chosen)
     return taken
 
 
-def _spread(pool: Sequence[Pooled], count: int, rng: np.random.Generator) -> list[Pooled]:
+def _spread(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[Draft]:
     """Drafts of each sort, one of each scene in turns, several times as many as are wanted."""
-    turns: dict[str, list[tuple[int, int, Pooled]]] = defaultdict(list)
+    turns: dict[str, list[tuple[int, int, Draft]]] = defaultdict(list)
     of_scene: Counter[tuple[str, str]] = Counter()
     for place, i in enumerate(rng.permutation(len(pool)).tolist()):
-        draft = pool[i].draft
-        turns[draft.kind].append((of_scene[draft.kind, draft.scene.id], place, pool[i]))
+        draft = pool[i]
+        turns[draft.kind].append((of_scene[draft.kind, draft.scene.id], place, draft))
         of_scene[draft.kind, draft.scene.id] += 1
     most = -(-_SPREAD * count // max(len(turns), 1))
     ranked = (sorted(group, key=lambda entry: entry[:2])[:most] for group in turns.values())
     return [one for group in ranked for _, _, one in group]
 
 
-def _kept(pool: Sequence[Pooled], count: int, rng: np.random.Generator) -> list[Pooled]:
+def _kept(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[Draft]:
     """The drafts that chance leaves; more likely ones as well where they would be too few."""
-    odds = np.array(keeping_odds([one.texts for one in pool]))
+    odds = np.array(keeping_odds([_texts(draft) for draft in pool]))
     rank = rng.random(len(pool)) / np.maximum(odds, 1e-9)
     least = float(np.sort(rank)[: _SPARE * count][-1]) if len(pool) else 0.0
     return [one for one, place in zip(pool, rank, strict=True) if place <= max(1.0, least)]
@@ -100,14 +75,14 @@ def _kept(pool: Sequence[Pooled], count: int, rng: np.random.Generator) -> list[
 class _Tally:
     """What was taken so far, and how much less even a further draft would make it."""
 
-    def __init__(self, pool: Sequence[Pooled]) -> None:
+    def __init__(self, pool: Sequence[Draft]) -> None:
         self._members: dict[Hashable, set[Hashable]] = defaultdict(set)
         self._counts: Counter[tuple[Hashable, Hashable]] = Counter()
         for one in pool:
             for group, member, _ in _even(one):
                 self._members[group].add(member)
 
-    def cost(self, one: Pooled) -> float:
+    def cost(self, one: Draft) -> float:
         """The lower the better."""
         cost = 0.0
         for group, member, weight in _even(one):
@@ -115,19 +90,18 @@ class _Tally:
             cost += weight * (self._counts[group, member] - sum(counts) / len(counts))
         return cost
 
-    def add(self, one: Pooled) -> None:
+    def add(self, one: Draft) -> None:
         """Count a draft as taken."""
         for group, member, _ in _even(one):
             self._counts[group, member] += 1
 
 
-def _even(one: Pooled) -> Iterator[tuple[Hashable, Hashable, float]]:
+def _even(draft: Draft) -> Iterator[tuple[Hashable, Hashable, float]]:
     """Groups, the draft's member of each, and weights: members should be equally frequent."""
-    draft = one.draft
     yield "kind", draft.kind, _WEIGHTS["kind"]
     yield ("wording", draft.kind), draft.wording, _WEIGHTS["wording"]
-    if one.option_texts:
-        yield ("options", draft.kind), frozenset(one.option_texts), _WEIGHTS["options"]
+    if texts := _option_texts(draft):
+        yield ("options", draft.kind), frozenset(texts), _WEIGHTS["options"]
         return
     for place, part in enumerate(draft.value.split(", ")):
         yield ("value", draft.kind, place), part, _WEIGHTS["value"]
@@ -135,9 +109,23 @@ def _even(one: Pooled) -> Iterator[tuple[Hashable, Hashable, float]]:
     yield "level", draft.scene.level, _WEIGHTS["level"]
 
 
-def _slots(draft: Draft) -> Mapping[str, object]:
-    slots: Mapping[str, object] = draft.evidence.get("slots", {})
-    return slots
+def _option_texts(draft: Draft) -> tuple[str, ...]:
+    """The options as texts; of pictures and places, whose texts tell nothing, none."""
+    return tuple(option for option in draft.options if isinstance(option, str))
+
+
+def _identity(draft: Draft) -> Hashable:
+    """Scene, colors, what is asked about and pictures, but not the words around them."""
+    colors = tuple(block.color for block in draft.scene.blocks)
+    slots = sorted((name, str(slot)) for name, slot in draft.evidence.get("slots", {}).items())
+    options = frozenset(option for option in draft.options if not isinstance(option, str))
+    return (draft.scene.id, colors, draft.kind, tuple(slots), draft.pictures, options)
+
+
+def _texts(draft: Draft) -> Texts:
+    """What a reader without pictures sees."""
+    group = (draft.scene.parents or (draft.scene.id,))[0]
+    return Texts(group, draft.kind, draft.text, _option_texts(draft), draft.looks)
 
 
 BALANCE = (0.22, 0.28)
@@ -158,19 +146,6 @@ def even_letters(count: int, rng: np.random.Generator) -> list[int]:
         shares = np.bincount(drawn, minlength=len(LETTERS))
         if low <= shares.min() and shares.max() <= high:
             return [int(letter) for letter in drawn]
-
-
-T = TypeVar("T")
-
-
-def pick(rng: np.random.Generator, options: Sequence[T]) -> T:
-    """One of the options."""
-    return options[int(rng.integers(len(options)))]
-
-
-def shuffled(rng: np.random.Generator, items: Sequence[T]) -> list[T]:
-    """The items in an order drawn with `rng`."""
-    return [items[int(i)] for i in rng.permutation(len(items))]
 
 
 _STEPS = 60
@@ -198,7 +173,7 @@ class Texts:
 
     @property
     def tells(self) -> bool:
-        """Whether there is anything to go by."""
+        """True if there is anything to go by."""
         return bool(self.options or self.looks)
 
 
@@ -223,7 +198,7 @@ class _Table:
 
 
 def keeping_odds(texts: Sequence[Texts]) -> list[float]:
-    """For each draft, with which probability it is kept; 1 where there is nothing to go by."""
+    """The probability with which each draft is kept; 1 where there is nothing to go by."""
     groups = sorted({one.group for one in texts if one.tells})
     half_of = {group: place % 2 for place, group in enumerate(groups)}
     odds = [1.0] * len(texts)
@@ -247,7 +222,7 @@ def _judged(known: Sequence[Texts], asked: Sequence[Texts]) -> list[float]:
 
 
 def _table(texts: Sequence[Texts], names: dict[str, int], grows: bool) -> _Table:
-    """The features of all options; unknown ones are added to `names`, or left out."""
+    """The features of all options; unknown ones are added to `names`, or dropped."""
     rows, columns, values, starts = [], [], [], []
     row = 0
     for one in texts:

@@ -1,4 +1,4 @@
-"""VP: which picture shows the same structure from elsewhere, or how it looks from a given side.
+"""VP: the picture of the same structure from elsewhere, or of how it looks from a given side.
 
 The structures of four options come from two changes, each made or not: mirroring, two blocks that
 exchange their colors, a block that is put a little elsewhere. All have the same blocks in the same
@@ -22,24 +22,29 @@ from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import Symmetry, turned_form
 from phyblock.making.poses import transformed
-from phyblock.making.questions.affordance import shifted
-from phyblock.making.questions.picture_view import View, drawn_view
-from phyblock.making.questions.pictured_drafts import (
-    are_told_apart,
+from phyblock.making.questions.draft import (
+    Draft,
+    Maker,
+    UnfairError,
     draft,
-    of_kind,
     only_index,
+    pick,
+    right_first,
+    shuffled,
+    slots_of,
+)
+from phyblock.making.questions.pictured import (
+    are_told_apart,
+    of_kind,
     option_pictures,
     picture_of,
     same_blocks,
 )
-from phyblock.making.questions.properties import recolored
-from phyblock.making.questions.question_draft import Draft, UnfairError
-from phyblock.making.questions.selection import pick, shuffled
-from phyblock.making.questions.wording import slots_of
+from phyblock.making.questions.structures import group_of
+from phyblock.making.questions.view import View, drawn_view, recolored
+from phyblock.sim.balance import surely_stands
+from phyblock.sim.contact import drop_height_m, find_overlaps
 from phyblock.sim.question_pictures import least_difference, seen, shown_pixels
-
-__all__ = ["ViewpointMaker"]
 
 _FRONTS_DEG = (0.0, 90.0, 180.0, 270.0)
 """Straight on: a mirror image of a slanted view can be a true view of the same side."""
@@ -74,7 +79,7 @@ class _Structure:
         return QuestionPicture("scene", self.blocks, (azimuth, view[1]))
 
 
-class ViewpointMaker:
+class ViewpointMaker(Maker):
     """Kinds: `vp-match`, a structure from anywhere; `vp-side`, what is seen from a side named."""
 
     subtask: Subtask = "VP"
@@ -123,12 +128,10 @@ def _match(
         shown, options = ([one.seen_from(view) for one in family] for view in (first, second))
         if are_told_apart(shown) and are_told_apart(options) and _differ_at_a_glance(options):
             right = int(rng.integers(len(family)))
-            order = [right, *(i for i in range(len(family)) if i != right)]
-            slots = {"side_words": side} if side else {}
-            facts = {"changes": changes}
-            dealt = [options[i] for i in order]
+            dealt = [options[i] for i in right_first(right, range(len(family)))]
+            pictures, slots = [shown[right]], {"side_words": side} if side else {}
             value = side or changes
-            yield draft(scene, rng, stem, dealt, [shown[right]], value, slots, facts)
+            yield draft(scene, rng, stem, dealt, pictures, value, slots, changes=changes)
             return
 
 
@@ -200,12 +203,12 @@ def _side(scene: Scene, rng: np.random.Generator, front: View, side: str) -> Ite
         if rng.random() < 0.5:
             # The mirror image is shown: what it looks like from a side is the other side mirrored.
             shown, options = base.mirrored().seen_from(front), options[::-1]
-        facts = {"changes": "mirror"}
-        yield draft(scene, rng, "vp-side", options, [shown], side, {"side_words": side}, facts)
+        slots = {"side_words": side}
+        yield draft(scene, rng, "vp-side", options, [shown], side, slots, changes="mirror")
 
 
 def _differ_at_a_glance(options: Sequence[QuestionPicture]) -> bool:
-    """Whether any two of the options differ in at least `_LEAST_SHARE` of what shows of blocks."""
+    """True if any two of the options differ in at least `_LEAST_SHARE` of what shows of blocks."""
     shots = [seen(option) for option in options]
     area = max(int((shot.block >= 0).sum()) for shot in shots)
     return least_difference(shots) >= _LEAST_SHARE * area
@@ -244,3 +247,32 @@ def _pixels(structure: _Structure, view: View) -> dict[int, int]:
     plain = (structure.mirrored() if structure.is_mirrored else structure).seen_from(view)
     plain = replace(plain, blocks=tuple(replace(b, color="red") for b in plain.blocks))
     return shown_pixels(plain, seen(plain))
+
+
+_BLOCKS_TRIED = 3
+_STEPS_M = tuple(
+    (x, y) for step in (0.025, 0.05) for x, y in ((step, 0), (-step, 0), (0, step), (0, -step))
+)
+_FLOATS_M = 0.0005
+
+
+def shifted(blocks: Sequence[Block], rng: np.random.Generator) -> tuple[Block, ...] | None:
+    """All blocks, with one that carries nothing moved along its level by 2.5 or 5 cm.
+
+    None where none of a few that are tried would stay, by statics with a margin: of 207 such moves
+    a simulation lets no other stay but two, whose weight is over an edge.
+    """
+    carrying = {order for block in blocks for order in block.depend}
+    free = [block for block in blocks if block.order not in carrying]
+    for block in shuffled(rng, free)[:_BLOCKS_TRIED]:
+        rest = [other for other in blocks if other.order != block.order]
+        for x, y in shuffled(rng, _STEPS_M):
+            at_x, at_y, z = block.position_m
+            place = (round(at_x + x, 4) + 0.0, round(at_y + y, 4) + 0.0, z)
+            moved = replace(block, position_m=place)
+            if drop_height_m(moved, rest) > _FLOATS_M or find_overlaps((*rest, moved)):
+                continue
+            every = tuple(moved if other.order == block.order else other for other in blocks)
+            if surely_stands(group_of(every, moved.order)):
+                return every
+    return None

@@ -1,18 +1,20 @@
-"""What a static question's picture shows: shares of blocks, where they are, along which axes."""
+"""The one picture of a static question: its view and colors, and what it shows of each block."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Collection, Mapping, Sequence
+from abc import abstractmethod
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.domain.blocks import SHAPES, BlockType, euler_deg_to_matrix
+from phyblock.domain.blocks import COLORS, SHAPES, BlockType, euler_deg_to_matrix
 from phyblock.domain.question import Question, QuestionPicture
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.question_draft import UnfairError
+from phyblock.making.questions.draft import Draft, Maker, UnfairError, slots_of
 from phyblock.sim.camera import view_axes
 from phyblock.sim.contact import bounds_m
 from phyblock.sim.pictures import (
@@ -23,28 +25,6 @@ from phyblock.sim.pictures import (
     shoot,
     visible_shares,
 )
-
-__all__ = [
-    "COUNTED",
-    "ELEVATIONS_DEG",
-    "NAMED",
-    "SHAPED",
-    "SHAPED_AREA",
-    "STUDIED",
-    "View",
-    "are_seen",
-    "center_m",
-    "drawn_view",
-    "goal_picture",
-    "outermost",
-    "picture_axes",
-    "require_seen",
-    "require_shapes_seen",
-    "shares",
-    "shown_picture",
-    "shows_profile",
-    "shows_solid",
-]
 
 View = tuple[float, float]
 """Azimuth and elevation of a camera [degrees]."""
@@ -73,6 +53,74 @@ _MIDDLE_GAP = 0.1
 """So much further out, of half the picture's width, is the middle of a block called leftmost,"""
 _EDGE_GAP = 0.05
 """and so much its outer edge."""
+
+
+class StaticMaker(Maker):
+    """Drafts cost little, so every scene is asked, each time from views drawn for it."""
+
+    views_a_scene: int = 1
+    drafts_a_view: int = 12
+
+    def __init_subclass__(cls) -> None:
+        """Derive the most drafts of a scene from those of a view."""
+        cls.drafts_a_scene = cls.views_a_scene * cls.drafts_a_view
+
+    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+        """Fair questions about a scene, view by view."""
+        for _ in range(self.views_a_scene):
+            yield from islice(self.seen_from(drawn_view(rng), scene, rng), self.drafts_a_view)
+
+    @abstractmethod
+    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+        """Fair questions about a scene that is seen from a view."""
+
+    def rederive(self, question: Question) -> tuple[int, ...]:
+        """The answer from the one picture and the slots of the text alone."""
+        return self.answer(question, shown_picture(question), slots_of(question))
+
+    @abstractmethod
+    def answer(
+        self, question: Question, picture: QuestionPicture, slots: Mapping[str, str]
+    ) -> tuple[int, ...]:
+        """The answer to a question about a picture; UnfairError as `rederive`."""
+
+
+def recolored(scene: Scene, rng: np.random.Generator) -> Scene:
+    """The scene with a color drawn for every block, so that color tells no shape."""
+    drawn_colors = [COLORS[int(i)] for i in rng.integers(len(COLORS), size=len(scene))]
+    return replace(
+        scene,
+        blocks=tuple(replace(b, color=c) for b, c in zip(scene.blocks, drawn_colors, strict=True)),
+    )
+
+
+def with_own_colors(scene: Scene, orders: Sequence[int], rng: np.random.Generator) -> Scene:
+    """The scene with a color for each of up to four blocks that no other block has.
+
+    The other blocks share the colors that are left. Raises ValueError for more than four blocks
+    when there are others.
+    """
+    colors = [COLORS[int(i)] for i in rng.permutation(len(COLORS))]
+    own = dict(zip(orders, colors, strict=False))
+    left = colors[len(orders) :]
+    if len(orders) > len(colors) or (not left and len(orders) < len(scene)):
+        raise ValueError(f"there are {len(colors)} colors for {len(orders)} blocks and the rest")
+    blocks = []
+    for block in scene.blocks:
+        color = own.get(block.order) or left[int(rng.integers(len(left)))]
+        blocks.append(replace(block, color=color))
+    return replace(scene, blocks=tuple(blocks))
+
+
+def seen_blocks(picture: QuestionPicture, least: float) -> list[Block]:
+    """The blocks that show at least this share of themselves in a picture."""
+    seen = shares(picture)
+    return [block for block in picture.blocks if seen[block.order] >= least]
+
+
+def orders_of(blocks: Sequence[Block]) -> list[int]:
+    """The orders of blocks."""
+    return [block.order for block in blocks]
 
 
 def drawn_view(rng: np.random.Generator) -> View:
@@ -108,7 +156,7 @@ def _shares(blocks: tuple[Block, ...], view: View) -> Mapping[int, float]:
 
 
 def are_seen(picture: QuestionPicture, orders: Collection[int], least: float) -> bool:
-    """Whether each of the named blocks shows at least this share of itself."""
+    """True if each of the named blocks shows at least this share of itself."""
     seen = shares(picture)
     return all(seen[order] >= least for order in orders)
 
@@ -136,7 +184,7 @@ def picture_axes(view: View) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def outermost(orders: Sequence[int], picture: QuestionPicture, to_left: bool) -> int | None:
-    """Which of the named blocks is farthest to a side of a picture; None when that is close.
+    """The one of the named blocks that is farthest to a side of a picture; None when that is close.
 
     Both its middle and its outer edge have to be clearly farther out than those of the others.
     """
@@ -179,7 +227,7 @@ def _areas(blocks: tuple[Block, ...], view: View) -> Mapping[int, float]:
 
 
 def shows_profile(block: Block, view: View) -> bool:
-    """Whether a view shows the face that tells an arch, a prism or a half cylinder from a box."""
+    """True if a view shows the face that tells an arch, a prism or a half cylinder from a box."""
     axis = _PROFILE_AXES.get(block.type)
     if axis is None:
         return True
@@ -188,7 +236,7 @@ def shows_profile(block: Block, view: View) -> bool:
 
 
 def shows_solid(block: Block, view: View) -> bool:
-    """Whether a view shows its profile, and no one face is nearly all that shows of the block."""
+    """True if a view shows its profile, and no one face is nearly all that shows of the block."""
     along = view_axes(*view)[2]
     corners = DrawnBlock(block.type, block.color, block.position_m, block.euler_deg).triangles_m
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -217,3 +265,18 @@ def _style(view: View) -> PictureStyle:
 def _plain(block: Block) -> Block:
     """The block as far as it decides what is hidden."""
     return replace(block, color="red", depend=())
+
+
+_LONGER = 1.3
+
+
+def length_axis(block: Block) -> int:
+    """The level axis of the world (0 or 1) that a block's longest side runs along.
+
+    UnfairError where it stands on end, stands askew, or no side is clearly the longest.
+    """
+    sides = np.diff(bounds_m(block), axis=0)[0]
+    first, second = sorted(range(3), key=lambda axis: -sides[axis])[:2]
+    if first == 2 or sides[first] < _LONGER * sides[second] or block.euler_deg[2] % 90:
+        raise UnfairError("has no length that lies along the ground")
+    return first

@@ -1,4 +1,4 @@
-"""Small additions to a structure that make its balance worth a question.
+"""Structures whose balance is worth a question, and what statics and simulation say of them.
 
 The structures of the data set are built so that they stand at every step; few of their blocks
 rest on more than they need, and none is held by a weight. An annex is a plank laid on a flat top,
@@ -8,20 +8,22 @@ at random, it is a balance, a cantilever with a counterweight, or a bridge with 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from phyblock.domain.blocks import COLORS, SHAPES, BlockType, Euler
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.selection import pick, shuffled
-from phyblock.sim.balance import MARGIN_M
-from phyblock.sim.contact import bounds_m, find_gaps, find_overlaps
+from phyblock.making.questions.draft import pick, shuffled
+from phyblock.sim.balance import MARGIN_M, is_balanced, surely_falls, surely_stands
+from phyblock.sim.contact import bounds_m, drop_height_m, find_gaps, find_overlaps
+from phyblock.sim.dynamics import groups
 from phyblock.sim.geometry import corners_m
+from phyblock.sim.outcomes import holds
 from phyblock.stable import plain_sum
-
-__all__ = ["with_annex"]
 
 _UNIT_M = 0.0125
 _PLANK_M = 0.025
@@ -191,3 +193,72 @@ def _column(height_m: float, rng: np.random.Generator) -> list[tuple[BlockType, 
         pieces.append(fitting[0])
         left_m -= fitting[0][1]
     return pieces
+
+
+_LIFT_M = 0.6
+_DIRECTIONS = 8
+
+
+def lowered(block: Block, onto: Sequence[Block], x_m: float, y_m: float) -> Block:
+    """The block let down, as it is turned, with the middle of its outline over a place (x, y) [m].
+
+    It stops where it first touches one of the blocks, or the floor.
+    """
+    middle = bounds_m(block).mean(axis=0)
+    x = round(block.position_m[0] + x_m - float(middle[0]), 6)
+    y = round(block.position_m[1] + y_m - float(middle[1]), 6)
+    lifted = replace(block, position_m=(x, y, block.position_m[2] + _LIFT_M))
+    fall = drop_height_m(lifted, onto)
+    return replace(lifted, position_m=(x, y, round(lifted.position_m[2] - fall, 6)))
+
+
+def lowered_round(put: Block, onto: Sequence[Block], rings_m: Sequence[float]) -> Iterator[Block]:
+    """The block let down anew all round where it is, in eight directions for each ring [m]."""
+    x, y, _ = bounds_m(put).mean(axis=0).tolist()
+    for radius_m in rings_m:
+        for number in range(_DIRECTIONS):
+            angle = 2 * math.pi * number / _DIRECTIONS
+            at = (x + radius_m * math.cos(angle), y + radius_m * math.sin(angle))
+            yield lowered(put, onto, *at)
+
+
+def stays_round(put: Block, onto: Sequence[Block], rings_m: Sequence[float]) -> bool | None:
+    """True if by statics a block let down stays, and likewise all round; None where unsure."""
+    stays = surely_stays((*onto, put), put.order)
+    is_alike = stays is not None and all(
+        is_balanced(group_of((*onto, moved), moved.order)) is stays
+        for moved in lowered_round(put, onto, rings_m)
+    )
+    return stays if is_alike else None
+
+
+def surely_stays(blocks: Sequence[Block], order: int) -> bool | None:
+    """True if by statics one of the blocks and all that touches it stay; None where unsure."""
+    group = group_of(blocks, order)
+    if is_balanced(group):
+        return True if surely_stands(group) else None
+    return False if surely_falls(group) else None
+
+
+def verdict(blocks: Sequence[Block], order: int) -> bool | None:
+    """True if all stay; None where statics leave a doubt or settings of a simulation disagree."""
+    stays = surely_stays(blocks, order)
+    return stays if stays is not None and holds(blocks, order) is stays else None
+
+
+def group_of(blocks: Sequence[Block], order: int) -> tuple[Block, ...]:
+    """The blocks in reach of one, itself among them."""
+    return next(group for group in groups(blocks) if any(b.order == order for b in group))
+
+
+def is_sure(left: Sequence[Block], moved: Collection[int]) -> bool:
+    """True if blocks just left to themselves surely do what a simulation says.
+
+    Those that stay stand without those that go, and each lot of those that go cannot be borne
+    by those that stay: with every weight 5 mm off to any side, other masses, and friction to spare.
+    """
+    still = [block for block in left if block.order not in moved]
+    falling = groups([block for block in left if block.order in moved])
+    return all(surely_stands(group) for group in groups(still)) and all(
+        surely_falls([*still, *lot]) for lot in falling
+    )

@@ -1,0 +1,475 @@
+"""Rules by which questions are drafted and answers derived: names, lengths, places, ranks."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from phyblock.data import read_builtin
+from phyblock.domain import BLOCK_TYPES, LETTERS, Block, BlockType, Color, QuestionPicture, Scene
+from phyblock.domain.blocks import SHAPES, Euler
+from phyblock.domain.question import Mark
+from phyblock.domain.symmetry import SYMMETRIES, Symmetry, turned_form
+from phyblock.making.poses import POSES, transformed
+from phyblock.making.questions.affordance import is_on_face, sort_of, stays_at
+from phyblock.making.questions.counterfactual import resting_on
+from phyblock.making.questions.counting import layers_of, sure_blocks
+from phyblock.making.questions.draft import UnfairError
+from phyblock.making.questions.pictured import four_alike
+from phyblock.making.questions.positions import LENGTHS, grid_cm
+from phyblock.making.questions.predictive import ranked_as_drawn
+from phyblock.making.questions.referring import (
+    SHAPE_WORDS,
+    Feature,
+    names,
+    resolve,
+    resolve_one,
+    shape_word,
+)
+from phyblock.making.questions.rotations import AXIS_TURNS, axis_turns, put_beside, tipped_over
+from phyblock.making.questions.selection import BALANCE, Texts, even_letters, keeping_odds
+from phyblock.making.questions.structures import (
+    is_sure,
+    lowered,
+    lowered_round,
+    stays_round,
+    with_annex,
+)
+from phyblock.making.questions.view import shows_solid
+from phyblock.making.questions.viewpoint import ViewpointMaker, shifted
+from phyblock.resources import bundled
+from phyblock.sim.contact import bounds_m, find_gaps, find_overlaps, support_graph
+from phyblock.sim.question_pictures import Top, least_difference, seen
+from tests.sim.structures import block as solid
+from tests.sim.structures import tower
+
+SCENES = [t.scene for t in read_builtin(bundled("benchmarks", "data", "phyblock-400")).tasks]
+FEATURES: tuple[Feature, ...] = ("color", "type", "size", "layer", "side", "support")
+scenes = st.sampled_from(SCENES[::9])
+seeds = st.integers(0, 2**32 - 1)
+
+
+def block(
+    order: int,
+    place: tuple[float, float, float],
+    depend: tuple[int, ...] = (),
+    kind: BlockType = "cube",
+    color: Color = "red",
+    euler: Euler = (0.0, 0.0, 0.0),
+    layer: int = 0,
+) -> Block:
+    return Block(order, kind, color, place, euler, depend, layer or 1 + bool(depend))
+
+
+def shown(*blocks: Block, azimuth: float = 45.0) -> QuestionPicture:
+    return QuestionPicture("scene", blocks, (azimuth, 22.0))
+
+
+# Names of blocks
+
+
+@settings(deadline=None)
+@given(
+    st.sampled_from(SCENES[::10]), st.sets(st.sampled_from(FEATURES), min_size=1), st.floats(0, 360)
+)
+def test_a_name_fits_its_block_alone_and_speaks_of_what_it_may(
+    scene: Scene, features: set[Feature], azimuth: float
+) -> None:
+    picture = QuestionPicture("scene", scene.blocks, (azimuth, 25.0))
+    for one in scene.blocks:
+        for name in names(one, picture, sorted(features)):
+            assert resolve(name, picture) == resolve(name, picture, loosely=True) == (one.order,)
+            assert resolve_one(f"the {name}", picture) == one
+            if "color" not in features:
+                assert not {"red", "yellow", "blue", "green", "orange"} & set(name.split())
+            if not {"type", "size"} & features:
+                assert not any(word in name for word in SHAPE_WORDS)
+
+
+def test_the_shortest_names_come_first_and_a_doubtful_one_is_none() -> None:
+    red, blue = block(1, (0, 0, 0.025)), block(3, (0, 0.4, 0.025), color="blue")
+    arch = block(2, (0, 0.2, 0.025), kind="arch")
+    picture = shown(red, arch, blue)
+    assert names(arch, picture, ("color", "type", "layer")) == ("arch",)
+    assert names(blue, picture, ("color", "type")) == ("blue block",)
+    assert names(red, picture, ("color", "type")) == ("red cube",)
+    beside_prism = shown(red, block(2, (0, 0.2, 0.025), kind="cuboid1"))
+    assert not names(red, beside_prism, ("type",))
+    with pytest.raises(UnfairError, match="may be taken for another block"):
+        resolve_one("red cube", beside_prism)
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "azimuth", "orders"),
+    [
+        # From azimuth 45 degrees, larger y is to the right.
+        ("leftmost cube", (0, 0.2, 0.025), 45.0, (1,)),
+        ("rightmost cube", (0, 0.2, 0.025), 45.0, (2,)),
+        ("leftmost cube", (0, 0.2, 0.025), 225.0, (2,)),
+        ("leftmost cube", (0, 0, 0.075), 45.0, ()),
+        ("topmost cube", (0, 0, 0.075), 45.0, (2,)),
+        ("topmost cube", (0, 0.06, 0.025), 45.0, ()),
+        ("blue cube resting on the red cube", (0, 0, 0.075), 45.0, (2,)),
+        ("blue cube in layer 2", (0, 0, 0.075), 45.0, (2,)),
+    ],
+)
+def test_words_for_places_fit_one_block_or_none(
+    text: str, place: tuple[float, float, float], azimuth: float, orders: tuple[int, ...]
+) -> None:
+    other = block(2, place, (1,) if place[2] > 0.05 else (), color="blue")
+    assert resolve(text, shown(block(1, (0, 0, 0.025)), other, azimuth=azimuth)) == orders
+
+
+@pytest.mark.parametrize("text", ["purple cube", "cube of red", "", "the the cube", "red"])
+def test_words_that_are_no_name_are_refused(text: str) -> None:
+    with pytest.raises(UnfairError, match="names no block"):
+        resolve(text, shown(block(1, (0, 0, 0.025))))
+
+
+def test_every_type_has_one_of_six_words() -> None:
+    assert len(SHAPE_WORDS) == 6
+    assert {shape_word(kind) for kind in BLOCK_TYPES} == set(SHAPE_WORDS)
+
+
+# Turns, lengths, layers
+
+
+@given(st.sampled_from([name for name, shape in SHAPES.items() if shape.is_long]), st.data())
+def test_a_turn_is_the_one_that_was_made(kind: BlockType, data: st.DataObject) -> None:
+    euler = data.draw(st.sampled_from(sorted(POSES[kind].values())))
+    lying = block(1, (0, 0, 0.1), kind=kind, euler=euler)
+    try:
+        turned = tipped_over(lying)
+    except UnfairError:
+        return
+    assert axis_turns(lying, lying)[0] == AXIS_TURNS[0]
+    assert {name for one in turned for name in axis_turns(one, lying)} == set(AXIS_TURNS)
+
+
+@settings(max_examples=30, deadline=None)
+@given(scenes, seeds)
+def test_a_loose_block_stands_free_on_the_ground(scene: Scene, seed: int) -> None:
+    loose = put_beside(scene.blocks[0], scene.blocks, np.random.default_rng(seed))
+    every = (*scene.blocks, loose)
+    assert not find_overlaps(every)
+    assert support_graph(every)[loose.order] == {0}
+    assert len({one.order for one in every}) == len(every)
+
+
+@settings(max_examples=40, deadline=None)
+@given(scenes)
+def test_layers_are_one_more_than_what_is_below(scene: Scene) -> None:
+    try:
+        layers = layers_of(scene.blocks)
+    except UnfairError:
+        return
+    below = support_graph(scene.blocks)
+    for order, layer in layers.items():
+        assert layer == 1 + max(layers.get(other, 0) for other in below[order])
+
+
+@settings(max_examples=40, deadline=None)
+@given(scenes, st.sampled_from(SYMMETRIES), st.sampled_from(sorted(LENGTHS)))
+def test_lengths_stay_what_they_are_in_a_mirror_and_after_a_turn(
+    scene: Scene, symmetry: Symmetry, rule: str
+) -> None:
+    other = transformed(scene.blocks, symmetry)
+    for (a, x), (b, y) in itertools.islice(
+        itertools.permutations(zip(scene.blocks, other, strict=True), 2), 20
+    ):
+        try:
+            length = LENGTHS[rule](a, b, scene.blocks)
+        except UnfairError:
+            continue
+        assert LENGTHS[rule](x, y, other) == pytest.approx(length, abs=1e-5)
+
+
+def test_a_gap_is_measured_between_sides_and_with_nothing_in_it() -> None:
+    left, right = block(2, (-0.05, 0, 0.05), (1,)), block(3, (0.05, 0, 0.05), (1,))
+    slab = block(1, (0, 0, 0.0125), kind="cuboid3")
+    between = block(4, (0, 0, 0.05), (1,), kind="cuboid1")
+    assert grid_cm(LENGTHS["gap"](left, right, (slab, left, right))) == 5
+    with pytest.raises(UnfairError, match="stands in the gap"):
+        LENGTHS["gap"](left, right, (slab, left, right, between))
+
+
+def test_a_hidden_block_is_sure_where_one_that_shows_rests_on_it_alone() -> None:
+    wall = [block(i, (0.06, y, 0.025)) for i, y in enumerate((-0.05, 0.0, 0.05), 1)]
+    low, high = block(5, (0, 0, 0.025)), block(6, (0, 0, 0.075), (5,))
+    assert sure_blocks(QuestionPicture("scene", (*wall, low, high), (0.0, 18.0))) == 5
+    with pytest.raises(UnfairError, match="nothing that can be seen rests on block 5"):
+        sure_blocks(QuestionPicture("scene", (*wall, low), (0.0, 18.0)))
+
+
+# Structures, places, viewpoints
+
+
+def test_an_annex_is_sound_and_its_balance_hangs_on_something() -> None:
+    """Nothing overlaps or floats, the scene's own is untouched, and some rule of thumb fails."""
+    rng = np.random.default_rng(3)
+    small = [scene for scene in SCENES if len(scene) < 9][::30]
+    made = [(scene, with_annex(scene, rng)) for scene in small]
+    annexed = [(scene, blocks) for scene, blocks in made if blocks]
+    assert len(annexed) > len(small) / 2
+    broken = 0
+    for number, (scene, blocks) in enumerate(annexed):
+        known = {block.order: block for block in scene.blocks}
+        added = [block.order for block in blocks if block.order not in known]
+        assert added
+        assert not find_overlaps(blocks)
+        assert not find_gaps(blocks)
+        assert all(known[block.order] == block for block in blocks if block.order in known)
+        assert len({block.order for block in blocks}) == len(blocks)
+        for order in added if number < 5 else ():
+            left = [block for block in blocks if block.order != order]
+            resting = resting_on(blocks, order)
+            assert resting_on(blocks, order, only=True) <= resting
+            broken += bool(resting) is is_sure(left, ())
+    assert broken
+
+
+TOP_M = 0.075
+PLANK = [*tower(1), solid(2, "cuboid3", (0, 0, 0.0625), (0, 0, 90))]
+"""15 cm long along y, balanced on a cube in its middle,"""
+WALL = solid(3, "cuboid3", (0.055, 0.05, 0.075), (0, 90, 0))
+"""beside one end, where it is in the way of a block that is put across the plank."""
+PUT = solid(4, "cuboid3", (0, 0, 0), (90, 0, 0))
+VIEW = (300.0, 35.0)
+
+
+@pytest.mark.parametrize(
+    ("place_m", "stays"),
+    [((0, 0), True), ((0, -0.068), False), ((0, 0.05), False), ((0, -0.053), None)],
+)
+def test_a_block_stays_where_the_plank_does_not_tip(
+    place_m: tuple[float, float], stays: bool | None
+) -> None:
+    """It falls off the wall as well; unsure is where the weights are nearly over the edge."""
+    plain = QuestionPicture("scene", (*PLANK, WALL), VIEW, marks=(Mark("A", (*place_m, TOP_M)),))
+    assert stays_at(plain, PUT, (*place_m, TOP_M)) is stays
+    assert is_on_face(plain, PUT, (*place_m, TOP_M)) is (place_m[1] <= 0)
+
+
+def test_a_place_where_the_block_stays_on_its_neighbors_is_none() -> None:
+    posts = [
+        solid(n, "cube", (x, 0, z))
+        for n, (x, z) in enumerate(((-0.055, 0.025), (-0.055, 0.075), (0.055, 0.025)), 5)
+    ]
+    between = (*tower(1), *posts, solid(8, "cube", (0.055, 0, 0.075)))
+    at = (0.0, 0.0, 0.05)
+    plain = QuestionPicture("scene", between, VIEW, marks=(Mark("A", at),))
+    assert stays_round(lowered(PUT, between, 0.0, 0.0), between, (0.005,)) is True
+    assert is_on_face(plain, PUT, at) is False
+    assert stays_at(plain, PUT, at) is None
+
+
+def test_a_block_is_let_down_all_round_as_far_off_as_told() -> None:
+    put = lowered(PUT, PLANK, 0.0, 0.03)
+    for radius_m in (0.00125, 0.005):
+        around = list(lowered_round(put, PLANK, (radius_m,)))
+        steps = [bounds_m(one).mean(axis=0) - bounds_m(put).mean(axis=0) for one in around]
+        assert len({(round(float(x), 5), round(float(y), 5)) for x, y, _ in steps}) == 8
+        for x, y, z in steps:
+            assert math.hypot(x, y) == pytest.approx(radius_m, abs=2e-6)
+            assert z == pytest.approx(0.0, abs=2e-6)
+
+
+def test_a_verdict_that_turns_close_by_is_none() -> None:
+    """A thin slab put over a gap of 5.2 cm bridges it, and drops in where it is 1 cm off."""
+    posts = [solid(1, "cube", (-0.051, 0, 0.025)), solid(2, "cube", (0.051, 0, 0.025))]
+    put = lowered(solid(3, "cuboid2", (0, 0, 0)), posts, 0.0, 0.0)
+    assert stays_round(put, posts, (0.005,)) is True
+    assert stays_round(put, posts, (0.03,)) is None
+
+
+@pytest.mark.parametrize(
+    ("shape", "azimuth_deg", "shows"),
+    [
+        *(("roof", 0.0, True), ("roof", 45.0, True), ("roof", 90.0, False)),
+        *(("slab", 0.0, False), ("slab", 45.0, True)),
+    ],
+)
+def test_a_block_shows_its_profile_and_more_than_one_face_or_not(
+    shape: str, azimuth_deg: float, shows: bool
+) -> None:
+    roof, slab = solid(1, "triangle", (0, 0, 0)), solid(1, "cuboid3", (0, 0, 0), (0, 90, 0))
+    assert shows_solid(roof if shape == "roof" else slab, (azimuth_deg, 30.0)) is shows
+
+
+def test_four_places_are_of_a_sort_by_three_ranks_of_the_right_one() -> None:
+    """Highest in the picture and apart from three on a low plank, not over its block's middle."""
+    post = [solid(n, "cube", (-0.3, 0, 0.025 + 0.05 * (n - 3))) for n in (3, 4, 5)]
+    plain = QuestionPicture("scene", (*PLANK, *post), VIEW)
+    right = Top((-0.31, 0.0, 0.15), 1.0, 0.01)
+    wrong = [Top((0.0, y, TOP_M), 1.0, abs(y)) for y in (0.0, 0.005, 0.05)]
+    assert sort_of(plain, [right, *wrong]) == "central 2, up 0, alone 3"
+    assert sort_of(plain, [*wrong, right]) == "central 0, up 3, alone 1"
+
+
+@settings(max_examples=5, deadline=None)
+@given(scenes, seeds)
+def test_a_shifted_block_rests_on_something_and_overlaps_nothing(scene: Scene, seed: int) -> None:
+    moved = shifted(scene.blocks, np.random.default_rng(seed))
+    if moved is not None:
+        assert sum(a != b for a, b in zip(scene.blocks, moved, strict=True)) == 1
+        assert not find_overlaps(moved)
+        assert all(support_graph(moved).values())
+
+
+def test_options_of_viewpoints_have_the_same_blocks_in_the_same_colors() -> None:
+    def contents(picture: QuestionPicture) -> tuple[list[str], list[str]]:
+        """Types and colors, each for itself: two blocks may have exchanged their colors."""
+        types, colors = zip(*((one.type, one.color) for one in picture.blocks), strict=True)
+        return sorted(types), sorted(colors)
+
+    small = [scene for scene in SCENES if len(scene) <= 6][::40]
+    maker, rng = ViewpointMaker(), np.random.default_rng(5)
+    drafts = [draft for scene in small for draft in maker.drafts(scene, rng)]
+    assert len(drafts) >= 2
+    for draft in drafts:
+        options = [option for option in draft.options if isinstance(option, QuestionPicture)]
+        assert all(contents(option) == contents(options[0]) for option in options)
+        shots = [seen(option) for option in options]
+        assert least_difference(shots) >= 0.1 * max((shot.block >= 0).sum() for shot in shots)
+        forms = [turned_form(option.blocks) for option in options]
+        distinct = len({repr(form) for form in forms})
+        assert draft.kind != "vp-match" or distinct == 4
+        right = [form == turned_form(draft.pictures[0].blocks) for form in forms]
+        assert right[0]
+        assert sum(right) == (1 if distinct == 4 else 2)
+
+
+# Choices: ranks of the right option, drafts that are kept, letters
+
+
+def drawn(seed: int, n: int = 10) -> tuple[np.random.Generator, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    return rng, rng.normal(size=(n, 4))
+
+
+def everywhere(n: int) -> np.ndarray:
+    return np.ones((n, n), dtype=bool)
+
+
+@given(seed=seeds, held=st.integers(0, 3))
+def test_a_rank_that_is_held_is_the_one_there_is(seed: int, held: int) -> None:
+    rng, measures = drawn(seed)
+    chosen = ranked_as_drawn(measures, everywhere(len(measures)), rng, {1: held})
+    if chosen:
+        below = sum(measures[i, 1] < measures[0, 1] for i in chosen)
+        assert abs(below - held) <= 1
+        assert len(set(chosen)) == 3
+        assert 0 not in chosen
+
+
+@given(seed=seeds, rights=st.integers(1, 4))
+def test_options_that_are_taken_are_told_apart_and_one_is_right(seed: int, rights: int) -> None:
+    rng, measures = drawn(seed)
+    apart = rng.random((len(measures),) * 2) < 0.7
+    apart &= apart.T
+    taken = (0, *ranked_as_drawn(measures, apart, rng))
+    assert all(apart[a, b] for a in taken for b in taken if a < b)
+    four = four_alike(measures, apart, rng, rights=rights)
+    if four.chosen:
+        right, *wrong = four.chosen
+        assert right < rights <= min(wrong)
+        assert all(apart[a, b] for a in four.chosen for b in four.chosen if a < b)
+        ranks = [sum(measures[i, m] < measures[right, m] for i in wrong) for m in range(4)]
+        assert np.abs(np.array(four.ranks) - ranks).max() <= 0.5
+
+
+@pytest.mark.parametrize("rights", [1, 4])
+def test_a_right_one_that_stands_out_in_the_pool_has_any_rank_among_four(rights: int) -> None:
+    """It would be the most of four in 47 cases of a hundred."""
+    ranks = []
+    for seed in range(300):
+        rng, measures = drawn(seed, n=10 if rights == 1 else 16)
+        measures[:rights, 0] = np.abs(measures[:rights, 0])
+        if rights == 1:
+            right, chosen = 0, ranked_as_drawn(measures, everywhere(10), rng)
+        else:
+            right, *chosen = four_alike(measures, everywhere(16), rng, rights=4).chosen or (0,)
+        if chosen:
+            ranks.append(sum(measures[i, 0] < measures[right, 0] for i in chosen))
+    shares = np.bincount(ranks, minlength=4) / len(ranks)
+    assert len(ranks) > 200
+    assert shares.max() < 0.42
+
+
+@given(st.integers(0, 200), seeds)
+def test_every_letter_is_right_about_as_often(count: int, seed: int) -> None:
+    letters = Counter(even_letters(count, np.random.default_rng(seed)))
+    assert letters.total() == count
+    for index in range(len(LETTERS)):
+        # In hundredths, since 0.28 of 150 is no whole number in floating point.
+        low, high = (round(100 * share) * count for share in BALANCE)
+        assert low // 100 <= letters[index] <= -(-high // 100)
+
+
+SHAPE_TEXTS = ("cube", "arch", "cylinder", "prism", "half cylinder")
+
+
+def pool(count: int, odds: tuple[float, ...], seed: int) -> list[Texts]:
+    """Drafts in which shapes are right as often as `odds` say, the more so of what is on top."""
+    rng = np.random.default_rng(seed)
+    made = []
+    for number in range(count):
+        word = "topmost" if rng.random() < 0.5 else "leftmost"
+        chances = np.array(odds) ** (2 if word == "topmost" else 1)
+        right = int(rng.choice(len(SHAPE_TEXTS), p=chances / chances.sum()))
+        others = [int(i) for i in rng.permutation(len(SHAPE_TEXTS)) if i != right][:3]
+        options = tuple(SHAPE_TEXTS[i] for i in (right, *others))
+        made.append(Texts(f"s{number % 60}", "", f"What shape is the {word} block?", options))
+    return made
+
+
+def rates(texts: list[Texts]) -> list[float]:
+    """How often each shape is right where it is offered."""
+    right = Counter(one.options[0] for one in texts)
+    offered = Counter(option for one in texts for option in one.options)
+    return [right[shape] / offered[shape] for shape in SHAPE_TEXTS]
+
+
+@pytest.mark.parametrize("word", ["topmost", "leftmost"])
+def test_of_the_drafts_kept_each_option_is_right_equally_often(word: str) -> None:
+    texts = pool(3000, (0.4, 0.25, 0.15, 0.1, 0.1), 1)
+    rng = np.random.default_rng(2)
+    kept = [
+        one
+        for one, odds in zip(texts, keeping_odds(texts), strict=True)
+        if word in one.question and rng.random() < odds
+    ]
+    before = [one for one in texts if word in one.question]
+    assert max(abs(rate - 0.25) for rate in rates(before)) > 0.15
+    assert max(abs(rate - 0.25) for rate in rates(kept)) < 0.08
+
+
+def test_drafts_that_tell_nothing_are_kept_and_so_are_options_that_are_no_texts() -> None:
+    assert np.mean(keeping_odds(pool(800, (0.2,) * 5, 3))) > 0.7
+    assert keeping_odds([Texts("s", "k", "Which picture?", ())] * 5) == [1.0] * 5
+    assert keeping_odds([]) == []
+
+
+@pytest.mark.parametrize("is_middle", [False, True])
+def test_of_the_drafts_kept_no_look_is_right_more_often(is_middle: bool) -> None:
+    """By the most of a measure, or by what is nearest to the others."""
+    rng, looked = np.random.default_rng(4), []
+    for number in range(1500):
+        looks = rng.normal(size=(4, 2))
+        off = -np.abs(looks[:, 1] - looks[:, 1].mean()) if is_middle else looks[:, 1]
+        right = int(np.argmax(1.5 * off + rng.gumbel(size=4)))
+        order = [right, *(i for i in range(4) if i != right)]
+        rows = tuple(tuple(row) for row in looks[order].tolist())
+        texts = Texts(f"s{number % 60}", "k", "Which?", (), rows)
+        looked.append((texts, int(off[right] == off.max())))
+    odds = keeping_odds([texts for texts, _ in looked])
+    kept = [most for (_, most), odd in zip(looked, odds, strict=True) if rng.random() < odd]
+    assert np.mean([most for _, most in looked]) > 0.4
+    assert len(kept) > 200
+    assert abs(np.mean(kept) - 0.25) < 0.08

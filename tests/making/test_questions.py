@@ -1,0 +1,394 @@
+"""Questions of all subtasks: sound, even, derived again, found when spoiled; the built-in set."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from phyblock.data import QuestionSet, read_builtin, read_questions
+from phyblock.data.questions import StoredQuestion
+from phyblock.domain import LETTERS, SUBTASKS, Question, Subtask
+from phyblock.domain.blocks import COLORS
+from phyblock.domain.question import rotated
+from phyblock.errors import DataError, StoreError
+from phyblock.making.questions.audit import audit_questions, duplicates_of
+from phyblock.making.questions.counterfactual import OUTCOME_TEXTS
+from phyblock.making.questions.draft import WORDINGS
+from phyblock.making.questions.files import check_place, question_card, write_questions
+from phyblock.making.questions.pictured import LEAST_PIXELS
+from phyblock.making.questions.production import (
+    MAKERS,
+    PER_SUBTASK,
+    as_question,
+    make_questions,
+    problem_of,
+    scene_drafts,
+)
+from phyblock.making.questions.view import ELEVATIONS_DEG
+from phyblock.making.workers import open_workers
+from phyblock.resources import bundled
+from phyblock.sim.contact import find_gaps
+from phyblock.sim.engine import other_engine
+from phyblock.sim.question_pictures import is_inside, least_difference, mark_pixel, seen
+from phyblock.types import BACKGROUNDS
+from tests.vqa_set import questions as asked_questions
+from tests.vqa_set import write_questions as write_asked
+from tests.workspace import Workspace
+
+FOLDER = bundled("benchmarks", "data", "phyblock-vqa")
+DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
+SCENES = {task.scene.id: task.scene for task in DATA.tasks}
+SOME = list(SCENES.values())[3::20]
+STATIC: tuple[Subtask, ...] = ("SH", "CO", "SI", "NU", "RP", "AP", "RD", "RR", "OC", "LC", "TC")
+ASKED: dict[Subtask, tuple[int, tuple[str, ...]]] = {
+    "VP": (3, ("l1-008-table", "l2-018-monument", "l2-016-car", "l1-003-gate")),
+    "CF": (3, ("l1-003-gate", "l2-063-recolored", "l2-051-recolored")),
+    "PD": (2, ("l2-016-car", "l2-042-recolored")),
+    "OR": (2, ("l3-011-stair", "l3-022-slide")),
+}
+"""Scenes that are quick to ask about, small ones most of them."""
+COUNT = 8
+HANGS_M = 0.004
+
+
+def made(
+    names: list[str], wanted: dict[Subtask, int], seed: int = 0, jobs: int = 1
+) -> list[Question]:
+    with open_workers(jobs) as workers:
+        return list(make_questions([SCENES[name] for name in names], wanted, seed, workers))
+
+
+def dynamic(jobs: int = 1) -> list[Question]:
+    asked = ((made(list(names), {s: n}, jobs=jobs)) for s, (n, names) in ASKED.items())
+    return [question for some in asked for question in some]
+
+
+def lines_of(questions: list[Question]) -> list[str]:
+    return [StoredQuestion.of(q, SCENES[q.scene.id]).as_json() for q in questions]
+
+
+def wrong_answer(question: Question, by: int = 1) -> Question:
+    turned = question.answer[1:] + question.answer[:1]
+    wrong = turned if len(turned) > 1 else ((turned[0] + by) % len(LETTERS),)
+    return replace(question, answer=wrong)
+
+
+@pytest.fixture(scope="module")
+def static() -> list[Question]:
+    return made([scene.id for scene in SOME], dict.fromkeys(STATIC, COUNT))
+
+
+@pytest.fixture(scope="module")
+def pictured() -> list[Question]:
+    return dynamic()
+
+
+def test_every_answer_is_derived_again_and_every_other_is_found_out(
+    static: list[Question], pictured: list[Question]
+) -> None:
+    assert Counter(q.subtask for q in static) == dict.fromkeys(STATIC, COUNT)
+    assert Counter(q.subtask for q in pictured) == {s: n for s, (n, _) in ASKED.items()}
+    for number, question in enumerate((*static, *pictured)):
+        assert problem_of(question) is None, question.id
+        problem = problem_of(wrong_answer(question, 1 + number % 3))
+        assert problem is not None
+        assert "the answer is" in problem
+
+
+def test_what_was_changed_is_found(static: list[Question]) -> None:
+    """A text, a scene that is counted over, and options without the right one."""
+    for question in static:
+        worded = replace(question, text=question.text.replace("the ", "a "))
+        assert worded.text == question.text or problem_of(worded) is not None
+        options = list(question.options)
+        options[question.answer[0]] = "the purple ball"
+        assert problem_of(replace(question, options=tuple(options))) is not None
+        if "-all-" in question.wording:
+            picture = replace(question.pictures[0], blocks=question.scene.blocks[:1])
+            assert problem_of(replace(question, pictures=(picture,))) is not None
+
+
+def test_views_backgrounds_and_colors_are_drawn_for_each_question(static: list[Question]) -> None:
+    views = [question.pictures[0].view_deg for question in static]
+    low, high = ELEVATIONS_DEG
+    assert len({azimuth // 30 for azimuth, _ in views}) == 12
+    assert all(low <= elevation <= high for _, elevation in views)
+    assert {q.pictures[0].background for q in static} == set(BACKGROUNDS)
+    recolored = Counter(
+        q.subtask for q in static if "colors" in StoredQuestion.of(q, SCENES[q.scene.id]).fields()
+    )
+    assert [recolored[subtask] for subtask in ("SH", "CO", "SI", "NU")] == [COUNT] * 3 + [0]
+
+
+def test_no_question_stands_twice(static: list[Question]) -> None:
+    told = [(q.scene, q.text, frozenset(q.options)) for q in static]
+    assert len(set(told)) == len(told) == len({question.id for question in static})
+
+
+def test_what_depends_on_the_view_is_told_for_the_view() -> None:
+    """Seen from the other side, in front is behind and left is right, or a named block hides."""
+    stored = read_questions(FOLDER, DATA).tasks
+    corners = [task.question for task in stored if task.question.wording.startswith("rp-corner")]
+    problems = []
+    for question in corners:
+        (picture,) = question.pictures
+        azimuth, elevation = picture.view_deg
+        behind = replace(picture, view_deg=((azimuth + 180) % 360, elevation))
+        problems.append(str(problem_of(replace(question, pictures=(behind,)))))
+    others = sum("the answer is" in problem for problem in problems)
+    hidden = sum("less than 40% of themselves" in problem for problem in problems)
+    assert others + hidden == len(problems)
+    assert others > len(problems) / 2
+
+
+def test_wordings_are_many_and_ask_for_heights_above_the_ground() -> None:
+    counts = Counter(name.split("-")[0].upper() for name in WORDINGS)
+    assert counts.keys() == set(MAKERS) == set(PER_SUBTASK)
+    assert all(counts[subtask] >= 12 for subtask in ("OC", "LC", "TC", "VP"))
+    for name, template in WORDINGS.items():
+        assert template[-1] in "?."
+        if any(word in template for word in ("high", "low")) and name.startswith("rp-"):
+            assert "ground" in template or "same height" in template or "Leave heights" in template
+            assert "picture" not in template or "Leave heights" in template
+
+
+def test_pictures_of_options_are_whole_and_told_apart(pictured: list[Question]) -> None:
+    for question in pictured:
+        kind = question.evidence["kind"]
+        options = [picture for picture in question.pictures if picture.label in LETTERS]
+        assert all(map(is_inside, question.pictures))
+        if options:
+            assert len(options) == len(LETTERS)
+            assert least_difference([seen(option) for option in options]) >= LEAST_PIXELS
+        if kind in ("cf-color", "pd-push", "pd-next"):
+            assert not any(find_gaps(picture.blocks, HANGS_M) for picture in question.pictures)
+        if kind == "cf-count":
+            assert sorted(question.options) == sorted(OUTCOME_TEXTS)
+        if question.subtask == "OR":
+            # Nothing is larger or smaller for being early: one outline, two colors.
+            shots = [seen(picture).block >= 0 for picture in question.pictures]
+            assert all((shot == shots[0]).all() for shot in shots)
+            assert all(len({b.color for b in one.blocks}) == 2 for one in question.pictures)
+
+
+def test_pictures_that_were_changed_are_found_out(pictured: list[Question]) -> None:
+    """A color that no text names; the right picture in the place of every wrong one."""
+    colored = next(q for q in pictured if q.evidence["kind"] == "cf-color")
+    places = {
+        tuple((b.order, b.position_m, b.euler_deg) for b in one.blocks) for one in colored.pictures
+    }
+    assert len(places) == 1
+    assert len({tuple(b.color for b in one.blocks) for one in colored.pictures}) == 5
+    unnamed = next(color for color in COLORS if color not in colored.evidence["slots"].values())
+    shown, first, *rest = colored.pictures
+    kept = next(b for b in first.blocks if b.order != colored.evidence["removed"])
+    blocks = tuple(replace(b, color=unnamed) if b is kept else b for b in first.blocks)
+    spoiled = replace(colored, pictures=(shown, replace(first, blocks=blocks), *rest))
+    assert problem_of(spoiled) == "picture A shows other colors than the text names"
+    matching = next(q for q in pictured if q.evidence["kind"] == "vp-match")
+    right = matching.pictures[1 + matching.answer[0]]
+    copied = [
+        replace(right, label=picture.label) if picture.label in LETTERS else picture
+        for picture in matching.pictures
+    ]
+    spoiled = replace(matching, pictures=tuple(copied))
+    assert problem_of(spoiled) == "4 of 4 options are right"
+
+
+def test_lines_read_back_as_the_questions(static: list[Question], tmp_path: Path) -> None:
+    folder = tmp_path / "q"
+    write_questions(folder, static, SCENES, "phyblock-400", "phyblock questions generate")
+    assert [task.question for task in read_questions(folder, DATA).tasks] == static
+    sums = (folder / "SHA256SUMS").read_text(encoding="utf-8").splitlines()
+    assert [line.split("  ")[1] for line in sums] == ["CARD.md", "questions.jsonl", "VERSION"]
+    assert f"| TC | type counting | {COUNT} |" in (folder / "CARD.md").read_text(encoding="utf-8")
+    with pytest.raises(StoreError, match="holds questions already"):
+        check_place(folder, replace=False)
+
+
+def test_the_processes_change_nothing_and_the_seed_does() -> None:
+    def lines(seed: int, jobs: int) -> list[str]:
+        names = [scene.id for scene in SOME[:12]]
+        return lines_of(made(names, {"CO": COUNT, "RP": COUNT}, seed, jobs))
+
+    assert lines(1, 1) == lines(1, 2) != lines(2, 1)
+
+
+def test_too_few_scenes_are_told_for_all_subtasks_at_once() -> None:
+    """Before any is drafted, where no scene could give so many; else when all were drafted."""
+    one = [SOME[0].id]
+    with pytest.raises(DataError) as told:
+        made(one, {"OC": COUNT, "OR": COUNT, "AD": COUNT})
+    assert [problem.where for problem in told.value.problems] == ["OR", "AD"]
+    with pytest.raises(DataError, match="OC: the scenes give no more than") as told:
+        made(one, {"OC": COUNT, "CO": COUNT, "NU": COUNT})
+    assert len(told.value.problems) > 1
+
+
+@pytest.mark.slow
+def test_two_processes_give_the_same_bytes(pictured: list[Question]) -> None:
+    assert lines_of(dynamic(jobs=2)) == lines_of(pictured)
+
+
+# The built-in set
+
+
+@pytest.fixture(scope="module")
+def built_in() -> QuestionSet:
+    return read_questions(FOLDER, DATA)
+
+
+def test_the_built_in_set_is_whole_and_even(built_in: QuestionSet) -> None:
+    asked = [task.question for task in built_in.tasks]
+    assert Counter(question.subtask for question in asked) == PER_SUBTASK
+    assert len(asked) == 2200
+    assert not duplicates_of(asked)
+    for subtask in SUBTASKS:
+        answers = [question.answer for question in asked if question.subtask == subtask]
+        if subtask == "OR":
+            assert len(set(answers)) > 12
+            continue
+        shares = [answers.count((index,)) / len(answers) for index in range(len(LETTERS))]
+        assert 0.22 <= min(shares) <= max(shares) <= 0.28
+    for line in (FOLDER / "SHA256SUMS").read_text(encoding="utf-8").splitlines():
+        digest, name = line.split("  ")
+        assert hashlib.sha256((FOLDER / name).read_bytes()).hexdigest() == digest
+    shipped = (FOLDER / "CARD.md").read_text(encoding="utf-8")
+    made_by = shipped.split("\n\n    ", 1)[1].splitlines()[0]
+    if not other_engine():
+        assert question_card(FOLDER.name, "phyblock-400", asked, made_by) == shipped
+
+
+def test_a_sample_of_the_answers_is_derived_again(built_in: QuestionSet) -> None:
+    for task in built_in.tasks[7::50]:
+        assert problem_of(task.question) is None, task.key
+
+
+def test_the_right_place_is_apart_from_the_others_as_often_as_any(built_in: QuestionSet) -> None:
+    ranks: Counter[int] = Counter()
+    for question in (t.question for t in built_in.tasks if t.question.subtask == "AD"):
+        shown = question.pictures[0]
+        places = np.array([mark_pixel(shown, mark.position_m) for mark in shown.marks])
+        apart = np.linalg.norm(places[:, None] - places, axis=2).sum(axis=1)
+        ranks[int((apart < apart[question.answer[0]]).sum())] += 1
+    assert ranks.keys() == set(range(len(LETTERS)))
+    assert max(ranks.values()) <= 17
+
+
+def test_a_place_that_is_not_marked_is_found_out(built_in: QuestionSet) -> None:
+    question = next(t.question for t in built_in.tasks if t.question.subtask == "AD")
+    scene, block = question.pictures
+    bare = replace(question, pictures=(replace(scene, marks=scene.marks[1:]), block))
+    assert problem_of(bare) == "no place A is marked on a block"
+
+
+@pytest.mark.slow
+def test_all_answers_are_derived_again(built_in: QuestionSet) -> None:
+    problems = {task.key: problem_of(task.question) for task in built_in.tasks}
+    assert {key: problem for key, problem in problems.items() if problem} == {}
+    spoiled = [wrong_answer(task.question) for task in built_in.tasks[3::44]]
+    assert all(problem_of(question) is not None for question in spoiled)
+
+
+def shipped_lines(subtask: Subtask) -> list[str]:
+    text = (FOLDER / "questions.jsonl").read_text(encoding="utf-8")
+    return [line for line in text.splitlines() if f'"subtask": "{subtask}"' in line]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("subtask", ["CO", "SI", "OR"])
+def test_a_subtask_made_by_the_command_of_the_card_has_the_same_bytes(subtask: Subtask) -> None:
+    """Subtasks come out alike alone and with others; these three are the quickest."""
+    assert lines_of(made(list(SCENES), {subtask: PER_SUBTASK[subtask]})) == shipped_lines(subtask)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(bool(other_engine()), reason="the set is made with the default simulators")
+@pytest.mark.parametrize("subtask", SUBTASKS)
+def test_shipped_lines_are_among_those_that_their_scenes_give(
+    built_in: QuestionSet, subtask: Subtask
+) -> None:
+    """A few of each subtask, of those too that take minutes to make whole."""
+    asked = [task.question for task in built_in.tasks if task.question.subtask == subtask]
+    for question, line in list(zip(asked, shipped_lines(subtask), strict=True))[9::40]:
+        original = SCENES[question.scene.id]
+        background = question.pictures[0].background
+        assert background is not None
+        dealt = (
+            as_question(question.id, subtask, draft, places, background)
+            for draft in scene_drafts((subtask, 0, original))
+            for places in itertools.permutations(range(len(LETTERS)))
+        )
+        assert line in (StoredQuestion.of(one, original).as_json() for one in dealt), question.id
+
+
+# The audit
+
+
+@pytest.fixture(scope="module")
+def asked(tmp_path_factory: pytest.TempPathFactory) -> list[Question]:
+    root = tmp_path_factory.mktemp("audited")
+    scenes = read_builtin(Workspace(root, root / "pictures").write_scenes())
+    folder = write_asked(root / "questions", asked_questions(per_subtask=8))
+    return [task.question for task in read_questions(folder, scenes).tasks]
+
+
+def of(asked: list[Question], subtask: str) -> list[Question]:
+    return [question for question in asked if question.subtask == subtask]
+
+
+def test_letters_are_counted_and_balance_is_judged(asked: list[Question]) -> None:
+    even = [replace(q, answer=(n % 4,)) for n, q in enumerate(of(asked, "SH"))]
+    (audit,) = audit_questions(even, with_texts=False, with_pictures=False)
+    assert audit.letters == dict.fromkeys(LETTERS, 2)
+    assert audit.is_balanced
+    (skewed,) = audit_questions(
+        [replace(q, answer=(0,)) for q in even], with_texts=False, with_pictures=False
+    )
+    assert skewed.letters == {"A": 8, "B": 0, "C": 0, "D": 0}
+    assert not skewed.is_balanced
+
+
+def test_a_repeat_is_found_in_any_order_of_its_options(asked: list[Question]) -> None:
+    for subtask in ("SH", "VP", "AD"):
+        first = of(asked, subtask)[0]
+        again = replace(rotated(first, 1), id="again")
+        found = duplicates_of([first, again])
+        assert found == ({} if subtask == "AD" else {"again": first.id})
+    assert duplicates_of(asked) == {}
+
+
+def test_a_text_that_gives_the_answer_away_is_a_finding(asked: list[Question]) -> None:
+    given = [
+        replace(q, id=f"sh-{n}", answer=(q.options.index("cube"),))
+        for n, q in enumerate(5 * of(asked, "SH"))
+    ]
+    (audit,) = audit_questions(given, with_pictures=False)
+    assert audit.text is not None
+    assert audit.text.accuracy == 1
+    assert any("text probe" in finding for finding in audit.findings())
+
+
+def test_a_picture_that_gives_the_answer_away_is_a_finding(asked: list[Question]) -> None:
+    """The right one of four equal pictures lacks a block in every question."""
+    given = []
+    for number in range(40):
+        first = of(asked, "VP")[number % 8]
+        scene, *options = first.pictures
+        less = replace(options[0], blocks=options[0].blocks[:-1])
+        shown = [
+            replace(less if i == number % 4 else options[0], label=letter)
+            for i, letter in enumerate(LETTERS)
+        ]
+        pictures = (scene, *shown)
+        given.append(replace(first, id=f"vp-{number}", pictures=pictures, answer=(number % 4,)))
+    (audit,) = audit_questions(given, with_texts=False)
+    assert audit.pictures is not None
+    assert (audit.pictures.n, audit.pictures.accuracy) == (40, 1)
+    assert any("pictures probe" in finding for finding in audit.findings())
