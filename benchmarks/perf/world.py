@@ -22,11 +22,11 @@ import psutil
 
 from phyblock.data import read_builtin
 from phyblock.domain import Scene
-from phyblock.making.scenes.candidate_sets import make_candidates
-from phyblock.making.scenes.compositions import beside
-from phyblock.making.scenes.scene_production import Order, produce, shares
+from phyblock.making.checks import audit_scene, verify_scene
+from phyblock.making.scenes.candidates import make_candidates
+from phyblock.making.scenes.designs import beside
+from phyblock.making.scenes.production import Order, produce, shares
 from phyblock.making.scenes.sketch import make_scene
-from phyblock.making.verification import audit_scene, verify_scene
 from phyblock.making.workers import Workers, open_workers
 from phyblock.resources import bundled
 from phyblock.sim.pictures import PictureStyle, candidates_png, composite_png, goal_png

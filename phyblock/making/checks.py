@@ -1,17 +1,23 @@
-"""What a check finds wrong."""
+"""Checks of scenes by geometry and physics: one list for making, verifying and auditing sets."""
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
+from itertools import combinations
 from typing import Literal
 
+import numpy as np
+
 from phyblock.domain.aov import AOVGraph, CycleError
-from phyblock.domain.blocks import KIT_PALETTE, BlockType, orientation_class
-from phyblock.domain.scene import MAX_CANDIDATES, Block, CandidateSet, Kind, Scene
+from phyblock.domain.blocks import KIT_PALETTE, orientation_class
+from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, CandidateSet, Kind, Scene
 from phyblock.errors import Problem
 from phyblock.making.poses import POSES, find_twins
+from phyblock.making.workers import Workers, open_workers
 from phyblock.sim.contact import (
     FIT_TOLERANCE_M,
     GROUND,
@@ -29,7 +35,16 @@ from phyblock.sim.dynamics import (
     check,
     check_steps,
 )
-from phyblock.sim.pictures import LEAST_SHOWN, PictureStyle, hidden_blocks, visible_shares
+from phyblock.sim.pictures import (
+    LEAST_SHOWN,
+    PictureStyle,
+    candidate_camera,
+    hidden_blocks,
+    on_the_floor,
+    picture,
+    visible_shares,
+)
+from phyblock.text import csv_cell
 
 CheckName = Literal[
     "size",
@@ -75,34 +90,30 @@ class Finding:
 
     @property
     def problem(self) -> Problem:
-        """The finding as an error says it."""
-        declared, derived = _shown(self.declared), _shown(self.derived)
+        """The finding as an error: orders as a list of the file, an empty one not at all."""
+        declared, derived = (
+            (str(list(one)) if one else "") if isinstance(one, tuple) else str(one)
+            for one in (self.declared, self.derived)
+        )
         return Problem(self.scene, self.message, self.field, declared, derived)
 
     def __str__(self) -> str:
         return str(self.problem)
 
 
-def _shown(value: Declared) -> str:
-    """Orders as a list of the file; an empty list says nothing."""
-    if isinstance(value, tuple):
-        return str(list(value)) if value else ""
-    return str(value)
-
-
 VIEW = PictureStyle(size_px=256)
-"""How the goal picture is drawn to see which blocks show in it."""
+"""Style of the goal picture in which blocks have to show."""
 
 STEP_TRIAL = replace(DEFAULT_TRIAL, physics=DEFAULT_TRIAL.physics[:1])
 """Every step is tried at the first of the two time steps, for two seconds or until at rest."""
 
 FINISHED_REST = Rest(quiet_s=0.5)
-"""When the generator takes a finished structure to be at rest."""
+"""The rest at which the generator ends the trial of a finished structure."""
 
 
 @dataclass(frozen=True)
 class Tolerances:
-    """What passes: overlaps and gaps up to `fit_m` [m], movement within the limits of the trials.
+    """Limits: overlaps and gaps up to `fit_m` [m], movement within the limits of the trials.
 
     `trial` is that of the finished structure, which is watched to its end, or until it is at rest
     as `rest` says; `step_trial` that of every step, `last_step` whether of the last step, too.
@@ -147,7 +158,7 @@ LEVEL_LIMITS: dict[int, Limits] = {
 
 
 class SceneFacts:
-    """A scene whose orders are unique, and facts about it; each is worked out once, when asked for.
+    """A scene whose orders are unique, and facts about it, each computed once, when asked for.
 
     The scene's dependencies need not be sound. Facts raise SimulationError as the simulator does.
     """
@@ -187,22 +198,32 @@ class SceneFacts:
     @cached_property
     def declared(self) -> Mapping[int, frozenset[int]]:
         """The same as the file declares it."""
-        return {block.order: declared_orders(block) for block in self.scene.blocks}
+        return {
+            block.order: frozenset(block.depend) or frozenset({GROUND})
+            for block in self.scene.blocks
+        }
 
     @cached_property
     def graph(self) -> AOVGraph | None:
         """The graph of the declared dependencies; None when they are unsound."""
-        return graph_of(self.declared)
+        vertex_of = {order: vertex for vertex, order in enumerate(self.declared)}
+        rests_on = [orders - {GROUND} for orders in self.declared.values()]
+        if any(order not in vertex_of for orders in rests_on for order in orders):
+            return None
+        try:
+            return AOVGraph(tuple(frozenset(vertex_of[o] for o in orders) for orders in rests_on))
+        except CycleError:
+            return None
 
     @cached_property
     def finished(self) -> Stability:
-        """What becomes of the finished structure, watched to the end or until it is at rest."""
+        """Stability of the finished structure, watched to the end or until it is at rest."""
         blocks, trial, rest = self.scene.blocks, self.tolerances.trial, self.tolerances.rest
         return check(blocks, trial) if rest is None else check(blocks, trial, rest)
 
     @cached_property
     def steps(self) -> tuple[Stability, ...]:
-        """What becomes of the structure after each step of the stored order."""
+        """Stability of the structure after each step of the stored order."""
         blocks = self.scene.blocks if self.tolerances.last_step else self.scene.blocks[:-1]
         return check_steps(blocks, self.tolerances.step_trial)
 
@@ -217,25 +238,6 @@ class SceneFacts:
         return hidden_blocks(self.scene)
 
 
-def declared_orders(block: Block) -> frozenset[int]:
-    """The orders that a block is declared to rest on; the ground alone is {0}."""
-    return frozenset(block.depend) or frozenset({GROUND})
-
-
-def graph_of(rests_on: Mapping[int, frozenset[int]]) -> AOVGraph | None:
-    """The graph over blocks in the order given; None for unknown blocks or a cycle."""
-    vertex_of = {order: vertex for vertex, order in enumerate(rests_on)}
-    if any(order not in vertex_of for orders in rests_on.values() for order in orders - {GROUND}):
-        return None
-    edges = [
-        frozenset(vertex_of[order] for order in orders - {GROUND}) for orders in rests_on.values()
-    ]
-    try:
-        return AOVGraph(tuple(edges))
-    except CycleError:
-        return None
-
-
 @dataclass(frozen=True)
 class Check:
     """A check; `law` is what holds where it finds nothing, several checks may share one."""
@@ -245,12 +247,26 @@ class Check:
     find: Callable[[SceneFacts], Iterable[Finding]]
 
 
+CHECKS: dict[CheckName, Check] = {}
+"""The checks of a scene by itself."""
+_Find = Callable[[SceneFacts], Iterable[Finding]]
+
+
+def _check(name: CheckName, law: str) -> Callable[[_Find], _Find]:
+    def register(find: _Find) -> _Find:
+        CHECKS[name] = Check(name, law, find)
+        return find
+
+    return register
+
+
 def findings_of(facts: SceneFacts, names: Iterable[CheckName]) -> Iterator[Finding]:
-    """What these checks find, in the order given; nothing is worked out before it is asked for."""
+    """The findings of these checks, in the order given, each computed when it is asked for."""
     for name in names:
         yield from CHECKS[name].find(facts)
 
 
+@_check("size", "limits of its levels")
 def _size(facts: SceneFacts) -> Iterator[Finding]:
     """More or fewer blocks, or more layers, than a level of the scene allows."""
     scene = facts.scene
@@ -259,12 +275,17 @@ def _size(facts: SceneFacts) -> Iterator[Finding]:
         limits = LEVEL_LIMITS[level]
         if not limits.least_blocks <= len(scene) <= limits.most_blocks:
             allowed = f"{limits.least_blocks} to {limits.most_blocks} at level {level}"
-            yield _sized(facts, "wrong size", "blocks", len(scene), allowed)
+            yield Finding(
+                scene.id, "size", "wrong size", field="blocks", declared=len(scene), derived=allowed
+            )
         if layers > limits.most_layers:
             allowed = f"at most {limits.most_layers} at level {level}"
-            yield _sized(facts, "too high", "layers", layers, allowed)
+            yield Finding(
+                scene.id, "size", "too high", field="layers", declared=layers, derived=allowed
+            )
 
 
+@_check("palette", "colors of the palette")
 def _palette(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks whose pair of type and color is not in the palette."""
     for at, block in _blocks(facts):
@@ -274,6 +295,39 @@ def _palette(facts: SceneFacts) -> Iterator[Finding]:
             yield Finding(facts.scene.id, "palette", message, about, field=at, declared=kind)
 
 
+@_check("undeclared dependency", "dependencies are contacts")
+def _undeclared_dependency(facts: SceneFacts) -> Iterator[Finding]:
+    """Contacts that carry and are not declared."""
+    yield from _dependencies(
+        facts, "undeclared dependency", "block {} rests on {}, which is not declared"
+    )
+
+
+@_check("dependency without contact", "dependencies are contacts")
+def _dependency_without_contact(facts: SceneFacts) -> Iterator[Finding]:
+    """Declared dependencies that are no contacts that carry."""
+    yield from _dependencies(
+        facts, "dependency without contact", "block {} does not rest on {}, which is declared"
+    )
+
+
+def _dependencies(facts: SceneFacts, name: CheckName, message: str) -> Iterator[Finding]:
+    for at, block in _blocks(facts):
+        declared, contacts = facts.declared[block.order], facts.contacts[block.order]
+        is_undeclared = name == "undeclared dependency"
+        for other in sorted(contacts - declared if is_undeclared else declared - contacts):
+            yield Finding(
+                facts.scene.id,
+                name,
+                message.format(block.order, _name(other)),
+                (block.order, other),
+                field=f"{at}.depend",
+                declared=tuple(sorted(declared)),
+                derived=tuple(sorted(contacts)),
+            )
+
+
+@_check("layer", "layers are longest paths")
 def _layer(facts: SceneFacts) -> Iterator[Finding]:
     """Layers that are not the longest path of the declared dependencies, where these are sound."""
     layers = () if facts.graph is None else facts.graph.layers
@@ -294,6 +348,7 @@ def _layer(facts: SceneFacts) -> Iterator[Finding]:
             )
 
 
+@_check("order", "order can be built")
 def _order(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks that stand in the file before one that they depend on, if that is sound."""
     if facts.graph is None:
@@ -302,12 +357,14 @@ def _order(facts: SceneFacts) -> Iterator[Finding]:
     for block in facts.scene.blocks:
         early = sorted(set(block.depend) - placed)
         if early:
-            message = f"the stored order puts block {block.order} before its support, {_all(early)}"
+            supports = ", ".join(map(_name, early))
+            message = f"the stored order puts block {block.order} before its support, {supports}"
             about = (block.order, *early)
             yield Finding(facts.scene.id, "order", message, about, field="blocks")
         placed.add(block.order)
 
 
+@_check("overlap", "no overlap")
 def _overlap(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks that share space, with one another or with the ground."""
     for overlap in facts.overlaps:
@@ -318,6 +375,7 @@ def _overlap(facts: SceneFacts) -> Iterator[Finding]:
         yield Finding(facts.scene.id, "overlap", message, pair, depth_mm, _fit_mm(facts), "mm")
 
 
+@_check("floating", "no gap")
 def _floating(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks that hang above what is below them."""
     for gap in facts.gaps:
@@ -327,43 +385,38 @@ def _floating(facts: SceneFacts) -> Iterator[Finding]:
         yield Finding(facts.scene.id, "floating", message, about, height_mm, _fit_mm(facts), "mm")
 
 
-def _undeclared_dependency(facts: SceneFacts) -> Iterator[Finding]:
-    """Contacts that carry and are not declared."""
-    for at, block in _blocks(facts):
-        declared, contacts = facts.declared[block.order], facts.contacts[block.order]
-        for other in sorted(contacts - declared):
-            message = f"block {block.order} rests on {_name(other)}, which is not declared"
-            yield _dependency(facts, "undeclared dependency", message, at, (block.order, other))
+@_check("unstable", "stands when finished")
+def _unstable(facts: SceneFacts) -> Iterator[Finding]:
+    """Blocks that fall from the finished structure."""
+    whole = facts.finished
+    if not whole.stable:
+        differing = "" if whole.agreed else ", not the same ones at every time step"
+        message = f"{{}} when all is built{differing}"
+        yield _fall(facts, "unstable", message, whole, facts.tolerances.trial)
 
 
-def _dependency_without_contact(facts: SceneFacts) -> Iterator[Finding]:
-    """Declared dependencies that are no contacts that carry."""
-    for at, block in _blocks(facts):
-        declared, contacts = facts.declared[block.order], facts.contacts[block.order]
-        for other in sorted(declared - contacts):
-            message = f"block {block.order} does not rest on {_name(other)}, which is declared"
-            pair = (block.order, other)
-            yield _dependency(facts, "dependency without contact", message, at, pair)
-
-
+@_check("unstable step", "stands at every step")
 def _unstable_step(facts: SceneFacts) -> Iterator[Finding]:
     """Steps of the stored order after which something falls."""
     trial = facts.tolerances.step_trial
     for count, (block, step) in enumerate(zip(facts.scene.blocks, facts.steps, strict=False), 1):
         if not step.stable:
-            message = f"{_falling(step)} at step {count}, once block {block.order} is placed"
+            message = f"{{}} at step {count}, once block {block.order} is placed"
             yield _fall(facts, "unstable step", message, step, trial)
 
 
-def _unstable(facts: SceneFacts) -> Iterator[Finding]:
-    """What falls from the finished structure."""
-    whole = facts.finished
-    if not whole.stable:
-        differing = "" if whole.agreed else ", not the same ones at every time step"
-        message = f"{_falling(whole)} when all is built{differing}"
-        yield _fall(facts, "unstable", message, whole, facts.tolerances.trial)
+def _fall(
+    facts: SceneFacts, name: CheckName, message: str, shown: Stability, trial: Trial
+) -> Finding:
+    named = ", ".join(map(str, shown.fallen))
+    falling = f"blocks {named} fall" if len(shown.fallen) > 1 else f"block {named} falls"
+    moved_mm, limit_mm = shown.moved_m * 1000, trial.limit_m * 1000
+    return Finding(
+        facts.scene.id, name, message.format(falling), shown.fallen, moved_mm, limit_mm, "mm"
+    )
 
 
+@_check("hidden", "every block shows")
 def _hidden(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks of which too little shows in the goal picture, of the picture or of their outline."""
     for order in facts.hidden:
@@ -377,14 +430,7 @@ def _hidden(facts: SceneFacts) -> Iterator[Finding]:
             yield Finding(facts.scene.id, "hidden", message, (order,), covered, limit, "%")
 
 
-def _lacking_candidates(facts: SceneFacts) -> Iterator[Finding]:
-    """Blocks that no candidate can stand for."""
-    missing = () if facts.candidates is None else facts.candidates.missing(facts.scene)
-    for order in missing:
-        message = f"the candidates hold nothing that block {order} needs"
-        yield Finding(facts.scene.id, "candidates", message, (order,), field="candidates")
-
-
+@_check("too many candidates", "candidate set")
 def _too_many_candidates(facts: SceneFacts) -> Iterator[Finding]:
     """More candidates than a set may hold."""
     count = 0 if facts.candidates is None else len(facts.candidates)
@@ -399,13 +445,27 @@ def _too_many_candidates(facts: SceneFacts) -> Iterator[Finding]:
         )
 
 
+@_check("candidates", "candidate set")
+def _lacking_candidates(facts: SceneFacts) -> Iterator[Finding]:
+    """Blocks that no candidate can stand for."""
+    missing = () if facts.candidates is None else facts.candidates.missing(facts.scene)
+    for order in missing:
+        message = f"the candidates hold nothing that block {order} needs"
+        yield Finding(facts.scene.id, "candidates", message, (order,), field="candidates")
+
+
+@_check("distractor", "candidate set")
 def _distractors(facts: SceneFacts) -> Iterator[Finding]:
     """Candidates that are not needed in poses that no design knows: these give themselves away."""
     scene = facts.scene
     looks = {block.look for block in scene.blocks}
+    poses = {
+        block_type: {orientation_class(block_type, euler) for euler in known.values()}
+        for block_type, known in POSES.items()
+    }
     offered = () if facts.candidates is None else facts.candidates.candidates
     for i, candidate in enumerate(offered):
-        if candidate.look not in looks and candidate.look[2] not in _poses(candidate.type):
+        if candidate.look not in looks and candidate.look[2] not in poses[candidate.type]:
             message = "is not needed and stands as no block of a goal does"
             yield Finding(
                 scene.id,
@@ -422,75 +482,12 @@ def _blocks(facts: SceneFacts) -> Iterator[tuple[str, Block]]:
         yield f"blocks[{i}]", block
 
 
-def _sized(facts: SceneFacts, message: str, field: str, count: int, allowed: str) -> Finding:
-    return Finding(facts.scene.id, "size", message, field=field, declared=count, derived=allowed)
-
-
-def _dependency(
-    facts: SceneFacts, check: CheckName, message: str, at: str, pair: tuple[int, int]
-) -> Finding:
-    return Finding(
-        facts.scene.id,
-        check,
-        message,
-        pair,
-        field=f"{at}.depend",
-        declared=tuple(sorted(facts.declared[pair[0]])),
-        derived=tuple(sorted(facts.contacts[pair[0]])),
-    )
-
-
-def _fall(
-    facts: SceneFacts, check: CheckName, message: str, shown: Stability, trial: Trial
-) -> Finding:
-    moved_mm, limit_mm = shown.moved_m * 1000, trial.limit_m * 1000
-    return Finding(facts.scene.id, check, message, shown.fallen, moved_mm, limit_mm, "mm")
-
-
-def _poses(block_type: BlockType) -> set[tuple[float, ...]]:
-    """The orientation classes in which designs lay down a type."""
-    return {orientation_class(block_type, euler) for euler in POSES[block_type].values()}
-
-
 def _fit_mm(facts: SceneFacts) -> float:
     return facts.tolerances.fit_m * 1000
 
 
-def _falling(shown: Stability) -> str:
-    named = ", ".join(map(str, shown.fallen))
-    return f"blocks {named} fall" if len(shown.fallen) > 1 else f"block {named} falls"
-
-
 def _name(order: int) -> str:
     return "the ground" if order == GROUND else f"block {order}"
-
-
-def _all(orders: Sequence[int]) -> str:
-    return ", ".join(map(_name, orders))
-
-
-CHECKS: Mapping[CheckName, Check] = {
-    check.name: check
-    for check in (
-        Check("size", "limits of its levels", _size),
-        Check("palette", "colors of the palette", _palette),
-        Check("undeclared dependency", "dependencies are contacts", _undeclared_dependency),
-        Check(
-            "dependency without contact", "dependencies are contacts", _dependency_without_contact
-        ),
-        Check("layer", "layers are longest paths", _layer),
-        Check("order", "order can be built", _order),
-        Check("overlap", "no overlap", _overlap),
-        Check("floating", "no gap", _floating),
-        Check("unstable", "stands when finished", _unstable),
-        Check("unstable step", "stands at every step", _unstable_step),
-        Check("hidden", "every block shows", _hidden),
-        Check("too many candidates", "candidate set", _too_many_candidates),
-        Check("candidates", "candidate set", _lacking_candidates),
-        Check("distractor", "candidate set", _distractors),
-    )
-}
-"""The checks of a scene by itself."""
 
 
 def find_duplicates(scenes: Iterable[Scene]) -> tuple[Finding, ...]:
@@ -528,9 +525,168 @@ PHYSICS: tuple[CheckName, ...] = (
 
 
 def is_acceptable(scene: Scene, palette: tuple[Kind, ...]) -> bool:
-    """Whether a scene could enter a data set, each of its blocks to be seen in the goal picture.
+    """True if a scene could enter a data set, each of its blocks to be seen in the goal picture.
 
     It ends at the first fault, and a trial ends once all is at rest, at both time steps.
     """
     facts = SceneFacts(scene, tolerances=OURS_IN_HASTE, palette=palette)
     return next(findings_of(facts, (*FORM, "hidden", *PHYSICS)), None) is None
+
+
+_VERIFIED: tuple[CheckName, ...] = (
+    "size",
+    "undeclared dependency",
+    "dependency without contact",
+    "layer",
+    "order",
+    "overlap",
+    "floating",
+    "unstable",
+    "unstable step",
+    "hidden",
+    "too many candidates",
+    "candidates",
+    "distractor",
+)
+LAWS = tuple(dict.fromkeys(CHECKS[name].law for name in _VERIFIED))
+"""The laws of a scene by itself."""
+Verified = dict[str, tuple[Finding, ...]]
+"""Findings against each law; empty where it holds."""
+_Task = tuple[Scene, CandidateSet]
+_LEAST_PIXELS = 0.01
+"""Two looks must differ in this share of a candidate's picture."""
+_VISIBLE_STEP = 24
+_CELL_PX = 128
+
+
+def verify_scenes(tasks: Iterable[_Task], workers: Workers) -> Iterator[Verified]:
+    """All of `LAWS` on each scene and its candidate set, in the order given."""
+    return workers.map(verify_scene, tasks)
+
+
+def verify_scene(task: _Task) -> Verified:
+    """All of `LAWS` on one scene and its candidate set."""
+    facts = SceneFacts(*task)
+    findings = tuple(findings_of(facts, _VERIFIED))
+    return {law: tuple(f for f in findings if CHECKS[f.check].law == law) for law in LAWS}
+
+
+def check_looks(sets: Iterable[CandidateSet]) -> tuple[int, tuple[Problem, ...]]:
+    """How many looks the candidate sets use, and the pairs that the camera cannot tell apart."""
+    looks = {candidate.look: candidate for offered in sets for candidate in offered.candidates}
+    pictures = {look: _pixels(candidate) for look, candidate in sorted(looks.items())}
+    alike = []
+    for (one, first), (other, second) in combinations(pictures.items(), 2):
+        differing = (np.abs(first - second).max(axis=2) > _VISIBLE_STEP).mean()
+        if differing < _LEAST_PIXELS:
+            message = f"looks like {_text_of(looks[other])}"
+            name = _text_of(looks[one])
+            alike.append(Problem(name, message, "candidates", f"{differing:.2%}"))
+    return len(looks), tuple(alike)
+
+
+def _pixels(candidate: Candidate) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
+    block = on_the_floor(candidate.type, candidate.color, candidate.euler_deg)
+    image = picture([block], candidate_camera(block, PictureStyle()), "white", _CELL_PX)
+    return np.asarray(image, dtype=np.int64)
+
+
+def _text_of(candidate: Candidate) -> str:
+    return f"{candidate.color} {candidate.type} at {candidate.euler_deg}"
+
+
+AUDITED: tuple[CheckName, ...] = (
+    "overlap",
+    "floating",
+    "undeclared dependency",
+    "dependency without contact",
+    "layer",
+    "order",
+    "unstable",
+    "unstable step",
+    "duplicate",
+    "candidates",
+)
+"""Checks of an audit in the order of its tables: causes before their effects."""
+_COLUMNS = ("scene", "level", "check", "blocks", "size", "unit", "declared", "found", "message")
+
+
+@dataclass(frozen=True)
+class SceneAudit:
+    """Findings about one scene.
+
+    `declared`, `contacts` and `shared` count dependencies (the ground is one): those declared,
+    those that are contacts, and those that are both.
+    """
+
+    scene: Scene
+    findings: tuple[Finding, ...]
+    declared: int
+    contacts: int
+    shared: int
+
+    def has(self, *checks: CheckName) -> bool:
+        """True if one of these checks found something."""
+        return any(finding.check in checks for finding in self.findings)
+
+    @property
+    def badness(self) -> tuple[float, float, int]:
+        """Sort key: scenes that fall, then the largest overlap or gap [mm], then all findings."""
+        falls = 2.0 * self.has("unstable") + 1.0 * self.has("unstable step")
+        fit = [f.value or 0.0 for f in self.findings if f.check in ("overlap", "floating")]
+        return falls, max(fit, default=0.0), len(self.findings)
+
+
+def audit_scene(
+    task: tuple[Scene, CandidateSet | None], tolerances: Tolerances = FOREIGN
+) -> SceneAudit:
+    """Check one scene; without candidates these are not checked.
+
+    Raises SimulationError as the simulator does.
+    """
+    scene, candidates = task
+    facts = SceneFacts(scene, candidates, tolerances)
+    pairs = [(facts.declared[block.order], facts.contacts[block.order]) for block in scene.blocks]
+    return SceneAudit(
+        scene,
+        tuple(findings_of(facts, tuple(name for name in AUDITED if name != "duplicate"))),
+        declared=sum(len(declared) for declared, _ in pairs),
+        contacts=sum(len(contacts) for _, contacts in pairs),
+        shared=sum(len(declared & contacts) for declared, contacts in pairs),
+    )
+
+
+def audit_scenes(
+    tasks: Iterable[tuple[Scene, CandidateSet | None]],
+    tolerances: Tolerances = FOREIGN,
+    jobs: int = 1,
+) -> Iterator[SceneAudit]:
+    """Check many scenes in `jobs` processes; results come in the order given.
+
+    Raises PhyblockError when a process is killed, SimulationError as the simulator does.
+    """
+    with open_workers(jobs) as workers:
+        yield from workers.map(partial(audit_scene, tolerances=tolerances), tasks)
+
+
+def findings_csv(audits: Sequence[SceneAudit], others: Sequence[Finding] = ()) -> str:
+    """Return all findings as CSV text with a header, sorted by scene."""
+    levels = {audit.scene.id: audit.scene.level for audit in audits}
+    findings = [*others, *(finding for audit in audits for finding in audit.findings)]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(_COLUMNS)
+    for finding in sorted(findings, key=lambda finding: finding.scene):
+        row = (
+            *(finding.scene, levels.get(finding.scene, ""), finding.check),
+            " ".join(map(str, finding.blocks)),
+            *("" if finding.value is None else f"{finding.value:.3f}", finding.unit),
+            *(shown_orders(finding.declared), shown_orders(finding.derived), finding.message),
+        )
+        writer.writerow(map(csv_cell, row))
+    return text.getvalue()
+
+
+def shown_orders(value: Declared) -> str:
+    """Return orders as numbers with spaces between them; anything else as text."""
+    return " ".join(map(str, value)) if isinstance(value, tuple) else str(value)

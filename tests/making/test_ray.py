@@ -11,7 +11,7 @@ import psutil
 import pytest
 
 from phyblock.errors import InputError
-from phyblock.making.scenes.scene_production import Order, Share, produce
+from phyblock.making.scenes.production import Order, Share, produce
 from phyblock.making.workers import open_workers
 
 ORDER = Order(3, "kit", (Share("1", 3, 1), Share("2", 4, 2), Share("3", 2, 1)))

@@ -15,7 +15,7 @@ from PIL import Image
 from phyblock.domain import KIT_PALETTE, Candidate, CandidateSet, Scene
 from phyblock.errors import DataError
 from phyblock.making.poses import POSES
-from phyblock.making.scenes.candidate_sets import make_candidates
+from phyblock.making.scenes.candidates import make_candidates
 from phyblock.sim.pictures import (
     LABEL_STRIP,
     PictureStyle,

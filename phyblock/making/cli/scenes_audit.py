@@ -13,9 +13,17 @@ from phyblock.cli.paths import NAME_OR_PATH, UserPath
 from phyblock.data import read_data_set
 from phyblock.domain import Scene
 from phyblock.files import OutFolder, check_free, make_folder, write_named
-from phyblock.making.checks import FOREIGN, CheckName, Finding, find_duplicates
+from phyblock.making.checks import (
+    AUDITED,
+    FOREIGN,
+    CheckName,
+    Finding,
+    SceneAudit,
+    audit_scenes,
+    find_duplicates,
+    findings_csv,
+)
 from phyblock.making.cli.working import jobs_option, tracked
-from phyblock.making.verification import AUDITED, SceneAudit, audit_scenes, findings_csv
 from phyblock.sim.film import marked_png
 from phyblock.sim.pictures import PictureStyle
 from phyblock.text import counted

@@ -13,7 +13,7 @@ from phyblock.errors import DataError, Problem
 from phyblock.making.checks import find_duplicates, find_orphans
 from phyblock.making.cli.working import jobs_option, tracked
 from phyblock.making.scenes.completing import Completed, ReadScene, complete, palette_of, read_given
-from phyblock.making.scenes.scene_files import check_folder, completed_card, open_writer
+from phyblock.making.scenes.files import check_folder, completed_card, open_writer
 from phyblock.making.workers import open_workers
 from phyblock.text import counted
 

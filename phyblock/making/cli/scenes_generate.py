@@ -16,8 +16,8 @@ from phyblock.making.cli.working import (
     tell_simulators,
     tracked,
 )
-from phyblock.making.scenes.scene_files import card, open_writer
-from phyblock.making.scenes.scene_production import Order, produce, shares
+from phyblock.making.scenes.files import card, open_writer
+from phyblock.making.scenes.production import Order, produce, shares
 from phyblock.making.scenes.sketch import PALETTES, Palette
 from phyblock.making.workers import open_workers
 from phyblock.text import counted

@@ -11,14 +11,15 @@ from phyblock.cli.console import make_console, plain_table
 from phyblock.cli.paths import NAME_OR_PATH
 from phyblock.data import SCENES_FILE, AssemblyTask, find_data_set, read_builtin
 from phyblock.errors import DataError, Problem
-from phyblock.making.checks import find_duplicates, find_orphans
-from phyblock.making.cli.working import jobs_option, ray_option, tracked
-from phyblock.making.verification import (
+from phyblock.making.checks import (
     LAWS,
     check_looks,
-    check_sums,
+    find_duplicates,
+    find_orphans,
     verify_scenes,
 )
+from phyblock.making.cli.working import jobs_option, ray_option, tracked
+from phyblock.making.scenes.files import check_sums
 from phyblock.making.workers import open_workers
 from phyblock.text import counted
 

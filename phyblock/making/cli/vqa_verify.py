@@ -11,7 +11,7 @@ from phyblock.domain import SUBTASK_NAMES, SUBTASKS
 from phyblock.making.cli.question_sets import data_option, questions_argument, read_question_set
 from phyblock.making.cli.working import jobs_option, ray_option, tracked
 from phyblock.making.questions.production import verify_questions
-from phyblock.making.verification import check_sums
+from phyblock.making.scenes.files import check_sums
 from phyblock.making.workers import open_workers
 from phyblock.text import counted
 

@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 from phyblock.data import read_builtin
 from phyblock.domain import Scene
 from phyblock.errors import DataError
+from phyblock.making.checks import verify_scene
 from phyblock.making.scenes.completing import GivenScene, ReadScene, complete, derived, read_given
-from phyblock.making.verification import check_sums, verify_scene
+from phyblock.making.scenes.files import check_sums
 from phyblock.resources import bundled
 from tests.workspace import SCENES, Workspace
 

@@ -15,8 +15,8 @@ from phyblock.data import read_builtin
 from phyblock.domain import KIT_PALETTE, MAX_CANDIDATES, Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.errors import DataError
 from phyblock.making.poses import POSES
-from phyblock.making.scenes.candidate_sets import NEEDED, make_candidates
-from phyblock.making.scenes.scene_production import Group, Request, draw, shares
+from phyblock.making.scenes.candidates import NEEDED, make_candidates
+from phyblock.making.scenes.production import Group, Request, draw, shares
 from phyblock.scoring.counts import micro
 from phyblock.scoring.plan import Goal, match_plan
 from phyblock.tracks.goal_blind import goal_blind_plans

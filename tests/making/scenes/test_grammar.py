@@ -11,10 +11,8 @@ from hypothesis import strategies as st
 
 from phyblock.domain import KIT_PALETTE, Scene
 from phyblock.domain.symmetry import canonical_form
-from phyblock.making.scenes.buildings import BUILDINGS
-from phyblock.making.scenes.compositions import COMPOSITIONS, beside
-from phyblock.making.scenes.creatures import CREATURES
-from phyblock.making.scenes.scene_production import GROUP_LEVELS, Request, draw
+from phyblock.making.scenes.designs import BUILDINGS, COMPOSITIONS, CREATURES, beside
+from phyblock.making.scenes.production import GROUP_LEVELS, Request, draw
 from phyblock.making.scenes.sketch import PALETTES, Draft
 from phyblock.sim.contact import bounds_m, find_gaps, find_overlaps
 from tests.designs.acceptance import form_problems

@@ -12,8 +12,8 @@ from phyblock.data import read_builtin
 from phyblock.domain import Scene
 from phyblock.domain.symmetry import canonical_form
 from phyblock.errors import DataError, StoreError
-from phyblock.making.scenes.scene_files import SetWriter, card, open_writer, sums_text
-from phyblock.making.scenes.scene_production import Order, Share, produce, shares
+from phyblock.making.scenes.files import SetWriter, card, open_writer, sums_text
+from phyblock.making.scenes.production import Order, Share, produce, shares
 from phyblock.making.workers import open_workers
 from phyblock.sim.engine import (
     REFERENCE_ENGINE,
@@ -151,7 +151,7 @@ def too_many_looks(scene: Scene) -> Scene:
 
 
 def test_rules_that_give_no_more_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("phyblock.making.scenes.scene_production._PATIENCE", 3)
+    monkeypatch.setattr("phyblock.making.scenes.production._PATIENCE", 3)
     order = Order(0, "kit", (Share("1", 100_000, 0),))
     with pytest.raises(DataError, match="new scenes of 100000"):
         for _ in zip(range(400), produce(order, _Nothing()), strict=False):

@@ -12,10 +12,10 @@ from pathlib import Path
 from phyblock.data import VERSION_FILE
 from phyblock.data.scenes import StoredScene
 from phyblock.domain.scene import CandidateSet, Scene
-from phyblock.errors import Problem, StoreError
-from phyblock.files import atomic_write, check_free, writing
+from phyblock.errors import Problem, StoreError, reason_of
+from phyblock.files import atomic_write, check_free, read_text, writing
 from phyblock.making.checks import FINISHED_REST, LEVEL_LIMITS
-from phyblock.making.scenes.candidate_sets import make_candidates
+from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.sketch import PALETTES, Palette
 from phyblock.sim.contact import FIT_TOLERANCE_M
 from phyblock.sim.dynamics import DEFAULT_REST, DEFAULT_TRIAL
@@ -123,6 +123,26 @@ def sums_text(folder: Path) -> str:
     names = (CARD_FILE, SCENES_FILE, VERSION_FILE)
     sums = [hex_digest((folder / name).read_bytes()) for name in names]
     return "".join(f"{one}  {name}\n" for one, name in zip(sums, names, strict=True))
+
+
+def check_sums(folder: Path) -> tuple[int, tuple[Problem, ...]]:
+    """How many files `SHA256SUMS` names, and those that are missing or changed."""
+    path = folder / SUMS_FILE
+    if not path.is_file():
+        return 1, (Problem(str(path), "is missing"),)
+    try:
+        lines = read_text(path).splitlines()
+    except (OSError, ValueError) as error:
+        return 1, (Problem(str(path), f"cannot be read: {reason_of(error)}"),)
+    wrong = []
+    for line in lines:
+        digest, _, name = line.partition("  ")
+        file = folder / name
+        if not file.is_file():
+            wrong.append(Problem(str(file), "is missing"))
+        elif hex_digest(file.read_bytes()) != digest:
+            wrong.append(Problem(str(file), f"differs from its checksum in {SUMS_FILE}"))
+    return len(lines), tuple(wrong)
 
 
 _TEXT = """# {name}
