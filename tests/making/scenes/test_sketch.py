@@ -39,14 +39,6 @@ def test_poses_of_a_type_look_different(block_type) -> None:
     assert len({orientation_class(block_type, euler) for euler in poses}) == len(poses)
 
 
-def test_a_pair_stands_on_both_sides() -> None:
-    sketch = Pad()
-    sketch.pair("triangle", 3, poses=("ramp-y", "ramp+y"))
-    left, right = sketch.blocks
-    assert left.position_m[1] == -right.position_m[1] == pytest.approx(-0.075)
-    assert left.euler_deg != right.euler_deg
-
-
 def test_a_scene_is_centered_and_its_graph_comes_from_contact() -> None:
     sketch = Pad(origin=(20.0, -8.0))
     sketch.pair("cube", 2)
