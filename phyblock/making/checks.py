@@ -142,7 +142,7 @@ FOREIGN = Tolerances(fit_m=0.002, last_step=False)
 
 @dataclass(frozen=True)
 class Limits:
-    """How many blocks and layers a level allows (paper section 3.1)."""
+    """The blocks and layers that a level allows (paper section 3.1)."""
 
     least_blocks: int
     most_blocks: int
@@ -572,7 +572,7 @@ def verify_scene(task: _Task) -> Verified:
 
 
 def check_looks(sets: Iterable[CandidateSet]) -> tuple[int, tuple[Problem, ...]]:
-    """How many looks the candidate sets use, and the pairs that the camera cannot tell apart."""
+    """Count the looks of candidate sets, and find the pairs that the camera cannot tell apart."""
     looks = {candidate.look: candidate for offered in sets for candidate in offered.candidates}
     pictures = {look: _pixels(candidate) for look, candidate in sorted(looks.items())}
     alike = []

@@ -1,4 +1,4 @@
-"""Where tasks run: in this process, in several, or on a Ray cluster; the answers are the same."""
+"""Workers for tasks: this process, several, or a Ray cluster; the answers are the same."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def _ray(jobs: int, address: str) -> Iterator[Workers]:
 
 
 def _answers(address: str) -> bool:
-    """Whether something listens at HOST:PORT; Ray itself would wait for minutes."""
+    """True if something listens at HOST:PORT; Ray itself would wait for minutes."""
     host, _, port = address.removeprefix("ray://").rpartition(":")
     if not (host and port.isdecimal()):
         return False

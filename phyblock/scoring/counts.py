@@ -95,7 +95,7 @@ def mean_of(sums: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class LetterRates:
-    """How often each letter is right and was given, of the `n` questions that have one letter."""
+    """Counts of each letter as right and as given, of the `n` questions that have one letter."""
 
     n: int
     right: Mapping[str, int]

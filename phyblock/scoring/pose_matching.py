@@ -62,9 +62,9 @@ def cheapest(cost: Floats) -> list[tuple[int, int]]:
 
 
 TOLERANCES_CM = (0.5, 1.0, 2.0, 4.0)
-"""How far from its place a right step may be [cm]; the headline is the mean over them."""
+"""The farthest that a right step may be from its place [cm]; the headline is the mean over them."""
 TURN_TOLERANCE_DEG = 15.0
-"""How far a right step may be turned, up to the symmetry of the block [degrees]."""
+"""The most that a right step may be turned, up to the symmetry of the block [degrees]."""
 FARTHEST_CM = 20.0
 """Steps that are farther off cost no more, so that one far away moves no other [cm]."""
 _SLACK = 1e-6

@@ -181,7 +181,7 @@ def _balanced_poses() -> list[tuple[BlockType, Euler]]:
 
 
 def _size(block: Block) -> str:
-    """How long, wide and high a block is as it is turned, to half a centimeter."""
+    """Length, width and height of a block as it is turned, to half a centimeter."""
     *level, high = (round(float(side) * 200) / 2 for side in np.diff(bounds_m(block), axis=0)[0])
     return f"{max(level):g} cm by {min(level):g} cm, and {high:g} cm in height"
 
@@ -249,7 +249,7 @@ def _by_statics(
 
 
 def looks_of(plain: QuestionPicture, top: Top) -> tuple[float, ...]:
-    """How central a place is on its block, how much room is round it, how high, how far out.
+    """Measures of a place: its distance from the middle of its block, room, height, distance out.
 
     In the world and in the picture, with how much of its block shows.
     """

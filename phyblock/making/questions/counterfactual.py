@@ -63,7 +63,7 @@ OUTCOME_TEXTS = (
     "Exactly two other blocks move or fall.",
     "Three or more other blocks move or fall.",
 )
-"""What can follow a removal, by how many other blocks do not stay; always all offered."""
+"""Outcomes of a removal, by the number of other blocks that do not stay; all are offered."""
 _ALL_SEEN = 0.12
 _STRUCTURES_TRIED = 6
 _VIEWS_TRIED = 3
@@ -72,7 +72,7 @@ _Sort = tuple[bool, bool]
 _SORTS: tuple[_Sort, ...] = ((False, False), (False, True), (True, False), (True, True))
 """True where what rests on the block goes with it, and where what rests on nothing else does."""
 _SHARES = (0.35, 0.25, 0.25, 0.15)
-"""How often removals of each sort are looked for: each rule is right in four cases of ten."""
+"""Shares of removals of each sort that are looked for: each rule is right in four cases of ten."""
 _STAYS_ASKED = 0.25
 _COLORED = 0.5
 
@@ -257,7 +257,7 @@ def _other_lots(
 
 
 def _looks(plain: QuestionPicture, shot: Shot, taken: int, lot: Lot) -> tuple[float, ...]:
-    """How much is colored, where, how high, how far from the block that is taken; how naive it is.
+    """Area, place, height and distance from the block taken of what is colored, and its naivety.
 
     A lot of no blocks is where the block is that is taken.
     """
@@ -318,7 +318,7 @@ def _below(blocks: tuple[Block, ...]) -> Mapping[int, frozenset[int]]:
 
 
 def sure_removal(blocks: Sequence[Block], order: int) -> Outcome | None:
-    """What surely follows a removal; None where settings or statics leave a doubt."""
+    """The sure outcome of a removal; None where settings or statics leave a doubt."""
     group = group_of(blocks, order)
     if not surely_stands(group):
         return None

@@ -196,7 +196,7 @@ def _longest(below: Mapping[int, Collection[int]]) -> dict[int, int]:
 
 
 def sure_blocks(picture: QuestionPicture) -> int:
-    """How many blocks there have to be at the least, going by what the picture shows.
+    """Count the blocks that have to be there, going by what the picture shows.
 
     Every block shows at least `COUNTED` of itself, but one at the most that shows less. That
     one is sure to be there, whatever it is, where a block that shows `NAMED` of itself rests on it

@@ -62,7 +62,7 @@ class Maker(ABC):
 
     subtask: Subtask
     scenes_tried: int = 400
-    """How many scenes, drawn evenly over the levels, are asked for drafts."""
+    """The number of scenes, drawn evenly over the levels, that are asked for drafts."""
     drafts_a_scene: int = 1
     """The most drafts that are taken of one scene."""
 

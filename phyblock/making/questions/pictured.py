@@ -22,9 +22,9 @@ LEAST_PIXELS = 220
 TAKEN = "X"
 """The letter of the block that is taken away or pushed."""
 WRONG = 3
-"""How many options are wrong."""
+"""The number of wrong options."""
 MOST_OFF = 1.0
-"""How many ranks the right option may be off, on average over the measures."""
+"""The most ranks that the right option may be off, on average over the measures."""
 _EQUAL = 0.02
 _UNLIKE_STEPS = 5.0
 _ALIKE_M = 0.002
@@ -142,7 +142,7 @@ def four_alike(
 def ranks_among(
     measures: Floats, right: int, threes: NDArray[np.int64], unlike: Floats | None = None
 ) -> Floats:
-    """How many of each three are below the right one, by measure; equal ones count half."""
+    """Numbers of each three that are below the right one, by measure; equal ones count half."""
     steps = measures[threes] - measures[right]
     if unlike is not None:
         four = np.column_stack([np.full(len(threes), right), threes])

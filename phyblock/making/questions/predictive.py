@@ -96,7 +96,7 @@ _ABOVE_M = 0.03
 _ENOUGH, _MOST_OF_A_SORT = 4, 8
 _RIGHTS_TRIED = 6
 _AREA_RANKS = (0.1, 0.2, 0.3, 0.4)
-"""How often each rank of the right picture by colored area is looked for.
+"""Shares of each rank of the right picture by colored area that are looked for.
 
 A block that stays hides more of what it stands on, so that the last rank is the hardest to find;
 what is found is evened out when questions are chosen.
@@ -329,7 +329,7 @@ def _told_apart(
 
 
 _PUSHED = 0.55
-"""How often a push is looked for, which fewer scenes allow than a next step."""
+"""Share of drafts for which a push is sought, which fewer scenes allow than a next step."""
 
 
 class PredictiveMaker(Maker):

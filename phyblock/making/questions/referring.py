@@ -22,7 +22,7 @@ from phyblock.making.questions.view import NAMED, outermost, seen_blocks, shows_
 from phyblock.sim.contact import bounds_m
 
 Feature = Literal["color", "type", "size", "layer", "side", "support"]
-"""What an expression may speak of; `size` tells rectangular prisms apart by their length."""
+"""Features of an expression; `size` tells rectangular prisms apart by their length."""
 _ORDER = ("cube", "rectangular prism", "triangular prism", "half cylinder", "cylinder", "arch")
 """The paper's six words (appendix A.4); those of further shapes come behind."""
 SHAPE_WORDS: dict[str, tuple[BlockType, ...]] = {

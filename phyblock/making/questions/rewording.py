@@ -74,7 +74,7 @@ def stems_of(questions: Sequence[Question]) -> dict[str, list[Question]]:
 
 
 def fault_of_form(template: str, originals: Sequence[str]) -> str | None:
-    """Why a text is no wording in the form of the originals; None where it is one."""
+    """Return the fault of a text as a wording in the form of the originals, or None."""
     try:
         slots = _slots(template)
     except ValueError as error:
@@ -131,7 +131,7 @@ async def write_wordings(
 async def _fault_of_meaning(
     model: Model, prompt: TemplatePrompt, template: str, question: Question, seed: int
 ) -> str | None:
-    """Why a paraphrase means something else, by a question whose answer is known."""
+    """Return the difference in meaning of a paraphrase, by a question whose answer is known."""
     slots: Mapping[str, str] = question.evidence.get("slots", {})
     text = fill_template(template, slots)
     asked = replace(question, text=text, wording=f"{stem_of(question.wording)}-m0")
@@ -199,7 +199,7 @@ def _chosen(questions: Sequence[Question], checks: int, seed: int) -> list[Quest
 
 
 def _slots(template: str) -> Counter[str]:
-    """How often each slot stands in a template; ValueError for broken braces.
+    """Count each slot of a template; ValueError for broken braces.
 
     With a conversion or a format, such as `block!r`, it is another slot.
     """
@@ -234,7 +234,7 @@ class Wording:
 
     @property
     def stem(self) -> str:
-        """What the wordings of one kind of question share."""
+        """The stem that the wordings of one kind of question share."""
         return stem_of(self.name)
 
     def asks(self, question: Question) -> Question:
@@ -284,7 +284,7 @@ def reword(
 
 
 def _faults(line: _StoredWording, earlier: Sequence[Wording]) -> Iterator[Fault]:
-    """Why an accepted line cannot be used beside those before it."""
+    """Yield the faults of an accepted line beside those before it."""
     stem = stem_of(line.wording)
     originals = [WORDINGS[known] for known in wording_ids(stem)]
     if not originals:

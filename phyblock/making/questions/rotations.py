@@ -63,7 +63,7 @@ AXIS_TURNS: tuple[str, ...] = (
     "a quarter turn about a level axis along its length",
     "a quarter turn about a level axis across its length",
 )
-"""What a block that lies along the ground can be told to do; to which side does not matter."""
+"""Turns of a block that lies along the ground; the side does not matter."""
 _SAME = 1e-4
 
 

@@ -73,7 +73,7 @@ def _kept(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[D
 
 
 class _Tally:
-    """What was taken so far, and how much less even a further draft would make it."""
+    """Counts of what was taken, and the unevenness that a further draft would add."""
 
     def __init__(self, pool: Sequence[Draft]) -> None:
         self._members: dict[Hashable, set[Hashable]] = defaultdict(set)
@@ -123,7 +123,7 @@ def _identity(draft: Draft) -> Hashable:
 
 
 def _texts(draft: Draft) -> Texts:
-    """What a reader without pictures sees."""
+    """The draft as a reader without pictures sees it."""
     group = (draft.scene.parents or (draft.scene.id,))[0]
     return Texts(group, draft.kind, draft.text, _option_texts(draft), draft.looks)
 
@@ -159,7 +159,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Texts:
-    """What a reader without pictures sees of a draft; the right option stands first.
+    """A draft as a reader without pictures sees it; the right option stands first.
 
     `group` is equal for drafts about scenes that share parts, `kind` for those that ask the same.
     `looks` are measures of options that are no texts, as many of each.
@@ -185,7 +185,7 @@ class _Table:
     columns: NDArray[np.int64]
     values: Floats
     starts: NDArray[np.int64]
-    """Where the options of each draft begin, the right one first."""
+    """Rows at which the options of each draft begin, the right one first."""
 
     def chances(self, weights: Floats) -> Floats:
         """Probability of each option, one after the other."""

@@ -65,7 +65,7 @@ _COLUMN: tuple[tuple[BlockType, float], ...] = (
     ("cuboid1", 0.025),
     ("cylinder", 0.1),
 )
-"""What columns are made of, and heights [m]."""
+"""Pieces of columns, and heights [m]."""
 
 
 def with_annex(scene: Scene, rng: np.random.Generator) -> tuple[Block, ...] | None:
@@ -160,7 +160,7 @@ def _planned(half_m: float, rng: np.random.Generator) -> _Plan | None:
 
 
 def _leans_m(plan: _Plan) -> float:
-    """How far plank and weights together have their center off the middle of the top [m]."""
+    """Distance of the center of plank and weights from the middle of the top [m]."""
     loads = [(plan.off_m, SHAPES[plan.type].mass_kg)]
     loads += [(plan.off_m + at_m, SHAPES[w.type].mass_kg) for at_m, w in plan.weights]
     moment = plain_sum(at_m * mass for at_m, mass in loads)

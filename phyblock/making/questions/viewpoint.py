@@ -180,7 +180,7 @@ def _changed(
 
 
 def _like(base: _Structure, changed: _Structure, other: _Structure) -> _Structure:
-    """What was changed from `base` changed in another structure as well."""
+    """Another structure with the same change as from `base`."""
     if changed.is_mirrored:
         return other.mirrored()
     if other.is_mirrored:
@@ -219,7 +219,7 @@ def _opposite(side: str) -> str:
 
 
 def _hits(family: Sequence[_Structure], first: View, second: View) -> float:
-    """How many of the structures the nearest histogram of colors finds again; ties count in part.
+    """Number of structures that the nearest histogram of colors finds again; ties count in part.
 
     By two ways to measure, the sum of differences and of their squares; 0 where they disagree.
     """
@@ -243,7 +243,7 @@ def _histogram(structure: _Structure, view: View) -> NDArray[np.float64]:
 
 
 def _pixels(structure: _Structure, view: View) -> dict[int, int]:
-    """How many pixels show each block, by order: those of its mirror image, whatever the colors."""
+    """Pixels that show each block, by order: those of its mirror image, whatever the colors."""
     plain = (structure.mirrored() if structure.is_mirrored else structure).seen_from(view)
     plain = replace(plain, blocks=tuple(replace(b, color="red") for b in plain.blocks))
     return shown_pixels(plain, seen(plain))

@@ -37,7 +37,7 @@ NEEDED: dict[BlockType, dict[str, float]] = {
         **{"ramp-y": 0.258, "ramp+x": 0.125},
     },
 }
-"""How many looks of a type and pose a goal of the grammar needs on average, over its colors:
+"""Looks of a type and pose that a goal of the grammar needs on average, over its colors:
 counted in 1,200 goals. Poses that no goal needs give themselves away and are not offered.
 """
 _EVEN_SHARE = 0.36
@@ -56,7 +56,7 @@ setting B, where a pose does not count, all of them are one block offered again 
 leaving some out would pay.
 """
 _MOST_DRAWN = 0.98
-"""What more than `_EVEN_SHARE` of all goals need is offered nearly always."""
+"""The most: looks that more than `_EVEN_SHARE` of all goals need are offered nearly always."""
 
 
 def make_candidates(
@@ -82,7 +82,7 @@ def make_candidates(
 
 
 def _rates(palette: tuple[Kind, ...]) -> dict[Candidate, float]:
-    """How often each look that some goal needs is drawn as a distractor, a rate over one unit of
+    """Rate at which each look that some goal needs is drawn as a distractor, over one unit of
     time: one is drawn within it where it is not needed as often as its even share asks.
     """
     colors = Counter(block_type for block_type, _ in palette)

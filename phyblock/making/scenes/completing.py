@@ -1,4 +1,4 @@
-"""What a scene is, derived from the poses of its blocks: dependencies, layers, levels, an order."""
+"""Scenes derived from the poses of their blocks: dependencies, layers, levels, an order."""
 
 from __future__ import annotations
 
@@ -190,7 +190,7 @@ class GivenScene(Line, extra="forbid"):
 
     @property
     def is_ordered(self) -> bool:
-        """Whether every block says its `order`."""
+        """True if every block says its `order`."""
         return all(block.order is not None for block in self.blocks)
 
 

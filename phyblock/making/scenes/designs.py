@@ -108,7 +108,7 @@ def gable(d: Draft, width: int, tone: int = 1) -> None:
 
 
 def crown(d: Draft, width: int, tone: int = 1) -> None:
-    """What ends a structure, on a deck `width` wide (2, 4, 6 or 8)."""
+    """The end of a structure, on a deck `width` wide (2, 4, 6 or 8)."""
     if width == 2:
         topping(d)
         return
@@ -147,7 +147,7 @@ def crown(d: Draft, width: int, tone: int = 1) -> None:
 
 
 def flank(d: Draft, width: int, tone: int = 0) -> None:
-    """What leans on both ends of a row that stands on the ground."""
+    """Blocks that lean on both ends of a row that stands on the ground."""
     kind, y = d.pick(("ramp", "ramp", "turret", "apse", "fence")), width / 2 + 1
     if kind == "ramp":
         d.pair("triangle", y, OUT)

@@ -126,7 +126,7 @@ def sums_text(folder: Path) -> str:
 
 
 def check_sums(folder: Path) -> tuple[int, tuple[Problem, ...]]:
-    """How many files `SHA256SUMS` names, and those that are missing or changed."""
+    """The number of files that `SHA256SUMS` names, and those that are missing or changed."""
     path = folder / SUMS_FILE
     if not path.is_file():
         return 1, (Problem(str(path), "is missing"),)

@@ -53,7 +53,7 @@ _MAX_LOOKS = 14
 
 @dataclass(frozen=True)
 class Request:
-    """What a scene is drawn from; `parents` are empty for a base scene."""
+    """The source of a scene; `parents` are empty for a base scene."""
 
     seed: int
     palette: Palette
@@ -150,7 +150,7 @@ _SOURCES: dict[Group, tuple[tuple[int, tuple[Group, ...]], ...]] = {
     "3": ((1, ("3",)), (2, ("1", "1+2", "2")), (2, ("1", "1+2", "2", "3"))),
     "4": ((2, ("3",)), (2, ("3",)), (2, ("3",)), (2, ("3",)), (1, ("4",))),
 }
-"""What variations are made from: how many parents, out of which groups."""
+"""Sources of variations: the number of parents, and their groups."""
 _PATIENCE = 150
 """So many candidates running that are refused or known end the search."""
 _LARGEST_ROUND = 256
@@ -158,7 +158,7 @@ _LARGEST_ROUND = 256
 
 @dataclass(frozen=True)
 class Share:
-    """How many scenes of a group are wanted: drawn by the grammar, and made from those."""
+    """The scenes of a group that are wanted: drawn by the grammar, and made from those."""
 
     group: Group
     base: int
@@ -167,7 +167,7 @@ class Share:
 
 @dataclass(frozen=True)
 class Order:
-    """What is wanted: the seed, the palette and the shares."""
+    """An order of scenes: the seed, the palette and the shares."""
 
     seed: int
     palette: Palette
@@ -259,7 +259,7 @@ class _Maker:
         return [bases[int(i)] for i in rng.choice(len(bases), size=count, replace=False)]
 
     def _sources(self, group: Group) -> list[tuple[int, list[tuple[str, Request]]]]:
-        """How many parents out of which base scenes, in the ways that there are enough for."""
+        """Numbers of parents and the base scenes they come from, where there are enough."""
         sources = [
             (count, [base for name in groups for base in self._bases[name]])
             for count, groups in _SOURCES[group]

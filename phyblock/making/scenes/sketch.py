@@ -109,7 +109,7 @@ T = TypeVar("T")
 
 
 class Draft:
-    """What the rules of the grammar draw on.
+    """The sketch, random source and colors that the rules of the grammar draw on.
 
     A cube comes in one of two tones of the structure, 0 or 1, so that a storey has one color; any
     other type has one color a structure, the kit's own with the palette `kit`.
