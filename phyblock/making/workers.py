@@ -13,8 +13,6 @@ from typing import Any, Protocol, TypeVar
 from phyblock.errors import InputError, PhyblockError, Problem
 from phyblock.workers import WorkerDiedError, WorkerPool
 
-__all__ = ["Workers", "open_workers"]
-
 T = TypeVar("T")
 R = TypeVar("R")
 _AHEAD = 4

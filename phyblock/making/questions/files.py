@@ -59,34 +59,11 @@ def write_questions(
             atomic_write(folder / name, data)
 
 
-_TEXT = """# {name}
-
-{count} multiple-choice questions about {scenes} scenes of `{scenes_name}`, in {subtasks} subtasks
-(paper, section 3.3 and appendix A.4), each with an answer that is derived from geometry, from the
-dependency graph or from physics, and derived again by `phyblock questions verify`. Made{simulators} by
-
-    {made_by}
-
-which gives the same bytes with any number of processes. No picture is stored: each is a recipe
-(its differences from the scene, and the viewpoint) that is drawn when it is needed. The version of
-the set stands in `VERSION`: results on different versions are never mixed.
-
-| subtask | | questions | scenes | wordings | A | B | C | D | most frequent answer |
-|---|---|---|---|---|---|---|---|---|---|
-{rows}
-
-A to D: share of questions whose right option has that letter (ordering: that comes first). The
-last column is the share of the most frequent right option text.
-
-`questions.jsonl` holds one question a line; docs/vqa.md describes the fields and the rules by which
-questions are made, and `phyblock questions audit` shows what can be guessed.
-"""  # noqa: E501
-
-
 def question_card(name: str, scenes_name: str, questions: Sequence[Question], made_by: str) -> str:
     """Return the Markdown card of a set of questions called `name` about those scenes."""
     by_subtask = {s: [q for q in questions if q.subtask == s] for s in SUBTASKS}
-    return _TEXT.format(
+    text = Path(__file__).with_name("card.md").read_text(encoding="utf-8")
+    return text.format(
         name=name,
         scenes_name=scenes_name,
         count=len(questions),

@@ -16,8 +16,6 @@ from phyblock.errors import DataError, Problem
 from phyblock.making.poses import POSES
 from phyblock.stable import drawn_bytes
 
-__all__ = ["NEEDED", "make_candidates"]
-
 NEEDED: dict[BlockType, dict[str, float]] = {
     "arch": {"gate": 0.196, "gate-turned": 0.081, "cradle": 0.05, "cradle-turned": 0.032},
     "cube": {"flat": 1.246},
