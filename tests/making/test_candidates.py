@@ -22,7 +22,7 @@ from phyblock.scoring.plan import Goal, match_plan
 from phyblock.tracks.goal_blind import goal_blind_plans
 from phyblock.types import SETTINGS, Setting
 
-BUILT_IN = Path(__file__).parents[3] / "benchmarks" / "data" / "phyblock-400"
+BUILT_IN = Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400"
 EVERY_LOOK = [(kind, euler) for kind in KIT_PALETTE for euler in POSES[kind[0]].values()]
 GAIN = 0.02
 """What a learner may win without seeing the goal: what is left is chance."""

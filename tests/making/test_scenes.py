@@ -1,0 +1,309 @@
+"""Sketches, designs, the grammar and the production of scenes: sound, varied, the same again."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from phyblock.data import read_builtin
+from phyblock.domain import BLOCK_TYPES, KIT_PALETTE, Scene, orientation_class
+from phyblock.domain.symmetry import canonical_form
+from phyblock.errors import DataError, StoreError
+from phyblock.making.poses import POSES
+from phyblock.making.scenes.designs import BUILDINGS, COMPOSITIONS, CREATURES, beside
+from phyblock.making.scenes.files import SetWriter, card, open_writer, sums_text
+from phyblock.making.scenes.production import (
+    GROUP_LEVELS,
+    Order,
+    Request,
+    Share,
+    draw,
+    produce,
+    shares,
+)
+from phyblock.making.scenes.sketch import PALETTES, Draft, make_scene
+from phyblock.making.workers import open_workers
+from phyblock.sim.contact import bounds_m, find_gaps, find_overlaps, support_graph
+from phyblock.sim.engine import (
+    REFERENCE_ENGINE,
+    described_engine,
+    installed_engines,
+    other_engine,
+    physics_engine,
+)
+from phyblock.sim.pictures import hidden_blocks
+from tests.designs.acceptance import accept, form_problems
+from tests.designs.pad import Pad
+from tests.designs.scenes import designed_scene, designed_scenes
+
+grid = st.integers(-3, 3)
+steps = st.lists(
+    st.sampled_from(BLOCK_TYPES).flatmap(
+        lambda block_type: st.tuples(
+            st.just(block_type), grid, grid, st.sampled_from(sorted(POSES[block_type]))
+        )
+    ),
+    min_size=1,
+    max_size=8,
+)
+
+
+@given(steps)
+@settings(max_examples=40, deadline=None)
+def test_whatever_is_put_down_neither_overlaps_nor_floats(drawn) -> None:
+    sketch = Pad()
+    for block_type, y, x, pose in drawn:
+        sketch.put(block_type, y, x, pose)
+    assert find_overlaps(sketch.blocks, 1e-5) == ()
+    assert find_gaps(sketch.blocks, 1e-5) == ()
+
+
+@pytest.mark.parametrize("block_type", BLOCK_TYPES)
+def test_poses_of_a_type_look_different(block_type) -> None:
+    poses = POSES[block_type].values()
+    assert len({orientation_class(block_type, euler) for euler in poses}) == len(poses)
+
+
+def test_a_scene_is_centered_and_its_graph_comes_from_contact() -> None:
+    sketch = Pad(origin=(20.0, -8.0))
+    sketch.pair("cube", 2)
+    sketch.put("cuboid3", pose="flat-y")
+    scene = make_scene("test", (1,), sketch.blocks)
+    assert [block.depend for block in scene.blocks] == [(), (), (1, 2)]
+    assert [block.layer for block in scene.blocks] == [1, 1, 2]
+    assert scene.blocks[2].position_m == (0.0, 0.0, 0.0625)
+    assert scene.parents == ("test",)
+
+
+def test_designs_declare_what_contact_says() -> None:
+    for scene in designed_scenes():
+        below = support_graph(scene.blocks)
+        for block, layer in zip(scene.blocks, scene.graph.layers, strict=True):
+            assert set(block.depend) == below[block.order] - {0}
+            assert block.layer == layer
+
+
+GROUPS = tuple(GROUP_LEVELS)
+seeds = st.integers(0, 2**31)
+requests = st.builds(
+    Request, seeds, st.sampled_from(["kit", "full"]), st.sampled_from(GROUPS), st.integers(0, 999)
+)
+
+
+@functools.cache
+def some(group: str, count: int, palette: str = "kit") -> tuple[Request, ...]:
+    found = (Request(5, palette, group, number) for number in range(200))
+    return tuple(islice((request for request in found if draw(request) is not None), count))
+
+
+@given(requests)
+@example(Request(13, "full", "3", 15))
+@settings(deadline=None, max_examples=40)
+def test_what_the_grammar_draws_keeps_its_limits(request_: Request) -> None:
+    scene = draw(request_)
+    if scene is not None:
+        assert scene.levels == GROUP_LEVELS[request_.group]
+        assert form_problems(scene, PALETTES[request_.palette]) == ()
+        assert find_overlaps(scene.blocks) == ()
+        assert find_gaps(scene.blocks) == ()
+        assert len({block.look for block in scene.blocks}) <= 14
+
+
+@pytest.mark.parametrize("group", GROUPS)
+def test_most_requests_give_a_scene_and_the_same_one_again(group: str) -> None:
+    scenes = [draw(Request(1, "kit", group, number)) for number in range(20)]
+    assert sum(scene is not None for scene in scenes) >= 12
+    assert scenes == [draw(Request(1, "kit", group, number)) for number in range(20)]
+
+
+@pytest.mark.parametrize("name", sorted({**BUILDINGS, **CREATURES, **COMPOSITIONS}))
+def test_every_theme_varies(name: str) -> None:
+    theme = {**BUILDINGS, **CREATURES, **COMPOSITIONS}[name]
+    forms = set()
+    for seed in range(10):
+        draft = Draft(np.random.default_rng(seed))
+        theme(draft)
+        assert [block.order for block in draft.blocks] == list(range(1, len(draft) + 1))
+        assert {block.kind for block in draft.blocks} <= set(KIT_PALETTE)
+        forms.add(canonical_form(draft.blocks))
+    assert len(forms) >= 4
+
+
+def test_a_recolored_scene_is_its_parent_but_for_colors() -> None:
+    for parent in some("3", 6, "full"):
+        original = draw(parent)
+        varied = draw(Request(5, "full", "3", 0, (parent,)))
+        assert varied is not None
+        assert varied.id == "recolored"
+        assert gray(varied) == gray(original)
+        assert canonical_form(varied.blocks) != canonical_form(original.blocks)
+
+
+def gray(scene: Scene) -> object:
+    return canonical_form([replace(block, color="red") for block in scene.blocks])
+
+
+def test_a_combined_scene_holds_both_parents() -> None:
+    parents = some("2", 2)
+    scene = next(
+        found
+        for number in range(20)
+        if (found := draw(Request(5, "kit", "3", number, parents))) is not None
+    )
+    whole = [draw(parent) for parent in parents]
+    assert len(scene) == sum(len(one) for one in whole)
+    split = len(whole[0])
+    assert canonical_form(scene.blocks[:split]) == canonical_form(whole[0].blocks)
+    assert canonical_form(scene.blocks[split:]) == canonical_form(whole[1].blocks)
+
+
+@given(st.integers(0, 3), st.integers(0, 3), st.sampled_from([0.0, 1.0, 2.5]), st.booleans())
+@settings(deadline=None, max_examples=20)
+def test_parts_stand_beside_one_another_with_their_gap(one, other, gap, deep) -> None:
+    axis = 0 if deep else 1
+    parts = [draw(request).blocks for request in (some("2", 4)[one], some("2", 4)[other])]
+    row = beside(parts, gap, axis)
+    low = min(bounds_m(block)[0][axis] for block in row[len(parts[0]) :])
+    high = max(bounds_m(block)[1][axis] for block in row[: len(parts[0])])
+    assert low - high == pytest.approx(gap * 0.025, abs=1e-5)
+    assert [block.order for block in row] == list(range(1, len(row) + 1))
+
+
+RECHECKED = ("l1-boat", "l1-dolmen", "l2-bridge", "l2-rocket", "l3-balance", "l3-robot")
+
+
+@pytest.mark.parametrize("scene", designed_scenes(), ids=lambda scene: scene.id)
+def test_a_scene_is_in_form_fits_together_and_shows(scene) -> None:
+    assert form_problems(scene) == ()
+    assert find_overlaps(scene.blocks) == ()
+    assert find_gaps(scene.blocks) == ()
+    assert hidden_blocks(scene) == ()
+
+
+@pytest.mark.parametrize("name", RECHECKED)
+def test_physics_again(name: str) -> None:
+    accept(designed_scene(name))
+
+
+SMALL = Order(3, "kit", (Share("1", 3, 1), Share("2", 4, 2), Share("3", 2, 1)))
+
+
+def made(order: Order, jobs: int = 1) -> list[Scene]:
+    with open_workers(jobs) as workers:
+        return list(produce(order, workers))
+
+
+def write(folder: Path, scenes: list[Scene]) -> SetWriter:
+    with open_writer(folder, "kit") as writer:
+        for scene in scenes:
+            writer.add(scene)
+        writer.finish("card\n")
+    return writer
+
+
+@pytest.fixture(scope="module")
+def scenes() -> list[Scene]:
+    return made(SMALL)
+
+
+def test_a_card_names_another_engine_and_not_the_usual_one(
+    scenes: list[Scene], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written = write(tmp_path / "set", scenes)
+    others = f", by {other_engine()}" if other_engine() else ""
+    assert bool(others) == (physics_engine().name != REFERENCE_ENGINE)
+    here = card("few", written, "make", "kit")
+    assert f"number of processes{others}.\n" in here
+    usual = here.replace(others, "")
+    if "mujoco" in installed_engines():
+        monkeypatch.setenv("PHYBLOCK_PHYSICS", "mujoco")
+        told = f"number of processes, by the physics engine {described_engine()}"
+        assert card("few", written, "make", "kit") == usual.replace("number of processes", told)
+
+
+@given(st.integers(1, 5000), st.sets(st.integers(1, 4), min_size=1))
+def test_shares_add_up(count: int, levels: set[int]) -> None:
+    found = shares(count, sorted(levels))
+    assert sum(share.base + share.varied for share in found) == count
+    assert {level for share in found for level in map(int, share.group.split("+"))} <= levels
+
+
+@pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.slow)])
+def test_every_scene_is_accepted_again_with_the_long_trial(scenes: list[Scene], every: int) -> None:
+    for scene in scenes[::every]:
+        accept(scene)
+        assert hidden_blocks(scene) == ()
+
+
+def test_no_two_scenes_are_the_same(scenes: list[Scene]) -> None:
+    assert len({canonical_form(scene.blocks) for scene in scenes}) == len(scenes)
+
+
+def test_variations_name_base_scenes(scenes: list[Scene]) -> None:
+    bases = {scene.id for scene in scenes if scene.parents == (scene.id,)}
+    varied = [scene for scene in scenes if scene.id not in bases]
+    assert varied
+    assert all(set(scene.parents) <= bases for scene in varied)
+
+
+@pytest.mark.slow
+def test_two_processes_give_the_same_bytes(tmp_path: Path, scenes: list[Scene]) -> None:
+    for jobs, folder in ((1, tmp_path / "one" / "set"), (2, tmp_path / "two" / "set")):
+        write(folder, made(SMALL, jobs))
+    one, two = ((tmp_path / name / "set" / "scenes.jsonl").read_bytes() for name in ("one", "two"))
+    assert one == two
+    assert len(one.splitlines()) == len(scenes)
+
+
+def test_what_is_written_is_read_back(tmp_path: Path, scenes: list[Scene]) -> None:
+    folder = tmp_path / "set"
+    writer = write(folder, scenes)
+    assert [task.scene for task in read_builtin(folder).tasks] == sorted(
+        scenes, key=lambda scene: scene.id
+    )
+    assert (folder / "SHA256SUMS").read_text() == sums_text(folder)
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "README.md",
+        "SHA256SUMS",
+        "VERSION",
+        "scenes.jsonl",
+    ]
+    assert writer.levels[2].scenes == 6
+    with pytest.raises(StoreError, match="holds a data set already"), open_writer(folder, "kit"):
+        pass
+
+
+def test_a_failure_leaves_nothing_half_written(tmp_path: Path, scenes: list[Scene]) -> None:
+    folder = tmp_path / "set"
+    with pytest.raises(DataError, match="at most 16"):
+        write(folder, [scenes[0], too_many_looks(scenes[0])])
+    assert list(folder.iterdir()) == []
+
+
+def too_many_looks(scene: Scene) -> Scene:
+    block = scene.blocks[0]
+    blocks = tuple(replace(block, euler_deg=(0.0, 0.0, 3.0 * i)) for i in range(18))
+    return replace(scene, blocks=tuple(replace(b, type="arch", color="red") for b in blocks))
+
+
+def test_rules_that_give_no_more_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("phyblock.making.scenes.production._PATIENCE", 3)
+    order = Order(0, "kit", (Share("1", 100_000, 0),))
+    with pytest.raises(DataError, match="new scenes of 100000"):
+        for _ in zip(range(400), produce(order, _Nothing()), strict=False):
+            pass
+
+
+class _Nothing:
+    """Workers whose rules never give a scene."""
+
+    def map(self, function, tasks):
+        del function
+        return (None for _ in tasks)
