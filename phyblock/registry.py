@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = [
     "PUBLISHED_TABLE",
     "TrackWords",
+    "add_baseline",
     "add_measure",
     "added_measures",
     "baseline_names",
@@ -29,6 +30,7 @@ __all__ = [
     "register_track",
     "remove_measure",
     "table_names",
+    "track_baselines",
     "unregister_track",
 ]
 
@@ -105,6 +107,7 @@ class TrackWords(Protocol):
 
 _registered: dict[str, TrackWords] = {}
 _measures: dict[str, tuple[Any, ...]] = {}
+_baselines: dict[str, dict[str, Callable[..., str]]] = {}
 
 
 def known_tracks() -> Mapping[str, TrackWords]:
@@ -151,9 +154,23 @@ def added_measures(track: str) -> tuple[Any, ...]:
     return _measures.get(track, ())
 
 
+def add_baseline(track: str, name: str, rule: Callable[..., str]) -> None:
+    """Add a rule that answers in place of a model: a function of what a request of the track is
+    about and a random generator. Raises ValueError for a name that is taken.
+    """
+    if name in track_baselines(known_track(track)):
+        raise ValueError(f"the track {track} has a baseline of this name: {name}")
+    _baselines.setdefault(track, {})[name] = rule
+
+
+def track_baselines(kind: TrackWords) -> Mapping[str, Callable[..., str]]:
+    """Return the rules of a track by name, the built-in ones first."""
+    return {**kind.baselines, **_baselines.get(kind.name, {})}
+
+
 def has_additions() -> bool:
-    """Whether tracks or measures were added to the built-in ones."""
-    return bool(_registered) or any(_measures.values())
+    """True if tracks, measures or baselines were added to the built-in ones."""
+    return bool(_registered or _baselines) or any(_measures.values())
 
 
 def table_names() -> tuple[str, ...]:
@@ -164,13 +181,14 @@ def table_names() -> tuple[str, ...]:
 
 def baseline_names() -> tuple[str, ...]:
     """Names of all baselines, in the order of the tracks that bring them."""
-    return tuple(dict.fromkeys(name for kind in known_tracks().values() for name in kind.baselines))
+    tracks = known_tracks().values()
+    return tuple(dict.fromkeys(name for kind in tracks for name in track_baselines(kind)))
 
 
 def baseline_rules(name: str) -> Mapping[type[object], Callable[..., str]]:
     """The rules of one baseline by what they answer about; empty for a name that is none."""
     return {
-        kind.subject: kind.baselines[name]
+        kind.subject: rules[name]
         for kind in known_tracks().values()
-        if name in kind.baselines
+        if name in (rules := track_baselines(kind))
     }

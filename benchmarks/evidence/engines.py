@@ -5,11 +5,11 @@
 Both engines must be installed (Python 3.11, `pip install -e '.[mujoco]'`). Every 20th scene and
 question is tried, or with `--all` each of them. A scene is let go as it is, after every step of
 random valid orders, and without each of its blocks, as strict step planning lets it go: a verdict
-is whether all blocks stand. A question's answer is derived again from its scene, as `phyblock vqa
-verify` does, which wants four settings of the engine to agree: it is found again, it is not sure
-in this engine, or another answer is. `same` counts equal verdicts, `opposite` those of which one
-says no where the other says yes (a question that is not sure says neither), `detail` those that
-are equal to the last block that falls.
+is whether all blocks stand. A question's answer is derived again from its scene, as `phyblock
+questions verify` does, which wants four settings of the engine to agree: it is found again, it is
+not sure in this engine, or another answer is. `same` counts equal verdicts, `opposite` those of
+which one says no where the other says yes (a question that is not sure says neither), `detail`
+those that are equal to the last block that falls.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@
 A run is made of recorded replies for the bundled scenes: the real command asks for them once, and
 its records are repeated under so many seeds that there are `--samples`. Then each in a process of
 its own: the floor, which reads the same lines as JSON and does nothing with them; resuming, which
-opens the run, reads its records and finds nothing left to ask; `phyblock tables`; `phyblock
+opens the run, reads its records and finds nothing left to ask; `phyblock report --print`; `phyblock
 report`. Prints wall and CPU seconds, their ratio to the floor's wall seconds, and the peak of
 resident memory.
 """

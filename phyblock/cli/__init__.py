@@ -1,1 +1,1 @@
-"""One file a verb; the only place that prints."""
+"""The command line: the only place that imports click and rich."""

@@ -1,69 +1,88 @@
-"""The `phyblock` command: verbs are loaded only when they are called."""
+"""The `phyblock` command: its verbs, plugins, and how errors end it."""
 
 from __future__ import annotations
 
 import gc
+import importlib
 import os
 import re
 import sys
+import traceback
 from collections import Counter
+from importlib.metadata import entry_points
 
 import click
 
-from phyblock.cli.verbs import Verbs
-from phyblock.errors import InputError, PhyblockError, Problem, StoreError, reason_of
+from phyblock.cli.options import Sections, Verbs
+from phyblock.errors import InputError, PhyblockError, Problem, SpecError, StoreError, reason_of
 from phyblock.text import counted, plain_lines
 from phyblock.types import QUOTE_HINT
 
-__all__ = ["main", "show_problems"]
-
-_VERBS = {
-    "run": "Run a suite, or continue where it stopped.",
-    "play": "Answer a suite yourself, in a browser, as models do.",
-    "score": "Read and score stored replies again; calls no model.",
-    "report": "Write a run's tables again from its records.",
-    "tables": "Print a run's tables; beside the paper's with --paper.",
-    "figures": "Draw a run's figures for a paper, as PDF and SVG.",
-    "compare": "Compare models on the same samples: difference, interval, verdict.",
-    "export": "Write a run for Inspect AI, Hugging Face datasets, or as CSV or Parquet.",
-    "bundle": "Write a run as one file that others can score again.",
-    "verify-bundle": "Score a bundle again and say whether it comes out the same.",
-    "site": "Put runs and bundles into a static leaderboard.",
-    "episode": "Show an episode step by step, as text or as a GIF.",
-    "export-data": "Write questions with pictures for VLMEvalKit or Hugging Face.",
-    "models": "List models with kinds, prices and keys; check one.",
-    "validate": "Check suites, models files and data sets.",
-    "scenes": "Make, check, show and draw scenes.",
-    "vqa": "Make, check and show questions about scenes.",
-    "cache": "Show or clear the reply cache.",
-    "init": "Lay out a working folder: a suite, models.yaml, prompts.",
+_CLI, _MAKING = "phyblock.cli", "phyblock.making.cli"
+_SECTIONS: Sections = {
+    "Run": {
+        "init": (f"{_CLI}.setup:init", "Lay out a folder: a suite, models.yaml, prompts."),
+        "validate": (f"{_CLI}.setup:validate", "Check suites, models files and data sets."),
+        "models": (f"{_CLI}.models:models", "List models with prices and keys; check one."),
+        "run": (f"{_CLI}.run:run", "Run a suite, or continue where it stopped."),
+        "play": (f"{_CLI}.play:play", "Answer a suite yourself, in a browser."),
+        "score": (f"{_CLI}.run:score", "Score stored replies again; calls no model."),
+        "cache": (f"{_CLI}.setup:cache", "Show or clear the reply cache."),
+    },
+    "Look": {
+        "report": (f"{_CLI}.results:report", "Write tables and page again, or print the tables."),
+        "show": (f"{_CLI}.show:show", "Show a sample: prompt, reply, verdict of each step."),
+        "compare": (f"{_CLI}.results:compare", "Compare models on the same samples."),
+        "figures": (f"{_CLI}.results:figures", "Draw figures for a paper, as PDF and SVG."),
+    },
+    "Share": {
+        "export": (f"{_CLI}.results:export", "Write a run, or questions, for other tools."),
+        "bundle": (f"{_CLI}.results:bundle", "Write a run as one file that others can verify."),
+        "verify": (f"{_CLI}.results:verify", "Score a bundle again and compare."),
+        "site": (f"{_CLI}.results:site", "Put runs and bundles into a leaderboard."),
+    },
+    "Data": {
+        "scenes": (f"{_MAKING}.scenes_verbs:command", "Make, check, show and draw scenes."),
+        "questions": (f"{_MAKING}.vqa_verbs:command", "Make, check and show questions."),
+    },
 }
-
-
-_MADE_ELSEWHERE = {
-    "scenes": "phyblock.making.cli.scenes_verbs",
-    "vqa": "phyblock.making.cli.vqa_verbs",
-}
-"""Verbs of the package beside this one, which the runner never imports but by these names."""
+_ENTRY_POINTS = "phyblock.plugins"
 
 
 @click.group(
     cls=Verbs,
-    verbs=_VERBS,
-    prefix="phyblock.cli.",
-    modules=_MADE_ELSEWHERE,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    sections=_SECTIONS,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 80},
     epilog="Start with: phyblock run quick",
 )
+@click.option(
+    "--plugin",
+    "plugins",
+    multiple=True,
+    metavar="MODULE",
+    help="Import a Python module that adds tracks, measures or baselines; may be given again.",
+)
 @click.version_option(None, "-V", "--version", package_name="phyblock", prog_name="phyblock")
-def phyblock() -> None:
+def phyblock(plugins: tuple[str, ...]) -> None:
     """Test vision-language models on PhyBlock: 3D block assembly from pictures."""
+    named = {
+        entry.value.partition(":")[0]: entry.name for entry in entry_points(group=_ENTRY_POINTS)
+    }
+    for module in dict.fromkeys([*named, *plugins]):
+        _load_plugin(module, f"plugin {named[module]}" if module in named else "--plugin")
 
 
-_LOOSE_END = re.compile(r"unexpected extra argument")
-"""What click says of a value that the shell took apart."""
-_VALUES = re.compile(r"=|,$")
-"""What values have that are often written with spaces: `KEY=[A, B]`, `A, B`."""
+def _load_plugin(module: str, where: str) -> None:
+    """Import a module that registers what it adds; SpecError that names the line it fails in."""
+    if os.getcwd() not in sys.path:
+        sys.path.insert(0, os.getcwd())
+    try:
+        importlib.import_module(module)
+    except Exception as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        place = "" if last.filename.startswith("<") else f" ({last.filename}:{last.lineno})"
+        message = f"cannot be imported: {type(error).__name__}: {error}{place}"
+        raise SpecError(Problem(where, message, found=module)) from error
 
 
 def main() -> None:
@@ -83,11 +102,13 @@ def main() -> None:
         sys.exit(0)
     except click.ClickException as error:
         error.show()
-        has_values = any(map(_VALUES.search, sys.argv[1:]))
-        if has_values and _LOOSE_END.search(error.format_message()):
+        # The shell took a value apart that has spaces: `KEY=[A, B]`, `A, B`.
+        has_values = any(re.search(r"=|,$", word) for word in sys.argv[1:])
+        if has_values and "unexpected extra argument" in error.format_message():
             click.echo(f"Hint: {QUOTE_HINT}", err=True)
         sys.exit(2)
     except click.Abort:
+        click.echo("Interrupted.", err=True)
         sys.exit(130)
     except InputError as error:
         show_problems(error)
@@ -114,31 +135,22 @@ def _drop_output() -> None:
     os.close(nowhere)
 
 
-def show_problems(error: InputError) -> None:
-    """Show the problems, of those that are alike the first alone."""
-    alike = Counter(_kind(problem) for problem in error.problems)
-    shown: Counter[tuple[str, str]] = Counter()
-    for problem in error.problems:
-        kind = _kind(problem)
-        if shown.total() == _SHOWN or shown[kind] == _SHOWN_ALIKE:
+def show_problems(error: InputError, most: int = 25, most_alike: int = 5) -> None:
+    """Print `most` problems, of those with the same field and message the first `most_alike`."""
+    kinds = [(re.sub(r"\[\d+\]", "[]", p.field), p.message) for p in error.problems]
+    alike, shown, unshown = Counter(kinds), Counter[tuple[str, str]](), 0
+    for problem, kind in zip(error.problems, kinds, strict=True):
+        if shown[kind] == most_alike:
+            continue
+        if shown.total() == most:
+            unshown += 1
             continue
         shown[kind] += 1
         click.echo(
             click.style("error: ", fg="red", bold=True) + plain_lines(str(problem)), err=True
         )
-        if shown[kind] == _SHOWN_ALIKE < alike[kind]:
-            more = f"... and {alike[kind] - _SHOWN_ALIKE:,} more like it"
+        if shown[kind] == most_alike < alike[kind]:
+            more = f"... and {alike[kind] - most_alike:,} more like it"
             click.echo(plain_lines(f"{more}: {': '.join(filter(None, kind))}"), err=True)
-    n_shown = sum(alike[kind] if shown[kind] == _SHOWN_ALIKE else shown[kind] for kind in alike)
-    if len(error.problems) > n_shown:
-        more = counted(len(error.problems) - n_shown, "more problem")
-        click.echo(f"... and {more}", err=True)
-
-
-def _kind(problem: Problem) -> tuple[str, str]:
-    """What problems of many places have in common: the field, whatever its index, and the words."""
-    return re.sub(r"\[\d+\]", "[]", problem.field), problem.message
-
-
-_SHOWN = 25
-_SHOWN_ALIKE = 5
+    if unshown:
+        click.echo(f"... and {counted(unshown, 'more problem')}", err=True)

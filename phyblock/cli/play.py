@@ -7,7 +7,6 @@ import contextlib
 import shlex
 import sys
 import webbrowser
-from collections.abc import Sequence
 from pathlib import Path
 from threading import Thread
 
@@ -15,9 +14,9 @@ import click
 from rich.console import Console
 from rich.progress import Progress
 
-from phyblock.cli.console import make_console, shown_path
-from phyblock.cli.paths import NAME_OR_PATH, UserPath
-from phyblock.cli.report import show_made
+from phyblock.cli.console import make_console, print_path, shown_path
+from phyblock.cli.options import NAME_OR_PATH, UserPath, limit_option, sets_option
+from phyblock.cli.results import show_made
 from phyblock.config.suite import load_suite
 from phyblock.errors import Problem, SpecError, reason_of
 from phyblock.files import read_text
@@ -36,14 +35,12 @@ from phyblock.run.session import Session
 from phyblock.run.store import held_run, run_folder
 from phyblock.text import counted
 
-__all__ = ["command"]
-
 _INTERRUPTED = 130
 _RUNS = Path("results")
 _LARGEST_CONSENT_BYTES = 64 * 1024
 
 
-@click.command("play", epilog=f"Bundled suites: {', '.join(bundled_suites())}.")
+@click.command(epilog=f"Bundled suites: {', '.join(bundled_suites())}.")
 @click.argument("suite", type=NAME_OR_PATH)
 @click.option(
     "--name",
@@ -58,12 +55,8 @@ _LARGEST_CONSENT_BYTES = 64 * 1024
     help="Number of the person in a study, from 1: balances the order of scenes over people. "
     "[default: an order by the name]",
 )
-@click.option(
-    "--set", "sets", multiple=True, metavar="KEY=VALUE", help="Override a value of the suite."
-)
-@click.option(
-    "--limit", type=click.IntRange(min=1), metavar="N", help="N scenes, spread over levels."
-)
+@sets_option
+@limit_option
 @click.option("--consent", type=UserPath(), metavar="FILE", help="Text that is agreed to first.")
 @click.option(
     "--beside",
@@ -72,7 +65,9 @@ _LARGEST_CONSENT_BYTES = 64 * 1024
     metavar="RUN",
     help="Show what the models of this run folder did, after the end.",
 )
-@click.option("--out", type=UserPath(), help="Folder of the run. [default: results/SUITE-DIGEST]")
+@click.option(
+    "--out", type=UserPath(), metavar="DIR", help="Folder. [default: results/SUITE-DIGEST]"
+)
 @click.option("--port", type=click.IntRange(0, 65535), default=0, help="[default: any free one]")
 @click.option("--no-report", is_flag=True, help="With --import: tables alone, no page.")
 @click.option("--no-browser", is_flag=True, help="Print the address and open nothing.")
@@ -80,7 +75,7 @@ _LARGEST_CONSENT_BYTES = 64 * 1024
 @click.option(
     "--import", "answers", type=UserPath(), metavar="FILE", help="Take answers of such a page."
 )
-def command(
+def play(
     suite: str,
     name: str,
     number: int | None,
@@ -102,7 +97,13 @@ def command(
     """
     if export is not None and answers is not None:
         raise SpecError(Problem("--export", "cannot be given with --import"))
-    person = Person(name, number, _consent(consent, answers, offline=export is not None))
+    if consent is not None:
+        text = _consent(consent)
+    elif answers is not None:
+        text = default_text(answers)
+    else:
+        text = default_consent(offline=export is not None)
+    person = Person(name, number, text)
     path = find_suite(suite)
     data, prompts = bundled("benchmarks", "data"), prompt_dirs(path)
     loaded = load_suite(path, sets, data_dir=data, prompt_dirs=prompts)
@@ -118,27 +119,19 @@ def command(
         run_folder(folder).check(names_to_write(folder, page=True))
     if answers is not None:
         return _import(console, plan, person, folder, answers, page=not no_report)
-    return _sit(console, plan, person, folder, beside, port, opens=not no_browser)
+    return _serve(console, plan, person, folder, beside, port, opens=not no_browser)
 
 
-def _consent(own: Path | None, answers: Path | None, *, offline: bool) -> str:
-    """The text that is agreed to, or was where there is a file of answers."""
-    if own is not None:
-        return _text(own)
-    return default_consent(offline=offline) if answers is None else default_text(answers)
-
-
-def _text(path: Path) -> str:
+def _consent(path: Path) -> str:
     try:
         text = read_text(path, _LARGEST_CONSENT_BYTES).strip()
     except OSError as error:
-        raise SpecError(
-            Problem(str(path), f"cannot be read: {reason_of(error)}", "--consent")
-        ) from error
+        message = f"cannot be read: {reason_of(error)}"
+        raise SpecError(Problem(str(path), message, "--consent")) from error
     except ValueError as error:
         raise SpecError(Problem(str(path), str(error), "--consent")) from error
     if not text:
-        raise SpecError(Problem(str(path), "says nothing", "--consent"))
+        raise SpecError(Problem(str(path), "is empty", "--consent"))
     return text
 
 
@@ -154,23 +147,16 @@ def _export(console: Console, plan: RunPlan, person: Person, folder: Path) -> in
     finally:
         plan.close()
     tasks = counted(plan.samples_per_model, "task")
-    console.print(f"{tasks} for {person.name}: open {shown_path(page)}", soft_wrap=True)
-    again = shlex.join(["phyblock", *_without(sys.argv[1:], "--export"), "--import", "FILE"])
-    console.print(f"Its answers come into a run with: {again}", soft_wrap=True, markup=False)
-    return 0
-
-
-def _without(words: Sequence[str], option: str) -> list[str]:
-    """The words of a command without an option and its value."""
-    kept: list[str] = []
-    skips = False
+    console.print(f"{tasks} for {person.name}; its answers come into a run with:")
+    words, again = iter(sys.argv[1:]), ["phyblock"]
     for word in words:
-        if not skips and not word.startswith(f"{option}="):
-            skips = word == option
-            kept += [] if skips else [word]
-        else:
-            skips = False
-    return kept
+        if word == "--export":
+            next(words)
+        elif not word.startswith("--export="):
+            again.append(word)
+    print_path(console, f"  {shlex.join([*again, '--import', 'FILE'])}")
+    print_path(console, page)
+    return 0
 
 
 def _import(
@@ -178,36 +164,34 @@ def _import(
 ) -> int:
     given = read_answers(file, plan, person)
     answers = FileAnswers(given, plan, person.model)
-    model = PersonModel(person.model, plan.suite, answers.ask)
+    present = {person.model: PersonModel(person.model, plan.suite, answers.ask)}
 
     async def run() -> RunResult:
-        present = {model.name: model}
-        async with Session(
-            plan, folder, lambda _: None, use_cache=False, present=present
-        ) as session:
-            return await session.run()
+        session = Session(plan, folder, lambda _: None, use_cache=False, present=present)
+        async with session as opened:
+            return await opened.run()
 
     result = asyncio.run(run())
-    show_made(folder, plan.suite.tables, page=page)
+    made = show_made(folder, plan.suite.tables, page=page)
     if known := len(given) - answers.taken:
         text = f"{known:,} of {counted(len(given), 'answer')} of {shown_path(file)} were there"
-        console.print(f"{text} already: those in the run stay.", soft_wrap=True)
-    done = f"{result.settled:,} of {counted(result.samples, 'answer')} are there"
-    console.print(f"{done}. The run is in {shown_path(folder)}", soft_wrap=True)
+        console.print(f"{text} already: those in the run stay.")
+    console.print(f"{result.settled:,} of {counted(result.samples, 'answer')} are there.")
+    print_path(console, made)
     return 1 if result.left else 0
 
 
-def _sit(
+def _serve(
     console: Console,
     plan: RunPlan,
     person: Person,
     folder: Path,
-    beside: Sequence[Path],
+    beside: tuple[Path, ...],
     port: int,
     *,
     opens: bool,
 ) -> int:
-    # Tables are made of pandas, which a sitting does without until its end.
+    # Tables are made of pandas, which a session does without until its end.
     from phyblock.play.outcomes import outcomes
     from phyblock.tables.load import load_run
 
@@ -215,8 +199,8 @@ def _sit(
         load_run(other, texts=False)
 
     def begun() -> None:
-        console.print(f"Open {server.address}", soft_wrap=True, markup=False, highlight=False)
-        console.print("Ctrl-C ends the sitting; the same command goes on.", style="dim")
+        print_path(console, f"Open {server.address}")
+        console.print("Ctrl-C ends the session; the same command goes on.", style="dim")
         if opens:
             # A browser for terminals would not come back before it is closed.
             Thread(target=webbrowser.open, args=(server.one_time_address,), daemon=True).start()
@@ -225,15 +209,14 @@ def _sit(
     with Server(sitting.desk, port) as server:
         result = asyncio.run(sitting.run())
         if result.left:
-            where = shown_path(folder)
-            done = f"{result.settled:,} of {result.samples:,} tasks are answered"
-            console.print(f"{done}. The run is in {where}", soft_wrap=True)
-            again = shlex.join(["phyblock", *sys.argv[1:]])
-            console.print(f"To go on, give the same command again: {again}", soft_wrap=True)
+            console.print(f"{result.settled:,} of {result.samples:,} tasks are answered.")
+            console.print("To go on, give the same command again:")
+            print_path(console, f"  {shlex.join(['phyblock', *sys.argv[1:]])}")
             return _INTERRUPTED
-        show_made(folder, plan.suite.tables, page=True)
+        made = show_made(folder, plan.suite.tables, page=True)
         server.show_files(report_files(folder))
         sitting.desk.finish(outcomes(folder, person.model, beside))
+        print_path(console, made)
         console.print("All is answered; the page shows how it went. Ctrl-C ends.", style="dim")
         with contextlib.suppress(KeyboardInterrupt):
             server.finished.wait()

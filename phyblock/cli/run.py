@@ -1,28 +1,41 @@
-"""`phyblock run`: a suite from start to tables, or on from where it stopped."""
+"""`phyblock run` and `phyblock score`: asking models, and judging stored replies again."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import shlex
 import signal
 import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any, cast
 
 import click
 from rich.console import Console
 
-from phyblock.cli.console import make_console, shown_path
-from phyblock.cli.estimate_view import show_estimate
-from phyblock.cli.names import split_names
-from phyblock.cli.paths import NAME_OR_PATH, UserPath, models_file_option
+from phyblock.cli.console import make_console, may_spend, print_path, print_table, shown_path
+from phyblock.cli.options import (
+    NAME_OR_PATH,
+    UserPath,
+    data_option,
+    limit_option,
+    models_file_option,
+    run_argument,
+    sets_option,
+    split_names,
+    yes_option,
+)
 from phyblock.cli.progress import ProgressView
-from phyblock.cli.report import show_made
+from phyblock.cli.results import show_made, show_tables
 from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
+from phyblock.models import Price, is_billed
 from phyblock.models.litellm_client import be_quiet
 from phyblock.report.made import names_to_write
 from phyblock.resources import bundled
-from phyblock.run.estimate import estimate, spending_refused, unlimited_spending
+from phyblock.run.estimate import Estimate, estimate
 from phyblock.run.execute import Cause, RunResult
 from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.preflight import (
@@ -33,32 +46,32 @@ from phyblock.run.preflight import (
     moved_remarks,
     prompt_dirs,
 )
+from phyblock.run.rescore import rescore
 from phyblock.run.session import Session, check_ready
 from phyblock.run.store import held_run, run_folder
-from phyblock.text import counted, one_line
-
-__all__ = ["command"]
+from phyblock.tables.text_table import NO_VALUE, Column, TextTable
+from phyblock.text import counted, one_line, plain_lines
+from phyblock.tracks import kind_of
+from phyblock.types import MATCHERS, PLAN_PARSERS, Matcher, PlanParser
 
 _INTERRUPTED = 130
+_LINE_EVERY_S = 2.0
 
 
-@click.command("run", epilog=f"Bundled suites: {', '.join(bundled_suites())}.")
+@click.command(epilog=f"Bundled suites: {', '.join(bundled_suites())}.")
 @click.argument("suite", type=NAME_OR_PATH)
-@click.option(
-    "--set", "sets", multiple=True, metavar="KEY=VALUE", help="Override a value of the suite."
-)
+@sets_option
 @click.option(
     "--models",
     metavar="A,B",
     help="Run these models in place of the suite's: any of models.yaml, group:NAME for all of a "
     "group, or the baselines.",
 )
-@click.option(
-    "--limit", type=click.IntRange(min=1), metavar="N", help="Run N scenes, spread over levels."
-)
+@limit_option
 @click.option(
     "--out",
     type=UserPath(),
+    metavar="DIR",
     help="Folder of the run. [default: results/SUITE-DIGEST]",
 )
 @models_file_option
@@ -68,8 +81,8 @@ _INTERRUPTED = 130
     "--retry-failed", is_flag=True, help="Ask again for samples whose request was rejected."
 )
 @click.option("--no-report", is_flag=True, help="Write only tables: no figures, no page.")
-@click.option("--yes", is_flag=True, help="Spend money without asking.")
-def command(
+@yes_option
+def run(
     suite: str,
     sets: tuple[str, ...],
     models: str | None,
@@ -89,116 +102,244 @@ def command(
     """
     console = make_console()
     path = find_suite(suite)
-    data, prompts = bundled("benchmarks", "data"), prompt_dirs(path)
-    loaded = load_suite(path, sets, data_dir=data, prompt_dirs=prompts)
-    known_in = find_models_file(models_file, path)
-    only, known = split_names(models), load_models(known_in)
-    plan = make_plan(loaded, known, only=only, limit=limit)
+    loaded = load_suite(
+        path, sets, data_dir=bundled("benchmarks", "data"), prompt_dirs=prompt_dirs(path)
+    )
+    known = load_models(find_models_file(models_file, path))
+    plan = make_plan(loaded, known, only=split_names(models), limit=limit)
     folder = out or plan.folder_in(Path("results"))
-    asks = {"use_cache": not no_cache, "retry_failed": retry_failed}
-    moved: list[str] = []
     found = held_run(folder, plan.manifest)
+    remarks = [] if found is None else moved_remarks(found, plan)
     if found is not None:
-        moved = moved_remarks(found, plan)
-        names = () if dry_run else names_to_write(folder, page=not no_report)
-        run_folder(folder).check(names)
+        run_folder(folder).check(() if dry_run else names_to_write(folder, page=not no_report))
+    asks = {"use_cache": not no_cache, "retry_failed": retry_failed}
     if dry_run:
-        show_estimate(console, plan, estimate(plan, folder, **asks))
-    for remark in (*moved, *asking_remarks(loaded, plan)):
-        console.print(remark, style="dim", markup=False, soft_wrap=True)
+        print_estimate(console, plan, estimate(plan, folder, **asks))
+    for remark in (*remarks, *asking_remarks(loaded, plan)):
+        console.print(remark, style="dim")
     if dry_run:
         return 0
     check_ready(plan)
-    if not yes and not _agreed(console, plan, folder, **asks):
+    if not yes and not _is_agreed(console, plan, folder, **asks):
         console.print("Nothing was asked.")
         return 1
     view = ProgressView(console, plan.suite.name)
     be_quiet()
     session = Session(plan, folder, view, use_cache=not no_cache, retry_failed=retry_failed)
     result = asyncio.run(_run(session, view))
-    show_made(folder, plan.suite.tables, page=not no_report)
-    return _conclude(console, folder, result, view)
+    made = show_made(folder, plan.suite.tables, page=not no_report)
+    code = _conclude(console, folder, result, view)
+    print_path(console, made)
+    return code
 
 
 async def _run(opened: Session, view: ProgressView) -> RunResult:
-    loop = asyncio.get_running_loop()
     whole = asyncio.current_task()
     assert whole is not None
     with view:
         async with opened as session:
 
-            def interrupted() -> None:
+            def stop() -> None:
                 if session.executor.stopping:
+                    assert whole is not None
                     whole.cancel()
                 session.executor.interrupt()
 
-            for name in (signal.SIGINT, signal.SIGTERM):
-                loop.add_signal_handler(name, interrupted)
-            try:
-                return await session.run()
-            except asyncio.CancelledError:
-                return session.executor.result
-            finally:
-                for name in (signal.SIGINT, signal.SIGTERM):
-                    loop.remove_signal_handler(name)
+            async def tick() -> None:
+                while True:
+                    await asyncio.sleep(1)
+                    view.tick()
+
+            ticking = asyncio.create_task(tick())
+            with _interrupts(stop, view.hear):
+                try:
+                    return await session.run()
+                except asyncio.CancelledError:
+                    return session.executor.result
+                finally:
+                    ticking.cancel()
 
 
-def _agreed(console: Console, plan: RunPlan, folder: Path, **asks: bool) -> bool:
-    """Ask before money is spent; nothing is asked when nothing costs anything.
+@contextlib.contextmanager
+def _interrupts(stop: Callable[[], None], hear: Callable[[], None]) -> Iterator[None]:
+    """Call `stop` in the loop on Ctrl-C or SIGTERM; `hear` at once, even where the loop is busy."""
+    loop = asyncio.get_running_loop()
 
-    Where nobody can answer, a cost limit is the answer. Raises SpecError where there is none.
-    """
-    if sys.stdin.isatty():
-        estimated = estimate(plan, folder, **asks)
-        if not any(row.may_cost for row in estimated):
-            return True
-        show_estimate(console, plan, estimated)
-        return click.confirm("Go on?", default=True)
-    costly = unlimited_spending(plan, folder, **asks)
-    if not costly:
+    def handler(*_: Any) -> None:
+        hear()
+        loop.call_soon_threadsafe(stop)
+
+    before = {name: signal.signal(name, handler) for name in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for name, earlier in before.items():
+            signal.signal(name, earlier)
+
+
+def _is_agreed(console: Console, plan: RunPlan, folder: Path, **asks: bool) -> bool:
+    billed = {model.name for model in plan.models if is_billed(model.config)}
+    if not billed:
         return True
-    show_estimate(console, plan, costly)
-    message = "would cost money, and there is no terminal to ask on"
-    hint = "agree with --yes, or set a limit: --set limits.max_cost_usd=5"
-    raise spending_refused(plan, costly, message, hint)
+    rows = estimate(plan, folder, **asks)
+    may_cost = [row.model for row in rows if row.may_cost and row.model in billed]
+    has_limit = plan.suite.limits.max_cost_usd is not None
+    return may_spend(may_cost, lambda: print_estimate(console, plan, rows), has_limit=has_limit)
 
 
 def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressView) -> int:
+    """Print how a run ended, what it cost and how to go on; return the exit code."""
     where = shown_path(folder)
     for name, reason in result.stopped.items():
-        console.print(f"{one_line(name)} was stopped:", style="red", end=" ")
-        console.print(reason, soft_wrap=True)
-    done = (
-        f"{result.settled:,} of {result.samples:,} samples are done"
-        if result.left
-        else f"All {result.samples:,} samples are done"
-        if result.samples != 1
-        else "The one sample is done"
-    )
-    cause = result.stop.cause if result.stop else None
-    reason = f" ({result.stop.reason})" if result.stop else ""
-    console.print(
-        f"{done}{reason}. Cost so far: {view.cost_text}. The run is in {where}",
-        soft_wrap=True,
-    )
-    if view.cached_text:
-        console.print(f"{view.cached_text} (--no-cache asks anew)", soft_wrap=True, markup=False)
+        console.print(f"{one_line(name)} was stopped: {reason}", style="red")
     if result.failed:
-        rejected = (
-            f"{counted(result.failed, 'request')} rejected for good; when the cause is mended,"
+        rejected = f"{counted(result.failed, 'request')} rejected for good;"
+        console.print(
+            f"{rejected} when the cause is fixed, ask again with --retry-failed", style="red"
         )
-        console.print(f"{rejected} ask again with --retry-failed", style="red", soft_wrap=True)
     if result.unjudged:
         unjudged = f"{counted(result.unjudged, 'answer')} could not be judged:"
-        console.print(
-            f"{unjudged} phyblock score {where} tries again, without a call",
-            style="red",
-            soft_wrap=True,
-        )
+        console.print(f"{unjudged} phyblock score {where} tries again, without a call", style="red")
+    done = f"All {result.samples:,} samples are done"
     if result.left:
-        again = shlex.join(["phyblock", *sys.argv[1:]])
+        reason = f" ({result.stop.reason})" if result.stop else ""
+        done = f"{result.settled:,} of {result.samples:,} samples are done{reason}"
+    cached = (
+        f" {view.cached:,} came from the reply cache (--no-cache asks anew)." if view.cached else ""
+    )
+    console.print(f"{done}. Cost so far: {view.cost_text}.{cached}")
+    cause = result.stop.cause if result.stop else None
+    if result.left:
         how = "raise limits.max_cost_usd and give" if cause is Cause.COST else "give"
-        console.print(f"To go on, {how} the same command again: {again}", soft_wrap=True)
+        console.print(f"To go on, {how} the same command again:")
+        print_path(console, f"  {shlex.join(['phyblock', *sys.argv[1:]])}")
     if cause is Cause.INTERRUPTED and result.left:
         return _INTERRUPTED
     return 1 if result.left or result.failed or result.unjudged else 0
+
+
+def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> None:
+    """Print what each model would take, the sum, and where prices are from."""
+    items = [counted(len(track.items), kind_of(track.name).item) for track in plan.tracks]
+    facts = [
+        f"{', '.join(items)} of {plan.dataset.name}",
+        counted(len(plan.suite.seeds), "seed"),
+        *([f"{len(plan.variants):,} conditions"] if len(plan.variants) > 1 else []),
+        counted(len(plan.models), "model"),
+    ]
+    examples = {plan.suite.at(variant).examples for variant in plan.variants}
+    numbers = sorted({n if isinstance(n, int) else len(n) for n in examples})
+    if numbers != [0]:
+        facts.append(f"{' or '.join(map(str, numbers))} worked examples before each question")
+    asked = [row for row in rows if row.kind == "litellm"]
+    columns: dict[str, Callable[[Estimate], str]] = {
+        "samples": lambda row: f"{row.samples:,}",
+        "done": lambda row: f"{row.done:,}",
+        "cached": lambda row: f"{row.cached:,}",
+        "calls": lambda row: f"{row.calls:,}",
+        "tokens in": lambda row: f"{row.prompt_tokens:,}",
+        "tokens out": lambda row: f"{row.completion_tokens:,}",
+        "cost": lambda row: _dollars(row.cost_usd) if row.calls else NO_VALUE,
+        "at most": lambda row: _dollars(row.most_usd) if row.calls else NO_VALUE,
+    }
+    cells = {heading: [text(row) for row in asked] for heading, text in columns.items()}
+    cells = {heading: texts for heading, texts in cells.items() if set(texts) != {"0"}}
+    headings = (Column("model", is_text=True), *map(Column, cells))
+    lines = tuple(zip((row.model for row in asked), *cells.values(), strict=True))
+    print_table(console, TextTable(f"{plan.suite.name}: {', '.join(facts)}", headings, lines))
+    if free := [row.model for row in rows if row.kind != "litellm"]:
+        console.print(f"Without a call: {', '.join(free)}.")
+    left = [row for row in rows if row.calls]
+    console.print(_sum_text(left))
+    by_source: dict[str, list[str]] = {}
+    for row in left:
+        if row.tariff is not None and row.tariff.source:
+            by_source.setdefault(row.tariff.source, []).append(row.model)
+    if by_source:
+        sources = [f"{source} ({', '.join(names)})" for source, names in by_source.items()]
+        console.print(f"Prices of {left[0].day}: {'; '.join(sources)}.")
+    for row in rows:
+        coming = row.next_tariff if row.calls else None
+        if coming is not None and row.tariff is not None:
+            now, then = (_a_million(tariff.at(0)) for tariff in (row.tariff, coming))
+            console.print(f"From {coming.since} on {row.model} costs {then} in place of {now}.")
+        if row.waiting:
+            console.print(f"{counted(row.waiting, 'call')} of {row.model} are in batches already.")
+    if batched := [row.model for row in left if row.batch]:
+        text = f"In batches: {', '.join(batched)}; answers come within a day, at the batch price."
+        console.print(text, style="dim")
+    if left:
+        text = (
+            "Tokens are estimates: texts by their words, pictures by their providers' rules, "
+            f"{_lengths_text(left)}; at most: each reply as long as it can be."
+        )
+        console.print(text, style="dim")
+
+
+def _sum_text(rows: Sequence[Estimate]) -> str:
+    known = [row for row in rows if row.cost_usd is not None]
+    costs = []
+    if known or not rows:
+        costs.append(f"about {_dollars(sum(row.cost_usd or 0.0 for row in known))}")
+    if known:
+        prompts = _dollars(sum(row.prompt_usd or 0.0 for row in known))
+        replies = _dollars(sum(row.reply_usd or 0.0 for row in known))
+        costs[0] += f" (prompts {prompts}, replies {replies})"
+    if unknown := len(rows) - len(known):
+        costs.append(f"unknown cost of {counted(unknown, 'model')} (give a price in models.yaml)")
+    return f"{counted(sum(row.calls for row in rows), 'call')}, {' and '.join(costs)}."
+
+
+def _a_million(price: Price) -> str:
+    return f"${price.input_usd:g} in and ${price.output_usd:g} out per million tokens"
+
+
+def _lengths_text(rows: Sequence[Estimate]) -> str:
+    """How long replies are taken to be: as the earlier ones of a model, else of usual length."""
+    measured, is_usual = [], False
+    for row in rows:
+        for kind, lengths in row.lengths.items():
+            if lengths.has_calls and lengths.mean is not None:
+                asked = f" in {kind}" if len(row.lengths) > 1 else ""
+                mean = f"{lengths.mean:,.0f} tokens (the mean of {lengths.replies:,})"
+                measured.append(f"of {row.model}{asked} {mean}")
+            else:
+                is_usual |= lengths.has_calls
+    return f"replies {', '.join((*measured, *['of usual length'] * is_usual))}"
+
+
+def _dollars(cost_usd: float | None) -> str:
+    if cost_usd is None:
+        return "unknown"
+    return f"${cost_usd:,.4f}" if 0 < cost_usd < 0.01 else f"${cost_usd:,.2f}"
+
+
+@click.command()
+@run_argument
+@click.option("--parser", type=click.Choice(PLAN_PARSERS), help="Parser to read replies with.")
+@click.option("--matcher", type=click.Choice(MATCHERS), help="Matcher of the headline numbers.")
+@click.option("--out", type=UserPath(), metavar="DIR", help="Folder for the new scores.")
+@data_option
+def score(
+    run: Path, parser: str | None, matcher: str | None, out: Path | None, data: Path | None
+) -> None:
+    """Read and score the stored replies of the folder RUN again, and count every measure again.
+    Calls no model.
+
+    The new scores replace the records of RUN in one step. With another parser or matcher they go
+    to RUN/scores/PARSER-MATCHER, or to --out, and RUN stays as it is.
+    """
+
+    def log(text: str) -> None:
+        click.echo(plain_lines(text), err=True)
+
+    chosen = cast("PlanParser | None", parser), cast("Matcher | None", matcher)
+    told_s = time.monotonic()
+
+    def progress(done: int) -> None:
+        nonlocal told_s
+        if time.monotonic() - told_s > _LINE_EVERY_S:
+            told_s = time.monotonic()
+            log(f"scored {done:,} samples")
+
+    show_tables(rescore(run, *chosen, out, data, log, progress), data)

@@ -26,8 +26,6 @@ from phyblock.tables.text_table import (
 )
 from phyblock.tracks.estimates import (
     headline_columns,
-    main_column,
-    main_measure,
     track_estimates,
     track_measures,
 )
@@ -35,7 +33,6 @@ from phyblock.tracks.kind import kind_of
 
 __all__ = [
     "Floor",
-    "floor_lines",
     "floors_frame",
     "floors_run",
     "floors_view",
@@ -203,25 +200,3 @@ def _texts(
         ", ".join(models["above"]) or NO_VALUE,
         ", ".join([*models["not above"], *unclear]) or NO_VALUE,
     )
-
-
-def floor_lines(table: pd.DataFrame, run: Run) -> Sequence[str]:
-    """For the terminal: the strongest floor of each track's main number, and who is not above."""
-    lines = ["Floors: what is reached without seeing the goal"]
-    for track in run.design.suite.tracks:
-        main, measure = main_column(run, track), main_measure(run, track)
-        mine = rows_of(headline_rows(table[table["track"] == track], run.design), main)
-        if len(mine):
-            lines.append(f"{kind_of(track).title}, {main.heading}: {_told(mine, measure)}")
-    return lines if len(lines) > 1 else ()
-
-
-def _told(rows: pd.DataFrame, measure: Measure) -> str:
-    first = rows.iloc[0]
-    floor = f"{first['floor']} {number(measure.scale * first['floor_value'])}"
-    told = [
-        f"{verdict} it: {', '.join(rows.loc[rows['verdict'] == verdict, 'model'])}"
-        for verdict in ("above", "not above")
-        if (rows["verdict"] == verdict).any()
-    ]
-    return "; ".join([floor, *told])

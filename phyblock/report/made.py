@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict
 
 from phyblock.files import NotRegularError, read_bytes
 from phyblock.report.inputs import digest_of_file
-from phyblock.report.terminal import Terminal
+from phyblock.report.summary import Summary
 from phyblock.run.code import code_digest
 from phyblock.run.store import run_folder
 
@@ -26,7 +26,7 @@ __all__ = ["MADE", "PAGE", "TABLES", "Made", "names_to_write", "note_made", "sti
 MADE = ".made.json"
 PAGE = "report.html"
 TABLES = "tables"
-_FORMAT = 1
+_FORMAT = 2
 
 
 class Made(BaseModel):
@@ -45,7 +45,7 @@ class Made(BaseModel):
     files: Mapping[str, str]
     kept: tuple[str, ...]
     names: tuple[tuple[str, ...], tuple[str, ...]]
-    terminal: Terminal
+    summary: Summary
 
 
 def _read(folder: Path) -> Made | None:
@@ -77,7 +77,7 @@ def still_made(folder: Path, inputs: str | None, *, page: bool) -> Made | None:
 def note_made(
     folder: Path,
     inputs: str | None,
-    terminal: Terminal,
+    summary: Summary,
     tables: Sequence[Path],
     page: PageWritten | None,
 ) -> None:
@@ -98,7 +98,7 @@ def note_made(
         files={_name(path, folder): digest_of_file(path) for path in files},
         kept=tuple(_name(path, folder) for path in page.pictures) if page else (),
         names=(files_of(page=False), files_of(page=True)),
-        terminal=terminal,
+        summary=summary,
     )
     run_folder(folder).write({MADE: made.model_dump_json()})
 

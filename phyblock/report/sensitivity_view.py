@@ -28,9 +28,7 @@ __all__ = [
     "LEVEL",
     "components_view",
     "factor_name",
-    "in_terminal",
     "levels_view",
-    "ranks_lines",
     "ranks_view",
     "sizes_text",
 ]
@@ -159,24 +157,6 @@ def ranks_view(table: pd.DataFrame, run: Run) -> TextTable:
             *_unranked(levels_frame(run)),
         ),
     )
-
-
-def ranks_lines(table: pd.DataFrame, _: Run) -> Sequence[str]:
-    """What the terminal says of the ranking."""
-    if not len(table):
-        return ()
-    flips, sure, pairs = (int(table[name].sum()) for name in ("flips", "sure", "pairs"))
-    least = number(float(table["tau"].min()), 2)
-    verdict = f"{sure} of them beyond noise" if sure else "none beyond noise"
-    return (
-        f"Ranking over ways of asking: Kendall's tau at least {least}; "
-        f"{flips} of {pairs} comparisons flip (a pair of models at another level), {verdict}.",
-    )
-
-
-def in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
-    """The whole table."""
-    return (view,)
 
 
 def _what(run: Run, tracks: Sequence[str]) -> list[str]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from phyblock.report.floors import floor_lines, floors_frame, floors_view
+from phyblock.report.floors import floors_frame, floors_view
 from phyblock.report.made import TABLES
 from phyblock.report.measure_table import (
     headline_frame,
@@ -25,14 +25,12 @@ from phyblock.report.sensitivity import (
 )
 from phyblock.report.sensitivity_view import (
     components_view,
-    in_terminal,
     levels_view,
-    ranks_lines,
     ranks_view,
 )
 from phyblock.run.store import run_folder
 from phyblock.tables.cost import cost_frame, cost_view
-from phyblock.tables.coverage import coverage_frame, coverage_in_terminal, coverage_view
+from phyblock.tables.coverage import coverage_frame, coverage_view
 from phyblock.tables.csv_text import to_csv
 from phyblock.tables.latex import to_latex
 from phyblock.tables.load import Run, load_run
@@ -105,14 +103,12 @@ _ESTIMATES = "estimates"
 _OF_ANY_TRACK = {
     _ESTIMATES: TableMaker(all_estimates),
     "measures": TableMaker(measures_frame, measures_view, _ESTIMATES),
-    "floors": TableMaker(floors_frame, floors_view, _ESTIMATES, lines=floor_lines),
-    "sensitivity": TableMaker(
-        components_frame, components_view, _ESTIMATES, in_terminal=in_terminal
-    ),
+    "floors": TableMaker(floors_frame, floors_view, _ESTIMATES),
+    "sensitivity": TableMaker(components_frame, components_view, _ESTIMATES),
     "sensitivity_levels": TableMaker(levels_frame, levels_view, _ESTIMATES),
-    "sensitivity_ranks": TableMaker(ranks_frame, ranks_view, _ESTIMATES, lines=ranks_lines),
+    "sensitivity_ranks": TableMaker(ranks_frame, ranks_view, _ESTIMATES),
     "sensitivity_pairs": TableMaker(pairs_frame, None, _ESTIMATES),
-    "coverage": TableMaker(coverage_frame, coverage_view, in_terminal=coverage_in_terminal),
+    "coverage": TableMaker(coverage_frame, coverage_view),
     "cost": TableMaker(cost_frame, cost_view, "coverage"),
 }
 """Tables that every run has."""
@@ -138,11 +134,7 @@ def _marked(
 
 def _headline_maker(track: str) -> TableMaker:
     """The table of a track that has none of its own."""
-    return TableMaker(
-        partial(headline_frame, track),
-        partial(headline_view, track),
-        in_terminal=lambda view, _: (view,),
-    )
+    return TableMaker(partial(headline_frame, track), partial(headline_view, track))
 
 
 def table_names(run: Run) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from phyblock.config.suite import Suite, Variant
 from phyblock.data import SCENES_FILE, Dataset, read_builtin, read_official
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.records.manifest import MANIFEST, Manifest
+from phyblock.registry import track_baselines
 from phyblock.resources import bundled_sets
 from phyblock.run.manifest import make_manifest
 from phyblock.run.models import (
@@ -203,7 +204,7 @@ def _check_models(models: Sequence[PlannedModel], tracks: Sequence[AnyTrack], su
                 message = f"is a person, who cannot answer in {track.name}"
                 hint = f"leave {track.name} out of tracks"
                 problems.append(Problem(where, message, "tracks", track.name, hint=hint))
-            able = kind_of(track.name).baselines
+            able = track_baselines(kind_of(track.name))
             if model.config.kind != "baseline" or model.name in able:
                 continue
             message = f"has no rule for {track.name}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import pandas as pd
 
@@ -19,7 +18,7 @@ from phyblock.tables.text_table import (
     track_text,
 )
 
-__all__ = ["coverage_frame", "coverage_in_terminal", "coverage_view"]
+__all__ = ["coverage_frame", "coverage_view"]
 
 _COUNTS = (
     *("recorded", *OUTCOMES, "extracted", "replies"),
@@ -162,18 +161,3 @@ def _coverage_notes(table: pd.DataFrame, run: Run) -> list[str]:
     if run.is_cut:
         notes.append("The last line of records.jsonl was cut off and is ignored.")
     return notes
-
-
-def coverage_in_terminal(view: TextTable, table: pd.DataFrame) -> tuple[TextTable, ...]:
-    """Samples and the outcomes that occurred, where not all were answered."""
-    if not (table["ok"] < table["expected"]).any():
-        return ()
-    always = ("Model", "Track", "Expected", "OK")
-    missing = (NOT_RUN, *HEADINGS.values())
-    dropped = [
-        column.name
-        for i, column in enumerate(view.columns)
-        if column.name not in always
-        and (column.name not in missing or all(row[i] == "0" for row in view.rows))
-    ]
-    return (replace(view.without(dropped), notes=()),)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
@@ -21,7 +21,6 @@ __all__ = [
     "headline_values",
     "interval_frame",
     "interval_view",
-    "narrower",
     "rows_of",
     "seeds_notes",
     "uncertainty_cells",
@@ -96,13 +95,6 @@ def seeds_notes(design: Design) -> tuple[str, ...]:
     """What a table says of several seeds; () for one."""
     seeds = len(design.suite.seeds)
     return (f"Values pool the samples of {seeds} seeds.", _SEEDS_NOTE) if seeds > 1 else ()
-
-
-def narrower(view: TextTable) -> tuple[TextTable, ...]:
-    """A table, then without what seeds say, then without intervals too."""
-    notes = tuple(note for note in view.notes if note != _SEEDS_NOTE)
-    pooled = replace(view.without([_SEEDS]), notes=notes)
-    return view, pooled, pooled.without([_INTERVAL])
 
 
 def interval_frame(

@@ -103,7 +103,7 @@ class EpisodeView:
 
 @dataclass(frozen=True)
 class ItemExport:
-    """How `phyblock export-data` writes what is asked about, with its pictures, for other tools.
+    """How `phyblock export --questions` writes items with their pictures for other tools.
 
     `formats` are the words for `--to`; `items` names the bundled set that is written unless
     another is named. `write` takes a format, the folder to write, the set by its name or folder,
@@ -122,17 +122,12 @@ class ItemExport:
 class TableMaker:
     """How a table is made and how people read it; without `view` it is a CSV file alone.
 
-    `comes_with` names the table that it accompanies, where it has rows at all. `in_terminal` gives
-    the forms of the view that the terminal shows, the widest first: it takes the first that fits,
-    else the last; without it, or where it gives none, the table stands in the files alone. `lines`
-    say in the terminal what is in the table, the first of them as a headline.
+    `comes_with` names the table that it accompanies, where it has rows at all.
     """
 
     frame: Callable[[Run], pd.DataFrame]
     view: Callable[[pd.DataFrame, Run], TextTable] | None = None
     comes_with: str = ""
-    in_terminal: Callable[[TextTable, pd.DataFrame], Sequence[TextTable]] | None = None
-    lines: Callable[[pd.DataFrame, Run], Sequence[str]] | None = None
 
 
 @dataclass(frozen=True)

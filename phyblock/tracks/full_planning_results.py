@@ -6,9 +6,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -27,7 +25,6 @@ from phyblock.sim.film import FilmStep, Tone
 from phyblock.tables.cells import (
     METRIC_NAMES,
     METRICS,
-    SIDE_METRICS,
     cell_scores,
     in_levels,
     level_cells,
@@ -55,7 +52,6 @@ from phyblock.tables.drawing import (
 from phyblock.tables.flat import BLOCK_COLUMNS, joined_counts
 from phyblock.tables.headline import (
     headline_rows,
-    narrower,
     seeds_notes,
     uncertainty_cells,
     uncertainty_columns,
@@ -93,7 +89,6 @@ from phyblock.tracks.full_planning import PLAN_FLOORS, PlanRecord
 from phyblock.tracks.plans import POSE_MEASURES
 from phyblock.tracks.tables import (
     order_frame,
-    order_in_terminal,
     order_view,
     scenes_frame,
     scenes_view,
@@ -473,8 +468,6 @@ PUBLISHED_LEVELS = ("1", "2", "3", "4", "overall")
 PUBLISHED_SETTING = "A"
 """The setting of every number in it."""
 
-_MET = 0.06
-"""Largest difference that rounding of the published numbers and of ours explains [points]."""
 _OVERALL_LEVELS = frozenset({2, 3, 4})
 """Levels whose scenes the paper's overall numbers pool."""
 
@@ -555,19 +548,6 @@ def comparison_notes(published: pd.DataFrame, design: Design) -> tuple[str, ...]
     if not set(design.suite.levels) >= _OVERALL_LEVELS:
         notes.append("Overall is not compared: the paper's pools the levels 2, 3 and 4.")
     return tuple(notes)
-
-
-def published_lines(published: pd.DataFrame, run: Run) -> tuple[str, ...]:
-    """How near each model comes to its row, and what could not be compared."""
-    largest = largest_differences(published)
-    cells = Counter(published.dropna(subset=["difference"])["model"])
-    width = max(map(len, largest.index), default=0)
-    lines = ["Beside the paper's Table 1: largest difference in points"]
-    for name, points in largest.items():
-        # Where nothing was compared, there is no difference to judge.
-        mark = ("as published" if points <= _MET else "differs") if cells[name] else "not compared"
-        lines.append(f"{name:<{width}}  {number(points, 3):>7}  {cells[name]} cells, {mark}")
-    return (*lines, *comparison_notes(published, run.design))
 
 
 _PAPER_LEVELS = ("1", "2", "3", "4", OVERALL)
@@ -943,28 +923,6 @@ def _difference_notes(table: pd.DataFrame, design: Design) -> list[str]:
         "Published: micro averages of one run.",
         "The last column has the largest absolute difference of each model.",
     ]
-
-
-def table1_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
-    """All of Table 1, else F1 alone, else without what seeds say and intervals."""
-    # The last note is about the labels of the columns that are left out.
-    note = "F1 alone, to fit; precision and recall are in tables/table1.md."
-    short = replace(view.without(SIDE_METRICS), notes=(note, *view.notes[:-1]))
-    return view, *narrower(short)
-
-
-def errors_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
-    """The rows over all levels, each with its model's name; where space is short, without
-    intervals, then shares alone.
-    """
-    rows, model = [], ""
-    for row in view.rows:
-        model = row[0] or model
-        if row[1] == level_name(OVERALL):
-            rows.append((model, *row[1:]))
-    whole = replace(view, rows=tuple(rows)).without(("Level", "n"))
-    bare = whole.without(_OF_TYPE[2:])
-    return whole, whole.without(_COUNTED), bare, bare.without(_COUNTED)
 
 
 _COLORS = (COLORS[0], COLORS[5], COLORS[4], COLORS[1])
@@ -1447,16 +1405,17 @@ REPORT = TrackReport(
     reference_note=HUMAN_NOTE,
     tables={
         "assembly": TableMaker(assembly_frame),
-        "table1": TableMaker(table1_frame, table1_view, in_terminal=table1_in_terminal),
+        "table1": TableMaker(table1_frame, table1_view),
         "intervals": TableMaker(intervals_table, intervals_view, "table1"),
         "table5": TableMaker(table5_frame, table5_view, "table1"),
         "settings": TableMaker(settings_frame, settings_view, "table1"),
-        "errors": TableMaker(errors_frame, errors_view, in_terminal=errors_in_terminal),
+        "errors": TableMaker(errors_frame, errors_view),
         "losses": TableMaker(losses_frame, losses_view, "errors"),
-        "orders": TableMaker(_orders, order_view, "table1", in_terminal=order_in_terminal),
+        "orders": TableMaker(_orders, order_view, "table1"),
         "scenes": TableMaker(partial(scenes_frame, NAME), scenes_view, "table1"),
-        "published": TableMaker(published_frame, published_view, lines=published_lines),
+        "published": TableMaker(published_frame, published_view),
     },
+    episodes=PLAN_VIEW,
     main_figure="f1-levels",
     figures={
         "f1-radar": FigureMaker("F1 by level, as in the paper", f1_radar),

@@ -287,12 +287,6 @@ def table_c_view(table: pd.DataFrame, run: Run) -> TextTable:
     )
 
 
-def table_c_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
-    """All of it, else without tolerances, else without intervals too."""
-    short = view.without(list(_CURVE.values()))
-    return view, short, short.without([_INTERVAL_C, "cm"])
-
-
 @made_once_copied
 def pose_errors_frame(run: Run) -> pd.DataFrame:
     """One row a model and error, over all scenes: its share of all steps with a 95 % interval [%];
@@ -564,7 +558,7 @@ REPORT = TrackReport(
     short="f1_c",
     notes=_notes,
     tables={
-        "table_c": TableMaker(table_c_frame, table_c_view, in_terminal=table_c_in_terminal),
+        "table_c": TableMaker(table_c_frame, table_c_view),
         "pose_errors": TableMaker(pose_errors_frame, pose_errors_view),
     },
     main_figure="f1-poses",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +25,6 @@ from phyblock.tables.headline import (
     headline_rows,
     interval_frame,
     interval_view,
-    narrower,
     seeds_notes,
     uncertainty_cells,
     uncertainty_columns,
@@ -71,7 +69,6 @@ from phyblock.tracks.step_planning import (
 )
 from phyblock.tracks.tables import (
     order_frame,
-    order_in_terminal,
     order_view,
     scenes_frame,
     scenes_view,
@@ -311,12 +308,6 @@ def endings_view(table: pd.DataFrame, run: Run) -> TextTable:
     )
 
 
-def endings_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
-    """How episodes ended, without notes, and without intervals where it is too wide."""
-    whole = replace(view, notes=())
-    return whole, whole.without(_OF_SHARE[1:])
-
-
 def moves_view(table: pd.DataFrame, run: Run) -> TextTable:
     """What became of steps, out of `moves_frame`."""
     rows = tuple(
@@ -546,12 +537,6 @@ def paper_table3_view(table: pd.DataFrame, run: Run) -> TextTable:
     return beside_view(table, run, number_in_paper=3, names=names, note=note)
 
 
-def table3_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
-    """Table 3 without its notes; where it is too wide, without what says less, bit by bit."""
-    whole = replace(view, notes=())
-    return whole, *narrower(whole.without(("Prec", "F1")))
-
-
 def step_progress(run: Run) -> pd.DataFrame:
     """Share of the goal's blocks that stand after each step [%], mean over episodes.
 
@@ -694,18 +679,13 @@ REPORT = TrackReport(
     references=_references,
     notes=_notes_report,
     tables={
-        "table3": TableMaker(table3_frame, table3_view, in_terminal=table3_in_terminal),
+        "table3": TableMaker(table3_frame, table3_view),
         "step_intervals": TableMaker(step_intervals, step_intervals_view, "table3"),
         "step_scores": TableMaker(step_scores_frame, None, "table3"),
-        "endings": TableMaker(endings_frame, endings_view, in_terminal=endings_in_terminal),
+        "endings": TableMaker(endings_frame, endings_view),
         "moves": TableMaker(moves_frame, moves_view, "endings"),
         "progress": TableMaker(progress_frame, progress_view),
-        "step_orders": TableMaker(
-            partial(order_frame, NAME, "placed"),
-            order_view,
-            "table3",
-            in_terminal=order_in_terminal,
-        ),
+        "step_orders": TableMaker(partial(order_frame, NAME, "placed"), order_view, "table3"),
         "step_scenes": TableMaker(partial(scenes_frame, NAME), scenes_view, "table3"),
     },
     main_figure="step-planning-f1",

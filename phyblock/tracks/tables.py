@@ -136,14 +136,6 @@ def _with_interval(row: Any, name: str, *, signed: bool = False) -> tuple[str, s
     return number(100 * row[name]), interval
 
 
-def order_in_terminal(view: TextTable, table: pd.DataFrame) -> tuple[TextTable, ...]:
-    """The table where candidates were shuffled, without intervals where it is too wide; else it
-    stands in the files alone.
-    """
-    is_shuffled = (table["order"] == "shuffled").any()
-    return (view, view.without(["95 % CI"])) if is_shuffled else ()
-
-
 _COLUMNS = (
     *("scene", "level", "n_blocks", "n_models", "mean", "sd"),
     *("discrimination", "is_negative"),

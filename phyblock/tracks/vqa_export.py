@@ -205,4 +205,4 @@ def _write(
 
 
 QUESTION_EXPORT = ItemExport(tuple(_FORMATS), BUILTIN_QUESTIONS, _write)
-"""What `phyblock export-data` writes."""
+"""What `phyblock export --questions` writes."""

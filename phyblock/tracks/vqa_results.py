@@ -42,7 +42,6 @@ from phyblock.tables.estimates import pooled_in
 from phyblock.tables.headline import (
     interval_frame,
     interval_view,
-    narrower,
     seeds_notes,
     uncertainty_cells,
     uncertainty_columns,
@@ -62,7 +61,7 @@ from phyblock.tables.paper_numbers import (
 )
 from phyblock.tables.shares import shares_of
 from phyblock.tables.showing import control_words
-from phyblock.tables.text_table import NO_VALUE, Column, TextTable, number, with_interval
+from phyblock.tables.text_table import Column, TextTable, number, with_interval
 from phyblock.tables.track_report import (
     FigureMaker,
     HeadlineColumn,
@@ -541,20 +540,6 @@ def vqa_intervals_view(table: pd.DataFrame, run: Run) -> TextTable:
     return interval_view(table, run, wanted, "Right answers")
 
 
-def table2_in_terminal(view: TextTable, _: pd.DataFrame) -> tuple[TextTable, ...]:
-    """The columns that were asked, or averages alone where those do not fit."""
-    asked = [
-        place
-        for place in range(len(view.columns))
-        if any(row[place] != NO_VALUE for row in view.rows if not row[0].startswith(" "))
-    ]
-    notes = view.notes[:-1]
-    whole = replace(view.with_columns(asked), notes=notes)
-    subtasks = [column.name for column in whole.columns if column.name in SUBTASKS]
-    note = "Averages alone, to fit; every subtask is in tables/table2.md."
-    return whole, *narrower(replace(whole.without(subtasks), notes=(note, *notes)))
-
-
 _DARK = 55.0
 _LEAST_IN = 5.5
 _SCALE_ROWS = 6
@@ -850,7 +835,7 @@ REPORT = TrackReport(
     notes=_notes_report,
     reference_note=HUMAN_NOTE,
     tables={
-        "table2": TableMaker(table2_frame, table2_view, in_terminal=table2_in_terminal),
+        "table2": TableMaker(table2_frame, table2_view),
         "vqa_intervals": TableMaker(vqa_intervals, vqa_intervals_view, "table2"),
         "letters": TableMaker(letters_frame, letters_view, "table2"),
         "questions": TableMaker(questions_frame, None, "table2"),

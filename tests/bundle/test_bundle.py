@@ -85,13 +85,13 @@ def test_a_bundle_verifies_elsewhere_and_holds_nothing_of_this_machine(
         shutil.copytree(folder, elsewhere.root / folder.name)
     shutil.copy(made.out / "bundle.zip", elsewhere.root / "b.zip")
     known = ("--data", "data", "--data", "questions")
-    done = elsewhere.phyblock("verify-bundle", "b.zip", *known)
+    done = elsewhere.phyblock("verify", "b.zip", *known)
     assert done.code == 0, done.err
     assert "10 records of 1 model, scored again" in done.out
-    done = elsewhere.phyblock("verify-bundle", "b.zip", "--data", "data")
+    done = elsewhere.phyblock("verify", "b.zip", "--data", "data")
     assert done.code == 2
     assert "needs the questions questions, which a bundle does not hold" in done.err
-    done = elsewhere.phyblock("verify-bundle", "b.zip")
+    done = elsewhere.phyblock("verify", "b.zip")
     assert "needs the data set data" in done.err
     assert "Traceback" not in done.err
 
@@ -205,10 +205,10 @@ def test_samples_that_were_left_out_are_counted(made: Workspace, tmp_path: Path)
     (copy / RECORDS).write_text("".join(lines[1:]), encoding="utf-8")
     bundle_run(copy, made.root / "less.zip")
     known = ("--data", "data", "--data", "questions")
-    done = made.phyblock("verify-bundle", "less.zip", *known)
+    done = made.phyblock("verify", "less.zip", *known)
     assert done.code == 0, done.err
     assert "9 of 10 expected samples: the run is not whole" in done.out
-    done = made.phyblock("verify-bundle", "out/bundle.zip", *known)
+    done = made.phyblock("verify", "out/bundle.zip", *known)
     assert "10 of 10 expected samples." in done.out
 
 

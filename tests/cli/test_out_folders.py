@@ -94,7 +94,7 @@ def test_a_run_begins_in_no_folder_of_another(
         ("score", "run", "--out", ""),
         ("export", "run", "--to", "csv", "--out", ""),
         ("scenes", "render", "phyblock-400", "--out", ""),
-        ("episode", "run", "sample", "--gif", ""),
+        ("show", "run", "sample", "--gif", ""),
         ("init", ""),
     ],
 )
@@ -109,7 +109,7 @@ def test_a_tilde_is_the_home_folder(suite: Workspace, monkeypatch: pytest.Monkey
     call("init", "~/bench", home=home)
     call("run", suite.root / "suite.yaml", "--out", "~/run", "--no-report", home=home)
     assert (home / "bench" / "models.yaml").is_file()
-    assert "Assembly planning" in call("tables", "~/run", home=home)
+    assert "Assembly planning" in call("report", "~/run", "--print", home=home)
     assert not (suite.root / "~").exists()
     with pytest.raises(click.UsageError, match="no such home folder"):
         call("init", "~nobody-of-this-name/x")
@@ -274,7 +274,7 @@ def test_init_writes_through_no_link(tmp_path: Path) -> None:
     assert not (tmp_path / "elsewhere.yaml").exists()
 
 
-@pytest.mark.parametrize("verb", ["scenes", "vqa"])
+@pytest.mark.parametrize("verb", ["scenes", "questions"])
 def test_a_data_set_is_made_over_no_sums_of_another(tmp_path: Path, verb: str) -> None:
     put(tmp_path / "SHA256SUMS")
     with pytest.raises(StoreError, match="SHA256SUMS: is already there"):

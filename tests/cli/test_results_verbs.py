@@ -1,4 +1,4 @@
-"""The verbs that read a finished run: tables, compare, figures, export."""
+"""The verbs that read a finished run: report, compare, figures, export."""
 
 from __future__ import annotations
 
@@ -29,30 +29,33 @@ def call(*words: str | Path) -> Result:
 
 
 def test_tables_print_all_or_one_in_any_form(folder: Path) -> None:
-    everything = call("tables", folder).output
+    everything = call("report", folder, "--print").output
     for caption in ("Assembly planning", "95 % intervals", "setting A (with orientation)", "seeds"):
         assert caption in everything
-    one = call("tables", folder, "--only", "table5", "--format", "md").output
+    one = call("report", folder, "--print", "--only", "table5", "--format", "md").output
     assert one.startswith("**F1 as the paper's Table 5: means over 2 seeds (%)")
-    assert r"\begin{tabular}" in call("tables", folder, "--only", "cost", "--format", "tex").output
+    assert (
+        r"\begin{tabular}"
+        in call("report", folder, "--print", "--only", "cost", "--format", "tex").output
+    )
     with pytest.raises(SpecError, match="no such table"):
-        call("tables", folder, "--only", "table9")
+        call("report", folder, "--print", "--only", "table9")
     assert not (folder / "tables").exists()
 
 
 def test_tables_without_rows_are_printed_only_when_asked_for(tmp_path: Path) -> None:
     records = [record("alpha", scene, 0, [score(1, 1, 1)]) for scene in LEVELS]
     folder = write_run(tmp_path / "run", records, manifest(seeds=[0], settings=["A"]))
-    everything = call("tables", folder).output
+    everything = call("report", folder, "--print").output
     assert "Assembly planning" in everything
     assert "setting A (with orientation)" not in everything
-    one = call("tables", folder, "--only", "settings").output
+    one = call("report", folder, "--print", "--only", "settings").output
     assert "setting A (with orientation)" in one
     assert "nan" not in one
 
 
 def test_tables_beside_the_paper(folder: Path) -> None:
-    output = call("tables", folder, "--paper").output
+    output = call("report", folder, "--print", "--paper").output
     # The paper has this model in its table of seeds alone.
     assert "beside the paper's Table 1" not in output
     assert "beside the paper's Table 5" in output
@@ -65,7 +68,7 @@ def test_a_run_without_full_planning_has_nothing_beside_tables_1_and_5(
     facts = manifest(models=[("alpha", "GPT-4.1")], seeds=seeds, items={"step_planning": 5})
     facts["suite"]["tracks"] = ["step_planning"]
     folder = write_run(tmp_path / "run", [], facts)
-    output = call("tables", folder, "--paper").output
+    output = call("report", folder, "--print", "--paper").output
     assert output == "No model of the run has a row in the paper's tables.\n"
 
 

@@ -123,9 +123,9 @@ _PLACES = st.sampled_from(
     ]
 )
 _VERBS = (
-    *("run", "score", "report", "tables", "figures", "compare", "export", "episode", "export-data"),
-    *("bundle", "verify-bundle", "site"),
-    *("models", "validate", "scenes", "vqa", "cache", "init", "--help", "-V", "nope", ""),
+    *("run", "score", "report", "figures", "compare", "export", "show", "play"),
+    *("bundle", "verify", "site"),
+    *("models", "validate", "scenes", "questions", "cache", "init", "--help", "-V", "nope", ""),
 )
 _WORDS = (
     *("suite.yaml", "data", "questions", "thesis", "gone", "stats", "audit", "show", "verify"),
@@ -253,7 +253,7 @@ KINDS: dict[str, Cases] = {
 
 _OF_RUN = {
     "out": (
-        ("tables", "out"),
+        ("report", "out", "--print"),
         ("score", "out", "--out", "fresh"),
         ("export", "out", "--to", "csv", "--out", "fresh"),
         ("compare", "out"),
@@ -261,13 +261,13 @@ _OF_RUN = {
         ("run", "suite.yaml", "--out", "out", "--no-report", "--models", "random,oracle"),
     ),
     "steps": (
-        ("tables", "steps"),
-        ("episode", "steps", "step_planning/oracle/t1/s0"),
+        ("report", "steps", "--print"),
+        ("show", "steps", "step_planning/oracle/t1/s0"),
         ("run", "suite.yaml", "--out", "steps", "--no-report", "--models", "oracle",
          "--set", "tracks=[step_planning]", "--set", "steps.physics=off"),
     ),
     "asked": (
-        ("tables", "asked"),
+        ("report", "asked", "--print"),
         ("score", "asked", "--out", "fresh"),
         ("run", "questions.yaml", "--out", "asked", "--no-report"),
     ),

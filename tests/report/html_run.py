@@ -49,7 +49,7 @@ def make_run(root: Path, pictures: Path) -> Workspace:
     rewrite(workspace.out)
     done = workspace.phyblock("report", workspace.out)
     assert done.code == 0, done.err
-    assert "The report is out/report.html" in done.out
+    assert done.out.splitlines()[-1] == "out/report.html"
     return workspace
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import pandas as pd
 from hypothesis import given
 
-from phyblock.cli.tally import Tally
+from phyblock.cli.progress import Tally
 from phyblock.records.files import known_records
 from phyblock.report import coverage_frame
 from phyblock.run.events import Summary
@@ -86,7 +86,7 @@ def test_an_episode_that_is_partly_from_the_cache_cost_what_was_asked_anew() -> 
     assert coverage_frame(run)[["cost_usd", "cost_unknown"]].values.tolist() == [[0.25, 0]]
     assert run.records["cost_usd"].tolist() == [0.75]
     tally = Tally(1)
-    tally.add(Summary.of(known_records().validate_python(episode)), fresh=True)
+    tally.add(Summary.of(known_records().validate_python(episode)))
     assert (tally.cost_usd, tally.unpriced) == (0.25, 0)
 
 

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from phyblock.cli.estimate_view import show_estimate
+from phyblock.cli.run import print_estimate
 from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
 from phyblock.models import Estimate as CallEstimate
@@ -84,7 +84,7 @@ def begin(workspace: Workspace, stack: ExitStack) -> dict[str, Billing]:
 
 def printed(plan: RunPlan, rows: list[Estimate]) -> str:
     console = Console(file=io.StringIO(), width=150)
-    show_estimate(console, plan, rows)
+    print_estimate(console, plan, rows)
     assert isinstance(console.file, io.StringIO)
     return console.file.getvalue()
 

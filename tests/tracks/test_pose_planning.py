@@ -317,7 +317,7 @@ def test_a_run_has_a_page_figures_a_film_and_is_compared(
         assert (workspace.out / file).exists(), file
     assert "Pose planning" in (workspace.out / "report.html").read_text("utf-8")
     gif, sample = workspace.root / "a.gif", "builder/t4/s0"
-    shown = ["episode", "out", sample, "--gif", str(gif), "--size", "128"]
+    shown = ["show", "out", sample, "--gif", str(gif), "--size", "128"]
     assert not phyblock.main(shown, standalone_mode=False)
     assert "falls" not in capsys.readouterr().out
     with Image.open(gif) as frames:

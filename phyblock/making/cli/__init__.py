@@ -1,1 +1,1 @@
-"""The verbs `phyblock scenes ...` and `phyblock vqa ...`, one module each."""
+"""The verbs `phyblock scenes ...` and `phyblock questions ...`, one module each."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from phyblock.cli.paths import NAME_OR_PATH
+from phyblock.cli.options import NAME_OR_PATH
 from phyblock.data import QuestionSet, find_questions, read_data_set, read_questions
 
 _QUESTIONS = "phyblock-vqa"

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import click
 
-from phyblock.cli.console import make_console, plain_table, shown_path
-from phyblock.cli.paths import NAME_OR_PATH, UserPath
+from phyblock.cli.console import make_console, print_rows, shown_path
+from phyblock.cli.options import NAME_OR_PATH, UserPath
 from phyblock.data import read_data_set
 from phyblock.domain import Scene
 from phyblock.files import OutFolder, check_free, make_folder, write_named
@@ -97,7 +97,7 @@ def _print_worst(worst: Sequence[SceneAudit]) -> None:
         rows.append((audit.scene.id, str(audit.scene.level), *facts, str(len(audit.findings))))
     if rows:
         headings = ("scene", "level", "check", "first finding", "blocks", "findings")
-        make_console().print(plain_table(headings, rows, numbers=1))
+        print_rows(make_console(), headings, rows, numbers=1)
 
 
 def _blocks(scene: Scene, orders: Sequence[int]) -> str:
@@ -112,7 +112,7 @@ def _print_totals(audits: Sequence[SceneAudit], twins: Sequence[Finding]) -> Non
         mine = [finding for finding in findings if finding.check == check]
         rows.append((check, str(len({finding.scene for finding in mine})), str(len(mine))))
     console = make_console()
-    console.print(plain_table(("check", "scenes", "findings"), rows, numbers=2))
+    print_rows(console, ("check", "scenes", "findings"), rows, numbers=2)
     declared, contacts, shared = (
         sum(getattr(audit, name) for audit in audits) for name in ("declared", "contacts", "shared")
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from phyblock.cli.console import shown_path
-from phyblock.cli.paths import UserPath
+from phyblock.cli.options import UserPath
 from phyblock.errors import DataError, Problem
 from phyblock.making.checks import find_duplicates, find_orphans
 from phyblock.making.cli.working import jobs_option, tracked

@@ -8,7 +8,7 @@ from typing import cast
 import click
 
 from phyblock.cli.console import shown_path
-from phyblock.cli.paths import UserPath
+from phyblock.cli.options import UserPath
 from phyblock.making.cli.working import (
     jobs_option,
     ray_option,

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from phyblock.cli.console import make_console, shown_path
-from phyblock.cli.paths import NAME_OR_PATH, UserPath
+from phyblock.cli.options import NAME_OR_PATH, UserPath
 from phyblock.data import AssemblyTask, read_data_set
 from phyblock.files import OutFolder
 from phyblock.making.cli.scene_sets import find_scenes

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import click
 
-from phyblock.cli.console import make_console, plain_table
-from phyblock.cli.paths import NAME_OR_PATH
+from phyblock.cli.console import make_console, print_rows
+from phyblock.cli.options import NAME_OR_PATH
 from phyblock.data import AssemblyTask, read_data_set
 from phyblock.domain import Block
 from phyblock.making.cli.scene_sets import find_scenes
@@ -34,9 +34,9 @@ def command(data: str, scene: str) -> None:
     console.print(f"{heading} · made from {parents}", markup=False, soft_wrap=True)
     headings = ("block", "type", "color", "on", "position mm", "euler deg")
     numbers = ("layer", "pick", "seen")
-    console.print(plain_table((*headings, *numbers), _blocks(task), numbers=3, tight=True))
+    print_rows(console, (*headings, *numbers), _blocks(task), numbers=3)
     offered = ("candidate", "type", "color", "euler deg", "needed")
-    console.print(plain_table(offered, _candidates(task), numbers=1))
+    print_rows(console, offered, _candidates(task), numbers=1)
 
 
 def _blocks(task: AssemblyTask) -> list[tuple[str, ...]]:

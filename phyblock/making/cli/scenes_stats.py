@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import click
 
-from phyblock.cli.console import make_console, plain_table
-from phyblock.cli.paths import NAME_OR_PATH
+from phyblock.cli.console import make_console, print_rows
+from phyblock.cli.options import NAME_OR_PATH
 from phyblock.data import AssemblyTask, Dataset, read_data_set
 from phyblock.domain import BLOCK_TYPES, COLORS, Scene
 from phyblock.text import counted
@@ -31,12 +31,12 @@ def command(data: str) -> None:
     by_level = _by_level(read)
     headings = ("level", "scenes", "blocks", "layers", "types", "colors", "dependencies")
     console.print("A scene has, mean and most")
-    console.print(plain_table(headings, [_sizes(*one) for one in by_level], numbers=6))
+    print_rows(console, headings, [_sizes(*one) for one in by_level], numbers=6)
     console.print("Blocks, by type and color")
-    console.print(plain_table(("type", *COLORS, "all", "share"), _palette(read), numbers=7))
+    print_rows(console, ("type", *COLORS, "all", "share"), _palette(read), numbers=7)
     console.print("Candidate sets")
     offered = ("level", "candidates", "needed", "other pose", "other color", "other type")
-    console.print(plain_table(offered, [_offers(*one) for one in by_level], numbers=5))
+    print_rows(console, offered, [_offers(*one) for one in by_level], numbers=5)
     console.print(
         "Candidates that are not needed differ from what is needed by their pose alone, else by "
         "their color, else by their type.",

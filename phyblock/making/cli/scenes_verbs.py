@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import click
 
-from phyblock.cli.verbs import Verbs
-
-__all__ = ["command"]
+from phyblock.cli.options import Verbs
 
 _VERBS = {
     "generate": "Make a data set from a seed.",
@@ -19,6 +17,14 @@ _VERBS = {
 }
 
 
-@click.group("scenes", cls=Verbs, verbs=_VERBS, prefix="phyblock.making.cli.scenes_")
+@click.group(
+    cls=Verbs,
+    sections={
+        "Commands": {
+            name: (f"phyblock.making.cli.scenes_{name}:command", about)
+            for name, about in _VERBS.items()
+        }
+    },
+)
 def command() -> None:
     """Make data sets of scenes, check them against physics, and look at them."""

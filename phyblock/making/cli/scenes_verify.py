@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
-from phyblock.cli.console import make_console, plain_table
-from phyblock.cli.paths import NAME_OR_PATH
+from phyblock.cli.console import make_console, print_rows
+from phyblock.cli.options import NAME_OR_PATH
 from phyblock.data import SCENES_FILE, AssemblyTask, find_data_set, read_builtin
 from phyblock.errors import DataError, Problem
 from phyblock.making.checks import (
@@ -56,7 +56,7 @@ def command(data: str, jobs: int, ray_address: str | None, limit: int | None) ->
     rows_of_set, problems_of_set = _check_set(where, tasks)
     console = make_console()
     shown = [(name, str(good), str(total)) for name, good, total in (*rows, *rows_of_set)]
-    console.print(plain_table(("check", "passed", "of"), shown, numbers=2))
+    print_rows(console, ("check", "passed", "of"), shown, numbers=2)
     failures = [*problems, *problems_of_set]
     for problem in failures:
         click.echo(f"failed: {problem}", err=True)

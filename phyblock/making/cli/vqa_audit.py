@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from phyblock.cli.console import make_console, plain_table
+from phyblock.cli.console import make_console, print_rows
 from phyblock.domain import LETTERS, SUBTASK_NAMES
 from phyblock.making.cli.question_sets import data_option, questions_argument, read_question_set
 from phyblock.making.cli.working import tracked
@@ -50,7 +50,7 @@ def command(questions: str, data: str, no_text_probe: bool, no_pictures: bool) -
     console = make_console()
     headings = ("", "subtask", "n", "base scenes", *LETTERS)
     probes = ("chance", "majority", "texts", "pictures")
-    console.print(plain_table((*headings, *probes), rows, numbers=10))
+    print_rows(console, (*headings, *probes), rows, numbers=10)
     console.print(
         "Percent. A to D: how often the letter is right (ordering: comes first). Probes: accuracy "
         "with a 95 % interval.",

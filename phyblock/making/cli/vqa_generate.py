@@ -1,4 +1,4 @@
-"""`phyblock vqa generate`: questions from a seed."""
+"""`phyblock questions generate`: questions from a seed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import click
 from rich.progress import Progress, TaskID
 
 from phyblock.cli.console import make_console, shown_path
-from phyblock.cli.paths import UserPath
+from phyblock.cli.options import UserPath
 from phyblock.data import read_data_set
 from phyblock.domain import SUBTASKS, Subtask
 from phyblock.making.cli.question_sets import data_option
@@ -70,7 +70,7 @@ def command(
             progress.advance(bars[subtask])
 
         questions = list(make_questions(scenes, wanted, seed, workers, report))
-    made_by = f"phyblock vqa generate --data {data} --seed {seed} --out {out.name}"
+    made_by = f"phyblock questions generate --data {data} --seed {seed} --out {out.name}"
     if len(subtasks) < len(SUBTASKS):
         made_by += f" --subtasks {','.join(subtasks)}"
     if per_subtask is not None:

@@ -1,4 +1,4 @@
-"""`phyblock vqa reword`: a set of questions in further wordings, which `phyblock run` can ask."""
+"""`phyblock questions reword`: a set in further wordings, which `phyblock run` can ask."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from phyblock.cli.console import make_console, shown_path
-from phyblock.cli.paths import UserPath
+from phyblock.cli.options import UserPath
 from phyblock.data import find_questions, read_data_set, read_questions
 from phyblock.domain import Question
 from phyblock.errors import DataError, Problem
@@ -44,9 +44,9 @@ def command(
 ) -> None:
     """Ask questions of a set in the accepted wordings of FILE, as a set that a suite can name.
 
-    FILE is what phyblock vqa write wrote, after a person has read it. Asks each question that FILE
-    has a wording for in one of them, under an id of its own. Derives its answer again; where that
-    fails, leaves the question out and names it.
+    FILE is what phyblock questions write wrote, after a person has read it. Asks each question that
+    FILE has a wording for in one of them, under an id of its own. Derives its answer again; where
+    that fails, leaves the question out and names it.
     """
     check_place(out, replace)
     further = read_wordings(wordings)
@@ -62,7 +62,7 @@ def command(
     if len(faults) == len(reworded):
         raise DataError([Problem(name, fault) for name, fault in faults.items()])
     sound = {old: new for old, new in reworded.items() if new.id not in faults}
-    made_by = f"phyblock vqa reword {wordings.name} --questions {questions} --data {data}"
+    made_by = f"phyblock questions reword {wordings.name} --questions {questions} --data {data}"
     made_by += f" --seed {seed} --out {out.name}" + (" --add" if add else "")
     originals = {task.scene.id: task.scene for task in scenes.tasks}
     write_questions(out, _merged(asked, sound, add), originals, scenes.name, made_by)

@@ -1,4 +1,4 @@
-"""`phyblock vqa show`: one question, with its pictures."""
+"""`phyblock questions show`: one question, with its pictures."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import click
 from PIL import Image
 
 from phyblock.cli.console import make_console, shown_path
-from phyblock.cli.paths import UserPath
+from phyblock.cli.options import UserPath
 from phyblock.data import QuestionSet
 from phyblock.domain import LETTERS, SUBTASK_NAMES, Question
 from phyblock.errors import DataError, Problem

@@ -1,12 +1,10 @@
-"""`phyblock vqa`: make questions about scenes, check them, look at them."""
+"""`phyblock questions`: make questions about scenes, check them, look at them."""
 
 from __future__ import annotations
 
 import click
 
-from phyblock.cli.verbs import Verbs
-
-__all__ = ["command"]
+from phyblock.cli.options import Verbs
 
 _VERBS = {
     "generate": "Make questions about a data set's scenes from a seed.",
@@ -18,6 +16,14 @@ _VERBS = {
 }
 
 
-@click.group("vqa", cls=Verbs, verbs=_VERBS, prefix="phyblock.making.cli.vqa_")
+@click.group(
+    cls=Verbs,
+    sections={
+        "Commands": {
+            name: (f"phyblock.making.cli.vqa_{name}:command", about)
+            for name, about in _VERBS.items()
+        }
+    },
+)
 def command() -> None:
     """Make multiple-choice questions about scenes, check them, and look at them."""

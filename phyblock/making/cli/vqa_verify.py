@@ -1,4 +1,4 @@
-"""`phyblock vqa verify`: every answer derived again."""
+"""`phyblock questions verify`: every answer derived again."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections import Counter
 
 import click
 
-from phyblock.cli.console import make_console, plain_table
+from phyblock.cli.console import make_console, print_rows
 from phyblock.domain import SUBTASK_NAMES, SUBTASKS
 from phyblock.making.cli.question_sets import data_option, questions_argument, read_question_set
 from phyblock.making.cli.working import jobs_option, ray_option, tracked
@@ -48,7 +48,7 @@ def command(questions: str, data: str, jobs: int, ray_address: str | None) -> No
     ]
     rows.append(("", "checksums", str(files - len(changed)), str(files)))
     console = make_console()
-    console.print(plain_table(("subtask", "", "derived again", "of"), rows, numbers=2))
+    print_rows(console, ("subtask", "", "derived again", "of"), rows, numbers=2)
     for failure in sorted(failures):
         click.echo(f"failed: {failure}", err=True)
     verdict = counted(len(failures), "failure") if failures else "all answers derived again"

@@ -1,4 +1,4 @@
-"""`phyblock vqa write`: further wordings from a model, checked, into a file for review."""
+"""`phyblock questions write`: further wordings from a model, checked, into a file for review."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pathlib import Path
 
 import click
 
-from phyblock.cli.console import make_console, shown_path
-from phyblock.cli.paths import UserPath, models_file_option
+from phyblock.cli.console import make_console, may_spend, shown_path
+from phyblock.cli.options import UserPath, models_file_option, yes_option
 from phyblock.config.models import ModelConfig, load_models
 from phyblock.config.suite import Suite
 from phyblock.domain import Question, Subtask
@@ -20,7 +20,7 @@ from phyblock.making.cli.question_sets import data_option, questions_option, rea
 from phyblock.making.cli.subtasks_option import subtasks_option
 from phyblock.making.cli.working import seed_option
 from phyblock.making.questions.rewording import Paraphrase, stems_of, write_wordings
-from phyblock.models import ReplyCache, build_model
+from phyblock.models import ReplyCache, build_model, is_billed
 from phyblock.models.litellm_client import be_quiet
 from phyblock.resources import bundled, reply_cache_file
 from phyblock.run.models import to_config
@@ -64,6 +64,7 @@ _AT_ONCE = 8
 )
 @models_file_option
 @click.option("--no-cache", is_flag=True, help="Neither read nor write the reply cache.")
+@yes_option
 def command(
     name: str,
     questions: str,
@@ -75,7 +76,8 @@ def command(
     out: Path,
     models_file: str | None,
     no_cache: bool,
-) -> None:
+    yes: bool,
+) -> int:
     """Ask a model for further wordings of questions, and check what they mean.
 
     Accepts a paraphrase when its slots are intact, when the answers of questions asked in it can be
@@ -90,6 +92,12 @@ def command(
     if not stems:
         message = "holds no question of these subtasks in a known wording"
         raise DataError(Problem(questions, message))
+    console = make_console()
+    most = counted(len(stems) * (1 + count * checks), "call")
+    billed = [name] if is_billed(config) and not yes else []
+    if not may_spend(billed, lambda: console.print(f"{name} may bill up to {most}.")):
+        console.print("Nothing was asked.")
+        return 1
     prompt = TemplatePrompt(bundled("prompts", "vqa_write.j2"), "vqa_write")
     asking = _ask(config, prompt, stems, count, checks, seed, use_cache=not no_cache)
     paraphrases = asyncio.run(asking)
@@ -98,7 +106,8 @@ def command(
     accepted = sum(paraphrase.fault is None for paraphrase in paraphrases)
     written = counted(len(paraphrases), "paraphrase")
     summary = f"{written}, {accepted} accepted, in {shown_path(out)}"
-    make_console().print(f"{summary}; read them before they are used", markup=False, soft_wrap=True)
+    console.print(f"{summary}; read them before they are used")
+    return 0
 
 
 def _config(name: str, models_file: str | None) -> ModelConfig:

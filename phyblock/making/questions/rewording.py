@@ -216,7 +216,7 @@ def _plain(text: str) -> str:
     return re.sub(r"[^a-z{}]+", " ", text.lower()).strip()
 
 
-_ALLOWED = "a file that phyblock vqa write wrote"
+_ALLOWED = "a file that phyblock questions write wrote"
 
 
 class _StoredWording(Line, extra="ignore"):

@@ -1,4 +1,4 @@
-"""`phyblock vqa generate|verify|show` as a person calls them."""
+"""`phyblock questions generate|verify|show` as a person calls them."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ SMALL = ("--subtasks", "CO,OC", "--per-subtask", 4, "--jobs", 1)
 def vqa(*args: object) -> Any:
     """The command as it ends."""
     return CliRunner(env={"COLUMNS": "160"}).invoke(
-        phyblock, ["vqa", *map(str, args)], standalone_mode=False, catch_exceptions=False
+        phyblock, ["questions", *map(str, args)], standalone_mode=False, catch_exceptions=False
     )
 
 

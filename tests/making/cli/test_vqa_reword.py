@@ -1,4 +1,4 @@
-"""`phyblock vqa reword`: from wordings that a model wrote to a run that asks them."""
+"""`phyblock questions reword`: from wordings that a model wrote to a run that asks them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def a_set(workspace: Workspace, *questions: Raw) -> None:
 
 def vqa(workspace: Workspace, *words: object) -> Result:
     places = ("--questions", workspace.root / "questions", "--data", workspace.root / "data")
-    return CliRunner().invoke(phyblock, ["vqa", *map(str, (*words, *places))])
+    return CliRunner().invoke(phyblock, ["questions", *map(str, (*words, *places))])
 
 
 def command(workspace: Workspace, out: str, *args: object) -> Result:

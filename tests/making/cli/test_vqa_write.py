@@ -1,4 +1,4 @@
-"""`phyblock vqa write` against a local server: what is accepted, and why the rest is not."""
+"""`phyblock questions write` against a local server: what is accepted, and why the rest is not."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def write(
     with Running(server) as running:
         workspace.write_models(running.url, "alpha", transport="direct")
         places = ("--questions", "./questions", "--data", "./data", "--out", "found.jsonl")
-        return workspace.phyblock("vqa", "write", "--model", "alpha", *places, *args)
+        return workspace.phyblock("questions", "write", "--model", "alpha", *places, *args)
 
 
 def written(workspace: Workspace) -> list[Raw]:
@@ -138,7 +138,7 @@ def test_an_unknown_model_and_a_taken_file_are_refused(workspace: Workspace) -> 
     workspace.write_models("http://127.0.0.1:9", "alpha")
     (workspace.root / "taken.jsonl").touch()
     for model, out, message in (("alfa", "new", "alpha"), ("alpha", "taken", "already there")):
-        done = workspace.phyblock("vqa", "write", "--model", model, "--out", f"{out}.jsonl")
+        done = workspace.phyblock("questions", "write", "--model", model, "--out", f"{out}.jsonl")
         assert done.code == 2
         assert message in done.errors[0]
 

@@ -1,4 +1,4 @@
-"""`phyblock episode`: an episode of a run, as text and as pictures."""
+"""`phyblock show`: a sample of any track, as text and as moving pictures."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from phyblock.data import read_builtin
 from phyblock.records.files import read_records
 from phyblock.tracks.step_planning import EpisodeRecord
 from phyblock.tracks.step_planning_results import OUTCOME_NAMES, episode_film, episode_table
+from tests.servers.chassis import Running
+from tests.servers.openai_chat import OpenAIChat
+from tests.vqa_set import questions, vqa_suite, write_questions
 from tests.workspace import Workspace
 
 SEESAW = {
@@ -48,38 +51,34 @@ def played(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Work
     return workspace
 
 
-def test_an_episode_is_told_and_shown(played: Workspace) -> None:
+def test_an_episode_is_shown_step_by_step(played: Workspace) -> None:
     endings = {r["seed"]: r["ending"] for r in played.records() if r["model"] == "oracle"}
     assert set(endings.values()) == {"completed", "collapsed"}
     fallen = next(seed for seed, ending in endings.items() if ending == "collapsed")
-    gif, sheet = played.root / "a" / "out.gif", played.root / "out.png"
-    sample = f"oracle/seesaw/s{fallen}"
-    done = played.phyblock(
-        "episode", "out", sample, "--gif", gif, "--sheet", sheet, "--size", "128"
-    )
+    gif = played.root / "a" / "out.gif"
+    done = played.phyblock("show", "out", f"oracle/seesaw/s{fallen}", "--gif", gif, "--size", "128")
     assert (done.code, done.err) == (0, "")
     assert "Collapsed" in done.out
-    assert "2  Move(3)    Placed" in done.out
+    assert ["2", "Move(3)", "Placed"] in [line.split()[:3] for line in done.out.splitlines()]
+    assert "3 yellow cuboid3" in done.out
     with Image.open(gif) as frames:
         assert frames.n_frames == 4
         frames.seek(2)
         before = frames.convert("RGB").crop((262, 17, 390, 145)).tobytes()
         frames.seek(3)
         assert frames.convert("RGB").crop((262, 17, 390, 145)).tobytes() != before
-    with Image.open(sheet) as picture:
-        assert picture.format == "PNG"
 
 
-def test_frames_say_what_became_of_steps_as_tables_do(played: Workspace) -> None:
+def test_frames_tell_of_steps_what_tables_do(played: Workspace) -> None:
     (task,) = read_builtin(played.root / "data").tasks
     for record in read_records(played.root / "out"):
         assert isinstance(record, EpisodeRecord)
         _, *frames, last = episode_film(record, task)
         outcomes = [row[2] for row in episode_table(record).rows]
         assert all(
-            frame.caption.endswith(f": {said}")
-            for frame, said in zip(frames, outcomes, strict=True)
-            if said != "Done"
+            frame.caption.endswith(f": {outcome}")
+            for frame, outcome in zip(frames, outcomes, strict=True)
+            if outcome != "Done"
         )
         assert set(outcomes) <= set(OUTCOME_NAMES.values())
         turns = tuple(turn.model_copy(update={"outcome": "empty"}) for turn in record.turns)
@@ -90,10 +89,10 @@ def test_frames_say_what_became_of_steps_as_tables_do(played: Workspace) -> None
 
 @pytest.mark.parametrize(
     ("sample", "message"),
-    [("no-such", "holds no such episode"), ("oracle", "holds 8 such episodes")],
+    [("no-such", "holds no such sample"), ("oracle", "holds 8 such samples")],
 )
-def test_which_episode_is_meant_must_be_clear(played: Workspace, sample: str, message: str) -> None:
-    done = played.phyblock("episode", "out", sample)
+def test_which_sample_is_meant_must_be_clear(played: Workspace, sample: str, message: str) -> None:
+    done = played.phyblock("show", "out", sample)
     assert (done.code, len(done.errors)) == (2, 1)
     assert message in done.errors[0]
     allowed = done.errors[0].partition("allowed")[2]
@@ -101,19 +100,43 @@ def test_which_episode_is_meant_must_be_clear(played: Workspace, sample: str, me
     assert f"and {11 if sample == 'no-such' else 3} more" in allowed
 
 
-def test_a_run_without_episodes_says_so(played: Workspace) -> None:
-    words = ("--set", "tracks=[full_planning]", "--models", "oracle", "--out", "plans")
-    assert played.phyblock("run", "suite.yaml", *words, "--no-report").code == 0
-    done = played.phyblock("episode", "plans", "oracle")
-    assert (done.code, len(done.errors)) == (2, 1)
-    assert "holds no episodes of step planning" in done.errors[0]
-
-
-def test_a_data_set_that_was_moved_can_be_named(played: Workspace) -> None:
+def test_without_its_data_set_a_sample_is_shown_and_not_drawn(played: Workspace) -> None:
     moved = (played.root / "data").rename(played.root / "elsewhere")
-    wanted = ("episode", "out", "repeat/seesaw/s0", "--gif", "x.gif")
-    done = played.phyblock(*wanted)
+    wanted = ("show", "out", "repeat/seesaw/s0")
+    assert played.phyblock(*wanted).code == 0
+    done = played.phyblock(*wanted, "--gif", "x.gif")
     assert (done.code, "--data" in done.err) == (2, True)
-    assert played.phyblock(*wanted, "--data", "elsewhere").code == 0
+    assert played.phyblock(*wanted, "--gif", "x.gif", "--data", "elsewhere").code == 0
     assert (played.root / "x.gif").stat().st_size > 1000
     moved.rename(played.root / "data")
+
+
+def test_a_plan_is_shown_from_its_prompt_to_its_verdicts(workspace: Workspace) -> None:
+    with Running(OpenAIChat()) as running:
+        workspace.write_models(running.url, "alpha")
+        workspace.write_suite(models=["alpha"])
+        assert workspace.run().code == 0
+    record = next(one for one in workspace.records() if one["scene"] == "t3")
+    done = workspace.phyblock("show", "out", "alpha/t3", env={"COLUMNS": "80"})
+    assert (done.code, done.err) == (0, "")
+    assert max(map(len, done.out.splitlines())) <= 80
+    order = [
+        done.out.index(text) for text in ("\nPrompt (", "\nReply\n", "\nRead\n", " blocks placed\n")
+    ]
+    assert order == sorted(order)
+    assert record["reply"]["text"].splitlines()[0] in done.out
+    assert " ".join(map(str, record["parse"]["plan"])) in done.out
+    rows = [line.split() for line in done.out[order[-1] :].splitlines()]
+    steps = [row[1] for row in rows if row and row[0].isdigit()]
+    assert steps == [str(candidate) for candidate in record["parse"]["plan"]]
+
+
+def test_an_answer_is_shown_with_the_right_one(workspace: Workspace) -> None:
+    write_questions(workspace.root / "questions", questions(per_subtask=2, subtasks=("SH", "CO")))
+    workspace.write_suite(**vqa_suite())
+    assert workspace.run("--models", "random").code == 0
+    for record in workspace.records()[:4]:
+        done = workspace.phyblock("show", "out", record["sample"])
+        assert (done.code, done.err) == (0, "")
+        verdict = "right" if record["answer"]["correct"] else "wrong: the answer is "
+        assert f"\n{verdict}" in done.out

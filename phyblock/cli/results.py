@@ -1,0 +1,418 @@
+"""The verbs that read finished runs: report, compare, figures, export, bundle, verify and site.
+
+Each imports what it needs when it is called: `run` shows a finished run that did not change from
+its notes, without counting or drawing anything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+from rich.console import Console
+
+from phyblock.cli.console import make_console, print_path, print_table, shown_path
+from phyblock.cli.options import (
+    NAME_OR_PATH,
+    UserPath,
+    data_folders_option,
+    data_option,
+    run_argument,
+    split_names,
+)
+from phyblock.errors import Problem, SpecError
+from phyblock.text import counted, one_line
+
+if TYPE_CHECKING:
+    from phyblock.bundle import Verified
+    from phyblock.report.summary import Summary
+    from phyblock.tables.text_table import TextTable
+
+_MB = 1e6
+_FAILURES = 4
+"""Messages of failed calls that are shown."""
+
+
+@click.command()
+@run_argument
+@click.option("--print", "prints", is_flag=True, help="Print all tables; write nothing.")
+@click.option("--only", "names", multiple=True, metavar="NAME", help="With --print: this table.")
+@click.option("--paper", is_flag=True, help="With --print: published, ours and difference.")
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["text", "md", "tex"]),
+    default="text",
+    show_default=True,
+    help="With --print: how.",
+)
+@data_option
+def report(
+    run: Path, prints: bool, names: tuple[str, ...], paper: bool, form: str, data: Path | None
+) -> None:
+    """Write tables and report.html of the folder RUN again; with --print, print its tables.
+
+    Takes numbers from run.yaml and records.jsonl alone: no model, no network. Draws scenes from the
+    data set, where it is at hand.
+    """
+    if prints:
+        _print_tables(run, names, form, is_paper=paper)
+    elif names or paper or form != "text":
+        raise click.UsageError("--only, --paper and --format are for --print")
+    else:
+        show_tables(run, data)
+
+
+def _print_tables(folder: Path, names: Sequence[str], form: str, *, is_paper: bool) -> None:
+    from phyblock.report import load_run, to_latex, to_markdown
+    from phyblock.report.write import make_tables, table_names
+    from phyblock.tables.showing import marked
+    from phyblock.tracks.kind import kinds
+
+    run = load_run(folder, texts=False)
+    if is_paper:
+        views: dict[str, TextTable] = {}
+        reports = [kind.report() for kind in kinds().values()]
+        tables = {n: (one, table) for one in reports for n, table in one.paper_tables.items()}
+        for n, (of_track, table) in sorted(tables.items()):
+            frame = table.frame(run)
+            if len(frame):
+                views[f"paper{n}"] = marked(table.view(frame, run), of_track.showing(run))
+    else:
+        frames, views = make_tables(run, names or table_names(run))
+        views = {name: view for name, view in views.items() if name in names or len(frames[name])}
+    if unknown := [name for name in names if name not in views]:
+        allowed = ", ".join(views if is_paper else table_names(run))
+        found = ", ".join(unknown)
+        raise SpecError(Problem(str(folder), "has no such table", "--only", found, allowed))
+    if not views:
+        click.echo("No model of the run has a row in the paper's tables.")
+    for name in names or views:
+        if form == "text":
+            print_table(make_console(), views[name])
+        elif form == "md":
+            click.echo(to_markdown(views[name]))
+        else:
+            click.echo(to_latex(views[name], f"phyblock-{name}"))
+
+
+def show_tables(folder: Path, data: Path | None = None) -> None:
+    """Write tables and page of a run folder, and print its summary and the page's path."""
+    print_path(make_console(), _made(folder, None, data, page=True, anew=True))
+
+
+def show_made(folder: Path, tables: Sequence[str], *, page: bool) -> Path:
+    """Print the summary of a run; write these tables and the page unless nothing has changed.
+
+    Returns the page, or the folder of tables where no page is wanted.
+    """
+    return _made(folder, tables, None, page=page, anew=False)
+
+
+def _made(
+    folder: Path, tables: Sequence[str] | None, data: Path | None, *, page: bool, anew: bool
+) -> Path:
+    from phyblock.report.inputs import inputs_digest
+    from phyblock.report.made import PAGE, TABLES, note_made, still_made
+
+    console = make_console()
+    inputs = inputs_digest(folder, tables)
+    made = None if anew else still_made(folder, inputs, page=page)
+    if made is not None:
+        _print_summary(console, made.summary)
+    else:
+        from phyblock import report as maker
+        from phyblock.report.summary import summary_of
+
+        written = maker.write_tables(folder, tables)
+        summary = summary_of(written)
+        _print_summary(console, summary)
+        paged = maker.write_page(written, data) if page else None
+        # Drawn from data elsewhere, it is not what a run makes of its own.
+        note_made(folder, None if data else inputs, summary, written.files, paged)
+    return folder / (PAGE if page else TABLES)
+
+
+def _print_summary(console: Console, summary: Summary) -> None:
+    for table in summary.tables:
+        print_table(console, table)
+    for model, message, times in summary.failures[:_FAILURES]:
+        console.print(one_line(f"{times:,} x {model}: {message}"), style="yellow")
+    if (others := len(summary.failures) - _FAILURES) > 0:
+        console.print(f"and {others:,} other messages", style="yellow")
+    for sentence in summary.blind:
+        console.print(sentence)
+
+
+@click.command()
+@run_argument
+@click.argument("other", type=UserPath(), required=False)
+@click.option("--models", metavar="A,B", help="Only these models; of two runs, A of the first.")
+@click.option("--track", metavar="NAME", default="", help="[default: the first that they have]")
+@click.option("--measure", metavar="NAME", default="", help="[default: the first of the track]")
+@click.option("--out", type=UserPath(), metavar="DIR", help="Folder for CSV, Markdown and LaTeX.")
+def compare(
+    run: Path, other: Path | None, models: str | None, track: str, measure: str, out: Path | None
+) -> None:
+    """Compare the models of the folder RUN with one another, or those of RUN with OTHER's.
+
+    Pairs samples of the same scene or question and seed, and tests them by a t test that knows
+    which scenes share base scenes. Shows p values with Holm's correction, and the difference that
+    each test could have found.
+    """
+    from phyblock.report import load_run
+    from phyblock.report.compare import compare_models, compare_runs
+    from phyblock.report.compare_view import (
+        compare_view,
+        flipped_lines,
+        ranks_view,
+        write_comparison,
+    )
+
+    names = split_names(models)
+    first = load_run(run, texts=False)
+    if other is None:
+        comparison = compare_models(first, names, track, measure)
+    else:
+        second = load_run(other, texts=False)
+        comparison = compare_runs(first, second, names, track, measure)
+    console = make_console()
+    print_table(console, compare_view(comparison))
+    if len(comparison.ranks) > 2:
+        print_table(console, ranks_view(comparison))
+    if comparison.table[["a", "b"]].drop_duplicates().shape[0] == 1:
+        for line in flipped_lines(comparison):
+            console.print(line)
+    if out is not None:
+        write_comparison(comparison, out)
+        print_path(console, out)
+
+
+_LEAST_MM, _MOST_MM, _MM = 60.0, 400.0, 25.4
+
+
+@click.command()
+@run_argument
+@click.option("--only", "names", multiple=True, metavar="NAME", help="Only this figure; repeat.")
+@click.option("--models", metavar="A,B", help="Only these models.")
+@click.option("--scene", default="", metavar="ID", help="The scene that figures of scenes show.")
+@click.option(
+    "--width",
+    metavar="column|text|MM",
+    default="text",
+    show_default=True,
+    help="Width: of a column, of the text, or millimeters.",
+)
+@click.option(
+    "--font",
+    type=click.Choice(["sans", "serif"]),
+    default="sans",
+    show_default=True,
+    help="Typeface.",
+)
+@click.option("--no-title", is_flag=True, help="Leave the title to the caption.")
+@click.option("--out", type=UserPath(), metavar="DIR", help="Folder. [default: RUN/paper]")
+@data_option
+def figures(
+    run: Path,
+    names: tuple[str, ...],
+    models: str | None,
+    scene: str,
+    width: str,
+    font: Literal["sans", "serif"],
+    no_title: bool,
+    out: Path | None,
+    data: Path | None,
+) -> None:
+    """Draw figures of the folder RUN for a paper: PDF and SVG whose text is text, PNG for slides,
+    and captions as plain text and as LaTeX floats.
+
+    Draws all figures of numbers, unless you name some with --only. Name figures of scenes
+    (inference, subtask-cards, perturbations) to draw them. Leaves out figures that the run has no
+    numbers for. Draws a figure that cannot be read at the chosen width as wide as it needs.
+    """
+    from phyblock.report import load_run
+    from phyblock.report.figures import Wanted, figure_names, of_models, write_paper_figures
+    from phyblock.tables.drawing import COLUMN_IN, WIDTH_IN, Look
+
+    try:
+        width_in = {"column": COLUMN_IN, "text": WIDTH_IN}.get(width) or float(width) / _MM
+    except ValueError:
+        width_in = 0.0
+    if not _LEAST_MM <= width_in * _MM <= _MOST_MM:
+        allowed = f"column, text, or {_LEAST_MM:g} to {_MOST_MM:g} millimeters"
+        raise click.BadParameter(
+            f"{width!r} is no width (allowed: {allowed})", param_hint="--width"
+        )
+    loaded = of_models(load_run(run, texts=False), split_names(models))
+    known = figure_names(loaded)
+    if unknown := [name for name in names if name not in known]:
+        found, allowed = ", ".join(unknown), ", ".join(known)
+        raise SpecError(Problem(str(run), "has no such figure", "--only", found, allowed))
+    look = Look(width_in, font, not no_title)
+    drawn = write_paper_figures(loaded, Wanted(names, scene, data), look, out)
+    console = make_console()
+    for name, needed_in in drawn.wider.items():
+        wider = f"{name} is {_MM * needed_in:.1f} mm wide instead of {_MM * width_in:g} mm"
+        console.print(f"{wider}: its names and numbers need the room.")
+    for file in drawn.files:
+        print_path(console, file)
+    if not drawn.files:
+        console.print("The run has no numbers for a figure.")
+
+
+_RUN_FORMS = ("inspect", "hf", "csv", "parquet")
+
+
+@click.command()
+@click.argument("run", type=UserPath(), required=False)
+@click.option(
+    "--to",
+    "form",
+    required=True,
+    metavar="FORMAT",
+    help=f"Of a run: {', '.join(_RUN_FORMS)}. Of questions: vlmevalkit, hf.",
+)
+@click.option(
+    "--questions",
+    is_flag=False,
+    flag_value="",
+    metavar="[SET]",
+    help="Write questions with their pictures: a folder, or a bundled set.",
+)
+@click.option("--out", type=UserPath(), metavar="DIR", help="Folder. [default: RUN/export/FORMAT]")
+@click.option(
+    "--data",
+    type=NAME_OR_PATH,
+    default="phyblock-400",
+    show_default=True,
+    help="With --questions: the scenes they are about.",
+)
+@click.option(
+    "--limit", type=click.IntRange(min=1), help="With --questions: N, spread over subtasks."
+)
+@click.option(
+    "--size",
+    "size_px",
+    type=click.IntRange(128, 2048),
+    default=512,
+    show_default=True,
+    help="With --questions: edge of a picture in pixels.",
+)
+def export(
+    run: Path | None,
+    form: str,
+    questions: str | None,
+    out: Path | None,
+    data: str,
+    limit: int | None,
+    size_px: int,
+) -> None:
+    """Write the records of the folder RUN, or questions with their pictures, for other tools.
+
+    inspect: Inspect AI logs, one a track and model. hf: a Hugging Face dataset. csv, parquet: a
+    row a sample. vlmevalkit: a TSV file of questions.
+    """
+    from phyblock.data import read_data_set
+    from phyblock.report import load_run
+    from phyblock.report.export.write import export_run
+    from phyblock.tracks import kinds
+
+    brought = [kind.report().export for kind in kinds().values()]
+    writers = {word: one for one in brought if one is not None for word in one.formats}
+    forms = _RUN_FORMS if questions is None else tuple(writers)
+    if form not in forms:
+        raise click.BadParameter(f"{form!r} is not one of {', '.join(forms)}.", param_hint="--to")
+    if (run is None) == (questions is None):
+        raise click.UsageError("Name the folder of a run, or --questions.")
+    if run is not None:
+        files = export_run(load_run(run, texts=False), form, out)
+    else:
+        assert questions is not None
+        if out is None:
+            raise click.UsageError("--questions needs --out: the folder to write.")
+        items = questions or writers[form].items
+        files = writers[form].write(form, out, items, read_data_set(data), limit, size_px)
+    for file in files:
+        print_path(make_console(), file)
+
+
+@click.command()
+@run_argument
+@click.option("--out", type=UserPath(), metavar="FILE", help="The file. [default: RUN/bundle.zip]")
+@data_folders_option
+def bundle(run: Path, out: Path | None, data: tuple[Path, ...]) -> None:
+    """Write the folder RUN as one file: manifest, records, digests.
+
+    Leaves out keys, pictures, prompts, addresses of servers, and all but the last part of paths of
+    this machine. Keeps what models wrote, and what they were sent beside the prompt. Scores the
+    replies again first, where the data are at hand, and refuses a run whose scores do not come out
+    the same.
+    """
+    from phyblock.bundle import bundle_run
+
+    console = make_console()
+    made = bundle_run(run, out, data)
+    if made.verified is None:
+        console.print(f"It was not verified here: {made.lacking}")
+    else:
+        _print_verified(console, made.verified)
+    console.print(f"{made.size_bytes / _MB:.1f} MB:")
+    print_path(console, made.path)
+
+
+def _print_verified(console: Console, verified: Verified) -> None:
+    samples = f"{verified.records:,} of {verified.expected:,} expected samples"
+    console.print(f"{samples}." if verified.is_whole else f"{samples}: the run is not whole.")
+    models = counted(len(verified.manifest.models), "model")
+    records, tables = counted(verified.records, "record"), counted(verified.tables, "table file")
+    console.print(f"{records} of {models}, scored again, and {tables} are the same bytes.")
+
+
+@click.command()
+@click.argument("file", type=UserPath())
+@data_folders_option
+def verify(file: Path, data: tuple[Path, ...]) -> None:
+    """Score the replies in the bundle FILE again; say whether its records and tables come out as
+    the same bytes, and whether samples were left out. Exits with 2 where they do not come out.
+
+    Calls no model. A bundle holds no data: sets that come with phyblock are found; name others
+    with --data.
+    """
+    from phyblock.bundle import FELL, opened_bundle
+
+    console = make_console()
+    with opened_bundle(file, data) as verified:
+        console.print(f"{shown_path(file)} verifies.")
+        _print_verified(console, verified)
+        console.print(f"Run {verified.manifest.run}, made with phyblock {verified.about.phyblock}.")
+        if verified.physics:
+            tracks = ", ".join(verified.physics)
+            console.print(f"{tracks}: physics was not carried out, {FELL}.")
+        console.print("That the models gave these replies, no bundle can show.")
+        console.print("Nor can it what they cost, how long they took, and which model answered.")
+
+
+@click.command()
+@click.argument("runs", nargs=-1, required=True, type=UserPath())
+@click.option("--out", type=UserPath(), required=True, metavar="DIR", help="Folder of the site.")
+@data_folders_option
+@click.option("--title", default="PhyBlock leaderboard", show_default=True, help="Its heading.")
+def site(runs: tuple[Path, ...], out: Path, data: tuple[Path, ...], title: str) -> None:
+    """Put RUNS (run folders and bundles) into one static folder: a ranked table, cost against
+    score, a page for every model and scene, replays.
+
+    The folder opens from disk or from any web server. Runs must be of one data version and prompt.
+    Bundles are scored again first, and those that do not verify are refused.
+    """
+    from phyblock.site import write_site
+
+    console = make_console()
+    made = write_site(runs, out, data, title)
+    if made.lacking:
+        console.print(made.lacking)
+    models, samples = counted(made.models, "model"), counted(made.samples, "sample")
+    console.print(f"{models}, {samples}, {made.size_bytes / _MB:.1f} MB:")
+    print_path(console, made.path)

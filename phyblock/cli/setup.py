@@ -1,0 +1,200 @@
+"""`phyblock init`, `validate` and `cache`: a working folder, its files, the paid replies."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+from collections.abc import Collection, Mapping
+from pathlib import Path
+
+import click
+
+from phyblock.cli.console import make_console, print_path, print_rows, shown_path
+from phyblock.cli.options import UserPath, models_file_option, sets_option
+from phyblock.config.models import RECORDED, ModelConfig, load_models
+from phyblock.config.suite import load_suite, suite_model, suite_tracks
+from phyblock.data import SCENES_FILE, read_builtin, read_official
+from phyblock.errors import InputError, Problem, SpecError
+from phyblock.files import check_free, read_bytes, writing
+from phyblock.resources import bundled, reply_cache_file
+from phyblock.run.models import model_problems
+from phyblock.run.plan import make_plan
+from phyblock.run.preflight import (
+    asking_remarks,
+    bundled_suites,
+    find_models_file,
+    find_suite,
+    prompt_dirs,
+)
+from phyblock.text import counted
+from phyblock.tracks import kind_of
+
+_FILES = (
+    ("models.yaml",),
+    ("benchmarks", "schemas", "suite.schema.json"),
+    ("benchmarks", "schemas", "models.schema.json"),
+)
+# A models file has model names at its top level, a suite has these.
+_SUITE_KEY = re.compile(rf"^(?:{'|'.join(suite_model().model_fields)})[ \t]*:", re.MULTILINE)
+# Keys that scenes have and neither suites nor models, in YAML and in JSON.
+_SCENE_KEYS = tuple(
+    re.compile(rf"""(?:^|[\s{{,"'-]){key}["']?[ \t]*:[ \t]*(?:[\[#]|$)""", re.MULTILINE)
+    for key in ("blocks", "position")
+)
+
+
+@click.command()
+@click.argument("folder", type=UserPath())
+@click.option(
+    "--suite",
+    type=click.Choice(bundled_suites()),
+    default="quick",
+    show_default=True,
+    help="Bundled suite to begin with.",
+)
+def init(folder: Path, suite: str) -> None:
+    """Lay out FOLDER with a suite, a models file and prompts to change.
+
+    Never writes over files that are already there.
+    """
+    templates = [kind_of(name).template for name in suite_tracks(find_suite(suite))]
+    prompts = [
+        ("prompts", path.name)
+        for template in templates
+        if template is not None
+        for path in sorted(bundled("prompts").glob(f"{template.stem}*.j2"))
+    ]
+    names = (*_FILES, ("benchmarks", f"{suite}.yaml"), *prompts)
+    files = [folder.joinpath(*parts) for parts in names]
+    check_free(files, "choose another folder")
+    console = make_console()
+    with writing(folder):
+        for target, parts in zip(files, names, strict=True):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with target.open("xb") as file:
+                file.write(bundled(*parts).read_bytes())
+            print_path(console, f"  {shown_path(target)}")
+    console.print(
+        "\nAdd a model with one line in models.yaml, then name it under models in the suite. "
+        "What you change under prompts/ is used by every run from here (NAME_json.j2 where a suite "
+        "asks for JSON). Next:"
+    )
+    place = shlex.quote(shown_path(folder))
+    print_path(console, f"  cd {place} && phyblock run benchmarks/{suite}.yaml")
+
+
+@click.command()
+@click.argument("files", nargs=-1, required=True, type=UserPath())
+@sets_option
+@models_file_option
+def validate(files: tuple[Path, ...], sets: tuple[str, ...], models_file: str | None) -> None:
+    """Check FILES: suites (or names of bundled ones) and models files, data set folders, official
+    checkouts.
+
+    Shows all problems of all files, and exits with 2 when there are any.
+    """
+    console = make_console()
+    problems: list[Problem] = []
+    for path in files:
+        try:
+            summary, *remarks = _check(path, sets, models_file)
+        except InputError as error:
+            problems += error.problems
+        else:
+            console.print(f"{shown_path(path)}: {summary}")
+            for remark in remarks:
+                console.print(f"  {remark}")
+    if problems:
+        raise InputError(problems)
+
+
+def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[str]:
+    """Describe a file without problems, and add remarks."""
+    if os.path.isdir(path) or path.name == SCENES_FILE:
+        folder = path.parent if path.name == SCENES_FILE else path
+        is_builtin = os.path.lexists(folder / SCENES_FILE)
+        dataset = read_builtin(folder) if is_builtin else read_official(folder)
+        levels = sorted({n for task in dataset.tasks for n in task.scene.levels})
+        by_level = ", ".join(
+            f"{sum(n in task.scene.levels for task in dataset.tasks)} of level {n}" for n in levels
+        )
+        scenes = counted(len(dataset.tasks), "scene")
+        return [f"data set {dataset.name}, {scenes} ({by_level})"]
+    path = find_suite(str(path))
+    try:
+        if _has_keys(path, _SUITE_KEY):
+            return _check_suite(path, sets, models_file)
+        known = load_models(path)
+        _check_models(path, known, known)
+        if not known:
+            allowed = "a suite, or a models file with name: provider/model lines"
+            raise SpecError(Problem(str(path), "names nothing", allowed=allowed))
+        return [f"models file, {counted(len(known), 'model')}"]
+    except SpecError as error:
+        if not _has_keys(path, *_SCENE_KEYS):
+            raise
+        message, allowed = "holds scenes", "a suite, a models file, or the folder of a data set"
+        hint = f"`phyblock scenes complete {shown_path(path)}` makes a data set of them"
+        raise SpecError(Problem(str(path), message, allowed=allowed, hint=hint)) from error
+
+
+def _check_suite(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[str]:
+    data = bundled("benchmarks", "data")
+    suite = load_suite(path, sets, data_dir=data, prompt_dirs=prompt_dirs(path))
+    named = find_models_file(models_file, path)
+    known = load_models(named)
+    if suite.models != RECORDED:
+        _check_models(named, known, suite.models)
+    plan = make_plan(suite, known)
+    models, samples = counted(len(plan.models), "model"), counted(plan.samples_per_model, "sample")
+    return [f"suite {plan.suite.name}, {models}, {samples} a model", *asking_remarks(suite, plan)]
+
+
+def _check_models(path: Path, known: Mapping[str, ModelConfig], names: Collection[str]) -> None:
+    if problems := list(model_problems(path, known, names)):
+        raise SpecError(problems)
+
+
+def _has_keys(path: Path, *keys: re.Pattern[str]) -> bool:
+    """True if a file has such keys; False for what cannot be read, whose reader says why."""
+    try:
+        text = read_bytes(path).decode(errors="replace")
+    except (OSError, ValueError):
+        return False
+    return all(key.search(text) for key in keys)
+
+
+@click.group()
+def cache() -> None:
+    """Show or clear the reply cache, which all runs of this user share."""
+
+
+@cache.command()
+def stats() -> None:
+    """Show how many replies the cache holds of each model, and how large its file is."""
+    from phyblock.models import ReplyCache
+
+    console = make_console()
+    with ReplyCache(reply_cache_file()) as opened:
+        held = opened.stats()
+    rows = [(model, f"{replies:,}") for model, replies in held.by_model.items()]
+    if rows:
+        print_rows(console, ("model", "replies"), rows, numbers=1)
+    size = f"{held.size_bytes / 1e6:,.1f} MB"
+    console.print(f"{counted(held.replies, 'reply', 'replies')}, {size}, in")
+    print_path(console, held.path)
+
+
+@cache.command()
+@click.option("--model", metavar="ID", help="Delete only the replies of this model id.")
+@click.option("--yes", is_flag=True, help="Do not ask.")
+def clear(model: str | None, yes: bool) -> None:
+    """Delete cached replies; repeated calls will be billed."""
+    from phyblock.models import ReplyCache
+
+    which = f"replies of {model}" if model else "all replies"
+    if not yes:
+        click.confirm(f"Delete {which}? Repeated calls will be billed.", abort=True)
+    with ReplyCache(reply_cache_file()) as opened:
+        make_console().print(f"Deleted {counted(opened.clear(model), 'reply', 'replies')}.")

@@ -1,0 +1,155 @@
+"""Tables in terminals of any width, names that others chose, and what a run ends with."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.cells import cell_len
+
+from phyblock.cli.console import make_console, print_table
+from phyblock.cli.progress import ProgressView
+from phyblock.report import Column, TextTable, load_run, to_latex, to_markdown, write_tables
+from phyblock.report.export.write import export_run
+from phyblock.report.summary import summary_of
+from phyblock.run.events import RunStarted
+from phyblock.tables.csv_text import to_csv
+from tests.report.factory import LEVELS, manifest, record, score, write_run
+
+NAME = ":b: [red]x[/red]\n=2 \x1b[31m\u202e|&\r"
+SHOWN = ":b: [red]x[/red] =2  [31m |&"
+FORMULA = "=HYPERLINK(A1)"
+WORDS = st.text("abc01%", min_size=1, max_size=9)
+GROUPS = st.sampled_from(["", "Level", "A long name"])
+
+
+@st.composite
+def tables(draw: st.DrawFn) -> TextTable:
+    columns = (
+        Column("Model", is_text=True),
+        *(Column(name, is_text=True) for name in draw(st.lists(WORDS, max_size=1))),
+        *(Column(draw(WORDS), draw(GROUPS)) for _ in range(draw(st.integers(1, 8)))),
+        *(Column(name, is_text=True) for name in draw(st.lists(WORDS, max_size=1))),
+    )
+    # No two cells are alike, so that each can be found again.
+    rows = tuple(
+        tuple(f"{draw(WORDS)}.{row}.{column}" for column in range(len(columns)))
+        for row in range(draw(st.integers(0, 4)))
+    )
+    note = st.lists(WORDS, min_size=1, max_size=30).map(" ".join)
+    return TextTable(draw(note), columns, rows, tuple(draw(st.lists(note, max_size=2))))
+
+
+@given(view=tables(), width=st.integers(60, 200))
+def test_no_line_is_wider_than_the_terminal_and_every_cell_stands_whole(
+    view: TextTable, width: int
+) -> None:
+    console = make_console()
+    console.file, console.width = io.StringIO(), width
+    print_table(console, view)
+    lines = console.file.getvalue().splitlines()
+    assert max(map(cell_len, lines)) <= width
+    words = [word for line in lines for word in line.split()]
+    pieces = sum(set(line) == {"─"} for line in lines)
+    for row in view.rows:
+        for column, cell in zip(view.columns, row, strict=True):
+            names = not any(one.is_text is False for one in view.columns[: row.index(cell)])
+            is_name = column.is_text and names
+            assert words.count(cell) == (pieces if is_name else 1)
+
+
+def test_tables_show_names_as_they_are() -> None:
+    console = make_console()
+    console.file = io.StringIO()
+    columns = (Column("Model", is_text=True), Column("F1"))
+    print_table(console, TextTable(NAME, columns, ((NAME, "1.0"), ("b", "2.0")), (NAME,)))
+    console.print(NAME.replace("\n", " "))
+    view = ProgressView(console, NAME)
+    view(RunStarted({NAME: 1}, {NAME: ()}))
+    console.print(view._panel())
+    shown = console.file.getvalue()
+    assert shown.count(SHOWN) == 6
+    assert "\x1b" not in shown
+    assert any(SHOWN in line and line.rstrip().endswith("1.0") for line in shown.splitlines())
+
+
+def test_files_hold_names_on_one_line() -> None:
+    columns = (Column("Model", is_text=True), Column("F1"))
+    view = TextTable("caption", columns, ((NAME, "1.0"), ("b", "2.0")))
+    table_lines = [line for line in to_markdown(view).splitlines() if line.startswith("|")]
+    assert len(table_lines) == 4
+    assert all(line.count("|") - line.count("\\|") == 3 for line in table_lines)
+    rows = [line for line in to_latex(view, "x").splitlines() if line.endswith("\\\\")]
+    assert len(rows) == 3
+    assert all(row.count("&") - row.count("\\&") == 1 for row in rows)
+
+
+def test_no_cell_of_any_csv_is_a_formula(tmp_path: Path) -> None:
+    records = [
+        record(FORMULA, scene, scores=[score(1, 1, 1)], text="-2+3+cmd|' /C calc'!A0")
+        for scene in LEVELS
+    ]
+    folder = write_run(tmp_path / "run", records, manifest(models=[FORMULA], seeds=[0]))
+    written = write_tables(folder)
+    exported = export_run(load_run(folder), "csv")
+    checked = 0
+    for path in (*written.files, *exported):
+        if path.suffix == ".csv":
+            with path.open(newline="", encoding="utf-8") as file:
+                for cell in (cell for row in csv.reader(file) for cell in row):
+                    checked += f"'{FORMULA}" == cell
+                    if cell.startswith(("=", "+", "-", "@", "\t", "\r")):
+                        float(cell)
+    assert checked > len(LEVELS)
+    assert pd.read_csv(exported[0])["reply"][0] == "'-2+3+cmd|' /C calc'!A0"
+
+
+def test_numbers_and_gaps_in_a_csv_stay() -> None:
+    frame = pd.DataFrame(
+        {
+            "a": [1, None, "=x"],
+            "b": [-1.5, 2.0, None],
+            "c": pd.array(["-x", None, "-2"], dtype="string"),
+        }
+    )
+    assert to_csv(frame, "%.1f") == "a,b,c\n1,-1.5,'-x\n,2.0,\n'=x,,-2\n"
+    assert frame["a"][2] == "=x"
+
+
+def ranked(folder: Path, records: list[dict[str, Any]], facts: dict[str, Any]) -> list[list[str]]:
+    """The rows of the headline table, with how many tables there are."""
+    summary = summary_of(write_tables(write_run(folder, records, facts)))
+    return [[*row[:2], row[-1]] for row in summary.tables[0].rows] + [[str(len(summary.tables))]]
+
+
+@pytest.mark.parametrize("is_whole", [True, False])
+def test_a_model_with_samples_that_were_not_asked_has_no_rank(
+    tmp_path: Path, is_whole: bool
+) -> None:
+    levels = list(LEVELS)
+    records = [
+        record(model, scene, scores=[score(tp, 1, 1)], outcome=outcome)
+        for model, tp, scenes, outcome in (
+            ("worse", 1, levels[:1], "api_error"),
+            ("worse", 1, levels[1:], "ok"),
+            ("best", 4, levels if is_whole else levels[1:], "ok"),
+        )
+        for scene in scenes
+    ]
+    rows = ranked(tmp_path / "run", records, manifest(models=["worse", "best"], seeds=[0]))
+    first, second, n_tables = rows
+    assert (first[1], second[1]) == ("best", "worse")
+    n = len(levels)
+    if is_whole:
+        assert (first[0], second[0]) == ("1", "2")
+    else:
+        assert (first[0], second[0]) == ("", "1")
+        assert (first[2], second[2]) == (f"{n - 1}/{n}", f"{n}/{n}")
+    # The second is the coverage, of the model whose calls failed.
+    assert n_tables == ["2"]
