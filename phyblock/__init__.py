@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from phyblock.api.scores import PlanScore, score
     from phyblock.api.suites import SceneTask, Suite, load_suite
     from phyblock.errors import PhyblockError
-    from phyblock.report.notebook import LoadedRun as Run
-    from phyblock.report.notebook import load_run
+    from phyblock.results.load import Run, load_run
 
     __version__: str
 
@@ -42,10 +41,10 @@ _HOMES = {
     "PhyblockError": "phyblock.errors",
     "Picture": "phyblock.api.pictures",
     "PlanScore": "phyblock.api.scores",
-    "Run": "phyblock.report.notebook:LoadedRun",
+    "Run": "phyblock.results.load",
     "SceneTask": "phyblock.api.suites",
     "Suite": "phyblock.api.suites",
-    "load_run": "phyblock.report.notebook",
+    "load_run": "phyblock.results.load",
     "load_suite": "phyblock.api.suites",
     "render": "phyblock.api.pictures",
     "run_suite": "phyblock.api.running",

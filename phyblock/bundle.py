@@ -27,20 +27,19 @@ from typing import Annotated, Any
 from pydantic import Field, TypeAdapter, ValidationError
 
 from phyblock.errors import DataError, InputError, Problem, SpecError, StoreError, reason_of
-from phyblock.files import atomic_write, open_regular, read_bytes, write_named
+from phyblock.files import atomic_write, digest_of_file, open_regular, read_bytes, write_named
 from phyblock.parsing.text import READER_VERSION
 from phyblock.records.files import RECORDS, read_records
 from phyblock.records.line import Line, decode, problems_of
 from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
 from phyblock.records.record import Record
 from phyblock.records.reply import Reply
-from phyblock.report.inputs import digest_of_file
-from phyblock.report.write import write_tables
 from phyblock.resources import bundled
+from phyblock.results.design import read_design
+from phyblock.results.tables import write_tables
 from phyblock.run.plan import recorded_dataset
 from phyblock.run.rescore import judged_anew, recorded_suite, reopen_tracks
 from phyblock.run.store import manifest_text, record_lines, run_folder, write_run
-from phyblock.tables.design import read_design
 from phyblock.text import some_of
 from phyblock.tracks.kind import kinds_with_physics
 

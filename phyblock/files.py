@@ -91,6 +91,18 @@ class RepeatedFieldError(ValueError):
         super().__init__(f"holds the field {field[:80]!r} twice in one object")
 
 
+def digest_of_file(path: Path) -> str:
+    """Return the SHA-256 of a file; empty where there is none. Raises OSError, NotRegularError."""
+    digest = hashlib.sha256()
+    try:
+        with open_regular(path) as file:
+            while chunk := file.read(2**20):
+                digest.update(chunk)
+    except FileNotFoundError:
+        return ""
+    return digest.hexdigest()
+
+
 def load_json(data: bytes | str, *, finite: bool = True, unique: bool = False) -> Any:
     """Decode JSON whose nesting, integers and floats are bounded.
 

@@ -140,7 +140,7 @@ def unregister_track(name: str) -> None:
 
 
 def add_measure(track: str, measure: Any) -> None:
-    """Add a `phyblock.tables.Measure` to a track; KeyError for a track that there is not."""
+    """Add a `tracks.measures.Measure` to a track; KeyError for a track that there is not."""
     _measures[known_track(track).name] = (*added_measures(track), measure)
 
 

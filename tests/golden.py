@@ -4,9 +4,9 @@
     python -m tests.golden make [NAME ...]     write tests/golden.json again
     ... --keep FOLDER                          keep the run folders there, to look into a difference
 
-Numbers are compared by digests of the rows of each model in `estimates.csv` and in the headline
-tables; models and columns that a run adds are no difference. Requests are compared by a digest of
-all bodies that a local server received.
+Numbers are compared by digests of the rows of each model and measure in `estimates.csv`, and of
+each model in the headline tables; models, measures and columns that a run adds are no difference.
+Requests are compared by a digest of all bodies that a local server received.
 """
 
 from __future__ import annotations
@@ -66,14 +66,18 @@ _LIMITS = {"questions": 16, "questions-letters": 16}
 
 
 def rows_digests(path: Path) -> dict[str, str]:
-    """Return a digest of the rows of each model in a table, whatever their order."""
+    """Return a digest of the rows of each model, of estimates each model and measure, in a table.
+
+    The order of rows changes nothing.
+    """
     with path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     columns = KEY_COLUMNS if path.name == "estimates.csv" else tuple(rows[0] if rows else ())
     by_model: defaultdict[str, list[str]] = defaultdict(list)
     for row in rows:
-        model = row.get("model") or row.get("Model") or ""
-        by_model[model].append(json.dumps([row[column] for column in columns]))
+        model = row.get("model") or ""
+        key = f"{model} {row['measure']}" if path.name == "estimates.csv" else model
+        by_model[key].append(json.dumps([row[column] for column in columns]))
     return {model: _digest(sorted(lines)) for model, lines in by_model.items()}
 
 

@@ -17,7 +17,7 @@ from phyblock.api.given import expect
 from phyblock.api.suites import Suite, load_suite
 from phyblock.config.models import load_models
 from phyblock.errors import Problem, SpecError
-from phyblock.report.notebook import LoadedRun, load_run
+from phyblock.results.load import Run, load_run
 from phyblock.run.estimate import spending_refused, unlimited_spending
 from phyblock.run.events import RunEvent, Stopping
 from phyblock.run.execute import RunResult
@@ -42,7 +42,7 @@ def run_suite(
     use_cache: bool = True,
     retry_failed: bool = False,
     yes: bool = False,
-) -> LoadedRun:
+) -> Run:
     """Run a suite, or go on with its run where it stopped, and load the run.
 
     The arguments are the options of `phyblock run`: `models` replaces the suite's, `limit` keeps so

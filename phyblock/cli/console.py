@@ -18,7 +18,7 @@ from rich.table import Table
 from rich.text import Text
 
 from phyblock.errors import Problem, SpecError
-from phyblock.tables.text_table import Column, TextTable
+from phyblock.results.text import Column, TextTable
 from phyblock.text import one_line, plain_lines
 
 _PIPE_WIDTH = 160

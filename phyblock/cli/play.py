@@ -16,7 +16,7 @@ from rich.progress import Progress
 
 from phyblock.cli.console import make_console, print_path, shown_path
 from phyblock.cli.options import NAME_OR_PATH, UserPath, limit_option, sets_option
-from phyblock.cli.results import show_made
+from phyblock.cli.results import show_tables
 from phyblock.config.suite import load_suite
 from phyblock.errors import Problem, SpecError, reason_of
 from phyblock.files import read_text
@@ -26,7 +26,6 @@ from phyblock.play.page import default_consent
 from phyblock.play.person import Person, PersonModel, plan_sitting
 from phyblock.play.server import Server
 from phyblock.play.sitting import Sitting, report_files
-from phyblock.report.made import names_to_write
 from phyblock.resources import bundled
 from phyblock.run.execute import RunResult
 from phyblock.run.plan import RunPlan
@@ -116,7 +115,9 @@ def play(
         return _export(console, plan, person, export)
     folder = out or plan.folder_in(_RUNS)
     if held_run(folder, plan.manifest) is not None:
-        run_folder(folder).check(names_to_write(folder, page=True))
+        from phyblock.report.files import files_of
+
+        run_folder(folder).check(files_of(page=True))
     if answers is not None:
         return _import(console, plan, person, folder, answers, page=not no_report)
     return _serve(console, plan, person, folder, beside, port, opens=not no_browser)
@@ -172,7 +173,7 @@ def _import(
             return await opened.run()
 
     result = asyncio.run(run())
-    made = show_made(folder, plan.suite.tables, page=page)
+    made = show_tables(folder, plan.suite.tables, page=page)
     if known := len(given) - answers.taken:
         text = f"{known:,} of {counted(len(given), 'answer')} of {shown_path(file)} were there"
         console.print(f"{text} already: those in the run stay.")
@@ -193,7 +194,7 @@ def _serve(
 ) -> int:
     # Tables are made of pandas, which a session does without until its end.
     from phyblock.play.outcomes import outcomes
-    from phyblock.tables.load import load_run
+    from phyblock.results.load import load_run
 
     for other in beside:
         load_run(other, texts=False)
@@ -213,7 +214,7 @@ def _serve(
             console.print("To go on, give the same command again:")
             print_path(console, f"  {shlex.join(['phyblock', *sys.argv[1:]])}")
             return _INTERRUPTED
-        made = show_made(folder, plan.suite.tables, page=True)
+        made = show_tables(folder, plan.suite.tables, page=True)
         server.show_files(report_files(folder))
         sitting.desk.finish(outcomes(folder, person.model, beside))
         print_path(console, made)

@@ -17,6 +17,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from phyblock.results.design import FAILURES
 from phyblock.run.events import (
     ModelNotice,
     ModelStopped,
@@ -28,7 +29,6 @@ from phyblock.run.events import (
     Summary,
 )
 from phyblock.scoring.counts import Counts
-from phyblock.tables.outcomes import FAILURES
 from phyblock.text import counted, one_line
 
 _LINE_EVERY_S = 10.0

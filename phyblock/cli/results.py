@@ -1,7 +1,6 @@
 """The verbs that read finished runs: report, compare, figures, export, bundle, verify and site.
 
-Each imports what it needs when it is called: `run` shows a finished run that did not change from
-its notes, without counting or drawing anything.
+Each imports what it needs when it is called.
 """
 
 from __future__ import annotations
@@ -27,8 +26,7 @@ from phyblock.text import counted, one_line
 
 if TYPE_CHECKING:
     from phyblock.bundle import Verified
-    from phyblock.report.summary import Summary
-    from phyblock.tables.text_table import TextTable
+    from phyblock.results.tables import Summary
 
 _MB = 1e6
 _FAILURES = 4
@@ -62,77 +60,54 @@ def report(
     elif names or paper or form != "text":
         raise click.UsageError("--only, --paper and --format are for --print")
     else:
-        show_tables(run, data)
+        print_path(make_console(), show_tables(run, data=data))
 
 
 def _print_tables(folder: Path, names: Sequence[str], form: str, *, is_paper: bool) -> None:
-    from phyblock.report import load_run, to_latex, to_markdown
-    from phyblock.report.write import make_tables, table_names
-    from phyblock.tables.showing import marked
-    from phyblock.tracks.kind import kinds
+    from phyblock.results.load import load_run
+    from phyblock.results.paper import PAPER_TABLES, beside_paper
+    from phyblock.results.tables import make_tables, table_names
+    from phyblock.results.text import to_latex, to_markdown
 
     run = load_run(folder, texts=False)
     if is_paper:
-        views: dict[str, TextTable] = {}
-        reports = [kind.report() for kind in kinds().values()]
-        tables = {n: (one, table) for one in reports for n, table in one.paper_tables.items()}
-        for n, (of_track, table) in sorted(tables.items()):
-            frame = table.frame(run)
-            if len(frame):
-                views[f"paper{n}"] = marked(table.view(frame, run), of_track.showing(run))
+        made = {f"paper{n}": beside_paper(run, n) for n in PAPER_TABLES}
+        tables = {name: table for name, table in made.items() if table is not None}
     else:
-        frames, views = make_tables(run, names or table_names(run))
-        views = {name: view for name, view in views.items() if name in names or len(frames[name])}
-    if unknown := [name for name in names if name not in views]:
-        allowed = ", ".join(views if is_paper else table_names(run))
+        tables = make_tables(run, names or table_names(run))
+    if unknown := [name for name in names if name not in tables]:
+        allowed = ", ".join(tables if is_paper else table_names(run))
         found = ", ".join(unknown)
         raise SpecError(Problem(str(folder), "has no such table", "--only", found, allowed))
-    if not views:
+    if not tables:
         click.echo("No model of the run has a row in the paper's tables.")
-    for name in names or views:
+    for name in names or tables:
+        view = tables[name].view
         if form == "text":
-            print_table(make_console(), views[name])
+            print_table(make_console(), view)
         elif form == "md":
-            click.echo(to_markdown(views[name]))
+            click.echo(to_markdown(view))
         else:
-            click.echo(to_latex(views[name], f"phyblock-{name}"))
+            click.echo(to_latex(view, f"phyblock-{name}"))
 
 
-def show_tables(folder: Path, data: Path | None = None) -> None:
-    """Write tables and page of a run folder, and print its summary and the page's path."""
-    print_path(make_console(), _made(folder, None, data, page=True, anew=True))
-
-
-def show_made(folder: Path, tables: Sequence[str], *, page: bool) -> Path:
-    """Print the summary of a run; write these tables and the page unless nothing has changed.
-
-    Returns the page, or the folder of tables where no page is wanted.
-    """
-    return _made(folder, tables, None, page=page, anew=False)
-
-
-def _made(
-    folder: Path, tables: Sequence[str] | None, data: Path | None, *, page: bool, anew: bool
+def show_tables(
+    folder: Path,
+    tables: Sequence[str] | None = None,
+    data: Path | None = None,
+    *,
+    page: bool = True,
 ) -> Path:
-    from phyblock.report.inputs import inputs_digest
-    from phyblock.report.made import PAGE, TABLES, note_made, still_made
+    """Write these tables, those of the suite by default, and the page of a run folder.
 
-    console = make_console()
-    inputs = inputs_digest(folder, tables)
-    made = None if anew else still_made(folder, inputs, page=page)
-    if made is not None:
-        _print_summary(console, made.summary)
-    else:
-        from phyblock import report as maker
-        from phyblock.report.summary import summary_of
+    Prints the summary; returns the page, or the folder of tables where no page is wanted.
+    """
+    from phyblock import report as maker
+    from phyblock.results.tables import summary_of
 
-        written = maker.write_tables(folder, tables)
-        summary = summary_of(written)
-        _print_summary(console, summary)
-        paged = maker.write_page(written, data) if page else None
-        # Drawn from data elsewhere, it is not what a run makes of its own.
-        note_made(folder, None if data else inputs, summary, written.files, paged)
-    return folder / (PAGE if page else TABLES)
+    written = maker.write_tables(folder, tables)
+    _print_summary(make_console(), summary_of(written.run))
+    return maker.write_report(written, data) if page else written.folder
 
 
 def _print_summary(console: Console, summary: Summary) -> None:
@@ -162,14 +137,15 @@ def compare(
     which scenes share base scenes. Shows p values with Holm's correction, and the difference that
     each test could have found.
     """
-    from phyblock.report import load_run
-    from phyblock.report.compare import compare_models, compare_runs
-    from phyblock.report.compare_view import (
+    from phyblock.results.compare import (
+        compare_models,
+        compare_runs,
         compare_view,
         flipped_lines,
         ranks_view,
         write_comparison,
     )
+    from phyblock.results.load import load_run
 
     names = split_names(models)
     first = load_run(run, texts=False)
@@ -197,7 +173,6 @@ _LEAST_MM, _MOST_MM, _MM = 60.0, 400.0, 25.4
 @run_argument
 @click.option("--only", "names", multiple=True, metavar="NAME", help="Only this figure; repeat.")
 @click.option("--models", metavar="A,B", help="Only these models.")
-@click.option("--scene", default="", metavar="ID", help="The scene that figures of scenes show.")
 @click.option(
     "--width",
     metavar="column|text|MM",
@@ -214,28 +189,29 @@ _LEAST_MM, _MOST_MM, _MM = 60.0, 400.0, 25.4
 )
 @click.option("--no-title", is_flag=True, help="Leave the title to the caption.")
 @click.option("--out", type=UserPath(), metavar="DIR", help="Folder. [default: RUN/paper]")
-@data_option
 def figures(
     run: Path,
     names: tuple[str, ...],
     models: str | None,
-    scene: str,
     width: str,
     font: Literal["sans", "serif"],
     no_title: bool,
     out: Path | None,
-    data: Path | None,
 ) -> None:
     """Draw figures of the folder RUN for a paper: PDF and SVG whose text is text, PNG for slides,
     and captions as plain text and as LaTeX floats.
 
-    Draws all figures of numbers, unless you name some with --only. Name figures of scenes
-    (inference, subtask-cards, perturbations) to draw them. Leaves out figures that the run has no
-    numbers for. Draws a figure that cannot be read at the chosen width as wide as it needs.
+    Draws all figures, unless you name some with --only. Leaves out figures that the run has no
+    numbers for.
     """
-    from phyblock.report import load_run
-    from phyblock.report.figures import Wanted, figure_names, of_models, write_paper_figures
-    from phyblock.tables.drawing import COLUMN_IN, WIDTH_IN, Look
+    from phyblock.results.figures import (
+        COLUMN_IN,
+        WIDTH_IN,
+        Look,
+        figure_titles,
+        write_paper_figures,
+    )
+    from phyblock.results.load import load_run, of_models
 
     try:
         width_in = {"column": COLUMN_IN, "text": WIDTH_IN}.get(width) or float(width) / _MM
@@ -247,23 +223,20 @@ def figures(
             f"{width!r} is no width (allowed: {allowed})", param_hint="--width"
         )
     loaded = of_models(load_run(run, texts=False), split_names(models))
-    known = figure_names(loaded)
+    known = figure_titles(loaded)
     if unknown := [name for name in names if name not in known]:
         found, allowed = ", ".join(unknown), ", ".join(known)
         raise SpecError(Problem(str(run), "has no such figure", "--only", found, allowed))
     look = Look(width_in, font, not no_title)
-    drawn = write_paper_figures(loaded, Wanted(names, scene, data), look, out)
+    drawn = write_paper_figures(loaded, names, look, out)
     console = make_console()
-    for name, needed_in in drawn.wider.items():
-        wider = f"{name} is {_MM * needed_in:.1f} mm wide instead of {_MM * width_in:g} mm"
-        console.print(f"{wider}: its names and numbers need the room.")
-    for file in drawn.files:
+    for file in drawn:
         print_path(console, file)
-    if not drawn.files:
+    if not drawn:
         console.print("The run has no numbers for a figure.")
 
 
-_RUN_FORMS = ("inspect", "hf", "csv", "parquet")
+_RUN_FORMS = ("hf", "csv", "parquet")
 
 
 @click.command()
@@ -312,12 +285,11 @@ def export(
 ) -> None:
     """Write the records of the folder RUN, or questions with their pictures, for other tools.
 
-    inspect: Inspect AI logs, one a track and model. hf: a Hugging Face dataset. csv, parquet: a
-    row a sample. vlmevalkit: a TSV file of questions.
+    hf: a Hugging Face dataset. csv, parquet: a row a sample. vlmevalkit: a TSV file of questions.
     """
     from phyblock.data import read_data_set
-    from phyblock.report import load_run
-    from phyblock.report.export.write import export_run
+    from phyblock.results.export import export_run
+    from phyblock.results.load import load_run
     from phyblock.tracks import kinds
 
     brought = [kind.report().export for kind in kinds().values()]

@@ -28,13 +28,13 @@ from phyblock.cli.options import (
     yes_option,
 )
 from phyblock.cli.progress import ProgressView
-from phyblock.cli.results import show_made, show_tables
+from phyblock.cli.results import show_tables
 from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
 from phyblock.models import Price, is_billed
 from phyblock.models.litellm_client import be_quiet
-from phyblock.report.made import names_to_write
 from phyblock.resources import bundled
+from phyblock.results.text import NO_VALUE, Column, TextTable
 from phyblock.run.estimate import Estimate, estimate
 from phyblock.run.execute import Cause, RunResult
 from phyblock.run.plan import RunPlan, make_plan
@@ -49,7 +49,6 @@ from phyblock.run.preflight import (
 from phyblock.run.rescore import rescore
 from phyblock.run.session import Session, check_ready
 from phyblock.run.store import held_run, run_folder
-from phyblock.tables.text_table import NO_VALUE, Column, TextTable
 from phyblock.text import counted, one_line, plain_lines
 from phyblock.tracks import kind_of
 from phyblock.types import MATCHERS, PLAN_PARSERS, Matcher, PlanParser
@@ -111,7 +110,9 @@ def run(
     found = held_run(folder, plan.manifest)
     remarks = [] if found is None else moved_remarks(found, plan)
     if found is not None:
-        run_folder(folder).check(() if dry_run else names_to_write(folder, page=not no_report))
+        from phyblock.report.files import files_of
+
+        run_folder(folder).check(() if dry_run else files_of(page=not no_report))
     asks = {"use_cache": not no_cache, "retry_failed": retry_failed}
     if dry_run:
         print_estimate(console, plan, estimate(plan, folder, **asks))
@@ -127,7 +128,7 @@ def run(
     be_quiet()
     session = Session(plan, folder, view, use_cache=not no_cache, retry_failed=retry_failed)
     result = asyncio.run(_run(session, view))
-    made = show_made(folder, plan.suite.tables, page=not no_report)
+    made = show_tables(folder, plan.suite.tables, page=not no_report)
     code = _conclude(console, folder, result, view)
     print_path(console, made)
     return code
@@ -342,4 +343,6 @@ def score(
             told_s = time.monotonic()
             log(f"scored {done:,} samples")
 
-    show_tables(rescore(run, *chosen, out, data, log, progress), data)
+    print_path(
+        make_console(), show_tables(rescore(run, *chosen, out, data, log, progress), data=data)
+    )

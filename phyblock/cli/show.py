@@ -150,8 +150,8 @@ def _print_reply(console: Console, reply: Reply, number: str) -> None:
 def _task(run: Path, record: Record, data: Path | None) -> AssemblyTask:
     """Return the scene with its candidates as it was shown; DataError where it is not at hand."""
     from phyblock.records.manifest import MANIFEST, read_manifest
+    from phyblock.results.design import read_design
     from phyblock.run.plan import recorded_dataset
-    from phyblock.tables.design import read_design
     from phyblock.tracks.showing import as_recorded
 
     manifest = read_manifest(run)

@@ -9,10 +9,9 @@ from typing import Any
 from phyblock.errors import SpecError
 from phyblock.records.files import read_records
 from phyblock.records.record import Record
-from phyblock.report.alike import check_alike
-from phyblock.report.comparable import Comparable, Part, comparable
-from phyblock.tables.design import Design
-from phyblock.tables.load import Run, load_run
+from phyblock.results.compare import Comparable, Part, check_alike, comparable
+from phyblock.results.design import Design
+from phyblock.results.load import Run, load_run
 from phyblock.text import one_line
 from phyblock.tracks.kind import kind_of
 

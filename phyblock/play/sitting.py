@@ -11,8 +11,8 @@ from pathlib import Path
 from phyblock.play.desk import Desk
 from phyblock.play.person import Person, PersonModel
 from phyblock.play.shown import Place
+from phyblock.report.html.write import REPORT_FILE as PAGE
 from phyblock.report.html.write import page_files
-from phyblock.report.made import PAGE
 from phyblock.run.events import RunEvent, RunStarted, SampleDone
 from phyblock.run.execute import RunResult
 from phyblock.run.plan import RunPlan

@@ -8,18 +8,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from phyblock.lazy import lazy_names
-from phyblock.tables.text_table import NO_VALUE, Column, TextTable
+from phyblock.results.text import NO_VALUE, Column, TextTable
 
 if TYPE_CHECKING:
     from phyblock.report.files import files_of
     from phyblock.report.html import write_page, write_report
-    from phyblock.report.write import TablesWritten, table_makers, write_tables
-    from phyblock.tables.coverage import coverage_frame
-    from phyblock.tables.design import Design, read_design
-    from phyblock.tables.latex import to_latex
-    from phyblock.tables.load import Run, load_run
-    from phyblock.tables.markdown import to_markdown
-    from phyblock.tables.paper_numbers import published_table
+    from phyblock.results.design import Design, read_design
+    from phyblock.results.load import Run, load_run
+    from phyblock.results.paper import published_table
+    from phyblock.results.tables import TablesWritten, coverage_frame, write_tables
+    from phyblock.results.text import to_latex, to_markdown
 
 __all__ = [
     "NO_VALUE",
@@ -33,7 +31,6 @@ __all__ = [
     "load_run",
     "published_table",
     "read_design",
-    "table_makers",
     "to_latex",
     "to_markdown",
     "write_page",
@@ -42,19 +39,18 @@ __all__ = [
 ]
 
 _HOMES = {
-    "coverage_frame": "phyblock.tables.coverage",
-    "Design": "phyblock.tables.design",
-    "read_design": "phyblock.tables.design",
+    "coverage_frame": "phyblock.results.tables",
+    "Design": "phyblock.results.design",
+    "read_design": "phyblock.results.design",
     "files_of": "phyblock.report.files",
-    "to_latex": "phyblock.tables.latex",
-    "Run": "phyblock.tables.load",
-    "load_run": "phyblock.tables.load",
-    "to_markdown": "phyblock.tables.markdown",
-    "published_table": "phyblock.tables.paper_numbers",
-    "TablesWritten": "phyblock.report.write",
-    "table_makers": "phyblock.report.write",
+    "to_latex": "phyblock.results.text",
+    "Run": "phyblock.results.load",
+    "load_run": "phyblock.results.load",
+    "to_markdown": "phyblock.results.text",
+    "published_table": "phyblock.results.paper",
+    "TablesWritten": "phyblock.results.tables",
     "write_page": "phyblock.report.html",
     "write_report": "phyblock.report.html",
-    "write_tables": "phyblock.report.write",
+    "write_tables": "phyblock.results.tables",
 }
 __getattr__ = lazy_names(__name__, _HOMES)

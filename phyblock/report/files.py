@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from phyblock.report.figures import figure_files
 from phyblock.report.html import page_files
-from phyblock.report.made import MADE
-from phyblock.report.write import table_files
+from phyblock.results.figures import figure_files
+from phyblock.results.tables import table_files
 
 __all__ = ["files_of"]
 
 
 def files_of(*, page: bool) -> tuple[str, ...]:
     """Names, as `OutFolder` takes them, of tables and with `page` of figures and the page too."""
-    return (*table_files(), MADE) + (figure_files() + page_files() if page else ())
+    return table_files() + (figure_files() + page_files() if page else ())

@@ -18,14 +18,13 @@ from phyblock.config.suite import Suite
 from phyblock.records.manifest import MANIFEST, Manifest, ManifestModel
 from phyblock.records.record import Record
 from phyblock.records.reply import Reply
+from phyblock.results.design import read_design
+from phyblock.results.estimates import counted_samples, estimate_frame, track_measures
+from phyblock.results.load import Run, frames_of
 from phyblock.run.floor_orders import floor_orders, floor_seeds
 from phyblock.run.records import begun, judged
-from phyblock.tables.design import read_design
-from phyblock.tables.estimates import estimate_frame
-from phyblock.tables.load import Run, frames_of
-from phyblock.tables.measures import VALUE_KEY, Better, value_key
 from phyblock.tracks import AnyTrack, SingleTrack, kind_of, shown_item
-from phyblock.tracks.estimates import counted_samples, track_measures
+from phyblock.tracks.measures import VALUE_KEY, Better, value_key
 
 __all__ = ["COMPUTED_FLOORS", "FloorValues", "floor_values"]
 

@@ -9,8 +9,8 @@ from pydantic import BaseModel
 
 from phyblock.config.suite import ImagesSpec
 from phyblock.errors import Problem, SpecError
+from phyblock.results.load import Run
 from phyblock.site.runs import SiteRun
-from phyblock.tables.load import Run
 from phyblock.tracks.base import CARRYING, ENGINE, FIRST_CARRYING, READER
 from phyblock.tracks.kind import kind_of
 

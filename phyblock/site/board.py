@@ -8,13 +8,17 @@ from dataclasses import asdict
 from typing import Any
 
 from phyblock.report.html.standing import shortfalls
+from phyblock.results.estimates import (
+    Value,
+    headline_columns,
+    main_column,
+    main_measure,
+    track_measures,
+)
 from phyblock.site.entries import Entry
 from phyblock.site.ranking import rank_ranges_of
 from phyblock.site.runs import SiteRun
 from phyblock.site.values import AllValues, TrackValues, values_of
-from phyblock.tables.headline import Value
-from phyblock.tables.showing import varied_words
-from phyblock.tracks.estimates import headline_columns, main_column, main_measure, track_measures
 from phyblock.tracks.kind import kind_of
 
 __all__ = ["all_values", "board_of"]
@@ -175,6 +179,6 @@ def _run(one: SiteRun) -> dict[str, Any]:
         "seeds": len(run.design.suite.seeds),
         "data": data.name if data else "",
         "version": data.version if data else None,
-        "asked": list(dict.fromkeys((*showing, *varied_words(run)))),
+        "asked": list(dict.fromkeys((*showing, *run.varied_words))),
         "phyblock": manifest.versions.get("phyblock", ""),
     }

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import combinations
 
-from phyblock.report.comparable import comparable
-from phyblock.report.compare import Side, compare
-from phyblock.report.verdicts import ranks
+from phyblock.results.compare import Side, comparable, compare, ranks
 from phyblock.site.entries import Entry
 from phyblock.site.runs import SiteRun
 from phyblock.site.values import AllValues

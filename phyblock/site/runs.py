@@ -10,7 +10,7 @@ from pathlib import Path
 from phyblock.bundle import named, opened_bundle
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.report.html.sources import Sources, open_sources
-from phyblock.tables.load import Run, load_run
+from phyblock.results.load import Run, load_run
 
 __all__ = ["SiteRun", "open_runs"]
 

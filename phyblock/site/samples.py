@@ -11,11 +11,11 @@ from phyblock.records.record import Record
 from phyblock.report.html.index import Numbers, read_places
 from phyblock.report.html.pack import Pack
 from phyblock.report.html.samples import IN_INDEX
+from phyblock.results.load import Run
 from phyblock.site.chunks import chunks
 from phyblock.site.entries import Entry
 from phyblock.site.runs import SiteRun
 from phyblock.site.values import AllValues, TrackValues
-from phyblock.tables.load import Run
 from phyblock.tracks.kind import kind_of
 from phyblock.tracks.pictures import scene_entry
 

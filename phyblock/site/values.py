@@ -7,13 +7,16 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from phyblock.records.manifest import ManifestModel
-from phyblock.report.comparable import Comparable, comparable
-from phyblock.tables.cost import cost_frame
-from phyblock.tables.coverage import coverage_frame
-from phyblock.tables.headline import Value, headline_values
-from phyblock.tables.load import Run
-from phyblock.tables.measures import Measure
-from phyblock.tracks.estimates import headline_columns, track_estimates, track_measures
+from phyblock.results.compare import Comparable, comparable
+from phyblock.results.estimates import (
+    Value,
+    headline_columns,
+    headline_of,
+    track_estimates,
+)
+from phyblock.results.load import Run
+from phyblock.results.tables import cost_frame, coverage_frame
+from phyblock.tracks.measures import Measure
 
 __all__ = ["AllValues", "Facts", "Key", "TrackValues", "values_of"]
 
@@ -78,15 +81,15 @@ def values_of(run: Run, track: str) -> TrackValues:
 
 def _values(run: Run, track: str) -> Iterator[tuple[str, Mapping[tuple[str, str], Value]]]:
     estimates, design = track_estimates(run, track), run.design
-    measures, columns = track_measures(track), headline_columns(run, track)
+    columns = headline_columns(run, track)
     shown = estimates[estimates["measure"].isin([column.measure for column in columns])]
     if not shown["setting"].astype(bool).any():
-        yield "", headline_values(estimates, design, measures, columns)
+        yield "", headline_of(run, track)
         return
     for setting in design.suite.settings:
         suite = design.suite.model_copy(update={"settings": (setting,)})
         in_setting = design.model_copy(update={"suite": suite})
-        yield setting, headline_values(estimates, in_setting, measures, columns)
+        yield setting, headline_of(run, track, in_setting)
 
 
 def _samples(run: Run, what: Comparable) -> Iterator[tuple[str, Iterator[tuple[Key, float]]]]:

@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from phyblock.errors import Problem, SpecError, StoreError
-from phyblock.files import LIST, OutFolder, writing
+from phyblock.files import LIST, OutFolder, digest_of_file, writing
 from phyblock.records.files import RECORDS
 from phyblock.records.manifest import MANIFEST
-from phyblock.report.inputs import digest_of_file
 from phyblock.site.alike import check_runs_alike
 from phyblock.site.board import all_values, board_of
 from phyblock.site.chunks import write_chunk

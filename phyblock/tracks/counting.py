@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from phyblock.registry import added_measures
-from phyblock.tables.measures import SampleCounts
 from phyblock.tracks.kind import kind_of
+from phyblock.tracks.measures import SampleCounts
 
 __all__ = ["count_sample", "counts_samples"]
 

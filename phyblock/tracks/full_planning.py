@@ -21,12 +21,12 @@ from phyblock.records.record import Record
 from phyblock.resources import bundled
 from phyblock.scoring.plan import AssemblyScorer, Score
 from phyblock.stable import drawn_bytes
-from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.asked_once import AS_IN_FILE, WholePlanTrack
 from phyblock.tracks.by_hand import Picking, candidate_choices
 from phyblock.tracks.examples import Examples, examples_of
 from phyblock.tracks.goal_blind import BlindGuesses
 from phyblock.tracks.kind import Opening, TrackKind
+from phyblock.tracks.measures import TrackReport
 from phyblock.tracks.opening import assembly_pictures, task_showing, template_prompt
 from phyblock.tracks.pictures import Pictures
 from phyblock.tracks.plans import PLAN_COLUMNS, POSE_COUNTS, PlanParse, plan_row, score_fields
@@ -359,7 +359,7 @@ TRACK = TrackKind(
     template=bundled("prompts", "full_planning.j2"),
     json_template=bundled("prompts", "full_planning_json.j2"),
     counted=(POSE_COUNTS,),
-    tables=("assembly", "table1", "errors"),
+    tables=("table1", "errors", "losses"),
     rescored=True,
     no_examples="",
     varies=("prompt", "background", "view", "candidate_order", "layout", "examples", "repeats"),

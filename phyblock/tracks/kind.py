@@ -14,10 +14,9 @@ from phyblock.data import Dataset
 from phyblock.records.manifest import Manifest
 from phyblock.records.record import Record
 from phyblock.registry import known_tracks
-from phyblock.tables.measures import SampleCounts
-from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.base import AnyTrack
 from phyblock.tracks.by_hand import Picking
+from phyblock.tracks.measures import SampleCounts, TrackReport
 from phyblock.tracks.pictures import Workshop, render_workers
 
 __all__ = ["Opening", "TrackKind", "kind_of", "kinds", "kinds_with_physics"]

@@ -12,7 +12,7 @@ from phyblock.records.line import Line
 from phyblock.records.record import ShownScene
 from phyblock.scoring.counts import Floats, ratio_of
 from phyblock.scoring.plan import Score
-from phyblock.tables.measures import Measure, SampleCounts
+from phyblock.tracks.measures import Measure, SampleCounts
 
 
 class PlanParse(Line):

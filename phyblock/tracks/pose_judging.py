@@ -56,7 +56,7 @@ from phyblock.sim.dynamics import (
 from phyblock.sim.engine import Pose, described_engine
 from phyblock.sim.geometry import center_cm, collision_pieces, origin_m, put
 from phyblock.stable import plain_sum
-from phyblock.tables.measures import SampleCounts
+from phyblock.tracks.measures import SampleCounts
 from phyblock.tracks.plans import PLAN_COLUMNS, PlanParse, plan_row, score_fields
 from phyblock.tracks.showing import file_plan
 from phyblock.types import (

@@ -29,12 +29,11 @@ from phyblock.sim.dynamics import ExecutionLimits
 from phyblock.sim.geometry import box_height_cm, center_cm, upright
 from phyblock.sim.pictures import PictureStyle, goal_style
 from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
-from phyblock.tables.listing import ListedScore, Listing
-from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.asked_once import AS_IN_FILE, WholePlanTrack
 from phyblock.tracks.base import CARRYING, READER, engine_identity
 from phyblock.tracks.by_hand import NumberField, Pick, Picking, candidate_choices
 from phyblock.tracks.kind import Opening, TrackKind
+from phyblock.tracks.measures import ListedScore, Listing, TrackReport
 from phyblock.tracks.opening import (
     check_drawn,
     picture_folder,

@@ -24,6 +24,7 @@ from phyblock.records.line import Line, Whole
 from phyblock.records.record import AskedTurn, Course, Record
 from phyblock.records.reply import Reply
 from phyblock.resources import bundled
+from phyblock.results.design import read_section
 from phyblock.scoring.counts import Counts
 from phyblock.scoring.plan import ERROR_TYPES, ErrorType
 from phyblock.scoring.steps import Assembly, MoveOutcome, attempted_counts, placed_counts
@@ -32,12 +33,11 @@ from phyblock.sim.engine import described_engine
 from phyblock.sim.pictures import PictureStyle, goal_style
 from phyblock.sim.question_pictures import question_key, question_png, state_picture
 from phyblock.stable import hex_digest
-from phyblock.tables.design import read_section
-from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.base import engine_identity
 from phyblock.tracks.by_hand import Choice, Pick, Picking, candidate_choices
 from phyblock.tracks.goal_blind import BlindGuesses
 from phyblock.tracks.kind import Opening, TrackKind
+from phyblock.tracks.measures import TrackReport
 from phyblock.tracks.opening import assembly_pictures, check_drawn, task_showing, template_prompt
 from phyblock.tracks.pictures import Drawing, Pictures
 from phyblock.tracks.plans import PLAN_COLUMNS, POSE_COUNTS, PlanParse, plan_row
@@ -1050,7 +1050,7 @@ TRACK = TrackKind(
     json_template=bundled("prompts", "step_planning_json.j2"),
     prompt_field=("steps", "prompt"),
     counted=(POSE_COUNTS,),
-    tables=("table3", "endings", "progress"),
+    tables=("table3", "endings", "moves"),
     no_examples="one would be an episode of several turns, each with a picture of its own",
     varies=("prompt", "background", "view", "candidate_order", "layout", "repeats"),
 )

@@ -53,13 +53,13 @@ from phyblock.sim.question_pictures import (
     sheet_size_px,
 )
 from phyblock.stable import hex_digest
-from phyblock.tables.track_report import TrackReport
 from phyblock.tracks.asked_once import AskedOnce
 from phyblock.tracks.by_hand import Choice, Picking, Spot
 from phyblock.tracks.elsewhere import Elsewhere
 from phyblock.tracks.examples import Examples, examples_of
 from phyblock.tracks.guesses import Guesses
 from phyblock.tracks.kind import Opening, TrackKind
+from phyblock.tracks.measures import TrackReport
 from phyblock.tracks.opening import (
     picture_folder,
     picture_style,
@@ -747,7 +747,7 @@ TRACK = TrackKind(
     template=bundled("prompts", "vqa.j2"),
     json_template=bundled("prompts", "vqa_json.j2"),
     prompt_field=("vqa", "prompt"),
-    tables=("table2",),
+    tables=("table2", "letters"),
     own_data=_questions,
     manifest=_manifest,
     own_root=_found_at,

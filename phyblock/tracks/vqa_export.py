@@ -17,7 +17,7 @@ from phyblock.files import OutFolder, writing
 from phyblock.models.request import Image
 from phyblock.resources import needs
 from phyblock.sim.pictures import PictureStyle
-from phyblock.tables.track_report import ItemExport
+from phyblock.tracks.measures import ItemExport
 from phyblock.tracks.opening import picture_folder
 from phyblock.tracks.pictures import render_workers
 from phyblock.tracks.vqa import (

@@ -15,11 +15,12 @@ from rich.cells import cell_len
 
 from phyblock.cli.console import make_console, print_table
 from phyblock.cli.progress import ProgressView
-from phyblock.report import Column, TextTable, load_run, to_latex, to_markdown, write_tables
-from phyblock.report.export.write import export_run
-from phyblock.report.summary import summary_of
+from phyblock.report import Column, TextTable, to_latex, to_markdown, write_tables
+from phyblock.results.export import export_run
+from phyblock.results.load import load_run
+from phyblock.results.tables import summary_of
+from phyblock.results.text import to_csv
 from phyblock.run.events import RunStarted
-from phyblock.tables.csv_text import to_csv
 from tests.report.factory import LEVELS, manifest, record, score, write_run
 
 NAME = ":b: [red]x[/red]\n=2 \x1b[31m\u202e|&\r"
@@ -124,7 +125,7 @@ def test_numbers_and_gaps_in_a_csv_stay() -> None:
 
 def ranked(folder: Path, records: list[dict[str, Any]], facts: dict[str, Any]) -> list[list[str]]:
     """The rows of the headline table, with how many tables there are."""
-    summary = summary_of(write_tables(write_run(folder, records, facts)))
+    summary = summary_of(load_run(write_run(folder, records, facts)))
     return [[*row[:2], row[-1]] for row in summary.tables[0].rows] + [[str(len(summary.tables))]]
 
 

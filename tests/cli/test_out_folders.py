@@ -171,12 +171,12 @@ def test_a_run_writes_through_no_link(suite: Workspace) -> None:
 def test_scripts_that_we_did_not_write_stay_whatever_their_names(finished: Path) -> None:
     theirs = finished / "report" / "0123456789ab" / "index.js"
     put(theirs)
-    write_report(write_tables(finished), figures=())
+    write_report(write_tables(finished), figures=False)
     (first,) = set((finished / "report").iterdir()) - {theirs.parent}
     put(first / "records-7.js")
     with (finished / "records.jsonl").open("a") as file:
         file.write((finished / "records.jsonl").read_text().splitlines()[0] + "\n")
-    write_report(write_tables(finished), figures=())
+    write_report(write_tables(finished), figures=False)
     (second,) = set((finished / "report").iterdir()) - {theirs.parent, first}
     assert theirs.read_text() == "mine"
     assert [path.name for path in first.iterdir()] == ["records-7.js"]
@@ -188,20 +188,20 @@ def test_a_link_in_the_place_of_a_build_is_not_followed(finished: Path, tmp_path
     put(tmp_path / "theirs" / "index.js")
     (finished / "report").mkdir()
     (finished / "report" / "0123456789ab").symlink_to(tmp_path / "theirs")
-    page = write_report(write_tables(finished), figures=())
+    page = write_report(write_tables(finished), figures=False)
     assert (finished / "report" / "0123456789ab").is_symlink()
     (build,) = (path for path in (finished / "report").iterdir() if not path.is_symlink())
     build.rename(tmp_path / "build")
     (finished / "report" / build.name).symlink_to(tmp_path / "theirs")
     with pytest.raises(StoreError, match="it is a link"):
-        write_report(write_tables(finished), figures=())
+        write_report(write_tables(finished), figures=False)
     assert files(tmp_path / "theirs") == {"index.js": b"mine"}
     assert page.is_file()
 
 
 def test_reports_that_are_written_at_once_all_come_to_their_end(finished: Path) -> None:
     def write(_: int) -> Path:
-        return write_report(write_tables(finished), figures=())
+        return write_report(write_tables(finished), figures=False)
 
     with ThreadPoolExecutor(4) as pool:
         pages = list(pool.map(write, range(5)))

@@ -46,7 +46,7 @@ def test_every_published_cell_comes_out_again(
     assert len(known) >= min(6, len(recorded))
     for model in known:
         mine = [cell for cell in cells if cell["model"] == model]
-        assert {(cell["level"], cell["metric"]) for cell in mine} == {
+        assert {(cell["cell"], cell["metric"]) for cell in mine} == {
             (level, metric) for level in ("1", "2", "3", "4", "overall") for metric in METRICS
         }
         for cell in mine:
@@ -60,8 +60,8 @@ def test_missing_replies_are_skipped_and_said(reproduced: tuple[Workspace, Done]
     assert re.search(r"claude-3-7-thinking +400 +390 +0 +10\n", done.out)
     scored = {
         row["model"]: row["n"]
-        for row in rows(workspace, "assembly.csv")
-        if row["level"] == "overall"
+        for row in rows(workspace, "estimates.csv")
+        if (row["measure"], row["setting"], row["cell"]) == ("f1", "A", "overall")
     }
     assert scored["claude-3-7-thinking"] == "390"
     assert {scored[model] for model, lost in missing.items() if not lost} == {"400"}

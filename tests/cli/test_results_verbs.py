@@ -30,10 +30,10 @@ def call(*words: str | Path) -> Result:
 
 def test_tables_print_all_or_one_in_any_form(folder: Path) -> None:
     everything = call("report", folder, "--print").output
-    for caption in ("Assembly planning", "95 % intervals", "setting A (with orientation)", "seeds"):
+    for caption in ("Assembly planning", "Wrong steps by type", "Coverage", "Tokens, cost"):
         assert caption in everything
-    one = call("report", folder, "--print", "--only", "table5", "--format", "md").output
-    assert one.startswith("**F1 as the paper's Table 5: means over 2 seeds (%)")
+    one = call("report", folder, "--print", "--only", "errors", "--format", "md").output
+    assert one.startswith("**Wrong steps by type (%)")
     assert (
         r"\begin{tabular}"
         in call("report", folder, "--print", "--only", "cost", "--format", "tex").output
@@ -41,17 +41,6 @@ def test_tables_print_all_or_one_in_any_form(folder: Path) -> None:
     with pytest.raises(SpecError, match="no such table"):
         call("report", folder, "--print", "--only", "table9")
     assert not (folder / "tables").exists()
-
-
-def test_tables_without_rows_are_printed_only_when_asked_for(tmp_path: Path) -> None:
-    records = [record("alpha", scene, 0, [score(1, 1, 1)]) for scene in LEVELS]
-    folder = write_run(tmp_path / "run", records, manifest(seeds=[0], settings=["A"]))
-    everything = call("report", folder, "--print").output
-    assert "Assembly planning" in everything
-    assert "setting A (with orientation)" not in everything
-    one = call("report", folder, "--print", "--only", "settings").output
-    assert "setting A (with orientation)" in one
-    assert "nan" not in one
 
 
 def test_tables_beside_the_paper(folder: Path) -> None:
@@ -92,21 +81,19 @@ def test_compare_says_the_verdict_and_what_flipped(folder: Path, tmp_path: Path)
 
 
 def test_figures_and_exports_name_what_they_wrote(folder: Path) -> None:
-    done = call("figures", folder, "--only", "f1-levels")
+    done = call("figures", folder, "--only", "errors")
     assert done.output.split() == [
-        str(folder / "paper" / f"f1-levels.{e}") for e in ("pdf", "svg", "png", "txt", "tex")
+        str(folder / "paper" / f"errors.{e}") for e in ("pdf", "svg", "png", "txt", "tex")
     ]
-    done = call(
-        "figures", folder, "--only", "f1-levels", "--models", "alpha", "--out", folder / "x"
-    )
-    assert (folder / "x" / "f1-levels.pdf").is_file()
+    done = call("figures", folder, "--only", "losses", "--models", "alpha", "--out", folder / "x")
+    assert (folder / "x" / "losses.pdf").is_file()
     for wrong in ("--width wide", "--width 20", "--width nan", "--font comic"):
         refused = call("figures", folder, *wrong.split())
         assert refused.exit_code == 2, wrong
         assert "allowed" in refused.output or "is not one of" in refused.output
     with pytest.raises(SpecError, match="no such model"):
         call("figures", folder, "--models", "omega")
-    with pytest.raises(SpecError, match="shown by none"):
-        call("figures", folder, "--only", "settings", "--scene", "000")
+    with pytest.raises(SpecError, match="no such figure"):
+        call("figures", folder, "--only", "radar")
     done = call("export", folder, "--to", "csv")
     assert done.output.strip() == str(folder / "export" / "csv" / "records.csv")

@@ -10,7 +10,7 @@ from PIL import Image
 from phyblock.data import read_builtin
 from phyblock.records.files import read_records
 from phyblock.tracks.step_planning import EpisodeRecord
-from phyblock.tracks.step_planning_results import OUTCOME_NAMES, episode_film, episode_table
+from phyblock.tracks.step_planning_results import OUTCOME_NAMES, REPORT
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.vqa_set import questions, vqa_suite, write_questions
@@ -73,8 +73,8 @@ def test_frames_tell_of_steps_what_tables_do(played: Workspace) -> None:
     (task,) = read_builtin(played.root / "data").tasks
     for record in read_records(played.root / "out"):
         assert isinstance(record, EpisodeRecord)
-        _, *frames, last = episode_film(record, task)
-        outcomes = [row[2] for row in episode_table(record).rows]
+        _, *frames, last = REPORT.episodes.frames(record, task)
+        outcomes = [row[2] for row in REPORT.episodes.table(record).rows]
         assert all(
             frame.caption.endswith(f": {outcome}")
             for frame, outcome in zip(frames, outcomes, strict=True)
@@ -83,7 +83,7 @@ def test_frames_tell_of_steps_what_tables_do(played: Workspace) -> None:
         assert set(outcomes) <= set(OUTCOME_NAMES.values())
         turns = tuple(turn.model_copy(update={"outcome": "empty"}) for turn in record.turns)
         unread = record.model_copy(update={"turns": turns})
-        assert {row[2] for row in episode_table(unread).rows} == {"Empty"}
+        assert {row[2] for row in REPORT.episodes.table(unread).rows} == {"Empty"}
         assert last.caption.startswith(f"{record.progress[-1]} of 3 blocks placed; ended: ")
 
 

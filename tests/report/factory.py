@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 
 from phyblock.records.files import known_records
 from phyblock.records.manifest import Manifest
-from phyblock.report import Run, read_design
+from phyblock.results.design import OUTCOMES, read_design
+from phyblock.results.load import Run, frames_of
 from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES
-from phyblock.tables.load import Frames, frames_of
-from phyblock.tables.outcomes import OUTCOMES
 
 laws = settings(max_examples=12, deadline=None)
 """Tables take some 50 ms each, so that few examples must do."""
@@ -123,15 +122,10 @@ def record(
     }
 
 
-def frames_from(records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Frames:
-    read = (known_records().validate_python(one) for one in records)
-    return frames_of(read, read_design(facts))
-
-
 def run_of(records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Run:
-    frames = frames_from(records, facts)
-    manifest = Manifest.model_validate(dict(facts))
-    return Run(Path("run"), manifest, read_design(facts), frames.records, frames.scores)
+    read = (known_records().validate_python(one) for one in records)
+    design = read_design(facts)
+    return Run(Path("run"), Manifest.model_validate(dict(facts)), design, *frames_of(read, design))
 
 
 def write_run(folder: Path, records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Path:

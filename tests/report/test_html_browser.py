@@ -314,7 +314,7 @@ def test_a_plan_with_poses_as_it_was_given_and_carried_out(
 ) -> None:
     workspace.write_suite(tracks=["pose_planning"], models=["oracle", "oracle-2d"], limit=1)
     assert workspace.run().code == 0
-    write_report(write_tables(workspace.out), figures=())
+    write_report(write_tables(workspace.out), figures=False)
     page = browser.new_page(viewport={"width": 1400, "height": 1000})
     visit = ReportVisit(page, workspace.out / "report.html")
     # The second block is refused: it would stand in the first.
@@ -443,7 +443,7 @@ def test_a_report_without_the_data_set_still_shows_replies(
     manifest = yaml.safe_load((folder / "run.yaml").read_text())
     manifest["dataset"]["root"] = "gone"
     (folder / "run.yaml").write_text(yaml.safe_dump(manifest))
-    write_report(write_tables(folder), figures=())
+    write_report(write_tables(folder), figures=False)
     page = browser.new_page()
     visit = ReportVisit(page, folder / "report.html")
     visit.show("full_planning/oracle/t5/s0")
@@ -459,7 +459,7 @@ def test_twenty_thousand_records_keep_memory_bounded(
     browser: Browser, made: Workspace, tmp_path: Path
 ) -> None:
     folder = _large_run(made, tmp_path / "run")
-    write_report(write_tables(folder), figures=())
+    write_report(write_tables(folder), figures=False)
     page = browser.new_page(viewport={"width": 1400, "height": 1000})
     visit = ReportVisit(page, folder / "report.html")
     visit.open("samples")
@@ -503,7 +503,7 @@ def test_a_track_of_ones_own_is_shown_by_what_it_reads_and_by_what_is_better_in_
         monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
         suite = workspace.write_suite(tracks=["counting"], models=["random"])
         run_suite(suite, out=workspace.out)
-        write_report(write_tables(workspace.out), figures=())
+        write_report(write_tables(workspace.out), figures=False)
         write_site([workspace.out], workspace.root / "site")
     finally:
         registry.unregister_track("counting")

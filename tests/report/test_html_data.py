@@ -50,7 +50,7 @@ def unpacked(script: str) -> Any:
 
 def write_page(folder: Path, data: Path | None = None) -> Path:
     """The report without figures, which take seconds."""
-    return write_report(write_tables(folder), data, figures=())
+    return write_report(write_tables(folder), data, figures=False)
 
 
 class Report:
@@ -198,7 +198,7 @@ def test_a_folder_that_cannot_be_written_is_said(tmp_path: Path) -> None:
     folder.chmod(0o555)
     try:
         with pytest.raises(StoreError, match="cannot be written"):
-            write_report(written, figures=())
+            write_report(written, figures=False)
     finally:
         folder.chmod(0o755)
 

@@ -122,7 +122,7 @@ def test_pictures_that_are_not_kept_are_said(
         (folder / name).write_bytes((troubled.out / name).read_bytes())
     # A cache in which nothing was ever kept.
     monkeypatch.setenv("PHYBLOCK_CACHE", str(tmp_path / "cache"))
-    write_report(write_tables(folder), figures=())
+    write_report(write_tables(folder), figures=False)
     page = browser.new_page()
     visit = ReportVisit(page, folder / "report.html")
     sample = next(r["sample"] for r in troubled.records() if r["track"] == "full_planning")
@@ -206,7 +206,7 @@ def test_a_model_without_any_sample_is_in_the_run_and_says_why(trouble: ReportVi
 
 def test_every_view_of_a_run_without_records_says_why(browser: Browser, tmp_path: Path) -> None:
     folder = write_run(tmp_path / "run", [], manifest())
-    write_report(write_tables(folder), figures=())
+    write_report(write_tables(folder), figures=False)
     page = browser.new_page()
     visit = ReportVisit(page, folder / "report.html")
     visit.page.goto(f"{visit.path.as_uri()}#samples")

@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 from phyblock.data import UNNUMBERED, VERSION_FILE, read_version
 from phyblock.errors import DataError, SpecError
 from phyblock.records.manifest import read_manifest
-from phyblock.report.alike import check_alike
-from phyblock.report.compare import compare_runs
-from phyblock.tables.load import load_run
-from phyblock.tracks.estimates import main_measure
+from phyblock.results.compare import check_alike, compare_runs
+from phyblock.results.estimates import main_measure
+from phyblock.results.load import load_run
 from tests.report.factory import manifest, run_of
 from tests.workspace import Workspace
 

@@ -9,10 +9,10 @@ import yaml
 
 from phyblock.cli.main import phyblock
 from phyblock.errors import SpecError
-from phyblock.report.compare import compare_runs
+from phyblock.results.compare import compare_runs
+from phyblock.results.load import load_run
 from phyblock.run.rescore import rescore
 from phyblock.sim.engine import ENGINES, described_engine, installed_engines
-from phyblock.tables.load import load_run
 from phyblock.tracks.step_planning import StepPlanning, StepRules
 from phyblock.types import Physics
 from tests.workspace import Raw, Workspace, candidates

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections import Counter
 from dataclasses import replace
 from typing import Any
@@ -12,6 +10,7 @@ import pytest
 from aiohttp import web
 
 from phyblock.records.files import STOPPED, read_stopped
+from phyblock.results.load import load_run
 from tests.servers.chassis import ISSUE_MIX, Faults, Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Raw, Workspace
@@ -41,8 +40,8 @@ TWICE = {"max_attempts": 2, "retry_for_s": 0.0}
 
 
 def coverage(workspace: Workspace) -> dict[str, Raw]:
-    text = workspace.tables()["coverage.csv"].decode()
-    return {row["model"]: row for row in csv.DictReader(io.StringIO(text))}
+    table = load_run(workspace.out).table("coverage").astype(str)
+    return {row["model"]: row for row in table.to_dict("records")}
 
 
 @pytest.mark.parametrize("samples", [200, pytest.param(1000, marks=pytest.mark.slow)])
@@ -167,7 +166,7 @@ def test_refused_seeds_are_said_in_the_tables(workspace: Workspace) -> None:
         workspace.write_suite(models=["alpha", "random"], seeds=[0, 1, 2])
         done = workspace.run()
     assert done.code == 0
-    note = "seed unsupported: 3 independent repeats"
+    note = "alpha: seed unsupported, seeds are independent repeats."
     tables = workspace.tables()
     assert note in tables["table1.md"].decode()
     assert note in tables["table1.tex"].decode()

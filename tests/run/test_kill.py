@@ -119,7 +119,7 @@ def test_what_was_answered_is_kept_whenever_the_run_is_killed(
         killed = workspace.tables()
         workspace.out = workspace.root / "undisturbed"
         assert workspace.run("--no-cache").code == 0
-        for name in ("assembly.csv", "table1.csv", "table1.md", "errors.csv"):
+        for name in ("estimates.csv", "table1.csv", "table1.md", "errors.csv"):
             assert workspace.tables()[name] == killed[name]
 
 

@@ -19,6 +19,7 @@ from phyblock.records.files import known_records
 from phyblock.records.record import Record
 from phyblock.report.html.ranked import rank_texts
 from phyblock.report.html.sources import Sources
+from phyblock.results.estimates import track_measures
 from phyblock.site import write as site_write
 from phyblock.site import write_site
 from phyblock.site.alike import check_runs_alike
@@ -26,7 +27,6 @@ from phyblock.site.board import all_values, board_of
 from phyblock.site.entries import entries_of
 from phyblock.site.runs import SiteRun, open_runs
 from phyblock.site.values import values_of
-from phyblock.tracks.estimates import track_measures
 from phyblock.tracks.kind import kind_of
 from tests.report.factory import manifest, record, run_of, score
 from tests.workspace import Workspace

@@ -244,7 +244,7 @@ def test_a_run_shows_examples_varies_them_and_says_which(workspace: Workspace) -
         assert len(running.server.seen) == 6
     assert (estimated.code, done.code, again.code) == (0, 0, 0), done.err
     told = " ".join(estimated.out.split())
-    assert "2 ways of asking, 0 or 2 worked examples before each question" in told
+    assert "0 or 2 worked examples before each question" in told
     assert seen[:3] == [seen[0]] * 3
     assert seen[3] > 2 * seen[0]
     records = workspace.records()

@@ -17,7 +17,7 @@ from phyblock.cli.main import phyblock
 from phyblock.report import write_report, write_tables
 from phyblock.run.rescore import rescore
 from phyblock.scoring.counts import ratio_of
-from phyblock.tables.measures import Measure, SampleCounts
+from phyblock.tracks.measures import Measure, SampleCounts
 from tests.vqa_set import write_questions
 from tests.workspace import Workspace
 
@@ -75,10 +75,10 @@ def check_everywhere(folder: Path) -> None:
     row = whole["all-candidates"]
     assert 0.5 < float(row["lo"]) <= float(row["value"]) <= float(row["hi"]) < 1
     assert {row["cell"] for row in rows} == {"1", "2", "3", "4", "overall"}
-    table = (folder / "tables" / "measures.md").read_text("utf-8")
-    assert "| all-candidates | Needless steps" in table
-    assert f"{NEEDLESS.meaning}; counted over steps; lower is better." in table
-    assert "Needless steps (%)" in (folder / "report.html").read_text("utf-8")
+    table = (folder / "tables" / "full_planning_measures.md").read_text("utf-8")
+    assert "Needless steps %" in table
+    assert f"{NEEDLESS.meaning}; over steps; lower is better." in table
+    assert "Needless steps" in (folder / "report.html").read_text("utf-8")
     command("compare", folder, "--measure", "needless", "--out", folder / "compared")
     with (folder / "compared" / "comparison.csv").open(newline="") as file:
         compared = {row["part"]: row for row in csv.DictReader(file)}["overall"]
@@ -114,7 +114,7 @@ def test_scoring_again_fills_in_what_older_records_lack(
     assert known.isdisjoint({"needless", "distance", "blocks_order"})
     assert {"success", "macro_f1"} <= known
     command("score", here.out, "--out", here.root / "scored")
-    write_report(write_tables(here.root / "scored"), figures=())
+    write_report(write_tables(here.root / "scored"))
     check_everywhere(here.root / "scored")
     for line, again in zip(stored, here.records(here.root / "scored"), strict=True):
         assert json.dumps({**line, "counts": again["counts"]}, sort_keys=True) == json.dumps(

@@ -11,27 +11,22 @@ from dataclasses import replace
 from typing import Any
 from xml.etree.ElementTree import fromstring
 
-import numpy as np
 import pytest
 
 from phyblock import registry
 from phyblock.cli.main import phyblock
 from phyblock.errors import SpecError
-from phyblock.report.comparable import comparable
-from phyblock.report.compare import compare_models
-from phyblock.report.figures import figure_files, figure_titles
-from phyblock.report.figures.dots import measure_dots
 from phyblock.report.html.headline import headlines
 from phyblock.report.html.page import render_page
 from phyblock.report.html.sources import Sources
+from phyblock.results.compare import comparable, compare_models
+from phyblock.results.load import Run, load_run
 from phyblock.site.board import all_values, board_of
 from phyblock.site.entries import entries_of
 from phyblock.site.runs import SiteRun
 from phyblock.site.values import values_of
-from phyblock.tables.load import Run, load_run
-from phyblock.tables.measures import Measure
-from phyblock.tables.track_report import WHOLE, HeadlineColumn
 from phyblock.tracks import TrackKind
+from phyblock.tracks.measures import WHOLE, HeadlineColumn, Measure
 from tests.tracks.test_fourth_track import ERROR, EXACT, TRACK
 from tests.workspace import Workspace
 
@@ -65,12 +60,6 @@ def show(kind: TrackKind) -> None:
 def test_the_leading_measure_leads_everywhere(run: Run) -> None:
     for kind, leading in ((TRACK, ERROR), (led_by(EXACT, ERROR, EXACT), EXACT)):
         show(kind)
-        figure = measure_dots(run, track="counting")
-        assert figure is not None
-        label = f"{leading.heading} ({leading.unit})"
-        assert [panel.get_xlabel() for panel in figure.axes] == [label]
-        assert figure_titles(run)["counting"] == f"Counting: {leading.heading}"
-        assert "figures/counting.svg" in figure_files()
         assert comparable(run, "counting").measure == leading
         assert compare_models(run).name == leading.heading
         assert [table.strip_name for table in headlines(run)] == [kind.report().main or "Overall"]
@@ -137,19 +126,6 @@ def test_a_sample_is_solved_where_it_has_the_best_value_that_there_is(
     assert solved == (
         {"oracle": asked, "random": 0} if has_best else {"oracle": None, "random": None}
     )
-
-
-@pytest.mark.parametrize("factor", [0, -1], ids=["nothing", "below zero"])
-def test_values_that_are_all_zero_or_below_are_drawn(run: Run, factor: int) -> None:
-    """In a unit of its own; matplotlib warns of an axis without length, which is an error here."""
-    measure = replace(ERROR, value=lambda sums: factor * ERROR.value(sums), most=None)
-    show(led_by(measure, measure))
-    figure = measure_dots(run, track="counting")
-    assert figure is not None
-    left, right = figure.axes[0].get_xlim()
-    (dots,) = (line for line in figure.axes[0].lines if len(line.get_xdata()) == 2)
-    values = np.asarray(dots.get_xdata(), dtype=float)
-    assert left <= values.min() <= values.max() < right
 
 
 @pytest.mark.usefixtures("run")

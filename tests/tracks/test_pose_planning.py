@@ -279,7 +279,7 @@ def test_a_run_with_faults_is_killed_resumed_and_scored_again(
         (workspace.out / "records.jsonl").write_text(text[: len(text) // 2])
         assert not phyblock.main(run, standalone_mode=False)
         assert running.server.ended["ok"] == len(SCENES)
-    assert "What poses cost" in capsys.readouterr().out
+    assert "Pose planning" in capsys.readouterr().out
 
     def by_sample(records: list[dict[str, Any]]) -> dict[str, Any]:
         kept = ("parse", "scores", "pose", "counts")

@@ -9,19 +9,24 @@ from functools import partial
 from typing import Literal
 from urllib.parse import urlencode
 
-from phyblock.report.floors import Floor, floors_run, headline_floors
 from phyblock.report.html.leads import samples_query
 from phyblock.report.html.ranked import kinds_of, rank_texts
 from phyblock.report.html.standing import shortfalls
-from phyblock.report.measure_table import headline_of, main_heading
-from phyblock.tables.headline import Value
-from phyblock.tables.load import Run
-from phyblock.tables.measures import Better
-from phyblock.tables.showing import captioned, varied_words
-from phyblock.tables.text_table import NO_VALUE, number, spread
-from phyblock.tables.track_report import HeadlineColumn
-from phyblock.tracks.estimates import headline_columns, main_measure, track_measures
+from phyblock.results.estimates import (
+    Floor,
+    Value,
+    blind_baselines,
+    headline_columns,
+    headline_floors,
+    headline_of,
+    main_column,
+    main_measure,
+    track_measures,
+)
+from phyblock.results.load import Run
+from phyblock.results.text import NO_VALUE, captioned, number, spread
 from phyblock.tracks.kind import kind_of
+from phyblock.tracks.measures import Better, HeadlineColumn
 
 __all__ = ["Cell", "Headline", "Row", "headlines"]
 
@@ -104,7 +109,7 @@ def headlines(run: Run) -> list[Headline]:
 def _headline(run: Run, track: str) -> Headline:
     kind = kind_of(track)
     report = kind.report()
-    main = main_heading(run, track)
+    main = main_column(run, track).heading
     columns = sorted(headline_columns(run, track), key=lambda column: column.heading != main)
     headings = [column.heading for column in columns]
     floors = headline_floors(run, track)
@@ -116,7 +121,7 @@ def _headline(run: Run, track: str) -> Headline:
     marked = {name: numbers.get(main) for name, numbers in references.items()}
     return Headline(
         track,
-        captioned(kind.title, (*report.showing(run), *varied_words(run))),
+        captioned(kind.title, (*report.showing(run), *run.varied_words)),
         (*headings, *(["Published"] if report.published(run) else [])),
         tuple(rows),
         (" ".join(_notes(run, track, rows, has_floors=bool(floors))),),
@@ -141,7 +146,7 @@ def _model_rows(
     better = [measures[column.measure].better for column in columns]
     is_share = measures[columns[0].measure].is_share
     queries = {column.heading: samples_query(run, track, column.cell) for column in columns}
-    own_floors = floors_run(run, track)
+    own_floors = blind_baselines(run, track)
     ranks, lacking = rank_texts(run, track), shortfalls(run, track)
     rows = []
     for name, sort in kinds_of(run).items():
@@ -212,7 +217,7 @@ def _cell(
     if value is None or math.isnan(value.value):
         return Cell(NO_VALUE, query=query)
     below = [] if math.isnan(value.lo) else [f"{number(value.lo)} to {number(value.hi)}"]
-    if below and floor is not None and not floor.is_below(value.lo, value.hi, better):
+    if below and floor is not None and not floor.is_below(value, better):
         below[0] += f" {_NOT_BETTER}"
     if seeds and not math.isnan(value.sd):
         below.append(f"seeds {spread(value.mean, value.sd)}")

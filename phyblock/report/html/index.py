@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 from phyblock.records.files import run_records
 from phyblock.records.record import Record
-from phyblock.tables.design import Design
-from phyblock.tables.listing import Listing
+from phyblock.results.design import Design
 from phyblock.tracks.kind import kind_of, kinds
+from phyblock.tracks.measures import Listing
 
 __all__ = ["Item", "Numbers", "Place", "SampleIndex", "read_places"]
 

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from itertools import takewhile
 from urllib.parse import urlencode
 
-from phyblock.report.sensitivity import ITEMS
-from phyblock.report.sensitivity_view import FACTOR, LEVEL, factor_name
-from phyblock.report.varied import blocks_of
-from phyblock.tables.load import Run
-from phyblock.tables.outcomes import HEADINGS, NOT_RUN
-from phyblock.tables.text_table import Column, TextTable, level_name, track_text
+from phyblock.results.design import HEADINGS, NOT_RUN
+from phyblock.results.load import Run
+from phyblock.results.sensitivity import FACTOR, ITEMS, LEVEL, blocks_of, factor_name
+from phyblock.results.tables import layouts_of
+from phyblock.results.text import Column, TextTable, level_name, track_text
 from phyblock.text import one_line
 from phyblock.tracks.kind import kind_of
 
@@ -74,7 +73,7 @@ class TableLeads:
 def table_leads(run: Run, name: str, table: TextTable) -> TableLeads:
     """What the headings and the texts of a table say of the samples behind its numbers."""
     tracks = run.design.suite.tracks
-    of_table = [track for track in tracks if name in kind_of(track).report().tables] or tracks
+    of_table = [track for track in tracks if name in (layouts_of(track) or (track,))] or tracks
     words = _Vocabulary(
         _words(run, of_table),
         frozenset(

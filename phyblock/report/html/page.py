@@ -9,7 +9,7 @@ from typing import Any
 from phyblock.report.html.headline import Headline
 from phyblock.report.html.leads import TableLeads
 from phyblock.report.html.shell import fill
-from phyblock.tables.text_table import Column, TextTable
+from phyblock.results.text import Column, TextTable
 
 __all__ = ["Figure", "render_page"]
 

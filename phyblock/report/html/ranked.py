@@ -5,17 +5,16 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from phyblock.report.compare import compare_models
-from phyblock.report.measure_table import headline_of, main_heading
-from phyblock.tables.headline import Value
-from phyblock.tables.load import Run
+from phyblock.results.compare import compare_models
+from phyblock.results.estimates import Value, headline_of, main_column
+from phyblock.results.load import Run
 
 __all__ = ["kinds_of", "rank_texts"]
 
 
 def rank_texts(run: Run, track: str) -> dict[str, str]:
     """The place that each model may have by its main value; {} where there are not two."""
-    main, values = main_heading(run, track), headline_of(run, track)
+    main, values = main_column(run, track).heading, headline_of(run, track)
     known = {model for (model, heading), v in values.items() if heading == main and _is_known(v)}
     models = [name for name, sort in kinds_of(run).items() if sort == "model" and name in known]
     if len(models) < 2:

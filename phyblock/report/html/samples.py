@@ -12,8 +12,8 @@ from phyblock.records.record import Record, Score, SentPrompt
 from phyblock.report.html.index import Item, Place, SampleIndex
 from phyblock.report.html.pack import Pack
 from phyblock.sim.pictures import PictureStyle
-from phyblock.tables.track_report import PageItems
 from phyblock.tracks.kind import kinds
+from phyblock.tracks.measures import PageItems
 
 __all__ = [
     "IN_INDEX",

@@ -13,8 +13,8 @@ from phyblock.files import atomic_write
 from phyblock.models import Image
 from phyblock.resources import cache_dir
 from phyblock.sim.pictures import PictureStyle
-from phyblock.tables.track_report import PageItems
 from phyblock.tracks import PicturePolicy, Pictures
+from phyblock.tracks.measures import PageItems
 from phyblock.tracks.pictures import Drawing, Studio
 
 __all__ = ["PictureShelf"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from phyblock.config.suite import FACTORS, ImagesSpec, with_values
-from phyblock.tables.load import Run
+from phyblock.results.load import Run
 
 __all__ = ["images_of"]
 

@@ -11,10 +11,10 @@ from pathlib import Path
 
 from phyblock.data import AssemblyTask, Dataset
 from phyblock.errors import DataError
+from phyblock.results.load import Run
 from phyblock.run.plan import recorded_dataset
-from phyblock.tables.load import Run
-from phyblock.tables.track_report import PageItems
 from phyblock.tracks.kind import kind_of
+from phyblock.tracks.measures import PageItems
 
 __all__ = ["Sources", "open_sources"]
 

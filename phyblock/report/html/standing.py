@@ -8,9 +8,9 @@ from collections.abc import Mapping
 import pandas as pd
 
 from phyblock.records.files import read_stopped
-from phyblock.tables.coverage import coverage_frame
-from phyblock.tables.load import Run
-from phyblock.tables.outcomes import WITHOUT_REPLY
+from phyblock.results.design import WITHOUT_REPLY
+from phyblock.results.load import Run
+from phyblock.results.tables import coverage_frame
 from phyblock.tracks.kind import kind_of
 
 __all__ = ["cautions", "samples_done", "shortfalls"]

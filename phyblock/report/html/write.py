@@ -15,7 +15,6 @@ from phyblock.data import AssemblyTask
 from phyblock.files import OutFolder, writing
 from phyblock.records.files import PROMPTS, RECORDS, STOPPED
 from phyblock.records.manifest import MANIFEST
-from phyblock.report.figures import figure_titles, write_figures
 from phyblock.report.html.headline import headlines
 from phyblock.report.html.index import Item, Place, SampleIndex, read_places
 from phyblock.report.html.leads import mean_parts, part_names, table_leads
@@ -32,17 +31,17 @@ from phyblock.report.html.sent import PictureShelf
 from phyblock.report.html.shown import images_of
 from phyblock.report.html.sources import Sources, open_sources
 from phyblock.report.html.standing import cautions, samples_done, shortfalls
-from phyblock.report.made import PAGE
-from phyblock.report.write import TablesWritten
+from phyblock.results.figures import figure_titles, write_figures
+from phyblock.results.load import Run
+from phyblock.results.tables import TablesWritten
 from phyblock.run.store import run_folder
-from phyblock.tables.load import Run
 from phyblock.tracks.opening import picture_policy
 from phyblock.tracks.pictures import kit, scene_entry
 from phyblock.tracks.showing import in_order
 
 __all__ = ["REPORT_FILE", "PageWritten", "page_files", "write_page", "write_report"]
 
-REPORT_FILE = PAGE
+REPORT_FILE = "report.html"
 _FOLDER = "report"
 _PICTURES = "pictures"
 _CHUNK_BYTES = 2**20
@@ -65,31 +64,28 @@ class PageWritten:
     is_whole: bool
 
 
-def write_report(
-    written: TablesWritten, data: Path | None = None, figures: Sequence[str] | None = None
-) -> Path:
+def write_report(written: TablesWritten, data: Path | None = None, *, figures: bool = True) -> Path:
     """Write figures and page as `write_page` does; the page's path."""
-    return write_page(written, data, figures).path
+    return write_page(written, data, figures=figures).path
 
 
 def write_page(
-    written: TablesWritten, data: Path | None = None, figures: Sequence[str] | None = None
+    written: TablesWritten, data: Path | None = None, *, figures: bool = True
 ) -> PageWritten:
     """Write figures, `report.html` and `report/` of a run whose tables were.
 
     Goals, candidates and assemblies are drawn by the page from the scenes: `data` is where the
     data set is now, if it has moved; where it cannot be read, the page says so and shows the rest.
-    Pictures that were sent lie beside the page as far as the picture cache has them. `figures`
-    names those to draw, all by default. Raises DataError for a `data` that is not what the run was
-    made on, StoreError where the folder cannot be written or something is in the way that we never
-    wrote.
+    Pictures that were sent lie beside the page as far as the picture cache has them. Raises
+    DataError for a `data` that is not what the run was made on, StoreError where the folder cannot
+    be written or something is in the way that we never wrote.
     """
     run = written.run
     sources = open_sources(run, data)
     out = run_folder(run.path)
     out.check(page_files())
     with out.alone(), writing(run.path / REPORT_FILE):
-        drawn = write_figures(run, figures)
+        drawn = write_figures(run) if figures else ()
         build = _build(run, sources)
         own = f"{_FOLDER}/{build}/"
         out.claim([REPORT_FILE])

@@ -1,1 +1,0 @@
-"""A run in the formats of other tools: Inspect AI logs, Hugging Face datasets, CSV and Parquet."""

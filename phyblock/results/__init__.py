@@ -1,0 +1,1 @@
+"""Results of a run: values with intervals, tables, comparisons, figures, exports."""

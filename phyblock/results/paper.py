@@ -1,0 +1,188 @@
+"""The numbers that the paper prints, and ours beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from phyblock.results.design import OVERALL
+from phyblock.results.estimates import headline_rows, pooled_in, track_estimates
+from phyblock.results.load import Run
+from phyblock.results.text import Column, TextTable, number
+from phyblock.tracks.kind import kind_of
+from phyblock.tracks.measures import CELL
+
+if TYPE_CHECKING:
+    from phyblock.results.tables import Table
+
+_SETTING = "A"
+"""The setting of every number in Table 1."""
+_OVERALL_LEVELS = frozenset({2, 3, 4})
+"""Levels whose scenes the paper's overall numbers pool."""
+
+
+@dataclass(frozen=True)
+class _Published:
+    """A table of the paper: the track and way of counting that is ours, decimals, a note.
+
+    `columns` are those of estimates, by metric as it is printed, with their headings.
+    """
+
+    track: str
+    columns: Mapping[str, tuple[str, str, str]]
+    criterion: str
+    digits: int
+    note: str
+
+
+_TABLES = {
+    1: _Published(
+        "full_planning",
+        {
+            "precision": ("precision", "value", "Prec"),
+            "recall": ("recall", "value", "Rec"),
+            "f1": ("f1", "value", "F1"),
+        },
+        "",
+        1,
+        "Ours: setting A, micro averages. Published: micro averages of one run.",
+    ),
+    2: _Published(
+        "vqa",
+        {"accuracy": ("accuracy", "value", "Accuracy")},
+        "",
+        1,
+        "Averages are unweighted means. The questions are our own: the paper's are not published.",
+    ),
+    3: _Published(
+        "step_planning",
+        {"recall": ("recall", "value", "Rec")},
+        "placed",
+        1,
+        "Of the published numbers, of the paper's own scenes, recall alone stands beside ours: it "
+        "is of the goal's blocks, whatever was tried. Precision depends on which wrong blocks a "
+        "simulator lets stand, which the paper does not say.",
+    ),
+    5: _Published(
+        "full_planning",
+        {"f1_mean": ("f1", "mean", "F1 mean"), "f1_sd": ("f1", "sd", "F1 sd")},
+        "",
+        2,
+        "Both: means over single seeds, sd with ddof = 1; all other tables pool the seeds.",
+    ),
+}
+PAPER_TABLES = tuple(_TABLES)
+"""Numbers of the paper's tables of results."""
+
+
+def published_table(table: int) -> pd.DataFrame:
+    """Return a results table of the paper (1, 2, 3 or 5), one printed value [%] a row.
+
+    `published/README.md` says what the columns are and where the numbers come from.
+    """
+    with (files("phyblock.results") / "published" / f"table{table}.csv").open("rb") as file:
+        return pd.read_csv(file, dtype={"level": "object"})
+
+
+def published_frame(run: Run, table: int) -> pd.DataFrame:
+    """Return one row for each printed value of a model of the run, with ours [%].
+
+    Columns are model, published_name, cell, metric, published, ours, difference (ours less
+    published) and n, the samples behind ours. Ours is not rounded, and NaN for what the run does
+    not measure. Table 1 is compared in setting A by the `paper` matcher where the run has it.
+    """
+    paper, design = _TABLES[table], run.design
+    printed = published_table(table)
+    if table == 2:
+        is_average = printed["subtask"] == "average"
+        printed["level"] = printed["subtask"].where(~is_average, printed["category"])
+        printed["metric"] = "accuracy"
+    printed = printed[printed["metric"].isin(list(paper.columns))]
+    printed = printed.rename(
+        columns={"model": "published_name", "value": "published", "level": CELL}
+    )
+    names = pd.DataFrame(list(design.published.items()), columns=["model", "published_name"])
+    cells = names.astype("object").merge(printed, on="published_name")
+    rows = pd.DataFrame(columns=["model", CELL, "metric", "ours", "n"])
+    if paper.track in design.suite.tracks and (table != 5 or len(design.suite.seeds) > 1):
+        rows = _ours(run, table)
+    elif paper.track not in design.suite.tracks or table == 5:
+        cells = cells.iloc[:0]
+    found = cells.merge(rows, on=["model", CELL, "metric"], how="left")
+    found["ours"] = found["ours"].astype("float64")
+    found["difference"] = found["ours"] - found["published"]
+    found["n"] = found["n"].astype("float64").fillna(0).astype("int64")
+    return found[
+        ["model", "published_name", CELL, "metric", "published", "ours", "difference", "n"]
+    ]
+
+
+def _ours(run: Run, table: int) -> pd.DataFrame:
+    paper, design = _TABLES[table], run.design
+    found = headline_rows(track_estimates(run, paper.track), design)
+    if table == 1:
+        matcher = "paper" if "paper" in design.suite.scoring.matchers else design.matcher
+        found = track_estimates(run, paper.track)
+        setting = _SETTING if _SETTING in design.suite.settings else None
+        found = found[(found["setting"] == setting) & found["matcher"].isin(["", matcher])]
+        if not set(design.suite.levels) >= _OVERALL_LEVELS:
+            found = found[found[CELL] != OVERALL]
+    if paper.criterion:
+        found = found[found["criterion"] == paper.criterion]
+    parts = []
+    for metric, (measure, column, _) in paper.columns.items():
+        mine = found[found["measure"] == measure]
+        ours = 100 * mine[column].astype("float64")
+        parts.append(mine[["model", CELL, "n"]].assign(metric=metric, ours=ours))
+    rows = pd.concat(parts)
+    if table == 2:
+        # A mean over a part of what the paper averages is not the same number.
+        from phyblock.tracks.vqa_results import ALL_CELLS
+
+        cells = kind_of(paper.track).report().cells(run)
+        asked = {cell.name: pooled_in(cell, cells) for cell in cells}
+        whole = {cell.name: pooled_in(cell, ALL_CELLS) for cell in ALL_CELLS}
+        rows.loc[rows[CELL].map(asked) != rows[CELL].map(whole), "ours"] = np.nan
+    return rows
+
+
+def beside_paper(run: Run, table: int) -> Table | None:
+    """Return our numbers beside a table of the paper; None where it has no model of the run."""
+    from phyblock.results.tables import Table
+
+    frame, paper = published_frame(run, table), _TABLES[table]
+    if not len(frame):
+        return None
+    cells = list(dict.fromkeys(frame[CELL]))
+    known = frame.set_index(["model", "metric", CELL]).to_dict("index")
+    kinds = {"Paper": ("published", paper.digits), "Ours": ("ours", 2), "Diff": ("difference", 2)}
+    rows = []
+    for model, name in dict(zip(frame["model"], frame["published_name"], strict=True)).items():
+        label = model if model == name else f"{model} ({name})"
+        for place, (metric, (_, _, heading)) in enumerate(paper.columns.items()):
+            texts = [label if place == 0 else "", heading]
+            for cell in cells:
+                row = known.get((model, metric, cell), {})
+                for kind, digits in kinds.values():
+                    value = float(row.get(kind, np.nan))
+                    texts.append(number(value, digits, signed=kind == "difference"))
+            rows.append(tuple(texts))
+    compared = frame.dropna(subset=["difference"])
+    notes = [paper.note]
+    if len(compared):
+        largest = number(compared["difference"].abs().max(), 3)
+        notes.insert(0, f"Largest absolute difference of {len(compared)} cells: {largest}.")
+    headings = {cell.name: cell.heading for cell in kind_of(paper.track).report().cells(run)}
+    columns = (Column(kind, headings.get(cell, cell)) for cell in cells for kind in kinds)
+    view = TextTable(
+        f"Our numbers beside the paper's Table {table}{run.design.of_suite} (%)",
+        (Column("Model", is_text=True), Column("", is_text=True), *columns),
+        tuple(rows),
+        tuple(notes),
+    )
+    return Table(frame, view)

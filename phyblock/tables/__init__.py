@@ -1,1 +1,0 @@
-"""What stored records come to: measures, estimates with their intervals, tables as text."""

@@ -1,0 +1,245 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+
+from phyblock.errors import SpecError
+from phyblock.report import Run
+from phyblock.results.compare import (
+    Side,
+    comparable,
+    compare,
+    compare_models,
+    compare_runs,
+    compare_view,
+    flipped_lines,
+    p_text,
+    ranks_view,
+    write_comparison,
+)
+from tests.report.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
+
+Records = list[dict[str, Any]]
+
+
+def plans(model: str, right: dict[str, int], seeds: tuple[int, ...] = (0,)) -> Records:
+    """Plans of four steps of which `right[scene]` place a block; goals have four blocks."""
+    return [
+        record(model, scene, seed, [score(tp, 4 - tp, 4 - tp)])
+        for scene, tp in right.items()
+        for seed in seeds
+    ]
+
+
+def one_seed(*records: dict[str, Any], **facts: Any) -> Run:
+    wanted = {"seeds": [0], "settings": ["A"], "matchers": ["optimal"], **facts}
+    return run_of(records, manifest(**wanted))
+
+
+@laws
+@given(record_lists())
+def test_turning_a_pair_round_turns_all_that_it_says_round(records: Records) -> None:
+    run = run_of(records, manifest())
+    one, other = (
+        compare_models(run, names).table for names in (["alpha", "beta"], ["beta", "alpha"])
+    )
+    assert (one["better"] == other["worse"]).all()
+    for name, sign in (("difference", -1), ("se", 1), ("p_holm", 1), ("n_samples", 1)):
+        pd.testing.assert_series_equal(one[name], sign * other[name], check_names=False)
+    pd.testing.assert_series_equal(one["lo"], -other["hi"], check_names=False)
+    # No two shares are further apart than 100 points, of however few scenes.
+    bounded = one[["lo", "hi", "detectable", "detectable_holm"]]
+    assert not (bounded.abs() > 100).any(axis=None)
+
+
+def test_only_samples_that_both_have_are_compared() -> None:
+    run = one_seed(
+        *plans("alpha", {"000": 4, "001": 2, "002": 0}),
+        *plans("beta", {"001": 4, "002": 0, "003": 4}),
+        record("beta", "000", outcome="missing", scores=[score(0, 0, 4)]),
+    )
+    row = compare_models(run).table.set_index("part").loc["overall"]
+    assert (row["n_samples"], row["n_scenes"], row["n_clusters"]) == (2, 2, 2)
+    assert (row["value_a"], row["value_b"], row["difference"]) == (25, 50, -25)
+    assert (row["better"], row["worse"], row["same"]) == (0, 1, 1)
+
+
+def test_a_model_without_any_reply_is_not_compared_though_empty_plans_count() -> None:
+    silent = [
+        record("beta", scene, outcome="api_error", scores=[score(0, 0, 4)]) for scene in LEVELS
+    ]
+    run = one_seed(*plans("alpha", dict.fromkeys(LEVELS, 3)), *silent, missing="count")
+    assert set(compare_models(run).table["verdict"]) == {"nothing to compare"}
+    some = record("beta", "000", scores=[score(3, 1, 1)])
+    run = one_seed(*plans("alpha", dict.fromkeys(LEVELS, 3)), some, *silent[1:], missing="count")
+    row = compare_models(run).table.set_index("part").loc["overall"]
+    assert (row["n_samples"], row["better"], row["same"]) == (5, 4, 1)
+
+
+def test_flipped_samples_are_those_that_one_side_alone_got_right() -> None:
+    run = one_seed(
+        *plans("alpha", {"000": 4, "001": 2, "002": 4, "003": 1}),
+        *plans("beta", {"000": 4, "001": 4, "002": 3, "003": 0}),
+    )
+    found = compare_models(run)
+    flipped = (
+        found.flipped[["scene", "right", "value_a", "value_b"]].to_records(index=False).tolist()
+    )
+    assert flipped == [("002", "alpha", 100, 75), ("001", "beta", 50, 100)]
+    assert flipped_lines(found) == (
+        "alpha is right where beta is not, 1: 002",
+        "beta is right where alpha is not, 1: 001",
+    )
+
+
+def test_what_cannot_be_told_is_said() -> None:
+    for n, verdict in ((12, "cannot tell"), (4, "too few base scenes to tell")):
+        right = {f"{scene:03}": 1 + scene % 3 for scene in range(n)}
+        other = {scene: 4 - tp for scene, tp in right.items()}
+        run = one_seed(
+            *plans("alpha", right),
+            *plans("beta", other),
+            scenes_by_level={2: n},
+            scenes=n,
+            levels=[2],
+        )
+        verdicts = compare_models(run).table.set_index("part")["verdict"]
+        assert verdicts["overall"] == verdict
+    lone = one_seed(*plans("alpha", {"000": 4}), *plans("beta", {"000": 0}))
+    verdicts = compare_models(lone).table.set_index("part")["verdict"]
+    assert verdicts["overall"] == "cannot tell: a single base scene"
+    assert verdicts["3"] == "nothing to compare"
+
+
+def test_a_gap_is_found_among_many_models_and_ranks_say_what_is_sure() -> None:
+    scenes = [f"{n:03}" for n in range(60)]
+    draw = np.random.default_rng(7)
+    strength = {"best": 0.75, **{f"model-{n:02}": 0.5 for n in range(25)}}
+    run = one_seed(
+        *(
+            one
+            for model, share in strength.items()
+            for one in plans(model, {scene: int(draw.binomial(4, share)) for scene in scenes})
+        ),
+        models=list(strength),
+        scenes_by_level={2: 60},
+        scenes=60,
+        levels=[2],
+    )
+    found = compare_models(run)
+    assert len(found.table) == 26 * 25 // 2
+    against_best = found.table[found.table["a"] == "best"]
+    assert (against_best["verdict"] == "best is better").all()
+    ranks = found.ranks.set_index("model")
+    assert tuple(ranks.loc["best", ["best", "worst"]]) == (1, 1)
+    assert (ranks.loc[ranks.index != "best", "best"] > 1).all()
+    assert [row[0] for row in ranks_view(found).rows] == list(found.ranks["model"])
+    assert (found.table["detectable"] < found.table["detectable_holm"]).all()
+
+
+def test_a_clear_difference_is_told_and_corrected_for_the_number_of_pairs() -> None:
+    scenes = [f"{n:03}" for n in range(40)]
+    three = {"alpha": 4, "beta": 2, "gamma": 2}
+    records = [
+        one
+        for model, tp in three.items()
+        for place, scene in enumerate(scenes)
+        for one in plans(model, {scene: max(0, tp - place % 2)})
+    ]
+    table = compare_models(one_seed(*records, models=list(three))).table.set_index(["a", "b"])
+    assert table.loc[("alpha", "beta"), "verdict"] == "alpha is better"
+    assert table.loc[("beta", "gamma"), "verdict"] == "cannot tell"
+    p = table.loc[("alpha", "beta"), "p"]
+    assert table.loc[("alpha", "beta"), "p_holm"] == pytest.approx(3 * p)
+
+
+def test_two_runs_are_compared_by_the_models_they_share_or_by_two_named() -> None:
+    first = one_seed(*plans("alpha", {"000": 4, "001": 2}), models=["alpha"])
+    second = run_of(
+        [*plans("alpha", {"000": 1, "001": 1}), *plans("beta", {"000": 4, "001": 4})],
+        manifest(seeds=[0]),
+    )
+    second = Run(Path("other"), second.manifest, second.design, second.records, second.scores)
+    shared = compare_runs(first, second).table.set_index("part")
+    assert shared.loc["overall", ["a", "b"]].tolist() == ["alpha (run)", "alpha (other)"]
+    assert shared.loc["overall", "difference"] == 50
+    named = compare_runs(first, second, ["alpha", "beta"]).table.set_index("part")
+    assert named.loc["overall", "difference"] == -25
+    with pytest.raises(SpecError, match="has no such model"):
+        compare_runs(first, second, ["beta", "alpha"])
+
+
+def test_runs_that_cannot_be_compared_are_refused() -> None:
+    first = one_seed(*plans("alpha", {"000": 4}), models=["alpha"])
+    other = record("alpha", "000", scores=[score(4, 0, 5)]) | {"n_blocks": 9}
+    with pytest.raises(SpecError, match="other blocks in 1 scene, the first 000"):
+        compare_runs(first, one_seed(other, models=["alpha"]))
+    with pytest.raises(SpecError, match="was not scored as run was, by optimal"):
+        compare_runs(first, one_seed(models=["alpha"], matchers=["paper"]))
+    with pytest.raises(SpecError, match="no model in common"):
+        compare_runs(first, one_seed(models=["beta"]))
+    facts = manifest(seeds=[0])
+    facts["suite"]["tracks"] = ["vqa"]
+    with pytest.raises(SpecError, match="no such track to compare"):
+        compare_runs(first, run_of([], facts))
+    with pytest.raises(SpecError, match=r"found: vqa(?s:.*)allowed: full_planning"):
+        compare_models(run_of([], manifest()), track="vqa")
+    with pytest.raises(SpecError, match="needs two models"):
+        compare_models(first)
+
+
+def test_level_1_is_compared_by_one_criterion_alone() -> None:
+    first = one_seed(*plans("alpha", {"001": 4, "002": 2}), models=["alpha"])
+    other = one_seed(
+        *plans("alpha", {"001": 4, "002": 4}), models=["alpha", "beta"], level1="membership"
+    )
+    with pytest.raises(SpecError, match="was not scored as run was, by selection"):
+        compare_runs(first, other)
+    second = one_seed(*plans("alpha", {"001": 4, "002": 4}), models=["alpha"], levels=[2, 3])
+    table = compare_runs(first, second).table.set_index("part")
+    assert table.index.tolist() == ["2", "3", "overall"]
+    assert table.loc["overall", "difference"] == -25
+
+
+def test_the_first_runs_policy_on_missing_replies_holds_for_both() -> None:
+    def of(missing: str, failed: str) -> Run:
+        lost = record("alpha", failed, outcome="missing", scores=[score(0, 0, 4)])
+        right = {scene: 4 for scene in ("000", "001", "002") if scene != failed}
+        return one_seed(*plans("alpha", right), lost, models=["alpha"], missing=missing)
+
+    for missing, samples in (("skip", 1), ("count", 3)):
+        other = of("count" if missing == "skip" else "skip", "001")
+        row = compare_runs(of(missing, "000"), other).table.set_index("part").loc["overall"]
+        assert (row["n_samples"], row["difference"]) == (samples, 0)
+
+
+def test_levels_are_rows_of_one_pair_alone() -> None:
+    run = one_seed(*plans("alpha", {"000": 4, "001": 1}), *plans("beta", {"000": 4, "001": 2}))
+    sides = [Side(name, name, run) for name in ("alpha", "beta")]
+    what = comparable(run, "full_planning")
+    parts = [part for part in what.parts if part.name in ("2", "overall")]
+    one = compare_view(compare([(sides[0], sides[1])], parts, what))
+    assert [row[:3] for row in one.rows] == [("alpha", "beta", "Level 2"), ("", "", "Overall")]
+    assert "Part" not in [
+        column.name
+        for column in compare_view(compare([(sides[0], sides[1])], parts[-1:], what)).columns
+    ]
+
+
+def test_a_comparison_is_written_and_p_values_are_readable(tmp_path: Path) -> None:
+    run = one_seed(*plans("alpha", {"000": 4, "001": 1}), *plans("beta", {"000": 4, "001": 2}))
+    files = write_comparison(compare_models(run), tmp_path / "out")
+    assert [file.name for file in files] == [
+        "comparison.csv",
+        "comparison.md",
+        "comparison.tex",
+        "flipped.csv",
+        "ranks.csv",
+    ]
+    assert len(pd.read_csv(files[0])) == 5
+    assert (p_text(0.0004), p_text(0.05), p_text(float("nan"))) == ("< 0.001", "0.050", "\u2013")

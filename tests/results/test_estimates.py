@@ -1,0 +1,333 @@
+"""Estimates of every track: laws of pooling, and numbers counted by hand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from random import Random
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
+from phyblock.results.estimates import all_estimates, blind_baselines, headline_floors
+from phyblock.results.load import Run
+from phyblock.scoring.counts import Counts, micro
+from phyblock.scoring.plan import ERROR_TYPES
+from tests.report.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
+
+Records = list[dict[str, Any]]
+
+
+def of(run: Run, measure: str, cell: str = "overall", model: str = "alpha", **way: str) -> Any:
+    """Return the one estimate of a measure; in setting A by the optimal matcher."""
+    frame = all_estimates(run)
+    wanted = {"measure": measure, "cell": cell, "model": model, **way}
+    headline = {"setting": ["", "A"], "matcher": ["", "optimal"]}
+    for name, value in wanted.items():
+        frame = frame[frame[name] == value]
+    for name, values in headline.items():
+        frame = frame if name in way else frame[frame[name].isin(values)]
+    assert len(frame) <= 1
+    return frame.iloc[0] if len(frame) else None
+
+
+def value(run: Run, *about: str, **way: str) -> float:
+    row = of(run, *about, **way)
+    return math.nan if row is None else float(row["value"])
+
+
+@laws
+@given(record_lists(), st.sampled_from(["skip", "count"]))
+def test_each_value_of_plans_is_the_micro_average_of_its_records(
+    records: Records, missing: str
+) -> None:
+    left_out = {"missing", "api_error"} if missing == "skip" else set()
+    frame = all_estimates(run_of(records, manifest(missing=missing)))
+    frame = frame[frame["measure"].isin(["precision", "recall", "f1"])]
+    for row in frame.to_dict("records"):
+        mine = [
+            one
+            for one in records
+            if one["model"] == row["model"] and one["outcome"] not in left_out
+            if row["cell"] == "overall" or int(row["cell"]) in one["levels"]
+        ]
+        counts = [
+            Counts(one["tp"], one["fp"], one["fn"])
+            for kept in mine
+            for one in kept["scores"]
+            if one["criterion"] == ("selection" if row["cell"] == "1" else "aov")
+            if (one["matcher"] or "", one["setting"]) == (row["matcher"], row["setting"])
+        ]
+        assert row["n"] == len(counts)
+        answered = any(one["outcome"] not in ("missing", "api_error") for one in mine)
+        wanted = getattr(micro(counts), row["measure"]) if answered else None
+        assert math.isnan(row["value"]) if wanted is None else row["value"] == pytest.approx(wanted)
+
+
+@laws
+@given(record_lists(), st.randoms())
+def test_the_order_of_records_changes_no_estimate(records: Records, random: Random) -> None:
+    shuffled = records.copy()
+    random.shuffle(shuffled)
+    frames = (all_estimates(run_of(one, manifest())) for one in (records, shuffled))
+    pd.testing.assert_frame_equal(*frames)
+
+
+@laws
+@given(record_lists())
+def test_seeds_alone_give_mean_and_deviation(records: Records) -> None:
+    keys = ["measure", "model", "setting", "matcher", "criterion", "cell"]
+    pooled = all_estimates(run_of(records, manifest())).set_index(keys)
+    alone = [
+        all_estimates(
+            run_of([one for one in records if one["seed"] == seed], manifest(seeds=[seed]))
+        ).set_index(keys)["value"]
+        for seed in (0, 1)
+    ]
+    for key, row in pooled.iterrows():
+        values = np.array([one.get(key, math.nan) for one in alone], dtype=float)
+        values = values[~np.isnan(values)]
+        assert row["seeds"] == len(values)
+        assert row["mean"] == pytest.approx(values.mean() if len(values) else math.nan, nan_ok=True)
+        sd = values.std(ddof=1) if len(values) > 1 else math.nan
+        assert row["sd"] == pytest.approx(sd, nan_ok=True, abs=1e-12)
+
+
+@laws
+@given(record_lists())
+def test_shares_of_wrong_steps_and_of_blocks_add_up_to_one(records: Records) -> None:
+    frame = all_estimates(run_of(records, manifest()))
+    ways = ["model", "setting", "matcher", "criterion", "cell"]
+    for prefix, left_out in (("wrong_", ""), ("blocks_", "blocks_support")):
+        shares = frame[frame["measure"].str.startswith(prefix) & (frame["measure"] != left_out)]
+        sums = shares.dropna(subset=["value"]).groupby(ways)["value"].sum()
+        assert np.allclose(sums, 1)
+
+
+def test_wrong_steps_by_hand() -> None:
+    records = [
+        record(scene="000", scores=[score(1, 4, 0, errors=(1, 0, 2, 1))]),
+        record(scene="002", scores=[score(1, 4, 0, errors=(0, 4, 0, 0))]),
+        record(scene="003", outcome="missing", scores=[score(0, 0, 4)]),
+    ]
+    run = run_of(records, manifest())
+    shares = [value(run, f"wrong_{name}", "2") for name in ERROR_TYPES]
+    assert shares == [0.25, 0, 0.5, 0.25]
+    row = of(run, "wrong_overflow")
+    assert (row["value"], row["n"]) == (0.5, 2)
+    assert 0 <= row["lo"] < 0.5 < row["hi"] <= 1
+    assert of(run, "wrong_overflow", "1") is None
+
+
+@pytest.mark.parametrize(("missing", "n", "recall"), [("skip", 1, 0.75), ("count", 3, 3 / 16)])
+def test_missing_replies_are_left_out_or_count_as_empty_plans(
+    missing: str, n: int, recall: float
+) -> None:
+    records = [
+        record(scene="001", scores=[score(3, 1, 1)]),
+        record(scene="002", scores=[score(0, 0, 4)], outcome="missing"),
+        record(scene="003", scores=[score(0, 0, 8)], outcome="api_error"),
+    ]
+    run = run_of(records, manifest(missing=missing))
+    row = of(run, "recall")
+    assert (row["n"], row["value"]) == (n, recall)
+    assert value(run, "precision") == 0.75
+
+
+def test_what_is_undefined_or_was_never_answered_has_no_value_and_is_not_zero() -> None:
+    records = [record(scene="001", scores=[score(0, 0, 4)])]
+    records += [
+        record("beta", scene, scores=[score(0, 0, 4)], outcome="api_error")
+        for scene in ("001", "002")
+    ]
+    run = run_of(records, manifest(missing="count"))
+    assert math.isnan(value(run, "precision", "2"))
+    assert (value(run, "recall", "2"), value(run, "f1", "2")) == (0, 0)
+    assert of(run, "f1", "3") is None
+    silent = of(run, "recall", model="beta")
+    assert silent["n"] == 2
+    assert math.isnan(silent["value"])
+
+
+def test_level_1_has_its_own_criterion_and_overall_counts_every_scene_once() -> None:
+    two = record(scores=[score(2, 1, 2), score(3, 0, 1, criterion="selection")])
+    assert LEVELS["000"] == (1, 2)
+    run = run_of([two], manifest())
+    assert [value(run, "recall", cell) for cell in ("1", "2", "overall")] == [0.75, 0.5, 0.5]
+    assert of(run, "recall")["n"] == 1
+    alone = record(scene="004", scores=[score(2, 1, 2), score(3, 0, 1, criterion="selection")])
+    assert value(run_of([alone], manifest()), "recall") == 0.5
+    assert value(run_of([two], manifest(levels=[1])), "recall") == 0.75
+    membership = record(scores=[score(5, 0, -1, criterion="membership")])
+    assert math.isnan(value(run_of([membership], manifest(level1="membership")), "f1", "1"))
+
+
+def answered(
+    subtask: str,
+    number: int,
+    given: str | None,
+    *,
+    model: str = "alpha",
+    seed: int = 0,
+    right: str = "A",
+    rotation: int = 0,
+    outcome: str = "",
+) -> dict[str, Any]:
+    name = f"{subtask.lower()}-{number:03d}"
+    kind = outcome or ("ok" if given else "parse_failure")
+    made = record(model, "000", seed, (), kind)
+    sample = f"vqa/{model}/{name}-r{rotation}/s{seed}"
+    about = {"id": name, "subtask": subtask, "category": "", "rotation": rotation}
+    told = {"right": right, "given": given, "correct": given == right}
+    return {**made, "track": "vqa", "sample": sample, "question": about, "answer": told}
+
+
+def questions(
+    records: Records, seeds: Iterable[int] = (0,), missing: str = "count", **shown: Any
+) -> Run:
+    made = manifest(models=["alpha", "beta"], seeds=seeds, missing=missing)
+    made["suite"] |= {"tracks": ["vqa"], "vqa": shown}
+    made["tracks"] = {"vqa": {"by_subtask": dict.fromkeys(SUBTASKS, 4)}}
+    return run_of(records, made)
+
+
+def complete(right: dict[Any, int], **more: Any) -> Records:
+    """Return four answers of every subtask, so many of them right."""
+    return [
+        answered(subtask, number, "A" if number < right.get(subtask, 0) else "B", **more)
+        for subtask in SUBTASKS
+        for number in range(4)
+    ]
+
+
+@given(st.fixed_dictionaries({subtask: st.integers(0, 4) for subtask in SUBTASKS}))
+@laws
+def test_averages_of_questions_are_unweighted_means_of_their_parts(right: dict[Any, int]) -> None:
+    run = questions(complete(right))
+    means = []
+    for category, subtasks in CATEGORIES.items():
+        means.append(np.mean([right[name] / 4 for name in subtasks]))
+        assert value(run, "accuracy", category) == pytest.approx(means[-1])
+        for name in subtasks:
+            assert value(run, "accuracy", name) == right[name] / 4
+    assert value(run, "accuracy") == pytest.approx(np.mean(means))
+
+
+def test_a_mean_of_which_a_part_was_not_answered_has_no_value() -> None:
+    records = [one for one in complete(dict.fromkeys(SUBTASKS, 4))
+               if one["question"]["subtask"] != "SI"]  # fmt: skip
+    run = questions(records)
+    assert value(run, "accuracy", "CO") == value(run, "accuracy", "dynamic_reasoning") == 1
+    assert math.isnan(value(run, "accuracy", "object_property"))
+    assert math.isnan(value(run, "accuracy"))
+
+
+@pytest.mark.parametrize(("missing", "n", "wanted"), [("count", 4, 0.5), ("skip", 3, 2 / 3)])
+def test_missing_answers_count_as_wrong_or_are_left_out(
+    missing: str, n: int, wanted: float
+) -> None:
+    records = [answered("SH", number, "A" if number < 2 else "B") for number in range(3)]
+    records.append(answered("SH", 3, None, outcome="api_error"))
+    row = of(questions(records, missing=missing), "accuracy", "SH")
+    assert (row["n"], row["value"]) == (n, pytest.approx(wanted))
+
+
+def test_circular_needs_every_rotation_of_a_seed() -> None:
+    def rotations(number: int, seed: int, wrong: int | None) -> Records:
+        return [
+            answered("SH", number, "B" if by == wrong else LETTERS[by], right=LETTERS[by],
+                     rotation=by, seed=seed)
+            for by in range(4)
+        ]  # fmt: skip
+
+    records = (
+        rotations(0, 0, None) + rotations(1, 0, 2) + rotations(0, 1, 0) + rotations(1, 1, None)
+    )
+    run = questions(records, seeds=(0, 1), circular=True)
+    assert value(run, "accuracy", "SH") == 0.5
+    assert value(run, "each_rotation", "SH") == 14 / 16
+    assert headline_floors(run, "vqa")["Overall"].name == "chance"
+    lacking = questions(records[1:], seeds=(0, 1), circular=True)
+    assert value(lacking, "accuracy", "SH") == 0.25
+
+
+def test_letters_are_those_of_questions_with_one_answer() -> None:
+    records = [
+        answered("SH", 0, "A"), answered("SH", 1, "B"), answered("CO", 0, None),
+        answered("OR", 0, "ABCD", right="ABCD"),
+    ]  # fmt: skip
+    run = questions(records)
+    assert (value(run, "right_a"), of(run, "right_a")["n"]) == (1, 3)
+    assert value(run, "given_a") == value(run, "given_b") == pytest.approx(1 / 3)
+    assert value(run, "given_c") == 0
+
+
+def episode(
+    model: str, scene: str, outcomes: str, ending: str, *, seed: int = 0, **fields: Any
+) -> dict[str, Any]:
+    """Return an episode of a goal of four blocks; p is placed, o overflow, ? unread, d done."""
+    names = {"p": "placed", "o": "overflow", "?": "no_move", "d": "done", "i": "invalid"}
+    placed = [outcomes[: n + 1].count("p") for n in range(len(outcomes))]
+    right, tried = outcomes.count("p"), sum(letter in "poi" for letter in outcomes)
+    scores = [
+        {"criterion": kind, "setting": setting, "matcher": None, "errors": None,
+         "tp": right, "fp": fp, "fn": 4 - right}
+        for setting in "AB"
+        for kind, fp in (("placed", 0), ("attempted", tried - right))
+    ]  # fmt: skip
+    made = record(model, scene, seed, scores, **fields)
+    made |= {"sample": f"step_planning/{model}/{scene}/s{seed}", "track": "step_planning"}
+    told = [names[letter] for letter in outcomes]
+    return {**made, "ending": ending, "outcomes": told, "progress": placed, "max_steps": 8}
+
+
+def episodes(*records: dict[str, Any], missing: str = "skip") -> Run:
+    facts = manifest(items={"step_planning": 2}, seeds=[0], missing=missing)
+    facts["suite"] |= {"tracks": ["step_planning"]}
+    return run_of(records, facts)
+
+
+def test_episodes_by_hand() -> None:
+    run = episodes(
+        episode("alpha", "001", "pppop", "completed"),
+        episode("alpha", "002", "ppd", "done"),
+        episode("beta", "001", "o?oi?", "max_failures"),
+    )
+    assert value(run, "precision", criterion="placed") == 1
+    assert value(run, "precision", criterion="attempted") == pytest.approx(6 / 7)
+    assert value(run, "recall", criterion="placed") == 0.75
+    assert (value(run, "completion"), value(run, "ended_done")) == (0.5, 0.5)
+    assert (value(run, "detour"), value(run, "steps")) == (1.25, 4)
+    assert [value(run, f"step_{name}") for name in ("placed", "overflow", "done")] == [
+        *(0.75, 0.125, 0.125)
+    ]
+    assert value(run, "step_unread", model="beta") == 0.4
+    assert value(run, "ended_max_failures", model="beta") == 1
+    assert math.isnan(value(run, "detour", model="beta"))
+
+
+@pytest.mark.parametrize(("missing", "n"), [("count", 2), ("skip", 1)])
+def test_episodes_without_a_reply_are_counted_as_the_suite_says(missing: str, n: int) -> None:
+    failed = episode("alpha", "002", "", "unanswered", outcome="api_error")
+    run = episodes(episode("alpha", "001", "pppp", "completed"), failed, missing=missing)
+    assert of(run, "completion")["n"] == of(run, "f1", criterion="placed")["n"] == n
+
+
+def test_the_strongest_blind_baseline_is_the_best_of_those_that_were_run() -> None:
+    facts = manifest(models=["alpha", "random", "goal-blind"], seeds=[0])
+    for model in facts["models"][1:]:
+        model["kind"] = "baseline"
+    tp = {"alpha": 4, "random": 1, "goal-blind": 2}
+    run = run_of(
+        [record(name, scene, scores=[score(n, 4 - n, 4 - n)]) for name, n in tp.items()
+         for scene in ("001", "002")],
+        facts,
+    )  # fmt: skip
+    assert blind_baselines(run, "full_planning") == {"random", "goal-blind"}
+    floor = headline_floors(run, "full_planning")["Overall F1"]
+    assert (floor.name, floor.value) == ("goal-blind", 50)

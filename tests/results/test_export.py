@@ -1,0 +1,117 @@
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from phyblock.errors import SpecError, StoreError
+from phyblock.results.export import FORMATS, export_frame, export_run
+from phyblock.results.load import load_run
+from tests.report.factory import LEVELS, manifest, record, score, write_run
+
+HF = "the package datasets is not installed"
+
+
+def asked(model: str, seed: int, right: bool, key: str = "sh-1") -> dict[str, Any]:
+    question = {"id": "sh-1", "subtask": "SH", "category": "object_property"}
+    return record(model, "000", seed) | {
+        "sample": f"vqa/{model}/{key}/s{seed}",
+        "track": "vqa",
+        "key": key,
+        "question": question | {"rotation": int(key[-1]) if "-r" in key else 0},
+        "parse": {"rule": "letter", "letters": "A" if right else "B"},
+        "answer": {"right": "A", "given": "A" if right else "B", "correct": right},
+    }
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    facts = manifest()
+    facts["suite"]["tracks"] = ["full_planning", "vqa"]
+    records: list[dict[str, Any]] = []
+    for place, scene in enumerate(LEVELS):
+        for seed in (0, 1):
+            scores = [score(place, 1, 1), score(place, 0, 1, setting="B")]
+            records.append(record("alpha", scene, seed, scores, prompt_tokens=100))
+    records[0]["prompt"] = {"template": "x", "version": "1", "images": [], "messages": "d1"}
+    records[1] = record("alpha", "000", 1, [score(0, 0, 4)], outcome="missing")
+    records += [asked("alpha", 0, True), asked("alpha", 1, False)]
+    records.append(record("beta", "000", 0, outcome="api_error"))
+    made = write_run(tmp_path / "run", records, facts)
+    prompt = {"role": "user", "parts": ["Look at", {"image": "goal"}]}
+    line = json.dumps({"sha256": "d1", "messages": [prompt]})
+    (made / "prompts.jsonl").write_text(line + "\n", encoding="utf-8")
+    return made
+
+
+def test_rows_hold_what_was_asked_answered_and_counted(folder: Path) -> None:
+    frame = export_frame(load_run(folder)).set_index("sample")
+    assert len(frame) == 13
+    row = frame.loc["full_planning/alpha/002/s0"]
+    assert (row["tp_a"], row["fp_a"], row["fn_a"], row["tp_b"]) == (2, 1, 1, 2)
+    assert (row["reply"], row["plan"], row["prompt_tokens"]) == (
+        "Move block with index 1",
+        [1],
+        100,
+    )
+    assert frame.loc["full_planning/alpha/000/s0", "prompt"] == "Look at\n[picture: goal]"
+    assert pd.isna(frame.loc["full_planning/alpha/000/s1", "reply"])
+    assert frame.loc["vqa/alpha/sh-1/s1", ["question_subtask", "answer_given"]].tolist() == [
+        "SH",
+        "B",
+    ]
+    assert frame.loc["full_planning/beta/000/s0", "error"] == "busy"
+
+
+def test_csv_and_parquet_come_back_as_the_same_rows(folder: Path) -> None:
+    run = load_run(folder)
+    (csv,), (parquet,) = export_run(run, "csv"), export_run(run, "parquet")
+    assert csv == folder / "export" / "csv" / "records.csv"
+    from_csv, from_parquet = pd.read_csv(csv), pd.read_parquet(parquet)
+    assert from_csv["sample"].tolist() == from_parquet["sample"].tolist()
+    assert from_csv["tp_a"].fillna(-1).tolist() == from_parquet["tp_a"].fillna(-1).tolist()
+    assert json.loads(from_csv["levels"][0]) == list(from_parquet["levels"][0]) == [1, 2]
+
+
+def test_a_hugging_face_dataset_has_the_right_rows(folder: Path, tmp_path: Path) -> None:
+    datasets = pytest.importorskip("datasets", reason=HF)
+    frame = export_frame(load_run(folder))
+    parquet, saved = export_run(load_run(folder), "hf", tmp_path / "out")
+    from_disk = datasets.load_from_disk(str(saved))
+    loaded = datasets.load_dataset(
+        "parquet", data_files=str(parquet), cache_dir=str(tmp_path / "cache"), split="train"
+    )
+    for rows in (from_disk, loaded):
+        assert rows.column_names == list(frame.columns)
+        assert rows["sample"][:] == frame["sample"].tolist()
+        assert rows["levels"][0] == [1, 2]
+        assert rows["tp_a"][2:4] == [1, 1]
+        assert rows["tp_a"][-3:] == [None, None, None]
+        assert rows["answer_correct"][-2:] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("form", "package", "extra"),
+    [
+        ("hf", "datasets", "hf"),
+        ("parquet", "pyarrow", "hf"),
+    ],
+)
+def test_a_missing_package_is_named_with_what_to_install(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, form: str, package: str, extra: str
+) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    name = package.partition(".")[0]
+    with pytest.raises(SpecError, match=rf"(?s)needs the package {name}\b.*phyblock\[{extra}\]"):
+        export_run(load_run(folder), form)
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_a_folder_that_cannot_be_written_is_said_so(folder: Path, form: str) -> None:
+    (folder / "export").write_text("in the way")
+    with pytest.raises(StoreError, match="cannot be written"):
+        export_run(load_run(folder), form)

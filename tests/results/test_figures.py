@@ -1,0 +1,121 @@
+"""Figures: drawn from estimates, the same bytes each time, with captions that LaTeX reads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from phyblock.errors import StoreError
+from phyblock.results.estimates import headline_of
+from phyblock.results.figures import (
+    COLUMN_IN,
+    Look,
+    cost,
+    figure_files,
+    figure_titles,
+    forest,
+    levels,
+    shares,
+    write_figures,
+    write_paper_figures,
+)
+from phyblock.results.load import Run, load_run, of_models
+from tests.report.factory import LEVELS, manifest, record, run_of, score, write_run
+
+TRACK = "full_planning"
+MODELS = ("alpha", "beta", "gamma")
+
+
+def records() -> list[dict[str, object]]:
+    return [
+        record(
+            model,
+            scene,
+            0,
+            [
+                score(1 + (place + n) % 4, n, 3 - (place + n) % 4),
+                score(2, n, 1, criterion="selection"),
+            ],
+            cost_usd=0.01 * (n + 1),
+        )
+        for n, model in enumerate(MODELS)
+        for place, scene in enumerate(LEVELS)
+    ]
+
+
+@pytest.fixture
+def run() -> Run:
+    return run_of(records(), manifest(models=MODELS, seeds=[0]))
+
+
+def test_lines_over_levels_and_cost_show_the_headline(run: Run) -> None:
+    values = headline_of(run, TRACK)
+    drawn = levels(run, track=TRACK)
+    assert drawn is not None
+    for line in drawn.axes[0].lines:
+        wanted = [values[str(line.get_label()), f"Level {n}"].value for n in (1, 2, 3, 4)]
+        assert list(line.get_ydata()) == pytest.approx(wanted)
+    drawn = cost(run, track=TRACK)
+    assert drawn is not None
+    points = {round(line.get_xdata()[0], 6): line.get_ydata()[0] for line in drawn.axes[0].lines}
+    assert points == pytest.approx(
+        {n + 1.0: values[model, "Overall F1"].value for n, model in enumerate(MODELS)}
+    )
+
+
+def test_shares_fill_a_bar(run: Run) -> None:
+    for table in ("errors", "losses"):
+        drawn = shares(run, track=TRACK, table=table)
+        assert drawn is not None
+        widths: dict[float, float] = {}
+        for bar in drawn.axes[0].patches:
+            place = round(bar.get_y(), 3)
+            widths[place] = widths.get(place, 0) + bar.get_width()
+        assert all(width == pytest.approx(100) for width in widths.values())
+
+
+def test_a_forest_has_a_row_a_pair_or_of_two_models_a_row_a_part(run: Run) -> None:
+    for chosen, rows in ((run, 3), (of_models(run, MODELS[:2]), 5)):
+        drawn = forest(chosen, track=TRACK)
+        assert drawn is not None
+        assert len(drawn.axes[0].get_yticks()) == rows
+    assert forest(of_models(run, MODELS[:1]), track=TRACK) is None
+
+
+def test_files_are_the_same_each_time_and_known_beforehand(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run", records(), manifest(models=MODELS, seeds=[0]))
+    run = load_run(folder)
+    first = {file: file.read_bytes() for file in write_figures(run)}
+    assert {file.stem for file in first} == {
+        *("levels-full-planning", "errors", "losses", "cost-full-planning"),
+    }
+    assert {file: file.read_bytes() for file in write_figures(run)} == first
+    assert {f"figures/{file.name}" for file in first} <= set(figure_files())
+    assert {file.stem for file in first} <= set(figure_titles(run))
+
+
+def test_a_paper_gets_each_figure_in_three_formats_with_a_caption(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run", records(), manifest(models=MODELS, seeds=[0]))
+    run = load_run(folder)
+    files = write_paper_figures(run, ["errors"], Look(COLUMN_IN, "serif", titled=False))
+    assert {file.name for file in files} == {
+        f"errors.{ending}" for ending in ("pdf", "svg", "png", "txt", "tex")
+    }
+    caption = (folder / "paper" / "errors.txt").read_text("utf-8")
+    assert caption.startswith("Wrong steps by type.")
+    float_text = (folder / "paper" / "errors.tex").read_text("utf-8")
+    assert r"\begin{figure}[t]" in float_text
+    assert r"\includegraphics{errors.pdf}" in float_text
+    assert "Wrong steps" not in (folder / "paper" / "errors.svg").read_text("utf-8")
+    wide = write_paper_figures(run, ["losses"], Look(), tmp_path / "out")
+    assert r"\begin{figure*}[t]" in wide[-1].read_text("utf-8")
+
+
+def test_nothing_of_the_user_is_written_over(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run", records(), manifest(models=MODELS, seeds=[0]))
+    (folder / "figures").mkdir()
+    (folder / "figures" / "errors.svg").write_text("mine")
+    with pytest.raises(StoreError, match=r"errors\.svg"):
+        write_figures(load_run(folder))
+    assert (folder / "figures" / "errors.svg").read_text("utf-8") == "mine"

@@ -1,0 +1,203 @@
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from random import Random
+
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phyblock.errors import StoreError
+from phyblock.report import load_run
+from phyblock.sim.engine import ENGINES
+from tests.report.factory import (
+    laws,
+    manifest,
+    record,
+    record_lists,
+    run_of,
+    score,
+    write_run,
+)
+
+
+def test_records_have_one_row_a_sample_and_scores_one_a_score(tmp_path: Path) -> None:
+    records = [
+        record("beta", "000", 0, [score(2, 1, 2), score(3, 0, 1, criterion="selection")]),
+        record("alpha", "001", 0, [score(4, 0, 0)], prompt_tokens=7, cost_usd=0.25),
+        record("alpha", "002", 0, outcome="api_error"),
+    ]
+    run = load_run(write_run(tmp_path / "run", records, manifest()))
+    assert run.records["sample"].tolist() == [
+        "full_planning/alpha/001/s0",
+        "full_planning/alpha/002/s0",
+        "full_planning/beta/000/s0",
+    ]
+    first = run.records.iloc[0]
+    assert first["levels"] == (2,)
+    assert first["prompt_tokens"] == 7
+    assert first["cost_usd"] == 0.25
+    assert first["text"] == "Move block with index 1"
+    assert first["plan"] == [1]
+    failed = run.records.iloc[1]
+    assert (failed["error_kind"], failed["error_status"]) == ("retryable", 429)
+    assert failed["text"] is None
+    assert pd.isna(failed["attempts"])
+    assert run.scores[["model", "criterion", "matcher", "tp"]].values.tolist() == [
+        ["alpha", "aov", "optimal", 4],
+        ["beta", "aov", "optimal", 2],
+        ["beta", "selection", "", 3],
+    ]
+    assert run.path == tmp_path / "run"
+    assert run.manifest.scenes == 5
+
+
+def test_texts_can_be_left_on_disk(tmp_path: Path) -> None:
+    run = load_run(write_run(tmp_path / "run", [record()], manifest()), texts=False)
+    assert run.records["text"].tolist() == [None]
+    assert run.records["finish"].tolist() == ["stop"]
+
+
+@laws
+@given(record_lists(), st.randoms())
+def test_the_order_of_records_changes_nothing(
+    records: list[dict[str, object]], random: Random
+) -> None:
+    shuffled = records.copy()
+    random.shuffle(shuffled)
+    left, right = (run_of(one, manifest()) for one in (records, shuffled))
+    pd.testing.assert_frame_equal(left.records, right.records)
+    pd.testing.assert_frame_equal(left.scores, right.scores)
+
+
+@laws
+@given(record_lists())
+def test_columns_and_types_do_not_depend_on_the_records(records: list[dict[str, object]]) -> None:
+    some, none = (run_of(one, manifest()) for one in (records, []))
+    assert some.records.dtypes.to_dict() == none.records.dtypes.to_dict()
+    assert some.scores.dtypes.to_dict() == none.scores.dtypes.to_dict()
+
+
+def test_a_later_record_of_a_sample_replaces_the_earlier() -> None:
+    frames = run_of(
+        [
+            record(outcome="api_error", scores=[score(0, 0, 4)]),
+            record("beta"),
+            record(scores=[score(4, 0, 0)]),
+        ],
+        manifest(),
+    )
+    assert frames.records["outcome"].tolist() == ["ok", "ok"]
+    assert frames.scores["tp"].tolist() == [4]
+
+
+@laws
+@given(st.data())
+def test_a_cut_last_line_is_passed_over_and_counted(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    folder = write_run(tmp_path_factory.mktemp("runs") / "run", [record()], manifest())
+    line = json.dumps(record("beta"))
+    kept = data.draw(st.integers(1, len(line) - 1))
+    with (folder / "records.jsonl").open("a", encoding="utf-8") as file:
+        file.write(line[:kept])
+    run = load_run(folder)
+    assert run.records["model"].tolist() == ["alpha"]
+    assert run.is_cut
+
+
+def test_a_whole_last_line_without_its_end_is_read(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run", [record()], manifest())
+    with (folder / "records.jsonl").open("a", encoding="utf-8") as file:
+        file.write(json.dumps(record("beta")))
+    run = load_run(folder)
+    assert run.records["model"].tolist() == ["alpha", "beta"]
+    assert not run.is_cut
+
+
+def test_a_whole_file_has_no_cut_line(tmp_path: Path) -> None:
+    assert not load_run(write_run(tmp_path / "run", [record()], manifest())).is_cut
+
+
+def test_a_run_without_records_is_empty(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run", [], manifest())
+    (folder / "records.jsonl").unlink()
+    run = load_run(folder)
+    assert run.records.empty
+    assert run.scores.empty
+
+
+@pytest.mark.parametrize(
+    ("line", "at", "field"),
+    [
+        ('{"sample": "x', ":14", ""),
+        ("\0\0\0", ":1", ""),
+        ("[1, 2]", "", ""),
+        ("{}", "", "track"),
+        (json.dumps(record() | {"seed": "first"}), "", "seed"),
+        (json.dumps(record() | {"scores": [{"criterion": "aov"}]}), "", "scores[0].setting"),
+        (json.dumps(record() | {"scores": [7]}), "", "scores[0]"),
+        (json.dumps(record() | {"reply": "text"}), "", "reply"),
+        (json.dumps(record() | {"levels": 2}), "", "levels"),
+    ],
+)
+def test_a_corrupt_line_is_named(tmp_path: Path, line: str, at: str, field: str) -> None:
+    folder = write_run(tmp_path / "run", [], manifest())
+    good = json.dumps(record())
+    (folder / "records.jsonl").write_text(f"{good}\n{line}\n{good}\n", encoding="utf-8")
+    with pytest.raises(StoreError) as caught:
+        load_run(folder)
+    (problem,) = caught.value.problems
+    assert problem.where == f"{folder / 'records.jsonl'}:2{at}"
+    assert problem.message.startswith("is not a record")
+    assert problem.field == field
+    assert problem.hint
+
+
+def test_a_folder_that_is_no_run_is_said_so(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match=r"holds no run\.yaml"):
+        load_run(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["a: [", "- 1\n", "", "\udcff"])
+def test_a_broken_manifest_is_said_so(tmp_path: Path, text: str) -> None:
+    (tmp_path / "run.yaml").write_bytes(text.encode("utf-8", "surrogateescape"))
+    with pytest.raises(StoreError, match=r"run\.yaml"):
+        load_run(tmp_path)
+
+
+def test_all_that_a_manifest_lacks_is_said_at_once(tmp_path: Path) -> None:
+    facts = manifest()
+    del facts["scenes"], facts["suite"]["seeds"]
+    facts["suite"]["scoring"]["missing"] = "ignore"
+    with pytest.raises(StoreError) as caught:
+        load_run(write_run(tmp_path / "run", [], facts))
+    assert {problem.field for problem in caught.value.problems} == {
+        "scenes",
+        "suite.seeds",
+        "suite.scoring.missing",
+    }
+
+
+def test_models_of_one_name_are_refused(tmp_path: Path) -> None:
+    facts = manifest(models=["alpha", "beta", "alpha"])
+    with pytest.raises(StoreError) as caught:
+        load_run(write_run(tmp_path / "run", [record()], facts))
+    (problem,) = caught.value.problems
+    assert (problem.field, problem.message) == ("models", "names models twice: alpha")
+
+
+def test_reading_runs_needs_no_simulator_and_no_network() -> None:
+    heavy = {"litellm", "rich", "matplotlib", "aiohttp"}
+    heavy |= {engine.library for engine in ENGINES.values()}
+    code = (
+        "import sys, phyblock.results.load, phyblock.results.tables\n"
+        f"heavy = {heavy} & set(sys.modules)\n"
+        "sys.exit(repr(heavy) if heavy else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

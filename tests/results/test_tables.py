@@ -1,0 +1,320 @@
+"""Tables: each number is that of an estimate, and files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from phyblock.cli.progress import Tally
+from phyblock.errors import StoreError
+from phyblock.files import LIST
+from phyblock.records.files import known_records
+from phyblock.results.compare import compare_models, write_comparison
+from phyblock.results.design import OUTCOMES
+from phyblock.results.estimates import all_estimates, track_measures
+from phyblock.results.figures import Look, write_paper_figures
+from phyblock.results.load import Run, load_run
+from phyblock.results.tables import (
+    coverage_frame,
+    layouts_of,
+    make_tables,
+    summary_of,
+    table_files,
+    write_tables,
+)
+from phyblock.results.text import NO_VALUE, number, to_latex, to_markdown
+from phyblock.run.events import Summary
+from phyblock.tracks.kind import kinds
+from tests.report.factory import laws, manifest, record, record_lists, run_of, score, write_run
+from tests.results.test_estimates import complete, episode, episodes, questions
+
+Records = list[dict[str, Any]]
+
+
+def shown_numbers(run: Run, track: str) -> int:
+    """Hold every number of a track's tables against the estimates of its model; return how many."""
+    frame = all_estimates(run)
+    scales = {measure.name: measure.scale for measure in track_measures(track)}
+    known: dict[str, set[float]] = {}
+    for one in frame.to_dict("records"):
+        ends = (scales[one["measure"]] * one[end] for end in ("value", "lo", "hi"))
+        known.setdefault(one["model"], set()).update(round(float(end), 6) for end in ends)
+    found = 0
+    for table in make_tables(run, list(layouts_of(track))).values():
+        if "model" not in table.frame or "expected" in table.frame or "replies" in table.frame:
+            continue
+        assert len(table.frame) == len(table.view.rows)
+        numbers = table.frame.drop(columns=["part"], errors="ignore").set_index("model")
+        texts = " ".join(text for row in table.view.rows for text in row)
+        for model, row in numbers.iterrows():
+            for value in row.dropna():
+                assert round(float(value), 6) in known[str(model)]
+                assert number(value) in texts or number(value, 2) in texts
+                found += 1
+    return found
+
+
+@laws
+@given(record_lists(), st.sampled_from(["skip", "count"]))
+def test_tables_of_plans_show_estimates(records: Records, missing: str) -> None:
+    shown_numbers(run_of(records, manifest(missing=missing)), "full_planning")
+
+
+def test_tables_of_episodes_and_questions_show_estimates() -> None:
+    ran = episodes(
+        episode("alpha", "001", "pppop", "completed"),
+        episode("alpha", "002", "ppd", "done"),
+        episode("beta", "001", "o?oi?", "max_failures"),
+    )
+    assert shown_numbers(ran, "step_planning") > 20
+    assert shown_numbers(questions(complete({"SH": 3, "OR": 1})), "vqa") > 20
+
+
+def test_table_1_is_the_headline_in_percent() -> None:
+    facts = manifest(seeds=[0], models=["beta", "alpha"])
+    scores = [score(1, 3, 1), score(4, 0, 0, matcher="paper"), score(4, 0, 0, setting="B")]
+    run = run_of([record(scene="001", scores=scores)], facts)
+    table = make_tables(run, ["table1"])["table1"]
+    rows = table.frame.set_index("model")
+    assert rows.index.tolist() == ["beta", "alpha"]
+    assert rows.loc["alpha", "overall_precision"] == 25
+    assert rows.loc["alpha", "level2_recall"] == 50
+    assert rows.loc["alpha", "overall_f1"] == pytest.approx(100 / 3)
+    assert rows.loc["beta"].isna().all()
+    assert set(table.view.rows[0][1:]) == {NO_VALUE}
+    notes = "\n".join(table.view.notes)
+    assert "Setting A, matcher optimal, Level 1 by selection" in notes
+    assert "Not complete, of 5 samples: beta 0, alpha 1." in notes
+    assert "only its Random row is as that header says" in notes
+
+
+def test_what_was_not_answered_and_seeds_that_were_refused_stand_under_tables() -> None:
+    records = [
+        record(scene="001", scores=[score(1, 0, 0)], seed_sent=False),
+        record(scene="001", seed=1, scores=[score(0, 0, 4)], outcome="api_error"),
+        record(scene="002", scores=[score(0, 0, 4)], outcome="missing"),
+    ]
+    for missing, how in (("count", "counted as wrong"), ("skip", "left out")):
+        notes = make_tables(run_of(records, manifest(missing=missing)), ["table1"])[
+            "table1"
+        ].view.notes
+        assert f"Without a reply, {how}: alpha 1 API errors and 1 missing replies." in notes
+        assert "alpha: seed unsupported, seeds are independent repeats." in notes
+        assert "Values pool the samples of 2 seeds." in notes
+
+
+@pytest.mark.parametrize(
+    ("shown", "words"),
+    [
+        ({"blind": True}, "blind"),
+        ({"wrong_image": True}, "pictures of another scene"),
+        ({"options_as": "letters"}, "options on one sheet"),
+        ({"circular": True}, "circular"),
+    ],
+)
+def test_how_questions_were_shown_is_in_the_captions(shown: dict[str, Any], words: str) -> None:
+    tables = make_tables(questions(complete({}), **shown), ["table2", "letters"])
+    for name in ("table2", "letters"):
+        view = tables[name].view
+        assert words in view.caption
+        assert words in to_markdown(view)
+        assert words in to_latex(view, "x")
+
+
+def test_layouts_name_what_tracks_declare() -> None:
+    for track, kind in kinds().items():
+        layouts = layouts_of(track)
+        assert set(kind.tables) == set(layouts)
+        measures = {measure.name for measure in track_measures(track)}
+        for layout in layouts.values():
+            named = {name for column in layout.columns for name in column.measures}
+            rows = layout.rows if isinstance(layout.rows, tuple) else ()
+            assert named | set(rows) <= measures
+
+
+@laws
+@given(record_lists())
+def test_outcomes_split_what_was_expected(records: Records) -> None:
+    table = coverage_frame(run_of(records, manifest()))
+    assert table["model"].tolist() == ["alpha", "beta"]
+    assert (table["recorded"] + table["not_run"] == table["expected"]).all()
+    assert (table[list(OUTCOMES)].sum(axis=1) == table["recorded"]).all()
+    assert (table["replies"] == table["recorded"] - table["api_error"] - table["missing"]).all()
+    for outcome in OUTCOMES:
+        ends = [one["outcome"] == outcome for one in records if one["model"] == "alpha"]
+        assert table[outcome].iloc[0] == sum(ends)
+
+
+def test_sums_of_cost_are_of_what_is_known_and_say_how_much_is_not() -> None:
+    records = [
+        record(scene="000", prompt_tokens=10, completion_tokens=5, cost_usd=0.5, latency_s=1.0),
+        record(scene="001", prompt_tokens=20, completion_tokens=7, cost_usd=0.25, latency_s=2.0),
+        record(scene="002", cached=True, latency_s=9.0, attempts=0),
+        record(scene="003", outcome="api_error"),
+        record("beta", scene="000", prompt_tokens=0, completion_tokens=0, cost_usd=0.0, attempts=3),
+    ]
+    table = coverage_frame(run_of(records, manifest())).set_index("model")
+    alpha = table.loc["alpha"]
+    assert (alpha["prompt_tokens"], alpha["completion_tokens"]) == (30, 12)
+    assert (alpha["tokens_unknown"], alpha["cost_unknown"]) == (1, 0)
+    assert (alpha["cost_usd"], alpha["latency_s"]) == (0.75, 1.5)
+    assert (alpha["cached"], alpha["attempts"], alpha["replies"]) == (1, 2, 3)
+    assert alpha["reasoning_tokens"] is pd.NA
+    beta = table.loc["beta"]
+    assert (beta["cost_usd"], beta["prompt_tokens"], beta["attempts"]) == (0, 0, 3)
+
+
+def test_an_unknown_cost_is_never_shown_as_zero() -> None:
+    facts = manifest(models=["unknown", "free", "dear", "cached"])
+    records = [
+        record("unknown"),
+        record("free", cost_usd=0.0),
+        record("dear", cost_usd=1234.5),
+        record("cached", cost_usd=0.25, cached=True, attempts=0),
+    ]
+    view = make_tables(run_of(records, facts), [])["cost"].view
+    places = [n for n, column in enumerate(view.columns) if column.group == "Cost (USD)"]
+    assert {row[0]: tuple(row[n] for n in places) for row in view.rows} == {
+        "unknown": (NO_VALUE, NO_VALUE),
+        "free": ("0.00", "0.00"),
+        "dear": ("1,234.50", "123,450.00"),
+        "cached": ("0.00", "25.00"),
+    }
+
+
+def test_an_episode_that_is_partly_from_the_cache_cost_what_was_asked_anew() -> None:
+    one = record("alpha", cost_usd=0.75)
+    parse = {"rule": "move", "move": 1, "problem": None}
+    turns = [
+        {"n": n, "step": n, "parse": parse,
+         "reply": {**one["reply"], "cost_usd": usd, "cached": old}}
+        for n, (usd, old) in enumerate([(0.5, True), (0.25, False)], 1)
+    ]  # fmt: skip
+    facts = manifest(models=["alpha"])
+    facts["suite"]["tracks"] = ["step_planning"]
+    told = {**one, "track": "step_planning", "turns": turns}
+    run = run_of([told], facts)
+    assert coverage_frame(run)[["cost_usd", "cost_unknown"]].values.tolist() == [[0.25, 0]]
+    tally = Tally(1)
+    tally.add(Summary.of(known_records().validate_python(told)))
+    assert (tally.cost_usd, tally.unpriced) == (0.25, 0)
+
+
+def records_of(model: str) -> Records:
+    scores = [score(1, 1, 1), score(2, 1, 0, setting="B"), score(3, 0, 1, criterion="selection")]
+    return [
+        record(model, scene, seed, scores) for scene in ("000", "002", "003") for seed in (0, 1)
+    ]
+
+
+def test_a_run_writes_estimates_tables_that_are_asked_for_and_cost(tmp_path: Path) -> None:
+    facts = manifest(models=[("alpha", "GPT-4o")])
+    written = write_tables(write_run(tmp_path / "run", records_of("alpha"), facts))
+    names = {"table1", "errors", "losses", "published", "coverage", "cost"}
+    assert set(written.tables) == names
+    assert {file.name for file in written.folder.iterdir()} == {
+        "estimates.csv",
+        *(f"{name}.{form}" for name in names for form in ("csv", "md", "tex")),
+    }
+    assert {f"tables/{file.name}" for file in written.files} <= set(table_files())
+    assert set(write_tables(written.run.path, ["errors"]).tables) == {"errors", "coverage", "cost"}
+
+
+def test_coverage_is_written_where_it_is_not_complete(tmp_path: Path) -> None:
+    facts = manifest(models=["alpha"], levels=[3], seeds=[0])
+    facts["items"] = {"full_planning": 1}
+    folder = write_run(tmp_path / "run", [record(scene="002", scores=[score(1, 0, 0)])], facts)
+    assert "coverage" not in write_tables(folder).tables
+    (folder / "records.jsonl").write_text(json.dumps(record(scene="002"))[:50])
+    assert "coverage" in write_tables(folder).tables
+
+
+def test_csv_files_hold_numbers_and_empty_cells(tmp_path: Path) -> None:
+    written = write_tables(write_run(tmp_path / "run", records_of("alpha"), manifest()))
+    with (written.folder / "table1.csv").open(newline="") as file:
+        table1 = {row["model"]: row for row in csv.DictReader(file)}
+    assert table1["alpha"]["level2_precision"] == "50.000000"
+    assert table1["beta"]["overall_f1"] == ""
+
+
+@settings(laws, max_examples=3)
+@given(record_lists())
+def test_writing_again_changes_nothing(
+    tmp_path_factory: pytest.TempPathFactory, records: Records
+) -> None:
+    folder = write_run(tmp_path_factory.mktemp("runs") / "run", records, manifest())
+    first = {file: file.read_bytes() for file in write_tables(folder).files}
+    assert {file: file.read_bytes() for file in write_tables(folder).files} == first
+    assert {file.name for file in folder.iterdir()} == {"run.yaml", "records.jsonl", "tables", LIST}
+
+
+def test_a_folder_that_cannot_be_written_is_said_so_and_leaves_no_rest(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run", [], manifest())
+    (folder / "tables" / "table1.csv" / "in-the-way").mkdir(parents=True)
+    with pytest.raises(StoreError, match="cannot be written"):
+        write_tables(folder)
+    assert [file.name for file in (folder / "tables").iterdir()] == ["table1.csv"]
+
+
+def test_the_summary_ranks_models_and_says_who_is_above_the_blind_baseline() -> None:
+    facts = manifest(models=["alpha", "beta", "random"], seeds=[0], levels=[3, 4])
+    facts["models"][2]["kind"] = "baseline"
+    facts["items"] = {"full_planning": 2}
+    tp = {"alpha": 1, "beta": 4, "random": 0}
+    records = [
+        record(name, scene, scores=[score(n, 4 - n, 4 - n)])
+        for name, n in tp.items()
+        for scene in ("002", "003")
+    ]
+    summary = summary_of(run_of(records, facts))
+    (table,) = summary.tables
+    assert [row[:3] for row in table.rows] == [
+        ("1", "beta", "100.0"),
+        ("2", "alpha", "25.0"),
+        ("", "random", "0.0"),
+    ]
+    (sentence,) = summary.blind
+    assert sentence.endswith("of 2 models are above random (0.0).")
+
+
+LATEX = next(filter(shutil.which, ("pdflatex", "lualatex")), None)
+
+
+@pytest.mark.skipif(LATEX is None, reason="neither pdflatex nor lualatex is installed")
+def test_latex_compiles_inside_any_document(tmp_path: Path) -> None:
+    models = [r"all & % $ # _ { } ~ ^ \ < > | \" ` ' -- [x] *", "[first]", "*star", "Ünïcode"]
+    folder = write_run(
+        tmp_path / "run",
+        [one for model in models for one in records_of(model)],
+        manifest(models=[(models[0], "GPT-4.1"), *models[1:]]),
+    )
+    write_tables(folder)
+    write_comparison(compare_models(load_run(folder)), folder / "tables")
+    write_paper_figures(load_run(folder), ["errors", "forest-full-planning"], Look())
+    files = sorted(file.relative_to(folder) for file in folder.glob("*/*.tex"))
+    assert {"tables/comparison.tex", "tables/table1.tex", "paper/errors.tex"} <= {
+        file.as_posix() for file in files
+    }
+    inputs = "".join(rf"\input{{{file.with_suffix('')}}}" for file in files)
+    for number_of_columns in ("onecolumn", "twocolumn"):
+        document = (
+            rf"\documentclass[{number_of_columns}]{{article}}"
+            rf"\usepackage{{booktabs}}\usepackage{{graphicx}}\graphicspath{{{{paper/}}}}"
+            rf"\begin{{document}}"
+            rf"{inputs}\end{{document}}"
+        )
+        (folder / "paper.tex").write_text(document)
+        command = [str(LATEX), "-interaction=nonstopmode", "-halt-on-error", "paper.tex"]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace")
+        assert done.returncode == 0, done.stdout
+        assert "Overfull" not in done.stdout
+        assert "too large" not in done.stdout
