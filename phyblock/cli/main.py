@@ -42,8 +42,8 @@ _SECTIONS: Sections = {
         "site": (f"{_CLI}.results:site", "Put runs and bundles into a leaderboard."),
     },
     "Data": {
-        "scenes": (f"{_MAKING}.scenes_verbs:command", "Make, check, show and draw scenes."),
-        "questions": (f"{_MAKING}.vqa_verbs:command", "Make, check and show questions."),
+        "scenes": (f"{_MAKING}.scenes:scenes", "Make, check, show and draw scenes."),
+        "questions": (f"{_MAKING}.questions:questions", "Make, check and show questions."),
     },
 }
 _ENTRY_POINTS = "phyblock.plugins"

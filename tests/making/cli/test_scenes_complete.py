@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -157,15 +156,6 @@ def test_a_file_that_is_wrong_is_said_with_its_line(tmp_path: Path, text: str, s
     assert said in str(caught.value)
 
 
-def test_a_scene_is_called_as_its_file_where_that_is_a_name(tmp_path: Path) -> None:
-    text = json.dumps({"blocks": GABLES})
-    for name in ("my gables.json", "gables.json"):
-        (tmp_path / name).write_text(text, encoding="utf-8")
-    assert read_given(tmp_path / "gables.json")[0].name == "gables"
-    with pytest.raises(DataError, match="has no id, and cannot be called as its file"):
-        read_given(tmp_path)
-
-
 def test_what_is_completed_is_a_data_set_that_validates_and_runs(workspace: Workspace) -> None:
     source = workspace.write_yaml("gables.yaml", {"scenes": [
         {"id": "gables", "blocks": GABLES},
@@ -190,29 +180,3 @@ def test_what_is_completed_is_a_data_set_that_validates_and_runs(workspace: Work
     ran = workspace.run()
     assert ran.code == 0, ran.err
     assert {record["outcome"] for record in workspace.records()} == {"ok"}
-
-
-def test_scenes_that_are_alike_and_parents_that_are_not_there_are_noted(
-    workspace: Workspace,
-) -> None:
-    turned = [
-        {**block, "position": [-block["position"][1], block["position"][0], block["position"][2]],
-         "euler": [0, 0, (block.get("euler", [0, 0, 0])[2] + 90) % 360]}
-        for block in GABLES[:2]
-    ]  # fmt: skip
-    source = workspace.write_yaml("two.yaml", {"scenes": [
-        {"id": "pair", "blocks": GABLES[:2]},
-        {"id": "turned", "blocks": turned, "parents": ["nowhere"]},
-    ]})  # fmt: skip
-    done = workspace.phyblock("scenes", "complete", source.name, "--jobs", "1")
-    assert done.code == 0, done.err
-    assert "scene turned: is scene pair, turned, mirrored or shifted at most" in done.out
-    assert "scene turned: parents name no base scene of the set" in done.out
-    assert "2 scenes completed" in done.out
-
-
-def test_a_given_order_is_kept() -> None:
-    blocks = [{**block, "order": 10 * n} for n, block in enumerate(GABLES, 1)]
-    scene = derived("gables", of(*blocks), "here")
-    assert [block.order for block in scene.blocks] == [10, 20, 30, 40, 50]
-    assert replace(scene, id="x").blocks[2].depend == (10, 20)

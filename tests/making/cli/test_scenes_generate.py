@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from phyblock.cli.main import phyblock
-from phyblock.errors import DataError, InputError
+from phyblock.errors import InputError
 
 ALONE = ("--jobs", "1")
 
@@ -30,11 +30,6 @@ def test_what_is_made_is_verified(folder: Path) -> None:
     result = call("verify", *ALONE, str(folder))
     assert result.exit_code == 0, result.output
     assert "all checks passed" in result.output
-
-
-def test_the_card_names_the_command_that_made_it(folder: Path) -> None:
-    text = (folder / "README.md").read_text(encoding="utf-8")
-    assert "scenes generate --count 3 --seed 9 --levels 2 --palette kit --out few" in text
 
 
 def test_a_changed_scene_fails_with_its_name(folder: Path, tmp_path: Path) -> None:
@@ -67,12 +62,6 @@ def test_a_bundled_set_is_verified_by_its_name() -> None:
     result = call("verify", "phyblock-400", "--limit", "1", *ALONE)
     assert result.exit_code == 0, result.output
     assert "phyblock-400: all checks passed" in result.output
-
-
-def test_a_data_set_in_another_format_is_sent_to_the_audit(tmp_path: Path) -> None:
-    (tmp_path / "data").mkdir()
-    with pytest.raises(DataError, match=r"no scenes.jsonl to verify\n.*scenes audit"):
-        call("verify", str(tmp_path), *ALONE, raises=True)
 
 
 @pytest.mark.parametrize("address", ["nowhere", "127.0.0.1:1", "127.0.0.1:99999", "host.invalid:1"])

@@ -96,28 +96,7 @@ def test_render_names_views_backgrounds_and_kinds(data: Path, tmp_path: Path) ->
     assert [path.name for path in (tmp_path / "one").glob("*.png")] == ["t1-20-22-checkerboard.png"]
 
 
-def test_views_that_turn_out_the_same_are_drawn_once(data: Path, tmp_path: Path) -> None:
-    words = ("--size", 128, "--view", "all", "--azimuth", 30, "--elevation", 30)
-    assert "1 file in" in scenes("render", data, "t1", "--out", tmp_path / "out", *words)
-
-
 @pytest.mark.parametrize("option", ["--azimuth", "--elevation"])
 def test_an_angle_that_is_no_number_is_refused(data: Path, tmp_path: Path, option: str) -> None:
     with pytest.raises(click.BadParameter, match="nan is no angle"):
         scenes("render", data, "t1", "--out", tmp_path / "out", option, "nan")
-
-
-def test_the_facts_of_a_scene_fit_a_narrow_terminal() -> None:
-    told = scenes("show", "phyblock-400", "l4-010-street", columns=80)
-    assert "semi_cylinder" in told
-    assert max(map(len, told.splitlines()[1:])) <= 80
-
-
-def test_a_folder_that_holds_no_data_set_is_refused_with_what_would_do(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match=r"holds no data set\n.*scenes\.jsonl, an official"):
-        scenes("show", tmp_path, "t1")
-
-
-def test_a_data_set_that_is_not_there_is_refused_with_the_bundled_ones() -> None:
-    with pytest.raises(DataError, match="phyblock-400"):
-        scenes("stats", "nowhere")

@@ -143,13 +143,6 @@ def test_an_unknown_model_and_a_taken_file_are_refused(workspace: Workspace) -> 
         assert message in done.errors[0]
 
 
-@pytest.mark.parametrize(
-    "template", ["Which shape has the {block}?", "Name the shape of the {block}."]
-)
-def test_a_wording_in_the_form_of_the_others_has_no_fault(template: str) -> None:
-    assert fault_of_form(template, ["What is the shape of the {block}?"]) is None
-
-
 @pytest.mark.parametrize("slot", ["{block!r}", "{block:>40}", "{block.text}", "{}", "{other}"])
 def test_a_slot_that_is_not_filled_in_as_it_is_is_another_one(slot: str) -> None:
     fault = fault_of_form(f"Which shape has the {slot}?", ["What is the shape of the {block}?"])

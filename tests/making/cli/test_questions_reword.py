@@ -13,7 +13,7 @@ from phyblock.cli.main import phyblock
 from phyblock.data import read_builtin, read_questions
 from phyblock.errors import DataError
 from phyblock.making.questions.rewording import read_wordings, reword
-from tests.making.cli.test_vqa_write import GOOD, QUESTION, SCENE, Writer, sees_negations
+from tests.making.cli.test_questions_write import GOOD, QUESTION, SCENE, Writer, sees_negations
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.vqa_set import vqa_suite, write_questions
@@ -92,7 +92,9 @@ def test_a_set_in_new_wordings_alone_verifies_and_comes_out_the_same(workspace: 
     assert line["answer"] == QUESTION["answer"]
     assert command(workspace, "one", "--replace").exit_code == 0
     places = ["--data", str(workspace.root / "data"), "--jobs", "1"]
-    again = CliRunner().invoke(phyblock, ["vqa", "verify", str(workspace.root / "one"), *places])
+    again = CliRunner().invoke(
+        phyblock, ["questions", "verify", str(workspace.root / "one"), *places]
+    )
     assert (again.exit_code, "all answers derived again" in again.output) == (0, True)
 
 
@@ -103,31 +105,6 @@ def test_a_question_that_cannot_be_derived_again_is_left_out(workspace: Workspac
     assert done.exit_code == 0
     assert "left out: sh-002-m1: the answer is B, not A" in done.output
     assert [line["id"] for line in lines_of(workspace.root / "new")] == ["sh-001-m1"]
-
-
-def test_nothing_is_written_where_nothing_can_be_asked(workspace: Workspace) -> None:
-    for question, message in (
-        (COLOR, "holds no question of these kinds"),
-        (QUESTION | {"answer": "A"}, "the answer is B, not A"),
-    ):
-        a_set(workspace, question)
-        wordings_file(workspace.root, LINE)
-        done = command(workspace, "new")
-        assert isinstance(done.exception, DataError)
-        assert message in str(done.exception)
-        assert not (workspace.root / "new").exists()
-
-
-def test_a_name_that_the_set_holds_is_not_given_twice(workspace: Workspace) -> None:
-    a_set(workspace, QUESTION, COLOR)
-    wordings_file(workspace.root, LINE)
-    assert command(workspace, "both", "--add").exit_code == 0
-    questions = (*lines_of(workspace.root / "both"), QUESTION | {"id": "sh-003"})
-    write_questions(workspace.root / "questions", questions)
-    done = command(workspace, "more", "--add")
-    assert "left out: sh-001-m1: the set holds a question of this name already" in done.output
-    ids = [line["id"] for line in lines_of(workspace.root / "more")]
-    assert ids == ["sh-001", "sh-001-m1", "co-001", "sh-003", "sh-003-m1"]
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from PIL import Image
 
 from phyblock.cli.main import phyblock
-from phyblock.errors import DataError, StoreError
+from phyblock.errors import DataError
 from phyblock.resources import bundled
 from phyblock.sim.engine import described_engine, installed_engines, other_engine
 
@@ -78,11 +78,6 @@ def test_a_set_by_another_engine_is_said_to_be(
     )
 
 
-def test_a_folder_is_not_written_over_unasked(folder: Path) -> None:
-    with pytest.raises(StoreError, match="holds questions already"):
-        vqa("generate", "--data", folder, "--out", folder / "q", *SMALL)
-
-
 @pytest.mark.parametrize("names", ["XX", "CO,CO", ""])
 def test_subtasks_that_are_not_there_are_told(tmp_path: Path, names: str) -> None:
     with pytest.raises(click.BadParameter, match="SH,CO,SI"):
@@ -122,11 +117,6 @@ def test_a_question_is_shown_with_its_pictures(folder: Path, tmp_path: Path) -> 
 def test_a_question_that_is_not_there_is_told_with_a_near_one(folder: Path) -> None:
     with pytest.raises(DataError, match="did you mean co-001"):
         vqa("show", "co-0001", "--questions", folder / "q", "--data", folder)
-
-
-def test_questions_that_are_not_there_are_told() -> None:
-    with pytest.raises(DataError, match=r"a folder with questions\.jsonl, or a bundled set"):
-        vqa("verify", "no-such-questions")
 
 
 def test_an_audit_says_what_it_finds(folder: Path, tmp_path: Path) -> None:

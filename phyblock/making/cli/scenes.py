@@ -1,0 +1,624 @@
+"""`phyblock scenes`: make data sets, check them, look at them."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import cast
+
+import click
+
+from phyblock.cli.console import make_console, print_rows, shown_path
+from phyblock.cli.options import NAME_OR_PATH, UserPath
+from phyblock.data import (
+    SCENES_FILE,
+    AssemblyTask,
+    Dataset,
+    find_data_set,
+    read_builtin,
+    read_data_set,
+)
+from phyblock.domain import BLOCK_TYPES, COLORS
+from phyblock.errors import DataError, Problem
+from phyblock.files import OutFolder, check_free, make_folder, write_named
+from phyblock.making.checks import (
+    AUDITED,
+    FOREIGN,
+    LAWS,
+    CheckName,
+    Finding,
+    SceneAudit,
+    audit_scenes,
+    check_looks,
+    find_duplicates,
+    find_orphans,
+    findings_csv,
+    verify_scenes,
+)
+from phyblock.making.cli.options import (
+    find_scenes,
+    jobs_option,
+    ray_option,
+    seed_option,
+    tell_simulators,
+    tracked,
+)
+from phyblock.making.scenes.completing import Completed, ReadScene, complete, palette_of, read_given
+from phyblock.making.scenes.files import card, check_folder, check_sums, completed_card, open_writer
+from phyblock.making.scenes.production import Order, produce, shares
+from phyblock.making.scenes.sketch import PALETTES, Palette
+from phyblock.making.workers import open_workers
+from phyblock.sim.camera import VIEWS
+from phyblock.sim.film import animation, exploded_png, filmstrip_png, marked_png
+from phyblock.sim.pictures import (
+    PictureStyle,
+    candidates_png,
+    composite_png,
+    goal_png,
+    visible_shares,
+)
+from phyblock.text import counted
+from phyblock.types import BACKGROUNDS, Background
+
+
+@click.group("scenes")
+def scenes() -> None:
+    """Make data sets of scenes, check them against physics, and look at them."""
+
+
+_PALETTE_TEXT: dict[Palette, str] = {
+    "kit": f"the official kit's {len(PALETTES['kit'])} pairs of type and color",
+    "full": f"all {len(PALETTES['full'])} pairs of type and color",
+}
+
+
+def _levels(ctx: click.Context, param: click.Parameter, value: str) -> tuple[int, ...]:
+    words = value.split(",")
+    if not all(word in ("1", "2", "3", "4") for word in words) or len(set(words)) < len(words):
+        raise click.BadParameter(f"{value!r}: give levels like 1,2,3,4", ctx, param)
+    return tuple(sorted(int(word) for word in words))
+
+
+@scenes.command("generate")
+@click.option(
+    "--count",
+    type=click.IntRange(1),
+    default=400,
+    show_default=True,
+    metavar="N",
+    help="How many scenes.",
+)
+@seed_option("Another seed gives other scenes.")
+@click.option(
+    "--levels",
+    default="1,2,3,4",
+    show_default=True,
+    callback=_levels,
+    metavar="LEVELS",
+    help="Levels to make, in the proportions of the built-in set.",
+)
+@click.option(
+    "--palette",
+    type=click.Choice(["kit", "full"]),
+    default="kit",
+    show_default=True,
+    help=f"The kit's {len(PALETTES['kit'])} pairs of type and color, or all that there are.",
+)
+@jobs_option
+@ray_option
+@click.option(
+    *("--out", "-o"),
+    type=UserPath(),
+    required=True,
+    metavar="DIR",
+    help="Folder to write.",
+)
+@click.option("--replace", is_flag=True, help="Replace a data set that is in the folder.")
+def generate(
+    count: int,
+    seed: int,
+    levels: tuple[int, ...],
+    palette: str,
+    jobs: int,
+    ray_address: str | None,
+    out: Path,
+    replace: bool,
+) -> None:
+    """Make N scenes with candidate sets, each checked by physics, and their data card.
+
+    The same N, seed, levels and palette give the same files with the same
+    physics engine, on any Python, any number of processes or a cluster.
+    """
+    kind = cast(Palette, palette)
+    order = Order(seed, kind, shares(count, levels))
+    with (
+        open_workers(jobs, ray_address) as workers,
+        open_writer(out, kind, replace, "give another --out, or --replace") as writer,
+    ):
+        for scene in tracked(produce(order, workers), count, "Making"):
+            writer.add(scene)
+        chosen = ",".join(map(str, levels))
+        made_by = f"phyblock scenes generate --count {count} --seed {seed} --levels {chosen}"
+        made_by += f" --palette {palette} --out {out.name}"
+        writer.finish(card(out.name, writer, made_by, _PALETTE_TEXT[kind]))
+    click.echo(f"{counted(count, 'scene')}, all checks passed: {shown_path(out)}")
+    tell_simulators()
+
+
+@scenes.command("complete")
+@click.argument("data", metavar="FILE_OR_FOLDER", type=UserPath())
+@jobs_option
+@click.option(
+    *("--out", "-o"),
+    type=UserPath(),
+    metavar="DIR",
+    help="Folder to write.  [default: NAME-set here]",
+)
+def complete_set(data: Path, jobs: int, out: Path | None) -> None:
+    """Make a data set from scenes that give type, color, position and euler of their blocks.
+
+    FILE_OR_FOLDER is YAML, JSON, or JSON with a scene a line, or a folder of such files.
+    Derives dependencies from contacts, and layers and levels from those; draws candidates unless
+    they are given. Refuses scenes whose blocks overlap, float or fall. Never writes over what was
+    given.
+    """
+    given = read_given(data)
+    folder = out or Path(f"{data.resolve().stem}-set")
+    check_folder(folder)
+    problems: list[Problem] = []
+    done: list[Completed] = []
+    with open_workers(min(jobs, len(given)), None) as workers:
+        for one in tracked(workers.map(_completed, given), len(given), "Completing"):
+            if isinstance(one, Completed):
+                done.append(one)
+            else:
+                problems += one
+    if problems:
+        raise DataError(problems)
+    scenes = [one.scene for one in done]
+    palette = palette_of(scenes)
+    made_by = f"phyblock scenes complete {shlex.quote(data.name)} --out {shlex.quote(folder.name)}"
+    with open_writer(folder, palette) as writer:
+        for one in done:
+            writer.add(one.scene, one.offered)
+        writer.finish(completed_card(folder.name, len(done), made_by))
+    for one in done:
+        for note in one.notes:
+            click.echo(f"note: scene {one.scene.id}: {note}")
+    for finding in (*find_duplicates(scenes), *find_orphans(scenes)):
+        sentence = f"{finding.field} {finding.message}".strip()
+        click.echo(f"note: scene {finding.scene}: {sentence}")
+    click.echo(f"{counted(len(done), 'scene')} completed: {shown_path(folder)}")
+    here = str(folder) if folder.is_absolute() else f"./{folder}"
+    click.echo(f"Next: phyblock run quick --set dataset.path={shlex.quote(here)}")
+
+
+def _completed(read: ReadScene) -> Completed | tuple[Problem, ...]:
+    try:
+        return complete(read)
+    except DataError as error:
+        return tuple(error.problems)
+
+
+@scenes.command("verify")
+@click.argument("data", metavar="[PATH]", default="phyblock-400", type=NAME_OR_PATH)
+@jobs_option
+@ray_option
+@click.option(
+    "--limit",
+    type=click.IntRange(1),
+    metavar="M",
+    help="Simulate the first M scenes alone; the rest is checked for duplicates and the like.",
+)
+def verify(data: str, jobs: int, ray_address: str | None, limit: int | None) -> None:
+    """Check every scene of PATH against geometry and physics, down to the last number.
+
+    PATH is a folder with scenes.jsonl or a bundled set, by default the built-in phyblock-400.
+    To check data sets made elsewhere, use: phyblock scenes audit.
+
+    Checks contacts, layers, overlaps, gaps, stability of the whole at two time steps and of every
+    step, candidates, duplicates, parents and checksums. Exits with 1 when anything fails.
+    """
+    where = find_data_set(data)
+    if not (where / SCENES_FILE).is_file():
+        hint = f"phyblock scenes audit {data}"
+        raise DataError(Problem(data, f"has no {SCENES_FILE} to verify", hint=hint))
+    tasks = read_builtin(where).tasks
+    simulated = [(task.scene, task.candidates) for task in tasks[:limit]]
+    passed = dict.fromkeys(LAWS, 0)
+    problems: list[Problem] = []
+    with open_workers(jobs, ray_address) as workers:
+        for broken in tracked(verify_scenes(simulated, workers), len(simulated), "Verifying"):
+            for law, findings in broken.items():
+                passed[law] += not findings
+                problems += [finding.problem for finding in findings]
+    scenes = [task.scene for task in tasks]
+    twins, orphans = find_duplicates(scenes), tuple(find_orphans(scenes))
+    looks, same = check_looks(task.candidates for task in tasks)
+    files, changed = check_sums(where)
+    rows = [(law, str(good), str(len(simulated))) for law, good in passed.items()]
+    alike = len({problem.where for problem in same})
+    for name, total, bad in (
+        ("no duplicate", len(scenes), len(twins)),
+        ("parents are base scenes", len(scenes), len(orphans)),
+        ("looks that pictures tell apart", looks, alike),
+        ("checksums", files, len(changed)),
+    ):
+        rows.append((name, str(total - bad), str(total)))
+    console = make_console()
+    print_rows(console, ("check", "passed", "of"), rows, numbers=2)
+    failures = [*problems, *(finding.problem for finding in (*twins, *orphans)), *same, *changed]
+    for problem in failures:
+        click.echo(f"failed: {problem}", err=True)
+    verdict = counted(len(failures), "failure") if failures else "all checks passed"
+    console.print(f"{data}: {verdict}", markup=False, soft_wrap=True)
+    if failures:
+        raise click.exceptions.Exit(1)
+
+
+_DEPENDING: tuple[CheckName, ...] = ("undeclared dependency", "dependency without contact")
+
+
+@scenes.command("audit")
+@click.argument("data", metavar="PATH", type=NAME_OR_PATH)
+@click.option("--csv", "table", type=UserPath(), metavar="FILE", help="All findings as CSV.")
+@click.option("--pictures", type=UserPath(), metavar="DIR", help="Draw the worst scenes here.")
+@click.option(
+    "--worst",
+    type=click.IntRange(0),
+    default=15,
+    show_default=True,
+    metavar="N",
+    help="Number of the worst scenes that are shown and drawn.",
+)
+@jobs_option
+@click.option(
+    "--tolerance",
+    type=click.FloatRange(0.01, 10),
+    default=1000 * FOREIGN.fit_m,
+    show_default=True,
+    help="Overlaps and gaps up to this pass [mm].",
+)
+def audit(
+    data: str, table: Path | None, pictures: Path | None, worst: int, jobs: int, tolerance: float
+) -> None:
+    """Audit the data set PATH: a folder with scenes.jsonl, an official checkout, or a bundled set.
+
+    Changes nothing in PATH. Shows the worst scenes and totals: overlaps, gaps, declared
+    dependencies against contacts, layers, orders, stability of every step and of the whole,
+    candidates, duplicates. --csv writes every finding. Exits with 0, whatever it finds.
+    """
+    if table is not None and table.is_dir():
+        check_free([table], "name another place")
+    for folder in (None if table is None else table.parent, pictures):
+        if folder is not None:
+            make_folder(folder)
+    tasks = [(task.scene, task.candidates) for task in read_data_set(data).tasks]
+    running = audit_scenes(tasks, replace(FOREIGN, fit_m=tolerance / 1000), min(jobs, len(tasks)))
+    audits = list(tracked(running, len(tasks), "Auditing"))
+    twins = find_duplicates(scene for scene, _ in tasks)
+    guilty = sorted((one for one in audits if one.findings), key=lambda one: one.badness)
+    worst_scenes = guilty[::-1][:worst]
+    _print_worst(worst_scenes)
+    _print_totals(audits, twins)
+    console = make_console()
+    if table is not None:
+        write_named(table, findings_csv(audits, twins))
+        console.print(f"all findings in {shown_path(table)}", markup=False)
+    if pictures is not None:
+        out = OutFolder(pictures)
+        out.check(f"{audit.scene.id}.png" for audit in worst_scenes)
+        for audit in worst_scenes:
+            blamed = {order for finding in audit.findings for order in finding.blocks}
+            out.write({f"{audit.scene.id}.png": marked_png(audit.scene, blamed, PictureStyle())})
+        told = f"{counted(len(worst_scenes), 'picture')} in {shown_path(pictures)}"
+        console.print(told, markup=False)
+
+
+def _print_worst(worst: Sequence[SceneAudit]) -> None:
+    rows = []
+    for audit in worst:
+        # The cause before its effect: what overlaps or floats before what falls.
+        first = min(audit.findings, key=lambda finding: AUDITED.index(finding.check))
+        named = [
+            f"{b.order} {b.color} {b.type}" for b in audit.scene.blocks if b.order in first.blocks
+        ]
+        blocks = ", ".join(named[:3]) + (", ..." if len(named) > 3 else "")
+        facts = (first.check, first.message, blocks)
+        rows.append((audit.scene.id, str(audit.scene.level), *facts, str(len(audit.findings))))
+    if rows:
+        headings = ("scene", "level", "check", "first finding", "blocks", "findings")
+        print_rows(make_console(), headings, rows, numbers=1)
+
+
+def _print_totals(audits: Sequence[SceneAudit], twins: Sequence[Finding]) -> None:
+    findings = [*twins, *(finding for audit in audits for finding in audit.findings)]
+    rows = []
+    for check in AUDITED:
+        mine = [finding for finding in findings if finding.check == check]
+        rows.append((check, str(len({finding.scene for finding in mine})), str(len(mine))))
+    console = make_console()
+    print_rows(console, ("check", "scenes", "findings"), rows, numbers=2)
+    declared, contacts, shared = (
+        sum(getattr(audit, name) for audit in audits) for name in ("declared", "contacts", "shared")
+    )
+
+    def without(*checks: CheckName) -> int:
+        return sum(not audit.has(*checks) for audit in audits)
+
+    for line in (
+        f"{counted(len(audits), 'scene')} read; {without(*AUDITED)} with no finding",
+        f"{without('unstable')} stand when finished, "
+        f"{without('unstable', 'unstable step')} at every step as well",
+        f"{_share(shared, declared)} declared dependencies are contacts (precision)",
+        f"{_share(shared, contacts)} contacts are declared (recall)",
+        f"{without(*_DEPENDING)} declare their contacts and nothing else",
+    ):
+        console.print(line, markup=False, soft_wrap=True)
+
+
+def _share(part: int, whole: int) -> str:
+    return f"{part} of {whole} ({part / whole:.3f})" if whole else "no"
+
+
+@scenes.command("show")
+@click.argument("data", metavar="PATH", type=NAME_OR_PATH)
+@click.argument("scene")
+def show(data: str, scene: str) -> None:
+    """Show the facts of SCENE in the data set PATH: blocks, layers, dependencies, candidates.
+
+    "on" names the blocks below, "pick" the candidate that stands for the block, "seen" the share
+    of it that no other hides in the default goal picture.
+    """
+    (task,) = find_scenes(read_data_set(data), (scene,))
+    console = make_console()
+    levels = " and ".join(map(str, task.scene.levels))
+    parents = ", ".join(task.scene.parents)
+    layers = counted(max(task.scene.graph.layers), "layer")
+    blocks = counted(len(task.scene), "block")
+    heading = f"scene {task.scene.id} · level {levels} · {blocks} · {layers}"
+    console.print(f"{heading} · made from {parents}", markup=False, soft_wrap=True)
+    headings = ("block", "type", "color", "on", "position mm", "euler deg")
+    numbers = ("layer", "pick", "seen")
+    print_rows(console, (*headings, *numbers), _blocks(task), numbers=3)
+    offered = ("candidate", "type", "color", "euler deg", "needed")
+    print_rows(console, offered, _candidates(task), numbers=1)
+
+
+def _blocks(task: AssemblyTask) -> list[tuple[str, ...]]:
+    seen = visible_shares(task.scene, PictureStyle())
+    rows: list[tuple[str, ...]] = []
+    for block in task.scene.blocks:
+        place = " ".join(f"{1000 * c + 0.0:.1f}".removesuffix(".0") for c in block.position_m)
+        number = task.candidates.index_of(block.look)
+        below = " ".join(map(str, sorted(block.depend))) or "ground"
+        what = (str(block.order), block.type, block.color, below)
+        numbers = (str(block.layer), str(number), f"{100 * seen[block.order]:.0f} %")
+        rows.append((*what, place, _angles(block.euler_deg), *numbers))
+    return rows
+
+
+def _candidates(task: AssemblyTask) -> list[tuple[str, ...]]:
+    looks = [block.look for block in task.scene.blocks]
+    rows: list[tuple[str, ...]] = []
+    for number, candidate in enumerate(task.candidates.candidates, 1):
+        needed = looks.count(candidate.look)
+        what = (str(number), candidate.type, candidate.color, _angles(candidate.euler_deg))
+        rows.append((*what, f"{needed} x" if needed else ""))
+    return rows
+
+
+def _angles(euler_deg: tuple[float, float, float]) -> str:
+    return " ".join(f"{angle:g}" for angle in euler_deg)
+
+
+_Drawing = tuple[str, Callable[[], bytes]]
+"""A file's name, and how its bytes are made."""
+
+
+def _finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
+    if value is not None and math.isnan(value):
+        raise click.BadParameter("nan is no angle", ctx, param)
+    return value
+
+
+@scenes.command("render")
+@click.argument("data", metavar="PATH", type=NAME_OR_PATH)
+@click.argument("scenes", metavar="[SCENE]...", nargs=-1)
+@click.option(
+    *("--out", "-o"),
+    type=UserPath(file_okay=False),
+    required=True,
+    metavar="DIR",
+    help="Folder for the pictures.",
+)
+@click.option(
+    "--view",
+    type=click.Choice([*VIEWS, "all"]),
+    default="oblique",
+    show_default=True,
+    help="Where the scene is seen from.",
+)
+@click.option(
+    "--azimuth",
+    type=click.FloatRange(-360, 360),
+    callback=_finite,
+    metavar="DEG",
+    help="0 looks from +x, 90 from +y.",
+)
+@click.option(
+    "--elevation",
+    type=click.FloatRange(1, 90),
+    callback=_finite,
+    metavar="DEG",
+    help="90 looks straight down.",
+)
+@click.option(
+    "--background",
+    type=click.Choice([*BACKGROUNDS, "all"]),
+    default="checkerboard",
+    show_default=True,
+    help="What stands behind the blocks.",
+)
+@click.option(
+    "--size",
+    type=click.IntRange(128, 2048),
+    default=512,
+    show_default=True,
+    help="Edge of a picture [pixels].",
+)
+@click.option("--composite", is_flag=True, help="Goal and candidates side by side, too.")
+@click.option("--exploded", is_flag=True, help="The structure pulled apart, too.")
+@click.option("--filmstrip", is_flag=True, help="All steps in one picture, too.")
+@click.option("--gif", is_flag=True, help="The assembly as an animated GIF, too.")
+@click.option("--webp", is_flag=True, help="The assembly as an animated WebP, too.")
+def render(
+    data: str,
+    scenes: tuple[str, ...],
+    out: Path,
+    view: str,
+    azimuth: float | None,
+    elevation: float | None,
+    background: str,
+    size: int,
+    **extras: bool,
+) -> None:
+    """Draw the scenes SCENE... of the data set PATH, or all of them.
+
+    Files are named SCENE-VIEW-BACKGROUND-WHAT; it writes over those that it wrote before.
+    """
+    read = read_data_set(data)
+    tasks = find_scenes(read, scenes) if scenes else read.tasks
+    styles = _styles(view, azimuth, elevation, background, size)
+    wanted = [name for name, is_wanted in extras.items() if is_wanted]
+    drawings = {
+        f"{task.scene.id}-{name}{what}": make
+        for task in tasks
+        for name, style in styles.items()
+        for what, make in _drawings(task, style, wanted)
+    }
+    folder = OutFolder(out)
+    folder.check(drawings)
+    for name, make in drawings.items():
+        folder.write({name: make()})
+    make_console().print(f"{counted(len(drawings), 'file')} in {shown_path(out)}")
+
+
+def _styles(
+    view: str, azimuth: float | None, elevation: float | None, background: str, size: int
+) -> dict[str, PictureStyle]:
+    """Every style asked for, by its part of the file names."""
+    styles = {}
+    floors: tuple[Background, ...] = tuple(b for b in BACKGROUNDS if background in (b, "all"))
+    for named, (around, above) in VIEWS.items():
+        if view not in (named, "all"):
+            continue
+        name: str = named
+        if azimuth is not None or elevation is not None:
+            around = around if azimuth is None else azimuth
+            above = above if elevation is None else elevation
+            name = f"{around:g}-{above:g}"
+        for floor in floors:
+            styles[f"{name}-{floor}"] = PictureStyle(size, floor, around, above)
+    return styles
+
+
+def _drawings(task: AssemblyTask, style: PictureStyle, extras: list[str]) -> Iterator[_Drawing]:
+    scene, candidates = task.scene, task.candidates
+    yield ".png", lambda: goal_png(scene, style)
+    makers: dict[str, _Drawing] = {
+        "composite": (
+            "-composite.png",
+            lambda: composite_png(goal_png(scene, style), candidates_png(candidates, style)),
+        ),
+        "exploded": ("-exploded.png", lambda: exploded_png(scene, style)),
+        "filmstrip": ("-filmstrip.png", lambda: filmstrip_png(scene, style)),
+        "gif": (".gif", lambda: animation(scene, style, "gif")),
+        "webp": (".webp", lambda: animation(scene, style, "webp")),
+    }
+    yield from (makers[name] for name in extras)
+
+
+@scenes.command("stats")
+@click.argument("data", metavar="PATH", type=NAME_OR_PATH)
+def stats(data: str) -> None:
+    """Show statistics of the data set PATH, by level.
+
+    Sizes, types, colors and layers as mean and most of a scene; blocks of every type and color;
+    candidate sets.
+    """
+    read = read_data_set(data)
+    console = make_console()
+    bases = len({parent for task in read.tasks for parent in task.scene.parents})
+    found = f"{counted(len(read.tasks), 'scene')}, {counted(bases, 'base scene')}"
+    console.print(f"{read.name}: {found}")
+    by_level = _by_level(read)
+    headings = ("level", "scenes", "blocks", "layers", "types", "colors", "dependencies")
+    console.print("A scene has, mean and most")
+    print_rows(console, headings, [_sizes(*one) for one in by_level], numbers=6)
+    console.print("Blocks, by type and color")
+    print_rows(console, ("type", *COLORS, "all", "share"), _palette(read), numbers=7)
+    console.print("Candidate sets")
+    offered = ("level", "candidates", "needed", "other pose", "other color", "other type")
+    print_rows(console, offered, [_offers(*one) for one in by_level], numbers=5)
+    console.print(
+        "Candidates that are not needed differ from what is needed by their pose alone, else by "
+        "their color, else by their type.",
+        style="dim",
+    )
+
+
+def _by_level(read: Dataset) -> list[tuple[str, list[AssemblyTask]]]:
+    """Tasks of every level, a scene of two levels in both, and of all together."""
+    levels = sorted({level for task in read.tasks for level in task.scene.levels})
+    by_level = [(str(n), [task for task in read.tasks if n in task.scene.levels]) for n in levels]
+    return [*by_level, ("all", list(read.tasks))]
+
+
+def _sizes(level: str, tasks: Sequence[AssemblyTask]) -> tuple[str, ...]:
+    scenes = [task.scene for task in tasks]
+    columns = (
+        [len(scene) for scene in scenes],
+        [max(scene.graph.layers) for scene in scenes],
+        [len({block.type for block in scene.blocks}) for scene in scenes],
+        [len({block.color for block in scene.blocks}) for scene in scenes],
+        [sum(len(block.depend) for block in scene.blocks) for scene in scenes],
+    )
+    return (level, str(len(scenes)), *map(_mean_and_most, columns))
+
+
+def _palette(read: Dataset) -> list[tuple[str, ...]]:
+    kinds = Counter(block.kind for task in read.tasks for block in task.scene.blocks)
+    total = sum(kinds.values())
+    rows = []
+    for block_type in BLOCK_TYPES:
+        counts = [kinds[(block_type, color)] for color in COLORS]
+        cells = [str(count) if count else "" for count in counts]
+        rows.append((block_type, *cells, str(sum(counts)), f"{100 * sum(counts) / total:.1f} %"))
+    whole = [sum(kinds[(t, color)] for t in BLOCK_TYPES) for color in COLORS]
+    return [*rows, ("all", *map(str, whole), str(total), "")]
+
+
+def _offers(level: str, tasks: Sequence[AssemblyTask]) -> tuple[str, ...]:
+    counts = [_offered(task) for task in tasks]
+    return (level, *(_mean_and_most([count[i] for count in counts]) for i in range(5)))
+
+
+def _offered(task: AssemblyTask) -> tuple[int, int, int, int, int]:
+    """Candidates; those needed; and others by what sets them apart: pose, color, type."""
+    looks = {block.look for block in task.scene.blocks}
+    kinds = {block.kind for block in task.scene.blocks}
+    types = {block.type for block in task.scene.blocks}
+    all_of_them = task.candidates.candidates
+    needed = sum(one.look in looks for one in all_of_them)
+    pose = sum(one.look not in looks and one.kind in kinds for one in all_of_them)
+    color = sum(one.kind not in kinds and one.type in types for one in all_of_them)
+    return len(all_of_them), needed, pose, color, len(all_of_them) - needed - pose - color
+
+
+def _mean_and_most(numbers: Sequence[int]) -> str:
+    return f"{sum(numbers) / len(numbers):.1f} {max(numbers):>3}"
