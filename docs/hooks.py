@@ -1,4 +1,4 @@
-"""What `mkdocs` adds to the pages: files of the repository beside docs/, and tables of YAML fields.
+"""Hooks of `mkdocs`: files of the repository beside docs/, and tables of fields made from schemas.
 
 Pages link to files outside docs/ as they stand in the repository, so that links work there as well;
 on the site those files lie in project/, and links are turned to them.
@@ -31,12 +31,10 @@ BESIDE = {
 }
 """Where on the site the files of the repository lie that pages link to."""
 
-INSTEAD = {"README.md": "index.md", "benchmarks/schemas": "reference/suites.md"}
+INSTEAD = {"README.md": "index.md", "benchmarks/schemas": "suites.md"}
 """Pages that stand for something of the repository."""
 
-FIELDS = {"reference/suites.md": "suite", "reference/models.md": "models"}
-"""Pages whose line `{{ fields }}` becomes tables of all fields of a schema."""
-
+_FIELDS = re.compile(r"{{ fields: (\w+) }}")
 _LINK = re.compile(r"(\]\()([^)#\s]+)(#[^)\s]*)?(\))")
 _SCHEME = re.compile(r"[a-z]+:")
 
@@ -53,9 +51,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
     """Turn links to files outside docs/ to where they lie on the site, and fill in tables."""
     here = page.file.src_uri
-    if name := FIELDS.get(here):
-        schema = json.loads(_text(f"benchmarks/schemas/{name}.schema.json"))
-        markdown = markdown.replace("{{ fields }}", field_tables(schema))
+    shown: set[str] = set()
+    markdown = _FIELDS.sub(lambda name: field_tables(name[1], shown), markdown)
     sources = {target: source for source, target in BESIDE.items()}
     folder = posixpath.dirname(sources.get(here, f"docs/{here}"))
 
@@ -71,13 +68,15 @@ def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
     return _LINK.sub(turned, markdown)
 
 
-def field_tables(schema: Schema) -> str:
-    """Give a table of the fields of a schema, and one of each of its parts that has fields."""
-    parts = {name: part for name, part in schema.get("$defs", {}).items() if "properties" in part}
+def field_tables(name: str, shown: set[str]) -> str:
+    """Return a table of the fields of a schema, and one of each part that is not shown yet."""
+    schema = json.loads(_text(f"benchmarks/schemas/{name}.schema.json"))
     tables = [_table(schema["properties"])] if "properties" in schema else []
-    for name, part in parts.items():
-        about, table = part.get("description", ""), _table(part["properties"])
-        tables.append(f"## {_title(name)}\n\n{about}\n\n{table}")
+    for part, fields in schema.get("$defs", {}).items():
+        if "properties" in fields and part not in shown:
+            shown.add(part)
+            about, table = fields.get("description", ""), _table(fields["properties"])
+            tables.append(f"### {_title(part)}\n\n{about}\n\n{table}")
     return "\n\n".join(tables)
 
 
@@ -86,7 +85,7 @@ def _text(path: str) -> str:
 
 
 def _table(fields: dict[str, Schema]) -> str:
-    lines = ["| field | holds | when left out | what it does |", "|---|---|---|---|"]
+    lines = ["| field | type | default | meaning |", "|---|---|---|---|"]
     for name, field in fields.items():
         default = "" if "default" not in field else f"`{json.dumps(field['default'])}`"
         text = " ".join(field.get("description", "").split()).replace("|", "\\|")
@@ -95,7 +94,7 @@ def _table(fields: dict[str, Schema]) -> str:
 
 
 def _kind(field: Schema) -> str:
-    """What a field may hold, in words."""
+    """Return the type of a field in words."""
     if "$ref" in field:
         name = field["$ref"].rsplit("/", 1)[-1]
         return f"[{_title(name)}](#{_title(name).lower().replace(' ', '-')})"
@@ -115,6 +114,6 @@ def _kind(field: Schema) -> str:
 
 
 def _title(name: str) -> str:
-    """`LimitsSpec` as a heading."""
+    """Return a class name as a heading: `LimitsSpec` is "Limits"."""
     words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name.removesuffix("Spec")).split()
     return " ".join([words[0], *(word.lower() for word in words[1:])])

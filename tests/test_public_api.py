@@ -19,7 +19,7 @@ from tests.workspace import Workspace
 
 NAMES = ["PhyblockError", "Picture", "PlanScore", "Run", "SceneTask", "Suite", "__version__"]
 NAMES += ["load_run", "load_suite", "render", "run_suite", "score"]
-GUIDE = Path(__file__).parents[1] / "docs" / "api.md"
+GUIDE = Path(__file__).parents[1] / "docs" / "python.md"
 PNG = b"\x89PNG\r\n\x1a\n"
 
 

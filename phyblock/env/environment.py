@@ -1,4 +1,4 @@
-"""The assembly of one scene as an episode of reinforcement learning (docs/environment.md).
+"""The assembly of one scene as an episode of reinforcement learning (docs/tutorials/agent.md).
 
 An action is the number of a candidate, or 0 for Done: a right move puts the block at its goal pose
 and gives a reward of 1, a wrong one changes nothing and gives 0. With `action="pose"` it also says

@@ -403,7 +403,7 @@ def test_scenes_run_in_processes_of_their_own() -> None:
 
 
 def blocks_of_code() -> list[str]:
-    text = (ROOT / "docs" / "environment.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "tutorials" / "agent.md").read_text(encoding="utf-8")
     return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
 
 
@@ -412,7 +412,7 @@ def test_what_the_docs_show_runs(place: int, capsys: pytest.CaptureFixture[str])
     code = blocks_of_code()[place]
     body = [line for line in code.splitlines() if line and not line.startswith(("import", "from"))]
     assert len(body) <= 10
-    exec(compile(code, f"docs/environment.md block {place}", "exec"), {})
+    exec(compile(code, f"agent.md block {place}", "exec"), {})
     if "right_moves" in code:
         complete, total, blocks = capsys.readouterr().out.split()
         assert (complete, float(total)) == ("True", float(blocks))

@@ -41,7 +41,7 @@ def missing_software() -> str:
     if found.returncode == 0:
         return ""
     why = (found.stderr.strip().splitlines() or ["it ends without a word"])[-1]
-    return f"{_PYTHON} has no serving software ({why}): see docs/servers.md"
+    return f"{_PYTHON} has no serving software ({why}): see CONTRIBUTING.md"
 
 
 @contextmanager
