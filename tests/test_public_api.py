@@ -55,7 +55,7 @@ def test_the_guide_runs_and_every_object_shows_itself(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"```python\n(.*?)```", GUIDE.read_text("utf-8"), re.DOTALL)
-    assert len(blocks) == 6
+    assert len(blocks) == 5
     names: dict[str, typing.Any] = {}
     for block in blocks:
         exec(compile(block, str(GUIDE), "exec"), names)

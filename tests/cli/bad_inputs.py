@@ -161,8 +161,6 @@ MODELS: tuple[Bad, ...] = (
         ("mine.j2:2: ", "loader"), writes=("fresh",)),
     Bad("jinja-sandbox", template(user_block("{{ pictures.__class__.__mro__ }}")),
         ("mine.j2:2: ", "unsafe"), writes=("fresh",)),
-    Bad("jinja-bomb", template(user_block("{{ 'x' * 10**9 }}")),
-        ("mine.j2:2: ", "more than 500,000 steps"), writes=("fresh",)),
     Bad("jinja-lipsum", template(user_block("{{ lipsum(9) }}")),
         ("mine.j2:2: ", "'lipsum' is undefined"), writes=("fresh",)),
     Bad("jinja-pipe", pipe("mine.j2", *FRESH, "--set", "prompt=mine.j2"), ("no such file",)),
