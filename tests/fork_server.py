@@ -41,7 +41,7 @@ _NOT_WRITTEN = 120
 
 _PRELOADED = ("PIL.GifImagePlugin", "PIL.JpegPresets", "aiohttp", "matplotlib.backends.backend_agg",
               "matplotlib.backends.backend_svg", "matplotlib.pyplot", "phyblock.report.html.write",
-              "phyblock.run.floors", "sqlite3", "yarl")  # fmt: skip
+              "phyblock.results.tables", "sqlite3", "yarl")  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -110,12 +110,15 @@ class Workspace:
         return folder
 
     def write_suite(self, *, name: str = "trial", **fields: Any) -> Path:
-        """`suite.yaml`: small pictures, the scenes of `data`; `fields` replace whole sections."""
+        """`suite.yaml`: small pictures, the scenes of `data`, baselines only
+        where `models` names them; `fields` replace whole sections.
+        """
         suite = {
             "name": name,
             "dataset": {"format": "builtin", "path": "./data"},
             "images": {"size_px": 128},
             "models": ["random", "oracle"],
+            "baselines": [],
             **fields,
         }
         return self.write_yaml("suite.yaml", suite)

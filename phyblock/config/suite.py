@@ -59,6 +59,7 @@ from phyblock.config.yaml import (
 from phyblock.errors import Problem, SpecError
 from phyblock.registry import (
     PUBLISHED_TABLE,
+    baseline_names,
     known_track,
     known_tracks,
     table_names,
@@ -402,6 +403,9 @@ class Suite(Section):
     models: ModelNames
     """Names from models.yaml or built-in baselines, group:NAME for all models of a group; or the
     word recorded: every folder of recorded replies in the official data."""
+    baselines: Unique[Annotated[str, _one_of(baseline_names)]] = ("goal-blind", "random")
+    """Built-in baselines that are scored beside models and recordings of full_planning, where every
+    track has them; they cost nothing. []: none."""
     prompt: Prompt = "default"
     """default; official (read out of the official checkout); or the path of a .j2 template,
     relative to the suite file."""
@@ -504,14 +508,24 @@ class Suite(Section):
         """Return what determines the results, as JSON-able data, whatever the order of lists.
 
         Leaves out name, description, limits and tables, sections of tracks that are not run,
-        models, limit and paths (of data and templates): a run stores which models were run, about
-        which items, and the hashes of what stands at the paths, which say more and survive a move.
+        models, baselines, seeds, limit and paths (of data and templates): a run stores which models
+        were run, about which items, and the hashes of what stands at the paths, which say more and
+        survive a move.
         """
         sections = {kind.section[0]: name for name, kind in known_tracks().items() if kind.section}
         idle = {key for key, track in sections.items() if track not in self.tracks}
-        unsaid = {"name", "description", "limit", "limits", "models", "tables"}
+        unsaid = {
+            "name",
+            "description",
+            "limit",
+            "limits",
+            "models",
+            "baselines",
+            "seeds",
+            "tables",
+        }
         spec = self.model_dump(mode="json", exclude={*unsaid, *idle})
-        for name in ("seeds", "levels", "settings", "tracks"):
+        for name in ("levels", "settings", "tracks"):
             spec[name].sort()
         for section in ("dataset", *sections):
             spec.get(section, {}).pop("path", None)

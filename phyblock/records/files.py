@@ -37,11 +37,20 @@ LineT = TypeVar("LineT", bound=Line)
 class Validation:
     """Shows that records and turns are those of a run, by its digest and their names.
 
-    `samples` are all ids of the run, where its plan is known.
+    `samples` are all ids of the run, where its plan is known. Records of models and seeds that the
+    run does not select at present are passed over, unless it is taken as a `whole`.
     """
 
     manifest: Manifest
     samples: Collection[str] | None = None
+    whole: bool = False
+
+    def takes(self, line: Line) -> bool:
+        """True if a line is to be seen."""
+        return self.whole or not isinstance(line, Record) or self._selects(line)
+
+    def _selects(self, record: Record) -> bool:
+        return self.manifest.selects(record.model, record.seed)
 
     def problem(self, where: str, line: Line) -> Problem | None:
         """Return what shows that a record or turn is of another run, or None."""
@@ -52,7 +61,11 @@ class Validation:
             field, found, allowed = "run", line.run, self.manifest.run
         elif isinstance(line, Record) and found != line.named:
             allowed = line.named
-        elif self.samples is None or found in self.samples:
+        elif (
+            self.samples is None
+            or found in self.samples
+            or (line.run and (isinstance(line, Turn) or not self._selects(line)))
+        ):
             return None
         else:
             allowed = "a sample of the suite as it is run"
@@ -108,7 +121,8 @@ class Lines(Generic[LineT]):
                         raise StoreError(problem)
                     self.start_bytes = self.whole_bytes
                     self.whole_bytes += len(data)
-                    yield where, line
+                    if self._validation is None or self._validation.takes(line):
+                        yield where, line
         except FileNotFoundError:
             return
         except OSError as error:
@@ -233,14 +247,18 @@ def _plain(track: str) -> type[Record]:
 
 
 def run_records(
-    folder: Path, manifest: Manifest | None = None, samples: Collection[str] | None = None
+    folder: Path,
+    manifest: Manifest | None = None,
+    samples: Collection[str] | None = None,
+    *,
+    whole: bool = False,
 ) -> RecordLines:
     """Return the records of a run folder; any that are not the run's own are a StoreError.
 
     `manifest` is that of the folder, read where it is not given; `samples` are the ids of its
-    plan, where that is known.
+    plan, where that is known. Models and seeds that it does not select are seen with `whole` alone.
     """
-    return RecordLines(folder, Validation(manifest or read_manifest(folder), samples))
+    return RecordLines(folder, Validation(manifest or read_manifest(folder), samples, whole))
 
 
 def read_records(folder: Path, manifest: Manifest | None = None) -> Iterator[Record]:

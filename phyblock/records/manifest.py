@@ -98,6 +98,9 @@ class Manifest(Line):
     """The suite with everything that it left out."""
     models: tuple[ManifestModel, ...] = ()
     """The models as they are called."""
+    others: tuple[ManifestModel, ...] = ()
+    """Models that were asked in this folder before, and that the command did not name this time:
+    their records stay, and no table counts them until they are named again."""
     dataset: ManifestDataset | None = None
     """The data set."""
     tracks: dict[str, dict[str, Any]] = Field(default_factory=dict)
@@ -114,9 +117,6 @@ class Manifest(Line):
     """Distinct scenes."""
     scenes_by_level: dict[int, int] = Field(default_factory=dict)
     """Scenes of each level; one scene may be of several."""
-    floors: dict[str, dict[str, dict[str, float]]] = Field(default_factory=dict)
-    """Scores on these scenes of baselines that never see the goal, by track and name, in [0, 1]:
-    by measure, cell, setting, matcher and criterion."""
     engine: str | None = None
     """The physics engine that blocks are let go in, with its version; null where nothing of the run
     depends on one, and in runs from before there was a choice (PyBullet)."""
@@ -127,6 +127,13 @@ class Manifest(Line):
     def run(self) -> str:
         """The digest by which its records show that they are its own."""
         return self.identity[:_DIGITS]
+
+    def selects(self, model: str, seed: int) -> bool:
+        """True if the models and seeds of the run include these; others may be on file."""
+        seeds = self.suite.get("seeds")
+        return seed in (seeds or [seed]) and (
+            not self.models or any(model == one.name for one in self.models)
+        )
 
 
 def read_manifest(folder: Path) -> Manifest:

@@ -85,9 +85,11 @@ class Executor:
         """`halt` is the switch that ends calls; `retry_failed` asks again also where
         a request was rejected for good; `extractor` is asked what unread replies say.
         """
+        planned = plan.sample_ids()
         self.settled: Mapping[str, Summary] = {
             sample: summary
             for sample, summary in store.standing.samples.items()
+            if sample in planned
             if (summary.is_answered if retry_failed else summary.is_final)
         }
         self._recorded = store.standing.samples

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from phyblock.config.models import ModelConfig
+from phyblock.config.models import HUMAN, ModelConfig
 from phyblock.config.suite import Suite, Variant
 from phyblock.data import UNNUMBERED, Dataset, read_version
 from phyblock.parsing.text import READER_VERSION
@@ -142,10 +142,10 @@ def inputs_of(
 
 
 def identity_of(inputs: Inputs) -> str:
-    """Return the hex digest of the inputs, whatever the order of the models."""
-    by_name = sorted(inputs["models"], key=lambda model: str(model["name"]))
-    canonical = json.dumps({**inputs, "models": by_name}, sort_keys=True, separators=(",", ":"))
-    return hex_digest(canonical)
+    """Return the hex digest of the inputs, whoever is asked; every person has a run alone."""
+    people = [model for model in inputs["models"] if str(model["name"]).startswith(HUMAN)]
+    decisive = {**inputs, "models": people}
+    return hex_digest(json.dumps(decisive, sort_keys=True, separators=(",", ":")))
 
 
 def _track(track: AnyTrack) -> dict[str, Any]:

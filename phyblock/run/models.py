@@ -17,6 +17,7 @@ from phyblock.models import known_providers, server_address, takes_format
 from phyblock.records.files import RECORDS, RecordLines
 from phyblock.records.record import Record
 from phyblock.text import did_you_mean
+from phyblock.tracks.kind import kind_of
 from phyblock.types import AnswerFormat, CandidateOrder
 
 
@@ -52,6 +53,25 @@ def plan_models(
     else:
         models = resolve_models(suite.models, known, lambda at: suite.where("models", at))
     return tuple(_planned(name, config, suite) for name, config in models.items())
+
+
+def with_baselines(
+    models: Sequence[PlannedModel], suite: Suite, known: Mapping[str, ModelConfig]
+) -> tuple[PlannedModel, ...]:
+    """Return models with the suite's `baselines` beside them.
+
+    They are scored in every run of plans in which a model or a recording is asked, where all tracks
+    know them: what rules reach that never see the goal is what a score has to be held against.
+    """
+    asks = any(model.config.kind in ("litellm", "replay") for model in models)
+    if not asks or "full_planning" not in suite.tracks:
+        return tuple(models)
+    named = {model.name for model in models}
+    kinds = [kind_of(name) for name in suite.tracks]
+    able = [name for name in suite.baselines if all(name in kind.baselines for kind in kinds)]
+    more = [name for name in able if name not in named]
+    found = resolve_models(more, known, lambda _: "models")
+    return (*models, *(_planned(name, config, suite) for name, config in found.items()))
 
 
 def plan_extractor(suite: Suite, known: Mapping[str, ModelConfig]) -> ModelConfig | None:

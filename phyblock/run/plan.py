@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from phyblock.config.models import RECORDED, ModelConfig, with_members
 from phyblock.config.suite import Suite, Variant
@@ -22,23 +21,20 @@ from phyblock.run.models import (
     plan_models,
     recorded_format,
     recorded_order,
+    with_baselines,
 )
 from phyblock.run.samples import Sample
 from phyblock.tracks import AnyTrack, EpisodeTrack, Item, Opening, kind_of, open_tracks
 from phyblock.tracks.selection import interleaved, select_tasks
-
-if TYPE_CHECKING:
-    from phyblock.run.floors import FloorValues
 
 
 @dataclass(frozen=True)
 class RunPlan:
     """Everything a run needs.
 
-    `manifest` is what `run.yaml` holds, but for the values of floors, which `floors` computes;
-    `tracks` are those of the reference, `variants` all conditions with the tracks of each;
-    `arranged` gives the order in which the items of a track are asked about; `extractor` is asked
-    about replies that cannot be read.
+    `manifest` is what `run.yaml` holds; `tracks` are those of the reference, `variants` all
+    conditions with the tracks of each; `arranged` gives the order in which the items of a track are
+    asked about; `extractor` is asked about replies that cannot be read.
     """
 
     suite: Suite
@@ -46,7 +42,6 @@ class RunPlan:
     dataset: Dataset
     variants: Mapping[Variant, tuple[AnyTrack, ...]]
     manifest: Manifest
-    floors: Callable[[], FloorValues]
     arranged: Callable[[Sequence[Item]], Sequence[Item]] = interleaved
     extractor: ModelConfig | None = None
 
@@ -54,10 +49,6 @@ class RunPlan:
     def tracks(self) -> tuple[AnyTrack, ...]:
         """The tracks as the reference asks."""
         return next(iter(self.variants.values()))
-
-    def begun(self) -> Manifest:
-        """The manifest of a run that begins, with what floors reach; it may take some seconds."""
-        return self.manifest.model_copy(update={"floors": self.floors()})
 
     @property
     def samples_per_model(self) -> int:
@@ -111,7 +102,7 @@ def make_plan(
     wrong.
     """
     dataset = open_dataset(suite.dataset.format, suite.files.dataset)
-    models = tuple(people) or plan_models(suite, known, only)
+    models = tuple(people) or with_baselines(plan_models(suite, known, only), suite, known)
     suite = _with_plain_names(suite, known)
     limit = suite.limit if limit is None else limit
     asks = any(model.config.kind != "replay" for model in models)
@@ -127,17 +118,7 @@ def make_plan(
             _check_prompts(of_variant)
     extractor = plan_extractor(suite, known)
     manifest = make_manifest(suite, models, selected, variants, limit, extractor)
-
-    def reopened(name: str, one: Suite) -> AnyTrack:
-        return kind_of(name).open(Opening(one, dataset, limit, False))
-
-    def floors() -> FloorValues:
-        # Values are computed in frames of pandas, which a run else does without until it ends.
-        from phyblock.run.floors import floor_values
-
-        return floor_values(manifest, suite, reopened)
-
-    return RunPlan(suite, models, selected, variants, manifest, floors, extractor=extractor)
+    return RunPlan(suite, models, selected, variants, manifest, extractor=extractor)
 
 
 def _with_plain_names(suite: Suite, known: Mapping[str, ModelConfig]) -> Suite:

@@ -197,7 +197,7 @@ def _judged(
     with ThreadPoolExecutor(1) as thread:
         loop = asyncio.new_event_loop()
         try:
-            for where, record in run_records(folder, manifest):
+            for where, record in run_records(folder, manifest, whole=not strict):
                 condition = record.way.shown.key
                 if condition not in tracks:
                     message = "was asked in a condition that the run does not have"

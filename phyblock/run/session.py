@@ -30,7 +30,7 @@ from phyblock.run.extraction import Extractor
 from phyblock.run.halt import Halt
 from phyblock.run.models import provider_problem
 from phyblock.run.plan import RunPlan
-from phyblock.run.store import RecordWriter, RunStore, held_run
+from phyblock.run.store import RecordWriter, RunStore
 
 __all__ = ["Session", "check_ready"]
 
@@ -84,9 +84,7 @@ class Session:
     async def __aenter__(self) -> Session:
         plan = self._plan
         try:
-            found = held_run(self._folder, plan.manifest)
-            manifest = plan.begun() if found is None else plan.manifest
-            self._store = RunStore(self._folder, manifest, plan.sample_ids())
+            self._store = RunStore(self._folder, plan.manifest, plan.sample_ids())
             self._check_batches(self._store)
             remove_unfinished(self._folder)
             asks = any(m.config.kind == "litellm" for m in plan.models) or plan.extractor

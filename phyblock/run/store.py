@@ -41,7 +41,7 @@ from phyblock.records.files import (
     run_records,
 )
 from phyblock.records.line import Line, encodable
-from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
+from phyblock.records.manifest import MANIFEST, Manifest, ManifestModel, read_manifest
 from phyblock.records.record import PictureMark, Prompt, PromptMessage, Record, Stopped, Turn
 from phyblock.run.events import Standing
 from phyblock.run.manifest import code_versions
@@ -54,10 +54,13 @@ LineT = TypeVar("LineT", bound=Line)
 
 _HINT = "choose another folder with --out"
 _NOT_IDENTITY = (
+    "suite.name",
     "suite.description",
     "suite.limit",
     "suite.limits",
     "suite.models",
+    "suite.baselines",
+    "suite.seeds",
     "suite.tables",
     "suite.dataset",
     "dataset.root",
@@ -89,7 +92,7 @@ class RunStore:
                 run_folder(folder).claim([])
                 self._lock.enter_context(locked(folder))
                 self._claim(manifest)
-                records = run_records(folder, manifest, samples)
+                records = run_records(folder, manifest, samples, whole=True)
                 self.records = self._open(records, self.standing.add)
                 turns = TurnLines(folder, self._validation)
                 self.turns = self._open(turns, self.standing.add_turn)
@@ -153,9 +156,21 @@ class RunStore:
         return file
 
     def _claim(self, manifest: Manifest) -> None:
-        if held_run(self._folder, manifest) is None:
-            with writing(self._folder, _HINT):
-                atomic_write(self._folder / MANIFEST, manifest_text(manifest), sync=True)
+        found = held_run(self._folder, manifest)
+        if found is not None:
+            if _selection(found) == _selection(manifest):
+                return
+            named = {model.name for model in manifest.models}
+            others = [m for m in (*found.models, *found.others) if m.name not in named]
+            changes = {"created": found.created, "others": tuple(others)}
+            manifest = manifest.model_copy(update=changes)
+        with writing(self._folder, _HINT):
+            atomic_write(self._folder / MANIFEST, manifest_text(manifest), sync=True)
+
+
+def _selection(manifest: Manifest) -> tuple[list[str], object]:
+    """The models and seeds of a run, of which a command may name others than the last."""
+    return [model.name for model in manifest.models], manifest.suite.get("seeds")
 
 
 def held_run(folder: Path, manifest: Manifest) -> Manifest | None:
@@ -173,10 +188,12 @@ def held_run(folder: Path, manifest: Manifest) -> Manifest | None:
     paid: tuple[Lines[Any], ...] = (RecordLines(folder), TurnLines(folder), BatchLines(folder))
     if all(next(iter(lines), None) is None for lines in paid):
         return None
-    if found.identity == manifest.identity:
+    names = _changed_models(found, manifest)
+    if found.identity == manifest.identity and not names:
         _check_versions(folder, found, manifest)
         return found
-    names = _changed(found, manifest)
+    if found.identity != manifest.identity:
+        names = [*_changed(found, manifest), *names]
     changed = f"different: {', '.join(names) or 'how phyblock asks, draws or reads'}"
     hint = "; ".join((*_reasons(found, manifest), _HINT))
     raise StoreError(Problem(str(folder), "holds another run", found=changed, hint=hint))
@@ -233,8 +250,8 @@ def _changed(found: Manifest, wanted: Manifest) -> list[str]:
 
 def _parts(manifest: Manifest) -> Iterator[tuple[str, Any]]:
     """Dotted names and values of what a run is made of, digests of pictures left out."""
-    fields = {**manifest.fields(), "models": _decisive(manifest)}
-    for part in ("suite", "models", "dataset", "limit"):
+    fields = manifest.fields()
+    for part in ("suite", "dataset", "limit"):
         value = fields.get(part)
         if isinstance(value, dict):
             yield from ((f"{part}.{key}", below) for key, below in value.items())
@@ -244,10 +261,20 @@ def _parts(manifest: Manifest) -> Iterator[tuple[str, Any]]:
         yield from ((f"{track}.{k}", below) for k, below in about.items() if k != "pictures")
 
 
-def _decisive(manifest: Manifest) -> list[dict[str, Any]]:
-    """What decides the models' replies, in the order of their names."""
-    models = sorted(manifest.models, key=lambda model: model.name)
-    return [{k: v for k, v in m.fields().items() if k not in _LABELS} for m in models]
+def _changed_models(found: Manifest, wanted: Manifest) -> list[str]:
+    """Dotted names of what decides the replies of models and was another when they were asked."""
+    asked = _decisive((*found.models, *found.others))
+    return [
+        f"models.{name}.{key}"
+        for name, model in _decisive(wanted.models).items()
+        for key in sorted(model.keys() | asked.get(name, {}).keys())
+        if name in asked and model.get(key) != asked[name].get(key)
+    ]
+
+
+def _decisive(models: Iterable[ManifestModel]) -> dict[str, dict[str, Any]]:
+    """What decides the models' replies, by their names."""
+    return {m.name: {k: v for k, v in m.fields().items() if k not in _LABELS} for m in models}
 
 
 _HINT_APPENDING = "free some space and give the same command again: it goes on from here"

@@ -214,6 +214,39 @@ def test_what_does_not_change_results_does_not_make_another_run(copy: Workspace)
     assert "All 45 samples are done" in done.out
 
 
+def test_more_models_and_seeds_go_on_in_the_folder_and_fewer_select_from_it(
+    workspace: Workspace,
+) -> None:
+    workspace.write_scenes()
+    workspace.write_suite(models=["random"], seeds=[1, 0])
+    first = workspace.run()
+    assert (first.code, first.err) == (0, "")
+    before, lines = workspace.tables(), workspace.records()
+    more = workspace.run("--models", "oracle,random", "--set", "seeds=[0,1,2]")
+    assert (more.code, more.err) == (0, "")
+    assert "All 30 samples are done" in more.out
+    assert workspace.records()[: len(lines)] == lines
+    whole = workspace.tables()
+    fewer = workspace.run("--set", "seeds=[0,1]", "--set", "settings=[B,A]", "--set", "name=x")
+    assert "All 10 samples are done" in fewer.out
+    for done in (workspace.run(), workspace.phyblock("score", "out")):
+        assert done.code == 0
+        tables = workspace.tables()
+        assert {name: tables[name] for name in before} == before
+    again = workspace.run("--models", "oracle,random", "--set", "seeds=[0,1,2]")
+    assert "All 30 samples are done" in again.out
+    assert len(workspace.records()) == 30
+    assert workspace.tables() == whole
+
+
+def test_a_model_that_is_asked_otherwise_makes_another_run(copy: Workspace) -> None:
+    copy.write_models("http://127.0.0.1:9", "alpha", temperature=0.5)
+    assert copy.run("--models", "oracle").code == 0
+    done = copy.run("--models", "alpha")
+    assert done.code == 2
+    assert "found: different: models.alpha.params" in done.err
+
+
 def test_the_same_model_named_twice_is_run_once(copy: Workspace) -> None:
     copy.out = copy.root / "twice"
     done = copy.run("--models", "oracle,oracle")
