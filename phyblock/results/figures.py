@@ -348,6 +348,8 @@ def shares(run: Run, *, track: str, table: str) -> Figure | None:
     layout = layouts_of(track)[table]
     filled_in = filled(run, track, layout)
     frame = filled_in.frame
+    if frame.empty:
+        return None
     whole = kind_of(track).report().cells(run)[-1].name
     measures = {one.name: one for one in kind_of(track).report().measures}
     if layout.rows == "cell":

@@ -193,6 +193,8 @@ class TemplatePrompt:
             trim_blocks=True,
             lstrip_blocks=True,
         )
+        # It draws words at random: a prompt is the same whenever it is made.
+        del self._environment.globals["lipsum"]
         try:
             tree = self._environment.parse(self._main.text)
             self._template = self._compiled(tree)

@@ -40,7 +40,7 @@ def made(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Worksp
     assert done.code == 0, done.err
     done = workspace.phyblock("bundle", "out")
     assert done.code == 0, done.err
-    assert "Verified: 10 records scored again" in done.out
+    assert "10 records of 1 model, scored again" in done.out
     return workspace
 
 

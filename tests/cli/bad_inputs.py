@@ -240,8 +240,6 @@ FOLDERS: tuple[Bad, ...] = (
     Bad("score-file", command("score", "suite.yaml"), ("suite.yaml", "phyblock run")),
     Bad("orphans", no_manifest, ("out: is not empty and holds no run", "no run.yaml", "--out")),
     Bad("changed-data", changed_data, ("data: sha256: is not the data set", "found", "allowed")),
-    Bad("no-data-for-figures", command("figures", "out", "--data", "nope"),
-        ("--data", "nope", "does not exist")),
     Bad("lost-data", lost_data, ("data: ", "is not there", "--data")),
     Bad("score-over-run", scores_over_run, ("precious: holds another run", "--out")),
     Bad("score-over-self", command("score", "out", "--out", "out"), ("out: holds another run",)),

@@ -120,7 +120,7 @@ IN_THE_WAY: dict[str, tuple[Prepare, str]] = {
     "linked-report": (lambda run: link(run / "report"), "report: .*it is a link"),
     "linked-tables": (lambda run: link(run / "tables"), "tables: .*it is a link"),
     "page": (lambda run: put(run / "report.html"), r"report\.html: .*phyblock did not make"),
-    "figure": (lambda run: put(run / "figures" / "scenes.svg"), "scenes.svg: .*did not make"),
+    "figure": (lambda run: put(run / "figures" / "errors.svg"), "errors.svg: .*did not make"),
     "table": (lambda run: put(run / "tables" / "table1.md"), "table1.md: .*did not make"),
 }
 
@@ -151,7 +151,7 @@ def test_a_run_goes_on_only_where_its_report_can_be_written(suite: Workspace) ->
                 call(*words)
             for path in (suite.out / "report", suite.out / "report.html"):
                 path.unlink(missing_ok=True)
-            (suite.out / "figures" / "scenes.svg").unlink(missing_ok=True)
+            (suite.out / "figures" / "errors.svg").unlink(missing_ok=True)
     left = files(suite.root)
     assert {path: left[path] for path in before} == before
     call(*words, "--no-report")

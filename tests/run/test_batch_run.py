@@ -55,7 +55,7 @@ def test_all_tracks_of_one_turn_go_out_in_batches_at_half_the_price(workspace: W
         for name in ("models.yaml", "singly.yaml"):
             dry = workspace.run("--dry-run", "--models-file", name)
             costs += re.findall(r"4 calls, about \$([\d.]+) ", dry.out)
-            assert ("at the price of batches" in dry.out) == (name == "models.yaml")
+            assert ("at the batch price" in dry.out) == (name == "models.yaml")
         batched, single = map(float, costs)
         assert batched == pytest.approx(single / 2, abs=0.006)  # cents are shown
         done = workspace.run("--yes")
@@ -123,7 +123,7 @@ def test_a_run_that_waits_is_stopped_and_goes_on_by_the_same_command(workspace: 
         assert "give the same command again" in out
 
         dry = workspace.run("--dry-run")
-        assert "10 calls of alpha went out in batches before." in dry.out
+        assert "10 calls of alpha are in batches already." in dry.out
         assert "0 calls, about $0.00." in dry.out
         other = workspace.run("--set", "sampling.temperature=0.5")
         assert other.code == 2
