@@ -94,7 +94,8 @@ DataFormat = Literal["builtin", "official"]
 
 Background = Literal["checkerboard", "white", "light-wood", "dark-wood", "concrete", "lawn"]
 """The six backgrounds of the paper; the checkerboard is dark, and where nothing else is said."""
-BACKGROUNDS: tuple[Background, ...] = get_args(Background)
+BACKGROUNDS: list[Background] = [*get_args(Background)]
+"""Those of the paper, then those that plugins add."""
 PictureName = Literal["goal", "candidates"]
 PictureSource = Literal["render", "dataset"]
 PictureLayout = Literal["composite", "separate"]

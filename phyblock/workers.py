@@ -8,6 +8,7 @@ its jobs from a pipe.
 
 from __future__ import annotations
 
+import importlib
 import os
 import pickle
 import queue
@@ -22,6 +23,8 @@ from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
 T = TypeVar("T")
+PLUGINS: list[str] = []
+"""Modules that every worker imports first: what they add is known there as well."""
 
 
 class WorkerDiedError(RuntimeError):
@@ -72,7 +75,7 @@ class _Worker:
         self.connection, theirs = Pipe()
         code = f"import sys; sys.path[:] = {sys.path!r}; from phyblock.workers import _serve; "
         self.process = subprocess.Popen(
-            [sys.executable, "-c", f"{code}_serve({theirs.fileno()})"],
+            [sys.executable, "-c", f"{code}_serve({theirs.fileno()}, {PLUGINS!r})"],
             stdin=subprocess.DEVNULL,
             pass_fds=(theirs.fileno(),),
             start_new_session=True,
@@ -94,8 +97,10 @@ class _Worker:
         self.process.wait()
 
 
-def _serve(number: int) -> None:
+def _serve(number: int, plugins: list[str]) -> None:
     """Do the jobs that come through a pipe, until it is closed."""
+    for plugin in plugins:
+        importlib.import_module(plugin)
     connection = Connection(number)
     jobs: queue.SimpleQueue[bytes] = queue.SimpleQueue()
 

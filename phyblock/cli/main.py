@@ -17,6 +17,7 @@ from phyblock.cli.options import Sections, Verbs
 from phyblock.errors import InputError, PhyblockError, Problem, SpecError, StoreError, reason_of
 from phyblock.text import counted, plain_lines
 from phyblock.types import QUOTE_HINT
+from phyblock.workers import PLUGINS
 
 _CLI, _MAKING = "phyblock.cli", "phyblock.making.cli"
 _SECTIONS: Sections = {
@@ -49,26 +50,12 @@ _SECTIONS: Sections = {
 _ENTRY_POINTS = "phyblock.plugins"
 
 
-@click.group(
-    cls=Verbs,
-    sections=_SECTIONS,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 80},
-    epilog="Start with: phyblock run quick",
-)
-@click.option(
-    "--plugin",
-    "plugins",
-    multiple=True,
-    metavar="MODULE",
-    help="Import a Python module that adds tracks, measures or baselines; may be given again.",
-)
-@click.version_option(None, "-V", "--version", package_name="phyblock", prog_name="phyblock")
-def phyblock(plugins: tuple[str, ...]) -> None:
-    """Test vision-language models on PhyBlock: 3D block assembly from pictures."""
+def _load_plugins(_: click.Context, __: click.Parameter, modules: tuple[str, ...]) -> None:
+    """Import plugins while the options of `phyblock` are read: before a command's own choices."""
     named = {
         entry.value.partition(":")[0]: entry.name for entry in entry_points(group=_ENTRY_POINTS)
     }
-    for module in dict.fromkeys([*named, *plugins]):
+    for module in dict.fromkeys([*named, *modules]):
         _load_plugin(module, f"plugin {named[module]}" if module in named else "--plugin")
 
 
@@ -78,11 +65,31 @@ def _load_plugin(module: str, where: str) -> None:
         sys.path.insert(0, os.getcwd())
     try:
         importlib.import_module(module)
+        PLUGINS.append(module)
     except Exception as error:
         last = traceback.extract_tb(error.__traceback__)[-1]
         place = "" if last.filename.startswith("<") else f" ({last.filename}:{last.lineno})"
         message = f"cannot be imported: {type(error).__name__}: {error}{place}"
         raise SpecError(Problem(where, message, found=module)) from error
+
+
+@click.group(
+    cls=Verbs,
+    sections=_SECTIONS,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 80},
+    epilog="Start with: phyblock run quick",
+)
+@click.option(
+    "--plugin",
+    multiple=True,
+    expose_value=False,
+    callback=_load_plugins,
+    metavar="MODULE",
+    help="Import a Python module that adds shapes, tracks, measures, ...; may be given again.",
+)
+@click.version_option(None, "-V", "--version", package_name="phyblock", prog_name="phyblock")
+def phyblock() -> None:
+    """Test vision-language models on PhyBlock: 3D block assembly from pictures."""
 
 
 def main() -> None:

@@ -35,6 +35,7 @@ from phyblock.config.models import (
     SamplingSpec,
 )
 from phyblock.config.validation import (
+    BackgroundName,
     Count,
     ModelName,
     Section,
@@ -67,7 +68,6 @@ from phyblock.registry import (
 from phyblock.text import did_you_mean
 from phyblock.types import (
     AnswerFormat,
-    Background,
     CandidateOrder,
     CandidateScale,
     Criterion,
@@ -183,7 +183,7 @@ class ImagesSpec(Section):
     """Edge of a rendered picture [pixels]."""
     view: View = "oblique"
     """Where rendered scenes and candidates are seen from; questions have views of their own."""
-    background: Background | None = None
+    background: BackgroundName | None = None
     """Ground of all rendered pictures, one of the paper's six; the checkerboard is dark. null: each
     question's own, and the checkerboard for all else."""
 
@@ -281,7 +281,7 @@ class VarySpec(Section):
 
     prompt: Levels[Prompt] = ()
     """Prompts, as in the track's own field; for suites of one track."""
-    background: Levels[Background] = ()
+    background: Levels[BackgroundName] = ()
     """Grounds of rendered pictures, as images.background."""
     view: Levels[View] = ()
     """Where rendered scenes are seen from, as images.view."""

@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Hashable, Iterator, Mapping
-from typing import Annotated, Any, Self, TypeVar, get_args
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Self, TypeVar, get_args
 
 from pydantic import (
     AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
+    PlainValidator,
     ValidationError,
     model_validator,
 )
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic_core import ErrorDetails, PydanticCustomError, PydanticKnownError
 
 from phyblock.config.yaml import FieldPath, YamlSource, dotted, looks_secret, show
+from phyblock.domain.blocks import BLOCK_TYPES, BlockType
+from phyblock.domain.question import SUBTASKS, Subtask
 from phyblock.errors import Problem
 from phyblock.text import did_you_mean
+from phyblock.types import BACKGROUNDS, Background
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 ItemT = TypeVar("ItemT", bound=Hashable)
@@ -99,6 +103,31 @@ TopP = Annotated[float, Field(strict=True, gt=0, le=1, allow_inf_nan=False)]
 TimeoutS = Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)]
 ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._:+-]{0,79}$")]
 """Names of models become names of folders and rows of tables, hence the narrow alphabet."""
+
+
+def one_of(words: Sequence[str], built_in: Any) -> PlainValidator:
+    """Return the check of a word that is in a list when it is read: plugins add words to it.
+
+    JSON Schemas name the built-in ones.
+    """
+
+    def checked(word: object) -> object:
+        if word in words:
+            return word
+        expected = " or ".join(f"'{each}'" for each in words)
+        raise PydanticKnownError("literal_error", {"expected": expected})
+
+    return PlainValidator(checked, json_schema_input_type=built_in)
+
+
+if TYPE_CHECKING:
+    ShapeName = BlockType
+    BackgroundName = Background
+    SubtaskName = Subtask
+else:
+    ShapeName = Annotated[str, one_of(BLOCK_TYPES, BlockType)]
+    BackgroundName = Annotated[str, one_of(BACKGROUNDS, Background)]
+    SubtaskName = Annotated[str, one_of(SUBTASKS, Subtask)]
 
 
 def prompt_check(*words: str) -> Callable[[str], str]:

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, StrictInt, Tag
 
+from phyblock.config.validation import BackgroundName, ShapeName, SubtaskName
 from phyblock.data.base import Dataset, QuestionSet, QuestionTask, read_lines, read_text
 from phyblock.data.scenes import (
     MAX_BLOCKS,
@@ -25,14 +26,13 @@ from phyblock.data.scenes import (
     plain,
     triple,
 )
-from phyblock.domain.blocks import BlockType, Color
+from phyblock.domain.blocks import Color
 from phyblock.domain.question import (
     LETTERS,
     Category,
     Mark,
     Question,
     QuestionPicture,
-    Subtask,
     category_of,
     is_picture_option,
 )
@@ -60,7 +60,7 @@ class StoredPose(Line, extra="ignore"):
 class StoredKind(Line, extra="ignore"):
     """The kind of a block in a picture."""
 
-    type: BlockType
+    type: ShapeName
     """Its shape."""
     color: Color
     """Its color."""
@@ -202,7 +202,7 @@ class StoredQuestion(Line, extra="forbid"):
 
     id: Name
     """Unique in the file."""
-    subtask: Subtask
+    subtask: SubtaskName
     """The letters of its subtask, as above."""
     category: Category | None = None
     """The category of the paper that the subtask belongs to."""
@@ -218,7 +218,7 @@ class StoredQuestion(Line, extra="forbid"):
     """`A` to `D`; for ordering all four letters in the right order, like `BADC`."""
     colors: dict[str, Color] = Field(default_factory=dict)
     """Colors of blocks that are recolored, by order; left out where none is."""
-    background: Background | None = None
+    background: BackgroundName | None = None
     """Ground of all its pictures; left out where a run's own is drawn, as in older sets."""
     pictures: Annotated[tuple[StoredPicture, ...], Field(min_length=1, max_length=_MOST_PICTURES)]
     """Its pictures."""

@@ -19,9 +19,10 @@ from pydantic import (
     WithJsonSchema,
 )
 
+from phyblock.config.validation import ShapeName
 from phyblock.data.base import AssemblyTask, Dataset, read_lines, read_text
 from phyblock.domain.aov import AOVGraph, CycleError
-from phyblock.domain.blocks import BlockType, Color
+from phyblock.domain.blocks import Color
 from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, CandidateSet, Scene
 from phyblock.records.line import Fault, Line, checked, refuse, shown, validated, worded
 
@@ -118,7 +119,7 @@ class StoredBlock(Line, extra="ignore"):
 
     order: Order
     """Its number, from 1, unique in the scene."""
-    type: BlockType
+    type: ShapeName
     """Its shape."""
     color: Color
     """Its color."""
@@ -154,7 +155,7 @@ class StoredBlock(Line, extra="ignore"):
 class StoredCandidate(Line, extra="ignore"):
     """A block of the dictionary shown to a model."""
 
-    type: BlockType
+    type: ShapeName
     """Its shape."""
     color: Color
     """Its color."""

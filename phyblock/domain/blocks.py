@@ -14,7 +14,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,8 @@ Euler = tuple[float, float, float]
 Outline = NDArray[np.float64]
 """Corners of a polygon, shape (n, 2) [m], counter-clockwise."""
 
-BLOCK_TYPES: tuple[BlockType, ...] = get_args(BlockType)
+BLOCK_TYPES: list[BlockType] = [*get_args(BlockType)]
+"""Those of the paper, then those that plugins add."""
 COLORS: tuple[Color, ...] = get_args(Color)
 
 DENSITY_KG_M3 = 1040.0
@@ -332,6 +333,15 @@ SHAPES: dict[BlockType, Shape] = {
 arch that is `open+y` stands on one end with its hole to +y. `x` and `y` name the direction of the
 long side, and for `upright` slabs the one that the slab is thin in.
 """
+
+
+def add_shape(name: str, shape: Shape) -> None:
+    """Add a type of block. Raises ValueError for a name that is taken."""
+    if name in SHAPES:
+        raise ValueError(f"there is a shape of this name: {name}")
+    SHAPES[cast(BlockType, name)] = shape
+    BLOCK_TYPES.append(cast(BlockType, name))
+
 
 KIT_PALETTE: tuple[tuple[BlockType, Color], ...] = tuple(
     sorted(

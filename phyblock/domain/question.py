@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, get_args
+from typing import Any, Literal, cast, get_args
 
 from phyblock.domain.scene import Block, Scene
 from phyblock.types import Background
@@ -16,16 +16,16 @@ Category = Literal[
     "object_property", "object_relationship", "scene_understanding", "dynamic_reasoning"
 ]
 
-SUBTASKS: tuple[Subtask, ...] = get_args(Subtask)
-"""Subtasks in the order of the paper's Table 2."""
-CATEGORIES: Mapping[Category, tuple[Subtask, ...]] = {
+SUBTASKS: list[Subtask] = [*get_args(Subtask)]
+"""Subtasks in the order of the paper's Table 2, then those that plugins add."""
+CATEGORIES: dict[Category, tuple[Subtask, ...]] = {
     "object_property": ("SH", "CO", "SI", "NU"),
     "object_relationship": ("RP", "AP", "RD", "RR"),
     "scene_understanding": ("OC", "LC", "TC", "VP"),
     "dynamic_reasoning": ("CF", "PD", "OR", "AD"),
 }
 """The four categories of paper section 3.3 and their subtasks."""
-SUBTASK_NAMES: Mapping[Subtask, str] = {
+SUBTASK_NAMES: dict[Subtask, str] = {
     "SH": "shape",
     "CO": "color",
     "SI": "size",
@@ -45,6 +45,16 @@ SUBTASK_NAMES: Mapping[Subtask, str] = {
 }
 LETTERS = "ABCD"
 """The options of a question, in order."""
+
+
+def add_subtask(code: str, name: str, category: Category) -> None:
+    """Add a kind of question to a category. Raises ValueError for a code that is taken."""
+    if code in SUBTASK_NAMES:
+        raise ValueError(f"there is a subtask of this code: {code}")
+    subtask = cast(Subtask, code)
+    SUBTASKS.append(subtask)
+    SUBTASK_NAMES[subtask] = name
+    CATEGORIES[category] = (*CATEGORIES[category], subtask)
 
 
 def category_of(subtask: Subtask) -> Category:

@@ -13,6 +13,7 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from PIL import Image, ImageFilter
 
 from phyblock.sim.camera import Camera
 from phyblock.sim.raster import Rgb
-from phyblock.types import Background
+from phyblock.types import BACKGROUNDS, Background
 
 Grid = NDArray[np.float32]
 """One number a texel or pixel, shape (n, n)."""
@@ -177,6 +178,16 @@ GROUNDS: dict[Background, Ground] = {
     "concrete": Ground(0.3, DARK_INK, (98, 98, 96), INK_RGB, texture=_concrete),
     "lawn": Ground(0.48, LIGHT_INK, (158, 180, 120), (250, 253, 244), texture=_lawn),
 }
+
+
+def add_background(name: str, ground: Ground) -> None:
+    """Add a background. Raises ValueError for a name that is taken."""
+    if name in GROUNDS:
+        raise ValueError(f"there is a background of this name: {name}")
+    GROUNDS[cast(Background, name)] = ground
+    BACKGROUNDS.append(cast(Background, name))
+
+
 TEXTURED: tuple[Background, ...] = tuple(name for name, one in GROUNDS.items() if one.texture)
 
 

@@ -15,7 +15,14 @@ import numpy as np
 from pydantic import Field
 
 from phyblock.config.suite import Suite
-from phyblock.config.validation import Count, Flag, PictureControls, TemplateName, UniqueSome
+from phyblock.config.validation import (
+    Count,
+    Flag,
+    PictureControls,
+    SubtaskName,
+    TemplateName,
+    UniqueSome,
+)
 from phyblock.data import (
     QUESTIONS_FILE,
     Dataset,
@@ -88,7 +95,9 @@ class VqaSpec(PictureControls):
         description="The name of a bundled question set (phyblock-vqa), or a folder; relative "
         "as dataset.path. Its scenes are those of dataset.",
     )
-    subtasks: UniqueSome[Subtask] = Field(default=SUBTASKS, description="Subtasks to ask about.")
+    subtasks: UniqueSome[SubtaskName] = Field(
+        default=(*SUBTASKS,), description="Subtasks to ask about."
+    )
     per_subtask: Count | None = Field(
         default=None, description="Questions of each subtask at most; null: all."
     )

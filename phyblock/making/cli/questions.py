@@ -93,7 +93,7 @@ def generate(
     on any Python, any number of processes or a cluster.
     """
     check_place(out, replace)
-    wanted = {subtask: per_subtask or PER_SUBTASK[subtask] for subtask in subtasks}
+    wanted = {subtask: per_subtask or PER_SUBTASK.get(subtask, 150) for subtask in subtasks}
     read = read_data_set(data)
     scenes = [task.scene for task in read.tasks]
     console = make_console(stderr=True)

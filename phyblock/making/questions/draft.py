@@ -18,7 +18,7 @@ from phyblock.errors import PhyblockError
 T = TypeVar("T")
 Option = str | QuestionPicture | Mark
 """A text; a picture, labeled later; or a place, which is marked in the first picture."""
-WORDINGS: Mapping[str, str] = {
+WORDINGS: dict[str, str] = {
     f"{stem}-{number}": text
     for stem, texts in yaml.safe_load(
         Path(__file__).with_name("wordings.yaml").read_text(encoding="utf-8")
@@ -26,6 +26,11 @@ WORDINGS: Mapping[str, str] = {
     for number, text in enumerate(texts, 1)
 }
 """All templates by id: subtask, kind where there are several, and number (`rp-corner-2`)."""
+
+
+def add_wordings(stem: str, texts: Sequence[str]) -> None:
+    """Add templates under the ids `stem-1`, `stem-2` and so on."""
+    WORDINGS.update({f"{stem}-{number}": text for number, text in enumerate(texts, 1)})
 
 
 class UnfairError(PhyblockError):

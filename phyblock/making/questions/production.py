@@ -34,7 +34,7 @@ from phyblock.making.questions.viewpoint import ViewpointMaker
 from phyblock.making.workers import Workers
 from phyblock.types import BACKGROUNDS, Background
 
-MAKERS: Mapping[Subtask, Maker] = {
+MAKERS: dict[Subtask, Maker] = {
     maker.subtask: maker
     for maker in (
         PropertyMaker("SH"),
@@ -55,7 +55,7 @@ MAKERS: Mapping[Subtask, Maker] = {
         AffordanceMaker(),
     )
 }
-"""The makers of questions, by subtask."""
+"""The makers of questions, by subtask; plugins add theirs."""
 PER_SUBTASK: Mapping[Subtask, int] = {s: 50 if s in ("OR", "AD") else 150 for s in SUBTASKS}
 """Questions of each subtask in the built-in set: 2,200 together, as in the paper."""
 _DIGITS = 6

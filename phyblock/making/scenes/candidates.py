@@ -86,7 +86,8 @@ def _rates(palette: tuple[Kind, ...]) -> dict[Candidate, float]:
     colors = Counter(block_type for block_type, _ in palette)
     rates = {}
     for block_type, color in palette:
-        for pose, needed in NEEDED[block_type].items():
+        added = dict.fromkeys(POSES[block_type], _EVEN_SHARE)
+        for pose, needed in NEEDED.get(block_type, added).items():
             share = needed / colors[block_type]
             drawn = min(share * (1 / _EVEN_SHARE - 1) / (1 - share), _MOST_DRAWN)
             one = Candidate(block_type, color, POSES[block_type][pose])
@@ -100,7 +101,7 @@ def _waiting(candidate: Candidate, rate: float, salt: str) -> float:
 
 
 def _place(candidate: Candidate, salt: str) -> tuple[int, float]:
-    return _TIERS[candidate.type], _drawn(candidate, f"{salt}/place")
+    return _TIERS.get(candidate.type, len(_RISING)), _drawn(candidate, f"{salt}/place")
 
 
 def _drawn(candidate: Candidate, salt: str) -> float:

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from phyblock.config.validation import ShapeName
 from phyblock.config.yaml import YamlSource, read_yaml
 from phyblock.data.base import lines_of, parse_json, read_json, read_text
 from phyblock.data.scenes import (
@@ -28,7 +29,7 @@ from phyblock.data.scenes import (
     triple,
 )
 from phyblock.domain.aov import CycleError
-from phyblock.domain.blocks import KIT_PALETTE, BlockType, Color
+from phyblock.domain.blocks import KIT_PALETTE, Color
 from phyblock.domain.scene import Block, CandidateSet, Scene
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.making.checks import LEVEL_LIMITS, OURS_IN_HASTE, CheckName, SceneFacts, findings_of
@@ -163,7 +164,7 @@ _PART = re.compile(r"\[(\d+)\]|([^.\[\]]+)")
 class GivenBlock(Line, extra="forbid"):
     """A block at its goal pose; `layer` and `depend` may be there and are derived all the same."""
 
-    type: BlockType
+    type: ShapeName
     color: Color
     position: Position
     euler: Annotated[Angles, EITHER_NAME] = (0, 0, 0)
