@@ -40,8 +40,8 @@ _POLL_S = 0.01
 _NOT_WRITTEN = 120
 
 _PRELOADED = ("PIL.GifImagePlugin", "PIL.JpegPresets", "aiohttp", "matplotlib.backends.backend_agg",
-              "matplotlib.backends.backend_svg", "matplotlib.pyplot", "phyblock.report.html.write",
-              "phyblock.results.tables", "sqlite3", "yarl")  # fmt: skip
+              "matplotlib.backends.backend_svg", "matplotlib.pyplot", "phyblock.results.tables",
+              "phyblock.web.report", "sqlite3", "yarl")  # fmt: skip
 
 
 @dataclass(frozen=True)

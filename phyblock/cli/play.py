@@ -20,12 +20,6 @@ from phyblock.cli.results import show_tables
 from phyblock.config.suite import load_suite
 from phyblock.errors import Problem, SpecError, reason_of
 from phyblock.files import read_text
-from phyblock.play.answers import FileAnswers, default_text, read_answers
-from phyblock.play.export import check_folder, check_offline, export_sitting
-from phyblock.play.page import default_consent
-from phyblock.play.person import Person, PersonModel, plan_sitting
-from phyblock.play.server import Server
-from phyblock.play.sitting import Sitting, report_files
 from phyblock.resources import bundled
 from phyblock.run.execute import RunResult
 from phyblock.run.plan import RunPlan
@@ -33,6 +27,15 @@ from phyblock.run.preflight import bundled_suites, find_suite, prompt_dirs
 from phyblock.run.session import Session
 from phyblock.run.store import held_run, run_folder
 from phyblock.text import counted
+from phyblock.web.answers import (
+    FileAnswers,
+    check_folder,
+    check_offline,
+    export_session,
+    read_answers,
+)
+from phyblock.web.server import Server, default_consent
+from phyblock.web.session import Person, PersonModel, PlaySession, plan_session, report_files
 
 _INTERRUPTED = 130
 _RUNS = Path("results")
@@ -98,15 +101,13 @@ def play(
         raise SpecError(Problem("--export", "cannot be given with --import"))
     if consent is not None:
         text = _consent(consent)
-    elif answers is not None:
-        text = default_text(answers)
     else:
-        text = default_consent(offline=export is not None)
+        text = default_consent(offline=export is not None or answers is not None)
     person = Person(name, number, text)
     path = find_suite(suite)
     data, prompts = bundled("benchmarks", "data"), prompt_dirs(path)
     loaded = load_suite(path, sets, data_dir=data, prompt_dirs=prompts)
-    plan = plan_sitting(loaded, person, limit)
+    plan = plan_session(loaded, person, limit)
     console = make_console()
     if export is not None or answers is not None:
         check_offline(plan)
@@ -115,7 +116,7 @@ def play(
         return _export(console, plan, person, export)
     folder = out or plan.folder_in(_RUNS)
     if held_run(folder, plan.manifest) is not None:
-        from phyblock.report.files import files_of
+        from phyblock.web.report import files_of
 
         run_folder(folder).check(files_of(page=True))
     if answers is not None:
@@ -144,7 +145,7 @@ def _export(console: Console, plan: RunPlan, person: Person, folder: Path) -> in
             def done(number: int) -> None:
                 progress.update(drawing, completed=number)
 
-            page = asyncio.run(export_sitting(plan, person, folder, done))
+            page = asyncio.run(export_session(plan, person, folder, done))
     finally:
         plan.close()
     tasks = counted(plan.samples_per_model, "task")
@@ -193,8 +194,8 @@ def _serve(
     opens: bool,
 ) -> int:
     # Tables are made of pandas, which a session does without until its end.
-    from phyblock.play.outcomes import outcomes
     from phyblock.results.load import load_run
+    from phyblock.web.session import outcomes
 
     for other in beside:
         load_run(other, texts=False)
@@ -206,9 +207,9 @@ def _serve(
             # A browser for terminals would not come back before it is closed.
             Thread(target=webbrowser.open, args=(server.one_time_address,), daemon=True).start()
 
-    sitting = Sitting(plan, person, folder, begun)
-    with Server(sitting.desk, port) as server:
-        result = asyncio.run(sitting.run())
+    session = PlaySession(plan.samples_per_model)
+    with Server(session, port) as server:
+        result = asyncio.run(session.run(plan, person, folder, begun))
         if result.left:
             console.print(f"{result.settled:,} of {result.samples:,} tasks are answered.")
             console.print("To go on, give the same command again:")
@@ -216,7 +217,7 @@ def _serve(
             return _INTERRUPTED
         made = show_tables(folder, plan.suite.tables, page=True)
         server.show_files(report_files(folder))
-        sitting.desk.finish(outcomes(folder, person.model, beside))
+        session.finish(outcomes(folder, person.model, beside))
         print_path(console, made)
         console.print("All is answered; the page shows how it went. Ctrl-C ends.", style="dim")
         with contextlib.suppress(KeyboardInterrupt):

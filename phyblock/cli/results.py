@@ -102,12 +102,15 @@ def show_tables(
 
     Prints the summary; returns the page, or the folder of tables where no page is wanted.
     """
-    from phyblock import report as maker
-    from phyblock.results.tables import summary_of
+    from phyblock.results.tables import summary_of, write_tables
 
-    written = maker.write_tables(folder, tables)
+    written = write_tables(folder, tables)
     _print_summary(make_console(), summary_of(written.run))
-    return maker.write_report(written, data) if page else written.folder
+    if not page:
+        return written.folder
+    from phyblock.web.report import write_report
+
+    return write_report(written, data)
 
 
 def _print_summary(console: Console, summary: Summary) -> None:
@@ -379,7 +382,7 @@ def site(runs: tuple[Path, ...], out: Path, data: tuple[Path, ...], title: str) 
     The folder opens from disk or from any web server. Runs must be of one data version and prompt.
     Bundles are scored again first, and those that do not verify are refused.
     """
-    from phyblock.site import write_site
+    from phyblock.web.leaderboard import write_site
 
     console = make_console()
     made = write_site(runs, out, data, title)

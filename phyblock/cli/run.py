@@ -110,7 +110,7 @@ def run(
     found = held_run(folder, plan.manifest)
     remarks = [] if found is None else moved_remarks(found, plan)
     if found is not None:
-        from phyblock.report.files import files_of
+        from phyblock.web.report import files_of
 
         run_folder(folder).check(() if dry_run else files_of(page=not no_report))
     asks = {"use_cache": not no_cache, "retry_failed": retry_failed}

@@ -15,11 +15,10 @@ from rich.cells import cell_len
 
 from phyblock.cli.console import make_console, print_table
 from phyblock.cli.progress import ProgressView
-from phyblock.report import Column, TextTable, to_latex, to_markdown, write_tables
 from phyblock.results.export import export_run
 from phyblock.results.load import load_run
-from phyblock.results.tables import summary_of
-from phyblock.results.text import to_csv
+from phyblock.results.tables import summary_of, write_tables
+from phyblock.results.text import Column, TextTable, to_csv, to_latex, to_markdown
 from phyblock.run.events import RunStarted
 from tests.report.factory import LEVELS, manifest, record, score, write_run
 

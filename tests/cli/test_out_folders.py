@@ -15,7 +15,8 @@ from click.testing import CliRunner
 from phyblock.cli.main import phyblock
 from phyblock.errors import StoreError
 from phyblock.files import LIST
-from phyblock.report import write_report, write_tables
+from phyblock.results.tables import write_tables
+from phyblock.web.report import write_report
 from tests.report.factory import LEVELS, manifest, record, score, write_run
 from tests.workspace import COMMAND, Workspace
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.data.published_names import PUBLISHED_NAMES, TABLE2_NAMES, match_published
-from phyblock.report import published_table
+from phyblock.results.paper import published_table
 
 SPELLINGS = {
     "claude-3-5-haiku": "Claude-3.5 Haiku",

@@ -9,7 +9,7 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.play.order import arranged, row_of_name, williams_row, williams_rows
+from phyblock.web.session import Person, arranged, williams_row, williams_rows
 
 
 @given(st.integers(1, 24))
@@ -43,4 +43,5 @@ def test_a_row_holds_every_item_once_in_whatever_order_they_come(
 
 
 def test_a_name_alone_draws_a_row_that_stays() -> None:
-    assert row_of_name("ada") == row_of_name("ada") != row_of_name("bob")
+    ada, again, bob = (Person(name, None, "May we?").row for name in ("ada", "ada", "bob"))
+    assert ada == again != bob

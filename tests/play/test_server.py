@@ -16,21 +16,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.errors import SpecError
-from phyblock.play.desk import Desk
-from phyblock.play.server import LARGEST_BODY_BYTES, Server
-from phyblock.play.shown import Place
+from phyblock.web.server import LARGEST_BODY_BYTES, Server
+from phyblock.web.session import PlaySession
 
 
 @pytest.fixture(scope="module")
-def desk() -> Desk:
-    desk = Desk(lambda: Place(1, 1))
-    desk.welcome({"name": "ada", "consent": "May we?", "done": 0, "of": 1})
-    return desk
+def session() -> PlaySession:
+    session = PlaySession(1)
+    session.welcome({"name": "ada", "consent": "May we?", "done": 0, "of": 1})
+    return session
 
 
 @pytest.fixture(scope="module")
-def server(desk: Desk) -> Iterator[Server]:
-    with Server(desk) as running:
+def server(session: PlaySession) -> Iterator[Server]:
+    with Server(session) as running:
         yield running
 
 
@@ -148,13 +147,17 @@ def test_other_paths_hold_nothing(server: Server, path: str) -> None:
     ],
 )
 def test_what_is_no_answer_is_refused_and_changes_nothing(
-    server: Server, desk: Desk, status: int, body: bytes | None, headers: dict[str, str | None]
+    server: Server,
+    session: PlaySession,
+    status: int,
+    body: bytes | None,
+    headers: dict[str, str | None],
 ) -> None:
-    before = desk.state(-1)
+    before = session.state(-1)
     answer = ask(server, "POST", "/{token}/answer", body, **headers)
     assert answer.status == status
     assert bool(answer.body) == (status == 400)
-    assert desk.state(-1) == before
+    assert session.state(-1) == before
 
 
 @pytest.mark.parametrize("method", ["PUT", "DELETE", "OPTIONS", "HEAD"])
@@ -172,9 +175,9 @@ def test_only_files_that_were_named_are_served(server: Server, tmp_path: Path) -
     server.show_files({})
 
 
-def test_a_port_that_is_taken_is_a_clear_error(server: Server, desk: Desk) -> None:
+def test_a_port_that_is_taken_is_a_clear_error(server: Server, session: PlaySession) -> None:
     with pytest.raises(SpecError, match="--port: cannot be used"):
-        Server(desk, server.port)
+        Server(session, server.port)
 
 
 def test_no_path_shows_up_in_an_answer(server: Server) -> None:
@@ -219,10 +222,10 @@ def test_whatever_is_asked_for_is_answered_with_a_refusal(
 
 @pytest.mark.parametrize("resets", [True, False])
 def test_who_leaves_while_waiting_leaves_no_word_on_the_terminal(
-    server: Server, desk: Desk, resets: bool, capfd: pytest.CaptureFixture[str]
+    server: Server, session: PlaySession, resets: bool, capfd: pytest.CaptureFixture[str]
 ) -> None:
     before = threading.active_count()
-    path = f"/{token(server)}/state?after={desk.state(-1)['change']}"
+    path = f"/{token(server)}/state?after={session.state(-1)['change']}"
     lines = f"GET {path} HTTP/1.1\r\nHost: {server.hosts[0]}\r\n\r\n"
     # The second is asked for on the same connection, which is gone when it is read.
     connection = send(server, 2 * lines.encode())
@@ -231,7 +234,7 @@ def test_who_leaves_while_waiting_leaves_no_word_on_the_terminal(
     if resets:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     connection.close()
-    desk.welcome(desk.state(-1)["about"])
+    session.welcome(session.state(-1)["about"])
     until_idle(before)
     assert capfd.readouterr() == ("", "")
 

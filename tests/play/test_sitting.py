@@ -20,13 +20,10 @@ import pytest
 
 from phyblock.errors import DataError
 from phyblock.models import Message, Request
-from phyblock.play.answers import default_text, read_answers
-from phyblock.play.desk import Desk
-from phyblock.play.page import default_consent
-from phyblock.play.server import Server
-from phyblock.play.shown import Place, shown
-from phyblock.stable import hex_digest
 from phyblock.tracks.by_hand import Choice, NumberField, Picking
+from phyblock.web.answers import read_answers
+from phyblock.web.server import Server, default_consent
+from phyblock.web.session import Place, PlaySession, shown
 from tests.browser import Visit
 from tests.fork_server import Forked, fork_server
 from tests.vqa_set import questions, write_questions
@@ -356,9 +353,9 @@ def test_what_no_picture_shows_is_picked_by_a_button_beside_number_fields(browse
         fields=(NumberField("x", "cm", 10.0, decimals=1, step=0.5, leap=5.0),),
     )
     request = Request("a", 0, (Message("user", ("What goes where?",)),), {}, "v", None)
-    desk = Desk(lambda: Place(1, 1))
-    desk.welcome({"name": "ada", "consent": "May we?", "done": 0, "of": 1})
-    with Server(desk) as server:
+    session = PlaySession(1)
+    session.welcome({"name": "ada", "consent": "May we?", "done": 0, "of": 1})
+    with Server(session) as server:
         page = opened(browser, server.address).page
         main = (
             'Picker.show(document.getElementById("main"), question, one => { window.sent = one; })'
@@ -498,7 +495,7 @@ def check_nothing_is_given_away(folder: Path) -> None:
         names.update(found)
         return found
 
-    json.loads(script.removeprefix("const SITTING = ").rstrip(";\n"), object_hook=fields)
+    json.loads(script.removeprefix("const SESSION = ").rstrip(";\n"), object_hook=fields)
     assert names == SHOWN
     files = [path.relative_to(folder).as_posix() for path in folder.rglob("*")]
     assert not any(re.search(r"\bt[123]\b|-001", text) for text in (script, *files))
@@ -518,16 +515,9 @@ def check_no_picture_is_left_behind(workspace: Workspace, folder: Path) -> None:
     own.unlink()
 
 
-def test_the_text_to_agree_to_says_where_answers_are(tmp_path: Path) -> None:
-    """And a file of answers tells which of the two it was, also that of an earlier version."""
+def test_the_text_to_agree_to_says_where_answers_are() -> None:
     texts = [default_consent(offline=offline) for offline in (True, False)]
     assert ["in this browser" in text for text in texts] == [True, False]
-    file = tmp_path / "answers.json"
-    for text in texts:
-        file.write_text(json.dumps({"consent": hex_digest(text)}), encoding="utf-8")
-        assert default_text(file) == text
-    file.write_text("[]", encoding="utf-8")
-    assert default_text(file) == texts[0]
 
 
 @pytest.mark.parametrize(
@@ -593,8 +583,8 @@ def check_bad_files(workspace: Workspace, content: dict[str, Any]) -> None:
     """Files of another sitting, or that are broken, are refused as a whole."""
     first, *_, last = content["answers"]
     for change, error in (
-        ({"model": "human:eve"}, "model: is of another sitting"),
-        ({"run": "0" * 64}, "run: is of another sitting"),
+        ({"model": "human:eve"}, "model: is of another session"),
+        ({"run": "0" * 64}, "run: is of another session"),
         ({"answers": [{**first, "number": 11}]}, "answers[0].number: is no question"),
         ({"answers": [first, first]}, "answers[1].number: is there twice"),
         ({"answers": [{**first, "took_s": -1}]}, "answers[0].took_s: is no file of answers"),

@@ -12,10 +12,9 @@ from typing import Any
 import pytest
 
 from phyblock.config.suite import load_suite
-from phyblock.play.person import Person, plan_sitting
-from phyblock.play.sitting import Sitting
 from phyblock.run.execute import RunResult
 from phyblock.tracks.by_hand import picks_of
+from phyblock.web.session import Person, PlaySession, plan_session
 from tests.workspace import SCENES, Workspace
 
 RED, BLUE = 0, 2
@@ -33,29 +32,24 @@ def suite(tmp_path: Path, pictures_dir: Path, monkeypatch: pytest.MonkeyPatch) -
 
 def played(suite: Path, picks: Sequence[int]) -> tuple[RunResult, list[dict[str, Any]]]:
     """Sit down, pick these one after another, and close the sitting; what was shown."""
-    sitting = Sitting(
-        plan_sitting(
-            load_suite(suite, data_dir=suite.parent), Person("ada", None, "May we?"), None
-        ),
-        Person("ada", None, "May we?"),
-        suite.parent / "out",
-        lambda: None,
-    )
+    person = Person("ada", None, "May we?")
+    plan = plan_session(load_suite(suite, data_dir=suite.parent), person, None)
+    session = PlaySession(plan.samples_per_model)
     shown: list[dict[str, Any]] = []
 
     async def sat() -> RunResult:
-        desk, left = sitting.desk, list(picks)
-        run = asyncio.create_task(sitting.run())
+        left = list(picks)
+        run = asyncio.create_task(session.run(plan, person, suite.parent / "out", lambda: None))
         while not run.done():
             await asyncio.sleep(0.01)
-            told = desk.state(-1)
+            told = session.state(-1)
             if told["phase"] == "consent":
-                desk.agree()
+                session.agree()
             elif told["phase"] == "question" and left:
                 shown.append(told["question"])
-                desk.answer(told["change"], picks_of([left.pop(0)]))
+                session.answer(told["change"], picks_of([left.pop(0)]))
             elif told["phase"] == "question":
-                desk.close()
+                session.close()
         return await run
 
     return asyncio.run(sat()), shown

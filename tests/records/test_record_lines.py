@@ -17,7 +17,7 @@ from phyblock.errors import StoreError
 from phyblock.records import files
 from phyblock.records.files import RecordLines, known_records, newest_starts
 from phyblock.records.reply import Reply, Usage
-from phyblock.report import load_run
+from phyblock.results.load import load_run
 from tests.records.damage import DAMAGED, lines_before, plan_record, with_value
 from tests.report.factory import manifest
 

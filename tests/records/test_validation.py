@@ -14,7 +14,7 @@ from phyblock.errors import StoreError
 from phyblock.records.files import Validation, known_records
 from phyblock.records.manifest import Manifest
 from phyblock.records.record import Turn
-from phyblock.report import load_run
+from phyblock.results.load import load_run
 from phyblock.run.rescore import rescore
 from tests.records.damage import Raw, plan_record
 from tests.workspace import Workspace

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import os
+import re
+import zlib
 from bisect import bisect_right
 from pathlib import Path
 from typing import Any
@@ -14,10 +17,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.errors import DataError, StoreError
-from phyblock.report import read_design, write_report, write_tables
-from phyblock.report.html.index import SampleIndex, read_places
-from phyblock.report.html.pack import Pack
-from phyblock.report.html.samples import pack_samples
+from phyblock.results.design import read_design
+from phyblock.results.tables import write_tables
+from phyblock.web.pack import Pack, SampleIndex, pack_samples, read_places
+from phyblock.web.report import write_report
 from tests.report.factory import laws, manifest, record, record_lists, score, write_run
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
@@ -31,21 +34,9 @@ JSON = st.recursive(
 
 
 def unpacked(script: str) -> Any:
-    """The data of a script, read as JavaScript reads its string."""
-    prefix, _, rest = script.partition(",'")
-    name, _, rest = rest.partition("','")
-    quoted, end = rest[:-3], rest[-3:]
-    assert (prefix.startswith("phyblockTake('"), end) == (True, "')\n"), name
-    text, escaped = [], False
-    for character in quoted:
-        if escaped or character != "\\":
-            assert escaped or character not in "'\n\r"
-            text.append(character)
-            escaped = False
-        else:
-            escaped = True
-    assert not escaped
-    return json.loads("".join(text))
+    """The data of a script: JSON, deflated, in base 64."""
+    (packed,) = re.findall(r"^phyblockTake\('[^']*','[^']*','([A-Za-z0-9+/=]*)'\)\n$", script)
+    return json.loads(zlib.decompress(base64.b64decode(packed)))
 
 
 def write_page(folder: Path, data: Path | None = None) -> Path:

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from phyblock.report import write_report, write_tables
+from phyblock.results.tables import write_tables
 from phyblock.scoring.plan import ERROR_TYPES
+from phyblock.web.report import write_report
 from tests.browser import expect
 from tests.report.browser import ReportVisit
 from tests.report.factory import manifest, write_run
@@ -448,12 +449,7 @@ def test_each_step_finds_its_sentence(visit: ReportVisit, form: str) -> None:
 
 
 def test_why_a_step_is_wrong_is_told_in_one_script(visit: ReportVisit) -> None:
-    rooms = Path(__file__).parents[2] / "phyblock"
-    scripts = [
-        path
-        for room in ("play", "report/html", "site")
-        for path in rooms.glob(f"{room}/assets/*.js")
-    ]
+    scripts = [*(Path(__file__).parents[2] / "phyblock/web/assets").glob("*.js")]
     for error in ERROR_TYPES:
         telling = [
             path.name for path in scripts if re.search(rf"\b{error}\b", path.read_text("utf-8"))

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 
 from phyblock.errors import SpecError
-from phyblock.report import Run
 from phyblock.results.compare import (
     Side,
     comparable,
@@ -22,6 +21,7 @@ from phyblock.results.compare import (
     ranks_view,
     write_comparison,
 )
+from phyblock.results.load import Run
 from tests.report.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
 
 Records = list[dict[str, Any]]

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.errors import StoreError
-from phyblock.report import load_run
+from phyblock.results.load import load_run
 from phyblock.sim.engine import ENGINES
 from tests.report.factory import (
     laws,

@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 
 from phyblock.config.suite import VarySpec
-from phyblock.report.html.leads import table_leads
 from phyblock.results.compare import compare_models, flipped_lines
 from phyblock.results.figures import sensitivity
 from phyblock.results.load import Run
@@ -97,18 +96,3 @@ def test_what_flipped_says_in_which_way_it_was_asked() -> None:
     named = ",".join(f"{name}={level}" for name, level in variant.items())
     assert row["variant"] == named != ""
     assert flipped_lines(found) == (f"alpha is right where beta is not, 1: s00 ({named})",)
-
-
-@pytest.mark.parametrize(
-    ("design", "led"),
-    [("crossed", {"background", "view", "between items"}), ("one_at_a_time", {"between items"})],
-)
-def test_what_all_ways_of_asking_gave_leads_to_all_samples(design: str, led: set[str]) -> None:
-    vary = {**VARY, "design": design}
-    run = run_of(asked({"alpha": 4}, vary=vary), facts("alpha", vary=vary))
-    view = sensitivity_view(sensitivity_frame(run), run)
-    leads = dict(
-        zip((row[1] for row in view.rows), table_leads(run, "sensitivity", view).rows, strict=True)
-    )
-    assert {name for name, lead in leads.items() if lead} == led
-    assert {lead for lead in leads.values() if lead} == {"track=full_planning&model=alpha"}

@@ -154,9 +154,9 @@ def killed_at(workspace: Workspace, server: BatchServer, number: int, extra_s: f
         if next(count) == number:
             first.wait(30)
             time.sleep(extra_s)
+            reached.set()
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pids[0], signal.SIGKILL)
-            reached.set()
 
     server.moment = moment
     with workspace.start("--yes") as process:

@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from phyblock import load_run
-from phyblock.report import write_tables
+from phyblock.results.tables import write_tables
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Raw, Workspace

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.domain import CATEGORIES, LETTERS
-from phyblock.report import published_table
+from phyblock.results.paper import published_table
 from phyblock.scoring.counts import chance, letter_rates
 
 ROUNDING = 0.05 + 1e-9

@@ -17,17 +17,21 @@ from phyblock.bundle import bundle_run
 from phyblock.errors import SpecError, StoreError
 from phyblock.records.files import known_records
 from phyblock.records.record import Record
-from phyblock.report.html.ranked import rank_texts
-from phyblock.report.html.sources import Sources
 from phyblock.results.estimates import track_measures
-from phyblock.site import write as site_write
-from phyblock.site import write_site
-from phyblock.site.alike import check_runs_alike
-from phyblock.site.board import all_values, board_of
-from phyblock.site.entries import entries_of
-from phyblock.site.runs import SiteRun, open_runs
-from phyblock.site.values import values_of
 from phyblock.tracks.kind import kind_of
+from phyblock.web import leaderboard
+from phyblock.web.leaderboard import (
+    SiteRun,
+    all_values,
+    board_of,
+    check_runs_alike,
+    entries_of,
+    open_runs,
+    values_of,
+    write_site,
+)
+from phyblock.web.pack import Sources
+from phyblock.web.report import rank_texts
 from tests.report.factory import manifest, record, run_of, score
 from tests.workspace import Workspace
 
@@ -132,7 +136,7 @@ def test_days_are_those_on_which_a_reply_was_asked_for_and_else_not_known() -> N
     ]
     run = run_of(records, manifest(models=how, seeds=[0]))
     facts = values_of(run, "full_planning").facts
-    assert {model: (fact.asked, fact.cached) for model, fact in facts.items()} == {
+    assert {model: (fact["asked"], fact["cached"]) for model, fact in facts.items()} == {
         "called": (("2026-11-20", "2026-11-21"), 0),
         "partly": (("2026-11-20", "2026-11-20"), 1),
         "cached": (None, 2),
@@ -236,23 +240,22 @@ def test_runs_that_differ_in_what_decides_are_refused_with_what_differs(
     assert ("--limit" in problem.hint) == (field == "dataset.sha256")
 
 
-def carried_out(version: int | None) -> dict[str, Any]:
+def carried_out(version: int) -> dict[str, Any]:
     facts = in_track("pose_planning")
     own = facts["tracks"]["pose_planning"]
-    named = {} if version is None else {"carrying": version}
-    return {**facts, "tracks": {"pose_planning": {**own, **named}}}
+    return {**facts, "tracks": {"pose_planning": {**own, "carrying": version}}}
 
 
-@pytest.mark.parametrize(("before", "after"), [(None, 2), (2, None), (1, 2)])
+@pytest.mark.parametrize(("before", "after"), [(2, 1), (1, 2)])
 def test_plans_that_were_carried_out_otherwise_do_not_stand_in_one_table(
-    before: int | None, after: int | None
+    before: int, after: int
 ) -> None:
     first, other = (site_run(f"{n}", **carried_out(n)) for n in (before, after))
     with pytest.raises(SpecError) as caught:
         check_runs_alike([first, other])
     (problem,) = caught.value.problems
     assert problem.field == "tracks.pose_planning.carrying"
-    assert (problem.found, problem.allowed) == (str(after or 1), str(before or 1))
+    assert (problem.found, problem.allowed) == (str(after), str(before))
     assert "run the older one again" in problem.hint
     measures = {measure.name: measure for measure in track_measures("pose_planning")}
     check = kind_of("pose_planning").report().check_alike
@@ -296,11 +299,11 @@ def test_a_build_that_was_stopped_never_looks_whole_and_what_is_not_ours_stays(
     (out / "CNAME").write_text("example.org")
     before = tree(out)
 
-    def stopped(*_: object) -> str:
+    def stopped(*_: object, **__: object) -> str:
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(site_write, "render_page", stopped)
+        patched.setattr(leaderboard, "fill", stopped)
         for place in (tmp_path / "new", out):
             with pytest.raises(KeyboardInterrupt):
                 write_site([made.root / "later"], place, title="Two")

@@ -14,10 +14,11 @@ import pytest
 
 from phyblock import registry
 from phyblock.cli.main import phyblock
-from phyblock.report import write_report, write_tables
+from phyblock.results.tables import write_tables
 from phyblock.run.rescore import rescore
 from phyblock.scoring.counts import ratio_of
 from phyblock.tracks.measures import Measure, SampleCounts
+from phyblock.web.report import write_report
 from tests.vqa_set import write_questions
 from tests.workspace import Workspace
 

@@ -16,17 +16,15 @@ import pytest
 from phyblock import registry
 from phyblock.cli.main import phyblock
 from phyblock.errors import SpecError
-from phyblock.report.html.headline import headlines
-from phyblock.report.html.page import render_page
-from phyblock.report.html.sources import Sources
 from phyblock.results.compare import comparable, compare_models
+from phyblock.results.estimates import main_column
 from phyblock.results.load import Run, load_run
-from phyblock.site.board import all_values, board_of
-from phyblock.site.entries import entries_of
-from phyblock.site.runs import SiteRun
-from phyblock.site.values import values_of
+from phyblock.results.tables import write_tables
 from phyblock.tracks import TrackKind
 from phyblock.tracks.measures import WHOLE, HeadlineColumn, Measure
+from phyblock.web.leaderboard import SiteRun, all_values, board_of, entries_of, values_of
+from phyblock.web.pack import Sources
+from phyblock.web.report import headlines, write_report
 from tests.tracks.test_fourth_track import ERROR, EXACT, TRACK
 from tests.workspace import Workspace
 
@@ -62,7 +60,9 @@ def test_the_leading_measure_leads_everywhere(run: Run) -> None:
         show(kind)
         assert comparable(run, "counting").measure == leading
         assert compare_models(run).name == leading.heading
-        assert [table.strip_name for table in headlines(run)] == [kind.report().main or "Overall"]
+        assert [table.columns[0] for table in headlines(run)] == [
+            main_column(run, "counting").heading
+        ]
         worth = values_of(run, "counting").samples["oracle"].values()
         assert set(worth) == {leading.best}
 
@@ -71,11 +71,8 @@ def test_the_leading_measure_leads_everywhere(run: Run) -> None:
 def test_shares_alone_are_drawn_on_a_scale_to_100(run: Run, measure: Measure) -> None:
     show(led_by(measure, measure))
     tables = headlines(run)
-    page = render_page(
-        about={"title": "Run", "facts": [], "description": ""}, cautions=(), headlines=tables,
-        figures=(), tables=(), models=run.design.model_names, folder="report", build="build",
-    )  # fmt: skip
-    (found,) = re.findall("<table.*?</table>", page, re.DOTALL)
+    page = write_report(write_tables(run.path), figures=False).read_text(encoding="utf-8")
+    found = re.findall("<table.*?</table>", page, re.DOTALL)[0]
     table = fromstring(found)
     n_drawn = len(run.design.model_names) if measure.is_share else 0
     assert sum(bool(row.strip) for row in tables[0].rows) == n_drawn

@@ -12,8 +12,9 @@ import pytest
 
 from phyblock import registry
 from phyblock.errors import StoreError
-from phyblock.report import load_run, write_tables
 from phyblock.results.estimates import track_estimates, track_measures
+from phyblock.results.load import load_run
+from phyblock.results.tables import write_tables
 from phyblock.scoring.counts import ratio_of
 from phyblock.tracks.kind import kind_of
 from phyblock.tracks.measures import Measure, SampleCounts

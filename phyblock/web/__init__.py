@@ -1,0 +1,1 @@
+"""Pages: the report of a run, the leaderboard of several, the page where a person answers."""

@@ -1,0 +1,692 @@
+"""Several runs as one leaderboard: a static folder that opens from disk or from any web server."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from phyblock.bundle import named, opened_bundle, portable_manifest
+from phyblock.config.suite import ImagesSpec
+from phyblock.errors import DataError, Problem, SpecError, StoreError
+from phyblock.files import LIST, OutFolder, digest_of_file, writing
+from phyblock.records.files import RECORDS
+from phyblock.records.manifest import MANIFEST, ManifestModel
+from phyblock.records.record import Record
+from phyblock.results.compare import Side, comparable, compare, ranks
+from phyblock.results.estimates import (
+    Value,
+    headline_columns,
+    headline_of,
+    main_column,
+    main_measure,
+    track_estimates,
+    track_measures,
+)
+from phyblock.results.load import Run, load_run
+from phyblock.results.tables import cost_frame, coverage_frame
+from phyblock.stable import hex_digest
+from phyblock.tracks.base import CARRYING, READER
+from phyblock.tracks.kind import kind_of
+from phyblock.tracks.pictures import kit, scene_entry
+from phyblock.web.pack import (
+    IN_INDEX,
+    Numbers,
+    Pack,
+    Sources,
+    fill,
+    open_sources,
+    read_places,
+    records_at,
+    write_script,
+)
+from phyblock.web.report import shortfalls
+
+INDEX = "index.html"
+_DATA = "data/"
+_LAYOUT = 1
+"""Version of the data's layout."""
+_PARTIAL = re.compile(r"\.[0-9a-f]{32}\.part")
+_SCRIPTS = (
+    *("dom.js", "chunks.js", "solid.js", "steps.js", "poses.js", "runs.js", "stage.js"),
+    *("quotes.js", "overlay.js", "why.js", "store.js", "table.js", "chart.js", "views.js"),
+    *("replay.js", "site.js"),
+)
+_STYLES = ("base.css", "samples.css", "reply.css", "site.css")
+_MAY_DIFFER = ("pictures", READER)
+"""Parts of a track's identity: digests of pictures, which change with their size; the reader."""
+_CONTROLS = frozenset({"blind", "wrong_image", "prompt", "path"})
+"""Parts of a track's section of the suite that are shown with the run, or known by their digest."""
+_HINT = "make a site of each"
+_CARRYING_HINT = (
+    "run the older one again, as phyblock score leaves what was carried out as it was, or make a "
+    "site of each"
+)
+_SCENES = "dataset.sha256"
+_SCENES_HINT = "give all runs the same levels and --limit, or make a site of each"
+_LABELS = ("published", "size_b", "served_at")
+"""Parts of a manifest's model that do not decide its replies."""
+_LONGEST = {"text": 6000, "reasoning": 2000}
+"""Characters of a reply that a site shows; the bundle has all of it."""
+_LEFT_OUT = IN_INDEX | {"reply", "scores", "turns", "prompt", "asked", "time", "counts"}
+"""Fields of records that a replay needs otherwise or not at all; those that tracks add, it has."""
+_REPLY = ("text", "reasoning", "finish", "cost_usd", "usage", "latency_s")
+
+
+@dataclass(frozen=True, eq=False)
+class SiteRun:
+    """A run that was opened: `where` is what the user calls it, `is_verified` that it came in a
+    bundle and was scored again; `sources` are what can be drawn of it.
+    """
+
+    where: str
+    run: Run
+    is_verified: bool
+    sources: Sources
+
+    @property
+    def date(self) -> str:
+        """The day on which it was begun, UTC."""
+        return self.run.manifest.created[:10]
+
+    @property
+    def tracks(self) -> tuple[str, ...]:
+        """The tracks of its suite."""
+        return self.run.design.suite.tracks
+
+
+@dataclass
+class Entry:
+    """A row: `runs` has the number of the run that asked each of its tracks. `name` is unique."""
+
+    model: ManifestModel
+    runs: dict[str, int] = field(default_factory=dict)
+    name: str = ""
+
+
+Key = tuple[str, str, int, str]
+"""A sample of one model: scene, item, seed, variant."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrackValues:
+    """A track of a run: `values` by setting, model and heading; `samples` what each sample is worth
+    by the main measure, in its unit, by model and `Key`, without those that have no value; `facts`
+    by model.
+
+    Settings are those of the run, or "" alone where the track knows none.
+    """
+
+    values: Mapping[str, Mapping[tuple[str, str], Value]]
+    samples: Mapping[str, Mapping[Key, float]]
+    facts: Mapping[str, Mapping[str, Any]]
+
+
+AllValues = Mapping[tuple[int, str], TrackValues]
+"""Values by number of the run, and track."""
+
+
+@dataclass(frozen=True)
+class SiteWritten:
+    """A site: its page, how many models and samples it shows, and its size without pictures."""
+
+    path: Path
+    models: int
+    samples: int
+    size_bytes: int
+    lacking: str
+
+
+def write_site(
+    paths: Sequence[Path], out: Path, data: Sequence[Path] = (), title: str = "PhyBlock leaderboard"
+) -> SiteWritten:
+    """Put run folders and bundles into one static folder, the same bytes for the same runs.
+
+    The page is written last and whole, so that a build that was stopped never looks like a site,
+    and one that was there stays as it is until then. Raises SpecError for runs that cannot stand in
+    one table, StoreError for what is no run, a bundle that does not verify, or a folder that holds
+    what we did not write, DataError for a bundle whose data are not at hand.
+    """
+    if not paths:
+        raise SpecError(Problem("site", "needs a run", allowed="run folders and bundles"))
+    folder = OutFolder(out)
+    _check_place(folder)
+    with ExitStack() as kept:
+        runs = open_runs(paths, data, kept)
+        check_runs_alike(runs)
+        entries, values = entries_of(runs), all_values(runs)
+        board = board_of(runs, entries, values)
+        build = _build(runs, title)
+        own = f"{_DATA}{build}/"
+        with folder.alone(), writing(out):
+            with folder.making(own) as new:
+                samples = _write_samples(new, build, runs, entries, values)
+                write_script(new, "board", build, {**board, "title": title})
+                write_script(new, "samples", build, {**samples, "kit": kit()})
+                size = sum(path.stat().st_size for path in new.iterdir())
+            facts = {"title": title, "folder": f"{_DATA}{build}", "build": build}
+            page = fill("site.html.j2", _SCRIPTS, _STYLES, **facts)
+            (path,) = folder.write({INDEX: page})
+            folder.remove(name for name in folder.names(_DATA) if not name.startswith(own))
+    n_samples, lacking = len(samples["rows"]["entry"]), str(samples["lacking"])
+    return SiteWritten(path, len(entries), n_samples, size + len(page.encode()), lacking)
+
+
+def _check_place(folder: OutFolder) -> None:
+    """Raise StoreError unless the folder is new, empty, or one that a site was written into."""
+    out = folder.path
+    with writing(out, "choose another folder with --out"):
+        try:
+            found = {entry.name for entry in os.scandir(out)}
+        except FileNotFoundError:
+            return
+        except NotADirectoryError as error:
+            raise StoreError(Problem(str(out), "is no folder")) from error
+    strangers = sorted(n for n in found if n != LIST and not _PARTIAL.fullmatch(n))
+    if strangers and INDEX not in folder.names(INDEX) and not folder.names(_DATA):
+        shown = ", ".join(strangers[:3]) + (", ..." if len(strangers) > 3 else "")
+        message, hint = "is not empty and holds no site", "name a new or an empty folder with --out"
+        raise StoreError(Problem(str(out), message, found=shown, hint=hint))
+    folder.check([INDEX, _DATA])
+
+
+def _build(runs: Sequence[SiteRun], title: str) -> str:
+    """Return a name for what the site shows: the same runs, written again, have the same files."""
+    told: list[Any] = [_LAYOUT, version("phyblock"), title]
+    for one in runs:
+        digests = [digest_of_file(one.run.path / name) for name in (MANIFEST, RECORDS)]
+        if one.is_verified:
+            # Its manifest names this machine's data.
+            digests[0] = one.run.manifest.identity
+        told.append([*digests, one.is_verified, bool(one.sources.lacking)])
+    return hex_digest(json.dumps(told))[:12]
+
+
+def open_runs(paths: Sequence[Path], data: Sequence[Path], kept: ExitStack) -> tuple[SiteRun, ...]:
+    """Open runs in the order given; bundles stay unpacked as long as `kept` is open.
+
+    `data` are folders to look for data in, beside where runs found them and what comes with
+    phyblock. Raises SpecError for a run that is given twice, StoreError for what is no run or does
+    not verify, and DataError for a bundle whose data are not at hand.
+    """
+    opened: list[SiteRun] = []
+    seen: dict[str, str] = {}
+    for path in paths:
+        where = str(path)
+        if path.is_file():
+            verified = kept.enter_context(opened_bundle(path, data))
+            with named(verified.folder, where):
+                run = load_run(verified.folder, texts=False)
+        else:
+            run = load_run(path, texts=False)
+        identity = run.manifest.identity
+        if identity in seen:
+            message = f"is the same run as {seen[identity]}"
+            raise SpecError(Problem(where, message, "identity", identity[:16], hint="give it once"))
+        seen[identity] = where
+        opened.append(SiteRun(where, run, path.is_file(), _sources(run, data)))
+    return tuple(opened)
+
+
+def _sources(run: Run, data: Sequence[Path]) -> Sources:
+    """Return what can be drawn, from the first place that has it."""
+    found = open_sources(run, None)
+    for folder in data if found.lacking else ():
+        try:
+            return open_sources(run, folder)
+        except DataError:
+            continue
+    return found
+
+
+def check_runs_alike(runs: Sequence[SiteRun]) -> None:
+    """Raise SpecError naming all in which a run differs from the first that it could be held
+    against, so that they cannot stand in one table.
+
+    All must be of one version of one data set. Those that share a track must have asked about the
+    same items of it, in the same words, shown alike in any size, and count in the same way.
+    """
+    problems: list[Problem] = []
+    for number, one in enumerate(runs):
+        differences = (list(_differences(one, first)) for first in runs[:number])
+        problems += next(filter(None, differences), [])
+    if problems:
+        raise SpecError(problems)
+
+
+def _differences(one: SiteRun, first: SiteRun) -> Iterator[Problem]:
+    shared = [track for track in one.tracks if track in first.tracks]
+    told, wanted = (dict(_facts(side.run, shared)) for side in (one, first))
+    for name, value in told.items():
+        other = wanted.get(name)
+        # A recording was asked elsewhere, and a baseline is asked in no words.
+        if value is None or other is None or value == other:
+            continue
+        message = f"cannot stand in one table with {first.where}"
+        if name == _SCENES:
+            counts = [
+                ", ".join(f"{side.run.manifest.items.get(t, 0):,} of {t}" for t in shared)
+                for side in (one, first)
+            ]
+            found, allowed = (
+                f"{count}, scenes {digest[:12]}"
+                for count, digest in zip(counts, (value, other), strict=True)
+            )
+            message += ": other scenes were asked about"
+            yield Problem(one.where, message, name, found, allowed, _SCENES_HINT)
+        else:
+            hint = _CARRYING_HINT if name.endswith(f".{CARRYING}") else _HINT
+            yield Problem(one.where, message, name, str(value), str(other), hint)
+
+
+def _facts(run: Run, shared: Sequence[str]) -> Iterator[tuple[str, Any]]:
+    """Yield what has to agree, by name; None where it is not said."""
+    manifest, suite = run.manifest, run.design.suite
+    if (data := manifest.dataset) is not None:
+        yield "dataset.name", data.name
+        yield "dataset.version", data.version
+    if not shared:
+        return
+    if data is not None:
+        yield _SCENES, data.sha256
+    if (asked := manifest.questions) is not None:
+        yield "questions.version", asked.version
+    yield "scoring.matchers", suite.scoring.matchers[0]
+    yield "scoring.level1", suite.scoring.level1
+    yield "scoring.missing", suite.scoring.missing
+    yield "settings", ", ".join(suite.settings)
+    yield "answer_format", suite.answer_format
+    yield "vary", ", ".join(suite.vary.factors) or "nothing"
+    for track in shared:
+        identity = manifest.tracks.get(track, {})
+        for key, value in identity.items():
+            if key not in _MAY_DIFFER:
+                if isinstance(value, Mapping) and {"name", "version"} <= value.keys():
+                    # A prompt by its name and digest.
+                    yield f"tracks.{track}.{key}", f"{value['name']} ({str(value['version'])[:12]})"
+                else:
+                    yield f"tracks.{track}.{key}", value
+        if identity.get("pictures") is not None:
+            yield from _section("images", run.section("images", ImagesSpec), {"size_px"})
+        if (section := kind_of(track).section) is not None:
+            yield from _section(section[0], run.section(*section[:2]), _CONTROLS)
+
+
+def _section(name: str, held: BaseModel, without: Collection[str]) -> Iterator[tuple[str, Any]]:
+    """Yield what a section of the suite says, its defaults as well."""
+    for key in type(held).model_fields:
+        if key not in without:
+            yield f"{name}.{key}", str(getattr(held, key))
+
+
+def entries_of(runs: Sequence[SiteRun]) -> tuple[Entry, ...]:
+    """Return every model of every run.
+
+    A model that two runs asked in different tracks is one row, where it is the same model with the
+    same parameters. Asked in the same track it is a row for each run: names are then told apart by
+    the date of the run, and by its identity where that is not enough.
+    """
+    found: list[tuple[str, Entry]] = []
+    for number, one in enumerate(runs):
+        # A run stands in the same row as a folder and as a bundle.
+        for model in portable_manifest(one.run.manifest).models:
+            told = {name: value for name, value in model.fields().items() if name not in _LABELS}
+            identity = json.dumps(told, sort_keys=True, default=str)
+            same = (
+                entry
+                for known, entry in found
+                if known == identity and not set(one.tracks) & set(entry.runs)
+            )
+            entry = next(same, None)
+            if entry is None:
+                entry = Entry(model)
+                found.append((identity, entry))
+            entry.runs |= dict.fromkeys(one.tracks, number)
+    entries = tuple(entry for _, entry in found)
+    forms = []
+    for entry in entries:
+        first = min(entry.runs.values())
+        name, one = entry.model.name, runs[first]
+        day, tag = one.date, f"{one.date}, run {one.run.manifest.identity[:8]}"
+        forms.append((name, f"{name} ({day})", f"{name} ({tag})", f"{name} ({tag}, {first + 1})"))
+    for form in zip(*forms, strict=True):
+        # The shortest name that no other has.
+        used = Counter(entry.name or name for entry, name in zip(entries, form, strict=True))
+        for entry, name in zip(entries, form, strict=True):
+            if not entry.name and used[name] == 1:
+                entry.name = name
+    return entries
+
+
+def all_values(runs: Sequence[SiteRun]) -> AllValues:
+    """Return the values of every track of every run."""
+    return {
+        (number, track): values_of(one.run, track)
+        for number, one in enumerate(runs)
+        for track in one.tracks
+    }
+
+
+def values_of(run: Run, track: str) -> TrackValues:
+    """Return all values of a track."""
+    what, estimates, design = comparable(run, track), track_estimates(run, track), run.design
+    samples = {
+        model: dict(zip(values.index, values.tolist(), strict=True))
+        for model, values in what.values(run, what.parts[-1], design)
+    }
+    columns = headline_columns(run, track)
+    shown = estimates[estimates["measure"].isin([column.measure for column in columns])]
+    values: dict[str, Mapping[tuple[str, str], Value]] = {}
+    for setting in design.suite.settings if shown["setting"].astype(bool).any() else ("",):
+        suite = design.suite.model_copy(update={"settings": (setting,)} if setting else {})
+        in_setting = design.model_copy(update={"suite": suite})
+        values[setting] = headline_of(run, track, in_setting)
+    return TrackValues(values, samples, _costs(run, track, samples, what.measure.best))
+
+
+def _costs(
+    run: Run, track: str, samples: Mapping[str, Mapping[Key, float]], best: float
+) -> dict[str, dict[str, Any]]:
+    """Return by model what its samples of a track took and came to; None where it is not known.
+
+    `solved` samples are worth all that a sample can be; None where a sample may always be worth
+    more. Costs [US dollars] are at the prices of the replies, cached ones included. `asked` are the
+    first and the last day, UTC, on which the run got a reply that it had asked for itself, one of
+    recordings and of cached replies being unknown; `cached` counts the latter.
+    """
+    costs, outcomes = (
+        frame[frame["track"] == track].set_index("model").to_dict("index")
+        for frame in (cost_frame(run), coverage_frame(run))
+    )
+    records = run.records[run.records["track"] == track]
+    sent = records["attempts"].fillna(0).astype("int64") > 0
+    times = records.loc[sent & records["time"].notna(), ["model", "time"]]
+    by_model = times.groupby("model")["time"]
+    days = {str(model): (min(of)[:10], max(of)[:10]) for model, of in by_model}
+    found = {}
+    for model, row in outcomes.items():
+        cost = {
+            name: None if isinstance(value, float) and math.isnan(value) else value
+            for name, value in costs[model].items()
+        }
+        solved = None
+        if not math.isnan(best):
+            solved = sum(value == best for value in samples.get(str(model), {}).values())
+        price = cost["cost_per_100_usd"]
+        whole = None if price is None else price / 100 * int(row["replies"])
+        facts = {
+            "expected": int(row["expected"]),
+            "done": int(row["recorded"]),
+            "failed": int(row["recorded"] - row["ok"]),
+            "solved": solved,
+            "prompt_tokens": cost["prompt_tokens"],
+            "completion_tokens": cost["completion_tokens"],
+            "latency_s": cost["latency_median_s"],
+            "usd_per_100": price,
+            "usd_per_solved": whole / solved if whole is not None and solved else None,
+            "asked": days.get(str(model)),
+            "cached": int(row["cached"]),
+        }
+        found[str(model)] = {
+            name: float(f"{value:.6g}") if isinstance(value, float) else value
+            for name, value in facts.items()
+        }
+    return found
+
+
+def rank_ranges_of(
+    track: str, entries: Sequence[Entry], runs: Sequence[SiteRun], values: AllValues
+) -> Mapping[str, tuple[int, int]]:
+    """Return best and worst rank of entries in a track, by name, Holm-corrected over all pairs.
+
+    `entries` are those with a value in it. Only models have ranks, of which no sample was left out;
+    {} where there are not two. A pair without a sample in common is not told apart. Raises
+    SpecError for runs that cannot be compared.
+    """
+    sides = []
+    for entry in entries:
+        facts = values[entry.runs[track], track].facts[entry.model.name]
+        if not entry.model.is_baseline and facts["done"] == facts["expected"]:
+            sides.append(Side(entry.name, entry.model.name, runs[entry.runs[track]].run))
+    if len(sides) < 2:
+        return {}
+    what = comparable(sides[0].run, track)
+    table = compare(list(combinations(sides, 2)), what.parts[-1:], what).table
+    known = table.assign(p=table["p"].fillna(1.0), p_holm=table["p_holm"].fillna(1.0))
+    rows = ranks(known, what.measure).to_dict("records")
+    return {str(row["model"]): (int(row["best"]), int(row["worst"])) for row in rows}
+
+
+def board_of(
+    runs: Sequence[SiteRun], entries: Sequence[Entry], values: AllValues
+) -> dict[str, Any]:
+    """Return what the first page shows, plain values.
+
+    Raises SpecError for runs that cannot be compared.
+    """
+    first: dict[str, int] = {}
+    for number, one in enumerate(runs):
+        for track in one.tracks:
+            first.setdefault(track, number)
+    numbers = {entry.name: _values(entry, values) for entry in entries}
+    ranges: dict[str, Mapping[str, tuple[int, int]]] = {}
+    tracks: list[dict[str, Any]] = []
+    columns: list[dict[str, Any]] = []
+    for track, place in first.items():
+        kind, run, measure = kind_of(track), runs[place].run, main_measure(runs[place].run, track)
+        heading = main_column(run, track).heading
+        tracks.append(
+            {
+                "name": track,
+                "title": kind.title,
+                "item": kind.item,
+                "main": heading,
+                "unit": measure.unit,
+                "better": measure.better,
+                "best": None if math.isnan(measure.best) else measure.best,
+                "notes": list(kind.report().notes(run)),
+                "physics": kind.physics(run.manifest.suite),
+            }
+        )
+        measures = {one.name: one for one in track_measures(track)}
+        columns += [
+            {
+                "id": _id(track, setting, column.heading),
+                "track": track,
+                "setting": setting,
+                "heading": column.heading,
+                "unit": measures[column.measure].unit,
+                "better": measures[column.measure].better,
+                "share": measures[column.measure].is_share,
+            }
+            for setting in values[place, track].values
+            for column in headline_columns(run, track)
+        ]
+        main = _id(track, next(iter(values[place, track].values)), heading)
+        ranked = [entry for entry in entries if main in numbers[entry.name]]
+        ranges[track] = rank_ranges_of(track, ranked, runs, values)
+    lacking = {key: shortfalls(runs[key[0]].run, key[1]) for key in values}
+    rows = []
+    for entry in entries:
+        name, of_tracks = entry.model.name, [(n, track) for track, n in entry.runs.items()]
+        rows.append(
+            {
+                "name": entry.name,
+                "model": name,
+                "kind": entry.model.kind,
+                "size_b": entry.model.size_b,
+                "runs": dict(entry.runs),
+                "values": numbers[entry.name],
+                "ranks": {t: list(r[entry.name]) for t, r in ranges.items() if entry.name in r},
+                "lacking": {k[1]: lacking[k][name] for k in of_tracks if name in lacking[k]},
+                "facts": {key[1]: values[key].facts[name] for key in of_tracks},
+            }
+        )
+    told = {"tracks": tracks, "columns": columns, "rows": rows}
+    return {**told, "runs": [_run(one) for one in runs]}
+
+
+def _id(track: str, setting: str, heading: str) -> str:
+    return "/".join(filter(None, (track, setting, heading)))
+
+
+def _values(entry: Entry, values: AllValues) -> dict[str, list[float | None]]:
+    """Return value and interval by column."""
+    return {
+        _id(track, setting, heading): [
+            None if math.isnan(number) else round(number, 4)
+            for number in (value.value, value.lo, value.hi)
+        ]
+        for track, number in entry.runs.items()
+        for setting, of_setting in values[number, track].values.items()
+        for (model, heading), value in of_setting.items()
+        if model == entry.model.name and not math.isnan(value.value)
+    }
+
+
+def _run(one: SiteRun) -> dict[str, Any]:
+    run, manifest, data = one.run, one.run.manifest, one.run.manifest.dataset
+    showing = [word for track in one.tracks for word in kind_of(track).report().showing(run)]
+    return {
+        "suite": run.design.suite.name,
+        "id": manifest.identity[:12],
+        "date": one.date,
+        "verified": one.is_verified,
+        "seeds": len(run.design.suite.seeds),
+        "data": data.name if data else "",
+        "version": data.version if data else None,
+        "asked": list(dict.fromkeys((*showing, *run.varied_words))),
+        "phyblock": manifest.versions.get("phyblock", ""),
+    }
+
+
+def _write_samples(
+    folder: Path,
+    build: str,
+    runs: Sequence[SiteRun],
+    entries: Sequence[Entry],
+    values: AllValues,
+) -> dict[str, Any]:
+    """Write the scripts of single samples; return the index of all samples and items as columns.
+
+    Raises OSError where the disk refuses, StoreError for a record that cannot be read.
+    """
+    packs = {kind: Pack(folder, kind, build) for kind in ("replays", "scenes", "questions")}
+    scenes, numbered, tracks, outcomes, ways = (Numbers() for _ in range(5))
+    names = ("track", "key", "scene", "levels", "part", "question")
+    items: dict[str, list[Any]] = {name: [] for name in names}
+    names = ("entry", "item", "seed", "way", "outcome", "score")
+    rows: dict[str, list[int | None]] = {name: [] for name in names}
+    owner = {
+        (number, track, entry.model.name): place
+        for place, entry in enumerate(entries)
+        for track, number in entry.runs.items()
+    }
+    for number, one in enumerate(runs):
+        for record in _records(one):
+            if (record.track, record.item) not in numbered:
+                known = one.sources.items.get(record.track)
+                shown = known.shown(record) if known else None
+                question = (
+                    packs["questions"].add(dict(known.entry(shown))) if known and shown else -1
+                )
+                about = (
+                    tracks.of(record.track),
+                    record.item,
+                    scenes.of(record.scene),
+                    list(record.levels),
+                    record.part,
+                    question,
+                )
+                for column, value in zip(items.values(), about, strict=True):
+                    column.append(value)
+            worth = values[number, record.track].samples.get(record.model, {})
+            score = worth.get((record.scene, record.item, record.seed, record.way.key))
+            sample = (
+                owner[number, record.track, record.model],
+                numbered.of((record.track, record.item)),
+                record.seed,
+                ways.of(record.way.key),
+                outcomes.of(record.outcome),
+                None if score is None else round(score * 10),
+            )
+            for of_row, told in zip(rows.values(), sample, strict=True):
+                of_row.append(told)
+            packs["replays"].add(_replay(record, one.run))
+    is_drawn = False
+    for scene in scenes:
+        tasks = (one.sources.tasks.get(scene) for one in runs)
+        task = next((task for task in tasks if task is not None), None)
+        is_drawn |= task is not None
+        packs["scenes"].add(task and scene_entry(task.scene, task.candidates))
+    for pack in packs.values():
+        pack.close()
+    parts: dict[str, str] = {}
+    for track in tracks:
+        parts |= kind_of(track).report().part_names
+    return {
+        "tracks": list(tracks),
+        "items": items,
+        "outcomes": list(outcomes),
+        "ways": list(ways),
+        "rows": rows,
+        "scenes": list(scenes),
+        "starts": {kind: pack.starts for kind, pack in packs.items()},
+        "parts": parts,
+        "lacking": "" if is_drawn else next((one.sources.lacking for one in runs), ""),
+    }
+
+
+def _records(one: SiteRun) -> Iterator[Record]:
+    """Yield the newest record of every sample that is of the suite, model by model: what one model
+    says packs best together.
+    """
+    order = {name: place for place, name in enumerate(one.run.design.model_names)}
+    places = read_places(one.run.path, one.run.design)
+    places = [place for place in places if place.track in one.tracks]
+    places.sort(key=lambda place: order.get(place.model, len(order)))
+    yield from records_at(one.run.path, places)
+
+
+def _replay(record: Record, run: Run) -> dict[str, Any]:
+    """Return what a page shows of a record."""
+    fields = record.fields()
+    entry = {
+        name: value for name, value in fields.items() if name not in _LEFT_OUT and value is not None
+    }
+    if record.asked_turns:
+        entry["turns"] = [
+            {
+                **{name: turn[name] for name in turn if name != "prompt"},
+                "reply": _cut(turn["reply"]),
+            }
+            for turn in fields["turns"]
+        ]
+    elif record.reply is not None:
+        entry["reply"] = _cut(fields["reply"])
+    entry["scores"] = [
+        {name: score.get(name) for name in ("setting", "tp", "fp", "fn", "placed", "why")}
+        for score in fields["scores"]
+        if score.get("matcher") in (None, run.design.matcher) and score.get("placed") is not None
+    ]
+    return entry
+
+
+def _cut(reply: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what is shown of a reply, long texts cut."""
+    kept = {name: reply[name] for name in _REPLY if reply.get(name) not in (None, "")}
+    for name, most in _LONGEST.items():
+        if len(text := kept.get(name, "")) > most:
+            kept |= {name: text[:most], f"{name}_characters": len(text)}
+    return kept
