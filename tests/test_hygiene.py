@@ -18,7 +18,6 @@ PACKAGES = ("phyblock",)
 LOCKS = ("requirements.lock", "requirements-dev.lock")
 MODULES = {
     "PIL": "pillow",
-    "inspect_ai": "inspect-ai",
     "pydantic_core": "pydantic-core",
     "sklearn": "scikit-learn",
     "typing_extensions": "typing-extensions",
