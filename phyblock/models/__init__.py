@@ -6,22 +6,25 @@ Importing this package imports neither litellm nor aiohttp: the first call throu
 from phyblock.models.batch_ledger import BatchFiles, remove_unfinished, under_way, waiting_keys
 from phyblock.models.build import build_model
 from phyblock.models.cache import CacheStats, ReplyCache, reply_key
-from phyblock.models.costs import Budget, Estimate, estimate, most_usd
-from phyblock.models.keys import KeyStatus, api_key_status, server_address
-from phyblock.models.litellm_client import known_providers
-from phyblock.models.model import ModelEvent, Observer, RetryPolicy, Tell, takes_format
-from phyblock.models.prices import (
+from phyblock.models.costs import (
+    Budget,
+    Estimate,
     Price,
     Prices,
     Rate,
     Tariff,
     ends_on,
+    estimate,
     is_billed,
     is_unlisted,
+    most_usd,
     prices_of,
     reply_cost_usd,
     today,
 )
+from phyblock.models.keys import KeyStatus, api_key_status, server_address
+from phyblock.models.litellm_client import known_providers
+from phyblock.models.model import ModelEvent, Observer, RetryPolicy, Tell, takes_format
 from phyblock.models.replay import read_raw_reply
 from phyblock.models.request import (
     AskLaterError,

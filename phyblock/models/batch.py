@@ -23,7 +23,16 @@ from phyblock.models.batch_ledger import Answers, Batch, BatchFiles, Ledger, cus
 from phyblock.models.batch_providers import PROVIDERS, BatchProvider, BatchStatus
 from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.client import Answer, Client, HttpClient, SeedRefusedError
-from phyblock.models.costs import Budget, counted, estimate, may_be_billed, most_usd
+from phyblock.models.costs import (
+    Budget,
+    Prices,
+    counted,
+    estimate,
+    may_be_billed,
+    most_usd,
+    reply_cost_usd,
+    today,
+)
 from phyblock.models.model import (
     FORMAT_HINT,
     EventKind,
@@ -32,7 +41,6 @@ from phyblock.models.model import (
     RetryPolicy,
     refuses_format,
 )
-from phyblock.models.prices import Prices, reply_cost_usd, today
 from phyblock.models.request import AskLaterError, Request, wire_params
 from phyblock.records.files import BATCHES
 from phyblock.records.reply import Reply

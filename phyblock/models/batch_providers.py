@@ -23,9 +23,8 @@ from urllib.parse import urlsplit
 from phyblock.config.models import ModelConfig, host_of
 from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.files import load_json
-from phyblock.models.client import Answer, HttpClient, error_of, malformed, shown
+from phyblock.models.client import OPENAI_API_BASE, Answer, HttpClient, error_of, malformed, shown
 from phyblock.models.keys import api_key, hidden, secrets_of
-from phyblock.models.openai_client import OPENAI_API_BASE
 
 T = TypeVar("T")
 

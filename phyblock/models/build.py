@@ -7,18 +7,15 @@ import re
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import Problem, SpecError
-from phyblock.models.baselines import BaselineModel
 from phyblock.models.batch import BatchModel
 from phyblock.models.batch_ledger import BatchFiles
 from phyblock.models.cache import ReplyCache
-from phyblock.models.client import Client, HttpClient
-from phyblock.models.costs import Budget
+from phyblock.models.client import Client, HttpClient, OpenAIClient
+from phyblock.models.costs import Budget, prices_of, require_prices
 from phyblock.models.limits import Limits
 from phyblock.models.litellm_client import LitellmClient
 from phyblock.models.model import ChatModel, Observer, RetryPolicy, Tell
-from phyblock.models.openai_client import OpenAIClient
-from phyblock.models.prices import prices_of, require_prices
-from phyblock.models.replay import open_replay
+from phyblock.models.replay import BaselineModel, open_replay
 from phyblock.models.request import Model
 from phyblock.models.servers import Server, Servers
 

@@ -17,22 +17,15 @@ import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import Problem, StoreError, reason_of
-from phyblock.models.replay import token_count
 from phyblock.models.request import Image, Message, Request, wire_params
 from phyblock.records.reply import Reply
 from phyblock.stable import hex_digest
 
-__all__ = ["CacheStats", "ReplyCache", "reply_key"]
-
 SCHEMA = 1
 """Version of the file's layout and of what enters a key."""
-
-_LATER_FIELDS = frozenset({"batched", "cached_tokens", "cache_write_tokens"})
-"""Fields of a reply and its usage that came after the first files."""
 
 _BUSY_TIMEOUT_S = 2.0
 _BUSY = re.compile(r"\b(locked|busy)\b")
@@ -128,8 +121,9 @@ class ReplyCache:
         if row is None:
             return None
         try:
-            return _reply(json.loads(row[0]))
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+            found = {**json.loads(row[0]), "cached": True, "attempts": 0}
+            return Reply.model_validate(found, strict=True)
+        except (ValueError, TypeError, RecursionError) as error:
             if self._tell is not None and not self._is_told:
                 self._is_told = True
                 why = f"{type(error).__name__}: {error}"
@@ -144,9 +138,8 @@ class ReplyCache:
         if self._is_off or reply.finish in ("length", "refusal") or not reply.text.strip():
             return False
         # What this run paid is no part of what another finds.
-        reply = reply.model_copy(update={"billed_usd": None})
-        text = json.dumps(_fields(reply), ensure_ascii=True, separators=(",", ":"))
-        row = (key, model_id, time.time(), text)
+        fields = reply.model_dump(exclude={"billed_usd"})
+        row = (key, model_id, time.time(), json.dumps(fields, separators=(",", ":")))
         with self._using():
             self._db.execute("INSERT OR REPLACE INTO replies VALUES (?, ?, ?, ?)", row)
             return True
@@ -240,22 +233,3 @@ class ReplyCache:
     ) -> StoreError:
         where = f"reply cache {self.path}"
         return StoreError(Problem(where, message, found=found, allowed=allowed, hint=hint))
-
-
-def _fields(reply: Reply) -> dict[str, Any]:
-    """What is kept of a reply, without later fields that say nothing: earlier versions share the
-    file, and take a reply with a field that they do not know for broken.
-    """
-    fields = reply.model_dump()
-    for place in (fields, fields["usage"]):
-        for name in _LATER_FIELDS & place.keys():
-            if place[name] is None or place[name] is False:
-                del place[name]
-    return fields
-
-
-def _reply(stored: dict[str, Any]) -> Reply:
-    # Older files may hold counts that a server made up.
-    usage = {name: token_count(number) for name, number in stored["usage"].items()}
-    found = {**stored, "usage": usage, "cached": True, "attempts": 0}
-    return Reply.model_validate(found, strict=True)

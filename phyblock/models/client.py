@@ -10,6 +10,7 @@ from __future__ import annotations
 import email.utils
 import math
 import re
+import time
 import urllib.parse
 import urllib.request
 from abc import ABC, abstractmethod
@@ -21,16 +22,18 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 from phyblock.config.models import ModelConfig, host_of
 from phyblock.errors import (
     ModelError,
+    Problem,
     RefusedError,
     RetryableError,
     SampleError,
+    SpecError,
     UnavailableError,
     UnreachableError,
 )
 from phyblock.files import load_json
-from phyblock.models.keys import hidden, secrets_of
+from phyblock.models.keys import api_key, hidden, secrets_of
 from phyblock.models.replay import read_chat_completion
-from phyblock.models.request import Request
+from phyblock.models.request import Request, json_body, wire_params
 from phyblock.records.reply import Reply
 from phyblock.text import well_formed
 
@@ -365,3 +368,38 @@ def retry_after_s(headers: Mapping[str, str]) -> float | None:
         then = then if then.tzinfo else then.replace(tzinfo=UTC)
         asked_s = (then - datetime.now(UTC)).total_seconds()
     return max(0.0, asked_s) if math.isfinite(asked_s) else None
+
+
+OPENAI_API_BASE = "https://api.openai.com/v1"
+
+
+class OpenAIClient(Client):
+    """`POST {api_base}/chat/completions`."""
+
+    def __init__(self, config: ModelConfig, http: HttpClient | None = None) -> None:
+        """Raise SpecError where no address is given and the provider is not OpenAI.
+
+        Without an address the request, with another provider's key, would go to OpenAI.
+        """
+        if config.api_base is None and config.provider != "openai":
+            message = "needs an api_base to be called directly"
+            raise SpecError(Problem(f"model {config.name}", message, "api_base", config.id))
+        super().__init__(config, http)
+        self._url = f"{(config.api_base or OPENAI_API_BASE).rstrip('/')}/chat/completions"
+
+    async def _complete(self, request: Request, *, with_seed: bool) -> Reply:
+        params = wire_params(self.config, request)
+        extra_body = params.pop("extra_body", {})
+        headers = {
+            "Authorization": f"Bearer {api_key(self.config)}",
+            "Content-Type": "application/json",
+            **params.pop("extra_headers", {}),
+        }
+        fields = {"model": self.config.provider_model, **params}
+        if with_seed:
+            fields["seed"] = request.seed
+        fields |= extra_body
+        body = json_body(fields, request.messages, self.config.image_detail)
+        started_s = time.perf_counter()
+        answer = await self.http.send(self._url, body, headers)
+        return read_completion(read_json(answer), time.perf_counter() - started_s, answer.status)

@@ -32,8 +32,8 @@ from phyblock.models.client import (
     read_completion,
     read_json,
 )
+from phyblock.models.costs import map_entry, mapped_providers
 from phyblock.models.keys import KEYLESS, api_key
-from phyblock.models.prices import map_entry, mapped_providers
 from phyblock.models.replay import read_raw_reply
 from phyblock.models.request import Request, wire_messages, wire_params
 from phyblock.records.reply import Reply, Usage

@@ -21,9 +21,18 @@ from phyblock.errors import (
 )
 from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.client import SeedRefusedError
-from phyblock.models.costs import Budget, Estimate, counted, estimate, may_be_billed
+from phyblock.models.costs import (
+    Budget,
+    Estimate,
+    Prices,
+    counted,
+    estimate,
+    map_entry,
+    may_be_billed,
+    reply_cost_usd,
+    today,
+)
 from phyblock.models.limits import Clock, Limits
-from phyblock.models.prices import Prices, map_entry, reply_cost_usd, today
 from phyblock.models.request import Request, wire_params
 from phyblock.models.servers import Server, Servers
 from phyblock.records.reply import Reply

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
 import os
 import signal
 import sqlite3
@@ -223,16 +221,6 @@ def test_a_reply_comes_back_whole_and_marked(tmp_path: Path) -> None:
         assert cache.get("k") == expected
 
 
-def test_counts_that_cannot_be_true_are_not_known(tmp_path: Path) -> None:
-    counts = {"prompt_tokens": -1, "completion_tokens": 10**30, "reasoning_tokens": 2}
-    usage = Usage().model_copy(update=counts)
-    with ReplyCache(tmp_path / "c.sqlite") as cache:
-        cache.put("k", "openai/m", REPLY.model_copy(update={"usage": usage}))
-        found = cache.get("k")
-    assert found is not None
-    assert found.usage == Usage(prompt_tokens=None, completion_tokens=None, reasoning_tokens=2)
-
-
 @pytest.mark.parametrize(
     "reply",
     [
@@ -352,13 +340,6 @@ def test_a_row_that_is_no_reply_is_missing_and_is_overwritten(
     assert "holds a broken reply" in text
 
 
-def test_a_folder_in_the_way_is_an_error(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("x")
-    for path in (tmp_path, tmp_path / "file" / "c.sqlite"):
-        with pytest.raises(StoreError, match="cannot be"):
-            ReplyCache(path)
-
-
 WRITER = """
 import sys
 from pathlib import Path
@@ -388,22 +369,6 @@ def test_processes_share_one_file(tmp_path: Path) -> None:
         assert all(f"{name}-{n}" in cache for name in "abcd" for n in range(100))
 
 
-def test_earlier_versions_can_read_what_is_kept_where_nothing_new_is_said(tmp_path: Path) -> None:
-    path = tmp_path / "replies.sqlite"
-    with ReplyCache(path) as cache:
-        cache.put("old", "openai/m", REPLY)
-        told = REPLY.model_copy(
-            update={"usage": REPLY.usage.model_copy(update={"cached_tokens": 0})}
-        )
-        cache.put("new", "openai/m", told)
-        assert cache.get("new") == told.model_copy(update={"cached": True, "attempts": 0})
-    with contextlib.closing(sqlite3.connect(path)) as file:
-        (text,) = file.execute("SELECT reply FROM replies WHERE key = 'old'").fetchone()
-    fields = json.loads(text)
-    assert set(fields["usage"]) == {"prompt_tokens", "completion_tokens", "reasoning_tokens"}
-    assert "batched" not in fields
-
-
 def test_what_was_kept_survives_a_kill(tmp_path: Path) -> None:
     path = tmp_path / "c.sqlite"
     process = writer(path, "a", 10**6)
@@ -428,14 +393,3 @@ def test_what_two_samples_ask_at_the_same_time_is_asked_once(
         answers = ask(make_model(config, cache=cache), *[make_request()] * 5)
     assert server.requests == 1
     assert [answer.cached for answer in answers if isinstance(answer, Reply)].count(True) == 4
-
-
-@pytest.mark.parametrize("mode", ["length", "400"])
-def test_what_is_no_whole_reply_is_asked_by_each(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: str
-) -> None:
-    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
-    server = ROUTES["direct"].server(Faults(mode=mode, latency_s=0.01))
-    with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
-        ask(make_model(ROUTES["direct"].config(running.url), cache=cache), *[make_request()] * 3)
-    assert server.requests == 3

@@ -12,7 +12,7 @@ from phyblock.config.models import ModelConfig
 from phyblock.domain import LETTERS, Question, Scene, Subtask
 from phyblock.errors import SpecError
 from phyblock.models import Request
-from phyblock.models.baselines import BaselineModel
+from phyblock.models.replay import BaselineModel
 from phyblock.parsing.answer import parse_answer
 from phyblock.tracks.vqa import ChoiceSubject
 

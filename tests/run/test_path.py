@@ -1,0 +1,82 @@
+"""How much of phyblock one sample touches: the modules that it goes through, those it imports."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import pytest
+
+import phyblock as package
+from phyblock.cli.main import phyblock
+from tests.servers.chassis import Running, Seen
+from tests.servers.openai_chat import OpenAIChat
+from tests.workspace import Workspace
+
+ROOT = Path(package.__file__).parent
+MOST_ENTERED = 50
+"""As many as today; 20 is the aim. Lower it with what goes."""
+MOST_IMPORTED = 136
+"""As many as today; 100 is the aim."""
+IMPORTED = (
+    "import atexit, sys\n"
+    "from phyblock.cli.main import main\n"
+    "names = lambda: [name for name in sys.modules if name.partition('.')[0] == 'phyblock']\n"
+    "atexit.register(lambda: print('modules', *names(), file=sys.stderr))\n"
+    "main()\n"
+)
+
+
+class Counting(OpenAIChat):
+    """Counts the requests that have arrived."""
+
+    arrived = 0
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        self.arrived += 1
+        return super().reply(seen, ending)
+
+
+def test_one_sample_goes_through_few_modules(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From the arrival of the second request to that of the third: the end of one sample and the
+    beginning of the next, in every thread.
+    """
+    monkeypatch.chdir(workspace.root)
+    monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
+    workspace.write_suite(models=["alpha"], levels=[2, 3], settings=["A"])
+    entered: set[str] = set()
+
+    def profile(frame: FrameType, event: str, _: object) -> None:
+        if event == "call" and server.arrived == 2:
+            entered.add(frame.f_code.co_filename)
+
+    with Running(server := Counting()) as running:
+        workspace.write_models(running.url, "alpha", max_concurrency=1)
+        threading.setprofile(profile)
+        sys.setprofile(profile)
+        try:
+            phyblock.main(["run", "suite.yaml", "--out", "out"], standalone_mode=False)
+        finally:
+            sys.setprofile(None)
+            threading.setprofile(None)
+    assert server.arrived == 4
+    modules = {Path(name).relative_to(ROOT) for name in entered if name.startswith(str(ROOT))}
+    assert Path("models/model.py") in modules
+    assert len(modules) <= MOST_ENTERED, " ".join(sorted(map(str, modules)))
+
+
+def test_one_sample_of_a_baseline_imports_few_modules(workspace: Workspace) -> None:
+    workspace.write_suite(models=["random"], levels=[2], settings=["A"])
+    command = [sys.executable, "-c", IMPORTED, "run", "suite.yaml", "--limit", "1", "--out", "out"]
+    done = subprocess.run(
+        command, cwd=workspace.root, env=workspace.env, capture_output=True, text=True, check=True
+    )
+    modules = done.stderr.rpartition("modules ")[2].split()
+    assert "phyblock.tracks.full_planning" in modules
+    assert len(modules) <= MOST_IMPORTED, sorted(modules)
