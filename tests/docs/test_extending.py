@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 import csv
 import re
+import zlib
 from pathlib import Path
 
 import pytest
@@ -62,9 +64,11 @@ def test_a_plugin_is_in_tables_and_on_the_page(section: str, workspace: Workspac
 
 
 def page_of(run: Path) -> str:
-    """Return the report with what it loads."""
-    files = [run / "report.html", *(run / "report").rglob("*.js")]
-    return "".join(file.read_text(encoding="utf-8") for file in files)
+    """Return the report with the data that it loads, unpacked."""
+    scripts = "".join(file.read_text(encoding="utf-8") for file in (run / "report").rglob("*.js"))
+    packed = re.findall(r"^phyblockTake\('[^']*','[^']*','([^']*)'\)$", scripts, re.M)
+    data = [zlib.decompress(base64.b64decode(text)).decode() for text in packed]
+    return "".join([(run / "report.html").read_text(encoding="utf-8"), *data])
 
 
 def test_every_kind_of_addition_has_a_plugin() -> None:
