@@ -47,23 +47,23 @@ PUBLISHED_TABLE = "published"
 
 
 class TrackWords(Protocol):
-    """What lower layers know of a track; `phyblock.tracks.TrackKind` is the whole."""
+    """The part of a track that lower layers know; `phyblock.tracks.TrackKind` is the whole."""
 
     @property
     def name(self) -> str:
-        """What suites and records call it."""
+        """Its name in suites and records."""
 
     @property
     def title(self) -> str:
-        """What people read in the place of the name."""
+        """Its name for people."""
 
     @property
     def plays(self) -> bool:
-        """Whether a sample is an episode of several turns."""
+        """True if a sample is an episode of several turns."""
 
     @property
     def about(self) -> str:
-        """What it asks, for the documentation of suites."""
+        """A sentence on what it asks, for the documentation of suites."""
 
     @property
     def template(self) -> Path | None:
@@ -83,7 +83,7 @@ class TrackWords(Protocol):
 
     @property
     def subject(self) -> type[object]:
-        """What its requests are about: the first argument of its rules."""
+        """The subject of its requests: the first argument of its rules."""
 
     @property
     def tables(self) -> tuple[str, ...]:
@@ -91,7 +91,7 @@ class TrackWords(Protocol):
 
     @property
     def prompt_field(self) -> tuple[str, ...]:
-        """Where a suite names its prompt, as a path of keys."""
+        """Path of keys to the prompt in a suite."""
 
     @property
     def varies(self) -> tuple[str, ...]:

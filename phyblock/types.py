@@ -79,7 +79,7 @@ Physics = Literal["off", "settle", "strict"]
 """What is simulated of every new state, and whether a collapse ends the episode."""
 
 PoseRotation = Literal["candidate", "free"]
-"""Whether candidates keep the orientation in which they are shown, or steps bring one."""
+"""True if candidates keep the orientation in which they are shown, or steps bring one."""
 StepEnd = Literal["stands", "falls", "knocks_over", "overlaps", "under_floor", "no_block"]
 """How a step that is carried out ends. `stands`: the block is where it was put, and so are the
 others. `falls`: it is not. `knocks_over`: others are not where they were. `overlaps`,
@@ -116,7 +116,7 @@ TransportName = Literal["auto", "litellm", "direct"]
 BATCH_PROVIDERS = ("openai", "hosted_vllm", "anthropic", "gemini")
 """Prefixes of model ids whose servers may take batches in a protocol that is spoken here."""
 SendMode = Literal["auto", "always", "never"]
-"""Whether a field that not every provider takes is sent."""
+"""True if a field that not every provider takes is sent."""
 ImageDetail = Literal["auto", "low", "medium", "high", "ultra_high", "original"]
 """How closely a provider looks at pictures; each knows some of these."""
 

@@ -1,1 +1,1 @@
-"""What a program or notebook imports from `phyblock`; the names stand in `phyblock.__all__`."""
+"""Public names of `phyblock`, for programs and notebooks; the names stand in `phyblock.__all__`."""

@@ -1,4 +1,4 @@
-"""Whether arguments are of a kind that a function takes."""
+"""Checks of arguments."""
 
 from __future__ import annotations
 

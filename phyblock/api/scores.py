@@ -1,4 +1,4 @@
-"""What a reply about a scene is worth."""
+"""Scores of a reply about a scene."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class PlanScore:
     errors: tuple[ErrorType | None, ...]
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: F1, and what became of each step."""
+        """Return what a notebook shows: F1, and what became of each step."""
         if self.rule is None:
             return f"<p>Nothing could be read: {escape(str(self.problem))}</p>"
         f1 = "none" if self.f1 is None else f"{100 * self.f1:.1f} %"

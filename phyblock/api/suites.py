@@ -103,7 +103,7 @@ class Suite:
         )
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: name, description, what it asks of whom."""
+        """Return what a notebook shows: name, description, what it asks of whom."""
         described = self.loaded.description
         return (
             f"<p><b>{escape(self.name)}</b> {escape(described)}</p><p>{escape(self._about())}</p>"

@@ -1,4 +1,4 @@
-"""What verbs share: groups that import a verb when it is called, paths, names and options."""
+"""Shared parts of verbs: groups that import a verb when it is called, paths, names and options."""
 
 from __future__ import annotations
 

@@ -204,7 +204,7 @@ class ProgressView:
 
     @property
     def cost_text(self) -> str:
-        """What the whole run cost so far, as far as prices are known."""
+        """Return the cost of the run so far, as far as prices are known."""
         spent = sum(tally.cost_usd for tally in self._tallies.values())
         unknown = any(tally.unpriced for tally in self._tallies.values())
         return f"${spent:,.2f}" + (" and replies whose cost is not known" if unknown else "")
@@ -227,7 +227,7 @@ class ProgressView:
                 self._troubles[model] = _Trouble(told_s=now_s)
 
     def _progress(self) -> str:
-        """How far the run is, in a line."""
+        """Return the progress of the run in a line."""
         tallies, now_s = self._tallies.values(), self._now()
         done, total = sum(t.done for t in tallies), sum(t.total for t in tallies)
         fresh = sum(t.fresh for t in tallies)

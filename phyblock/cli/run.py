@@ -296,7 +296,7 @@ def _a_million(price: Price) -> str:
 
 
 def _lengths_text(rows: Sequence[Estimate]) -> str:
-    """How long replies are taken to be: as the earlier ones of a model, else of usual length."""
+    """Name the assumed length of replies: as the earlier ones of a model, else of usual length."""
     measured, is_usual = [], False
     for row in rows:
         for kind, lengths in row.lengths.items():

@@ -1,1 +1,1 @@
-"""What a person may write in YAML: suites, models files and --set overrides."""
+"""Models of what people write in YAML: suites, models files and --set overrides."""

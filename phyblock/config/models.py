@@ -146,7 +146,7 @@ def _check_day(value: object) -> date:
 
 
 class BatchRateSpec(Section):
-    """What tokens cost in the provider's batches."""
+    """Prices of tokens in the provider's batches."""
 
     input: UsdPerMillion
     """Prompt tokens [USD per million]."""
@@ -159,7 +159,7 @@ class BatchRateSpec(Section):
 
 
 class RateSpec(BatchRateSpec):
-    """What tokens cost."""
+    """Prices of tokens."""
 
     batch: BatchRateSpec | None = None
     """What they cost in batches; null: half at OpenAI's, Anthropic's and Google's own addresses,
@@ -167,7 +167,7 @@ class RateSpec(BatchRateSpec):
 
 
 class TierSpec(RateSpec):
-    """What tokens cost in calls with long prompts."""
+    """Prices of tokens in calls with long prompts."""
 
     above: Count
     """Prompts of more tokens than this."""
@@ -182,7 +182,7 @@ def _check_rising(tiers: tuple[TierSpec, ...]) -> tuple[TierSpec, ...]:
 
 
 class PriceSpec(RateSpec):
-    """What a model costs, where litellm's price map does not know it or is wrong."""
+    """The price of a model, where litellm's price map does not know it or is wrong."""
 
     since: Annotated[date, BeforeValidator(_check_day)] | None = Field(default=None, alias="from")
     """Day from which this holds (UTC). Before the first one that is named, litellm's price map
@@ -370,7 +370,7 @@ class ModelConfig(Section):
 
     @property
     def kind(self) -> Kind:
-        """How it answers: over the network, from a recording, by a rule, or by hand."""
+        """The kind of answers: over the network, from a recording, by a rule, or by hand."""
         if self.replay is not None:
             return "replay"
         if self.id:

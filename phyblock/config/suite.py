@@ -150,7 +150,7 @@ Examples = Annotated[
 
 
 class DatasetSpec(Section):
-    """Which scenes are run."""
+    """The scenes of a run."""
 
     format: DataFormat = "builtin"
     """builtin: the project's own format. official: a checkout of the official PhyBlock
@@ -163,7 +163,7 @@ class DatasetSpec(Section):
 
 
 class ImagesSpec(Section):
-    """Which pictures a model is shown."""
+    """The pictures that a model is shown."""
 
     source: PictureSource = "render"
     """render: drawn from the scene. dataset: the official composites, or their two halves apart; a
@@ -189,7 +189,7 @@ class ImagesSpec(Section):
 
 
 class CandidatesSpec(Section):
-    """How candidates are offered."""
+    """The presentation of candidates."""
 
     order: CandidateOrder = "file"
     """file: numbered as in the data. shuffled: each seed draws another order for every scene, the
@@ -197,7 +197,7 @@ class CandidatesSpec(Section):
 
 
 class ScoringSpec(Section):
-    """How replies are scored."""
+    """The rules of scoring."""
 
     matchers: UniqueSome[Matcher] = ("optimal", "paper")
     """optimal: interchangeable blocks are matched so that most steps count. paper: greedy, the
@@ -390,7 +390,7 @@ class Suite(Section):
     )
     """What is asked."""
     dataset: DatasetSpec = DatasetSpec()
-    """Which scenes are run."""
+    """The scenes of a run."""
     levels: UniqueSome[Level] = (1, 2, 3, 4)
     """Difficulty levels."""
     limit: Count | None = None
@@ -417,14 +417,14 @@ class Suite(Section):
     the least of seeds, never a scene that shares a base scene or its goal with the one asked
     about), or names of scenes (where one may not be shown, a drawn one stands in)."""
     images: ImagesSpec = ImagesSpec()
-    """Which pictures a model is shown."""
+    """The pictures that a model is shown."""
     candidates: CandidatesSpec = CandidatesSpec()
-    """How candidates are offered."""
+    """The presentation of candidates."""
     parser: PlanParser = "steps"
     """steps: reads the step list and records the rule that matched. official: the official
     expression over the whole reply."""
     scoring: ScoringSpec = ScoringSpec()
-    """How replies are scored."""
+    """The rules of scoring."""
     sampling: SamplingSpec = SamplingSpec()
     """Sampling parameters for models that say nothing of their own."""
     limits: LimitsSpec = LimitsSpec()

@@ -58,7 +58,7 @@ class AOVGraph:
         return tuple(layers[vertex] for vertex in range(len(self)))
 
     def is_ready(self, vertex: int, placed: int) -> bool:
-        """Whether `vertex` is unplaced and all it depends on is in the bit mask `placed`."""
+        """True if `vertex` is unplaced and all it depends on is in the bit mask `placed`."""
         needed = self.needed_masks[vertex]
         return not placed >> vertex & 1 and needed & placed == needed
 
@@ -67,7 +67,7 @@ class AOVGraph:
         return tuple(v for v in range(len(self)) if self.is_ready(v, placed))
 
     def is_valid(self, order: Sequence[int]) -> bool:
-        """Whether `order` places every vertex exactly once, each only when it is ready."""
+        """True if `order` places every vertex exactly once, each only when it is ready."""
         placed = 0
         for vertex in order:
             if not 0 <= vertex < len(self) or not self.is_ready(vertex, placed):

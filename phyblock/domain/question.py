@@ -63,7 +63,7 @@ def category_of(subtask: Subtask) -> Category:
 
 
 def is_picture_option(option: str) -> bool:
-    """Whether an option is a picture: `<img1>` to `<img4>`, as in the official files."""
+    """True if an option is a picture: `<img1>` to `<img4>`, as in the official files."""
     return option in ("<img1>", "<img2>", "<img3>", "<img4>")
 
 
@@ -116,7 +116,7 @@ class Question:
 
     @property
     def key(self) -> str:
-        """What samples and caches call the question."""
+        """The name of the question in samples and caches."""
         return self.id
 
     @property
@@ -149,7 +149,7 @@ def rotated(question: Question, by: int) -> Question:
 
 
 def rotated_label(label: str, by: int, n: int) -> str:
-    """What a picture's label becomes; those that are no option's stay."""
+    """Return the new label of a picture; those that are no option's stay."""
     if label not in LETTERS[:n]:
         return label
     return LETTERS[(LETTERS.index(label) - by) % n]
@@ -163,7 +163,7 @@ def _relabeled(picture: QuestionPicture, by: int, n: int, question: Question) ->
 
 
 def _names_marks(question: Question) -> bool:
-    """Whether the options name places lettered in a picture: `place A`, `place B`, ..."""
+    """True if the options name places lettered in a picture: `place A`, `place B`, ..."""
     marked = {mark.letter for picture in question.pictures for mark in picture.marks}
     letters = LETTERS[: len(question.options)]
     return marked.issuperset(letters) and all(

@@ -15,7 +15,7 @@ Look = tuple[BlockType, Color, tuple[float, ...]]
 
 
 class Oriented:
-    """What settings B and A see of anything that has a type, a color and an orientation."""
+    """The look, to settings B and A, of anything that has a type, a color and an orientation."""
 
     type: BlockType
     color: Color

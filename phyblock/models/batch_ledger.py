@@ -26,7 +26,7 @@ _FOLDER = "batches"
 
 @dataclass(frozen=True)
 class BatchFiles:
-    """Where batches of a run are kept: the lines written so far, oldest first, and what appends
+    """Batches of a run as they are kept: the lines written so far, oldest first, and what appends
     one and returns when it is on disk; the run's folder. A batch is looked at every `poll_s` or
     more often.
     """

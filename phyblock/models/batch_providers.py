@@ -38,7 +38,7 @@ _LARGEST_RESULTS_BYTES = 1024**3
 
 @dataclass(frozen=True)
 class BatchStatus:
-    """How a batch is, as its provider says.
+    """The state of a batch, as its provider says.
 
     A `refused` batch asked nothing of anyone. `token` is the name that we gave it, None where the
     provider does not tell. `total` counts requests, None where it does not say, `created_s` is a

@@ -1,4 +1,4 @@
-"""What both clients share: one HTTP client with bounds, the reply in an answer, or its error.
+"""Shared parts of both clients: one HTTP client with bounds, the reply in an answer, or its error.
 
 No redirect is followed, so that keys and prompts go to the host that was named and to no other. A
 body is read up to a limit. The time limit holds for the whole exchange, whatever the server does.
@@ -114,7 +114,7 @@ def shown(text: str, secrets: tuple[str, ...]) -> str:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a server answered; `fault` says what is wrong with its body, or "" for nothing."""
+    """The answer of a server; `fault` says what is wrong with its body, or "" for nothing."""
 
     status: int
     headers: Mapping[str, str]

@@ -1,4 +1,4 @@
-"""What models cost: dollars a token by day, by length of the prompt, and in batches.
+"""Prices of models: dollars a token by day, by length of the prompt, and in batches.
 
 Prices come from models.yaml, else from litellm's map of models, which is read as a file of the
 installed library: nothing heavy is imported. What neither knows is
@@ -132,7 +132,7 @@ class Tariff:
 
 @dataclass(frozen=True)
 class Prices:
-    """What a model costs day by day: tariffs in the order of their days."""
+    """Prices of a model day by day: tariffs in the order of their days."""
 
     tariffs: tuple[Tariff, ...]
 
@@ -337,7 +337,7 @@ class Budget:
 
     @property
     def spent_usd(self) -> float:
-        """What settled calls cost, what was `spent_usd` at the start included."""
+        """The cost of settled calls, what was `spent_usd` at the start included."""
         return self._spent_usd
 
     def most_usd(

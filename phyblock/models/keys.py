@@ -1,4 +1,4 @@
-"""What the environment says of a model: its key, which no text may hold, and its server."""
+"""A model's part of the environment: its key, which no text may hold, and its server."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ _LOOKS_SECRET = re.compile(
 
 @dataclass(frozen=True)
 class KeyStatus:
-    """What is known of a model's key.
+    """The state of a model's key.
 
     `variables` are the environment variables looked at, in order; `is_set` is True if one holds a
     key, `is_needed` if calls fail without; `fault` is what keeps the key that is set from being

@@ -71,7 +71,7 @@ same: litellm then decides about redirects, sizes and what is sent twice.
 
 @dataclass
 class _Exchange:
-    """What one call put on the wire: the last answer, or why there is none that may be read."""
+    """The traffic of one call: the last answer, or why there is none that may be read."""
 
     http: HttpClient
     answer: Answer | None = None

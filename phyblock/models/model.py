@@ -76,7 +76,7 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True)
 class RetryPolicy:
-    """How often, how long and how patiently a request is sent again.
+    """Limits on how often and how long a request is sent again.
 
     A request is given up when it has failed `attempts` times and `retry_for_s` have passed since
     it first failed, both: attempts that fail at once outlast an outage, attempts that each take

@@ -83,7 +83,7 @@ def _check_version(run: Run, first: Run) -> None:
 
 
 def _check_variants(run: Run, first: Run) -> None:
-    """What a run varies is told from its reference: two that vary otherwise mean other things."""
+    """Raise SpecError for runs that vary other factors: their values mean other things."""
     found, wanted = (one.design.suite.vary for one in (run, first))
     if found != wanted:
         message = f"asks in other ways than {first.path}"
@@ -112,7 +112,7 @@ _KEYS = ["scene", "item", "seed", "variant"]
 
 @dataclass(frozen=True)
 class Part:
-    """What one row of a pair is about: a cell, and the way of counting where there are several."""
+    """The subject of one row of a pair: a cell, and the way of counting where there are several."""
 
     name: str
     cell: str
@@ -154,7 +154,7 @@ class Comparable:
         return {str(model): mine[columns] for model, mine in indexed.groupby("model", sort=False)}
 
     def values(self, run: Run, part: Part, design: Design) -> Iterator[tuple[str, pd.Series]]:
-        """What each sample is worth in the measure's unit, by model; by scene, item, seed and
+        """Return the value of each sample in the measure's unit, by model; by scene, item, seed and
         variant, without samples that have no value.
         """
         each = self.each(part)
@@ -183,12 +183,14 @@ class Comparable:
         return len(self.pooled(part)) * (len(self.measure.counted.columns) + 1)
 
     def each(self, part: Part) -> Metric:
-        """What one sample is worth."""
+        """Return the value of one sample."""
         unflat = self._unflat(part)
         return lambda sums: self.measure.value(unflat(sums)[..., :-1].sum(axis=-2))
 
     def whole(self, part: Part, totals: Floats) -> Metric:
-        """What sums are worth; means are over the pooled cells of which `totals` have samples."""
+        """Return the values of sums; means are over the pooled cells of which `totals` have
+        samples.
+        """
         unflat, pooled = self._unflat(part), self.pooled(part)
         values = value_of_cells(self.measure, self.cells_of(part), pooled)
         asked = unflat(totals)[..., -1] > 0
@@ -244,7 +246,7 @@ def comparable(run: Run, track: str, measure: str = "") -> Comparable:
 
 
 def _is_single(cell: Cell, cells: tuple[Cell, ...]) -> bool:
-    """Whether a cell is a part of a mean and pooled itself: too small to be compared alone."""
+    """True if a cell is a part of a mean and pooled itself: too small to be compared alone."""
     return not cell.of and any(cell.name in other.of for other in cells)
 
 
@@ -321,7 +323,7 @@ class Side:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What `compare` found.
+    """The result of `compare`.
 
     `table` has one row a pair and part of the track (levels, categories of questions): a, b, part,
     value_a, value_b, difference (a minus b), se, lo, hi [all in `unit`], p, p_holm (corrected for
@@ -405,7 +407,7 @@ def _shared_track(runs: Sequence[Run], wanted: str) -> str:
 
 
 def _tags(first: Run, second: Run) -> tuple[str, str]:
-    """What tells two runs apart in a label: their folders' names, else paths, else their order."""
+    """Return labels that tell two runs apart: their folders' names, else paths, else their order."""
     names = first.path.resolve().name, second.path.resolve().name
     paths = str(first.path), str(second.path)
     return next((pair for pair in (names, paths) if pair[0] != pair[1]), ("first", "second"))
@@ -453,7 +455,7 @@ def compare(
 
 
 def _asked(runs: Sequence[Run], track: str) -> Iterator[str]:
-    """What is unusual about how each run asked and read, where there is anything."""
+    """Return what is unusual about how each run asked and read, where there is anything."""
     for run in runs:
         words = (*kind_of(track).report().showing(run), *run.varied_words)
         if words:

@@ -111,7 +111,7 @@ class Design(_Part):
 
     @property
     def published(self) -> dict[str, str]:
-        """What the paper calls each model that it knows; Table 1 need not have a row of it."""
+        """Names in the paper of the models that it knows; Table 1 need not have a row of it."""
         return {model.name: model.published for model in self.models if model.published}
 
     @property
@@ -134,7 +134,7 @@ class Design(_Part):
 
     @property
     def repeats(self) -> int:
-        """How often a model is asked about each item: with every seed, in every way."""
+        """Number of samples of an item and model: with every seed, in every way."""
         return len(self.suite.seeds) * self.suite.vary.n_variants
 
     @property

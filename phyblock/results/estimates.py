@@ -33,7 +33,7 @@ from phyblock.tracks.measures import (
 
 @dataclass(frozen=True, eq=False)
 class Grouping:
-    """Which of `values`, sorted, each row has: `codes` are places among them."""
+    """A column of few values: `values` are sorted, `codes` are places among them."""
 
     codes: NDArray[np.intp]
     values: list[Any]
@@ -337,7 +337,8 @@ def track_measures(track: str) -> tuple[Measure, ...]:
 def numbers_of(
     counted: SampleCounts, counts: Mapping[str, Sequence[float]] | None, where: str
 ) -> Sequence[float] | None:
-    """What a record at `where` holds of these counts; None where they are lacking, () for none.
+    """Return what a record at `where` holds of these counts; None where they are lacking, () for
+    none.
 
     Raises StoreError for another number of them than the measure has now.
     """
@@ -350,7 +351,7 @@ def numbers_of(
 
 
 def stored_counts(track: str) -> tuple[SampleCounts, ...]:
-    """What measures of a track count of each sample as it is judged."""
+    """Return the counts of each sample that measures of a track need as it is judged."""
     counted = {measure.counted.name: measure.counted for measure in track_measures(track)}
     return tuple(one for one in counted.values() if one.sample is not None)
 

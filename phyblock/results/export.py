@@ -98,7 +98,7 @@ def track_columns() -> dict[str, str]:
 
 
 def _own_counts(run: Run, record: Record) -> dict[str, float | None]:
-    """What measures count beside `scores`: `count_<name>_<column>`."""
+    """Return the counts of measures beside `scores`: `count_<name>_<column>`."""
     found: dict[str, float | None] = {}
     for track in run.design.suite.tracks:
         for counted in stored_counts(track):

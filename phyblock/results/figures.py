@@ -175,7 +175,7 @@ def headed(figure: Figure, title: str, subtitle: str) -> None:
 
 
 def text_width_in(text: str, size_pt: float, weight: str = "normal") -> float:
-    """How wide a line of text is in the chosen font [inches]."""
+    """Return the width of a line of text in the chosen font [inches]."""
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import text_to_path
 

@@ -1,4 +1,4 @@
-"""How far the way of asking moves each model, in runs that vary it."""
+"""Sensitivity of each model to the presentation, in runs that vary it."""
 
 from __future__ import annotations
 
@@ -75,12 +75,12 @@ class Varied:
         return found.reshape(*found.shape[:2], -1, found.shape[-1])
 
     def blocks(self, factor: str) -> Blocks:
-        """Where a factor has all its levels."""
+        """Return the places of all levels of a factor."""
         return blocks_of(self.vary, factor)
 
 
 def blocks_of(vary: VarySpec, factor: str) -> Blocks:
-    """Where a factor has all its levels."""
+    """Return the places of all levels of a factor."""
     levels, repeats = vary.names(factor), vary.names(REPEAT) or ("1",)
     places: dict[Variant, dict[tuple[str, str], int]] = {}
     for place, variant in enumerate(vary.variants):
@@ -184,7 +184,7 @@ LEVEL = Column("Level", is_text=True)
 
 
 def factor_name(factor: str) -> str:
-    """What people read in the place of a factor's name."""
+    """Return the name of a factor for people."""
     return _NAMES.get(factor, factor.replace("_", " "))
 
 
@@ -225,8 +225,8 @@ def sensitivity_view(table: pd.DataFrame, run: Run) -> TextTable:
 
 
 def sizes_text(table: pd.DataFrame) -> str:
-    """How many items, of how many base scenes, are behind rows of `sensitivity_frame`: from the
-    model that has fewest to the one that has most.
+    """Return how many items, of how many base scenes, are behind rows of `sensitivity_frame`: from
+    the model that has fewest to the one that has most.
     """
     items, scenes = (_from_to(table[name]) for name in ("n_items", "n_clusters"))
     return f"{items} items of {scenes} base scenes"

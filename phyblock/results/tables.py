@@ -500,7 +500,7 @@ def make_tables(run: Run, names: Sequence[str]) -> dict[str, Table]:
 
 @dataclass(frozen=True)
 class Summary:
-    """What the terminal shows at the end of a run.
+    """The text that the terminal shows at the end of a run.
 
     Headline tables, the coverage where it is not complete, one sentence a track on the strongest
     blind baseline, and failed calls by model and message, the most frequent first.

@@ -112,7 +112,7 @@ def track_column(tracks: Sequence[str]) -> tuple[Column, ...]:
 
 
 def track_text(track: str, tracks: Sequence[str]) -> tuple[str, ...]:
-    """What stands in the `track_column`."""
+    """Return the cells of a row in the `track_column`."""
     return (track.replace("_", " "),) if len(tracks) > 1 else ()
 
 

@@ -1,4 +1,4 @@
-"""What stands for the code that works something out of a run."""
+"""Digests of the code that computes something from a run."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _MOST_FILES = 100_000
 
 
 def code_digest() -> str | None:
-    """What stands for the code that judges records, and makes tables, figures and the page.
+    """Return a digest of the code that judges records, and makes tables, figures and the page.
 
     None where tracks or measures were added from outside: their code cannot be told.
     """

@@ -1,4 +1,4 @@
-"""What a run would take: calls, tokens and dollars by model; nothing is called or rendered."""
+"""Estimates of a run: calls, tokens and dollars by model; nothing is called or rendered."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class ReplyLengths:
 
     @property
     def has_calls(self) -> bool:
-        """Whether replies are to come."""
+        """True if replies are to come."""
         return bool(self._coming)
 
     @property
@@ -88,7 +88,7 @@ class ReplyLengths:
 
 @dataclass
 class Estimate:
-    """What one model would take; dollars are None where the price of `day` is not known.
+    """The estimate of one model; dollars are None where the price of `day` is not known.
 
     `done` samples have a record in the folder, `cached` ones a reply in the cache, `waiting` ones
     went out in batches, `calls` are left to make (none for recordings and baselines, which answer
@@ -171,7 +171,7 @@ class Estimate:
 
     @property
     def may_cost(self) -> bool:
-        """Whether money may be spent: calls are left, and not known to be free for good."""
+        """True if money may be spent: calls are left, and not known to be free for good."""
         return self.calls > 0 and (self.prices is None or not self.prices.is_free_from(self.day))
 
     @property
@@ -298,15 +298,15 @@ def _add(
 
 
 def _kind(track: str, variant: Variant) -> str:
-    """What replies of one length have in common."""
+    """Replies of one length."""
     return f"{track} {variant.shown.key}".strip()
 
 
 def unlimited_spending(
     plan: RunPlan, folder: Path, *, use_cache: bool, retry_failed: bool = False
 ) -> Sequence[Estimate]:
-    """What every model would take, where one that is billed may cost something and no limit of the
-    suite holds it; nothing where there is nothing to agree to.
+    """Return the estimate of every model, where one that is billed may cost something and no limit
+    of the suite holds it; nothing where there is nothing to agree to.
     """
     billed = _billed(plan)
     if plan.suite.limits.max_cost_usd is not None or not billed:

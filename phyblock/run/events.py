@@ -1,4 +1,4 @@
-"""What happens in a run, told to whoever watches; the run itself prints nothing."""
+"""Events of a run, for callbacks; the run itself prints nothing."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Stopping:
 
     @property
     def text(self) -> str:
-        """What a person who stopped it is told: what it waits for, and how to give that up."""
+        """Message to a person who stopped it: what it waits for, and how to give that up."""
         if not self.in_flight:
             return f"Stopping: {self.reason}."
         calls = f"{counted(self.in_flight, 'call')} under way"
@@ -78,7 +78,8 @@ _HEADLINE = "aov"
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What running figures need of a record; `counts` are of the headline matcher and setting.
+    """The part of a record that running figures need; `counts` are of the headline matcher and
+    setting.
 
     `paid_usd` is None where a price is not known, `cached` None where there is no reply.
     """

@@ -29,7 +29,7 @@ __all__ = ["Cause", "Executor", "RunResult", "Stop"]
 
 
 class Cause(Enum):
-    """What ends a run before all is asked."""
+    """The kinds of causes that end a run before all is asked."""
 
     INTERRUPTED = auto()
     COST = auto()
@@ -39,7 +39,7 @@ class Cause(Enum):
 
 @dataclass(frozen=True)
 class Stop:
-    """Why a run stopped before all was asked: its kind, and the words for a person."""
+    """The reason why a run stopped before all was asked: its kind, and the words for a person."""
 
     cause: Cause
     reason: str
@@ -47,7 +47,7 @@ class Stop:
 
 @dataclass
 class RunResult:
-    """How a run ended: how many of its samples have a final record, how many of those are
+    """The result of a run: how many of its samples have a final record, how many of those are
     requests that were rejected for good, and how many are replies that could not be judged;
     `stopped` models and why.
     """
@@ -111,7 +111,7 @@ class Executor:
 
     @property
     def stopping(self) -> bool:
-        """Whether no new sample is started."""
+        """True if no new sample is started."""
         return self.result.stop is not None
 
     def interrupt(self) -> None:

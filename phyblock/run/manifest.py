@@ -82,7 +82,7 @@ def code_versions() -> dict[str, str]:
 
 
 def _place(model: PlannedModel) -> dict[str, object]:
-    """Where a model is served, which decides nothing."""
+    """Address of a model's server, which decides nothing."""
     addresses = model.config.addresses
     return {"served_at": addresses} if addresses else {}
 
@@ -96,7 +96,7 @@ def _versions() -> dict[str, str]:
 
 
 def _of_tracks(suite: Suite) -> dict[str, Any]:
-    """What single tracks say beyond what all of them have."""
+    """Facts of single tracks beyond what all of them have."""
     kinds = [kind_of(name) for name in suite.tracks]
     told = {"engine": described_engine()} if kinds_with_physics(suite.model_dump()) else {}
     return told | {
@@ -149,18 +149,18 @@ def identity_of(inputs: Inputs) -> str:
 
 
 def _track(track: AnyTrack) -> dict[str, Any]:
-    """What decides what a track asks; replies are judged again when its reader changes."""
+    """Return what decides a track's requests; replies are judged again when its reader changes."""
     return {name: value for name, value in track.identity().items() if name != READER}
 
 
 def _dataset(dataset: Dataset, data_version: int) -> dict[str, object]:
-    """What of the data decides the results; runs from before versions were counted say none."""
+    """Return the facts of the data that decide the results."""
     known: dict[str, object] = {"name": dataset.name, "sha256": dataset.sha256}
     return known if data_version == UNNUMBERED else {**known, "version": data_version}
 
 
 def _model(model: PlannedModel) -> dict[str, object]:
-    """What decides a model's replies; a recording by what is in it, not by where it is."""
+    """Return what decides a model's replies; a recording by what is in it, not by where it is."""
     folder = model.config.recording
     if folder is None:
         return model.config.identity()

@@ -132,7 +132,7 @@ def to_config(name: str, known: ModelConfig, suite: Suite) -> ModelConfig:
 
 
 def _sends_format(config: ModelConfig, suite: Suite) -> bool:
-    """Whether the JSON schema of answers is sent; SpecError for a model that says its own."""
+    """True if the JSON schema of answers is sent; SpecError for a model that says its own."""
     if suite.answer_format == "text" or config.response_format == "never":
         return False
     if config.response_format == "auto" and not takes_format(config):
@@ -152,8 +152,8 @@ def _replay(name: str, folder: Path) -> ModelConfig:
 def model_problems(
     path: Path, known: Mapping[str, ModelConfig], names: Iterable[str]
 ) -> Iterator[Problem]:
-    """What is wrong with the models and groups of these names in a models file: recordings that are
-    not there, providers that nobody knows.
+    """Return what is wrong with the models and groups of these names in a models file: recordings
+    that are not there, providers that nobody knows.
     """
     source = read_yaml(path)
     for name in (name for name in with_members(tuple(names), known) if name in known):

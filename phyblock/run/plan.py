@@ -58,7 +58,7 @@ class RunPlan:
 
     @property
     def has_episodes(self) -> bool:
-        """Whether a track plays episodes."""
+        """True if a track plays episodes."""
         return any(isinstance(track, EpisodeTrack) for track in self.tracks)
 
     def folder_in(self, root: Path) -> Path:
@@ -250,6 +250,6 @@ def recorded_dataset(
 
 
 def asked_about(manifest: Manifest, levels: Sequence[int], dataset: Dataset) -> Dataset:
-    """What of a data set a run asks about, whose suite has these levels."""
+    """Return the part of a data set that a run asks about, whose suite has these levels."""
     tasks = select_tasks(dataset.tasks, levels, manifest.limit)
     return replace(dataset, tasks=tasks)

@@ -50,7 +50,7 @@ def find_suite(name: str) -> Path:
 
 
 def what_it_is(path: Path) -> str:
-    """Why something that is no file cannot be read; "" where there is nothing at all."""
+    """Return why something that is no file cannot be read; "" where there is nothing at all."""
     if os.path.isdir(path):
         return "is a folder"
     return "is not a regular file" if os.path.exists(path) else ""
@@ -105,7 +105,7 @@ def asking_remarks(suite: Suite, plan: RunPlan) -> list[str]:
 
 
 def moved_remarks(begun: Manifest, plan: RunPlan) -> list[str]:
-    """Which models are served elsewhere than when the run began: its replies still stand."""
+    """Return the models that are served elsewhere than when the run began: its replies still stand."""
     before = {model.name: model.served_at for model in begun.models}
     return [
         f"{model.name} was asked at {', '.join(before[model.name])} and is now at "

@@ -44,7 +44,7 @@ def begun(
 
 
 def about_item(item: Item) -> dict[str, Any]:
-    """What a record says of the scene of its item."""
+    """Return the fields of a record about the scene of its item."""
     scene = item.scene
     return {
         "scene": scene.id,
@@ -74,7 +74,7 @@ def judged(
 
 
 def about_prompt(request: Request, template: str, digest: str) -> SentPrompt:
-    """What a record says of a prompt that stands in `prompts.jsonl` under `digest`."""
+    """Return the fields of a record about a prompt that stands in `prompts.jsonl` under `digest`."""
     images = tuple(_picture(part) for part in _pictures(request.messages))
     examples: dict[str, Any] = {"examples": request.examples} if request.examples else {}
     return SentPrompt(

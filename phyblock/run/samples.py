@@ -226,14 +226,16 @@ class SampleRunner:
 
 
 def _asked(config: ModelConfig, request: Request) -> dict[str, AskedAs]:
-    """What a record says of a request for JSON; nothing where none was made of anyone."""
+    """Return the fields of a record about a request for JSON; nothing where none was made of
+    anyone.
+    """
     if request.response_format is None or config.kind != "litellm":
         return {}
     return {"asked": "response_format" if config.sends_format else "prompt"}
 
 
 async def _ask_now(model: Model, request: Request) -> Reply | None:
-    """What a model answers that may put a request off: an episode that has begun goes on."""
+    """Return the answer of a model that may defer a request: an episode that has begun goes on."""
     try:
         return await model.ask(request)
     except AskLaterError:
@@ -251,7 +253,7 @@ async def _answer(asked: Awaitable[Reply | None]) -> Reply | ModelError | None:
 
 
 def _pooled(replies: Sequence[Reply]) -> Reply:
-    """What an episode's replies took together, with the text of the last one.
+    """Return the sum of an episode's replies, with the text of the last one.
 
     It is cut off or refused where every one of them is.
     """

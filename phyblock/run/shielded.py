@@ -12,8 +12,8 @@ _Result = TypeVar("_Result")
 
 
 async def to_its_end(work: Coroutine[Any, Any, _Result]) -> tuple[_Result, bool]:
-    """What work gives, and whether the waiting task was cancelled meanwhile; raises what it
-    raises.
+    """Return the result of work, and whether the waiting task was cancelled meanwhile; raises what
+    it raises.
     """
     task = asyncio.create_task(work)
     is_cancelled = False

@@ -213,7 +213,7 @@ def _check_versions(folder: Path, found: Manifest, wanted: Manifest) -> None:
 
 
 def _reasons(found: Manifest, wanted: Manifest) -> Iterator[str]:
-    """What makes two runs of manifests that a user wrote in the same words."""
+    """Return the differences of manifests that a user wrote in the same words."""
     made, now = (one.dataset.version if one.dataset else 1 for one in (found, wanted))
     if made != now:
         yield f"its data are version {made}, these version {now}"
@@ -273,7 +273,7 @@ def _changed_models(found: Manifest, wanted: Manifest) -> list[str]:
 
 
 def _decisive(models: Iterable[ManifestModel]) -> dict[str, dict[str, Any]]:
-    """What decides the models' replies, by their names."""
+    """Return what decides the models' replies, by their names."""
     return {m.name: {k: v for k, v in m.fields().items() if k not in _LABELS} for m in models}
 
 

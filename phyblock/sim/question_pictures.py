@@ -397,7 +397,9 @@ def is_apart(
 
 
 def _hit(block: DrawnBlock, camera: Camera, pixel: tuple[int, int]) -> Top | None:
-    """Where the ray through a pixel meets the block first (Moeller-Trumbore); None if it misses."""
+    """Return where the ray through a pixel meets the block first (Moeller-Trumbore); None if it
+    misses.
+    """
     half = camera.half_tangent
     across = ((pixel[1] + 0.5) / SEEN_PX * 2 - 1) * half
     up = (1 - (pixel[0] + 0.5) / SEEN_PX * 2) * half

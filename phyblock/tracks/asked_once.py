@@ -1,4 +1,4 @@
-"""What the tracks share that ask once about an item: pictures, worked examples, one prompt."""
+"""Shared parts of tracks that ask once about an item: pictures, worked examples, one prompt."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ class AskedOnce(ABC, Generic[ItemT, PicturesT]):
 
     @abstractmethod
     def facts(self, item: ItemT, pictures: tuple[Image, ...]) -> dict[str, object]:
-        """What templates may use; nothing in it gives an answer away."""
+        """Return the variables of templates; nothing in it gives an answer away."""
 
     @abstractmethod
     def _subject(self, item: ItemT) -> object:
-        """What baselines answer about."""
+        """Return the subject of baselines."""
 
     @abstractmethod
     def _form(self, item: ItemT) -> AnswerForm[Any] | None:
@@ -64,10 +64,10 @@ class AskedOnce(ABC, Generic[ItemT, PicturesT]):
 
     @abstractmethod
     def _pictured(self, item: ItemT) -> object | None:
-        """What the pictures of an item show; None where none is sent."""
+        """Return the drawing of an item; None where none is sent."""
 
     def _pictured_for(self, item: ItemT, _seed: int) -> object | None:
-        """What the pictures that a seed sends show: those of the item, unless the track differs."""
+        """Return the drawing that a seed sends: that of the item, unless the track differs."""
         return self._pictured(item)
 
     def _forms(self) -> Sequence[ItemT]:
@@ -75,7 +75,7 @@ class AskedOnce(ABC, Generic[ItemT, PicturesT]):
         return self.items
 
     def _right_answer(self, item: ItemT) -> str:
-        """What a worked example is answered with; of tracks that show such."""
+        """Return the answer of a worked example; of tracks that show such."""
         raise NotImplementedError(f"there is no worked example of {item.key}")
 
     def identity(self) -> dict[str, Any]:
@@ -192,11 +192,11 @@ class WholePlanTrack(AskedOnce[AssemblyTask, PicturesT], Generic[RulesT, Picture
         return self._showing.of(item, seed)
 
     def about(self, item: AssemblyTask) -> dict[str, Any]:
-        """How the scene is shown, where not as the file has it."""
+        """Return how the scene is shown, where not as the file has it."""
         return showing_fields(item)
 
     def facts(self, item: AssemblyTask, pictures: tuple[Image, ...]) -> dict[str, object]:
-        """What templates may use; nothing in it gives an answer away."""
+        """Return the variables of templates; nothing in it gives an answer away."""
         return {
             "pictures": [picture.label for picture in pictures],
             "n_candidates": len(item.candidates),

@@ -1,4 +1,4 @@
-"""What a track is: the items it asks about, and how it asks and judges.
+"""The protocol of tracks: items, requests and judgement.
 
 Most tracks ask once a sample; step planning plays an episode of several turns.
 """
@@ -50,8 +50,8 @@ FIRST_CARRYING = 1
 
 
 def engine_identity() -> dict[str, Any]:
-    """What a track's identity says of the physics engine: runs made before there was a choice say
-    nothing, and are to go on with the engine of reference.
+    """Return the facts of the physics engine in a track's identity: runs made before there was a
+    choice say nothing, and are to go on with the engine of reference.
     """
     engine = physics_engine()
     if engine.name == REFERENCE_ENGINE:
@@ -60,7 +60,7 @@ def engine_identity() -> dict[str, Any]:
 
 
 class Item(Protocol):
-    """What one sample is about: a scene with its candidates, or a question."""
+    """The subject of a sample: a scene with its candidates, or a question."""
 
     @property
     def key(self) -> str:
@@ -75,18 +75,18 @@ ItemT = TypeVar("ItemT", bound=Item)
 
 
 class Judgement(Protocol):
-    """What a reply was read as, and what that is worth."""
+    """A reply as it was parsed and scored."""
 
     @property
     def is_read(self) -> bool:
-        """Whether anything could be read."""
+        """True if anything could be read."""
 
     def fields(self) -> dict[str, Any]:
         """`parse`, `scores` and what else the record says of it."""
 
 
 class Track(Protocol[ItemT]):
-    """What all tracks have in common."""
+    """The common part of all tracks."""
 
     @property
     def name(self) -> str:
@@ -94,14 +94,14 @@ class Track(Protocol[ItemT]):
 
     @property
     def items(self) -> Sequence[ItemT]:
-        """What it asks about; every seed repeats all of them."""
+        """Its items; every seed repeats all of them."""
 
     @property
     def template(self) -> str:
         """Name of the prompt; "" where every model is a recording."""
 
     def about(self, item: ItemT) -> dict[str, Any]:
-        """What records say of an item besides its scene."""
+        """Return the fields of records about an item besides its scene."""
 
     def identity(self) -> dict[str, Any]:
         """Digests of what decides its results: data, prompt, pictures; JSON-able."""
@@ -150,8 +150,8 @@ class JudgesApart(Protocol):
     """A track that takes so long to judge a reply that it does so beside the calls of others."""
 
     async def judge_apart(self, item: Any, text: str | None, earlier: Record | None) -> Judgement:
-        """What `judge` gives; of the `earlier` record of the same sample it may take what replies
-        alone do not decide.
+        """Return what `judge` does; of the `earlier` record of the same sample it may take what
+        replies alone do not decide.
         """
 
 
@@ -179,7 +179,7 @@ class Episode(Protocol):
 
     @property
     def is_read(self) -> bool:
-        """Whether anything could be read in any reply."""
+        """True if anything could be read in any reply."""
 
     def fields(self) -> dict[str, Any]:
         """`parse`, `scores`, `turns` (a mapping for each reply taken), `ending` and what else the

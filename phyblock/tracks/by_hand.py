@@ -1,4 +1,4 @@
-"""How a person answers what a track asks: by picking choices, which make a reply in text.
+"""Answers of people: by picking choices, which make a reply in text.
 
 Where a choice alone does not say it all, as where a block goes, numbers are given with every pick.
 """
@@ -27,8 +27,8 @@ _PICTURES = ("composite", "candidates")
 
 @dataclass(frozen=True)
 class Spot:
-    """Where a choice is seen: in the last picture of this `label`, the cell of the grid that fills
-    the square at its right end, from 0; or with None the whole picture.
+    """The place where a choice is seen: in the last picture of this `label`, the cell of the grid
+    that fills the square at its right end, from 0; or with None the whole picture.
     """
 
     label: str

@@ -1,4 +1,4 @@
-"""What is counted of a sample when its reply is judged, and kept in its record."""
+"""Counts of a sample that are made when its reply is judged, and kept in its record."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ __all__ = ["count_sample", "counts_samples"]
 
 
 def counts_samples(track: str) -> bool:
-    """Whether measures of a track count samples as they are judged."""
+    """True if measures of a track count samples as they are judged."""
     return bool(_sorts(track))
 
 
 def count_sample(track: str, item: Any, judged: Any) -> Mapping[str, tuple[float, ...]]:
-    """What the measures of a track count of one sample, by name of the counts.
+    """Return the counts of one sample that the measures of a track need, by name of the counts.
 
     `judged` is the judgement of the reply, or the episode once it has ended. Where a measure does
     not count a sample, its counts are empty: they are absent where a record was written before the
@@ -31,7 +31,7 @@ def count_sample(track: str, item: Any, judged: Any) -> Mapping[str, tuple[float
 
 
 def _sorts(track: str) -> dict[str, Callable[[Any, Any], Sequence[float] | None]]:
-    """What counts a sample of a track, by name of the counts."""
+    """Return the functions that count a sample of a track, by name of the counts."""
     added: list[SampleCounts] = [measure.counted for measure in added_measures(track)]
     return {
         counted.name: counted.sample

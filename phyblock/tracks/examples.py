@@ -51,7 +51,7 @@ class Shots:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Which they are."""
+        """Return the examples."""
         return tuple(example.key for example in self.examples)
 
     def before(self, messages: tuple[Message, ...]) -> tuple[Message, ...]:

@@ -1,4 +1,4 @@
-"""What a suite says of the full-planning track: the section `full_planning`."""
+"""Full planning: a whole plan in one reply."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from phyblock.types import AnswerFormat, Level1Criterion, Matcher, PlanParser, S
 
 
 class PlanningSpec(PictureControls):
-    """How the scenes of the full_planning track are shown, beside `images` and `candidates`."""
+    """Presentation of scenes in the full_planning track, beside `images` and `candidates`."""
 
 
 class PlanRecord(Record):
@@ -156,7 +156,7 @@ def pick_plan(subject: PlanSubject) -> Picking:
 
 
 def can_be_worked(task: AssemblyTask) -> bool:
-    """Whether every block of the goal is among the candidates."""
+    """True if every block of the goal is among the candidates."""
     return all(task.candidates.index_of(block.look) is not None for block in task.scene.blocks)
 
 
@@ -188,7 +188,7 @@ def _drawn_order(scene: Scene) -> list[int]:
 
 @dataclass(frozen=True)
 class PlanningRules:
-    """How replies are read and scored; the first matcher is the headline."""
+    """Rules of parsing and scoring; the first matcher is the headline."""
 
     parser: PlanParser
     settings: tuple[Setting, ...]
@@ -201,13 +201,13 @@ class PlanningRules:
         return None if self.answer_format == "text" else plan_form(len(item.candidates))
 
     def read(self, item: AssemblyTask, text: str) -> ParsedPlan:
-        """What a reply to a question about a scene says."""
+        """The plan that a reply holds."""
         return parse_plan(text, len(item.candidates), self.parser)
 
 
 @dataclass(frozen=True)
 class PlanJudgement:
-    """What a reply was read as, and what that is worth."""
+    """A reply as it was parsed and scored."""
 
     parser: PlanParser
     parsed: ParsedPlan
@@ -222,7 +222,7 @@ class PlanJudgement:
 
     @property
     def is_read(self) -> bool:
-        """Whether a rule matched."""
+        """True if a rule matched."""
         return self.parsed.rule is not None
 
     def fields(self) -> dict[str, Any]:
@@ -265,7 +265,7 @@ class FullPlanning(WholePlanTrack[PlanningRules, Pictures]):
         self._scorers: dict[object, AssemblyScorer] = {}
 
     def facts(self, item: AssemblyTask, pictures: tuple[Image, ...]) -> dict[str, object]:
-        """What templates may use; nothing in it gives an answer away."""
+        """Return the variables of templates; nothing in it gives an answer away."""
         scale = None if self._pictures is None else self._pictures.candidate_scale
         return {**super().facts(item, pictures), "candidate_scale": scale}
 
@@ -311,7 +311,7 @@ def open_full_planning(opening: Opening) -> FullPlanning:
 
 
 def _rules(suite: Suite) -> PlanningRules:
-    """How a suite reads and scores plans."""
+    """Return the rules by which a suite parses and scores plans."""
     level1 = suite.scoring.level1
     criterion = None if level1 == "aov" else level1
     matchers, asked = suite.scoring.matchers, suite.answer_format

@@ -1,4 +1,4 @@
-"""What a track declares about itself: everything outside its folder goes by this."""
+"""The declaration of a track, by which everything outside its module goes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = ["Opening", "TrackKind", "kind_of", "kinds", "kinds_with_physics"]
 
 @dataclass(frozen=True)
 class Opening:
-    """What a track is opened with; without `with_prompts` nothing is asked of anyone.
+    """The arguments that a track is opened with; without `with_prompts` nothing is asked of anyone.
 
     `limit` is how many items the user wants at most, None for all. `shop` is where pictures
     of all tracks are drawn.

@@ -105,12 +105,12 @@ class Measure:
 
     @property
     def is_share(self) -> bool:
-        """Whether values are parts of a whole, which bounds their intervals."""
+        """True if values are parts of a whole, which bounds their intervals."""
         return self.unit == "%" and not self.is_difference
 
     @property
     def end_of_range(self) -> float:
-        """Where the range of values ends that begins at 0; NaN for no range."""
+        """The end of the range of values, which begins at 0; NaN for no range."""
         if self.is_share:
             return 1.0
         return math.nan if self.most is None else self.most
@@ -124,7 +124,7 @@ class Measure:
 
     @property
     def scale(self) -> float:
-        """What a value is multiplied by where it is shown."""
+        """The factor of a value where it is shown."""
         return 100.0 if self.unit == "%" else 1.0
 
     @property
@@ -167,12 +167,12 @@ def in_unit(heading: str, unit: str) -> str:
 
 
 def value_key(row: Mapping[Any, Any]) -> str:
-    """What a value is of, as a key: `f1/overall/A/optimal/aov`."""
+    """Return the key of a value: `f1/overall/A/optimal/aov`."""
     return "/".join(str(row[name]) for name in VALUE_KEY)
 
 
 class ListedScore(NamedTuple):
-    """What F1 of a sample is made of, and the types of its wrong steps."""
+    """The counts behind F1 of a sample, and the types of its wrong steps."""
 
     tp: float
     fp: float
@@ -237,7 +237,7 @@ class KeptPictures(Protocol):
 
 @dataclass(frozen=True)
 class PageItems:
-    """What the page of a report shows of items that are more than their scene.
+    """The data of a report's page on items that are more than their scene.
 
     `shown` gives what a record asked about, as it was shown, None where that is not known. `entry`
     is what the page takes of it, `pictures` finds those that were sent in a folder of kept ones.
@@ -250,7 +250,7 @@ class PageItems:
 
 @dataclass(frozen=True)
 class EpisodeView:
-    """How a record of a track is shown step by step: as a table, and as frames of a film.
+    """The views of a record step by step: as a table, and as frames of a film.
 
     `state_keys` name, in the cache, the pictures that its turns were sent beside those of the
     scene.
@@ -264,7 +264,8 @@ class EpisodeView:
 
 @dataclass(frozen=True)
 class ItemExport:
-    """How `phyblock export --questions` writes items with their pictures for other tools.
+    """The form in which `phyblock export --questions` writes items with their pictures for other
+    tools.
 
     `formats` are the words for `--to`; `items` names the bundled set that is written unless
     another is named. `write` takes a format, the folder to write, the set by its name or folder,

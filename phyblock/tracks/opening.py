@@ -1,4 +1,4 @@
-"""What tracks share when they are opened: picture style, worker processes, prompts."""
+"""Shared parts of opening tracks: picture style, worker processes, prompts."""
 
 from __future__ import annotations
 
@@ -52,19 +52,19 @@ def open_tracks(opening: Opening, names: Sequence[str]) -> tuple[AnyTrack, ...]:
 
 
 def picture_folder() -> Path:
-    """Where drawn pictures are kept."""
+    """Return the folder of drawn pictures."""
     return cache_dir() / "pictures"
 
 
 def picture_style(images: ImagesSpec) -> PictureStyle:
-    """How a suite wants pictures drawn."""
+    """Return the style in which a suite wants pictures drawn."""
     ground = images.background or BACKGROUNDS[0]
     seen = PictureStyle.from_view(images.view, images.size_px, ground)
     return replace(seen, candidate_scale=images.candidate_scale)
 
 
 def picture_policy(images: ImagesSpec) -> PicturePolicy:
-    """Which pictures of goals and candidates a suite wants, and how they are drawn."""
+    """Return which pictures of goals and candidates a suite wants, and how they are drawn."""
     return PicturePolicy(images.source, images.layout, images.order, picture_style(images))
 
 
@@ -92,7 +92,7 @@ def task_showing(
     tasks: Sequence[AssemblyTask],
     pool: Sequence[AssemblyTask],
 ) -> TaskShowing:
-    """How a suite shows the scenes of a track, whose section is of this type and name.
+    """Return how a suite shows the scenes of a track, whose section is of this type and name.
 
     Raises SpecError where another goal is wanted and `pool` has none for one of `tasks`.
     """

@@ -1,4 +1,4 @@
-"""Where pictures are made: worker processes, and a cache on disk by content."""
+"""Drawing of pictures: worker processes, and a cache on disk by content."""
 
 from __future__ import annotations
 
@@ -62,8 +62,8 @@ class Drawing:
 
 
 class Workshop:
-    """What studios may share: `workers` processes, which start with the first work that there is,
-    and the pictures that are being made or were used last.
+    """The shared part of studios: `workers` processes, which start with the first work that there
+    is, and the pictures that are being made or were used last.
     """
 
     def __init__(self, workers: int) -> None:
@@ -74,7 +74,7 @@ class Workshop:
         self._alone = asyncio.Lock()
 
     async def work_out(self, work: Callable[[], _Result]) -> _Result:
-        """What `work`, a `partial` of a function of a module, gives in a worker process.
+        """Return what `work`, a `partial` of a function of a module, gives in a worker process.
 
         Where one was killed it is done once more, alone; SimulationError where it is killed again.
         """
@@ -177,7 +177,7 @@ class Studio:
         return data
 
     async def work_out(self, work: Callable[[], _Result]) -> _Result:
-        """What `work`, a `partial` of a function of a module, gives in a worker process."""
+        """Return what `work`, a `partial` of a function of a module, gives in a worker process."""
         return await self._shop.work_out(work)
 
     def _path(self, key: str) -> Path:
@@ -195,7 +195,7 @@ def _take_note(drawn: asyncio.Task[bytes]) -> None:
 
 
 def render_workers() -> int:
-    """How many processes draw pictures."""
+    """Return the number of processes that draw pictures."""
     return min(_RENDER_WORKERS, os.cpu_count() or 1)
 
 
@@ -273,7 +273,7 @@ def rounded(values: Iterable[float]) -> list[float]:
 
 @dataclass(frozen=True)
 class PicturePolicy:
-    """Which pictures a sample carries, in which order.
+    """The pictures that a sample carries, and their order.
 
     `source`: rendered here, or the data set's own composite. `layout`: one composite, or the two
     pictures apart in `order`.
@@ -294,11 +294,11 @@ class Pictures(Studio):
 
     @property
     def candidate_scale(self) -> CandidateScale | None:
-        """How candidates are scaled, for the prompt; None where pictures are the data set's."""
+        """Return how candidates are scaled, for the prompt; None where pictures are the data set's."""
         return None if self.policy.source == "dataset" else self.policy.style.candidate_scale
 
     def style_of(self, task: AssemblyTask) -> PictureStyle:
-        """How the pictures of a task are drawn: larger than usual where its goal is wide."""
+        """Return how the pictures of a task are drawn: larger than usual where its goal is wide."""
         return goal_style(task.scene, self.policy.style)
 
     async def of(self, task: AssemblyTask) -> tuple[Image, ...]:
@@ -327,7 +327,9 @@ class Pictures(Studio):
         return self.outlined(drawings, joined_size_px(side) if is_joined else (side, side))
 
     def keys(self, task: AssemblyTask) -> tuple[str, ...]:
-        """What decides the pixels of a task's pictures: digests of content, style and renderer."""
+        """Return what decides the pixels of a task's pictures: digests of content, style and
+        renderer.
+        """
         if self.policy.source == "dataset":
             of = dict.fromkeys(one.composite for one in (task, _goal_of(task)) if one is not None)
             parts = (b"" if path is None else read_picture(path) for path in of)

@@ -1,4 +1,4 @@
-"""What records of plans of blocks have in common: the plan that was read, and its scores."""
+"""The common part of records of plans: the plan that was read, and its scores."""
 
 from __future__ import annotations
 

@@ -106,7 +106,7 @@ class CarryTolerances(Line):
 
 
 class RestingBlock(Line):
-    """Where a block came to lie."""
+    """The place where a block came to lie."""
 
     step: Whole
     """Number of the step, from 1, that put it."""
@@ -117,7 +117,7 @@ class RestingBlock(Line):
 
 
 class StepOutcome(Line):
-    """What a step is worth by geometry, and how it ended when it was carried out."""
+    """The score of a step by geometry, and how it ended when it was carried out."""
 
     vertex: Whole | None
     """The goal block, from 0, that it stands for; null: none."""
@@ -132,7 +132,7 @@ class StepOutcome(Line):
     iou: Amount | None = None
     """Volume that both share, of the volume of both together."""
     end: StepEnd
-    """How it ended."""
+    """The ending."""
     moved_cm: Amount = 0.0
     """How far the block came to lie from where it was to be [cm]."""
     turned_deg: Amount = 0.0
@@ -151,10 +151,10 @@ class StepOutcome(Line):
 
 
 class PoseOutcome(Line):
-    """What a plan with poses is worth."""
+    """The score of a plan with poses."""
 
     rotation: PoseRotation
-    """Whether candidates keep their orientation or steps bring one."""
+    """True if candidates keep their orientation or steps bring one."""
     right: dict[str, tuple[Whole, ...]]
     """By frame, `absolute` or `aligned`: right steps within 0.5, 1, 2 and 4 cm."""
     shift_cm: tuple[Amount, Amount]
@@ -168,7 +168,7 @@ class PoseOutcome(Line):
     iou: Amount
     """Intersection over union of all that stands and the goal, in voxels of 5 mm by 64 points."""
     completed: bool
-    """Whether all of the goal was reached, and nothing else lies about."""
+    """True if all of the goal was reached, and nothing else lies about."""
     limits: CarryTolerances
     """The tolerances."""
     engine: str
@@ -192,7 +192,7 @@ class PoseRecord(Record):
         return plan_row(self.parse, self.shown)
 
     def course(self, matcher: str) -> Course | None:
-        """What was wrong with each step, and how many blocks of the goal were not reached."""
+        """Return what was wrong with each step, and how many blocks of the goal were not reached."""
         if self.pose is None or self.parse is None:
             return super().course(matcher)
         names = (str(step.block) for step in self.parse.steps)
@@ -317,7 +317,7 @@ _PARSER = "poses"
 
 @dataclass(frozen=True)
 class PoseRules:
-    """How replies are read, scored and carried out; the first matcher is the headline."""
+    """Rules of parsing, scoring and execution; the first matcher is the headline."""
 
     rotation: PoseRotation
     settings: tuple[Setting, ...]
@@ -329,7 +329,7 @@ class PoseRules:
 
     @property
     def is_free(self) -> bool:
-        """Whether steps bring a rotation."""
+        """True if steps bring a rotation."""
         return self.rotation == "free"
 
     @property
@@ -365,7 +365,7 @@ class Ended:
 
 @dataclass(frozen=True)
 class PoseJudgement:
-    """What a reply was read as, and what that is worth.
+    """A reply as it was parsed and scored.
 
     `fits` and `errors` have an entry for each step that was read, `kept` are those that name a
     candidate.
@@ -388,7 +388,7 @@ class PoseJudgement:
 
     @property
     def is_read(self) -> bool:
-        """Whether a rule matched."""
+        """True if a rule matched."""
         return self.parsed.rule is not None
 
     def fields(self) -> dict[str, Any]:

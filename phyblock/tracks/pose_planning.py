@@ -1,4 +1,4 @@
-"""What a suite says of the pose-planning track: the section `pose`."""
+"""Pose planning: blocks, order and positions in one reply."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class ViewSpec(Section):
 
 
 def _kind(view: object) -> str:
-    """What a view is meant as, so that it is said to be wrong as that alone."""
+    """Return the kind of view that is meant, so that it is said to be wrong as that alone."""
     return "direction" if isinstance(view, Mapping | ViewSpec) else "name"
 
 
@@ -93,7 +93,7 @@ Angle = Annotated[float, Field(strict=True, gt=0, le=90, allow_inf_nan=False)]
 
 
 class PoseSpec(PictureControls):
-    """How poses are asked for in the pose_planning track, and how plans are carried out."""
+    """Requests of poses in the pose_planning track, and the execution of plans."""
 
     rotation: PoseRotation = Field(
         default="candidate",
@@ -336,7 +336,7 @@ class PosePictures(Studio):
         return self.outlined(self._drawings(task), (side, side))
 
     def keys(self, task: AssemblyTask) -> tuple[str, ...]:
-        """What decides the pixels of a task's pictures."""
+        """Return what decides the pixels of a task's pictures."""
         return tuple(drawing.key for drawing in self._drawings(task))
 
     def _drawings(self, task: AssemblyTask) -> tuple[Drawing, ...]:
@@ -356,7 +356,7 @@ class PosePictures(Studio):
 
 
 def shows_three_sides(view: View | ViewSpec) -> bool:
-    """Whether a block that is seen so shows its top and two sides, as the sheet of blocks needs."""
+    """True if a block that is seen so shows its top and two sides, as the sheet of blocks needs."""
     azimuth_deg, elevation_deg = _direction(view)
     off_axis_deg = abs((azimuth_deg + 45) % 90 - 45)
     return off_axis_deg >= _LEAST_TURN_DEG and _LEAST_DEG <= elevation_deg <= _MOST_DEG
@@ -428,7 +428,7 @@ class PosePlanning(WholePlanTrack[PoseRules, PosePictures]):
         yield from super().outlines(item if isinstance(item, ShownTask) else self.shown(item, 0))
 
     def facts(self, item: AssemblyTask, pictures: tuple[Image, ...]) -> dict[str, object]:
-        """What templates may use; nothing in it gives an answer away."""
+        """Return the variables of templates; nothing in it gives an answer away."""
         return {**super().facts(item, pictures), "rotation": self.rules.rotation}
 
     def _subject(self, item: AssemblyTask) -> PoseSubject:
@@ -441,7 +441,7 @@ class PosePlanning(WholePlanTrack[PoseRules, PosePictures]):
     async def judge_apart(
         self, item: AssemblyTask, text: str | None, earlier: Record | None
     ) -> PoseJudgement:
-        """What `judge` gives, worked out in another process, or in a thread without one.
+        """Return what `judge` does, computed in another process, or in a thread without one.
 
         A plan that an earlier record holds is not carried out again.
         """
@@ -488,7 +488,7 @@ def _check_sheet(suite: Suite, poses: PoseSpec) -> None:
 
 
 def _rules(suite: Suite, poses: PoseSpec) -> PoseRules:
-    """How a suite reads, scores and carries out plans with poses."""
+    """Return the rules by which a suite parses, scores and executes plans with poses."""
     return PoseRules(
         poses.rotation,
         suite.settings,

@@ -221,7 +221,7 @@ def _kept_worlds(
 
 
 def _no_plan(record: PoseRecord) -> str:
-    """Why there is not one step."""
+    """Return why there is not one step."""
     why = "there is no reply"
     if record.error is not None:
         why = record.error.message
@@ -239,7 +239,7 @@ def _ended(step: StepOutcome) -> str:
 
 
 def _where(error: PoseError) -> str:
-    """What is wrong with a step that stands."""
+    """Return what is wrong with a step that stands."""
     return f", but {ERROR_NAMES[error].lower()}"
 
 
@@ -274,7 +274,7 @@ def _notes(run: Run) -> Sequence[str]:
 
 
 def _check_alike(run: Run, first: Run, _: Sequence[str], measure: Measure) -> None:
-    """What is counted of the world depends on how plans are carried out, F1 does not."""
+    """Return the version of execution for measures of the world; F1 does not depend on it."""
     if measure.counted not in (CARRIED, ERRORS):
         return
     for key, unsaid in ((CARRYING, FIRST_CARRYING), (ENGINE, None)):

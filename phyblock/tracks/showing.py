@@ -33,7 +33,8 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Showing:
-    """How a suite shows scenes: `blind` leaves out the goal, `wrong_image` shows another one.
+    """The presentation of scenes in a suite: `blind` leaves out the goal, `wrong_image` shows
+    another one.
 
     What is drawn is drawn anew with each of the `seeds`.
     """
@@ -45,7 +46,7 @@ class Showing:
 
     @property
     def is_plain(self) -> bool:
-        """Whether scenes are shown as the file has them."""
+        """True if scenes are shown as the file has them."""
         return self.order == "file" and not self.blind and not self.wrong_image
 
 
@@ -160,7 +161,9 @@ def file_plan(task: AssemblyTask, steps: Sequence[int]) -> tuple[int, ...] | Non
 
 
 def showing_fields(task: AssemblyTask) -> dict[str, Any]:
-    """What records say of how a task was shown; nothing where it was as the file has it."""
+    """Return the fields of records about how a task was shown; nothing where it was as the file has
+    it.
+    """
     if not isinstance(task, ShownTask):
         return {}
     goal = None if task.goal is None else task.goal.key

@@ -1,4 +1,4 @@
-"""What a suite says of the step-planning track: the section `steps`."""
+"""Step planning: one block at a time, in a simulator."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ class EpisodeRecord(Record):
     """The physics engine that blocks were let go in, with its version; null where none were, and
     in records from before there was a choice (PyBullet)."""
     ending: Ending = "unanswered"
-    """How it ended."""
+    """The ending."""
     outcomes: tuple[StepOutcome, ...] = ()
     """What became of every step."""
     progress: tuple[Whole, ...] = ()
@@ -178,11 +178,11 @@ class EpisodeRecord(Record):
     exported: ClassVar[Mapping[str, str]] = {"ending": "string"}
 
     def export_row(self) -> Mapping[str, Any]:
-        """How it ended."""
+        """The ending."""
         return {"ending": self.ending}
 
     def course(self, matcher: str) -> Course:
-        """What became of every step; no matcher has a part in it."""
+        """The outcome of every step; no matcher has a part in it."""
         del matcher
         steps = (
             (str(turn.parse.move), None if turn.outcome in ("placed", "done") else turn.outcome)
@@ -202,7 +202,7 @@ class EpisodeRecord(Record):
 
     @property
     def limit_usd(self) -> float:
-        """What a failed request counts; replies were counted where each was written, as a turn."""
+        """The use of a failed request; replies were counted where each was written, as a turn."""
         return super().limit_usd if self.reply is None else 0.0
 
     @property
@@ -227,7 +227,7 @@ ENDINGS: tuple[Ending, ...] = get_args(Ending)
 
 @dataclass(frozen=True)
 class StepLimits:
-    """What ends an episode, whatever the model does; None is no bound.
+    """Limits that end an episode, whatever the model does; None is no bound.
 
     `steps` None is twice the number of blocks, so that every episode ends. `failures` are failed
     steps in a row, `repeats` failures in a row of one and the same operation; `tokens` and `usd`
@@ -247,7 +247,7 @@ class StepLimits:
 
 @dataclass(frozen=True)
 class StepRules:
-    """How episodes are played and scored.
+    """Rules of playing and scoring episodes.
 
     The simulator lets a move succeed under `accepts`; scores are counted under all `settings`.
     Reasons are a part of the JSON that is asked for where `cot`.
@@ -274,7 +274,7 @@ class StepRules:
 
 @dataclass
 class Tally:
-    """What counts against the limits of an episode."""
+    """The use of an episode's limits."""
 
     steps: int = 0
     failures: int = 0
@@ -357,7 +357,7 @@ class PastStep:
     seen: Image | None
 
     def report(self, feedback: Feedback) -> str:
-        """What the model is told about it."""
+        """Return the message to the model about it."""
         if feedback == "none":
             return ""
         if self.outcome == "placed":
@@ -574,7 +574,7 @@ _NOT_TRIED = ("done", *get_args(MoveProblem))
 
 @dataclass(frozen=True)
 class Desk:
-    """What an episode needs done for it.
+    """The services that an episode needs.
 
     `settle` lets blocks go at their goal poses; `write` gives the messages of the step after the
     given ones, with the picture of the assembly that is among them, and is None for models that
@@ -675,12 +675,12 @@ class StepEpisode:
 
     @property
     def is_read(self) -> bool:
-        """Whether an operation could be read in any reply."""
+        """True if an operation could be read in any reply."""
         return any(turn["parse"]["problem"] is None for turn in self._turns)
 
     @property
     def outcomes(self) -> list[StepOutcome]:
-        """What became of every step, in order."""
+        """The outcome of every step, in order."""
         return [step.outcome for step in self._past]
 
     @property
@@ -689,7 +689,7 @@ class StepEpisode:
         return [turn["parse"]["move"] for turn in self._turns if _is_attempt(turn)]
 
     def fields(self) -> dict[str, Any]:
-        """What the record says of the episode (docs/results.md)."""
+        """Return the fields of the record about the episode (docs/results.md)."""
         placed = [outcome == "placed" for outcome in self.outcomes]
         plan = self.steps
         return {
@@ -807,7 +807,7 @@ _LIKELY = PastStep("Move(1)", "placed", "Next plan: Move(1)", None)
 
 @dataclass(frozen=True)
 class _Sight:
-    """What a model is shown: a prompt and the pictures in it."""
+    """The view of a model: a prompt and the pictures in it."""
 
     prompt: StepPrompt
     pictures: Pictures
@@ -966,7 +966,7 @@ class StepPlanning:
         )
 
     async def _settle(self, blocks: Sequence[Block]) -> Settled:
-        """What becomes of blocks, worked out in another process, or in a thread without one."""
+        """Return what becomes of blocks, computed in another process, or in a thread without one."""
         state = tuple(blocks)
         if state not in self._settled:
             trial = DEFAULT_TRIAL if self.rules.physics == "strict" else ONE_SETTING
@@ -1000,7 +1000,7 @@ def open_step_planning(opening: Opening) -> StepPlanning:
 
 
 def _rules(suite: Suite) -> StepRules:
-    """How a suite plays episodes."""
+    """Return the rules by which a suite plays episodes."""
     steps = suite.section(StepsSpec)
     limits = StepLimits(
         steps.max_steps,

@@ -1,4 +1,4 @@
-"""What a suite says of the VQA track: the section `vqa`."""
+"""Questions with four options, in 16 subtasks."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ class VqaSpec(PictureControls):
 
     @property
     def rotations(self) -> int:
-        """How often each question is asked with one seed."""
+        """The number of times that each question is asked with one seed."""
         return len(LETTERS) if self.circular else 1
 
 
@@ -147,22 +147,22 @@ class QuestionShown(Line):
     rotation: Whole = 0
     """Number of places by which its options were turned."""
     options_as: str = ""
-    """Whether options that are pictures were sent as pictures or as letters in one."""
+    """True if options that are pictures were sent as pictures or as letters in one."""
     blind: bool = False
-    """Whether no picture was sent."""
+    """True if no picture was sent."""
     wrong_image: bool = False
-    """Whether the pictures were those of another scene."""
+    """True if the pictures were those of another scene."""
 
 
 class GivenAnswer(Line):
-    """What was answered, and what is right."""
+    """The given and the right answer."""
 
     right: str
     """The right letters."""
     given: str | None
     """The letters given, null: none."""
     correct: bool
-    """Whether they are the same."""
+    """True if they are the same."""
 
 
 class ChoiceRecord(Record):
@@ -186,7 +186,7 @@ class ChoiceRecord(Record):
     }
 
     def row(self) -> Mapping[str, Any]:
-        """Which question it is, the letters that are right and those given."""
+        """The question, the letters that are right and those given."""
         answer = self.answer
         return {
             "question": self.question.id,
@@ -207,7 +207,7 @@ class ChoiceRecord(Record):
     }
 
     def export_row(self) -> Mapping[str, Any]:
-        """Which question it is, the right answer, and the one that was given."""
+        """The question, the right answer, and the one that was given."""
         question = {name: getattr(self.question, name) for name in _QUESTION}
         answer = {name: getattr(self.answer, name, None) for name in _ANSWER}
         return {
@@ -222,7 +222,7 @@ class ChoiceRecord(Record):
 
     @property
     def is_correct(self) -> bool | None:
-        """Whether the answer is right."""
+        """True if the answer is right."""
         return None if self.answer is None else self.answer.correct
 
     @property
@@ -238,7 +238,7 @@ class ChoiceRecord(Record):
 
 @dataclass(frozen=True)
 class VqaRules:
-    """How questions are shown.
+    """The presentation of questions.
 
     `circular`: every rotation of the options is asked; `blind`: no picture is sent;
     `wrong_image`: the pictures are those of a question about another scene.
@@ -257,7 +257,7 @@ class VqaRules:
         return choice_form(question.options, question.subtask == "OR")
 
     def read(self, question: Question, text: str) -> ParsedAnswer:
-        """What a reply to a question says."""
+        """The answer that a reply gives."""
         return parse_answer(text, question.options, question.subtask == "OR")
 
     def right_answer(self, question: Question) -> str:
@@ -401,7 +401,7 @@ class QuestionPictures(Studio):
         ), False
 
     def keys(self, shown: ShownQuestion) -> tuple[str, ...]:
-        """What decides the pixels of a question's pictures."""
+        """Return what decides the pixels of a question's pictures."""
         return tuple(drawing.key for drawing in self._drawings(shown))
 
     @property
@@ -488,14 +488,14 @@ class AskedQuestion:
 
 @dataclass(frozen=True)
 class ChoiceJudgement:
-    """What a reply was read as, and whether that is right."""
+    """A reply as it was parsed, and whether it is right."""
 
     parsed: ParsedAnswer
     right: str
 
     @property
     def is_read(self) -> bool:
-        """Whether a rule matched."""
+        """True if a rule matched."""
         return self.parsed.rule is not None
 
     def fields(self) -> dict[str, Any]:
@@ -544,7 +544,7 @@ class Vqa(AskedOnce[AskedQuestion, QuestionPictures]):
             self._elsewhere.check(tasks, "question", "vqa.wrong_image")
 
     def about(self, item: AskedQuestion) -> dict[str, Any]:
-        """Which question it is and how it is shown."""
+        """The question and how it is shown."""
         return {
             "question": {
                 "id": item.question.id,
@@ -569,7 +569,7 @@ class Vqa(AskedOnce[AskedQuestion, QuestionPictures]):
         }
 
     def facts(self, item: AskedQuestion, pictures: tuple[Image, ...]) -> dict[str, object]:
-        """What templates may use; nothing in it gives the answer away."""
+        """Return the variables of templates; nothing in it gives the answer away."""
         question = item.question
         letters = LETTERS[: len(question.options)]
         return {
@@ -619,12 +619,12 @@ class Vqa(AskedOnce[AskedQuestion, QuestionPictures]):
 
 
 def elsewhere_in(questions: QuestionSet) -> Elsewhere[QuestionTask]:
-    """What wrong pictures of a question are taken from: others that show what it shows."""
+    """Return the pool of wrong pictures of a question: others that show what it shows."""
     return Elsewhere(questions.tasks, _sort_of)
 
 
 def _sort_of(task: QuestionTask) -> tuple[object, ...]:
-    """What pictures must share to stand in for one another: a text may speak of place B."""
+    """Return what pictures must share to stand in for one another: a text may speak of place B."""
     marks = sorted(
         (picture.label, *sorted(mark.letter for mark in picture.marks))
         for picture in task.question.pictures
@@ -670,7 +670,7 @@ def open_vqa(opening: Opening) -> Vqa:
 
 
 def _subtask(item: AskedQuestion) -> str:
-    """What a question and its worked examples share."""
+    """Return what a question and its worked examples share."""
     return item.task.question.subtask
 
 

@@ -454,7 +454,7 @@ def reword_set(
 
 
 def _faults(taken: Set[str], reworded: Sequence[Question], jobs: int) -> dict[str, str]:
-    """Why reworded questions cannot be used, by id."""
+    """Return reasons why reworded questions cannot be used, by id."""
     faults = {}
     with open_workers(jobs) as workers:
         verified = verify_questions(reworded, workers)
