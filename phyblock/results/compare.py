@@ -407,7 +407,7 @@ def _shared_track(runs: Sequence[Run], wanted: str) -> str:
 
 
 def _tags(first: Run, second: Run) -> tuple[str, str]:
-    """Return labels that tell two runs apart: their folders' names, else paths, else their order."""
+    """Return two labels that tell runs apart: folders' names, else paths, else their order."""
     names = first.path.resolve().name, second.path.resolve().name
     paths = str(first.path), str(second.path)
     return next((pair for pair in (names, paths) if pair[0] != pair[1]), ("first", "second"))

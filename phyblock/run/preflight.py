@@ -105,7 +105,7 @@ def asking_remarks(suite: Suite, plan: RunPlan) -> list[str]:
 
 
 def moved_remarks(begun: Manifest, plan: RunPlan) -> list[str]:
-    """Return the models that are served elsewhere than when the run began: its replies still stand."""
+    """Return the models served elsewhere than when the run began: its replies still stand."""
     before = {model.name: model.served_at for model in begun.models}
     return [
         f"{model.name} was asked at {', '.join(before[model.name])} and is now at "

@@ -74,7 +74,7 @@ def judged(
 
 
 def about_prompt(request: Request, template: str, digest: str) -> SentPrompt:
-    """Return the fields of a record about a prompt that stands in `prompts.jsonl` under `digest`."""
+    """Return the fields of a record about a prompt that is in `prompts.jsonl` under `digest`."""
     images = tuple(_picture(part) for part in _pictures(request.messages))
     examples: dict[str, Any] = {"examples": request.examples} if request.examples else {}
     return SentPrompt(

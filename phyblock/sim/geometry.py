@@ -282,7 +282,7 @@ def box_height_cm(block: Block) -> float:
 def origin_m(
     block_type: BlockType, euler_deg: Euler, center_cm: tuple[float, float, float]
 ) -> tuple[float, float, float]:
-    """Return the place of the body frame [m] of a block whose box has its middle at a place [cm]."""
+    """Return where the body frame [m] of a block is whose box has its middle at a place [cm]."""
     x, y, z = np.array(center_cm) / _CM - _box_middle_m(block_type, euler_deg)
     return float(x), float(y), float(z)
 

@@ -192,7 +192,7 @@ class PoseRecord(Record):
         return plan_row(self.parse, self.shown)
 
     def course(self, matcher: str) -> Course | None:
-        """Return what was wrong with each step, and how many blocks of the goal were not reached."""
+        """Return what was wrong with each step, and how many goal blocks were not reached."""
         if self.pose is None or self.parse is None:
             return super().course(matcher)
         names = (str(step.block) for step in self.parse.steps)

@@ -966,7 +966,7 @@ class StepPlanning:
         )
 
     async def _settle(self, blocks: Sequence[Block]) -> Settled:
-        """Return what becomes of blocks, computed in another process, or in a thread without one."""
+        """Return the fate of blocks, computed in another process, or in a thread without one."""
         state = tuple(blocks)
         if state not in self._settled:
             trial = DEFAULT_TRIAL if self.rules.physics == "strict" else ONE_SETTING
