@@ -294,7 +294,7 @@ class Pictures(Studio):
 
     @property
     def candidate_scale(self) -> CandidateScale | None:
-        """Return the scale of candidates, for the prompt; None where pictures are the data set's."""
+        """The scale of candidates, for the prompt; None where pictures are the data set's."""
         return None if self.policy.source == "dataset" else self.policy.style.candidate_scale
 
     def style_of(self, task: AssemblyTask) -> PictureStyle:
