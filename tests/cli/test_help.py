@@ -69,7 +69,7 @@ def test_every_option_that_messages_and_docs_name_is_there() -> None:
 
 
 def is_option(verb: str, *words: str) -> bool:
-    """Whether a verb, or its own verb that the next word names, has the option that ends it."""
+    """True if a verb, or its own verb that the next word names, has the option that ends it."""
     context = click.Context(group)
     command = group.get_command(context, verb)
     assert command is not None

@@ -127,7 +127,7 @@ class Killing:
         self._over = threading.Event()
 
     async def run(self, work: Any) -> bool:
-        """Whether the work came to its end."""
+        """True if the work came to its end."""
         self._loop = asyncio.get_running_loop()
         self._task = asyncio.create_task(work)
         try:

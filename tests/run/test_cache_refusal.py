@@ -31,7 +31,7 @@ def prepare(workspace: Workspace, url: str, at_once: int = 1) -> None:
 
 
 def catches(pid: int, number: signal.Signals) -> bool:
-    """Whether a process has its own handler of a signal, as one that asks models has of SIGTERM."""
+    """True if a process has its own handler of a signal, as one that asks models has of SIGTERM."""
     status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
     (mask,) = re.findall(r"^SigCgt:\s*(\w+)", status, re.MULTILINE)
     return bool(int(mask, 16) >> (number - 1) & 1)

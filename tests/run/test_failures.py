@@ -30,7 +30,7 @@ class BySeed(OpenAIChat):
 
 
 def is_scored(record: Raw) -> bool:
-    """Whether a record has a score of every setting and matcher."""
+    """True if a record has a score of every setting and matcher."""
     found = {(s["setting"], s["matcher"]) for s in record["scores"] if s["criterion"] == "aov"}
     return found == {(setting, matcher) for setting in "AB" for matcher in ("optimal", "paper")}
 

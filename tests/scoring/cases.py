@@ -56,7 +56,7 @@ def cases(draw: st.DrawFn, max_blocks: int = 6, max_steps: int = 8) -> Case:
 
 
 def equal(block: Block, candidate: Candidate, setting: Setting) -> bool:
-    """Whether a candidate stands for a block, said without orientation classes."""
+    """True if a candidate stands for a block, said without orientation classes."""
     same_kind = (block.type, block.color) == (candidate.type, candidate.color)
     same_yaw = block.euler_deg[2] % 180 == candidate.euler_deg[2] % 180
     return same_kind and (same_yaw or setting == "B")

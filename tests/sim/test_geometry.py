@@ -15,7 +15,7 @@ every_type = pytest.mark.parametrize("block_type", BLOCK_TYPES)
 
 
 def is_closed(mesh: Mesh) -> bool:
-    """Whether every edge is used exactly once in each direction."""
+    """True if every edge is used exactly once in each direction."""
     edges = np.concatenate([mesh.triangles[:, [i, (i + 1) % 3]] for i in range(3)])
     forward = {(int(a), int(b)) for a, b in edges}
     return len(forward) == len(edges) and all((b, a) in forward for a, b in forward)

@@ -110,7 +110,7 @@ def met_by(
 def is_hidden(
     props: list[Prop], points: NDArray[np.float64], way: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Whether anything stands in the way from points (n, 3)."""
+    """True if anything stands in the way from points (n, 3)."""
     away, _ = met_by(props, points, np.broadcast_to(way, points.shape))
     return np.isfinite(away).any(axis=0)
 

@@ -40,7 +40,7 @@ def placed(one: Block) -> list[ConvexPiece]:
 
 
 def share_a_point(first: ConvexPiece, second: ConvexPiece) -> bool:
-    """Whether two convex hulls meet, asked of a linear program."""
+    """True if two convex hulls meet, asked of a linear program."""
     n, m = len(first.vertices_m), len(second.vertices_m)
     equal = np.zeros((5, n + m))
     equal[:3, :n], equal[:3, n:] = first.vertices_m.T, -second.vertices_m.T

@@ -226,7 +226,7 @@ def test_names_in_the_chart_meet_nothing(visit: SiteVisit, count: int) -> None:
 
 
 def shaded_edges(region: Locator) -> list[bool]:
-    """Whether the left and the right edge of a region are darker than the paper within."""
+    """True if the left and the right edge of a region are darker than the paper within."""
     with Image.open(BytesIO(region.screenshot())) as picture:
         gray = picture.convert("L")
     columns = [gray.crop((x, 0, x + 1, gray.height)) for x in (0, gray.width - 1)]
