@@ -33,6 +33,7 @@ from phyblock.models import (
 from phyblock.models.batch import UnsureError
 from phyblock.models.batch_ledger import new_token
 from phyblock.models.batch_providers import PROVIDERS, BatchProvider
+from phyblock.models.limits import Clock
 from tests.models.batching import Disk, Killing, command, run_command
 from tests.models.factory import QUICK, ask, make_model, make_request, with_fields
 from tests.models.routes import KEY_VARIABLE, ROUTES
@@ -201,6 +202,22 @@ def test_a_refused_batch_stops_the_model_and_asks_nothing(disk: Disk) -> None:
         assert disk.events[-1] == "lost"
         assert len(texts(run_command(config, disk, requests))) == 2
         assert once(running.server, 2)  # type: ignore[arg-type]
+
+
+def test_a_server_that_cannot_be_reached_is_spoken_of(disk: Disk) -> None:
+    """A log would fall silent for minutes while it is tried again."""
+
+    async def at_once(_: float) -> None:
+        return
+
+    told: list[ModelEvent] = []
+    slow = replace(QUICK, attempts=4, base_s=400.0, max_wait_s=400.0, clock=Clock(sleep=at_once))
+    config = config_at("direct", "http://127.0.0.1:9")
+    (ended,) = run_command(config, disk, requests_of(1), policy=slow, told=told)
+    assert isinstance(ended, UnavailableError)
+    said = [event.message for event in told if event.message.startswith("trying again in ")]
+    assert said
+    assert all("127.0.0.1:9" in text for text in said)
 
 
 CALLS = {

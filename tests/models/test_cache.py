@@ -340,6 +340,13 @@ def test_a_row_that_is_no_reply_is_missing_and_is_overwritten(
     assert "holds a broken reply" in text
 
 
+def test_a_folder_in_the_way_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x")
+    for path in (tmp_path, tmp_path / "file" / "c.sqlite"):
+        with pytest.raises(StoreError, match="cannot be"):
+            ReplyCache(path)
+
+
 WRITER = """
 import sys
 from pathlib import Path
@@ -393,3 +400,14 @@ def test_what_two_samples_ask_at_the_same_time_is_asked_once(
         answers = ask(make_model(config, cache=cache), *[make_request()] * 5)
     assert server.requests == 1
     assert [answer.cached for answer in answers if isinstance(answer, Reply)].count(True) == 4
+
+
+@pytest.mark.parametrize("mode", ["length", "400"])
+def test_what_is_no_whole_reply_is_asked_by_each(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: str
+) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+    server = ROUTES["direct"].server(Faults(mode=mode, latency_s=0.01))
+    with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
+        ask(make_model(ROUTES["direct"].config(running.url), cache=cache), *[make_request()] * 3)
+    assert server.requests == 3

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import asyncio
 import sqlite3
 from pathlib import Path
 
 import pytest
+from aiohttp import web
 from pydantic import ValidationError
 
 from phyblock.config.models import ModelConfig
-from phyblock.errors import UnavailableError
+from phyblock.errors import RetryableError, UnavailableError
 from phyblock.models import (
+    ModelEvent,
     Reply,
     ReplyCache,
+    RetryPolicy,
 )
-from tests.models.factory import ask, make_model, make_request, reply_of
+from tests.models.factory import QUICK, ask, make_model, make_request, reply_of, run, with_fields
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Faults, Running
 
@@ -55,6 +59,18 @@ def test_seeds_are_kept_apart_also_where_the_provider_takes_none(tmp_path: Path)
     assert [reply.seed_sent for reply in again] == [False] * 5  # type: ignore[union-attr]
 
 
+@pytest.mark.parametrize("mode", ["length", "filtered", "blank", "400", "policy", "500", "html"])
+def test_what_is_no_whole_reply_is_asked_again(tmp_path: Path, mode: str) -> None:
+    server = ROUTES["direct"].server(Faults(mode=mode))
+    with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
+        config = ROUTES["direct"].config(running.url)
+        ask(make_model(config, cache=cache), make_request())
+        before = server.requests
+        ask(make_model(config, cache=cache), make_request())
+        assert server.requests == 2 * before
+        assert cache.stats().replies == 0
+
+
 def refuse_after(path: Path, replies: int) -> None:
     """Make a cache that takes so many replies and not one more."""
     ReplyCache(path).close()
@@ -93,6 +109,87 @@ def test_a_dead_model_still_gives_what_is_cached(tmp_path: Path) -> None:
     assert isinstance(answers[1], Reply)
 
 
+def test_one_dead_model_leaves_the_others_going() -> None:
+    dead, alive = (ROUTES["direct"].server(Faults(mode=mode)) for mode in ("403", "ok"))
+    with Running(dead) as first, Running(alive) as second:
+        models = [
+            make_model(ROUTES["direct"].config(running.url), overall=gate)
+            for gate in [asyncio.Semaphore(4)]
+            for running in (first, second)
+        ]
+
+        async def main() -> list[object]:
+            asked = (m.ask(make_request(f"{n:03}")) for n in range(20) for m in models)
+            answers = await asyncio.gather(*asked, return_exceptions=True)
+            for model in models:
+                await model.aclose()
+            return list(answers)
+
+        answers = run(main)
+    assert [type(answer) for answer in answers] == [UnavailableError, Reply] * 20
+    assert alive.requests == 20
+    assert dead.requests <= 4
+
+
+def test_concurrency_stays_under_the_models_and_the_overall_limit() -> None:
+    server = ROUTES["direct"].server(Faults(latency_s=0.01))
+    requests = [make_request(f"{n:03}") for n in range(30)]
+    with Running(server) as running:
+        config = ROUTES["direct"].config(running.url, max_concurrency=5)
+        ask(make_model(config), *requests)
+        assert server.most_at_once == 5
+        server.most_at_once = 0
+        ask(make_model(config, overall=asyncio.Semaphore(2)), *requests)
+        assert server.most_at_once == 2
+
+
+def test_a_429_is_told_and_asked_again() -> None:
+    server = ROUTES["direct"].server(Faults(rate_limited=0.5))
+    events: list[ModelEvent] = []
+    with Running(server) as running:
+        config = ROUTES["direct"].config(running.url, max_concurrency=8)
+        policy = RetryPolicy(30, 0.0, base_s=0.001, max_wait_s=0.001, max_retry_after_s=0.0)
+        answers = ask(
+            make_model(config, events=events, policy=policy),
+            *(make_request(f"{n:03}") for n in range(40)),
+        )
+    assert all(isinstance(answer, Reply) for answer in answers)
+    assert sum(event.kind == "retry" for event in events) == server.ended["429"]
+
+
+def test_a_server_that_is_not_there_is_a_connection_error(unused_port: int) -> None:
+    for name in ("direct", "openai"):
+        config = ROUTES[name].config(f"http://127.0.0.1:{unused_port}")
+        (answer,) = ask(make_model(config), make_request())
+        assert isinstance(answer, RetryableError)
+        assert answer.status is None
+
+
+@pytest.fixture
+def unused_port() -> int:
+    with Running(ROUTES["direct"].server()) as running:
+        return running.port
+
+
+def test_a_wrong_path_says_to_look_at_the_address() -> None:
+    with Running(ROUTES["direct"].server()) as running:
+        config = ROUTES["direct"].config(running.url + "/nowhere")
+        (answer,) = ask(make_model(config), make_request())
+    assert isinstance(answer, UnavailableError)
+    assert answer.status == 404
+
+
+def test_a_missing_key_sends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(KEY_VARIABLE)
+    for name, route in ROUTES.items():
+        server = route.server()
+        with Running(server) as running:
+            (answer,) = ask(make_model(route.config(running.url)), make_request())
+        assert isinstance(answer, UnavailableError), name
+        assert KEY_VARIABLE in str(answer)
+        assert server.requests == 0
+
+
 def test_no_key_reaches_the_cache_even_when_a_server_repeats_it(tmp_path: Path) -> None:
     class Parrot(ROUTES["direct"].server):  # type: ignore[misc, name-defined]
         def reply(self, seen, ending):  # type: ignore[no-untyped-def]
@@ -110,10 +207,42 @@ def test_no_key_reaches_the_cache_even_when_a_server_repeats_it(tmp_path: Path) 
     assert KEY.encode() not in b"".join(file.read_bytes() for file in tmp_path.iterdir())
 
 
+def test_attempts_count_every_request_that_was_sent() -> None:
+    server = ROUTES["direct"].server(Faults(server_error=0.4))
+    with Running(server) as running:
+        answers = ask(
+            make_model(ROUTES["direct"].config(running.url), policy=QUICK),
+            *(make_request(f"{n:03}") for n in range(20)),
+        )
+    assert sum(reply.attempts for reply in answers) == server.requests  # type: ignore[union-attr]
+
+
 def test_a_providers_key_never_goes_to_another(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XAI_API_KEY", KEY)
     with pytest.raises(ValidationError, match="needs the address"):
         ModelConfig(name="m", id="xai/grok", transport="direct")
+
+
+def test_a_redirect_is_not_followed_and_says_to_look_at_the_address() -> None:
+    class Moved(ROUTES["direct"].server):  # type: ignore[misc, name-defined]
+        def add_routes(self, app):  # type: ignore[no-untyped-def]
+            super().add_routes(app)
+            app.router.add_post("/old/chat/completions", self.moved)
+
+        async def moved(self, _):  # type: ignore[no-untyped-def]
+            self.ended["moved"] += 1
+            raise web.HTTPPermanentRedirect("/v1/chat/completions")
+
+    server = Moved()
+    with Running(server) as running:
+        config = ROUTES["direct"].config(running.url)
+        (answer,) = ask(
+            make_model(with_fields(config, api_base=f"{running.url}/old")), make_request()
+        )
+    assert isinstance(answer, UnavailableError)
+    assert answer.status == 308
+    assert "is api_base the address" in str(answer)
+    assert server.ended == {"moved": 1}
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,8 @@ from phyblock.errors import (
     BudgetReachedError,
     RetryableError,
     SpecError,
+    UnavailableError,
+    UnreachableError,
 )
 from phyblock.models import (
     Budget,
@@ -74,6 +76,12 @@ def test_prices_come_from_the_map_where_the_provider_is_the_same(
         assert found.output_usd == pytest.approx(price.output_usd, rel=0.2)
 
 
+def test_a_price_of_ones_own_comes_first() -> None:
+    known = prices_of(config("openai/o1", price={"input": 1, "output": 2}))
+    assert known is not None
+    assert known.at(DAY) == Price(1, 2)
+
+
 @pytest.mark.parametrize("fields", [{"replay": "x"}, {}])
 def test_recordings_and_baselines_cost_nothing(fields: dict[str, str]) -> None:
     assert prices_of(ModelConfig(name="m", **fields)) == Prices.flat(0, 0)  # type: ignore[arg-type]
@@ -96,6 +104,15 @@ def test_what_is_not_known_is_not_nothing(usage: Usage) -> None:
 
 def request_of(*parts: str | Image, **params: object) -> Request:
     return Request("0", 0, (Message("user", parts),), params, "v", PlanSubject(SCENE, CANDIDATES))
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "tokens"),
+    [(512, 512, 255), (1024, 1024, 765), (2048, 4096, 1105), (100, 100, 255), (4096, 512, 765)],
+)
+def test_pictures_are_counted_by_tiles(width: int, height: int, tokens: int) -> None:
+    image = Image(b"", "goal", width, height)
+    assert estimate(config("x/y"), request_of(image)).prompt_tokens == tokens
 
 
 @pytest.mark.parametrize(
@@ -206,6 +223,16 @@ def test_the_most_of_many_calls_is_the_sum_and_above_the_usual(
     assert most_usd(price, whole, DAY) >= usd
 
 
+def test_the_longest_reply_is_what_was_asked_for_or_what_the_model_can() -> None:
+    def most(model_id: str, **params: object) -> int:
+        return estimate(config(model_id), request_of("a", **params)).most_completion_tokens
+
+    assert most("openai/gpt-4o-2024-08-06", max_tokens=100) == 100
+    assert most("openai/gpt-4o-2024-08-06", max_completion_tokens=70) == 70
+    assert most("openai/gpt-4o-2024-08-06") == 16384
+    assert most("x/y") == 32768
+
+
 def test_a_model_without_a_price_under_a_budget_is_an_error_at_the_start() -> None:
     with pytest.raises(SpecError, match="no known price"):
         build_model(config("openai/nobodys"), cache=None, budget=Budget(1.0))
@@ -240,6 +267,17 @@ def test_a_budget_is_never_passed_and_stops_only_when_nothing_more_fits(
     run(main)
 
 
+def test_a_reservation_without_a_known_cost_counts_in_full() -> None:
+    async def main() -> None:
+        budget = Budget(1.0, spent_usd=0.25)
+        budget.settle(await budget.reserve(lambda: 0.5), None)
+        assert budget.spent_usd == 0.75
+        with pytest.raises(BudgetReachedError, match=r"0\.7500 spent"):
+            await budget.reserve(lambda: 0.5)
+
+    run(main)
+
+
 def test_a_call_that_waits_reserves_what_was_learned_meanwhile() -> None:
     budget, price = Budget(1.0), Prices.flat(100.0, 0.0)
     expected = Estimate(4000, 100, 100)
@@ -256,6 +294,15 @@ def test_a_call_that_waits_reserves_what_was_learned_meanwhile() -> None:
             await second
 
     run(main)
+
+
+def test_a_provider_that_counts_pictures_higher_is_reserved_for() -> None:
+    budget, price = Budget(1.0), Prices.flat(1.0, 1.0)
+    expected = Estimate(1000, 100, 100)
+    before = budget.most_usd("m", price, expected, DAY)
+    budget.learn("m", expected, Usage(prompt_tokens=20_000, completion_tokens=10))
+    assert budget.most_usd("m", price, expected, DAY) > 10 * before
+    assert budget.most_usd("n", price, expected, DAY) == before
 
 
 strange = st.one_of(
@@ -422,6 +469,14 @@ def test_a_run_stops_before_its_limit_and_answers_say_what_they_cost(
     assert 0.25 < budget.spent_usd <= 0.3
 
 
+def test_an_unknown_price_is_an_unknown_cost(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+    with Running(ROUTES["direct"].server()) as running:
+        (answer,) = ask(make_model(ROUTES["direct"].config(running.url)), make_request())
+    assert isinstance(answer, Reply)
+    assert answer.cost_usd is None
+
+
 @pytest.mark.parametrize(("mode", "is_counted"), [("html", True), ("reset", True), ("500", False)])
 def test_a_failure_that_may_have_been_billed_counts_against_the_budget(
     monkeypatch: pytest.MonkeyPatch, mode: str, is_counted: bool
@@ -455,3 +510,23 @@ def test_a_reply_says_what_the_limit_counts_for_all_its_attempts(
     assert sum(usd or 0.0 for usd in billed) == pytest.approx(budget.spent_usd)
     assert max(usd or 0.0 for usd in billed) > min(usd or 0.0 for usd in billed) > 0
     assert {reply.billed_usd for reply in [*again, *free]} == {None}  # type: ignore[union-attr]
+
+
+def test_a_server_to_which_nothing_could_be_sent_costs_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+    budget = Budget(100.0)
+    config = ROUTES["direct"].config("http://127.0.0.1:9", price={"input": 10.0, "output": 100.0})
+    (answer,) = ask(make_model(config, budget=budget), make_request())
+    assert isinstance(answer, UnreachableError)
+    assert budget.spent_usd == 0
+
+
+def test_a_model_without_its_key_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(KEY_VARIABLE, raising=False)
+    budget = Budget(1.0)
+    config = ROUTES["direct"].config("http://127.0.0.1:9", price={"input": 10.0, "output": 100.0})
+    (answer,) = ask(make_model(config, budget=budget), make_request())
+    assert isinstance(answer, UnavailableError)
+    assert budget.spent_usd == 0

@@ -64,6 +64,10 @@ def test_all_samples_finish_with_one_request_a_success_and_one_a_fault(route: st
     finish_all(route, 300 if route in SHOWN else 120, QUICK, size=2_000)
 
 
+def test_all_samples_finish_over_four_replicas() -> None:
+    finish_all("direct", 300, QUICK, size=2_000, replicas=4)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("route", ROUTES)
 @pytest.mark.parametrize("replicas", [1, 4])

@@ -63,6 +63,11 @@ def test_a_key_that_is_needed_and_not_set_stops_the_model_before_any_call() -> N
         api_key(config("openai/m", api_base="http://x", api_key_env="MINE_API_KEY"))
 
 
+def test_servers_that_need_none_get_a_placeholder_and_others_are_left_to_litellm() -> None:
+    assert api_key(config("openai/m", api_base="http://x")) == "no-key"
+    assert api_key(config("vertex_ai/g")) is None
+
+
 def test_keys_are_hidden_wherever_they_stand(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MINE_API_KEY", "correct horse battery staple")
     secrets = secrets_of(config("openai/m", api_key_env="MINE_API_KEY"))
@@ -125,6 +130,10 @@ def test_a_short_key_is_hidden_as_a_word_and_not_inside_of_others() -> None:
     assert hidden("key s3cr! of s3cr, not xs3cr or s3crets", ("s3cr",)) == (
         "key [key]! of [key], not xs3cr or s3crets"
     )
+
+
+def test_the_longer_of_two_keys_goes_whole() -> None:
+    assert hidden("a-long-key-and-more", ("a-long-key", "a-long-key-and-more")) == "[key]"
 
 
 def test_white_space_around_a_key_is_no_part_of_it(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -124,6 +124,15 @@ def test_batches_cost_half_only_where_that_is_known(
     assert own.at(DAY, batched=True) == Price(3.0, 4.0)
 
 
+def test_the_price_of_batches_can_be_told(tmp_path: Path) -> None:
+    told = "{input: 8, output: 40, batch: {input: 3, output: 4, cached: 1}}"
+    base = "api_base: https://gateway.example/v1"
+    known = prices_of(read(tmp_path, f"m: {{id: openai/mine, {base}, price: {told}}}"))
+    assert known is not None
+    assert known.at(DAY) == Price(8.0, 40.0)
+    assert known.at(DAY, batched=True) == Price(3.0, 4.0, 1.0)
+
+
 @given(
     st.lists(st.integers(0, 400), min_size=1, max_size=4, unique=True),
     st.integers(-9, 410),
@@ -193,6 +202,15 @@ def test_tiers_batches_and_caches_are_priced_as_the_map_says(
     assert price.cached_usd == pytest.approx(entry["cache_read_input_token_cost" + ending] * 1e6)
 
 
+def test_a_model_that_has_tiers_alone_has_a_price() -> None:
+    known = prices_of(config("dashscope/qwen3-vl-plus"))
+    assert known is not None
+    usual, long = known.at(DAY, 32_000), known.at(DAY, 32_001)
+    assert usual is not None and long is not None  # noqa: PT018
+    assert (usual.input_usd, long.input_usd) == pytest.approx((0.2, 0.3))
+    assert known.on(DAY).source.startswith("litellm ")  # type: ignore[union-attr]
+
+
 def test_prices_by_day_and_tier_are_read(tmp_path: Path) -> None:
     text = """\
 m:
@@ -210,6 +228,18 @@ m:
     assert known.at(DAY) == Price(1, 2, 0.5)
     assert known.at(december, 1000) == Price(2, 4)
     assert known.at(december, 1001) == Price(3, 5, None, 6)
+
+
+def test_before_the_first_day_that_is_named_the_map_holds(tmp_path: Path) -> None:
+    text = "m: {id: openai/gpt-4o-2024-08-06, price: [{from: 2027-01-01, input: 9, output: 9}]}\n"
+    known = prices_of(read(tmp_path, text))
+    mapped = prices_of(config("openai/gpt-4o-2024-08-06"))
+    assert known is not None and mapped is not None  # noqa: PT018
+    assert known.on(DAY) == mapped.on(DAY)
+    assert known.at(date(2027, 1, 1)) == Price(9, 9)
+    coming = known.next_after(DAY)
+    assert coming is not None
+    assert coming.since == date(2027, 1, 1)
 
 
 @pytest.mark.parametrize(
@@ -235,6 +265,12 @@ m:
 def test_prices_that_cannot_be_meant_are_refused(tmp_path: Path, price: str, said: str) -> None:
     with pytest.raises(SpecError, match=f"(?s){said}"):
         read(tmp_path, f"m: {{id: openai/gpt-4o, price: {price}}}\n")
+
+
+def test_prices_are_no_part_of_what_a_model_is(tmp_path: Path) -> None:
+    plain = read(tmp_path, "m: openai/gpt-4o\n")
+    priced = read(tmp_path, "m: {id: openai/gpt-4o, price: [{input: 1, output: 2}]}\n")
+    assert plain.identity() == priced.identity()
 
 
 CACHED: dict[type[LocalServer], dict[str, Any]] = {
@@ -264,6 +300,10 @@ CACHED: dict[type[LocalServer], dict[str, Any]] = {
     },
 }
 """What each protocol says of a prompt of 1,000 tokens, most of them in its cache."""
+
+
+def test_every_protocol_is_among_the_routes() -> None:
+    assert {route.server for route in ROUTES.values()} == set(CACHED)
 
 
 @pytest.mark.parametrize("route", ROUTES)

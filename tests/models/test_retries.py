@@ -61,6 +61,14 @@ class Script:
         return asyncio.run(main())
 
 
+def test_errors_that_may_pass_are_repeated() -> None:
+    script = Script(RetryableError("a"), RetryableError("b"))
+    assert script.run() == "answer"
+    assert script.calls == 3
+    assert script.told == script.waits
+    assert len(script.waits) == 2
+
+
 @pytest.mark.parametrize(
     "error",
     [
@@ -79,6 +87,15 @@ def test_all_others_are_not(error: Exception) -> None:
         script.run()
     assert script.calls == 1
     assert script.waits == []
+
+
+def test_after_the_last_attempt_its_error_comes_out() -> None:
+    errors = [RetryableError(str(n)) for n in range(20)]
+    script = Script(*errors)
+    with pytest.raises(RetryableError, match=r"^7$"):
+        script.run(retry_for_s=0.0)
+    assert script.calls == 8
+    assert len(script.waits) == 7
 
 
 statuses = st.sampled_from([None, 408, 429, 500, 502, 503])

@@ -8,6 +8,7 @@ from contextlib import ExitStack
 from typing import Any
 
 import pytest
+from aiohttp import web
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -27,7 +28,7 @@ from phyblock.models.servers import FAILURES_TO_REST, Server, Servers
 from tests.models.factory import QUICK, ask, make_model, make_request, run, with_fields
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.models.test_limits import FakeTime
-from tests.servers.chassis import Faults, Running, kill, start
+from tests.servers.chassis import Faults, Running, Seen, kill, start
 from tests.servers.openai_chat import OpenAIChat
 
 REFUSED = UnreachableError("connection refused")
@@ -180,6 +181,17 @@ def test_a_server_that_has_answered_is_tried_for_as_long_as_the_policy_says(
     assert begins_s + 290 <= time.now_s < begins_s + 420
 
 
+def test_all_go_on_soon_when_a_server_answers_again() -> None:
+    time = FakeTime()
+    client = Outage(time, 0.0, 100.0, 1.0)
+    answers, told = ask_through(client, time, samples=16, width=16)
+    assert len(answers) == 16
+    assert time.now_s < 100 + 15 + 5 * 1.0
+    *while_away, back = told[1:]
+    assert all("still cannot be reached" in text for text in while_away)
+    assert back.partition(" after")[0] == "http://gone:1 answers again"
+
+
 def servers_of(count: int, policy: RetryPolicy | None = None) -> Servers:
     made = [Server(f"http://replica:{n}", None) for n in range(count)]  # type: ignore[arg-type]
     return Servers(made, policy or RetryPolicy(), lambda _: None)
@@ -217,6 +229,17 @@ def test_whoever_is_asked_is_there_and_has_no_more_to_do_than_any_other_that_is(
             held.pop(number % len(held)).under_way -= 1
 
 
+def test_what_failed_at_one_server_is_sent_to_another() -> None:
+    servers = servers_of(2)
+    first = servers.pick()
+    second = servers.pick(failed=first)
+    assert second is not first
+    first.under_way = 2
+    assert servers.pick(failed=second) is first
+    alone = servers_of(1)
+    assert alone.pick(failed=alone.pick()) is alone.all[0]
+
+
 @pytest.mark.parametrize("status", [429, 500, 529, 400, None])
 def test_what_a_server_says_itself_and_what_is_late_is_no_outage(status: int | None) -> None:
     servers = servers_of(1)
@@ -239,6 +262,15 @@ def test_failures_of_one_request_alone_are_no_outage(status: int | None, sent: S
     assert servers.rest_s() == 0.0
     assert servers.failed(servers.all[0], error, "another", 0.0)
     assert servers.rest_s() > 0
+
+
+def test_an_answer_between_failures_keeps_a_server_in_use() -> None:
+    servers = servers_of(1)
+    for number in range(50):
+        for nth in range(FAILURES_TO_REST - 1):
+            servers.failed(servers.all[0], REFUSED, (number, nth), 0.0)
+        servers.replied(servers.all[0])
+    assert servers.rest_s() == 0.0
 
 
 @given(st.none() | st.floats(0, 1000), st.integers(0, 20))
@@ -381,3 +413,61 @@ def test_a_server_that_refuses_everything_is_left_out_and_the_last_one_stops_the
         stopped = ask(make_model(config), *map(make_request, names(30)))
     assert {type(answer) for answer in stopped} == {UnavailableError}
     assert wrong.requests + right.ended["404"] <= 3 * 4
+
+
+def test_a_failure_counts_as_an_attempt_wherever_it_happened() -> None:
+    with ExitStack() as stack:
+        servers = [OpenAIChat(Faults(mode="500")) for _ in range(3)]
+        urls = [stack.enter_context(Running(server)).url for server in servers]
+        (answer,) = ask(make_model(at(*urls), policy=QUICK), make_request())
+    assert isinstance(answer, RetryableError)
+    assert sum(server.requests for server in servers) == QUICK.attempts
+    assert all(server.requests >= 2 for server in servers)
+
+
+@pytest.mark.parametrize("page", ["html", "cut", "empty"])
+def test_who_never_gives_a_reply_that_can_be_read_is_asked_no_more(page: str) -> None:
+    told: list[str] = []
+    wrong, right = OpenAIChat(Faults(mode=page)), OpenAIChat()
+    few = QUICK.max_connection_failures + 10
+    with Running(wrong) as first, Running(right) as second:
+        alone = ask(make_model(at(first.url, max_concurrency=3)), *map(make_request, names(30)))
+        assert wrong.requests <= few
+        beside = at(first.url, second.url, max_concurrency=4)
+        answers = ask(make_model(beside, told=told), *map(make_request, names(60)))
+        assert wrong.requests <= 2 * few
+        # One that has given a reply is there, whatever follows.
+        wrong.faults = Faults()
+        model = make_model(at(first.url))
+
+        async def main() -> list[object]:
+            first_of_all = await answers_of(model, "first")
+            wrong.faults = Faults(mode=page)
+            answers = first_of_all + await answers_of(model, *names(4))
+            await model.aclose()
+            return answers
+
+        later = run(main)
+    assert {type(answer) for answer in alone} <= {RetryableError, UnavailableError}
+    assert f"{first.url} never gave a reply that can be read, " in str(alone[-1])
+    assert [type(answer) for answer in answers] == [Reply] * 60
+    assert told[0].startswith(f"{first.url} gives no reply that can be read, trying now and then")
+    assert [type(answer) for answer in later] == [Reply, *[RetryableError] * 4]
+
+
+class SlowAtHead(OpenAIChat):
+    """Never answers about the scenes whose names begin with "slow"."""
+
+    async def _end(self, seen: Seen, ending: str, request: web.Request) -> web.StreamResponse:
+        is_slow = any(isinstance(part, str) and "Scene slow" in part for part in seen.parts)
+        return await super()._end(seen, "slow" if is_slow else ending, request)
+
+
+@pytest.mark.parametrize("route", ["direct", "openai"])
+def test_slow_requests_at_the_head_end_alone_and_the_rest_goes_on(route: str) -> None:
+    asked = [f"slow {n}" for n in range(8)] + names(12)
+    with Running(SlowAtHead()) as running:
+        policy = RetryPolicy(2, 0.0, base_s=0.001, max_wait_s=0.002)
+        config = ROUTES[route].config(running.url, timeout_s=0.5, max_concurrency=8)
+        answers = ask(make_model(config, policy=policy), *map(make_request, asked))
+    assert [type(answer) for answer in answers] == [RetryableError] * 8 + [Reply] * 12

@@ -20,6 +20,7 @@ from tests.servers.chassis import Faults, LocalServer, Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 
 KEY = "sk-not-a-real-key-1234"
+RETRIED = ("429", "500", "reset", "cut", "html", "empty")
 
 
 @pytest.fixture(autouse=True)
@@ -40,6 +41,18 @@ def serve(route: str, faults: Faults) -> tuple[Running, LocalServer]:
 
 def config(route: str, url: str, **fields: object) -> ModelConfig:
     return ROUTES[route].config(url, **fields)
+
+
+@pytest.mark.parametrize("mode", RETRIED)
+def test_a_failure_that_may_pass_is_sent_once_an_attempt(route: str, mode: str) -> None:
+    running, server = serve(route, Faults(mode=mode))
+    events: list[ModelEvent] = []
+    with running:
+        model = make_model(config(route, running.url, seed="never"), events=events)
+        (answer,) = ask(model, make_request())
+    assert isinstance(answer, RetryableError), answer
+    assert server.requests == QUICK.attempts
+    assert [event.kind for event in events].count("retry") == QUICK.attempts - 1
 
 
 @pytest.mark.parametrize("mode", ["401", "403", "404"])
@@ -97,6 +110,14 @@ def test_the_end_of_a_reply_is_read(route: str, mode: str, finish: str, has_text
     assert answer.text == (server.seen[0].reply_text if has_text else "")
     assert answer.usage.prompt_tokens == 1000
     assert answer.attempts == server.requests == 1
+
+
+def test_thoughts_stand_apart_from_the_text(route: str) -> None:
+    running, _ = serve(route, Faults())
+    with running:
+        (answer,) = ask(make_model(config(route, running.url)), make_request())
+    assert isinstance(answer, Reply)
+    assert answer.reasoning == "Let me see."
 
 
 @pytest.mark.parametrize("wish", ["7", "Wed, 21 Oct 2099 07:28:00 GMT"])
