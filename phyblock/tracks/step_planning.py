@@ -24,7 +24,6 @@ from phyblock.records.line import Line, Whole
 from phyblock.records.record import AskedTurn, Course, Record
 from phyblock.records.reply import Reply
 from phyblock.resources import bundled
-from phyblock.results.design import read_section
 from phyblock.scoring.counts import Counts
 from phyblock.scoring.plan import ERROR_TYPES, ErrorType
 from phyblock.scoring.steps import Assembly, MoveOutcome, attempted_counts, placed_counts
@@ -1023,7 +1022,8 @@ def _rules(suite: Suite) -> StepRules:
 
 
 def _physics(suite: Mapping[str, Any]) -> bool:
-    return read_section(suite, "steps", StepsSpec).physics != "off"
+    section = suite.get("steps")
+    return not isinstance(section, Mapping) or section.get("physics") != "off"
 
 
 def _report() -> TrackReport:
