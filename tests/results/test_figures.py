@@ -75,6 +75,14 @@ def test_shares_fill_a_bar(run: Run) -> None:
         assert all(width == pytest.approx(100) for width in widths.values())
 
 
+def test_a_run_without_an_answer_draws_nothing_and_does_not_fail(tmp_path: Path) -> None:
+    failed = [
+        record(model, scene, 0, [], outcome="api_error") for model in MODELS for scene in LEVELS
+    ]
+    write_run(tmp_path, failed, manifest(models=MODELS, seeds=[0]))
+    assert write_figures(load_run(tmp_path)) == ()
+
+
 def test_a_forest_has_a_row_a_pair_or_of_two_models_a_row_a_part(run: Run) -> None:
     for chosen, rows in ((run, 3), (of_models(run, MODELS[:2]), 5)):
         drawn = forest(chosen, track=TRACK)
