@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TypeVar, get_args
+from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 from pydantic_core import PydanticCustomError
@@ -13,9 +13,6 @@ from phyblock.config.suite import VarySpec
 from phyblock.errors import Problem, StoreError
 from phyblock.registry import known_tracks, table_names
 from phyblock.types import AnswerFormat, CandidateOrder, Criterion, MissingPolicy, Outcome
-
-if TYPE_CHECKING:
-    pass
 
 OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
 """Every outcome, in the order of columns."""

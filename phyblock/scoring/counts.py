@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.domain.question import LETTERS, Subtask
+from phyblock.domain.question import Subtask
 
 Floats = NDArray[np.float64]
 Metric = Callable[[Floats], Floats]
@@ -91,27 +90,6 @@ def mean_of(sums: Floats) -> Floats:
     out = np.full(total.shape, np.nan)
     np.divide(total, number, out=out, where=number > 0)
     return out
-
-
-@dataclass(frozen=True)
-class LetterRates:
-    """Counts of each letter as right and as given, of the `n` questions that have one letter."""
-
-    n: int
-    right: Mapping[str, int]
-    given: Mapping[str, int]
-
-
-def letter_rates(answers: Iterable[tuple[str, str | None]]) -> LetterRates:
-    """Counts by letter of pairs (right, given or None), without ordering questions."""
-    single = [(right, given) for right, given in answers if len(right) == 1]
-    rights = Counter(right for right, _ in single)
-    givens = Counter(given for _, given in single)
-    return LetterRates(
-        len(single),
-        {letter: rights[letter] for letter in LETTERS},
-        {letter: givens[letter] for letter in LETTERS},
-    )
 
 
 def chance(subtask: Subtask, n_options: int = 4) -> float:

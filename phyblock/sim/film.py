@@ -50,7 +50,6 @@ _RING: dict[Tone, Rgb] = {"plain": (230, 232, 236), "good": (64, 214, 96), "bad"
 _STRIP = 0.13
 _FRAME = 0.012
 _FRAME_MS, _LAST_FRAME_MS = 900, 2600
-_SHEET_COLUMNS = 2
 
 
 def step_images(scene: Scene, style: PictureStyle) -> list[Image.Image]:
@@ -206,11 +205,6 @@ def episode_gif(images: Sequence[Image.Image]) -> bytes:
     # Frames of every tone have a part in the colors: the first, the middle and the last ones.
     chosen = [images[0], images[len(images) // 2], images[-1]]
     return _animated(images, _FRAME_MS, _LAST_FRAME_MS, "gif", _stacked(chosen, 1))
-
-
-def episode_sheet(images: Sequence[Image.Image]) -> bytes:
-    """PNG of all frames, from left to right and from top to bottom."""
-    return to_png(_stacked(images, _SHEET_COLUMNS))
 
 
 def _stacked(images: Sequence[Image.Image], columns: int) -> Image.Image:

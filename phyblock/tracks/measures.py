@@ -33,9 +33,6 @@ SCORED_BY = ("setting", "matcher", "criterion")
 CELL = "cell"
 """Column of the cell that a row of counts is pooled in."""
 
-VALUE_KEY = ("measure", CELL, *SCORED_BY)
-"""What tells the values of one model apart."""
-
 Better = Literal["higher", "lower"]
 Unit = Literal["%", "cm", "degrees", "steps", "blocks", ""]
 
@@ -164,11 +161,6 @@ def share(
 def in_unit(heading: str, unit: str) -> str:
     """A heading with the unit of the values below it in brackets, where they have one."""
     return f"{heading} ({unit})" if unit else heading
-
-
-def value_key(row: Mapping[Any, Any]) -> str:
-    """Return the key of a value: `f1/overall/A/optimal/aov`."""
-    return "/".join(str(row[name]) for name in VALUE_KEY)
 
 
 class ListedScore(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 
 from phyblock.data import read_builtin
-from phyblock.sim.film import FilmStep, episode_gif, episode_images, episode_sheet
+from phyblock.sim.film import FilmStep, episode_gif, episode_images
 from phyblock.sim.pictures import PictureStyle, goal_png
 
 TASK = read_builtin(Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400").tasks[0]
@@ -49,11 +49,8 @@ def test_a_wrong_move_marks_its_candidate_and_changes_no_world() -> None:
     assert not np.array_equal(middle[0], middle[2])
 
 
-def test_a_gif_holds_every_frame_and_a_sheet_all_of_them() -> None:
+def test_a_gif_holds_every_frame() -> None:
     images = episode_images(TASK.scene, TASK.candidates, STEPS, STYLE)
     with Image.open(io.BytesIO(episode_gif(images))) as gif:
         assert gif.n_frames == len(STEPS)
         assert gif.size == images[0].size
-    with Image.open(io.BytesIO(episode_sheet(images))) as sheet:
-        assert sheet.width > 2 * images[0].width
-        assert sheet.height > 3 * images[0].height
