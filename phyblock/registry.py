@@ -24,7 +24,6 @@ __all__ = [
     "added_measures",
     "baseline_names",
     "baseline_rules",
-    "has_additions",
     "known_track",
     "known_tracks",
     "register_track",
@@ -166,11 +165,6 @@ def add_baseline(track: str, name: str, rule: Callable[..., str]) -> None:
 def track_baselines(kind: TrackWords) -> Mapping[str, Callable[..., str]]:
     """Return the rules of a track by name, the built-in ones first."""
     return {**kind.baselines, **_baselines.get(kind.name, {})}
-
-
-def has_additions() -> bool:
-    """True if tracks, measures or baselines were added to the built-in ones."""
-    return bool(_registered or _baselines) or any(_measures.values())
 
 
 def table_names() -> tuple[str, ...]:

@@ -130,10 +130,6 @@ def _one_of(names: Callable[[], Sequence[str]]) -> AfterValidator:
     return AfterValidator(check_name)
 
 
-TrackName = Annotated[str, _one_of(lambda: tuple(known_tracks()))]
-TableName = Annotated[str, _one_of(table_names)]
-
-
 def _list_tag(value: object) -> str:
     return "list" if isinstance(value, list | tuple) else "one"
 

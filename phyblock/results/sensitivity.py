@@ -180,7 +180,6 @@ def _components(found: Varied, model: str, factor: str) -> tuple[int, Component,
 _NAMES = {REPEAT: "asked again", ITEMS: "between items"}
 _MODEL = Column("Model", is_text=True)
 FACTOR = Column("Factor", is_text=True)
-LEVEL = Column("Level", is_text=True)
 
 
 def factor_name(factor: str) -> str:

@@ -9,12 +9,7 @@ from phyblock.registry import added_measures
 from phyblock.tracks.kind import kind_of
 from phyblock.tracks.measures import SampleCounts
 
-__all__ = ["count_sample", "counts_samples"]
-
-
-def counts_samples(track: str) -> bool:
-    """True if measures of a track count samples as they are judged."""
-    return bool(_sorts(track))
+__all__ = ["count_sample"]
 
 
 def count_sample(track: str, item: Any, judged: Any) -> Mapping[str, tuple[float, ...]]:
