@@ -41,7 +41,7 @@ from phyblock.run.plan import recorded_dataset
 from phyblock.run.rescore import judged_anew, recorded_suite, reopen_tracks
 from phyblock.run.store import manifest_text, record_lines, run_folder, write_run
 from phyblock.text import some_of
-from phyblock.tracks.kind import kinds_with_physics
+from phyblock.tracks.base import kinds_with_physics
 
 BUNDLE_FILE = "bundle.zip"
 """Its name in the run's folder, unless another place is named."""

@@ -36,7 +36,7 @@ __all__ = [
 _PACKAGES = (
     "phyblock.tracks.full_planning",
     "phyblock.tracks.step_planning",
-    "phyblock.tracks.vqa",
+    "phyblock.tracks.questions",
     "phyblock.tracks.pose_planning",
 )
 """Packages that hold a `TRACK`, in the order in which tracks are listed."""

@@ -18,7 +18,7 @@ from phyblock.resources import bundled
 from phyblock.run.plan import open_dataset
 from phyblock.run.preflight import find_suite, prompt_dirs
 from phyblock.text import counted, did_you_mean
-from phyblock.tracks.selection import select_tasks
+from phyblock.tracks.items import select_tasks
 
 __all__ = ["SceneTask", "Scenes", "Suite", "load_suite"]
 

@@ -152,7 +152,7 @@ def _task(run: Path, record: Record, data: Path | None) -> AssemblyTask:
     from phyblock.records.manifest import MANIFEST, read_manifest
     from phyblock.results.design import read_design
     from phyblock.run.plan import recorded_dataset
-    from phyblock.tracks.showing import as_recorded
+    from phyblock.tracks.items import as_recorded
 
     manifest = read_manifest(run)
     levels = read_design(manifest.fields(), str(run / MANIFEST)).suite.levels

@@ -51,7 +51,7 @@ from phyblock.scoring.statistics import (
     rank_ranges,
 )
 from phyblock.text import counted
-from phyblock.tracks.kind import kind_of, kinds
+from phyblock.tracks.base import kind_of, kinds
 from phyblock.tracks.measures import CELL, Cell, Measure, in_unit
 
 

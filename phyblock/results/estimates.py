@@ -19,7 +19,7 @@ from phyblock.results.design import Design
 from phyblock.results.load import Run
 from phyblock.scoring.counts import Floats
 from phyblock.scoring.statistics import Clusters, in_range, jackknife
-from phyblock.tracks.kind import kind_of
+from phyblock.tracks.base import kind_of
 from phyblock.tracks.measures import (
     CELL,
     SCORED_BY,

@@ -32,7 +32,7 @@ from phyblock.results.tables import cost_frame, filled, layouts_of
 from phyblock.results.text import between, escape, level_name, number
 from phyblock.run.store import run_folder
 from phyblock.text import counted
-from phyblock.tracks.kind import kind_of, kinds
+from phyblock.tracks.base import kind_of, kinds
 from phyblock.tracks.measures import in_unit
 
 if TYPE_CHECKING:

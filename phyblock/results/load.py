@@ -285,7 +285,7 @@ class Run:
         Columns have the short name of a track, or its name, and then `_lo` and `_hi`.
         """
         from phyblock.results.estimates import headline_of, main_column
-        from phyblock.tracks.kind import kind_of
+        from phyblock.tracks.base import kind_of
 
         table = pd.DataFrame(index=pd.Index(self.design.model_names, name="model"))
         for track in self.design.suite.tracks:

@@ -14,7 +14,7 @@ from phyblock.results.design import OVERALL
 from phyblock.results.estimates import headline_rows, pooled_in, track_estimates
 from phyblock.results.load import Run
 from phyblock.results.text import Column, TextTable, number
-from phyblock.tracks.kind import kind_of
+from phyblock.tracks.base import kind_of
 from phyblock.tracks.measures import CELL
 
 if TYPE_CHECKING:

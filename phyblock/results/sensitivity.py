@@ -29,7 +29,7 @@ from phyblock.scoring.statistics import (
     spread_of_items,
     within,
 )
-from phyblock.tracks.kind import kind_of
+from phyblock.tracks.base import kind_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,7 +44,7 @@ from phyblock.results.text import (
 )
 from phyblock.run.store import run_folder
 from phyblock.text import counted
-from phyblock.tracks.kind import kind_of, kinds
+from phyblock.tracks.base import kind_of, kinds
 from phyblock.tracks.measures import CELL, Measure
 
 TABLES = "tables"

@@ -21,8 +21,7 @@ from phyblock.run.models import PlannedModel
 from phyblock.sim.engine import ENGINES, described_engine
 from phyblock.stable import hex_digest
 from phyblock.tracks import AnyTrack, kind_of
-from phyblock.tracks.base import READER
-from phyblock.tracks.kind import kinds_with_physics
+from phyblock.tracks.base import READER, kinds_with_physics
 
 _ENGINES = (engine.distribution for engine in ENGINES.values())
 _LIBRARIES = ("litellm", *_ENGINES, "numpy", "pillow", "jinja2")

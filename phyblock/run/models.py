@@ -17,7 +17,7 @@ from phyblock.models import known_providers, server_address, takes_format
 from phyblock.records.files import RECORDS, RecordLines
 from phyblock.records.record import Record
 from phyblock.text import did_you_mean
-from phyblock.tracks.kind import kind_of
+from phyblock.tracks.base import kind_of
 from phyblock.types import AnswerFormat, CandidateOrder
 
 

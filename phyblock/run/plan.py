@@ -25,7 +25,7 @@ from phyblock.run.models import (
 )
 from phyblock.run.samples import Sample
 from phyblock.tracks import AnyTrack, EpisodeTrack, Item, Opening, kind_of, open_tracks
-from phyblock.tracks.selection import interleaved, select_tasks
+from phyblock.tracks.items import interleaved, select_tasks
 
 
 @dataclass(frozen=True)

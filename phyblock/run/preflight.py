@@ -15,7 +15,7 @@ from phyblock.records.manifest import Manifest
 from phyblock.resources import bundled
 from phyblock.run.plan import RunPlan
 from phyblock.text import did_you_mean
-from phyblock.tracks.opening import template_prompt
+from phyblock.tracks.base import template_prompt
 from phyblock.tracks.prompts import FORM_FACTS
 
 

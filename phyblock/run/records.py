@@ -12,7 +12,7 @@ from phyblock.records.files import known_records
 from phyblock.records.record import Record, SentImage, SentPrompt
 from phyblock.records.reply import Reply, StoredError
 from phyblock.tracks import Episode, Item, Judgement
-from phyblock.tracks.counting import count_sample
+from phyblock.tracks.base import count_sample
 from phyblock.types import Outcome
 
 __all__ = ["about_item", "about_prompt", "begun", "judged"]

@@ -29,8 +29,7 @@ from phyblock.run.records import about_item, judged
 from phyblock.run.store import check_place, locked, run_folder, write_run
 from phyblock.text import counted
 from phyblock.tracks import AnyTrack, EpisodeTrack, Item, kind_of, open_tracks, shown_item
-from phyblock.tracks.base import CARRYING, ENGINE, READER
-from phyblock.tracks.kind import Opening
+from phyblock.tracks.base import CARRYING, ENGINE, READER, Opening
 from phyblock.types import Matcher, PlanParser
 
 __all__ = ["judged_anew", "recorded_suite", "reopen_tracks", "rescore"]

@@ -7,15 +7,18 @@ from phyblock.tracks.base import (
     AnyTrack,
     Episode,
     EpisodeTrack,
-    Item,
     Judgement,
+    Opening,
     SingleTrack,
     Track,
+    TrackKind,
     judgement_of,
+    kind_of,
+    kinds,
+    open_tracks,
     shown_item,
 )
-from phyblock.tracks.kind import Opening, TrackKind, kind_of, kinds
-from phyblock.tracks.opening import open_tracks
+from phyblock.tracks.items import Item
 from phyblock.tracks.pictures import Drawing, PicturePolicy, Pictures, Studio
 from phyblock.tracks.prompts import OfficialPrompt, Prompt, TemplatePrompt
 

@@ -12,7 +12,7 @@ from phyblock.results.text import Column, TextTable
 from phyblock.scoring.counts import f1_of, precision_of, recall_of
 from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES, BlockOutcome, ErrorType
 from phyblock.sim.film import FilmStep, Tone
-from phyblock.tracks.full_planning import PLAN_FLOORS, PlanRecord
+from phyblock.tracks.full_planning import PLAN_FLOORS, POSE_MEASURES, PlanRecord
 from phyblock.tracks.measures import (
     EpisodeView,
     HeadlineColumn,
@@ -21,7 +21,6 @@ from phyblock.tracks.measures import (
     TrackReport,
     share,
 )
-from phyblock.tracks.plans import POSE_MEASURES
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from phyblock.data import AssemblyTask
 from phyblock.domain import Candidate, CandidateSet, Kind, Plan, Scene
 from phyblock.scoring.plan import Goal, most_placed
-from phyblock.tracks.showing import Showing, ShownTask, TaskShowing
+from phyblock.tracks.items import Showing, ShownTask, TaskShowing
 from phyblock.types import CandidateOrder, Setting
 
 Floats = NDArray[np.float64]

@@ -39,7 +39,7 @@ from phyblock.sim.pictures import (
     to_png,
 )
 from phyblock.stable import hex_digest
-from phyblock.tracks.showing import ShownTask
+from phyblock.tracks.items import ShownTask
 from phyblock.types import CandidateScale, PictureLayout, PictureName, PictureSource
 from phyblock.workers import WorkerDiedError, WorkerPool
 

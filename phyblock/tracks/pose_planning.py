@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import functools
+import math
+import threading
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, Tag
@@ -15,47 +19,662 @@ from pydantic import AfterValidator, Discriminator, Field, Tag
 from phyblock.config.suite import Suite
 from phyblock.config.validation import PictureControls, Section, TemplateName, UniqueSome, refuse
 from phyblock.data import AssemblyTask
-from phyblock.domain import Block, CandidateSet, PoseStep, Scene
+from phyblock.domain import (
+    Block,
+    BlockType,
+    Candidate,
+    CandidateSet,
+    Plan,
+    PosePlan,
+    PoseStep,
+    Scene,
+    euler_deg_to_matrix,
+    turn_deg,
+)
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.models.request import Image, Request
-from phyblock.parsing.poses import FARTHEST_PLACE_CM, MOST_POSE_STEPS
+from phyblock.parsing.poses import (
+    FARTHEST_PLACE_CM,
+    MOST_POSE_STEPS,
+    ParsedPoses,
+    parse_poses,
+    pose_form,
+)
+from phyblock.parsing.structured import AnswerForm
 from phyblock.parsing.text import READER_VERSION
-from phyblock.records.record import Record
+from phyblock.records.line import Amount, Line, Whole
+from phyblock.records.record import Course, Record
 from phyblock.resources import bundled
-from phyblock.scoring.pose import POSE_ERRORS
-from phyblock.scoring.pose_matching import TOLERANCES_CM
+from phyblock.scoring.plan import AssemblyScorer, Score
+from phyblock.scoring.pose import (
+    POSE_ERRORS,
+    POSE_FRAMES,
+    Laid,
+    Piece,
+    PoseError,
+    PoseFit,
+    PoseScore,
+    PoseScorer,
+    blocks_reached,
+    pose_errors,
+)
+from phyblock.scoring.pose_matching import TOLERANCES_CM, TURN_TOLERANCE_DEG
+from phyblock.sim.balance import MARGIN_M, is_balanced
 from phyblock.sim.camera import VIEWS
-from phyblock.sim.dynamics import ExecutionLimits
-from phyblock.sim.geometry import box_height_cm, center_cm, upright
+from phyblock.sim.contact import voxel_iou
+from phyblock.sim.dynamics import (
+    ExecutedStep,
+    ExecutionLimits,
+    execute,
+    groups,
+    settle,
+)
+from phyblock.sim.engine import Pose, described_engine
+from phyblock.sim.geometry import box_height_cm, center_cm, collision_pieces, origin_m, put, upright
 from phyblock.sim.pictures import PictureStyle, goal_style
 from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
-from phyblock.tracks.asked_once import AS_IN_FILE, WholePlanTrack
-from phyblock.tracks.base import CARRYING, READER, engine_identity
-from phyblock.tracks.by_hand import NumberField, Pick, Picking, candidate_choices
-from phyblock.tracks.kind import Opening, TrackKind
-from phyblock.tracks.measures import ListedScore, Listing, TrackReport
-from phyblock.tracks.opening import (
+from phyblock.stable import plain_sum
+from phyblock.tracks.base import (
+    AS_IN_FILE,
+    CARRYING,
+    READER,
+    Opening,
+    TrackKind,
+    WholePlanTrack,
     check_drawn,
+    engine_identity,
     picture_folder,
     picture_style,
     task_showing,
     template_prompt,
 )
+from phyblock.tracks.baselines import NumberField, Pick, Picking, candidate_choices
+from phyblock.tracks.full_planning import PLAN_COLUMNS, PlanParse, plan_row, score_fields
+from phyblock.tracks.items import ShownTask, TaskShowing, file_plan, select_tasks
+from phyblock.tracks.measures import ListedScore, Listing, SampleCounts, TrackReport
 from phyblock.tracks.pictures import Drawing, Studio, Workshop
-from phyblock.tracks.pose_judging import (
-    CARRY_VERSION,
-    COUNTED,
-    RIGHT,
-    PoseJudgement,
-    PoseRecord,
-    PoseRules,
-    buildable_order,
-    judge_poses,
-)
 from phyblock.tracks.prompts import Prompt
-from phyblock.tracks.selection import select_tasks
-from phyblock.tracks.showing import ShownTask, TaskShowing
-from phyblock.types import PoseRotation, View
+from phyblock.types import (
+    SETTINGS,
+    STEP_ENDS,
+    AnswerFormat,
+    Matcher,
+    PoseRotation,
+    Setting,
+    StepEnd,
+    View,
+)
+
+
+class GivenStep(Line):
+    """A step as it was read."""
+
+    block: int
+    """Number of the candidate, as it was shown."""
+    center_cm: tuple[Amount, Amount, Amount]
+    """x, y and z of the middle of the block's box [cm]."""
+    euler_deg: tuple[Amount, Amount, Amount] | None = None
+    """Its rotation, extrinsic x-y-z angles [degrees]; null: as the candidate is shown."""
+
+
+class PoseParse(PlanParse):
+    """The plan with poses that was read in a reply; `plan` leaves out numbers that no candidate
+    has.
+    """
+
+    steps: tuple[GivenStep, ...] = ()
+    """The steps with their poses, those included that name no candidate."""
+
+
+class CarryTolerances(Line):
+    """By what a plan was judged when it was carried out."""
+
+    overlap_cm: Amount
+    """Farthest that a block was moved out of others [cm]."""
+    stand_cm: Amount
+    """Farthest that a block moved and still stood [cm]."""
+    stand_deg: Amount
+    """Farthest that it turned [degrees]."""
+    reached_cm: Amount
+    """Farthest from its place that a block of the goal was reached [cm]."""
+    reached_deg: Amount
+    """Farthest that it was turned [degrees]."""
+
+
+class RestingBlock(Line):
+    """The place where a block came to lie."""
+
+    step: Whole
+    """Number of the step, from 1, that put it."""
+    center_cm: tuple[Amount, Amount, Amount]
+    """x, y and z of the middle of its box [cm]."""
+    euler_deg: tuple[Amount, Amount, Amount]
+    """Its rotation, extrinsic x-y-z angles [degrees]."""
+
+
+class StepOutcome(Line):
+    """The score of a step by geometry, and how it ended when it was carried out."""
+
+    vertex: Whole | None
+    """The goal block, from 0, that it stands for; null: none."""
+    position_cm: Amount | None = None
+    """How far its center of mass is from that block's [cm]."""
+    sideways_cm: Amount | None = None
+    """The same over the floor [cm]."""
+    up_cm: Amount | None = None
+    """The same in height, above zero where it is too high [cm]."""
+    turn_deg: Amount | None = None
+    """How far it is turned, up to the block's symmetry [degrees]."""
+    iou: Amount | None = None
+    """Volume that both share, of the volume of both together."""
+    end: StepEnd
+    """The ending."""
+    moved_cm: Amount = 0.0
+    """How far the block came to lie from where it was to be [cm]."""
+    turned_deg: Amount = 0.0
+    """How far it was turned [degrees]."""
+    gap_cm: Amount = 0.0
+    """How far it was above what it would fall on when it was let go [cm]."""
+    overlap_cm: Amount = 0.0
+    """How far it was moved out of others, or how deep it was refused [cm]."""
+    knocked: tuple[Whole, ...] = ()
+    """Numbers of the steps, from 1, whose blocks it moved."""
+    error: PoseError | None = None
+    """What was wrong, null where nothing was."""
+    rests: tuple[RestingBlock, ...] | None = None
+    """The blocks that lie elsewhere after it than before, its own than where it was put, by more
+    than 1 mm or 1 degree; null: not kept."""
+
+
+class PoseOutcome(Line):
+    """The score of a plan with poses."""
+
+    rotation: PoseRotation
+    """True if candidates keep their orientation or steps bring one."""
+    right: dict[str, tuple[Whole, ...]]
+    """By frame, `absolute` or `aligned`: right steps within 0.5, 1, 2 and 4 cm."""
+    shift_cm: tuple[Amount, Amount]
+    """The shift that aligns it, after the turn [cm]."""
+    turn_deg: Amount
+    """The turn about the vertical that aligns it [degrees]."""
+    steps: tuple[StepOutcome, ...]
+    """What became of each step."""
+    reached: Whole
+    """Blocks of the goal that stand where they should in the end."""
+    iou: Amount
+    """Intersection over union of all that stands and the goal, in voxels of 5 mm by 64 points."""
+    completed: bool
+    """True if all of the goal was reached, and nothing else lies about."""
+    limits: CarryTolerances
+    """The tolerances."""
+    engine: str
+    """The physics engine, with its version."""
+
+
+class PoseRecord(Record):
+    """A plan with poses for a scene."""
+
+    track: Literal["pose_planning"]
+    """`pose_planning`."""
+    parse: PoseParse | None = None
+    """The plan that was read."""
+    pose: PoseOutcome | None = None
+    """What it is worth."""
+
+    columns: ClassVar[Mapping[str, str]] = PLAN_COLUMNS
+
+    def row(self) -> Mapping[str, Any]:
+        """The plan in both numberings."""
+        return plan_row(self.parse, self.shown)
+
+    def course(self, matcher: str) -> Course | None:
+        """Return what was wrong with each step, and how many goal blocks were not reached."""
+        if self.pose is None or self.parse is None:
+            return super().course(matcher)
+        names = (str(step.block) for step in self.parse.steps)
+        errors = (step.error for step in self.pose.steps)
+        blocks = next((score.tp + score.fn for score in self.scores), self.pose.reached)
+        return Course(tuple(zip(names, errors, strict=True)), blocks - self.pose.reached)
+
+
+def _right(_: Any, judged: Any) -> tuple[int, ...]:
+    by_frame = {score.frame: score.right for score in judged.poses}
+    right = (count for frame in POSE_FRAMES for count in by_frame[frame])
+    return (*right, len(judged.kept), judged.poses[0].n_blocks)
+
+
+def _fits(_: Any, judged: Any) -> tuple[float, ...]:
+    fits = [fit for fit in judged.fits if fit is not None]
+    return (
+        plain_sum(fit.position_cm for fit in fits),
+        plain_sum(fit.turn_deg for fit in fits),
+        plain_sum(fit.iou for fit in fits),
+        len(fits),
+    )
+
+
+def _carried_counts(_: Any, judged: Any) -> tuple[float, ...]:
+    ended = judged.ended
+    ends = Counter(step.end for step in ended.steps)
+    whole = (ended.reached, judged.poses[0].n_blocks, ended.iou, ended.completed, 1)
+    return (*(ends[name] for name in STEP_ENDS), len(ended.steps), *whole)
+
+
+def _errors(_: Any, judged: Any) -> tuple[int, ...]:
+    counts = Counter(error for error in judged.errors if error is not None)
+    return (*(counts[name] for name in POSE_ERRORS), len(judged.errors))
+
+
+def _plan(setting: Setting) -> SampleCounts:
+    """The plan without its poses under a setting, by the headline matcher."""
+
+    def count(_: Any, judged: Any) -> tuple[int, int, int] | None:
+        scores = (score for score in judged.scores if score.setting == setting)
+        counts = next((score.counts for score in scores), None)
+        return None if counts is None else (counts.tp, counts.fp, counts.fn)
+
+    return SampleCounts(f"plan_{setting.lower()}", ("tp", "fp", "fn"), sample=count)
+
+
+RIGHT = SampleCounts(
+    "poses",
+    (*(f"{frame}_{cm:g}" for frame in POSE_FRAMES for cm in TOLERANCES_CM), "steps", "blocks"),
+    sample=_right,
+)
+FITS = SampleCounts("fits", ("position_cm", "turn_deg", "iou", "n"), sample=_fits)
+CARRIED = SampleCounts(
+    "carried",
+    (*STEP_ENDS, "steps", "reached", "blocks", "iou", "completed", "plans"),
+    sample=_carried_counts,
+)
+ERRORS = SampleCounts("pose_errors", (*POSE_ERRORS, "steps"), sample=_errors)
+PLANS = {setting: _plan(setting) for setting in SETTINGS}
+COUNTED = (RIGHT, FITS, CARRIED, ERRORS, *PLANS.values())
+
+
+_STILL_M, _STILL_DEG = 0.001, 1.0
+"""A block that moved by no more lies where it did before."""
+
+
+def rests_of(
+    put: Sequence[Block | None], worlds: Sequence[Sequence[Block]]
+) -> tuple[tuple[RestingBlock, ...], ...]:
+    """Return for each step the blocks that lie elsewhere after it than before, its own than where
+    it was put, by more than 1 mm or 1 degree.
+
+    `worlds` are the blocks after each step, with the numbers of their steps as orders.
+    """
+    poses = {n: Pose.goal(block) for n, block in enumerate(put, 1) if block is not None}
+    rests = []
+    for world in worlds:
+        moved = []
+        for block in world:
+            before, after = poses[block.order], Pose.goal(block)
+            if before.distance_m(after) > _STILL_M or before.angle_deg(after) > _STILL_DEG:
+                poses[block.order] = after
+                x, y, z = (round(part, 2) + 0.0 for part in center_cm(block))
+                rest = RestingBlock(
+                    step=block.order, center_cm=(x, y, z), euler_deg=block.euler_deg
+                )
+                moved.append(rest)
+        rests.append(tuple(moved))
+    return tuple(rests)
+
+
+def worlds_of(
+    put: Sequence[Block | None], stays: Sequence[bool], rests: Sequence[Sequence[RestingBlock]]
+) -> tuple[tuple[Block, ...], ...]:
+    """Return the blocks after each step, to within 1 mm and 1 degree; `stays` says whose block was
+    not refused.
+    """
+    lying: dict[int, Block] = {}
+    worlds = []
+    for number, (block, is_put, moved) in enumerate(zip(put, stays, rests, strict=True), 1):
+        if block is not None and is_put:
+            lying[number] = replace(block, order=number)
+        for rest in moved:
+            one = lying[rest.step]
+            place = origin_m(one.type, rest.euler_deg, rest.center_cm)
+            lying[rest.step] = replace(one, position_m=place, euler_deg=rest.euler_deg)
+        worlds.append(tuple(lying.values()))
+    return tuple(worlds)
+
+
+CARRY_VERSION = 2
+"""Version of how plans are carried out and of how what stands in the end is measured; it goes up
+where some plan may end otherwise. Before 2 everything in the world was let go together, for 5 s
+where it crept, and voxels were whole or empty.
+"""
+_ONE_AT_A_TIME = threading.Lock()
+_KEPT = 32
+_DIGITS = 4
+_PARSER = "poses"
+
+
+@dataclass(frozen=True)
+class PoseRules:
+    """Rules of parsing, scoring and execution; the first matcher is the headline."""
+
+    rotation: PoseRotation
+    settings: tuple[Setting, ...]
+    matchers: tuple[Matcher, ...]
+    limits: ExecutionLimits
+    reached_cm: float
+    reached_deg: float
+    answer_format: AnswerFormat = "text"
+
+    @property
+    def is_free(self) -> bool:
+        """True if steps bring a rotation."""
+        return self.rotation == "free"
+
+    @property
+    def told(self) -> dict[str, float]:
+        """The tolerances of what is carried out, as records tell them."""
+        return {
+            **asdict(self.limits),
+            "reached_cm": self.reached_cm,
+            "reached_deg": self.reached_deg,
+        }
+
+    def form(self, item: AssemblyTask) -> AnswerForm[Any] | None:
+        """The form in which a plan for a scene is asked for; None where that is text."""
+        if self.answer_format == "text":
+            return None
+        return pose_form(len(item.candidates), free=self.is_free)
+
+
+@dataclass(frozen=True)
+class Ended:
+    """Result of a plan that was executed: its steps, the blocks that each of them moved (None where
+    that was not kept), the blocks of the goal that were reached, the IoU of all that stands with
+    the goal, True if that is the whole goal and nothing else, and the engine with its version.
+    """
+
+    steps: tuple[ExecutedStep, ...]
+    rests: tuple[tuple[RestingBlock, ...] | None, ...]
+    reached: int
+    iou: float
+    completed: bool
+    engine: str
+
+
+@dataclass(frozen=True)
+class PoseJudgement:
+    """A reply as it was parsed and scored.
+
+    `fits` and `errors` have an entry for each step that was read, `kept` are those that name a
+    candidate.
+    """
+
+    parsed: ParsedPoses
+    kept: tuple[PoseStep, ...]
+    in_file: tuple[int, ...] | None
+    scores: tuple[Score, ...]
+    poses: tuple[PoseScore, ...]
+    fits: tuple[PoseFit | None, ...]
+    errors: tuple[PoseError | None, ...]
+    ended: Ended
+    rules: PoseRules
+
+    @property
+    def steps(self) -> tuple[int, ...]:
+        """The candidates that were named, in order."""
+        return tuple(step.candidate for step in self.kept)
+
+    @property
+    def is_read(self) -> bool:
+        """True if a rule matched."""
+        return self.parsed.rule is not None
+
+    def fields(self) -> dict[str, Any]:
+        """`parse`, `scores` and `pose` of the record (docs/results.md)."""
+        given = self.parsed.plan.steps
+        kept = set(self.kept)
+        dropped = [step.candidate for step in given if step not in kept]
+        return {
+            "parse": {
+                "parser": _PARSER,
+                "rule": self.parsed.rule,
+                "plan": list(self.steps),
+                "file_plan": self.in_file,
+                "dropped": dropped,
+                "version": READER_VERSION,
+                "problem": self.parsed.problem,
+                "steps": [_given(step) for step in given],
+            },
+            "scores": [score_fields(score) for score in self.scores],
+            "pose": self._outcome(),
+        }
+
+    def _outcome(self) -> dict[str, Any]:
+        motion = self.poses[-1].motion
+        whole = zip(self.fits, self.ended.steps, self.ended.rests, self.errors, strict=True)
+        return {
+            "rotation": self.rules.rotation,
+            "right": {score.frame: list(score.right) for score in self.poses},
+            "shift_cm": [round(part, _DIGITS) + 0.0 for part in motion.shift_cm],
+            "turn_deg": round(math.degrees(motion.turn_rad), _DIGITS) + 0.0,
+            "steps": [_step_fields(*step) for step in whole],
+            "reached": self.ended.reached,
+            "iou": self.ended.iou,
+            "completed": self.ended.completed,
+            "limits": self.rules.told,
+            "engine": self.ended.engine,
+        }
+
+
+def judge_poses(
+    item: AssemblyTask, text: str | None, rules: PoseRules, earlier: PoseRecord | None = None
+) -> PoseJudgement:
+    """Read, score and carry out a reply; None, where there is no reply, is an empty plan.
+
+    A plan that an `earlier` record holds, executed with the same tolerances, ended as it did.
+    """
+    parsed = ParsedPoses(PosePlan(), None)
+    if text is not None:
+        parsed = parse_poses(text, len(item.candidates), free=rules.is_free)
+    given = parsed.plan.steps
+    n = len(item.candidates)
+    kept = tuple(step for step in given if 1 <= step.candidate <= n)
+    scorer = _scorer(item.scene, item.candidates, "B" if rules.is_free else "A")
+    poses = scorer.score([laid(step, item.candidates[step.candidate]) for step in kept])
+    blocks = [put(step, item.candidates) for step in given]
+    ended = _ended_before(earlier, given, rules) or _carried(item, blocks, rules)
+    found = iter(poses[0].fits)
+    fits = tuple(next(found) if 1 <= step.candidate <= n else None for step in given)
+    numbers, ends = [step.candidate for step in given], [step.end for step in ended.steps]
+    return PoseJudgement(
+        parsed,
+        kept,
+        file_plan(item, [step.candidate for step in kept]),
+        _plan_scores(item, kept, rules),
+        poses,
+        fits,
+        pose_errors(scorer.goal, numbers, fits, ends),
+        ended,
+        rules,
+    )
+
+
+def _ended_before(
+    record: PoseRecord | None, given: Sequence[PoseStep], rules: PoseRules
+) -> Ended | None:
+    """Return the result that a record holds of the same steps under the same rules, else None."""
+    if record is None or record.pose is None or record.parse is None:
+        return None
+    pose = record.pose
+    known = [PoseStep(s.block, s.center_cm, s.euler_deg) for s in record.parse.steps]
+    if (known, pose.limits.fields()) != (list(given), rules.told) or len(pose.steps) != len(given):
+        return None
+    steps = tuple(
+        ExecutedStep(s.end, s.moved_cm, s.turned_deg, s.gap_cm, s.overlap_cm, s.knocked)
+        for s in pose.steps
+    )
+    rests = tuple(step.rests for step in pose.steps)
+    return Ended(steps, rests, pose.reached, pose.iou, pose.completed, pose.engine)
+
+
+def _carried(item: AssemblyTask, blocks: Sequence[Block | None], rules: PoseRules) -> Ended:
+    # An engine has no more than one plan at a time, whichever thread asks.
+    with _ONE_AT_A_TIME:
+        done = execute(blocks, rules.limits)
+    goal = item.scene.blocks
+    reached = blocks_reached(goal, done.blocks, rules.reached_cm, rules.reached_deg)
+    is_whole = reached == len(goal) == len(done.blocks)
+    iou = round(voxel_iou(goal, done.blocks), _DIGITS)
+    rests = rests_of(blocks, done.worlds)
+    return Ended(done.steps, rests, reached, iou, is_whole, described_engine())
+
+
+@functools.cache
+def pieces_of(block_type: BlockType) -> tuple[Piece, ...]:
+    """Return the convex pieces of a block in its body frame."""
+    return tuple(Piece(p.vertices_m, p.face_normals) for p in collision_pieces(block_type))
+
+
+def laid(step: PoseStep, candidate: Candidate) -> Laid:
+    """Return a step as a rigid body; without a rotation of its own it has its candidate's."""
+    euler = candidate.euler_deg if step.euler_deg is None else step.euler_deg
+    return Laid(step.candidate, origin_m(candidate.type, euler, step.center_cm), euler)
+
+
+@functools.lru_cache(maxsize=_KEPT)
+def _scorer(scene: Scene, candidates: CandidateSet, setting: Setting) -> PoseScorer:
+    return PoseScorer(scene, candidates, setting, pieces_of)
+
+
+def _plan_scores(
+    item: AssemblyTask, kept: Sequence[PoseStep], rules: PoseRules
+) -> tuple[Score, ...]:
+    """The plan without its poses, under every setting and matcher."""
+    numbers, candidates = [step.candidate for step in kept], item.candidates
+    if rules.is_free:
+        numbers, candidates = _as_candidates(item, kept)
+    scorer = AssemblyScorer(item.scene, candidates, rules.settings)
+    return scorer.score(Plan(tuple(numbers)), rules.matchers, None)
+
+
+def _as_candidates(item: AssemblyTask, kept: Sequence[PoseStep]) -> tuple[list[int], CandidateSet]:
+    """Steps with rotations as candidates that are turned so.
+
+    One that is within the tolerance of how some block of the goal is turned is turned just so.
+    """
+    numbers: list[int] = []
+    found: dict[Candidate, int] = {}
+    for step in kept:
+        one = item.candidates[step.candidate]
+        turned = replace(one, euler_deg=step.euler_deg or one.euler_deg)
+        near = [
+            (_apart_deg(turned, block.euler_deg), place, block.euler_deg)
+            for place, block in enumerate(item.scene.blocks)
+            if block.kind == one.kind
+        ]
+        if near and min(near)[0] <= TURN_TOLERANCE_DEG:
+            turned = replace(one, euler_deg=min(near)[2])
+        numbers.append(found.setdefault(turned, len(found) + 1))
+    return numbers, CandidateSet(tuple(found))
+
+
+def _apart_deg(one: Candidate, euler_deg: tuple[float, float, float]) -> float:
+    rotations = [np.array(euler_deg_to_matrix(euler)) for euler in (one.euler_deg, euler_deg)]
+    return turn_deg(one.type, rotations[0], rotations[1])
+
+
+def _given(step: PoseStep) -> dict[str, Any]:
+    turned = {} if step.euler_deg is None else {"euler_deg": list(step.euler_deg)}
+    return {"block": step.candidate, "center_cm": list(step.center_cm), **turned}
+
+
+def _step_fields(
+    fit: PoseFit | None,
+    end: ExecutedStep,
+    rests: tuple[RestingBlock, ...] | None,
+    error: PoseError | None,
+) -> dict[str, Any]:
+    told: dict[str, Any] = {"vertex": None}
+    if fit is not None:
+        told = {
+            "vertex": fit.vertex,
+            "position_cm": fit.position_cm,
+            "sideways_cm": fit.sideways_cm,
+            "up_cm": fit.up_cm,
+            "turn_deg": fit.turn_deg,
+            "iou": fit.iou,
+        }
+    return {
+        **told,
+        "end": end.end,
+        "moved_cm": end.moved_cm,
+        "turned_deg": end.turned_deg,
+        "gap_cm": end.gap_cm,
+        "overlap_cm": end.overlap_cm,
+        "knocked": list(end.knocked),
+        "error": error,
+        **({} if rests is None else {"rests": [rest.fields() for rest in rests]}),
+    }
+
+
+_MOST_TRIED = 200
+_MOST_SETTLED = 16
+"""States that the physics engine is asked about, each of which may take a second."""
+
+
+def buildable_order(scene: Scene, wanted: Sequence[int]) -> list[int]:
+    """The vertices of a scene in a valid order, as near to the `wanted` one, which is valid too, as
+    balance lets it be.
+
+    Each step takes the first block with which what stands is in balance with every weight off by
+    `MARGIN_M`, else the first with which it is in balance at all and stands in the physics engine;
+    where there is none, an earlier step is taken back. The wanted order where no other is found.
+    """
+    return _Search(scene, wanted).found() or list(wanted)
+
+
+class _Search:
+    def __init__(self, scene: Scene, wanted: Sequence[int]) -> None:
+        self._blocks, self._needs = scene.blocks, scene.graph.depends_on
+        self._wanted = wanted
+        self._dead: set[frozenset[int]] = set()
+        self._left, self._settles_left = _MOST_TRIED, _MOST_SETTLED
+
+    def found(self, order: tuple[int, ...] = ()) -> list[int]:
+        """The rest of an order that begins so; empty where there is none."""
+        if len(order) == len(self._blocks):
+            return list(order)
+        placed = frozenset(order)
+        if placed not in self._dead:
+            for vertex in self._next(order):
+                if whole := self.found((*order, vertex)):
+                    return whole
+            self._dead.add(placed)
+        return []
+
+    def _next(self, order: tuple[int, ...]) -> Iterator[int]:
+        """The blocks that may come next, the surest first."""
+        ready = [v for v in self._wanted if v not in order and self._needs[v] <= set(order)]
+        doubtful = []
+        for vertex in ready:
+            if self._left <= 0:
+                return
+            self._left -= 1
+            touched = self._touched((*order, vertex))
+            if is_balanced(touched, margin_m=MARGIN_M):
+                yield vertex
+            elif is_balanced(touched):
+                doubtful.append(vertex)
+        # So near to an edge engines differ, and a structure may stand while its mirror image falls.
+        yield from (vertex for vertex in doubtful if self._settles((*order, vertex)))
+
+    def _settles(self, order: tuple[int, ...]) -> bool:
+        self._settles_left -= 1
+        return self._settles_left >= 0 and settle(self._touched(order)).stands
+
+    def _touched(self, order: tuple[int, ...]) -> tuple[Block, ...]:
+        """The blocks that hang together with the last one."""
+        blocks = [replace(self._blocks[v], order=place) for place, v in enumerate(order)]
+        return next(group for group in groups(blocks) if blocks[-1] in group)
+
 
 _LIMITS = ExecutionLimits()
 MOST_VIEWS = 4

@@ -30,18 +30,19 @@ from phyblock.tracks.measures import (
     by_settings,
     share,
 )
-from phyblock.tracks.pose_judging import (
+from phyblock.tracks.pose_planning import (
     CARRIED,
     ERRORS,
     FITS,
+    LISTED_IN_C,
     PLANS,
+    POSE_FLOORS,
     RIGHT,
     PoseOutcome,
     PoseRecord,
     StepOutcome,
     worlds_of,
 )
-from phyblock.tracks.pose_planning import LISTED_IN_C, POSE_FLOORS
 from phyblock.types import REFUSED_ENDS, Setting, StepEnd
 
 if TYPE_CHECKING:

@@ -32,17 +32,22 @@ from phyblock.sim.engine import described_engine
 from phyblock.sim.pictures import PictureStyle, goal_style
 from phyblock.sim.question_pictures import question_key, question_png, state_picture
 from phyblock.stable import hex_digest
-from phyblock.tracks.base import engine_identity
-from phyblock.tracks.by_hand import Choice, Pick, Picking, candidate_choices
+from phyblock.tracks.base import (
+    Opening,
+    TrackKind,
+    assembly_pictures,
+    check_drawn,
+    engine_identity,
+    task_showing,
+    template_prompt,
+)
+from phyblock.tracks.baselines import Choice, Pick, Picking, candidate_choices
+from phyblock.tracks.full_planning import PLAN_COLUMNS, POSE_COUNTS, PlanParse, plan_row
 from phyblock.tracks.goal_blind import BlindGuesses
-from phyblock.tracks.kind import Opening, TrackKind
+from phyblock.tracks.items import Showing, TaskShowing, file_plan, select_tasks, showing_fields
 from phyblock.tracks.measures import TrackReport
-from phyblock.tracks.opening import assembly_pictures, check_drawn, task_showing, template_prompt
 from phyblock.tracks.pictures import Drawing, Pictures
-from phyblock.tracks.plans import PLAN_COLUMNS, POSE_COUNTS, PlanParse, plan_row
 from phyblock.tracks.prompts import TemplatePrompt, form_facts, response_format
-from phyblock.tracks.selection import select_tasks
-from phyblock.tracks.showing import Showing, TaskShowing, file_plan, showing_fields
 from phyblock.types import AnswerFormat, CandidateScale, Gating, Physics, Setting
 
 PositiveUsd = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]

@@ -15,6 +15,7 @@ from phyblock.sim.engine import PHYSICS_VARIABLE, REFERENCE_ENGINE, described_en
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.text import counted
 from phyblock.tracks.base import ENGINE
+from phyblock.tracks.full_planning import POSE_MEASURES
 from phyblock.tracks.measures import (
     CELL,
     SCORED_BY,
@@ -26,7 +27,6 @@ from phyblock.tracks.measures import (
     TrackReport,
     share,
 )
-from phyblock.tracks.plans import POSE_MEASURES
 from phyblock.tracks.step_planning import (
     ENDINGS,
     STEP_FLOORS,

@@ -24,7 +24,8 @@ from phyblock.tracks.measures import (
     share,
 )
 from phyblock.tracks.pictures import block_entry, rounded
-from phyblock.tracks.vqa import (
+from phyblock.tracks.questions import (
+    QUESTION_EXPORT,
     AskedQuestion,
     ChoiceRecord,
     QuestionPictures,
@@ -32,7 +33,6 @@ from phyblock.tracks.vqa import (
     VqaSpec,
     open_questions,
 )
-from phyblock.tracks.vqa_export import QUESTION_EXPORT
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -18,7 +18,7 @@ from phyblock.records.manifest import MANIFEST
 from phyblock.run.plan import RunPlan
 from phyblock.tracks import SingleTrack
 from phyblock.tracks.base import shown_item
-from phyblock.tracks.by_hand import Picking, picks_of
+from phyblock.tracks.baselines import Picking, picks_of
 from phyblock.web.server import assets
 from phyblock.web.session import Given, Person, Place, picking_of, pictures_of, shown
 

@@ -37,8 +37,7 @@ from phyblock.results.estimates import (
 from phyblock.results.load import Run, load_run
 from phyblock.results.tables import cost_frame, coverage_frame
 from phyblock.stable import hex_digest
-from phyblock.tracks.base import CARRYING, READER
-from phyblock.tracks.kind import kind_of
+from phyblock.tracks.base import CARRYING, READER, kind_of
 from phyblock.tracks.pictures import kit, scene_entry
 from phyblock.web.pack import (
     IN_INDEX,

@@ -34,7 +34,7 @@ from phyblock.results.load import Run
 from phyblock.run.plan import recorded_dataset
 from phyblock.sim.pictures import PictureStyle
 from phyblock.tracks import PicturePolicy, Pictures
-from phyblock.tracks.kind import kind_of, kinds
+from phyblock.tracks.base import kind_of, kinds
 from phyblock.tracks.measures import Listing, PageItems
 from phyblock.tracks.pictures import Drawing, Studio
 

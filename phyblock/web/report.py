@@ -40,11 +40,10 @@ from phyblock.results.load import Run
 from phyblock.results.tables import TablesWritten, coverage_frame, table_files
 from phyblock.results.text import NO_VALUE, captioned, number, spread
 from phyblock.run.store import run_folder
-from phyblock.tracks.kind import kind_of
+from phyblock.tracks.base import kind_of, picture_policy
+from phyblock.tracks.items import in_order
 from phyblock.tracks.measures import Better, HeadlineColumn
-from phyblock.tracks.opening import picture_policy
 from phyblock.tracks.pictures import kit, scene_entry
-from phyblock.tracks.showing import in_order
 from phyblock.web.pack import (
     Item,
     Pack,

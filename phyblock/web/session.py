@@ -44,8 +44,8 @@ from phyblock.run.session import Session
 from phyblock.stable import drawn_bytes, hex_digest
 from phyblock.text import one_line
 from phyblock.tracks import Item
-from phyblock.tracks.by_hand import Pick, Picking
-from phyblock.tracks.kind import kind_of, kinds
+from phyblock.tracks.base import kind_of, kinds
+from phyblock.tracks.baselines import Pick, Picking
 from phyblock.web.report import REPORT_FILE, page_files
 
 _ItemT = TypeVar("_ItemT", bound=Item)

@@ -8,7 +8,7 @@ import json
 import pytest
 
 from phyblock.models import HaltedError, Image, Message, Request
-from phyblock.tracks.by_hand import Choice, Picking, Spot, picks_of
+from phyblock.tracks.baselines import Choice, Picking, Spot, picks_of
 from phyblock.web.session import Given, NotNowError, PlaySession
 
 PICTURE = Image(b"pixels", "candidates", 64, 64)

@@ -20,7 +20,7 @@ import pytest
 
 from phyblock.errors import DataError
 from phyblock.models import Message, Request
-from phyblock.tracks.by_hand import Choice, NumberField, Picking
+from phyblock.tracks.baselines import Choice, NumberField, Picking
 from phyblock.web.answers import read_answers
 from phyblock.web.server import Server, default_consent
 from phyblock.web.session import Place, PlaySession, shown

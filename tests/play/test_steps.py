@@ -13,7 +13,7 @@ import pytest
 
 from phyblock.config.suite import load_suite
 from phyblock.run.execute import RunResult
-from phyblock.tracks.by_hand import picks_of
+from phyblock.tracks.baselines import picks_of
 from phyblock.web.session import Person, PlaySession, plan_session
 from tests.workspace import SCENES, Workspace
 

@@ -33,7 +33,7 @@ from phyblock.results.tables import (
 )
 from phyblock.results.text import NO_VALUE, number, to_latex, to_markdown
 from phyblock.run.events import Summary
-from phyblock.tracks.kind import kinds
+from phyblock.tracks.base import kinds
 from tests.report.factory import laws, manifest, record, record_lists, run_of, score, write_run
 from tests.results.test_estimates import complete, episode, episodes, questions
 

@@ -13,7 +13,7 @@ import yaml
 
 from phyblock.data import AssemblyTask, read_builtin
 from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png
-from phyblock.tracks.showing import Showing, TaskShowing, shown_order
+from phyblock.tracks.items import Showing, TaskShowing, shown_order
 from tests.servers.chassis import Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Raw, Workspace

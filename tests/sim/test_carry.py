@@ -24,7 +24,7 @@ from phyblock.sim.engine import (
     installed_engines,
     physics_engine,
 )
-from phyblock.tracks.pose_judging import pieces_of
+from phyblock.tracks.pose_planning import pieces_of
 from tests.sim.structures import block, counterweighted_beam, tower
 
 CREEP_M_S = 0.0015

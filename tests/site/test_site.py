@@ -18,7 +18,7 @@ from phyblock.errors import SpecError, StoreError
 from phyblock.records.files import known_records
 from phyblock.records.record import Record
 from phyblock.results.estimates import track_measures
-from phyblock.tracks.kind import kind_of
+from phyblock.tracks.base import kind_of
 from phyblock.web import leaderboard
 from phyblock.web.leaderboard import (
     SiteRun,

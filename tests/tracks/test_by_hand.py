@@ -14,11 +14,11 @@ from phyblock.parsing.poses import parse_poses
 from phyblock.resources import bundled
 from phyblock.run.plan import open_dataset
 from phyblock.sim.pictures import joined_size_px
-from phyblock.tracks.by_hand import Picking, Spot, picks_of
+from phyblock.tracks.baselines import Picking, Spot, picks_of
 from phyblock.tracks.full_planning import PlanSubject, pick_plan
 from phyblock.tracks.pose_planning import PoseSubject, pick_poses
+from phyblock.tracks.questions import ChoiceSubject, pick_answer
 from phyblock.tracks.step_planning import StepSubject, pick_step
-from phyblock.tracks.vqa import ChoiceSubject, pick_answer
 
 DATA = open_dataset("builtin", bundled("benchmarks", "data", "phyblock-400"))
 TASK = DATA.tasks[0]

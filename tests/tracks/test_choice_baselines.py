@@ -14,7 +14,7 @@ from phyblock.errors import SpecError
 from phyblock.models import Request
 from phyblock.models.replay import BaselineModel
 from phyblock.parsing.answer import parse_answer
-from phyblock.tracks.vqa import ChoiceSubject
+from phyblock.tracks.questions import ChoiceSubject
 
 OPTIONS = ("cube", "arch", "cylinder", "cuboid")
 

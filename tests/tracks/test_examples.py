@@ -22,10 +22,10 @@ from phyblock.models.request import Image
 from phyblock.resources import bundled
 from phyblock.run.manifest import make_manifest
 from phyblock.run.plan import open_dataset
-from phyblock.tracks import Opening, open_tracks, vqa
-from phyblock.tracks.examples import Examples
+from phyblock.tracks import Opening, open_tracks, questions
 from phyblock.tracks.full_planning import worked_plan
-from phyblock.tracks.vqa import VqaSpec
+from phyblock.tracks.items import Examples
+from phyblock.tracks.questions import VqaSpec
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
@@ -44,7 +44,7 @@ def suite_file(folder: Path) -> Path:
 
 @pytest.fixture(autouse=True, scope="module")
 def _questions_are_read_once() -> Iterator[None]:
-    read, known = vqa.open_questions, {}
+    read, known = questions.open_questions, {}
 
     def once(*args: Any) -> Any:
         if not known:
@@ -52,7 +52,7 @@ def _questions_are_read_once() -> Iterator[None]:
         return known[""]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(vqa, "open_questions", once)
+        patch.setattr(questions, "open_questions", once)
         yield
 
 

@@ -19,9 +19,9 @@ from phyblock.data import AssemblyTask
 from phyblock.models.request import Message, Request
 from phyblock.scoring.counts import mean_of, ratio_of
 from phyblock.tracks import Opening, TrackKind
+from phyblock.tracks.base import assembly_pictures
+from phyblock.tracks.items import select_tasks
 from phyblock.tracks.measures import Measure, SampleCounts, TrackReport
-from phyblock.tracks.opening import assembly_pictures
-from phyblock.tracks.selection import select_tasks
 from tests.servers.chassis import Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace

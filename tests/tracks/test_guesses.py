@@ -10,7 +10,7 @@ import pytest
 
 from phyblock.domain import LETTERS, Question, Scene
 from phyblock.domain.question import rotated
-from phyblock.tracks.guesses import FOLDS, PROBES, Folds, Guesses
+from phyblock.tracks.baselines import FOLDS, PROBES, Folds, Guesses
 
 WORDS = ("cube", "arch", "cylinder", "cuboid", "cone", "prism")
 

@@ -29,20 +29,21 @@ from phyblock.scoring.pose import POSE_ERRORS, PoseFit, pose_errors
 from phyblock.sim.dynamics import ExecutionLimits, execute
 from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import center_cm, put
-from phyblock.tracks import pose_judging as judging
 from phyblock.tracks import pose_planning as pose_track
 from phyblock.tracks.full_planning import FullPlanning, PlanningRules
-from phyblock.tracks.pose_judging import PoseRecord, PoseRules, worlds_of
+from phyblock.tracks.items import ShownTask
 from phyblock.tracks.pose_planning import (
     POSE_RULES,
     PosePlanning,
+    PoseRecord,
+    PoseRules,
     PoseSpec,
     PoseSubject,
+    worlds_of,
     written,
 )
 from phyblock.tracks.pose_planning_results import pose_film, pose_table
 from phyblock.tracks.prompts import TemplatePrompt
-from phyblock.tracks.showing import ShownTask
 from phyblock.types import REFUSED_ENDS, STEP_ENDS, StepEnd
 from tests.data.broken import write_scenes
 from tests.servers.chassis import Faults, Running, Seen
@@ -287,8 +288,8 @@ def test_a_run_with_faults_is_killed_resumed_and_scored_again(
 
     assert by_sample(workspace.records()) == by_sample(whole)
     # What fell when it was asked is what fell: nothing is carried out again.
-    monkeypatch.setattr(judging, "execute", None)
-    monkeypatch.setattr(pose_track, "CARRY_VERSION", judging.CARRY_VERSION + 1)
+    monkeypatch.setattr(pose_track, "execute", None)
+    monkeypatch.setattr(pose_track, "CARRY_VERSION", pose_track.CARRY_VERSION + 1)
     again = rescore(workspace.out, None, None, workspace.root / "again")
     with pytest.raises(StoreError, match="carries plans out and measures what stands otherwise"):
         phyblock.main(run, standalone_mode=False)

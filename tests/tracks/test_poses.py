@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from phyblock.domain import Candidate, CandidateSet, Scene
 from phyblock.domain.scene import Block
-from phyblock.tracks.plans import pose_choices, pose_counts
+from phyblock.tracks.full_planning import pose_choices, pose_counts
 
 UP, OVER, ASIDE = (0.0, 0.0, 0.0), (90.0, 0.0, 0.0), (0.0, 0.0, 90.0)
 SCENE = Scene(

@@ -15,8 +15,7 @@ from phyblock.data import QuestionSet, read_builtin, read_questions
 from phyblock.domain import LETTERS, is_picture_option
 from phyblock.errors import SpecError, StoreError
 from phyblock.sim.pictures import PictureStyle
-from phyblock.tracks.vqa import QuestionPictures
-from phyblock.tracks.vqa_export import export_questions
+from phyblock.tracks.questions import QuestionPictures, export_questions
 from tests.vqa_set import write_questions
 from tests.workspace import Workspace
 

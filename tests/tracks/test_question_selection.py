@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from phyblock.data import QuestionTask
 from phyblock.domain import SUBTASKS, Question, Scene, Subtask
-from phyblock.tracks.vqa import select_questions
+from phyblock.tracks.questions import select_questions
 
 LEVELS = (1, 2, 3, 4)
 

@@ -16,7 +16,7 @@ from phyblock.results.estimates import track_estimates, track_measures
 from phyblock.results.load import load_run
 from phyblock.results.tables import write_tables
 from phyblock.scoring.counts import ratio_of
-from phyblock.tracks.kind import kind_of
+from phyblock.tracks.base import kind_of
 from phyblock.tracks.measures import Measure, SampleCounts
 from tests.report.factory import manifest, record, write_run
 

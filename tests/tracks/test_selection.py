@@ -7,7 +7,7 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.tracks.selection import spread, stratified
+from phyblock.tracks.items import spread, stratified
 
 SIZES = st.lists(st.integers(1, 200), min_size=1, max_size=4)
 

@@ -20,7 +20,7 @@ from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png
 from phyblock.tracks import PicturePolicy, Pictures
 from phyblock.tracks.full_planning import FullPlanning, PlanningRules
 from phyblock.tracks.goal_blind import goal_blind_plans
-from phyblock.tracks.showing import (
+from phyblock.tracks.items import (
     Showing,
     ShownTask,
     TaskShowing,

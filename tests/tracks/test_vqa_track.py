@@ -23,7 +23,7 @@ from phyblock.resources import bundled
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.tracks import TemplatePrompt
-from phyblock.tracks.vqa import ChoiceSubject, QuestionPictures, ShownQuestion, Vqa, VqaRules
+from phyblock.tracks.questions import ChoiceSubject, QuestionPictures, ShownQuestion, Vqa, VqaRules
 from tests.vqa_set import write_questions
 from tests.workspace import Workspace
 

@@ -22,7 +22,7 @@ from phyblock.domain.scene import Block
 from phyblock.making.questions.selection import BALANCE
 from phyblock.sim.pictures import COLOR_RGB, Shot
 from phyblock.sim.question_pictures import changed_pixels, seen
-from phyblock.tracks.guesses import FOLDS, Folds, Guesses
+from phyblock.tracks.baselines import FOLDS, Folds, Guesses
 
 Floats = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from phyblock.domain.question import LETTERS
 from phyblock.making.questions.draft import Draft
-from phyblock.tracks.guesses import text_features
+from phyblock.tracks.baselines import text_features
 
 _LOOKED_AT = 100
 _SPREAD = 20
