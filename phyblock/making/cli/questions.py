@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import asyncio
 import io
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence, Set
-from contextlib import AsyncExitStack
 from pathlib import Path
 
 import click
 from PIL import Image
 from rich.progress import Progress, TaskID
 
-from phyblock.cli.console import make_console, may_spend, print_rows, shown_path
-from phyblock.cli.options import UserPath, models_file_option, yes_option
-from phyblock.config.models import ModelConfig, load_models
-from phyblock.config.suite import Suite
-from phyblock.data import QuestionSet, find_questions, read_data_set, read_questions
+from phyblock.cli.console import make_console, print_rows, shown_path
+from phyblock.cli.options import UserPath
+from phyblock.data import QuestionSet, read_data_set
 from phyblock.domain import LETTERS, SUBTASK_NAMES, SUBTASKS, Question, Subtask
-from phyblock.errors import DataError, Problem, SpecError
-from phyblock.files import check_free, make_folder, write_named
+from phyblock.errors import DataError, Problem
+from phyblock.files import write_named
 from phyblock.making.cli.options import (
     data_option,
     jobs_option,
@@ -38,24 +33,11 @@ from phyblock.making.cli.options import (
 from phyblock.making.questions.audit import Probe, audit_questions
 from phyblock.making.questions.files import check_place, write_questions
 from phyblock.making.questions.production import PER_SUBTASK, make_questions, verify_questions
-from phyblock.making.questions.rewording import (
-    Paraphrase,
-    read_wordings,
-    reword,
-    stems_of,
-    write_wordings,
-)
 from phyblock.making.scenes.files import check_sums
 from phyblock.making.workers import open_workers
-from phyblock.models import ReplyCache, build_model, is_billed
-from phyblock.models.litellm_client import be_quiet
-from phyblock.resources import bundled, reply_cache_file
-from phyblock.run.models import to_config
-from phyblock.run.preflight import find_models_file
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_png
 from phyblock.text import counted, did_you_mean
-from phyblock.tracks import TemplatePrompt
 
 
 @click.group("questions")
@@ -276,205 +258,3 @@ def _shown(probe: Probe | None) -> str:
         return "-"
     low, high = probe.interval
     return f"{100 * probe.accuracy:.0f} [{100 * low:.0f}, {100 * high:.0f}]"
-
-
-_AT_ONCE = 8
-
-
-@questions.command("write")
-@click.option("--model", "name", required=True, metavar="NAME", help="A model of models.yaml.")
-@questions_option
-@data_option
-@subtasks_option
-@click.option(
-    *("--count", "count"),
-    type=click.IntRange(1, 20),
-    default=4,
-    show_default=True,
-    metavar="N",
-    help="Paraphrases asked for, of each kind of question.",
-)
-@click.option(
-    "--checks",
-    type=click.IntRange(1, 10),
-    default=2,
-    show_default=True,
-    metavar="N",
-    help="Questions that each paraphrase is checked with.",
-)
-@seed_option("Another seed asks for other wordings.")
-@click.option(
-    "--out",
-    type=UserPath(dir_okay=False),
-    required=True,
-    metavar="FILE",
-    help="JSON Lines for review.",
-)
-@models_file_option
-@click.option("--no-cache", is_flag=True, help="Neither read nor write the reply cache.")
-@yes_option
-def write(
-    name: str,
-    questions: str,
-    data: str,
-    subtasks: tuple[Subtask, ...],
-    count: int,
-    checks: int,
-    seed: int,
-    out: Path,
-    models_file: str | None,
-    no_cache: bool,
-    yes: bool,
-) -> int:
-    """Ask a model for further wordings of questions, and check what they mean.
-
-    Accepts a paraphrase when its slots are intact, when the answers of questions asked in it can be
-    derived again, and when the model finds these answers. Writes every paraphrase to the file, with
-    the reason where it is not accepted. Nothing is used before a person has read it.
-    """
-    config = _config(name, models_file)
-    check_free([out], "name another file")
-    make_folder(out.parent)
-    asked = [task.question for task in read_question_set(questions, data).tasks]
-    stems = stems_of([question for question in asked if question.subtask in subtasks])
-    if not stems:
-        message = "holds no question of these subtasks in a known wording"
-        raise DataError(Problem(questions, message))
-    console = make_console()
-    most = counted(len(stems) * (1 + count * checks), "call")
-    billed = [name] if is_billed(config) and not yes else []
-    if not may_spend(billed, lambda: console.print(f"{name} may bill up to {most}.")):
-        console.print("Nothing was asked.")
-        return 1
-    prompt = TemplatePrompt(bundled("prompts", "vqa_write.j2"), "vqa_write")
-    asking = _ask(config, prompt, stems, count, checks, seed, use_cache=not no_cache)
-    paraphrases = asyncio.run(asking)
-    lines = [paraphrase.line(name, number) for number, paraphrase in _numbered(paraphrases)]
-    write_named(out, "".join(line + "\n" for line in lines))
-    accepted = sum(paraphrase.fault is None for paraphrase in paraphrases)
-    written = counted(len(paraphrases), "paraphrase")
-    summary = f"{written}, {accepted} accepted, in {shown_path(out)}"
-    console.print(f"{summary}; read them before they are used")
-    return 0
-
-
-def _config(name: str, models_file: str | None) -> ModelConfig:
-    known = load_models(find_models_file(models_file, None))
-    if name not in known:
-        hint = did_you_mean(name, list(known)) or "list them: phyblock models"
-        raise SpecError(Problem("--model", "is not in the models file", "", name, hint=hint))
-    return to_config(name, known[name], Suite(name="write", models=(name,)))
-
-
-async def _ask(
-    config: ModelConfig,
-    prompt: TemplatePrompt,
-    stems: Mapping[str, Sequence[Question]],
-    count: int,
-    checks: int,
-    seed: int,
-    *,
-    use_cache: bool,
-) -> list[Paraphrase]:
-    tell = make_console(stderr=True).print
-    async with AsyncExitStack() as stack:
-        cache = None
-        if use_cache:
-            cache = stack.enter_context(ReplyCache(reply_cache_file(), tell))
-        be_quiet()
-        model = build_model(config, cache=cache, overall=asyncio.Semaphore(_AT_ONCE), tell=tell)
-        stack.push_async_callback(model.aclose)
-        by_stem = await asyncio.gather(
-            *(
-                write_wordings(model, prompt, stem, questions, count, checks, seed)
-                for stem, questions in stems.items()
-            )
-        )
-    return [paraphrase for of_stem in by_stem for paraphrase in of_stem]
-
-
-def _numbered(paraphrases: Sequence[Paraphrase]) -> list[tuple[int, Paraphrase]]:
-    """Each with its number inside its stem, from 1."""
-    counts: dict[str, int] = {}
-    numbered = []
-    for paraphrase in paraphrases:
-        counts[paraphrase.stem] = counts.get(paraphrase.stem, 0) + 1
-        numbered.append((counts[paraphrase.stem], paraphrase))
-    return numbered
-
-
-@questions.command("reword")
-@click.argument("wordings", type=UserPath(), metavar="FILE")
-@questions_option
-@data_option
-@click.option("--add", is_flag=True, help="Keep the questions of the set beside the new ones.")
-@seed_option("Another seed draws other wordings.")
-@jobs_option
-@click.option("--out", type=UserPath(), required=True, metavar="DIR", help="Folder to write.")
-@click.option("--replace", is_flag=True, help="Replace questions that are in the folder.")
-def reword_set(
-    wordings: Path,
-    questions: str,
-    data: str,
-    add: bool,
-    seed: int,
-    jobs: int,
-    out: Path,
-    replace: bool,
-) -> None:
-    """Ask questions of a set in the accepted wordings of FILE, as a set that a suite can name.
-
-    FILE is what phyblock questions write wrote, after a person has read it. Asks each question that
-    FILE has a wording for in one of them, under an id of its own. Derives its answer again; where
-    that fails, leaves the question out and names it.
-    """
-    check_place(out, replace)
-    further = read_wordings(wordings)
-    scenes = read_data_set(data)
-    read = read_questions(find_questions(questions), scenes)
-    asked = [task.question for task in read.tasks]
-    reworded = reword(asked, further, seed)
-    if not reworded:
-        stems = ", ".join(sorted({wording.stem for wording in further}))
-        message = "holds no question of these kinds in a known wording"
-        raise DataError(Problem(questions, message, found=stems))
-    faults = _faults({question.id for question in asked}, list(reworded.values()), jobs)
-    if len(faults) == len(reworded):
-        raise DataError([Problem(name, fault) for name, fault in faults.items()])
-    sound = {old: new for old, new in reworded.items() if new.id not in faults}
-    made_by = f"phyblock questions reword {wordings.name} --questions {questions} --data {data}"
-    made_by += f" --seed {seed} --out {out.name}" + (" --add" if add else "")
-    originals = {task.scene.id: task.scene for task in scenes.tasks}
-    write_questions(out, _merged(asked, sound, add), originals, scenes.name, made_by)
-    for name, fault in faults.items():
-        click.echo(f"left out: {name}: {fault}", err=True)
-    beside = f" beside {counted(len(asked), 'question')} as before" if add else ""
-    summary = f"{counted(len(sound), 'question')} in further wordings{beside}: {shown_path(out)}"
-    make_console().print(summary, markup=False, soft_wrap=True)
-
-
-def _faults(taken: Set[str], reworded: Sequence[Question], jobs: int) -> dict[str, str]:
-    """Return reasons why reworded questions cannot be used, by id."""
-    faults = {}
-    with open_workers(jobs) as workers:
-        verified = verify_questions(reworded, workers)
-        for question, fault in tracked(verified, len(reworded), "Verifying", "questions"):
-            if question.id in taken:
-                fault = "the set holds a question of this name already"
-            if fault is not None:
-                faults[question.id] = fault
-    return faults
-
-
-def _merged(
-    asked: Sequence[Question], reworded: Mapping[str, Question], add: bool
-) -> list[Question]:
-    """The reworded questions in the order of the set, each after the one it was where that stays.
-
-    A choice of some questions, spread over the set, then holds of both.
-    """
-    merged: list[Question] = []
-    for question in asked:
-        merged += [question] if add else []
-        merged += [reworded[question.id]] if question.id in reworded else []
-    return merged
