@@ -9,16 +9,13 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from pydantic import BaseModel
+    from phyblock.tracks.base import AnyTrack
 
 __all__ = [
     "PUBLISHED_TABLE",
-    "TrackWords",
     "add_baseline",
     "add_measure",
     "added_measures",
@@ -33,94 +30,35 @@ __all__ = [
     "unregister_track",
 ]
 
-_PACKAGES = (
+_MODULES = (
     "phyblock.tracks.full_planning",
     "phyblock.tracks.step_planning",
     "phyblock.tracks.questions",
     "phyblock.tracks.pose_planning",
 )
-"""Packages that hold a `TRACK`, in the order in which tracks are listed."""
+"""Modules that hold a `TRACK`, in the order in which tracks are listed."""
 
 PUBLISHED_TABLE = "published"
 """The comparison with the paper, which a suite has only if it asks for it."""
 
 
-class TrackWords(Protocol):
-    """The part of a track that lower layers know; `phyblock.tracks.TrackKind` is the whole."""
-
-    @property
-    def name(self) -> str:
-        """Its name in suites and records."""
-
-    @property
-    def title(self) -> str:
-        """Its name for people."""
-
-    @property
-    def plays(self) -> bool:
-        """True if a sample is an episode of several turns."""
-
-    @property
-    def about(self) -> str:
-        """A sentence on what it asks, for the documentation of suites."""
-
-    @property
-    def template(self) -> Path | None:
-        """The bundled prompt, None where it has none."""
-
-    @property
-    def json_template(self) -> Path | None:
-        """The bundled prompt that asks for JSON, None where it asks for text alone."""
-
-    @property
-    def section(self) -> tuple[str, type[BaseModel], str] | None:
-        """Key, model and description of the section of a suite that is its own."""
-
-    @property
-    def baselines(self) -> Mapping[str, Callable[..., str]]:
-        """Rules that answer without a model, by name of the baseline."""
-
-    @property
-    def subject(self) -> type[object]:
-        """The subject of its requests: the first argument of its rules."""
-
-    @property
-    def tables(self) -> tuple[str, ...]:
-        """Names of tables that a suite can ask for, in the order in which they are listed."""
-
-    @property
-    def prompt_field(self) -> tuple[str, ...]:
-        """Path of keys to the prompt in a suite."""
-
-    @property
-    def varies(self) -> tuple[str, ...]:
-        """Factors of a suite's section `vary` that change what it asks."""
-
-    @property
-    def record(self) -> type[Any] | None:
-        """The model of its records; None for one that adds nothing to them."""
-
-    def data_folder(self, suite: Any) -> tuple[str, tuple[str, ...], bool] | None:
-        """The folder of its own data as a suite says it: text, path of keys, may be bundled."""
-
-
-_registered: dict[str, TrackWords] = {}
+_registered: dict[str, type[AnyTrack]] = {}
 _measures: dict[str, tuple[Any, ...]] = {}
 _baselines: dict[str, dict[str, Callable[..., str]]] = {}
 
 
-def known_tracks() -> Mapping[str, TrackWords]:
+def known_tracks() -> Mapping[str, type[AnyTrack]]:
     """Every track by name, the built-in ones first."""
-    built_in = [importlib.import_module(package).TRACK for package in _PACKAGES]
+    built_in = [importlib.import_module(module).TRACK for module in _MODULES]
     return {kind.name: kind for kind in built_in} | _registered
 
 
-def known_track(name: str) -> TrackWords:
+def known_track(name: str) -> type[AnyTrack]:
     """The track of a name; KeyError for one that there is not."""
     return known_tracks()[name]
 
 
-def register_track(kind: TrackWords) -> None:
+def register_track(kind: type[AnyTrack]) -> None:
     """Add a track. Raises ValueError for a name, section or table that is taken."""
     taken = {name for other in known_tracks().values() for name in _names_of(other)}
     if clash := sorted(_names_of(kind) & (taken | {PUBLISHED_TABLE})):
@@ -128,7 +66,7 @@ def register_track(kind: TrackWords) -> None:
     _registered[kind.name] = kind
 
 
-def _names_of(kind: TrackWords) -> set[str]:
+def _names_of(kind: type[AnyTrack]) -> set[str]:
     """Names that a suite says for a track."""
     return {kind.name, *kind.tables} | ({kind.section[0]} if kind.section is not None else set())
 
@@ -162,7 +100,7 @@ def add_baseline(track: str, name: str, rule: Callable[..., str]) -> None:
     _baselines.setdefault(track, {})[name] = rule
 
 
-def track_baselines(kind: TrackWords) -> Mapping[str, Callable[..., str]]:
+def track_baselines(kind: type[AnyTrack]) -> Mapping[str, Callable[..., str]]:
     """Return the rules of a track by name, the built-in ones first."""
     return {**kind.baselines, **_baselines.get(kind.name, {})}
 

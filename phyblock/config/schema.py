@@ -18,7 +18,7 @@ def suite_schema() -> dict[str, Any]:
     schema = suite_model().model_json_schema()
     properties, kinds = schema["properties"], known_tracks()
     properties["tracks"]["items"]["enum"] = list(kinds)
-    properties["tracks"]["description"] = " ".join(f"{k.name}: {k.about}." for k in kinds.values())
+    properties["tracks"]["description"] = " ".join(f"{k.name}: {k.asks}." for k in kinds.values())
     properties["tables"]["items"]["enum"] = list(table_names())
     names = [{"enum": list(baseline_names())}, {"type": "string", "pattern": _NAME}]
     listed = next(branch for branch in properties["models"]["oneOf"] if "items" in branch)

@@ -31,7 +31,7 @@ from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan
 from phyblock.run.samples import Sample
 from phyblock.run.store import held_run
-from phyblock.tracks import AnyTrack, Item, shown_item
+from phyblock.tracks import AnyTrack, Item
 
 _ENOUGH_REPLIES = 20
 """Replies whose mean length stands for those to come."""
@@ -243,7 +243,7 @@ def _outlines(
     track: AnyTrack, item: Item, seeds: Sequence[int]
 ) -> Iterator[tuple[Sequence[int], Sequence[tuple[Request, bool]]]]:
     """The outlines of an item, with the seeds that show it so."""
-    shown = {seed: shown_item(track, item, seed) for seed in seeds}
+    shown = {seed: track.shown(item, seed) for seed in seeds}
     if alike := [seed for seed in seeds if shown[seed] is item]:
         yield alike, list(track.outlines(item))
     for seed in seeds:

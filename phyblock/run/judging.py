@@ -9,7 +9,7 @@ from phyblock.errors import SimulationError
 from phyblock.records.record import Record
 from phyblock.records.reply import StoredError
 from phyblock.run.records import judged
-from phyblock.tracks import Item, SingleTrack, judgement_of
+from phyblock.tracks import Item, SingleTrack
 
 __all__ = ["judged_apart"]
 
@@ -26,10 +26,10 @@ async def judged_apart(
     Where no engine could carry the reply out, it says so and can be judged again.
     """
     try:
-        return judged(fields, item, await judgement_of(track, item, text, earlier))
+        return judged(fields, item, await track.judge_apart(item, text, earlier))
     except SimulationError as error:
         if text is None:
             raise
         lacking = StoredError(kind="unjudged", message=str(error))
-        nothing = await judgement_of(track, item, None)
+        nothing = await track.judge_apart(item, None, None)
         return judged({**fields, "error": lacking}, item, nothing)

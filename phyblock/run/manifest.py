@@ -21,7 +21,7 @@ from phyblock.run.models import PlannedModel
 from phyblock.sim.engine import ENGINES, described_engine
 from phyblock.stable import hex_digest
 from phyblock.tracks import AnyTrack, kind_of
-from phyblock.tracks.base import READER, kinds_with_physics
+from phyblock.tracks.base import kinds_with_physics
 
 _ENGINES = (engine.distribution for engine in ENGINES.values())
 _LIBRARIES = ("litellm", *_ENGINES, "numpy", "pillow", "jinja2")
@@ -98,12 +98,7 @@ def _of_tracks(suite: Suite) -> dict[str, Any]:
     """Facts of single tracks beyond what all of them have."""
     kinds = [kind_of(name) for name in suite.tracks]
     told = {"engine": described_engine()} if kinds_with_physics(suite.model_dump()) else {}
-    return told | {
-        key: value
-        for kind in kinds
-        if kind.manifest is not None
-        for key, value in kind.manifest(suite).items()
-    }
+    return told | {key: value for kind in kinds for key, value in kind.manifest(suite).items()}
 
 
 Inputs = Mapping[str, Any]
@@ -148,8 +143,8 @@ def identity_of(inputs: Inputs) -> str:
 
 
 def _track(track: AnyTrack) -> dict[str, Any]:
-    """Return what decides a track's requests; replies are judged again when its reader changes."""
-    return {name: value for name, value in track.identity().items() if name != READER}
+    """Return what decides a track's requests."""
+    return track.identity()
 
 
 def _dataset(dataset: Dataset, data_version: int) -> dict[str, object]:

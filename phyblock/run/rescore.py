@@ -28,8 +28,8 @@ from phyblock.run.plan import CHANGED, asked_about, recorded_dataset
 from phyblock.run.records import about_item, judged
 from phyblock.run.store import check_place, locked, run_folder, write_run
 from phyblock.text import counted
-from phyblock.tracks import AnyTrack, EpisodeTrack, Item, kind_of, open_tracks, shown_item
-from phyblock.tracks.base import CARRYING, ENGINE, READER, Opening
+from phyblock.tracks import AnyTrack, EpisodeTrack, Item, kind_of, open_tracks
+from phyblock.tracks.base import CARRYING, ENGINE, Opening
 from phyblock.types import Matcher, PlanParser
 
 __all__ = ["judged_anew", "recorded_suite", "reopen_tracks", "rescore"]
@@ -156,7 +156,7 @@ def reopen_tracks(
     made on.
     """
     path = folder / MANIFEST
-    roots = {name: kind_of(name).own_root(manifest) for name in suite.tracks}
+    roots = {name: kind_of(name).data_root(manifest) for name in suite.tracks}
     folders = {name: Path(root) for name, root in roots.items() if root is not None}
     suite = suite.with_files(SuiteFiles(path, dataset.root, YamlSource(str(path)), folders))
     opening = Opening(suite, dataset, manifest.limit, with_prompts=False)
@@ -165,7 +165,7 @@ def reopen_tracks(
         stored = manifest.tracks.get(name, {})
         for key, value in track.identity().items():
             # A track that asks nobody has no prompts and pictures; engines and readers ask nothing.
-            if key not in (CARRYING, ENGINE, READER) and value not in (None, stored.get(key)):
+            if key not in (CARRYING, ENGINE) and value not in (None, stored.get(key)):
                 root, field = folders.get(name, dataset.root), f"tracks.{name}.{key}"
                 was = str(stored.get(key))
                 raise DataError(Problem(str(root), CHANGED, field, str(value), was))
@@ -206,7 +206,7 @@ def _judged(
                 if track is None or item is None:
                     message = "names an item that the run does not have"
                     raise StoreError(Problem(where, message, "key", record.item, hint=_RESTORE))
-                shown = shown_item(track, item, record.seed)
+                shown = track.shown(item, record.seed)
                 work = _judged_again(track, shown, record, where, strict=strict)
                 yield record, thread.submit(loop.run_until_complete, work).result()
         finally:

@@ -26,7 +26,6 @@ from phyblock.tracks import (
     EpisodeTrack,
     Item,
     SingleTrack,
-    shown_item,
 )
 from phyblock.types import AskedAs
 
@@ -63,7 +62,7 @@ class Sample:
 
     def shown(self) -> Sample:
         """The sample with its item as its seed shows it."""
-        return replace(self, item=shown_item(self.track, self.item, self.seed))
+        return replace(self, item=self.track.shown(self.item, self.seed))
 
 
 class SampleRunner:
@@ -215,7 +214,7 @@ class SampleRunner:
     def _prompt(self, track: AnyTrack, request: Request) -> SentPrompt | None:
         if not request.messages:
             return None
-        return about_prompt(request, track.template, self._prompts.keep(request.messages))
+        return about_prompt(request, track.prompt_name, self._prompts.keep(request.messages))
 
     def _begin(self, sample: Sample, answer: Reply | ModelError | None) -> dict[str, Any]:
         name, item = sample.track.name, sample.item

@@ -1,4 +1,4 @@
-"""One folder a track: what it asks, how replies are read and scored, its baselines and measures.
+"""One module a track: what it asks, how replies are read and scored, its baselines and records.
 
 `phyblock.registry` lists the tracks. Outside this package only verbs that belong to one name it.
 """
@@ -9,39 +9,28 @@ from phyblock.tracks.base import (
     EpisodeTrack,
     Judgement,
     Opening,
+    SceneTrack,
     SingleTrack,
     Track,
-    TrackKind,
-    judgement_of,
     kind_of,
     kinds,
     open_tracks,
-    shown_item,
 )
 from phyblock.tracks.items import Item
-from phyblock.tracks.pictures import Drawing, PicturePolicy, Pictures, Studio
-from phyblock.tracks.prompts import OfficialPrompt, Prompt, TemplatePrompt
+from phyblock.tracks.prompts import TemplatePrompt
 
 __all__ = [
     "AnyTrack",
-    "Drawing",
     "Episode",
     "EpisodeTrack",
     "Item",
     "Judgement",
-    "OfficialPrompt",
     "Opening",
-    "PicturePolicy",
-    "Pictures",
-    "Prompt",
+    "SceneTrack",
     "SingleTrack",
-    "Studio",
     "TemplatePrompt",
     "Track",
-    "TrackKind",
-    "judgement_of",
     "kind_of",
     "kinds",
     "open_tracks",
-    "shown_item",
 ]

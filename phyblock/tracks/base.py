@@ -1,66 +1,57 @@
-"""The protocol of tracks: items, requests and judgement.
+"""Tracks: what each declares, and how it asks and judges in a suite.
 
-Most tracks ask once a sample; step planning plays an episode of several turns.
+A track is one class. Its class attributes declare it; an instance is the track as a suite opens
+it. Most tracks ask once a sample (`SingleTrack`), step planning plays episodes (`EpisodeTrack`);
+what those about scenes share is in `SceneTrack`.
 """
 
 from __future__ import annotations
 
+import asyncio
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
+from typing import Any, ClassVar, Generic, Protocol
 
 from pydantic import BaseModel
 
-from phyblock.config.suite import ImagesSpec, Suite
+from phyblock.config.suite import Suite
 from phyblock.config.validation import PictureControls
 from phyblock.data import AssemblyTask, Dataset
 from phyblock.errors import Problem, SpecError
-from phyblock.models.request import Image, Request
+from phyblock.models.request import Image, Message, Request
 from phyblock.parsing.structured import AnswerForm
 from phyblock.records.manifest import Manifest
 from phyblock.records.record import Record
 from phyblock.records.reply import Reply
 from phyblock.registry import added_measures, known_tracks
-from phyblock.resources import cache_dir
 from phyblock.sim.engine import REFERENCE_ENGINE, physics_engine
-from phyblock.sim.pictures import PictureStyle
 from phyblock.stable import hex_digest
 from phyblock.tracks.baselines import Picking
 from phyblock.tracks.items import (
     Examples,
     ItemT,
-    Shots,
-    Showing,
-    TaskShowing,
-    WorkedExample,
-    showing_fields,
+    Presentation,
+    other_goals,
+    presentation_fields,
+    select_tasks,
 )
 from phyblock.tracks.measures import SampleCounts, TrackReport
-from phyblock.tracks.pictures import PicturePolicy, Pictures, Workshop, render_workers
-from phyblock.tracks.prompts import Prompt, TemplatePrompt, form_facts, response_format
-from phyblock.types import BACKGROUNDS
+from phyblock.tracks.pictures import Pictures, ScenePictures, Workshop
+from phyblock.tracks.prompts import Prompt, TemplatePrompt, form_facts
 
 ENGINE = "physics"
-"""Key in a track's identity of the physics engine that decides its results, where there is one and
-it is not the engine of reference. What it decided stands in the records.
+"""Key in a track's identity of the physics engine that decides its results, where that is not the
+engine of reference. Its results stand in the records.
 """
-READER = "reader"
-"""The same of the version of a reader of the track's own; what is scored again is read anew."""
 CARRYING = "carrying"
-"""The same of the version of how plans are carried out and what stands is measured, as the records
-keep it.
-"""
-FIRST_CARRYING = 1
-"""How plans were carried out before runs said so."""
+"""The same of the version of how plans are carried out and what stands is measured."""
 
 
 def engine_identity() -> dict[str, Any]:
-    """Return the facts of the physics engine in a track's identity: runs made before there was a
-    choice say nothing, and are to go on with the engine of reference.
-    """
+    """Return the part of a track's identity that names the physics engine, if not the reference."""
     engine = physics_engine()
     if engine.name == REFERENCE_ENGINE:
         return {}
@@ -68,137 +59,29 @@ def engine_identity() -> dict[str, Any]:
 
 
 class Judgement(Protocol):
-    """A reply as it was parsed and scored."""
+    """A reply as it was read, with its scores."""
 
     @property
     def is_read(self) -> bool:
         """True if anything could be read."""
 
     def fields(self) -> dict[str, Any]:
-        """`parse`, `scores` and what else the record says of it."""
+        """Return `parse`, `scores` and what else the record says of it."""
 
 
-class Track(Protocol[ItemT]):
-    """The common part of all tracks."""
-
-    @property
-    def name(self) -> str:
-        """Its name in suites and records."""
-
-    @property
-    def items(self) -> Sequence[ItemT]:
-        """Its items; every seed repeats all of them."""
-
-    @property
-    def template(self) -> str:
-        """Name of the prompt; "" where every model is a recording."""
-
-    def about(self, item: ItemT) -> dict[str, Any]:
-        """Return the fields of records about an item besides its scene."""
-
-    def identity(self) -> dict[str, Any]:
-        """Digests of what decides its results: data, prompt, pictures; JSON-able."""
-
-    def outlines(self, item: ItemT) -> Iterable[tuple[Request, bool]]:
-        """The requests of an item as far as they can be told before any is answered.
-
-        With seed 0 and no parameters, made without rendering; with each, whether its pictures are
-        the real ones.
-        """
-
-    def close(self) -> None:
-        """Release worker processes."""
-
-
-@runtime_checkable
-class SingleTrack(Track[ItemT], Protocol[ItemT]):
-    """A track that asks once a sample."""
-
-    async def request(
-        self, item: ItemT, seed: int, params: Mapping[str, object], *, with_messages: bool
-    ) -> Request:
-        """The request of one sample; without messages for models that need none."""
-
-    def judge(self, item: ItemT, text: str | None) -> Judgement:
-        """Read and score a reply; None, where there is no reply, is scored as nothing said."""
-
-
-@runtime_checkable
-class ShowsBySeed(Protocol[ItemT]):
-    """A track that shows an item otherwise with every seed, as with its candidates shuffled."""
-
-    def shown(self, item: ItemT, seed: int) -> ItemT:
-        """The item as a seed shows it, by which it is asked, judged and counted; its key is the
-        same.
-        """
-
-
-def shown_item(track: AnyTrack, item: Any, seed: int) -> Any:
-    """An item of a track as a seed shows it."""
-    return track.shown(item, seed) if isinstance(track, ShowsBySeed) else item
-
-
-@runtime_checkable
-class JudgesApart(Protocol):
-    """A track that takes so long to judge a reply that it does so beside the calls of others."""
-
-    async def judge_apart(self, item: Any, text: str | None, earlier: Record | None) -> Judgement:
-        """Return what `judge` does; of the `earlier` record of the same sample it may take what
-        replies alone do not decide.
-        """
-
-
-async def judgement_of(
-    track: AnySingleTrack, item: Any, text: str | None, earlier: Record | None = None
-) -> Judgement:
-    """A reply read and scored, for the first time or again after an `earlier` record."""
-    if isinstance(track, JudgesApart):
-        return await track.judge_apart(item, text, earlier)
-    return track.judge(item, text)
-
-
-class Episode(Protocol):
+class Episode(Judgement, Protocol):
     """One sample of several turns, as a state machine that replies alone drive.
 
     The same replies lead to the same requests, so that a killed run goes on in the middle of an
-    episode by taking the replies it has.
+    episode by taking the replies it has. `fields` holds `turns` too, a mapping for each reply
+    taken, as things stand.
     """
 
     async def request(self) -> Request | None:
-        """The next request, or None when the episode has ended."""
+        """Return the next request, or None when the episode has ended."""
 
     def take(self, request: Request, reply: Reply) -> None:
         """Go on with the reply to the last request."""
-
-    @property
-    def is_read(self) -> bool:
-        """True if anything could be read in any reply."""
-
-    def fields(self) -> dict[str, Any]:
-        """`parse`, `scores`, `turns` (a mapping for each reply taken), `ending` and what else the
-        record says, as things stand.
-        """
-
-
-@runtime_checkable
-class EpisodeTrack(Track[ItemT], Protocol[ItemT]):
-    """A track whose samples are episodes."""
-
-    def start(
-        self, item: ItemT, seed: int, params: Mapping[str, object], *, with_messages: bool
-    ) -> Episode:
-        """An episode that has not begun."""
-
-    def again(self, item: ItemT, record: Record) -> Episode:
-        """The episode of a record before its first reply, to be judged anew.
-
-        What replies alone do not decide, as what fell, is taken from the record.
-        """
-
-
-AnySingleTrack = SingleTrack[Any]
-AnyTrack = AnySingleTrack | EpisodeTrack[Any]
-"""A track of either kind."""
 
 
 @dataclass(frozen=True)
@@ -213,150 +96,377 @@ class Opening:
     dataset: Dataset
     limit: int | None
     with_prompts: bool
-    shop: Workshop = field(default_factory=lambda: Workshop(render_workers()))
+    shop: Workshop = field(default_factory=Workshop)
 
 
-@dataclass(frozen=True)
-class TrackKind:
-    """A track: what it is called, what it adds to a suite, how it is opened.
+class Track(ABC, Generic[ItemT]):
+    """A track: its declaration, and its items in one suite, all of which every seed repeats."""
 
-    `title` and `item` (the noun for what it asks about) are for people, `about` says in a suite's
-    documentation what it asks. `open` raises SpecError, DataError or PromptError with what is
-    wrong. `report` imports what tables and figures are made by, which takes long. `subject` is the
-    type that the rules of its `baselines` take, with a random generator, to answer in the
-    benchmark's own reply form. `section` is the key, model and description of the part of a suite
-    that is its own. `template` is the bundled prompt, None where it has none, and `prompt_field`
-    where a suite names another; `json_template` is the one that asks for JSON, None where the track
-    asks for text alone. `own_data` gives the folder of data of its own as a suite says it,
-    `manifest` what the manifest says beyond what all tracks have. `own_root` tells where a run
-    found these data. With `rescored`, what its replies are worth depends on the suite's parser and
-    matchers, and `phyblock score` judges them again even where no measure counts samples. With
-    `plays`, samples are episodes of several turns. `record` is the model of its records, where it
-    adds something to them. `counted` is what its measures count of every sample as it is judged.
-    `no_examples` says why it shows no worked examples, "" where it does.
-    `by_hand` says of a subject how a person answers, None where nothing can be picked.
-    `varies` names the factors of a suite's `vary` that change what it asks. `physics` says of a
-    suite, as a manifest holds it, whether blocks are let go in a physics engine.
-    """
+    name: ClassVar[str]
+    """Its name in suites and records."""
+    title: ClassVar[str]
+    """Its name for people."""
+    item: ClassVar[str] = "scene"
+    """The noun for what it asks about."""
+    asks: ClassVar[str]
+    """A clause on what it asks, for the documentation of suites."""
+    section: ClassVar[tuple[str, type[BaseModel], str] | None] = None
+    """Key, model and description of the section of a suite that is its own."""
+    template: ClassVar[Path | None] = None
+    """The bundled prompt, None where it has none."""
+    json_template: ClassVar[Path | None] = None
+    """The prompt that asks for JSON, None where it asks for text alone."""
+    prompt_field: ClassVar[tuple[str, ...]] = ("prompt",)
+    """Path of keys to the prompt in a suite."""
+    subject: ClassVar[type[object]]
+    """The subject of its requests: the first argument of its rules."""
+    baselines: ClassVar[Mapping[str, Callable[..., str]]] = {}
+    """Rules that answer, given a subject and a random generator, by name of the baseline."""
+    by_hand: ClassVar[Callable[..., Picking] | None] = None
+    """How a person answers about a subject; None where nothing can be picked."""
+    record: ClassVar[type[Record] | None] = None
+    """The model of its records; None for one that adds nothing to them."""
+    counted: ClassVar[tuple[SampleCounts, ...]] = ()
+    """What its measures count of every sample as it is judged."""
+    tables: ClassVar[tuple[str, ...]] = ()
+    """Names of tables that a suite can ask for, in the order in which they are listed."""
+    varies: ClassVar[tuple[str, ...]] = ("repeats",)
+    """Factors of a suite's section `vary` that change what it asks."""
+    no_examples: ClassVar[str] = "it declares none"
+    """The reason why it shows no worked examples; "" where it does."""
+    plays: ClassVar[bool] = False
+    """True if a sample is an episode of several turns."""
 
-    name: str
-    title: str
-    item: str
-    about: str
-    open: Callable[[Opening], AnyTrack]
-    report: Callable[[], TrackReport]
-    subject: type[object]
-    template: Path | None = None
-    json_template: Path | None = None
-    record: type[Record] | None = None
-    prompt_field: tuple[str, ...] = ("prompt",)
-    section: tuple[str, type[BaseModel], str] | None = None
-    baselines: Mapping[str, Callable[..., str]] = field(default_factory=dict)
-    tables: tuple[str, ...] = ()
-    own_data: Callable[[Suite], tuple[str, tuple[str, ...], bool] | None] | None = None
-    manifest: Callable[[Suite], Mapping[str, Any]] | None = None
-    plays: bool = False
-    own_root: Callable[[Manifest], str | None] = lambda _: None
-    rescored: bool = False
-    counted: tuple[SampleCounts, ...] = ()
-    no_examples: str = "it declares none"
-    by_hand: Callable[[Any], Picking] | None = None
-    varies: tuple[str, ...] = ("repeats",)
-    physics: Callable[[Mapping[str, Any]], bool] = lambda _: False
+    items: Sequence[ItemT]
 
-    def data_folder(self, suite: Any) -> tuple[str, tuple[str, ...], bool] | None:
-        """The folder of its own data: text, path of keys, whether it may be a bundled set."""
-        return None if self.own_data is None else self.own_data(suite)
+    def __init__(self, opening: Opening) -> None:
+        """Open the track; subclasses select its items.
+
+        Raises SpecError, DataError or PromptError with what is wrong.
+        """
+        self.suite = opening.suite
+        self.shop = opening.shop if opening.with_prompts else None
+        self.prompt: Prompt | None = None
+        self.pictures: Pictures | None = None
+        self.examples: Examples[ItemT] = Examples((), 0)
+        if self.shop is not None:
+            self.prompt = self.open_prompt()
+            self.pictures = self.open_pictures(self.shop)
+
+    @classmethod
+    def report(cls) -> TrackReport:
+        """Import and return what tables and figures are made by, which takes long."""
+        raise NotImplementedError(f"{cls.name} has no report")
+
+    @classmethod
+    def data_folder(cls, suite: Any) -> tuple[str, tuple[str, ...], bool] | None:
+        """Return the folder of its own data: text, path of keys, True if it may be bundled."""
+        del suite
+        return None
+
+    @classmethod
+    def data_root(cls, manifest: Manifest) -> str | None:
+        """Return where a run found the data of its own."""
+        del manifest
+        return None
+
+    @classmethod
+    def manifest(cls, suite: Suite) -> Mapping[str, Any]:
+        """Return what the manifest of a run holds beyond what all tracks have."""
+        del suite
+        return {}
+
+    @classmethod
+    def physics(cls, suite: Mapping[str, Any]) -> bool:
+        """True if a suite, as a manifest holds it, lets blocks go in a physics engine."""
+        del suite
+        return False
+
+    def open_prompt(self) -> Prompt:
+        """Return the prompt of the suite; PromptError for a broken one."""
+        return template_prompt(self.suite, self.name)
+
+    @abstractmethod
+    def open_pictures(self, shop: Workshop) -> Pictures:
+        """Return the pictures of its items, drawn in a shop."""
+
+    @property
+    def prompt_name(self) -> str:
+        """Name of the prompt; "" where every model is a recording."""
+        return "" if self.prompt is None else self.prompt.name
+
+    def shown(self, item: ItemT, seed: int) -> ItemT:
+        """Return the item as a seed shows it, by which it is asked, judged and counted."""
+        del seed
+        return item
+
+    def each_shown(self) -> Sequence[ItemT]:
+        """Return all items, in every form in which they are shown."""
+        return self.items
+
+    def about(self, item: ItemT) -> dict[str, Any]:
+        """Return the fields of records about an item besides its scene."""
+        del item
+        return {}
+
+    def drawn(self, item: ItemT, seed: int | None = None) -> object | None:
+        """Return what its pictures are of, as a seed sends them; None where none is sent."""
+        del seed
+        return item
+
+    def form(self, item: ItemT) -> AnswerForm[Any] | None:
+        """Return the form in which an answer is asked for; None where that is text."""
+        del item
+        return None
+
+    def identity(self) -> dict[str, Any]:
+        """Return what decides its results, JSON-able: name and version of the prompt, a digest of
+        all that decides the pictures, and the worked examples where there are any.
+        """
+        if self.prompt is None or self.pictures is None:
+            return {"prompt": None, "pictures": None}
+        examples = self.examples.used(self.items)
+        drawn = map(self.drawn, (*self.each_shown(), *examples))
+        keys = [self.pictures.keys(one) for one in drawn if one is not None]
+        return {
+            "prompt": {"name": self.prompt.name, "version": self.prompt.version},
+            "pictures": hex_digest(json.dumps(keys)),
+            **({"examples": [example.key for example in examples]} if examples else {}),
+        }
+
+    @abstractmethod
+    def outlines(self, item: ItemT) -> Iterable[tuple[Request, bool]]:
+        """Yield the requests of an item as far as they are known before any is answered.
+
+        With seed 0 and no parameters, made without rendering; with each, True if its pictures are
+        the real ones.
+        """
+
+    async def work_out(self, work: Callable[[], Any]) -> Any:
+        """Return what `work`, a `partial` of a function of a module, gives in another process, or
+        in a thread where no pictures are drawn.
+        """
+        if self.shop is None:
+            return await asyncio.to_thread(work)
+        return await self.shop.work_out(work)
+
+    def close(self) -> None:
+        """Stop the worker processes."""
+        if self.shop is not None:
+            self.shop.close()
 
 
-def kinds() -> Mapping[str, TrackKind]:
-    """Every track by name, in the order in which they are listed."""
-    return {name: kind for name, kind in known_tracks().items() if isinstance(kind, TrackKind)}
+class SingleTrack(Track[ItemT]):
+    """A track that asks once a sample."""
+
+    @abstractmethod
+    def subject_of(self, item: ItemT) -> object:
+        """Return what baselines answer about."""
+
+    @abstractmethod
+    def facts(self, item: ItemT, pictures: Sequence[Image]) -> dict[str, object]:
+        """Return what templates may use; nothing in it gives an answer away."""
+
+    @abstractmethod
+    def judge(self, item: ItemT, text: str | None) -> Judgement:
+        """Read and score a reply; None, where there is no reply, is scored as nothing said."""
+
+    async def judge_apart(self, item: ItemT, text: str | None, earlier: Record | None) -> Judgement:
+        """Return what `judge` does; where that takes long, beside the calls of others.
+
+        Of the `earlier` record of the same sample it may take what replies alone do not decide.
+        """
+        del earlier
+        return self.judge(item, text)
+
+    def right_answer(self, item: ItemT) -> str:
+        """Return the answer of a worked example, in the form that is asked for."""
+        raise NotImplementedError(f"there is no worked example of {item.key}")
+
+    async def request(
+        self, item: ItemT, seed: int, params: Mapping[str, object], *, with_messages: bool
+    ) -> Request:
+        """Return the request of one sample; without messages for models that need none."""
+        if not with_messages or self.pictures is None:
+            return Request(item.key, seed, (), params, "", self.subject_of(item))
+        drawn = [self.drawn(one) for one in self.examples.of(item)] + [self.drawn(item, seed)]
+        images = [() if one is None else await self.pictures.of(one) for one in drawn]
+        return self._request(item, seed, params, images)
+
+    def outlines(self, item: ItemT) -> Iterator[tuple[Request, bool]]:
+        """Yield the one request, made without rendering, and True if its pictures are real."""
+        if self.pictures is None:
+            yield Request(item.key, 0, (), {}, "", self.subject_of(item)), True
+            return
+        drawn = [self.drawn(one) for one in self.examples.of(item)] + [self.drawn(item, 0)]
+        found = [((), True) if one is None else self.pictures.outline(one) for one in drawn]
+        request = self._request(item, 0, {}, [images for images, _ in found])
+        yield request, all(are_real for _, are_real in found)
+
+    def _request(
+        self,
+        item: ItemT,
+        seed: int,
+        params: Mapping[str, object],
+        images: Sequence[tuple[Image, ...]],
+    ) -> Request:
+        """Return the request with the pictures of each worked example, then of the item."""
+        assert self.prompt is not None
+        examples, turns = self.examples.of(item), list[Message]()
+        for one, pictures in zip(examples, images, strict=False):
+            *_, asked = self.prompt.messages(pictures, self.facts(one, pictures))
+            parts = tuple(
+                replace(part, label=f"example {one.key}: {part.label}")
+                if isinstance(part, Image)
+                else part
+                for part in asked.parts
+            )
+            turns += [Message("user", parts), Message("assistant", (self.right_answer(one),))]
+        *first, question = self.prompt.messages(images[-1], self.facts(item, images[-1]))
+        form = self.form(item)
+        return Request(
+            item.key,
+            seed,
+            (*first, *turns, question),
+            params,
+            self.prompt.version,
+            self.subject_of(item),
+            None if form is None else form.response_format,
+            examples=tuple(one.key for one in examples),
+        )
 
 
-def kinds_with_physics(suite: Mapping[str, Any]) -> tuple[TrackKind, ...]:
-    """The tracks of a suite, as a manifest holds it, that let blocks go in a physics engine."""
+class EpisodeTrack(Track[ItemT]):
+    """A track whose samples are episodes."""
+
+    plays = True
+
+    @abstractmethod
+    def start(
+        self, item: ItemT, seed: int, params: Mapping[str, object], *, with_messages: bool
+    ) -> Episode:
+        """Return an episode that has not begun."""
+
+    @abstractmethod
+    def again(self, item: ItemT, record: Record) -> Episode:
+        """Return the episode of a record before its first reply, to be judged again.
+
+        What replies alone do not decide, as what fell, is taken from the record.
+        """
+
+
+class SceneTrack(Track[AssemblyTask]):
+    """A track about scenes, as a seed shows them; its section may hold `PictureControls`."""
+
+    drawn_here: ClassVar[str] = ""
+    """The reason why pictures of the data set will not do; "" where they will."""
+
+    def __init__(self, opening: Opening) -> None:
+        """Select scenes evenly over levels. Raises SpecError where another goal is to be shown and
+        a scene has none.
+        """
+        suite, pool = opening.suite, opening.dataset.tasks
+        self.pool = pool
+        self.items = select_tasks(pool, suite.levels, opening.limit)
+        controls = None if self.section is None else suite.section(self.section[1])
+        is_blind, elsewhere = False, None
+        if self.section is not None and isinstance(controls, PictureControls):
+            is_blind = controls.blind
+            if controls.wrong_image:
+                elsewhere = other_goals(pool)
+                elsewhere.check(self.items, "scene", f"{self.section[0]}.wrong_image")
+        self.presentation = Presentation(suite.candidates.order, is_blind, elsewhere, suite.seeds)
+        super().__init__(opening)
+
+    def open_pictures(self, shop: Workshop) -> Pictures:
+        """Return pictures of goals and candidates as a suite wants them."""
+        images = self.suite.images
+        if self.drawn_here and images.source == "dataset":
+            where = self.suite.where("images", "source")
+            hint = "render the pictures: --set images.source=render"
+            raise SpecError(Problem(where, self.drawn_here, "images.source", "dataset", hint=hint))
+        return ScenePictures(shop, images)
+
+    def shown(self, item: AssemblyTask, seed: int) -> AssemblyTask:
+        """Return the scene as a seed shows it."""
+        return self.presentation.of(item, seed)
+
+    def each_shown(self) -> Sequence[AssemblyTask]:
+        """Return all scenes, in every form in which they are shown."""
+        return [self.shown(task, s) for s in self.presentation.drawn_seeds for task in self.items]
+
+    def about(self, item: AssemblyTask) -> dict[str, Any]:
+        """Return how the scene is shown, where not as the file has it."""
+        return presentation_fields(item)
+
+    def facts(self, item: AssemblyTask, pictures: Sequence[Image]) -> dict[str, object]:
+        """Return what templates may use; nothing in it gives an answer away."""
+        scale = self.pictures.candidate_scale if isinstance(self.pictures, ScenePictures) else None
+        return {
+            "pictures": [picture.label for picture in pictures],
+            "n_candidates": len(item.candidates),
+            "candidate_scale": scale,
+            "is_blind": self.presentation.blind,
+            **form_facts(self.form(item)),
+        }
+
+
+AnyTrack = SingleTrack[Any] | EpisodeTrack[Any]
+"""A track of either kind."""
+
+
+def kinds() -> Mapping[str, type[AnyTrack]]:
+    """Return every track by name, in the order in which they are listed."""
+    return known_tracks()
+
+
+def kind_of(name: str) -> type[AnyTrack]:
+    """Return the track of a name; KeyError for one that there is not."""
+    return kinds()[name]
+
+
+def kinds_with_physics(suite: Mapping[str, Any]) -> tuple[type[AnyTrack], ...]:
+    """Return the tracks of a suite, as a manifest holds it, that use a physics engine."""
     asked = [kind for name, kind in kinds().items() if name in (suite.get("tracks") or ())]
     return tuple(kind for kind in asked if kind.physics(suite))
 
 
-def kind_of(name: str) -> TrackKind:
-    """The track of a name; KeyError for one that there is not."""
-    return kinds()[name]
+def count_sample(track: str, item: Any, judged: Any) -> Mapping[str, tuple[float, ...]]:
+    """Return the counts of one sample that the measures of a track need, by name of the counts.
+
+    `judged` is the judgement of the reply, or the episode once it has ended. Where a measure does
+    not count a sample, its counts are empty: they are absent where a record was written before the
+    measure was there, and `phyblock score` fills them in.
+    """
+    added: list[SampleCounts] = [measure.counted for measure in added_measures(track)]
+    return {
+        counted.name: tuple(map(float, counted.sample(item, judged) or ()))
+        for counted in (*kind_of(track).counted, *added)
+        if counted.sample is not None
+    }
 
 
 def open_tracks(opening: Opening, names: Sequence[str]) -> tuple[AnyTrack, ...]:
-    """The tracks of these names, in their order.
+    """Return the tracks of these names, in their order.
 
     Raises SpecError, DataError or PromptError with what is wrong.
     """
     suite = opening.suite
-    if suite.answer_format == "json_schema":
-        lacking = [name for name in names if kind_of(name).json_template is None]
-        if lacking:
+    for name in names:
+        kind = kind_of(name)
+        if suite.answer_format == "json_schema" and kind.json_template is None:
             where, message = suite.where("answer_format"), "cannot be asked for as JSON"
-            found, hint = f"track {', '.join(lacking)}", "use answer_format: text"
-            raise SpecError(Problem(where, message, "answer_format", found, hint=hint))
-    if suite.examples:
-        for name in names:
-            if reason := kind_of(name).no_examples:
-                where, message = suite.where("examples"), f"cannot be shown in {name}: {reason}"
-                raise SpecError(Problem(where, message, "examples", hint="leave them out"))
-    return tuple(kind_of(name).open(opening) for name in names)
-
-
-def picture_folder() -> Path:
-    """Return the folder of drawn pictures."""
-    return cache_dir() / "pictures"
-
-
-def picture_style(images: ImagesSpec) -> PictureStyle:
-    """Return the style in which a suite wants pictures drawn."""
-    ground = images.background or BACKGROUNDS[0]
-    seen = PictureStyle.from_view(images.view, images.size_px, ground)
-    return replace(seen, candidate_scale=images.candidate_scale)
-
-
-def picture_policy(images: ImagesSpec) -> PicturePolicy:
-    """Return which pictures of goals and candidates a suite wants, and how they are drawn."""
-    return PicturePolicy(images.source, images.layout, images.order, picture_style(images))
-
-
-def assembly_pictures(suite: Suite, shop: Workshop | None = None) -> Pictures:
-    """Pictures of goals and candidates as a suite wants them, drawn in a shop of their own or this
-    one.
-    """
-    return Pictures(picture_folder(), picture_policy(suite.images), shop or render_workers())
-
-
-def check_drawn(suite: Suite, reason: str) -> None:
-    """Raise SpecError, with the reason, for a suite that takes pictures from the data set."""
-    if suite.images.source == "dataset":
-        where, hint = (
-            suite.where("images", "source"),
-            "render the pictures: --set images.source=render",
-        )
-        raise SpecError(Problem(where, reason, "images.source", "dataset", hint=hint))
-
-
-def task_showing(
-    suite: Suite,
-    section: type[PictureControls],
-    name: str,
-    tasks: Sequence[AssemblyTask],
-    pool: Sequence[AssemblyTask],
-) -> TaskShowing:
-    """Return how a suite shows the scenes of a track, whose section is of this type and name.
-
-    Raises SpecError where another goal is wanted and `pool` has none for one of `tasks`.
-    """
-    controls = suite.section(section)
-    how = Showing(suite.candidates.order, controls.blind, controls.wrong_image, suite.seeds)
-    return TaskShowing(how, tasks, pool, f"{name}.wrong_image")
+            hint = "use answer_format: text"
+            raise SpecError(Problem(where, message, "answer_format", f"track {name}", hint=hint))
+        if suite.examples and kind.no_examples:
+            where, message = suite.where("examples"), f"cannot be shown in {name}"
+            message = f"{message}: {kind.no_examples}"
+            raise SpecError(Problem(where, message, "examples", hint="leave them out"))
+    return tuple(kind_of(name)(opening) for name in names)
 
 
 def template_prompt(suite: Suite, name: str) -> TemplatePrompt:
-    """The prompt of a track: the suite's own template, else the bundled one for its format.
+    """Return the prompt of a track: the suite's own template, else the bundled one for its format.
 
     Raises PromptError for a broken one.
     """
@@ -368,223 +478,3 @@ def template_prompt(suite: Suite, name: str) -> TemplatePrompt:
         return TemplatePrompt(path, path.stem, default)
     assert default is not None, f"{name} has no prompt of its own"
     return default
-
-
-def count_sample(track: str, item: Any, judged: Any) -> Mapping[str, tuple[float, ...]]:
-    """Return the counts of one sample that the measures of a track need, by name of the counts.
-
-    `judged` is the judgement of the reply, or the episode once it has ended. Where a measure does
-    not count a sample, its counts are empty: they are absent where a record was written before the
-    measure was there, and `phyblock score` fills them in.
-    """
-    counts = {name: count(item, judged) for name, count in _sorts(track).items()}
-    return {
-        name: tuple(float(number) for number in numbers or ()) for name, numbers in counts.items()
-    }
-
-
-def _sorts(track: str) -> dict[str, Callable[[Any, Any], Sequence[float] | None]]:
-    """Return the functions that count a sample of a track, by name of the counts."""
-    added: list[SampleCounts] = [measure.counted for measure in added_measures(track)]
-    return {
-        counted.name: counted.sample
-        for counted in (*kind_of(track).counted, *added)
-        if counted.sample is not None
-    }
-
-
-class _SentPictures(Protocol):
-    async def of(self, shown: Any) -> tuple[Image, ...]: ...
-
-    def outline(self, shown: Any) -> tuple[tuple[Image, ...], bool]: ...
-
-    def keys(self, shown: Any) -> tuple[str, ...]: ...
-
-    def close(self) -> None: ...
-
-
-PicturesT = TypeVar("PicturesT", bound=_SentPictures)
-
-
-class AskedOnce(ABC, Generic[ItemT, PicturesT]):
-    """Asks once about an item, with pictures; how replies are judged is the track's."""
-
-    items: Sequence[ItemT]
-
-    def __init__(
-        self,
-        prompt: Prompt | None,
-        pictures: PicturesT | None,
-        examples: Examples[ItemT] | None = None,
-    ) -> None:
-        """`prompt` and `pictures` are None where every model is a recording; `examples` are in
-        the form in which they are shown.
-        """
-        self.template = "" if prompt is None else prompt.name
-        self._prompt = prompt
-        self._pictures = pictures
-        self._examples: Examples[ItemT] = examples or Examples((), 0)
-        self._worked: dict[str, WorkedExample] = {}
-
-    @abstractmethod
-    def facts(self, item: ItemT, pictures: tuple[Image, ...]) -> dict[str, object]:
-        """Return the variables of templates; nothing in it gives an answer away."""
-
-    @abstractmethod
-    def _subject(self, item: ItemT) -> object:
-        """Return the subject of baselines."""
-
-    @abstractmethod
-    def _form(self, item: ItemT) -> AnswerForm[Any] | None:
-        """The form in which an answer is asked for; None where that is text."""
-
-    @abstractmethod
-    def _pictured(self, item: ItemT) -> object | None:
-        """Return the drawing of an item; None where none is sent."""
-
-    def _pictured_for(self, item: ItemT, _seed: int) -> object | None:
-        """Return the drawing that a seed sends: that of the item, unless the track differs."""
-        return self._pictured(item)
-
-    def _forms(self) -> Sequence[ItemT]:
-        """All items, in every form in which they are shown."""
-        return self.items
-
-    def _right_answer(self, item: ItemT) -> str:
-        """Return the answer of a worked example; of tracks that show such."""
-        raise NotImplementedError(f"there is no worked example of {item.key}")
-
-    def identity(self) -> dict[str, Any]:
-        """Name and version of the prompt, a digest of all that decides the pictures, and the worked
-        examples where there are any.
-        """
-        if self._prompt is None or self._pictures is None:
-            return {"prompt": None, "pictures": None}
-        examples = self._examples.used(self.items)
-        pictured = map(self._pictured, (*self._forms(), *examples))
-        keys = [self._pictures.keys(shown) for shown in pictured if shown is not None]
-        return {
-            "prompt": {"name": self._prompt.name, "version": self._prompt.version},
-            "pictures": hex_digest(json.dumps(keys)),
-            **({"examples": [example.key for example in examples]} if examples else {}),
-        }
-
-    async def request(
-        self, item: ItemT, seed: int, params: Mapping[str, object], *, with_messages: bool
-    ) -> Request:
-        """The request of one sample; without messages for models that need none."""
-        if not with_messages or self._prompt is None or self._pictures is None:
-            return Request(item.key, seed, (), params, "", self._subject(item))
-        for one in self._examples.of(item):
-            if one.key not in self._worked:
-                pictures = await self._images(self._pictures, self._pictured(one))
-                self._worked[one.key] = self._example(one, self._prompt, pictures)
-        shots = Shots(tuple(self._worked[one.key] for one in self._examples.of(item)))
-        pictures = await self._images(self._pictures, self._pictured_for(item, seed))
-        return self._request(item, seed, params, self._prompt, pictures, shots)
-
-    def outlines(self, item: ItemT) -> Iterator[tuple[Request, bool]]:
-        """The one request, made without rendering, and whether its pictures are the real ones."""
-        if self._prompt is None or self._pictures is None:
-            yield Request(item.key, 0, (), {}, "", self._subject(item)), True
-            return
-        examples = []
-        pictures, are_real = self._outline(self._pictures, self._pictured_for(item, 0))
-        for one in self._examples.of(item):
-            its_pictures, is_real = self._outline(self._pictures, self._pictured(one))
-            examples.append(self._example(one, self._prompt, its_pictures))
-            are_real = are_real and is_real
-        shots = Shots(tuple(examples))
-        yield self._request(item, 0, {}, self._prompt, pictures, shots), are_real
-
-    def close(self) -> None:
-        """Stop the processes that draw pictures and work things out."""
-        if self._pictures is not None:
-            self._pictures.close()
-
-    async def _images(self, pictures: PicturesT, shown: object | None) -> tuple[Image, ...]:
-        return () if shown is None else await pictures.of(shown)
-
-    def _outline(self, pictures: PicturesT, shown: object | None) -> tuple[tuple[Image, ...], bool]:
-        return ((), True) if shown is None else pictures.outline(shown)
-
-    def _example(self, item: ItemT, prompt: Prompt, pictures: tuple[Image, ...]) -> WorkedExample:
-        *_, question = prompt.messages(pictures, self.facts(item, pictures))
-        return WorkedExample(item.key, question, self._right_answer(item))
-
-    def _request(
-        self,
-        item: ItemT,
-        seed: int,
-        params: Mapping[str, object],
-        prompt: Prompt,
-        pictures: tuple[Image, ...],
-        shots: Shots,
-    ) -> Request:
-        messages = prompt.messages(pictures, self.facts(item, pictures))
-        return Request(
-            item.key,
-            seed,
-            shots.before(messages),
-            params,
-            prompt.version,
-            self._subject(item),
-            response_format(self._form(item)),
-            examples=shots.keys,
-        )
-
-
-AS_IN_FILE = TaskShowing(Showing())
-"""Scenes as the file has them."""
-
-
-class _Rules(Protocol):
-    def form(self, item: AssemblyTask) -> AnswerForm[Any] | None: ...
-
-
-RulesT = TypeVar("RulesT", bound=_Rules)
-
-
-class WholePlanTrack(AskedOnce[AssemblyTask, PicturesT], Generic[RulesT, PicturesT]):
-    """Asks once about a scene, as a seed shows it."""
-
-    def __init__(
-        self,
-        rules: RulesT,
-        prompt: Prompt | None,
-        pictures: PicturesT | None,
-        items: Sequence[AssemblyTask],
-        showing: TaskShowing,
-        examples: Examples[AssemblyTask] | None = None,
-    ) -> None:
-        """See `AskedOnce`."""
-        super().__init__(prompt, pictures, examples)
-        self.rules = rules
-        self.items = items
-        self._showing = showing
-
-    def shown(self, item: AssemblyTask, seed: int) -> AssemblyTask:
-        """The scene as a seed shows it."""
-        return self._showing.of(item, seed)
-
-    def about(self, item: AssemblyTask) -> dict[str, Any]:
-        """Return how the scene is shown, where not as the file has it."""
-        return showing_fields(item)
-
-    def facts(self, item: AssemblyTask, pictures: tuple[Image, ...]) -> dict[str, object]:
-        """Return the variables of templates; nothing in it gives an answer away."""
-        return {
-            "pictures": [picture.label for picture in pictures],
-            "n_candidates": len(item.candidates),
-            "is_blind": self._showing.how.blind,
-            **form_facts(self._form(item)),
-        }
-
-    def _form(self, item: AssemblyTask) -> AnswerForm[Any] | None:
-        return self.rules.form(item)
-
-    def _pictured(self, item: AssemblyTask) -> AssemblyTask:
-        return item
-
-    def _forms(self) -> Sequence[AssemblyTask]:
-        return [self.shown(task, seed) for seed in self._showing.seeds for task in self.items]

@@ -9,12 +9,10 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from phyblock.config.suite import Suite
 from phyblock.config.validation import PictureControls
-from phyblock.data import AssemblyTask, Dataset, official_prompt
+from phyblock.data import AssemblyTask, official_prompt
 from phyblock.domain import Block, CandidateSet, Plan, Scene
 from phyblock.errors import DataError, Problem, SpecError
-from phyblock.models.request import Image
 from phyblock.parsing.plan import ParsedPlan, parse_plan, plan_form, reader_version
 from phyblock.parsing.structured import AnswerForm
 from phyblock.records.line import Line
@@ -23,22 +21,17 @@ from phyblock.resources import bundled
 from phyblock.scoring.counts import Floats, ratio_of
 from phyblock.scoring.plan import AssemblyScorer, Score
 from phyblock.stable import drawn_bytes
-from phyblock.tracks.base import (
-    AS_IN_FILE,
-    Opening,
-    TrackKind,
-    WholePlanTrack,
-    assembly_pictures,
-    task_showing,
-    template_prompt,
-)
+from phyblock.tracks.base import Opening, SceneTrack, SingleTrack
 from phyblock.tracks.baselines import Picking, candidate_choices
 from phyblock.tracks.goal_blind import BlindGuesses
-from phyblock.tracks.items import Examples, TaskShowing, examples_of, file_plan, select_tasks
+from phyblock.tracks.items import examples_of, file_plan
 from phyblock.tracks.measures import Measure, SampleCounts, TrackReport
-from phyblock.tracks.pictures import Pictures
 from phyblock.tracks.prompts import OfficialPrompt, Prompt
-from phyblock.types import AnswerFormat, Level1Criterion, Matcher, PlanParser, Setting
+from phyblock.types import PlanParser
+
+
+class PlanningSpec(PictureControls):
+    """Presentation of scenes in the full_planning track, beside `images` and `candidates`."""
 
 
 class PlanParse(Line):
@@ -66,7 +59,7 @@ PLAN_COLUMNS = dict.fromkeys(("parser", "plan", "file_plan", "dropped", "shown")
 
 
 def plan_row(parse: PlanParse | None, shown: ShownScene | None) -> Mapping[str, Any]:
-    """The values of `PLAN_COLUMNS`; `shown` is None for what was shown as the file has it."""
+    """Return the values of `PLAN_COLUMNS`; `shown` is None for candidates as in the file."""
     order = None if shown is None else shown.fields()
     if parse is None:
         return {**dict.fromkeys(PLAN_COLUMNS), "shown": order}
@@ -80,8 +73,23 @@ def plan_row(parse: PlanParse | None, shown: ShownScene | None) -> Mapping[str, 
     }
 
 
+class PlanRecord(Record):
+    """A plan for a scene."""
+
+    track: Literal["full_planning"]
+    """`full_planning`."""
+    parse: PlanParse | None = None
+    """The plan that was read."""
+
+    columns: ClassVar[Mapping[str, str]] = PLAN_COLUMNS
+
+    def row(self) -> Mapping[str, Any]:
+        """Return the plan in both numberings, and by which parser it was read."""
+        return plan_row(self.parse, self.shown)
+
+
 def score_fields(score: Score) -> dict[str, Any]:
-    """A score as records hold it."""
+    """Return a score as records hold it."""
     return {
         "criterion": score.criterion,
         "matcher": score.matcher,
@@ -97,110 +105,6 @@ def score_fields(score: Score) -> dict[str, Any]:
     }
 
 
-def pose_choices(
-    scene: Scene, candidates: CandidateSet, steps: Sequence[int]
-) -> Iterator[tuple[bool, bool]]:
-    """For each kind that could be chosen wrongly and was named: whether the pose that is listed
-    first is right, and whether the pose that was named first is.
-
-    Such a kind is needed in one pose or several, and offered in a pose in which it is not. Numbers
-    that no candidate has name nothing.
-    """
-    needed = {block.look for block in scene.blocks}
-    kinds = {block.kind for block in scene.blocks}
-    chosen: dict[Any, bool] = {}
-    for step in steps:
-        if 1 <= step <= len(candidates):
-            one = candidates[step]
-            chosen.setdefault(one.kind, one.look in needed)
-    for kind in sorted(kinds & set(chosen)):
-        right = [one.look in needed for one in candidates.candidates if one.kind == kind]
-        if not all(right):
-            yield right[0], chosen[kind]
-
-
-def pose_counts(
-    scene: Scene, candidates: CandidateSet, steps: Sequence[int]
-) -> tuple[int, int, int, int]:
-    """The numbers of `POSE_COUNTS`."""
-    choices = list(pose_choices(scene, candidates, steps))
-    first = [is_right for is_first, is_right in choices if is_first]
-    later = [is_right for is_first, is_right in choices if not is_first]
-    return sum(first), len(first), sum(later), len(later)
-
-
-def _count(item: Any, judged: Any) -> tuple[int, int, int, int]:
-    return pose_counts(item.scene, item.candidates, judged.steps)
-
-
-def _first(sums: Floats) -> Floats:
-    return ratio_of(sums[..., :2])
-
-
-def _later(sums: Floats) -> Floats:
-    return ratio_of(sums[..., 2:])
-
-
-def _gap(sums: Floats) -> Floats:
-    return np.asarray(_first(sums) - _later(sums))
-
-
-POSE_COUNTS = SampleCounts(
-    "poses", ("first_right", "first_n", "later_right", "later_n"), sample=_count
-)
-POSE_MEASURES = (
-    Measure(
-        "pose_first",
-        "Right pose, listed first",
-        POSE_COUNTS,
-        _first,
-        "kinds named in the right pose, of those whose right pose is listed first among others",
-        over="kinds",
-    ),
-    Measure(
-        "pose_later",
-        "Right pose, listed later",
-        POSE_COUNTS,
-        _later,
-        "the same, of those of which a wrong pose is listed first",
-        over="kinds",
-    ),
-    Measure(
-        "pose_gap",
-        "Listed first less later",
-        POSE_COUNTS,
-        _gap,
-        "what is won by the place in the list: nothing, for a model that goes by the picture",
-        better="lower",
-        over="kinds",
-        is_difference=True,
-    ),
-)
-
-
-class PlanningSpec(PictureControls):
-    """Presentation of scenes in the full_planning track, beside `images` and `candidates`."""
-
-
-class PlanRecord(Record):
-    """A plan for a scene."""
-
-    track: Literal["full_planning"]
-    """`full_planning`."""
-    parse: PlanParse | None = None
-    """The plan that was read."""
-
-    columns: ClassVar[Mapping[str, str]] = PLAN_COLUMNS
-
-    def row(self) -> Mapping[str, Any]:
-        """The plan in both numberings, and by which parser it was read."""
-        return plan_row(self.parse, self.shown)
-
-
-_RANDOM_STEPS = 4
-"""As in the paper's Random row."""
-
-
 @dataclass(frozen=True)
 class PlanSubject:
     """A whole plan is asked for; `guess` gives one that was learned without the goal."""
@@ -211,8 +115,12 @@ class PlanSubject:
 
 
 def plan_text(steps: Iterable[int]) -> str:
-    """A plan in the benchmark's own reply form."""
+    """Return a plan in the benchmark's own reply form."""
     return "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(steps, 1))
+
+
+_RANDOM_STEPS = 4
+"""As in the paper's Random row."""
 
 
 def _random_plan(subject: PlanSubject, rng: np.random.Generator) -> str:
@@ -223,139 +131,150 @@ def _all_candidates(subject: PlanSubject, _: np.random.Generator) -> str:
     return plan_text(range(1, len(subject.candidates) + 1))
 
 
-def _oracle_plan(subject: PlanSubject, rng: np.random.Generator) -> str:
-    blocks = subject.scene.blocks
-    return plan_text(_needed(subject, blocks[v]) for v in subject.scene.graph.random_order(rng))
-
-
-def _unoriented_plan(subject: PlanSubject, rng: np.random.Generator) -> str:
-    """A valid order in which every block stands wrongly, wherever a wrong one can be chosen."""
-    blocks = subject.scene.blocks
-    order = subject.scene.graph.random_order(rng)
-    return plan_text(
-        _turned(subject.candidates, blocks[v], rng) or _needed(subject, blocks[v]) for v in order
-    )
-
-
-def _first_poses(subject: PlanSubject, rng: np.random.Generator) -> str:
-    """A valid order of the right kinds, of each kind the pose that is listed first."""
-    blocks = subject.scene.blocks
-    order = subject.scene.graph.random_order(rng)
-    first = subject.candidates.first_of
-    return plan_text(first(blocks[v].kind) or _needed(subject, blocks[v]) for v in order)
-
-
 def _goal_blind(subject: PlanSubject, _: np.random.Generator) -> str:
     return plan_text(subject.guess().steps)
 
 
-def _needed(subject: PlanSubject, block: Block) -> int:
-    index = subject.candidates.index_of(block.look)
-    if index is None:
-        found = f"{block.color} {block.type} turned {block.euler_deg}"
-        where = f"scene {subject.scene.id}"
-        message = "no candidate looks like this block"
-        raise DataError(Problem(where, message, f"blocks[order={block.order}]", found))
-    return index
+def _in_valid_order(choose: Callable[[PlanSubject, Block, np.random.Generator], int | None]) -> Any:
+    """Return the rule that takes a random valid order, and of each block the candidate that is
+    chosen, else the right one.
+    """
+
+    def rule(subject: PlanSubject, rng: np.random.Generator) -> str:
+        blocks, order = subject.scene.blocks, subject.scene.graph.random_order(rng)
+        return plan_text(
+            choose(subject, blocks[v], rng) or needed_candidate(subject, blocks[v]) for v in order
+        )
+
+    return rule
 
 
-def _turned(candidates: CandidateSet, block: Block, rng: np.random.Generator) -> int | None:
-    """Number of a candidate of the block's kind that looks otherwise, or None."""
-    numbers = range(1, len(candidates) + 1)
-    wrong = [
-        n for n in numbers if candidates[n].kind == block.kind and candidates[n].look != block.look
-    ]
+def _first_pose(subject: PlanSubject, block: Block, _: np.random.Generator) -> int | None:
+    """Return the candidate of the block's kind that is listed first."""
+    return subject.candidates.first_of(block.kind)
+
+
+def _turned(subject: PlanSubject, block: Block, rng: np.random.Generator) -> int | None:
+    """Return a candidate of the block's kind that looks otherwise, or None."""
+    listed = enumerate(subject.candidates.candidates, 1)
+    wrong = [n for n, one in listed if one.kind == block.kind and one.look != block.look]
     return wrong[int(rng.integers(len(wrong)))] if wrong else None
 
 
-PLAN_RULES = {
+def needed_candidate(subject: PlanSubject, block: Block) -> int:
+    """Return the number of the candidate that looks like a block; DataError for none."""
+    index = subject.candidates.index_of(block.look)
+    if index is None:
+        found = f"{block.color} {block.type} turned {block.euler_deg}"
+        where, place = f"scene {subject.scene.id}", f"blocks[order={block.order}]"
+        raise DataError(Problem(where, "no candidate looks like this block", place, found))
+    return index
+
+
+PLAN_RULES: Mapping[str, Callable[..., str]] = {
     "random": _random_plan,
     "all-candidates": _all_candidates,
     "goal-blind": _goal_blind,
-    "first-pose": _first_poses,
-    "oracle": _oracle_plan,
-    "oracle-no-orientation": _unoriented_plan,
+    "first-pose": _in_valid_order(_first_pose),
+    "oracle": _in_valid_order(lambda *_: None),
+    "oracle-no-orientation": _in_valid_order(_turned),
 }
-"""Rules by name of the baseline."""
 PLAN_FLOORS = ("goal-blind", "all-candidates", "random")
-"""Those that never see the goal."""
-
-
-_MOST_STEPS = 99
-"""Far above what any goal has."""
+"""The baselines that never see the goal."""
 
 
 def pick_plan(subject: PlanSubject) -> Picking:
-    """Any candidates, each as often as needed."""
+    """Return the choices of a person: any candidates, each as often as needed."""
     return Picking(
         candidate_choices(len(subject.candidates)),
         least=1,
-        most=_MOST_STEPS,
+        most=99,  # Far above what any goal has.
         repeats=True,
         noun="step",
         write=lambda picks: plan_text(pick.place + 1 for pick in picks),
     )
 
 
-def can_be_worked(task: AssemblyTask) -> bool:
-    """True if every block of the goal is among the candidates."""
-    return all(task.candidates.index_of(block.look) is not None for block in task.scene.blocks)
-
-
 def worked_plan(task: AssemblyTask, form: AnswerForm[list[int]] | None) -> str:
-    """A right answer in the form that is asked for, None for text.
+    """Return a right answer in the form that is asked for, None for text.
 
-    Blocks are placed in a valid order that does not follow that of the file.
+    Blocks are placed in a valid order that does not follow that of the file: the next is the ready
+    one whose digest is the least.
     """
-    looks = [task.scene.blocks[vertex].look for vertex in _drawn_order(task.scene)]
-    numbers = [task.candidates.index_of(look) for look in looks]
-    steps = [number for number in numbers if number is not None]
+    order: list[int] = []
+    while ready := task.scene.graph.ready(sum(1 << vertex for vertex in order)):
+        order.append(min(ready, key=lambda v: drawn_bytes("example plan", task.scene.id, v)))
+    subject = PlanSubject(task.scene, task.candidates)
+    steps = [needed_candidate(subject, task.scene.blocks[vertex]) for vertex in order]
     if form is None:
         return plan_text(steps)
     reasoning = f"The goal has {len(steps)} blocks. Each is placed once all it rests on is there."
     return form.write(steps, reasoning)
 
 
-def _drawn_order(scene: Scene) -> list[int]:
-    """Vertices in a valid order: the next is the ready one whose digest is the least."""
+def pose_choices(
+    scene: Scene, candidates: CandidateSet, steps: Sequence[int]
+) -> Iterator[tuple[bool, bool]]:
+    """Yield, for each kind that could be chosen wrongly and was named, True if the pose that is
+    listed first is right, and True if the pose that was named first is.
 
-    def place(vertex: int) -> bytes:
-        return drawn_bytes("example plan", scene.id, vertex)
+    Such a kind is needed in one pose or several, and offered in a pose in which it is not. Numbers
+    that no candidate has name nothing.
+    """
+    needed = {block.look for block in scene.blocks}
+    chosen: dict[Any, bool] = {}
+    for step in steps:
+        if 1 <= step <= len(candidates):
+            chosen.setdefault(candidates[step].kind, candidates[step].look in needed)
+    for kind in sorted({block.kind for block in scene.blocks} & set(chosen)):
+        right = [one.look in needed for one in candidates.candidates if one.kind == kind]
+        if not all(right):
+            yield right[0], chosen[kind]
 
-    order: list[int] = []
-    while ready := scene.graph.ready(sum(1 << vertex for vertex in order)):
-        order.append(min(ready, key=place))
-    return order
+
+def pose_counts(item: Any, judged: Any) -> tuple[int, int, int, int]:
+    """Return the numbers of `POSE_COUNTS` of a plan or an episode."""
+    choices = list(pose_choices(item.scene, item.candidates, judged.steps))
+    first = [is_right for is_first, is_right in choices if is_first]
+    later = [is_right for is_first, is_right in choices if not is_first]
+    return sum(first), len(first), sum(later), len(later)
 
 
-@dataclass(frozen=True)
-class PlanningRules:
-    """Rules of parsing and scoring; the first matcher is the headline."""
+def _gap(sums: Floats) -> Floats:
+    return np.asarray(ratio_of(sums[..., :2]) - ratio_of(sums[..., 2:]))
 
-    parser: PlanParser
-    settings: tuple[Setting, ...]
-    matchers: tuple[Matcher, ...]
-    level1: Level1Criterion | None
-    answer_format: AnswerFormat = "text"
 
-    def form(self, item: AssemblyTask) -> AnswerForm[list[int]] | None:
-        """The form in which a plan for a scene is asked for; None where that is text."""
-        return None if self.answer_format == "text" else plan_form(len(item.candidates))
-
-    def read(self, item: AssemblyTask, text: str) -> ParsedPlan:
-        """The plan that a reply holds."""
-        return parse_plan(text, len(item.candidates), self.parser)
+POSE_COUNTS = SampleCounts(
+    "poses", ("first_right", "first_n", "later_right", "later_n"), sample=pose_counts
+)
+POSE_MEASURES = (
+    Measure(
+        "pose_first", "Right pose, listed first", POSE_COUNTS, lambda s: ratio_of(s[..., :2]),
+        "kinds named in the right pose, of those whose right pose is listed first among others",
+        over="kinds",
+    ),
+    Measure(
+        "pose_later", "Right pose, listed later", POSE_COUNTS, lambda s: ratio_of(s[..., 2:]),
+        "the same, of those of which a wrong pose is listed first", over="kinds",
+    ),
+    Measure(
+        "pose_gap", "Listed first less later", POSE_COUNTS, _gap,
+        "what is won by the place in the list: nothing, for a model that goes by the picture",
+        better="lower", over="kinds", is_difference=True,
+    ),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class PlanJudgement:
-    """A reply as it was parsed and scored."""
+    """A reply as it was read and scored; `in_file` is the plan in the numbers of the file, where
+    others were shown.
+    """
 
     parser: PlanParser
     parsed: ParsedPlan
     scores: tuple[Score, ...]
     in_file: tuple[int, ...] | None = None
-    """The plan in the numbers of the file, where others were shown."""
 
     @property
     def steps(self) -> tuple[int, ...]:
@@ -368,12 +287,12 @@ class PlanJudgement:
         return self.parsed.rule is not None
 
     def fields(self) -> dict[str, Any]:
-        """`parse` and `scores` of the record (docs/results.md)."""
+        """Return `parse` and `scores` of the record (docs/results.md)."""
         return {
             "parse": {
                 "parser": self.parser,
                 "rule": self.parsed.rule,
-                "plan": list(self.parsed.plan.steps),
+                "plan": list(self.steps),
                 "file_plan": self.in_file,
                 "dropped": list(self.parsed.dropped),
                 "version": reader_version(self.parser),
@@ -384,125 +303,88 @@ class PlanJudgement:
         }
 
 
-class FullPlanning(WholePlanTrack[PlanningRules, Pictures]):
-    """Prompt, parse and score of the track; pure but for the pictures it asks for."""
+class FullPlanning(SceneTrack, SingleTrack[AssemblyTask]):
+    """Asks for a whole plan in one reply."""
 
     name = "full_planning"
+    title = "Full planning"
+    asks = "a whole plan in one reply"
+    section = (name, PlanningSpec, "How scenes are shown in the full_planning track.")
+    template = bundled("prompts", "full_planning.j2")
+    json_template = bundled("prompts", "full_planning_json.j2")
+    subject = PlanSubject
+    baselines = PLAN_RULES
+    by_hand = staticmethod(pick_plan)
+    record = PlanRecord
+    counted = (POSE_COUNTS,)
+    tables = ("table1", "errors", "losses")
+    varies = ("prompt", "background", "view", "candidate_order", "layout", "examples", "repeats")
+    no_examples = ""
 
-    def __init__(
-        self,
-        rules: PlanningRules,
-        prompt: Prompt | None = None,
-        pictures: Pictures | None = None,
-        items: Sequence[AssemblyTask] = (),
-        showing: TaskShowing = AS_IN_FILE,
-        pool: Sequence[AssemblyTask] = (),
-        examples: Examples[AssemblyTask] | None = None,
-    ) -> None:
-        """`prompt` and `pictures` are None where every model is a recording; from `pool`, else
-        `items`, baselines learn. `examples` are in the form in which they are shown.
-        """
-        super().__init__(rules, prompt, pictures, items, showing, examples)
-        self._guesses = BlindGuesses(showing, pool or items, rules.settings[0])
+    def __init__(self, opening: Opening) -> None:
+        """Open the track; examples are shown as scenes are, with their own goals."""
+        super().__init__(opening)
+        suite = self.suite
+        self._guesses = BlindGuesses(suite.candidates.order, self.pool, suite.settings[0])
         self._scorers: dict[object, AssemblyScorer] = {}
+        is_drawn = suite.images.source == "render"
+        if self.shop is None:
+            return
+        if lacking := [task.key for task in self.items if not (is_drawn or task.composite)]:
+            message = f"has no picture of {len(lacking)} of {len(self.items)} scenes"
+            found = ", ".join(lacking[:8]) + (", ..." if len(lacking) > 8 else "")
+            hint, where = "render them: --set images.source=render", str(opening.dataset.root)
+            raise DataError(Problem(where, message, "images.source", found, hint=hint))
+        own = replace(self.presentation, elsewhere=None)
+        able = (
+            own.of(task, suite.seeds[0])
+            for task in (self.pool if suite.examples else ())
+            if (is_drawn or task.composite)
+            and all(task.candidates.index_of(block.look) for block in task.scene.blocks)
+        )
+        self.examples = examples_of(suite, able, self.items, "scene")
 
-    def facts(self, item: AssemblyTask, pictures: tuple[Image, ...]) -> dict[str, object]:
-        """Return the variables of templates; nothing in it gives an answer away."""
-        scale = None if self._pictures is None else self._pictures.candidate_scale
-        return {**super().facts(item, pictures), "candidate_scale": scale}
+    @classmethod
+    def report(cls) -> TrackReport:
+        """Return what tables and figures are made by."""
+        from phyblock.tracks.full_planning_results import REPORT
 
-    def _right_answer(self, item: AssemblyTask) -> str:
-        return worked_plan(item, self._form(item))
+        return REPORT
 
-    def _subject(self, item: AssemblyTask) -> PlanSubject:
-        guess = partial(self._guesses.plan, item)
-        return PlanSubject(item.scene, item.candidates, guess)
+    def open_prompt(self) -> Prompt:
+        """Return the official prompt or a template."""
+        if self.suite.prompt != "official":
+            return super().open_prompt()
+        if self.suite.dataset.format != "official":
+            message = "the official prompt is read from the official data set"
+            hint = "set dataset.format to official and dataset.path to its checkout"
+            where = str(self.suite.files.path)
+            raise SpecError(Problem(where, message, "prompt", "official", hint=hint))
+        return OfficialPrompt(official_prompt(self.suite.files.dataset))
+
+    def form(self, item: AssemblyTask) -> AnswerForm[list[int]] | None:
+        """Return the form in which a plan is asked for; None where that is text."""
+        return None if self.suite.answer_format == "text" else plan_form(len(item.candidates))
+
+    def subject_of(self, item: AssemblyTask) -> PlanSubject:
+        """Return what baselines answer about."""
+        return PlanSubject(item.scene, item.candidates, partial(self._guesses.plan, item))
+
+    def right_answer(self, item: AssemblyTask) -> str:
+        """Return the answer of a worked example."""
+        return worked_plan(item, self.form(item))
 
     def judge(self, item: AssemblyTask, text: str | None) -> PlanJudgement:
         """Read and score a reply; None, where there is no reply, is scored as an empty plan."""
-        parsed = ParsedPlan(Plan(), None) if text is None else self.rules.read(item, text)
+        suite, parsed = self.suite, ParsedPlan(Plan(), None)
+        if text is not None:
+            parsed = parse_plan(text, len(item.candidates), suite.parser)
         key = (item.key, item.candidates)
-        scorer = self._scorers.get(key)
-        if scorer is None:
-            scorer = AssemblyScorer(item.scene, item.candidates, self.rules.settings)
-            self._scorers[key] = scorer
-        scores = scorer.score(parsed.plan, self.rules.matchers, self.rules.level1)
-        in_file = file_plan(item, parsed.plan.steps)
-        return PlanJudgement(self.rules.parser, parsed, scores, in_file)
+        if key not in self._scorers:
+            self._scorers[key] = AssemblyScorer(item.scene, item.candidates, suite.settings)
+        level1 = None if suite.scoring.level1 == "aov" else suite.scoring.level1
+        scores = self._scorers[key].score(parsed.plan, suite.scoring.matchers, level1)
+        return PlanJudgement(suite.parser, parsed, scores, file_plan(item, parsed.plan.steps))
 
 
-def open_full_planning(opening: Opening) -> FullPlanning:
-    """The track; SpecError, DataError or PromptError with what is wrong."""
-    suite = opening.suite
-    tasks = select_tasks(opening.dataset.tasks, suite.levels, opening.limit)
-    pool = opening.dataset.tasks
-    showing = task_showing(suite, PlanningSpec, FullPlanning.name, tasks, pool)
-    if not opening.with_prompts:
-        return FullPlanning(_rules(suite), items=tasks, showing=showing, pool=pool)
-    if suite.images.source == "dataset":
-        _check_composites(opening.dataset, tasks)
-    prompt, pictures = _prompt(opening.suite), assembly_pictures(suite, opening.shop)
-    as_shown = TaskShowing(replace(showing.how, wrong_image=False))
-    able = [
-        as_shown.of(task, suite.seeds[0])
-        for task in pool
-        if can_be_worked(task) and (task.composite or suite.images.source == "render")
-    ]
-    examples = examples_of(opening.suite, able, tasks, "scene", stand_ins=showing.stand_ins)
-    return FullPlanning(_rules(suite), prompt, pictures, tasks, showing, pool, examples)
-
-
-def _rules(suite: Suite) -> PlanningRules:
-    """Return the rules by which a suite parses and scores plans."""
-    level1 = suite.scoring.level1
-    criterion = None if level1 == "aov" else level1
-    matchers, asked = suite.scoring.matchers, suite.answer_format
-    return PlanningRules(suite.parser, suite.settings, matchers, criterion, asked)
-
-
-def _prompt(suite: Suite) -> Prompt:
-    if suite.prompt != "official":
-        return template_prompt(suite, FullPlanning.name)
-    if suite.dataset.format != "official":
-        message = "the official prompt is read from the official data set"
-        hint = "set dataset.format to official and dataset.path to its checkout"
-        raise SpecError(Problem(str(suite.files.path), message, "prompt", "official", hint=hint))
-    return OfficialPrompt(official_prompt(suite.files.dataset))
-
-
-def _check_composites(dataset: Dataset, tasks: Sequence[AssemblyTask]) -> None:
-    """Raise DataError when the data set has no picture of a scene."""
-    lacking = [task.key for task in tasks if task.composite is None]
-    if lacking:
-        message = f"has no picture of {len(lacking)} of {len(tasks)} scenes"
-        found = ", ".join(lacking[:8]) + (", ..." if len(lacking) > 8 else "")
-        hint = "render them: --set images.source=render"
-        raise DataError(Problem(str(dataset.root), message, "images.source", found, hint=hint))
-
-
-def _report() -> TrackReport:
-    from phyblock.tracks.full_planning_results import REPORT
-
-    return REPORT
-
-
-TRACK = TrackKind(
-    name=FullPlanning.name,
-    title="Full planning",
-    item="scene",
-    about="a whole plan in one reply",
-    open=open_full_planning,
-    report=_report,
-    subject=PlanSubject,
-    baselines=PLAN_RULES,
-    by_hand=pick_plan,
-    section=("full_planning", PlanningSpec, "How scenes are shown in the full_planning track."),
-    record=PlanRecord,
-    template=bundled("prompts", "full_planning.j2"),
-    json_template=bundled("prompts", "full_planning_json.j2"),
-    counted=(POSE_COUNTS,),
-    tables=("table1", "errors", "losses"),
-    rescored=True,
-    no_examples="",
-    varies=("prompt", "background", "view", "candidate_order", "layout", "examples", "repeats"),
-)
+TRACK = FullPlanning

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from phyblock.data import AssemblyTask
 from phyblock.domain import Candidate, CandidateSet, Kind, Plan, Scene
 from phyblock.scoring.plan import Goal, most_placed
-from phyblock.tracks.items import Showing, ShownTask, TaskShowing
+from phyblock.tracks.items import Presentation, ShownTask
 from phyblock.types import CandidateOrder, Setting
 
 Floats = NDArray[np.float64]
@@ -217,18 +217,16 @@ def _ways(
 
 
 class BlindGuesses:
-    """The goal-blind plans of tasks, learned from all of `pool` in the form that each seed shows.
+    """The goal-blind plans of tasks, learned from all of `pool` in the order that each seed shows.
 
     A place in the list tells something only where the order is the file's, so plans are learned
-    anew for every order.
+    anew for every order. A goal is not learned from, whichever is shown.
     """
 
     def __init__(
-        self, showing: TaskShowing, pool: Sequence[AssemblyTask], setting: Setting
+        self, order: CandidateOrder, pool: Sequence[AssemblyTask], setting: Setting
     ) -> None:
-        self._order = showing.how.order
-        self._pool = tuple(pool)
-        self._setting = setting
+        self._order, self._pool, self._setting = order, tuple(pool), setting
         self._plans: dict[int, dict[str, Plan]] = {}
 
     def plan(self, task: AssemblyTask) -> Plan:
@@ -240,12 +238,10 @@ class BlindGuesses:
         return self._plans[seed][task.key]
 
 
-@functools.lru_cache(maxsize=8)
+@functools.lru_cache(maxsize=32)
 def _learned(
     pool: tuple[AssemblyTask, ...], order: CandidateOrder, seed: int, setting: Setting
 ) -> dict[str, Plan]:
-    # A goal is not learned from, whichever is shown.
-    showing = TaskShowing(Showing(order))
-    shown = [showing.of(one, seed) for one in pool]
+    shown = [Presentation(order).of(one, seed) for one in pool]
     candidates = {one.key: one.candidates for one in shown}
     return goal_blind_plans([one.scene for one in shown], candidates, setting)

@@ -1,17 +1,19 @@
-"""Drawing of pictures: worker processes, and a cache on disk by content."""
+"""Pictures of samples: drawn once in worker processes, and kept on disk by content."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
 import os
+from abc import ABC, abstractmethod
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
+from phyblock.config.suite import ImagesSpec
 from phyblock.data import AssemblyTask
 from phyblock.domain import BLOCK_TYPES, Block, CandidateSet, Scene
 from phyblock.errors import DataError, Problem, SimulationError
@@ -25,6 +27,7 @@ from phyblock.files import (
     writing,
 )
 from phyblock.models.request import Image
+from phyblock.resources import cache_dir
 from phyblock.sim.geometry import solid_mesh
 from phyblock.sim.pictures import (
     COLOR_RGB,
@@ -40,38 +43,46 @@ from phyblock.sim.pictures import (
 )
 from phyblock.stable import hex_digest
 from phyblock.tracks.items import ShownTask
-from phyblock.types import CandidateScale, PictureLayout, PictureName, PictureSource
+from phyblock.types import BACKGROUNDS, CandidateScale
 from phyblock.workers import WorkerDiedError, WorkerPool
 
 _Result = TypeVar("_Result")
-_RENDER_WORKERS = 4
-_KEPT = 128
-"""Samples whose pictures stay in memory: more than are under way at once."""
+_WORKERS = 4
+_KEPT = 256
+"""Pictures that stay in memory: more than are under way at once."""
 
 
 @dataclass(frozen=True)
 class Drawing:
     """A picture to be made: what it shows, the digest of what decides it, and how to make it.
 
-    `make` runs in a worker process: a `partial` of a function of a module.
+    `make` runs in a worker process: a `partial` of a function of a module. `size_px` are width and
+    height of the picture. One that `is_file` is read, and not kept in the cache.
     """
 
     label: str
     key: str
     make: Callable[[], bytes]
+    size_px: tuple[int, int] = (0, 0)
+    is_file: bool = False
 
 
 class Workshop:
-    """The shared part of studios: `workers` processes, which start with the first work that there
-    is, and the pictures that are being made or were used last.
+    """Draws pictures and does other long work in processes, which start with the first of it.
+
+    Pictures are kept in `folder` by content, and the last ones in memory. `rendered` counts those
+    made in this object's lifetime.
     """
 
-    def __init__(self, workers: int) -> None:
-        self.making: dict[Path, asyncio.Task[bytes]] = {}
-        self.recent: OrderedDict[tuple[Studio, str], tuple[Image, ...]] = OrderedDict()
-        self._workers = workers
+    def __init__(self, workers: int = 0, folder: Path | None = None) -> None:
+        """Without `workers`, as many as there are processors, at most four."""
+        self.rendered = 0
+        self._folder = folder or cache_dir() / "pictures"
+        self._workers = workers or min(_WORKERS, os.cpu_count() or 1)
         self._pool: WorkerPool | None = None
         self._alone = asyncio.Lock()
+        self._making: dict[str, asyncio.Task[bytes]] = {}
+        self._recent: OrderedDict[tuple[str, str], Image] = OrderedDict()
 
     async def work_out(self, work: Callable[[], _Result]) -> _Result:
         """Return what `work`, a `partial` of a function of a module, gives in a worker process.
@@ -90,82 +101,55 @@ class Workshop:
                 message = "a process that draws and simulates was killed twice"
                 raise SimulationError(message) from error
 
+    async def image(self, drawing: Drawing) -> Image:
+        """Return a picture from memory, from the cache, or made now.
+
+        Raises DataError for a file that is no picture, StoreError when the cache folder cannot be
+        written, SimulationError when a worker was killed.
+        """
+        if (kept := self.kept(drawing)) is not None:
+            return kept
+        key = drawing.key
+        if key not in self._making:
+            self._making[key] = asyncio.create_task(self._draw(drawing))
+            self._making[key].add_done_callback(_take_note)
+        # Shielded: others may wait for the same picture when one waiter is cancelled.
+        data = await asyncio.shield(self._making[key])
+        return self._remembered(drawing, to_image(data, drawing.label))
+
+    def kept(self, drawing: Drawing) -> Image | None:
+        """Return a picture at hand; None where it is not there, not whole, or no picture.
+
+        Raises DataError for a file that is no picture.
+        """
+        name = (drawing.key, drawing.label)
+        if name in self._recent:
+            self._recent.move_to_end(name)
+            return self._recent[name]
+        if drawing.is_file:
+            return self._remembered(drawing, to_image(drawing.make(), drawing.label))
+        data = _whole_png(self._path(drawing.key))
+        try:
+            found = None if data is None else to_image(data, drawing.label)
+        except DataError:
+            # It is drawn again.
+            return None
+        return None if found is None else self._remembered(drawing, found)
+
     def close(self) -> None:
         """Stop the worker processes."""
         if self._pool is not None:
             self._pool.shutdown(wait=True, cancel_futures=True)
             self._pool = None
 
+    def _remembered(self, drawing: Drawing, image: Image) -> Image:
+        self._recent[drawing.key, drawing.label] = image
+        if len(self._recent) > _KEPT:
+            self._recent.popitem(last=False)
+        return image
 
-class Studio:
-    """Makes pictures once and keeps them in `folder` by content.
-
-    `shop` is where the work is done, by so many processes of its own where it is a number.
-    `rendered` counts the files made in this object's lifetime.
-    """
-
-    def __init__(self, folder: Path, shop: Workshop | int) -> None:
-        self.rendered = 0
-        self._folder = folder
-        self._shop = Workshop(shop) if isinstance(shop, int) else shop
-
-    def recalled(self, name: str) -> tuple[Image, ...] | None:
-        """Pictures that are still in memory under a name."""
-        recent = self._shop.recent
-        if (self, name) in recent:
-            recent.move_to_end((self, name))
-        return recent.get((self, name))
-
-    def remembered(self, name: str, images: tuple[Image, ...]) -> tuple[Image, ...]:
-        """The pictures, now in memory under a name; those unused for longest make room."""
-        recent = self._shop.recent
-        recent[self, name] = images
-        if len(recent) > _KEPT:
-            recent.popitem(last=False)
-        return images
-
-    async def images(self, drawings: Sequence[Drawing]) -> tuple[Image, ...]:
-        """Pictures from the cache or made now, at the same time; raises as `image`."""
-        return tuple(await asyncio.gather(*(self.image(drawing) for drawing in drawings)))
-
-    def outlined(
-        self, drawings: Sequence[Drawing], size_px: tuple[int, int]
-    ) -> tuple[tuple[Image, ...], bool]:
-        """Pictures as far as they are at hand, and whether all are; nothing is rendered.
-
-        Where one is not made yet, empty ones of `size_px` stand in for all.
-        """
-        kept = [image for drawing in drawings if (image := self.kept(drawing)) is not None]
-        if len(kept) == len(drawings):
-            return tuple(kept), True
-        return tuple(Image(b"", drawing.label, *size_px) for drawing in drawings), False
-
-    def kept(self, drawing: Drawing) -> Image | None:
-        """A picture from the cache, or None where it is not there, not whole, or no picture."""
-        data = _whole_png(self._path(drawing.key))
-        try:
-            return None if data is None else to_image(data, drawing.label)
-        except DataError:
-            # It is drawn anew.
-            return None
-
-    async def image(self, drawing: Drawing) -> Image:
-        """A picture from the cache, or made now.
-
-        Raises StoreError when the cache folder cannot be written, SimulationError when a worker
-        was killed.
-        """
+    async def _draw(self, drawing: Drawing) -> bytes:
         path = self._path(drawing.key)
-        if (kept := self.kept(drawing)) is not None:
-            return kept
-        making = self._shop.making
-        if path not in making:
-            making[path] = asyncio.create_task(self._draw(path, drawing))
-            making[path].add_done_callback(_take_note)
-        # Shielded: others may wait for the same picture when one waiter is cancelled.
-        return to_image(await asyncio.shield(making[path]), drawing.label)
-
-    async def _draw(self, path: Path, drawing: Drawing) -> bytes:
         try:
             data = await self.work_out(drawing.make)
             self.rendered += 1
@@ -173,19 +157,11 @@ class Studio:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 atomic_write(path, data)
         finally:
-            del self._shop.making[path]
+            del self._making[drawing.key]
         return data
-
-    async def work_out(self, work: Callable[[], _Result]) -> _Result:
-        """Return what `work`, a `partial` of a function of a module, gives in a worker process."""
-        return await self._shop.work_out(work)
 
     def _path(self, key: str) -> Path:
         return self._folder / key[:2] / f"{key}.png"
-
-    def close(self) -> None:
-        """Stop the worker processes."""
-        self._shop.close()
 
 
 def _take_note(drawn: asyncio.Task[bytes]) -> None:
@@ -194,24 +170,162 @@ def _take_note(drawn: asyncio.Task[bytes]) -> None:
         drawn.exception()
 
 
-def render_workers() -> int:
-    """Return the number of processes that draw pictures."""
-    return min(_RENDER_WORKERS, os.cpu_count() or 1)
-
-
 def to_image(data: bytes, label: str) -> Image:
-    """An encoded picture as it is sent; DataError for what is none."""
+    """Return an encoded picture as it is sent; DataError for what is none."""
     return Image(data, label, *picture_size(data, f"picture {label}"))
 
 
 def _whole_png(path: Path) -> bytes | None:
-    """The bytes of a picture in the cache; None when it is not there, or not whole."""
+    """Return the bytes of a picture in the cache; None when it is not there, or not whole."""
     try:
         data = read_bytes(path, LARGEST_PICTURE_BYTES)
     except (OSError, ValueError):
         return None
     is_whole = data.startswith(b"\x89PNG\r\n\x1a\n") and data.endswith(b"IEND\xaeB`\x82")
     return data if is_whole else None
+
+
+class Pictures(ABC):
+    """The pictures of a track's items; a track says how an item is drawn."""
+
+    def __init__(self, shop: Workshop) -> None:
+        self.shop = shop
+        self._drawings: dict[str, tuple[Drawing, ...]] = {}
+
+    @abstractmethod
+    def draw(self, item: Any) -> tuple[Drawing, ...]:
+        """Return the pictures of an item as it is shown, in the order sent."""
+
+    def drawings(self, item: Any) -> tuple[Drawing, ...]:
+        """Return what `draw` does, computed once for each name of what is shown."""
+        name = getattr(item, "shown_as", item.key)
+        if name not in self._drawings:
+            self._drawings[name] = self.draw(item)
+        return self._drawings[name]
+
+    async def of(self, item: Any) -> tuple[Image, ...]:
+        """Return the pictures of an item, drawn at the same time; raises as `Workshop.image`."""
+        return tuple(await asyncio.gather(*map(self.shop.image, self.drawings(item))))
+
+    def outline(self, item: Any) -> tuple[tuple[Image, ...], bool]:
+        """Return the pictures as far as they are at hand, and True if all are; none is rendered.
+
+        Where one is not made yet, empty ones of their sizes stand in for all.
+        """
+        return outlined(self.shop, self.drawings(item))
+
+    def keys(self, item: Any) -> tuple[str, ...]:
+        """Return what decides the pixels: digests of content, style and renderer."""
+        return tuple(drawing.key for drawing in self.drawings(item))
+
+
+def outlined(shop: Workshop, drawings: Iterable[Drawing]) -> tuple[tuple[Image, ...], bool]:
+    """Return pictures as `Pictures.outline` does."""
+    wanted = tuple(drawings)
+    kept = [image for drawing in wanted if (image := shop.kept(drawing)) is not None]
+    if len(kept) == len(wanted):
+        return tuple(kept), True
+    return tuple(Image(b"", drawing.label, *drawing.size_px) for drawing in wanted), False
+
+
+def picture_style(images: ImagesSpec) -> PictureStyle:
+    """Return the style in which a suite wants pictures drawn."""
+    ground = images.background or BACKGROUNDS[0]
+    seen = PictureStyle.from_view(images.view, images.size_px, ground)
+    return replace(seen, candidate_scale=images.candidate_scale)
+
+
+class ScenePictures(Pictures):
+    """The goal and the candidates of a scene, as the section `images` of a suite says."""
+
+    def __init__(self, shop: Workshop, images: ImagesSpec) -> None:
+        super().__init__(shop)
+        self._images = images
+        self._style = picture_style(images)
+
+    @property
+    def candidate_scale(self) -> CandidateScale | None:
+        """The scale of candidates, for the prompt; None where pictures are the data set's."""
+        return None if self._images.source == "dataset" else self._style.candidate_scale
+
+    def style_of(self, task: AssemblyTask) -> PictureStyle:
+        """Return how the pictures of a task are drawn: larger than usual where its goal is wide."""
+        return goal_style(task.scene, self._style)
+
+    def keys(self, item: AssemblyTask) -> tuple[str, ...]:
+        """Return what decides the pixels; of the data set's own pictures, digests of the files."""
+        if self._images.source != "dataset":
+            return super().keys(item)
+        of = dict.fromkeys(one.composite for one in (item, goal_of(item)) if one is not None)
+        parts = (b"" if path is None else read_picture(path) for path in of)
+        return tuple(hex_digest(data) for data in parts)
+
+    def draw(self, item: AssemblyTask) -> tuple[Drawing, ...]:
+        """Return one composite, or the two pictures apart; DataError where the data set has none.
+
+        A goal that is not shown has no part in the size of what is.
+        """
+        if self._images.source == "dataset":
+            return self._files(item)
+        shown = goal_of(item)
+        style = self._style if shown is None else self.style_of(shown)
+        side = (style.size_px, style.size_px)
+        key = candidates_key(item.candidates, style)
+        grid = Drawing("candidates", key, partial(candidates_png, item.candidates, style), side)
+        if shown is None:
+            return (grid,)
+        key, make = goal_key(shown.scene, style), partial(goal_png, shown.scene, style)
+        goal = Drawing("goal", key, make, side)
+        if self._images.layout == "separate":
+            apart = {"goal": goal, "candidates": grid}
+            return tuple(apart[label] for label in self._images.order)
+        key = hex_digest(f"composite {goal.key} {grid.key}")
+        join = partial(_joined, goal.make, grid.make)
+        return (Drawing("composite", key, join, joined_size_px(style.size_px)),)
+
+    def _files(self, task: AssemblyTask) -> tuple[Drawing, ...]:
+        """Return the data set's own composite, or what is cut out of it."""
+        shown, own = goal_of(task), _composite(task)
+        grid = partial(_half, own, is_goal=False)
+        if shown is None:
+            makes: dict[str, Callable[[], bytes]] = {"candidates": grid}
+        elif self._images.layout == "composite":
+            is_whole = not isinstance(task, ShownTask)
+            join = partial(_joined, partial(_half, _composite(shown), is_goal=True), grid)
+            makes = {"composite": partial(read_picture, own) if is_whole else join}
+        else:
+            apart = {"goal": partial(_half, _composite(shown), is_goal=True), "candidates": grid}
+            makes = {label: apart[label] for label in self._images.order}
+        name = getattr(task, "shown_as", task.key)
+        return tuple(Drawing(label, name, make, is_file=True) for label, make in makes.items())
+
+
+def goal_of(task: AssemblyTask) -> AssemblyTask | None:
+    """Return the task whose goal is shown, None where none is."""
+    return task.goal if isinstance(task, ShownTask) else task
+
+
+def _composite(task: AssemblyTask) -> Path:
+    if task.composite is None:
+        where = f"scene {task.scene.id}"
+        hint = "render the pictures: --set images.source=render"
+        raise DataError(Problem(where, "the data set has no picture of it", hint=hint))
+    return task.composite
+
+
+def _joined(make_goal: Callable[[], bytes], make_grid: Callable[[], bytes]) -> bytes:
+    return composite_png(make_goal(), make_grid())
+
+
+def _half(composite: Path, *, is_goal: bool) -> bytes:
+    """Return goal or candidates cut out of a 2:1 composite: two squares but for the gap between."""
+    with decode_picture(read_picture(composite), str(composite)) as picture:
+        # PNG knows no CMYK, in which JPEG files may come.
+        picture = picture.convert("RGB") if picture.mode == "CMYK" else picture
+        width, height = picture.size
+        side = width // 2 - width // 256
+        left = 0 if is_goal else width - side
+        return to_png(picture.crop((left, 0, left + side, height)))
 
 
 _DECIMALS = 6
@@ -269,140 +383,3 @@ def block_entry(block: Block) -> dict[str, Any]:
 def rounded(values: Iterable[float]) -> list[float]:
     """Numbers with as many decimals as a drawing needs."""
     return [round(float(value), _DECIMALS) for value in values]
-
-
-@dataclass(frozen=True)
-class PicturePolicy:
-    """The pictures that a sample carries, and their order.
-
-    `source`: rendered here, or the data set's own composite. `layout`: one composite, or the two
-    pictures apart in `order`.
-    """
-
-    source: PictureSource
-    layout: PictureLayout
-    order: tuple[PictureName, ...]
-    style: PictureStyle
-
-
-class Pictures(Studio):
-    """The pictures of assembly tasks under one policy."""
-
-    def __init__(self, folder: Path, policy: PicturePolicy, shop: Workshop | int) -> None:
-        super().__init__(folder, shop)
-        self.policy = policy
-
-    @property
-    def candidate_scale(self) -> CandidateScale | None:
-        """The scale of candidates, for the prompt; None where pictures are the data set's."""
-        return None if self.policy.source == "dataset" else self.policy.style.candidate_scale
-
-    def style_of(self, task: AssemblyTask) -> PictureStyle:
-        """Return how the pictures of a task are drawn: larger than usual where its goal is wide."""
-        return goal_style(task.scene, self.policy.style)
-
-    async def of(self, task: AssemblyTask) -> tuple[Image, ...]:
-        """The pictures of one task as they are sent.
-
-        Raises DataError when the data set has no picture of it or a broken one, StoreError when
-        the cache folder cannot be written.
-        """
-        name = _name(task)
-        if (recent := self.recalled(name)) is not None:
-            return recent
-        if self.policy.source == "dataset":
-            return self.remembered(name, self._from_dataset(task))
-        return self.remembered(name, await self.images(self._drawings(task)))
-
-    def outline(self, task: AssemblyTask) -> tuple[tuple[Image, ...], bool]:
-        """The pictures as far as they are at hand, and whether all are; nothing is rendered.
-
-        A picture that is not made yet is stood in for by an empty one of its size.
-        """
-        if self.policy.source == "dataset":
-            return self._from_dataset(task), True
-        drawings = self._drawings(task)
-        side = self._shown_style(task).size_px
-        is_joined = drawings[0].label == "composite"
-        return self.outlined(drawings, joined_size_px(side) if is_joined else (side, side))
-
-    def keys(self, task: AssemblyTask) -> tuple[str, ...]:
-        """Return what decides the pixels of a task's pictures: digests of content, style and
-        renderer.
-        """
-        if self.policy.source == "dataset":
-            of = dict.fromkeys(one.composite for one in (task, _goal_of(task)) if one is not None)
-            parts = (b"" if path is None else read_picture(path) for path in of)
-            return tuple(hex_digest(data) for data in parts)
-        return tuple(drawing.key for drawing in self._drawings(task))
-
-    def _shown_style(self, task: AssemblyTask) -> PictureStyle:
-        """The style of what is shown: a goal that is not shown has no part in its size."""
-        goal = _goal_of(task)
-        return self.policy.style if goal is None else self.style_of(goal)
-
-    def _drawings(self, task: AssemblyTask) -> tuple[Drawing, ...]:
-        candidates, style = task.candidates, self._shown_style(task)
-        grid = Drawing(
-            "candidates",
-            candidates_key(candidates, style),
-            partial(candidates_png, candidates, style),
-        )
-        of = _goal_of(task)
-        if of is None:
-            return (grid,)
-        goal = Drawing("goal", goal_key(of.scene, style), partial(goal_png, of.scene, style))
-        if self.policy.layout == "separate":
-            apart = {"goal": goal, "candidates": grid}
-            return tuple(apart[label] for label in self.policy.order)
-        key = hex_digest(f"composite {goal.key} {grid.key}")
-        return (Drawing("composite", key, partial(_composite, goal.make, grid.make)),)
-
-    def _from_dataset(self, task: AssemblyTask) -> tuple[Image, ...]:
-        of, data = _goal_of(task), _composite_file(task)
-        if self.policy.layout == "composite" and not isinstance(task, ShownTask):
-            return (to_image(data, "composite"),)
-        _, grid = _halves(data, task.composite)
-        if of is None:
-            return (to_image(grid, "candidates"),)
-        goal, _ = _halves(_composite_file(of), of.composite)
-        if self.policy.layout == "composite":
-            return (to_image(composite_png(goal, grid), "composite"),)
-        halves = {"goal": goal, "candidates": grid}
-        return tuple(to_image(halves[label], label) for label in self.policy.order)
-
-
-def _goal_of(task: AssemblyTask) -> AssemblyTask | None:
-    """The task whose goal is shown, None where none is."""
-    return task.goal if isinstance(task, ShownTask) else task
-
-
-def _name(task: AssemblyTask) -> str:
-    """Tells apart the ways in which a task is shown."""
-    if not isinstance(task, ShownTask):
-        return task.key
-    return f"{task.key} {task.order} {task.goal and task.goal.key}"
-
-
-def _composite_file(task: AssemblyTask) -> bytes:
-    if task.composite is None:
-        where = f"scene {task.scene.id}"
-        hint = "render the pictures: --set images.source=render"
-        raise DataError(Problem(where, "the data set has no picture of it", hint=hint))
-    return read_picture(task.composite)
-
-
-def _composite(make_goal: Callable[[], bytes], make_grid: Callable[[], bytes]) -> bytes:
-    return composite_png(make_goal(), make_grid())
-
-
-def _halves(composite: bytes, path: Path | None) -> tuple[bytes, bytes]:
-    """Goal and candidates cut out of a 2:1 composite: two squares but for the gap between."""
-    with decode_picture(composite, str(path)) as picture:
-        # PNG knows no CMYK, in which JPEG files may come.
-        picture = picture.convert("RGB") if picture.mode == "CMYK" else picture
-        width, height = picture.size
-        side = width // 2 - width // 256
-        left = picture.crop((0, 0, side, height))
-        right = picture.crop((width - side, 0, width, height))
-        return to_png(left), to_png(right)

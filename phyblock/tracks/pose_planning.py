@@ -1,22 +1,19 @@
-"""Pose planning: blocks, order and positions in one reply."""
+"""Pose planning: blocks, order and positions in one reply, carried out in a physics engine."""
 
 from __future__ import annotations
 
-import asyncio
 import functools
 import math
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, Tag
 
-from phyblock.config.suite import Suite
 from phyblock.config.validation import PictureControls, Section, TemplateName, UniqueSome, refuse
 from phyblock.data import AssemblyTask
 from phyblock.domain import (
@@ -32,7 +29,7 @@ from phyblock.domain import (
     turn_deg,
 )
 from phyblock.errors import DataError, Problem, SpecError
-from phyblock.models.request import Image, Request
+from phyblock.models.request import Image
 from phyblock.parsing.poses import (
     FARTHEST_PLACE_CM,
     MOST_POSE_STEPS,
@@ -62,48 +59,137 @@ from phyblock.scoring.pose_matching import TOLERANCES_CM, TURN_TOLERANCE_DEG
 from phyblock.sim.balance import MARGIN_M, is_balanced
 from phyblock.sim.camera import VIEWS
 from phyblock.sim.contact import voxel_iou
-from phyblock.sim.dynamics import (
-    ExecutedStep,
-    ExecutionLimits,
-    execute,
-    groups,
-    settle,
-)
+from phyblock.sim.dynamics import ExecutedStep, ExecutionLimits, execute, groups, settle
 from phyblock.sim.engine import Pose, described_engine
-from phyblock.sim.geometry import box_height_cm, center_cm, collision_pieces, origin_m, put, upright
+from phyblock.sim.geometry import (
+    box_height_cm,
+    center_cm,
+    collision_pieces,
+    origin_m,
+    put,
+    upright,
+)
 from phyblock.sim.pictures import PictureStyle, goal_style
 from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
 from phyblock.stable import plain_sum
-from phyblock.tracks.base import (
-    AS_IN_FILE,
-    CARRYING,
-    READER,
-    Opening,
-    TrackKind,
-    WholePlanTrack,
-    check_drawn,
-    engine_identity,
-    picture_folder,
-    picture_style,
-    task_showing,
-    template_prompt,
-)
+from phyblock.tracks.base import CARRYING, Opening, SceneTrack, SingleTrack, engine_identity
 from phyblock.tracks.baselines import NumberField, Pick, Picking, candidate_choices
 from phyblock.tracks.full_planning import PLAN_COLUMNS, PlanParse, plan_row, score_fields
-from phyblock.tracks.items import ShownTask, TaskShowing, file_plan, select_tasks
+from phyblock.tracks.items import ShownTask, file_plan
 from phyblock.tracks.measures import ListedScore, Listing, SampleCounts, TrackReport
-from phyblock.tracks.pictures import Drawing, Studio, Workshop
-from phyblock.tracks.prompts import Prompt
-from phyblock.types import (
-    SETTINGS,
-    STEP_ENDS,
-    AnswerFormat,
-    Matcher,
-    PoseRotation,
-    Setting,
-    StepEnd,
-    View,
-)
+from phyblock.tracks.pictures import Drawing, Pictures, Workshop, goal_of, picture_style
+from phyblock.types import SETTINGS, STEP_ENDS, Matcher, PoseRotation, Setting, StepEnd, View
+
+CARRY_VERSION = 2
+"""Version of how plans are carried out and of how what stands in the end is measured; it goes up
+where some plan may end otherwise. Before 2 everything in the world was let go together, for 5 s
+where it crept, and voxels were whole or empty.
+"""
+MOST_VIEWS = 4
+KIT_LABEL = "blocks"
+"""The label of the sheet of candidates."""
+Center = tuple[float, float, float]
+_LIMITS = ExecutionLimits()
+_DIGITS = 4
+_RANDOM_STEPS = 4
+_RANDOM_REACH_CM = 15.0
+_LEAST_TURN_DEG, _LEAST_DEG, _MOST_DEG = 10.0, 10.0, 75.0
+_MOST_TRIED = 200
+_MOST_SETTLED = 16
+"""States that the physics engine is asked about, each of which may take a second."""
+_STILL_M, _STILL_DEG = 0.001, 1.0
+"""A block that moved by no more lies where it did before."""
+_ONE_AT_A_TIME = threading.Lock()
+
+
+class ViewSpec(Section):
+    """A direction to see the goal from."""
+
+    azimuth_deg: Annotated[float, Field(strict=True, ge=-360, le=360, allow_inf_nan=False)] = Field(
+        description="0 looks from +x, 90 from +y [degrees]."
+    )
+    elevation_deg: Annotated[float, Field(strict=True, ge=1, le=90, allow_inf_nan=False)] = Field(
+        description="90 looks straight down [degrees]."
+    )
+
+
+def _kind(view: object) -> str:
+    """Return the kind of view that is meant, so that it is said to be wrong as that alone."""
+    return "direction" if isinstance(view, Mapping | ViewSpec) else "name"
+
+
+AnyView = Annotated[
+    Annotated[View, Tag("name")] | Annotated[ViewSpec, Tag("direction")], Discriminator(_kind)
+]
+
+
+def _check_few(views: tuple[View | ViewSpec, ...]) -> tuple[View | ViewSpec, ...]:
+    if len(views) <= MOST_VIEWS:
+        return views
+    raise refuse(f"has {len(views)} views", allowed=f"1 to {MOST_VIEWS}")
+
+
+Tolerance = Annotated[float, Field(strict=True, gt=0, le=10, allow_inf_nan=False)]
+Angle = Annotated[float, Field(strict=True, gt=0, le=90, allow_inf_nan=False)]
+
+
+class PoseSpec(PictureControls):
+    """Requests of poses in the pose_planning track, and the execution of plans."""
+
+    rotation: PoseRotation = Field(
+        default="candidate",
+        description="candidate: blocks keep the orientation in which they are shown, and steps "
+        "give a number and a place. free: each kind is shown once, upright, and steps give a "
+        "rotation as well.",
+    )
+    views: Annotated[
+        UniqueSome[AnyView],
+        AfterValidator(_check_few),
+        Field(max_length=MOST_VIEWS),
+    ] = Field(
+        default=("oblique", "top"),
+        description="Where the goal is seen from, a picture each, 1 to 4 of them: "
+        f"{', '.join(get_args(View))}, or an azimuth_deg and elevation_deg. Blocks are shown from "
+        "where the first one is.",
+    )
+    overlap_cm: Tolerance = Field(
+        default=_LIMITS.overlap_cm,
+        description="A block that shares space with others is moved out of them by so much at "
+        "most; one that would need more is refused [cm].",
+    )
+    stand_cm: Tolerance = Field(
+        default=_LIMITS.stand_cm,
+        description="A block that moves farther when it is let go has fallen, or was knocked over "
+        "by another [cm].",
+    )
+    stand_deg: Angle = Field(
+        default=_LIMITS.stand_deg, description="The same for how far it turns [degrees]."
+    )
+    reached_cm: Tolerance = Field(
+        default=1.0,
+        description="A block of the goal is reached where one of its kind lies so near in the end "
+        "[cm].",
+    )
+    reached_deg: Angle = Field(default=10.0, description="The same for how it is turned [degrees].")
+    prompt: TemplateName = Field(
+        default="default", description="default, or the path of a .j2 template."
+    )
+
+    @property
+    def is_free(self) -> bool:
+        """True if steps bring a rotation."""
+        return self.rotation == "free"
+
+    @property
+    def limits(self) -> ExecutionLimits:
+        """The tolerances by which plans are carried out."""
+        return ExecutionLimits(self.overlap_cm, self.stand_cm, self.stand_deg)
+
+    @property
+    def tolerances(self) -> dict[str, float]:
+        """All tolerances by which what is carried out is judged, as records hold them."""
+        names = ("overlap_cm", "stand_cm", "stand_deg", "reached_cm", "reached_deg")
+        return {name: getattr(self, name) for name in names}
 
 
 class GivenStep(Line):
@@ -245,12 +331,8 @@ def _right(_: Any, judged: Any) -> tuple[int, ...]:
 
 def _fits(_: Any, judged: Any) -> tuple[float, ...]:
     fits = [fit for fit in judged.fits if fit is not None]
-    return (
-        plain_sum(fit.position_cm for fit in fits),
-        plain_sum(fit.turn_deg for fit in fits),
-        plain_sum(fit.iou for fit in fits),
-        len(fits),
-    )
+    parts = ("position_cm", "turn_deg", "iou")
+    return (*(plain_sum(getattr(fit, part) for fit in fits) for part in parts), len(fits))
 
 
 def _carried_counts(_: Any, judged: Any) -> tuple[float, ...]:
@@ -265,15 +347,11 @@ def _errors(_: Any, judged: Any) -> tuple[int, ...]:
     return (*(counts[name] for name in POSE_ERRORS), len(judged.errors))
 
 
-def _plan(setting: Setting) -> SampleCounts:
-    """The plan without its poses under a setting, by the headline matcher."""
-
-    def count(_: Any, judged: Any) -> tuple[int, int, int] | None:
-        scores = (score for score in judged.scores if score.setting == setting)
-        counts = next((score.counts for score in scores), None)
-        return None if counts is None else (counts.tp, counts.fp, counts.fn)
-
-    return SampleCounts(f"plan_{setting.lower()}", ("tp", "fp", "fn"), sample=count)
+def _plan(setting: Setting, _: Any, judged: Any) -> tuple[int, int, int] | None:
+    """Count the plan without its poses under a setting, by the headline matcher."""
+    scores = (score for score in judged.scores if score.setting == setting)
+    counts = next((score.counts for score in scores), None)
+    return None if counts is None else (counts.tp, counts.fp, counts.fn)
 
 
 RIGHT = SampleCounts(
@@ -288,12 +366,26 @@ CARRIED = SampleCounts(
     sample=_carried_counts,
 )
 ERRORS = SampleCounts("pose_errors", (*POSE_ERRORS, "steps"), sample=_errors)
-PLANS = {setting: _plan(setting) for setting in SETTINGS}
-COUNTED = (RIGHT, FITS, CARRIED, ERRORS, *PLANS.values())
+PLANS = {
+    setting: SampleCounts(
+        f"plan_{setting.lower()}", ("tp", "fp", "fn"), sample=partial(_plan, setting)
+    )
+    for setting in SETTINGS
+}
 
 
-_STILL_M, _STILL_DEG = 0.001, 1.0
-"""A block that moved by no more lies where it did before."""
+def _in_c(record: Record) -> ListedScore | None:
+    """Return right steps as a mean over the tolerances, which gives the mean of their F1."""
+    if RIGHT.name not in record.counts:
+        return None
+    counts = dict(zip(RIGHT.columns, record.counts[RIGHT.name], strict=True))
+    right = sum(counts[f"absolute_{cm:g}"] for cm in TOLERANCES_CM) / len(TOLERANCES_CM)
+    pose = record.pose if isinstance(record, PoseRecord) else None
+    errors = {step.error for step in pose.steps if step.error is not None} if pose else ()
+    return ListedScore(right, counts["steps"] - right, counts["blocks"] - right, errors)
+
+
+LISTED_IN_C = Listing("C", POSE_ERRORS, _in_c, is_counted=False)
 
 
 def rests_of(
@@ -340,55 +432,13 @@ def worlds_of(
     return tuple(worlds)
 
 
-CARRY_VERSION = 2
-"""Version of how plans are carried out and of how what stands in the end is measured; it goes up
-where some plan may end otherwise. Before 2 everything in the world was let go together, for 5 s
-where it crept, and voxels were whole or empty.
-"""
-_ONE_AT_A_TIME = threading.Lock()
-_KEPT = 32
-_DIGITS = 4
-_PARSER = "poses"
-
-
-@dataclass(frozen=True)
-class PoseRules:
-    """Rules of parsing, scoring and execution; the first matcher is the headline."""
-
-    rotation: PoseRotation
-    settings: tuple[Setting, ...]
-    matchers: tuple[Matcher, ...]
-    limits: ExecutionLimits
-    reached_cm: float
-    reached_deg: float
-    answer_format: AnswerFormat = "text"
-
-    @property
-    def is_free(self) -> bool:
-        """True if steps bring a rotation."""
-        return self.rotation == "free"
-
-    @property
-    def told(self) -> dict[str, float]:
-        """The tolerances of what is carried out, as records tell them."""
-        return {
-            **asdict(self.limits),
-            "reached_cm": self.reached_cm,
-            "reached_deg": self.reached_deg,
-        }
-
-    def form(self, item: AssemblyTask) -> AnswerForm[Any] | None:
-        """The form in which a plan for a scene is asked for; None where that is text."""
-        if self.answer_format == "text":
-            return None
-        return pose_form(len(item.candidates), free=self.is_free)
-
-
 @dataclass(frozen=True)
 class Ended:
-    """Result of a plan that was executed: its steps, the blocks that each of them moved (None where
-    that was not kept), the blocks of the goal that were reached, the IoU of all that stands with
-    the goal, True if that is the whole goal and nothing else, and the engine with its version.
+    """Result of a plan that was executed.
+
+    Its steps, the blocks that each of them moved (None where that was not kept), the blocks of the
+    goal that were reached, the IoU of all that stands with the goal, True if that is the whole goal
+    and nothing else, and the engine with its version.
     """
 
     steps: tuple[ExecutedStep, ...]
@@ -401,10 +451,10 @@ class Ended:
 
 @dataclass(frozen=True)
 class PoseJudgement:
-    """A reply as it was parsed and scored.
+    """A reply as it was read and scored.
 
     `fits` and `errors` have an entry for each step that was read, `kept` are those that name a
-    candidate.
+    candidate, `in_file` is the plan in the numbers of the file, where others were shown.
     """
 
     parsed: ParsedPoses
@@ -415,7 +465,7 @@ class PoseJudgement:
     fits: tuple[PoseFit | None, ...]
     errors: tuple[PoseError | None, ...]
     ended: Ended
-    rules: PoseRules
+    spec: PoseSpec
 
     @property
     def steps(self) -> tuple[int, ...]:
@@ -428,157 +478,35 @@ class PoseJudgement:
         return self.parsed.rule is not None
 
     def fields(self) -> dict[str, Any]:
-        """`parse`, `scores` and `pose` of the record (docs/results.md)."""
-        given = self.parsed.plan.steps
+        """Return `parse`, `scores` and `pose` of the record (docs/results.md)."""
+        given, motion = self.parsed.plan.steps, self.poses[-1].motion
         kept = set(self.kept)
-        dropped = [step.candidate for step in given if step not in kept]
+        whole = zip(self.fits, self.ended.steps, self.ended.rests, self.errors, strict=True)
         return {
             "parse": {
-                "parser": _PARSER,
+                "parser": "poses",
                 "rule": self.parsed.rule,
                 "plan": list(self.steps),
                 "file_plan": self.in_file,
-                "dropped": dropped,
+                "dropped": [step.candidate for step in given if step not in kept],
                 "version": READER_VERSION,
                 "problem": self.parsed.problem,
                 "steps": [_given(step) for step in given],
             },
             "scores": [score_fields(score) for score in self.scores],
-            "pose": self._outcome(),
+            "pose": {
+                "rotation": self.spec.rotation,
+                "right": {score.frame: list(score.right) for score in self.poses},
+                "shift_cm": [round(part, _DIGITS) + 0.0 for part in motion.shift_cm],
+                "turn_deg": round(math.degrees(motion.turn_rad), _DIGITS) + 0.0,
+                "steps": [_outcome(*step) for step in whole],
+                "reached": self.ended.reached,
+                "iou": self.ended.iou,
+                "completed": self.ended.completed,
+                "limits": self.spec.tolerances,
+                "engine": self.ended.engine,
+            },
         }
-
-    def _outcome(self) -> dict[str, Any]:
-        motion = self.poses[-1].motion
-        whole = zip(self.fits, self.ended.steps, self.ended.rests, self.errors, strict=True)
-        return {
-            "rotation": self.rules.rotation,
-            "right": {score.frame: list(score.right) for score in self.poses},
-            "shift_cm": [round(part, _DIGITS) + 0.0 for part in motion.shift_cm],
-            "turn_deg": round(math.degrees(motion.turn_rad), _DIGITS) + 0.0,
-            "steps": [_step_fields(*step) for step in whole],
-            "reached": self.ended.reached,
-            "iou": self.ended.iou,
-            "completed": self.ended.completed,
-            "limits": self.rules.told,
-            "engine": self.ended.engine,
-        }
-
-
-def judge_poses(
-    item: AssemblyTask, text: str | None, rules: PoseRules, earlier: PoseRecord | None = None
-) -> PoseJudgement:
-    """Read, score and carry out a reply; None, where there is no reply, is an empty plan.
-
-    A plan that an `earlier` record holds, executed with the same tolerances, ended as it did.
-    """
-    parsed = ParsedPoses(PosePlan(), None)
-    if text is not None:
-        parsed = parse_poses(text, len(item.candidates), free=rules.is_free)
-    given = parsed.plan.steps
-    n = len(item.candidates)
-    kept = tuple(step for step in given if 1 <= step.candidate <= n)
-    scorer = _scorer(item.scene, item.candidates, "B" if rules.is_free else "A")
-    poses = scorer.score([laid(step, item.candidates[step.candidate]) for step in kept])
-    blocks = [put(step, item.candidates) for step in given]
-    ended = _ended_before(earlier, given, rules) or _carried(item, blocks, rules)
-    found = iter(poses[0].fits)
-    fits = tuple(next(found) if 1 <= step.candidate <= n else None for step in given)
-    numbers, ends = [step.candidate for step in given], [step.end for step in ended.steps]
-    return PoseJudgement(
-        parsed,
-        kept,
-        file_plan(item, [step.candidate for step in kept]),
-        _plan_scores(item, kept, rules),
-        poses,
-        fits,
-        pose_errors(scorer.goal, numbers, fits, ends),
-        ended,
-        rules,
-    )
-
-
-def _ended_before(
-    record: PoseRecord | None, given: Sequence[PoseStep], rules: PoseRules
-) -> Ended | None:
-    """Return the result that a record holds of the same steps under the same rules, else None."""
-    if record is None or record.pose is None or record.parse is None:
-        return None
-    pose = record.pose
-    known = [PoseStep(s.block, s.center_cm, s.euler_deg) for s in record.parse.steps]
-    if (known, pose.limits.fields()) != (list(given), rules.told) or len(pose.steps) != len(given):
-        return None
-    steps = tuple(
-        ExecutedStep(s.end, s.moved_cm, s.turned_deg, s.gap_cm, s.overlap_cm, s.knocked)
-        for s in pose.steps
-    )
-    rests = tuple(step.rests for step in pose.steps)
-    return Ended(steps, rests, pose.reached, pose.iou, pose.completed, pose.engine)
-
-
-def _carried(item: AssemblyTask, blocks: Sequence[Block | None], rules: PoseRules) -> Ended:
-    # An engine has no more than one plan at a time, whichever thread asks.
-    with _ONE_AT_A_TIME:
-        done = execute(blocks, rules.limits)
-    goal = item.scene.blocks
-    reached = blocks_reached(goal, done.blocks, rules.reached_cm, rules.reached_deg)
-    is_whole = reached == len(goal) == len(done.blocks)
-    iou = round(voxel_iou(goal, done.blocks), _DIGITS)
-    rests = rests_of(blocks, done.worlds)
-    return Ended(done.steps, rests, reached, iou, is_whole, described_engine())
-
-
-@functools.cache
-def pieces_of(block_type: BlockType) -> tuple[Piece, ...]:
-    """Return the convex pieces of a block in its body frame."""
-    return tuple(Piece(p.vertices_m, p.face_normals) for p in collision_pieces(block_type))
-
-
-def laid(step: PoseStep, candidate: Candidate) -> Laid:
-    """Return a step as a rigid body; without a rotation of its own it has its candidate's."""
-    euler = candidate.euler_deg if step.euler_deg is None else step.euler_deg
-    return Laid(step.candidate, origin_m(candidate.type, euler, step.center_cm), euler)
-
-
-@functools.lru_cache(maxsize=_KEPT)
-def _scorer(scene: Scene, candidates: CandidateSet, setting: Setting) -> PoseScorer:
-    return PoseScorer(scene, candidates, setting, pieces_of)
-
-
-def _plan_scores(
-    item: AssemblyTask, kept: Sequence[PoseStep], rules: PoseRules
-) -> tuple[Score, ...]:
-    """The plan without its poses, under every setting and matcher."""
-    numbers, candidates = [step.candidate for step in kept], item.candidates
-    if rules.is_free:
-        numbers, candidates = _as_candidates(item, kept)
-    scorer = AssemblyScorer(item.scene, candidates, rules.settings)
-    return scorer.score(Plan(tuple(numbers)), rules.matchers, None)
-
-
-def _as_candidates(item: AssemblyTask, kept: Sequence[PoseStep]) -> tuple[list[int], CandidateSet]:
-    """Steps with rotations as candidates that are turned so.
-
-    One that is within the tolerance of how some block of the goal is turned is turned just so.
-    """
-    numbers: list[int] = []
-    found: dict[Candidate, int] = {}
-    for step in kept:
-        one = item.candidates[step.candidate]
-        turned = replace(one, euler_deg=step.euler_deg or one.euler_deg)
-        near = [
-            (_apart_deg(turned, block.euler_deg), place, block.euler_deg)
-            for place, block in enumerate(item.scene.blocks)
-            if block.kind == one.kind
-        ]
-        if near and min(near)[0] <= TURN_TOLERANCE_DEG:
-            turned = replace(one, euler_deg=min(near)[2])
-        numbers.append(found.setdefault(turned, len(found) + 1))
-    return numbers, CandidateSet(tuple(found))
-
-
-def _apart_deg(one: Candidate, euler_deg: tuple[float, float, float]) -> float:
-    rotations = [np.array(euler_deg_to_matrix(euler)) for euler in (one.euler_deg, euler_deg)]
-    return turn_deg(one.type, rotations[0], rotations[1])
 
 
 def _given(step: PoseStep) -> dict[str, Any]:
@@ -586,22 +514,17 @@ def _given(step: PoseStep) -> dict[str, Any]:
     return {"block": step.candidate, "center_cm": list(step.center_cm), **turned}
 
 
-def _step_fields(
+def _outcome(
     fit: PoseFit | None,
     end: ExecutedStep,
     rests: tuple[RestingBlock, ...] | None,
     error: PoseError | None,
 ) -> dict[str, Any]:
+    """Return the fields of `StepOutcome`."""
     told: dict[str, Any] = {"vertex": None}
     if fit is not None:
-        told = {
-            "vertex": fit.vertex,
-            "position_cm": fit.position_cm,
-            "sideways_cm": fit.sideways_cm,
-            "up_cm": fit.up_cm,
-            "turn_deg": fit.turn_deg,
-            "iou": fit.iou,
-        }
+        names = ("vertex", "position_cm", "sideways_cm", "up_cm", "turn_deg", "iou")
+        told = {name: getattr(fit, name) for name in names}
     return {
         **told,
         "end": end.end,
@@ -615,165 +538,162 @@ def _step_fields(
     }
 
 
-_MOST_TRIED = 200
-_MOST_SETTLED = 16
-"""States that the physics engine is asked about, each of which may take a second."""
+def judge_poses(
+    item: AssemblyTask,
+    text: str | None,
+    spec: PoseSpec,
+    settings: tuple[Setting, ...],
+    matchers: tuple[Matcher, ...],
+    earlier: PoseRecord | None = None,
+) -> PoseJudgement:
+    """Read, score and carry out a reply; None, where there is no reply, is an empty plan.
+
+    A plan that an `earlier` record holds, executed with the same tolerances, ended as it did.
+    """
+    parsed, n = ParsedPoses(PosePlan(), None), len(item.candidates)
+    if text is not None:
+        parsed = parse_poses(text, n, free=spec.is_free)
+    given = parsed.plan.steps
+    kept = tuple(step for step in given if 1 <= step.candidate <= n)
+    scorer = _scorer(item.scene, item.candidates, "B" if spec.is_free else "A")
+    poses = scorer.score([_laid(step, item.candidates[step.candidate]) for step in kept])
+    ended = _ended_before(earlier, given, spec) or _carried(item, given, spec)
+    found = iter(poses[0].fits)
+    fits = tuple(next(found) if 1 <= step.candidate <= n else None for step in given)
+    numbers, ends = [step.candidate for step in given], [step.end for step in ended.steps]
+    named, candidates = [step.candidate for step in kept], item.candidates
+    in_file = file_plan(item, named)
+    if spec.is_free:
+        named, candidates = _as_candidates(item, kept)
+    # The plan without its poses, under every setting and matcher.
+    scores = AssemblyScorer(item.scene, candidates, settings).score(
+        Plan(tuple(named)), matchers, None
+    )
+    errors = pose_errors(scorer.goal, numbers, fits, ends)
+    return PoseJudgement(parsed, kept, in_file, scores, poses, fits, errors, ended, spec)
+
+
+def _ended_before(
+    record: PoseRecord | None, given: Sequence[PoseStep], spec: PoseSpec
+) -> Ended | None:
+    """Return the result that a record holds of the same steps by the same tolerances, or None."""
+    if record is None or record.pose is None or record.parse is None:
+        return None
+    pose = record.pose
+    known = [PoseStep(s.block, s.center_cm, s.euler_deg) for s in record.parse.steps]
+    is_same = (known, pose.limits.fields()) == (list(given), spec.tolerances)
+    if not is_same or len(pose.steps) != len(given):
+        return None
+    steps = tuple(
+        ExecutedStep(s.end, s.moved_cm, s.turned_deg, s.gap_cm, s.overlap_cm, s.knocked)
+        for s in pose.steps
+    )
+    rests = tuple(step.rests for step in pose.steps)
+    return Ended(steps, rests, pose.reached, pose.iou, pose.completed, pose.engine)
+
+
+def _carried(item: AssemblyTask, given: Sequence[PoseStep], spec: PoseSpec) -> Ended:
+    blocks = [put(step, item.candidates) for step in given]
+    # An engine has no more than one plan at a time, whichever thread asks.
+    with _ONE_AT_A_TIME:
+        done = execute(blocks, spec.limits)
+    goal = item.scene.blocks
+    reached = blocks_reached(goal, done.blocks, spec.reached_cm, spec.reached_deg)
+    is_whole = reached == len(goal) == len(done.blocks)
+    iou = round(voxel_iou(goal, done.blocks), _DIGITS)
+    rests = rests_of(blocks, done.worlds)
+    return Ended(done.steps, rests, reached, iou, is_whole, described_engine())
+
+
+@functools.cache
+def pieces_of(block_type: BlockType) -> tuple[Piece, ...]:
+    """Return the convex pieces of a block in its body frame."""
+    return tuple(Piece(p.vertices_m, p.face_normals) for p in collision_pieces(block_type))
+
+
+def _laid(step: PoseStep, candidate: Candidate) -> Laid:
+    """Return a step as a rigid body; without a rotation of its own it has its candidate's."""
+    euler = candidate.euler_deg if step.euler_deg is None else step.euler_deg
+    return Laid(step.candidate, origin_m(candidate.type, euler, step.center_cm), euler)
+
+
+@functools.lru_cache(maxsize=32)
+def _scorer(scene: Scene, candidates: CandidateSet, setting: Setting) -> PoseScorer:
+    return PoseScorer(scene, candidates, setting, pieces_of)
+
+
+def _as_candidates(item: AssemblyTask, kept: Sequence[PoseStep]) -> tuple[list[int], CandidateSet]:
+    """Return steps with rotations as numbers of candidates that are turned so.
+
+    One that is within the tolerance of how some block of the goal is turned is turned just so.
+    """
+    numbers: list[int] = []
+    found: dict[Candidate, int] = {}
+    for step in kept:
+        one = item.candidates[step.candidate]
+        turned = replace(one, euler_deg=step.euler_deg or one.euler_deg)
+        mine = np.array(euler_deg_to_matrix(turned.euler_deg))
+        near = [
+            (turn_deg(one.type, mine, np.array(euler_deg_to_matrix(block.euler_deg))), place)
+            for place, block in enumerate(item.scene.blocks)
+            if block.kind == one.kind
+        ]
+        if near and min(near)[0] <= TURN_TOLERANCE_DEG:
+            turned = replace(one, euler_deg=item.scene.blocks[min(near)[1]].euler_deg)
+        numbers.append(found.setdefault(turned, len(found) + 1))
+    return numbers, CandidateSet(tuple(found))
 
 
 def buildable_order(scene: Scene, wanted: Sequence[int]) -> list[int]:
-    """The vertices of a scene in a valid order, as near to the `wanted` one, which is valid too, as
-    balance lets it be.
+    """Return the vertices of a scene in a valid order, as near to the `wanted` one, which is valid
+    too, as balance lets it be.
 
     Each step takes the first block with which what stands is in balance with every weight off by
     `MARGIN_M`, else the first with which it is in balance at all and stands in the physics engine;
     where there is none, an earlier step is taken back. The wanted order where no other is found.
     """
-    return _Search(scene, wanted).found() or list(wanted)
+    blocks, needs = scene.blocks, scene.graph.depends_on
+    dead: set[frozenset[int]] = set()
+    left = {"tried": _MOST_TRIED, "settled": _MOST_SETTLED}
 
+    def touched(order: tuple[int, ...]) -> tuple[Block, ...]:
+        """Return the blocks that hang together with the last one."""
+        placed = [replace(blocks[v], order=place) for place, v in enumerate(order)]
+        return next(group for group in groups(placed) if placed[-1] in group)
 
-class _Search:
-    def __init__(self, scene: Scene, wanted: Sequence[int]) -> None:
-        self._blocks, self._needs = scene.blocks, scene.graph.depends_on
-        self._wanted = wanted
-        self._dead: set[frozenset[int]] = set()
-        self._left, self._settles_left = _MOST_TRIED, _MOST_SETTLED
+    def settles(order: tuple[int, ...]) -> bool:
+        left["settled"] -= 1
+        return left["settled"] >= 0 and settle(touched(order)).stands
 
-    def found(self, order: tuple[int, ...] = ()) -> list[int]:
-        """The rest of an order that begins so; empty where there is none."""
-        if len(order) == len(self._blocks):
-            return list(order)
-        placed = frozenset(order)
-        if placed not in self._dead:
-            for vertex in self._next(order):
-                if whole := self.found((*order, vertex)):
-                    return whole
-            self._dead.add(placed)
-        return []
-
-    def _next(self, order: tuple[int, ...]) -> Iterator[int]:
-        """The blocks that may come next, the surest first."""
-        ready = [v for v in self._wanted if v not in order and self._needs[v] <= set(order)]
+    def following(order: tuple[int, ...]) -> Iterator[int]:
+        """Yield the blocks that may come next, the surest first."""
         doubtful = []
-        for vertex in ready:
-            if self._left <= 0:
+        for vertex in wanted:
+            if vertex in order or not needs[vertex] <= set(order):
+                continue
+            if left["tried"] <= 0:
                 return
-            self._left -= 1
-            touched = self._touched((*order, vertex))
-            if is_balanced(touched, margin_m=MARGIN_M):
+            left["tried"] -= 1
+            hanging = touched((*order, vertex))
+            if is_balanced(hanging, margin_m=MARGIN_M):
                 yield vertex
-            elif is_balanced(touched):
+            elif is_balanced(hanging):
                 doubtful.append(vertex)
         # So near to an edge engines differ, and a structure may stand while its mirror image falls.
-        yield from (vertex for vertex in doubtful if self._settles((*order, vertex)))
+        yield from (vertex for vertex in doubtful if settles((*order, vertex)))
 
-    def _settles(self, order: tuple[int, ...]) -> bool:
-        self._settles_left -= 1
-        return self._settles_left >= 0 and settle(self._touched(order)).stands
+    def found(order: tuple[int, ...] = ()) -> list[int]:
+        """Return the rest of an order that begins so; empty where there is none."""
+        if len(order) == len(blocks):
+            return list(order)
+        if frozenset(order) not in dead:
+            for vertex in following(order):
+                if whole := found((*order, vertex)):
+                    return whole
+            dead.add(frozenset(order))
+        return []
 
-    def _touched(self, order: tuple[int, ...]) -> tuple[Block, ...]:
-        """The blocks that hang together with the last one."""
-        blocks = [replace(self._blocks[v], order=place) for place, v in enumerate(order)]
-        return next(group for group in groups(blocks) if blocks[-1] in group)
-
-
-_LIMITS = ExecutionLimits()
-MOST_VIEWS = 4
-
-
-class ViewSpec(Section):
-    """A direction to see the goal from."""
-
-    azimuth_deg: Annotated[float, Field(strict=True, ge=-360, le=360, allow_inf_nan=False)] = Field(
-        description="0 looks from +x, 90 from +y [degrees]."
-    )
-    elevation_deg: Annotated[float, Field(strict=True, ge=1, le=90, allow_inf_nan=False)] = Field(
-        description="90 looks straight down [degrees]."
-    )
-
-
-def _kind(view: object) -> str:
-    """Return the kind of view that is meant, so that it is said to be wrong as that alone."""
-    return "direction" if isinstance(view, Mapping | ViewSpec) else "name"
-
-
-AnyView = Annotated[
-    Annotated[View, Tag("name")] | Annotated[ViewSpec, Tag("direction")], Discriminator(_kind)
-]
-
-
-def _check_few(views: tuple[View | ViewSpec, ...]) -> tuple[View | ViewSpec, ...]:
-    if len(views) <= MOST_VIEWS:
-        return views
-    raise refuse(f"has {len(views)} views", allowed=f"1 to {MOST_VIEWS}")
-
-
-Tolerance = Annotated[float, Field(strict=True, gt=0, le=10, allow_inf_nan=False)]
-Angle = Annotated[float, Field(strict=True, gt=0, le=90, allow_inf_nan=False)]
-
-
-class PoseSpec(PictureControls):
-    """Requests of poses in the pose_planning track, and the execution of plans."""
-
-    rotation: PoseRotation = Field(
-        default="candidate",
-        description="candidate: blocks keep the orientation in which they are shown, and steps "
-        "give a number and a place. free: each kind is shown once, upright, and steps give a "
-        "rotation as well.",
-    )
-    views: Annotated[
-        UniqueSome[AnyView],
-        AfterValidator(_check_few),
-        Field(max_length=MOST_VIEWS),
-    ] = Field(
-        default=("oblique", "top"),
-        description="Where the goal is seen from, a picture each, 1 to 4 of them: "
-        f"{', '.join(get_args(View))}, or an azimuth_deg and elevation_deg. Blocks are shown from "
-        "where the first one is.",
-    )
-    overlap_cm: Tolerance = Field(
-        default=_LIMITS.overlap_cm,
-        description="A block that shares space with others is moved out of them by so much at "
-        "most; one that would need more is refused [cm].",
-    )
-    stand_cm: Tolerance = Field(
-        default=_LIMITS.stand_cm,
-        description="A block that moves farther when it is let go has fallen, or was knocked over "
-        "by another [cm].",
-    )
-    stand_deg: Angle = Field(
-        default=_LIMITS.stand_deg, description="The same for how far it turns [degrees]."
-    )
-    reached_cm: Tolerance = Field(
-        default=1.0,
-        description="A block of the goal is reached where one of its kind lies so near in the end "
-        "[cm].",
-    )
-    reached_deg: Angle = Field(default=10.0, description="The same for how it is turned [degrees].")
-    prompt: TemplateName = Field(
-        default="default", description="default, or the path of a .j2 template."
-    )
-
-
-_RIGHT = tuple(RIGHT.columns.index(f"absolute_{cm:g}") for cm in TOLERANCES_CM)
-_STEPS, _BLOCKS = (RIGHT.columns.index(name) for name in ("steps", "blocks"))
-
-
-def _in_c(record: Record) -> ListedScore | None:
-    """Right steps as a mean over the tolerances, which gives the mean of their F1."""
-    counts = record.counts.get(RIGHT.name)
-    if counts is None:
-        return None
-    right = sum(counts[place] for place in _RIGHT) / len(_RIGHT)
-    pose = record.pose if isinstance(record, PoseRecord) else None
-    errors = {step.error for step in pose.steps if step.error is not None} if pose else ()
-    return ListedScore(right, counts[_STEPS] - right, counts[_BLOCKS] - right, errors)
-
-
-LISTED_IN_C = Listing("C", POSE_ERRORS, _in_c, is_counted=False)
-
-
-_RANDOM_STEPS = 4
-_RANDOM_REACH_CM = 15.0
+    return found() or list(wanted)
 
 
 @dataclass(frozen=True)
@@ -783,9 +703,6 @@ class PoseSubject:
     scene: Scene
     candidates: CandidateSet
     is_free: bool
-
-
-Center = tuple[float, float, float]
 
 
 def written(steps: Iterable[PoseStep]) -> str:
@@ -830,10 +747,6 @@ def _step(subject: PoseSubject, block: Block, center: Center) -> PoseStep:
     where, field = f"scene {subject.scene.id}", f"blocks[order={block.order}]"
     found = f"{block.color} {block.type} turned {block.euler_deg}"
     raise DataError(Problem(where, "no candidate looks like this block", field, found))
-
-
-def _oracle(subject: PoseSubject, rng: np.random.Generator) -> str:
-    return _built(subject, rng)
 
 
 def _noisy(sigma_cm: float) -> Callable[[PoseSubject, np.random.Generator], str]:
@@ -882,147 +795,150 @@ def _random(subject: PoseSubject, rng: np.random.Generator) -> str:
     return written(steps)
 
 
-POSE_RULES = {
+POSE_RULES: Mapping[str, Callable[..., str]] = {
     "random": _random,
-    "oracle": _oracle,
+    "oracle": _built,
     "oracle-noise-1mm": _noisy(0.1),
     "oracle-noise-3mm": _noisy(0.3),
     "oracle-noise-1cm": _noisy(1.0),
     "oracle-2d": _flat,
     "stack": _stack,
 }
-"""Rules by name of the baseline."""
 POSE_FLOORS = ("random",)
-"""Those that never see the goal."""
-
-
-_PLACE = tuple(
-    NumberField(name, "cm", FARTHEST_PLACE_CM, decimals=2, step=0.5, leap=5.0) for name in "xyz"
-)
-_TURN = tuple(
-    NumberField(f"r{name}", "degrees", 360.0, decimals=1, step=15.0, leap=90.0, start=0.0)
-    for name in "xyz"
-)
-"""At first as the sheet of blocks shows it."""
+"""The baselines that never see the goal."""
 
 
 def pick_poses(subject: PoseSubject) -> Picking:
-    """Any candidates, each as often as needed, with its place, and its turn where that is free."""
+    """Return the choices of a person: any candidates, each as often as needed, with its place, and
+    its turn where that is free, at first as the sheet of blocks shows it.
+    """
+    fields = [NumberField(name, "cm", FARTHEST_PLACE_CM, 2, 0.5, 5.0) for name in "xyz"]
+    if subject.is_free:
+        fields += [NumberField(f"r{n}", "degrees", 360.0, 1, 15.0, 90.0, 0.0) for n in "xyz"]
+
+    def step(pick: Pick) -> PoseStep:
+        x, y, z, *turn = pick.numbers
+        return PoseStep(pick.place + 1, (x, y, z), (turn[0], turn[1], turn[2]) if turn else None)
+
     return Picking(
         candidate_choices(len(subject.candidates), (KIT_LABEL,)),
         least=1,
         most=MOST_POSE_STEPS,
         repeats=True,
         noun="step",
-        write=lambda picks: written(map(_step_by_hand, picks)),
-        fields=(*_PLACE, *(_TURN if subject.is_free else ())),
+        write=lambda picks: written(map(step, picks)),
+        fields=tuple(fields),
     )
 
 
-def _step_by_hand(pick: Pick) -> PoseStep:
-    x, y, z, *turn = pick.numbers
-    return PoseStep(pick.place + 1, (x, y, z), (turn[0], turn[1], turn[2]) if turn else None)
-
-
-KIT_LABEL = "blocks"
-_LEAST_TURN_DEG, _LEAST_DEG, _MOST_DEG = 10.0, 10.0, 75.0
-
-
-class PosePictures(Studio):
-    """Pictures of assembly tasks: the goal from every view, then the sheet of the candidates."""
+class PosePictures(Pictures):
+    """Pictures of scenes: the goal from every view, then the sheet of the candidates."""
 
     def __init__(
-        self,
-        folder: Path,
-        style: PictureStyle,
-        views: tuple[View | ViewSpec, ...],
-        shop: Workshop | int,
+        self, shop: Workshop, style: PictureStyle, views: tuple[View | ViewSpec, ...]
     ) -> None:
-        super().__init__(folder, shop)
+        super().__init__(shop)
         # The prompt says that the sheet has one scale, whatever other pictures of candidates have.
-        self._style = replace(style, candidate_scale="common")
-        self._views = views
+        style = replace(style, candidate_scale="common")
+        self._seen = []
+        for view in views:
+            azimuth_deg, elevation_deg = direction_deg(view)
+            name = f"azimuth {azimuth_deg:g}°, elevation {elevation_deg:g}°"
+            name = name if isinstance(view, ViewSpec) else view
+            seen = replace(style, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
+            self._seen.append((name, seen))
 
-    async def of(self, task: AssemblyTask) -> tuple[Image, ...]:
-        """The pictures of one task; StoreError where the cache folder cannot be written."""
-        name = _name(task)
-        recent = self.recalled(name)
-        return recent or self.remembered(name, await self.images(self._drawings(task)))
-
-    def outline(self, task: AssemblyTask) -> tuple[tuple[Image, ...], bool]:
-        """The pictures as far as they are at hand, and whether all are; nothing is rendered."""
-        side = written_style(self._style).size_px
-        return self.outlined(self._drawings(task), (side, side))
-
-    def keys(self, task: AssemblyTask) -> tuple[str, ...]:
-        """Return what decides the pixels of a task's pictures."""
-        return tuple(drawing.key for drawing in self._drawings(task))
-
-    def _drawings(self, task: AssemblyTask) -> tuple[Drawing, ...]:
-        seen = [_seen(self._style, view) for view in self._views]
-        style = written_style(seen[0][1])
-        sheet = partial(kit_png, task.candidates, style)
-        drawings = [Drawing(KIT_LABEL, kit_key(task.candidates, style), sheet)]
-        goal = task.goal if isinstance(task, ShownTask) else task
-        if goal is not None:
-            drawings = [*(self._goal(goal, name, one) for name, one in seen), *drawings]
-        return tuple(drawings)
-
-    def _goal(self, task: AssemblyTask, name: str, style: PictureStyle) -> Drawing:
-        style = written_style(goal_style(task.scene, style))
-        make = partial(ruled_png, task.scene, style)
-        return Drawing(f"goal, {name}", ruled_key(task.scene, style), make)
+    def draw(self, item: AssemblyTask) -> tuple[Drawing, ...]:
+        """Return the goal, where it is shown, from every view, and the sheet from the first."""
+        drawings = []
+        if (goal := goal_of(item)) is not None:
+            for name, seen in self._seen:
+                style = written_style(goal_style(goal.scene, seen))
+                key, make = ruled_key(goal.scene, style), partial(ruled_png, goal.scene, style)
+                drawings.append(Drawing(f"goal, {name}", key, make, (style.size_px, style.size_px)))
+        style = written_style(self._seen[0][1])
+        key, make = kit_key(item.candidates, style), partial(kit_png, item.candidates, style)
+        return (*drawings, Drawing(KIT_LABEL, key, make, (style.size_px, style.size_px)))
 
 
 def shows_three_sides(view: View | ViewSpec) -> bool:
     """True if a block that is seen so shows its top and two sides, as the sheet of blocks needs."""
-    azimuth_deg, elevation_deg = _direction(view)
+    azimuth_deg, elevation_deg = direction_deg(view)
     off_axis_deg = abs((azimuth_deg + 45) % 90 - 45)
     return off_axis_deg >= _LEAST_TURN_DEG and _LEAST_DEG <= elevation_deg <= _MOST_DEG
 
 
-def _direction(view: View | ViewSpec) -> tuple[float, float]:
-    if isinstance(view, ViewSpec):
-        return view.azimuth_deg, view.elevation_deg
-    return VIEWS[view]
+def direction_deg(view: View | ViewSpec) -> tuple[float, float]:
+    """Return azimuth and elevation of a view [degrees]."""
+    return (view.azimuth_deg, view.elevation_deg) if isinstance(view, ViewSpec) else VIEWS[view]
 
 
-def _seen(style: PictureStyle, view: View | ViewSpec) -> tuple[str, PictureStyle]:
-    """A view as words for people, and the style that looks from there."""
-    azimuth_deg, elevation_deg = _direction(view)
-    name = f"azimuth {azimuth_deg:g}°, elevation {elevation_deg:g}°"
-    if not isinstance(view, ViewSpec):
-        name = view
-    return name, replace(style, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
-
-
-def _name(task: AssemblyTask) -> str:
-    """Tells apart the ways in which a task is shown."""
-    if not isinstance(task, ShownTask):
-        return task.key
-    return f"{task.key} {task.order} {task.goal and task.goal.key}"
-
-
-class PosePlanning(WholePlanTrack[PoseRules, PosePictures]):
-    """Prompt, parse and score of the track; pictures and physics are worked out elsewhere."""
+class PosePlanning(SceneTrack, SingleTrack[AssemblyTask]):
+    """Asks for a plan with the place of every block, and carries it out."""
 
     name = "pose_planning"
+    title = "Pose planning"
+    asks = "a whole plan with the place of every block"
+    section = (
+        "pose",
+        PoseSpec,
+        "How poses are asked for in the pose_planning track, and how plans are carried out.",
+    )
+    template = bundled("prompts", "pose_planning.j2")
+    json_template = bundled("prompts", "pose_planning_json.j2")
+    prompt_field = ("pose", "prompt")
+    subject = PoseSubject
+    baselines = POSE_RULES
+    by_hand = staticmethod(pick_poses)
+    record = PoseRecord
+    counted = (RIGHT, FITS, CARRIED, ERRORS, *PLANS.values())
+    tables = ("table_c", "pose_errors")
+    varies = ("prompt", "background", "candidate_order", "repeats")
+    no_examples = "one would need the floor and the sheet of blocks of a scene of its own"
+    drawn_here = "the floor is ruled in pictures that are drawn here"
 
-    def __init__(
-        self,
-        rules: PoseRules,
-        prompt: Prompt | None = None,
-        pictures: PosePictures | None = None,
-        items: Sequence[AssemblyTask] = (),
-        showing: TaskShowing = AS_IN_FILE,
-    ) -> None:
-        """`prompt` and `pictures` are None where every model is a recording."""
-        super().__init__(rules, prompt, pictures, items, showing)
+    def __init__(self, opening: Opening) -> None:
+        """Open the track."""
+        self.spec = opening.suite.section(PoseSpec)
+        super().__init__(opening)
+
+    @classmethod
+    def report(cls) -> TrackReport:
+        """Return what tables and figures are made by."""
+        from phyblock.tracks.pose_planning_results import REPORT
+
+        return REPORT
+
+    @classmethod
+    def physics(cls, suite: Mapping[str, Any]) -> bool:
+        """True: every plan is carried out."""
+        del suite
+        return True
+
+    def open_pictures(self, shop: Workshop) -> Pictures:
+        """Return goals and sheets of blocks; SpecError for a first view from which blocks of the
+        sheet cannot be told apart.
+        """
+        super().open_pictures(shop)
+        first = self.spec.views[0]
+        if shows_three_sides(first):
+            return PosePictures(shop, picture_style(self.suite.images), self.spec.views)
+        name = first if isinstance(first, str) else "a view along an axis, or too steep or too flat"
+        problem = Problem(
+            self.suite.where("pose", "views"),
+            "the sheet of blocks is seen from the first view, and blocks look alike from there",
+            "pose.views[0]",
+            name,
+            "first oblique, or an azimuth 10 degrees off the axes and an elevation of 10 to 75; "
+            "others after it",
+            hint=f"put oblique first: views: [oblique, {name}]" if isinstance(first, str) else "",
+        )
+        raise SpecError(problem)
 
     def shown(self, item: AssemblyTask, seed: int) -> AssemblyTask:
-        """The scene as a seed shows it; where steps bring a rotation, each kind once, upright."""
+        """Return the scene as a seed shows it; with a free rotation each kind once, upright."""
         shown = super().shown(item, seed)
-        if not self.rules.is_free:
+        if not self.spec.is_free:
             return shown
         kit, numbers = upright(shown.candidates)
         if isinstance(shown, ShownTask):
@@ -1031,31 +947,29 @@ class PosePlanning(WholePlanTrack[PoseRules, PosePictures]):
         return ShownTask(shown.scene, kit, shown.composite, numbers, shown, seed)
 
     def identity(self) -> dict[str, Any]:
-        """Name and version of the prompt, a digest of all that decides the pictures, the
-        versions of the reader and of how plans are carried out, and the physics engine where it is
-        another one than PyBullet.
+        """Return what decides its results, with the version of how plans are carried out, and the
+        physics engine where it is another one than PyBullet.
         """
-        return {
-            **super().identity(),
-            READER: READER_VERSION,
-            CARRYING: CARRY_VERSION,
-            **engine_identity(),
-        }
+        return {**super().identity(), CARRYING: CARRY_VERSION, **engine_identity()}
 
-    def outlines(self, item: AssemblyTask) -> Iterator[tuple[Request, bool]]:
-        """The one request, made without rendering, and whether its pictures are the real ones."""
-        yield from super().outlines(item if isinstance(item, ShownTask) else self.shown(item, 0))
+    def form(self, item: AssemblyTask) -> AnswerForm[Any] | None:
+        """Return the form in which a plan is asked for; None where that is text."""
+        if self.suite.answer_format == "text":
+            return None
+        return pose_form(len(item.candidates), free=self.spec.is_free)
 
-    def facts(self, item: AssemblyTask, pictures: tuple[Image, ...]) -> dict[str, object]:
+    def facts(self, item: AssemblyTask, pictures: Sequence[Image]) -> dict[str, object]:
         """Return the variables of templates; nothing in it gives an answer away."""
-        return {**super().facts(item, pictures), "rotation": self.rules.rotation}
+        return {**super().facts(item, pictures), "rotation": self.spec.rotation}
 
-    def _subject(self, item: AssemblyTask) -> PoseSubject:
-        return PoseSubject(item.scene, item.candidates, self.rules.is_free)
+    def subject_of(self, item: AssemblyTask) -> PoseSubject:
+        """Return what baselines answer about."""
+        return PoseSubject(item.scene, item.candidates, self.spec.is_free)
 
     def judge(self, item: AssemblyTask, text: str | None) -> PoseJudgement:
         """Read, score and carry out a reply; None, where there is none, is an empty plan."""
-        return judge_poses(item, text, self.rules)
+        suite = self.suite
+        return judge_poses(item, text, self.spec, suite.settings, suite.scoring.matchers)
 
     async def judge_apart(
         self, item: AssemblyTask, text: str | None, earlier: Record | None
@@ -1065,89 +979,9 @@ class PosePlanning(WholePlanTrack[PoseRules, PosePictures]):
         A plan that an earlier record holds is not carried out again.
         """
         known = earlier if isinstance(earlier, PoseRecord) else None
-        work = partial(judge_poses, item, text, self.rules, known)
-        if self._pictures is None:
-            return await asyncio.to_thread(work)
-        return await self._pictures.work_out(work)
+        rules = (self.spec, self.suite.settings, self.suite.scoring.matchers, known)
+        found: PoseJudgement = await self.work_out(partial(judge_poses, item, text, *rules))
+        return found
 
 
-def open_pose_planning(opening: Opening) -> PosePlanning:
-    """The track; SpecError, DataError or PromptError with what is wrong."""
-    suite = opening.suite
-    poses = suite.section(PoseSpec)
-    tasks = select_tasks(opening.dataset.tasks, suite.levels, opening.limit)
-    showing = task_showing(suite, PoseSpec, "pose", tasks, opening.dataset.tasks)
-    rules = _rules(suite, poses)
-    if not opening.with_prompts:
-        return PosePlanning(rules, items=tasks, showing=showing)
-    check_drawn(suite, "the floor is ruled in pictures that are drawn here")
-    _check_sheet(suite, poses)
-    style = picture_style(suite.images)
-    pictures = PosePictures(picture_folder(), style, poses.views, opening.shop)
-    prompt = template_prompt(suite, PosePlanning.name)
-    return PosePlanning(rules, prompt, pictures, tasks, showing)
-
-
-def _check_sheet(suite: Suite, poses: PoseSpec) -> None:
-    """Raise SpecError for a first view from which blocks of the sheet cannot be told apart."""
-    first = poses.views[0]
-    if shows_three_sides(first):
-        return
-    name = first if isinstance(first, str) else "a view along an axis, or too steep or too flat"
-    problem = Problem(
-        suite.where("pose", "views"),
-        "the sheet of blocks is seen from the first view, and blocks look alike from there",
-        "pose.views[0]",
-        name,
-        "first oblique, or an azimuth 10 degrees off the axes and an elevation of 10 to 75; others "
-        "after it",
-        hint=f"put oblique first: views: [oblique, {name}]" if isinstance(first, str) else "",
-    )
-    raise SpecError(problem)
-
-
-def _rules(suite: Suite, poses: PoseSpec) -> PoseRules:
-    """Return the rules by which a suite parses, scores and executes plans with poses."""
-    return PoseRules(
-        poses.rotation,
-        suite.settings,
-        suite.scoring.matchers,
-        ExecutionLimits(poses.overlap_cm, poses.stand_cm, poses.stand_deg),
-        poses.reached_cm,
-        poses.reached_deg,
-        suite.answer_format,
-    )
-
-
-def _report() -> TrackReport:
-    from phyblock.tracks.pose_planning_results import REPORT
-
-    return REPORT
-
-
-TRACK = TrackKind(
-    name=PosePlanning.name,
-    title="Pose planning",
-    item="scene",
-    about="a whole plan with the place of every block",
-    open=open_pose_planning,
-    report=_report,
-    subject=PoseSubject,
-    baselines=POSE_RULES,
-    physics=lambda _: True,
-    section=(
-        "pose",
-        PoseSpec,
-        "How poses are asked for in the pose_planning track, and how plans are carried out.",
-    ),
-    record=PoseRecord,
-    template=bundled("prompts", "pose_planning.j2"),
-    json_template=bundled("prompts", "pose_planning_json.j2"),
-    prompt_field=("pose", "prompt"),
-    counted=COUNTED,
-    tables=("table_c", "pose_errors"),
-    rescored=True,
-    no_examples="one would need the floor and the sheet of blocks of a scene of its own",
-    by_hand=pick_poses,
-    varies=("prompt", "background", "candidate_order", "repeats"),
-)
+TRACK = PosePlanning

@@ -20,7 +20,7 @@ from phyblock.sim.engine import described_engine
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.geometry import put, upright
 from phyblock.text import counted
-from phyblock.tracks.base import CARRYING, ENGINE, FIRST_CARRYING
+from phyblock.tracks.base import CARRYING, ENGINE
 from phyblock.tracks.measures import (
     EpisodeView,
     HeadlineColumn,
@@ -278,8 +278,8 @@ def _check_alike(run: Run, first: Run, _: Sequence[str], measure: Measure) -> No
     """Return the version of execution for measures of the world; F1 does not depend on it."""
     if measure.counted not in (CARRIED, ERRORS):
         return
-    for key, unsaid in ((CARRYING, FIRST_CARRYING), (ENGINE, None)):
-        found, wanted = (one.manifest.tracks.get(NAME, {}).get(key, unsaid) for one in (run, first))
+    for key in (CARRYING, ENGINE):
+        found, wanted = (one.manifest.tracks.get(NAME, {}).get(key) for one in (run, first))
         if found != wanted:
             message = f"carried plans out otherwise than {first.path}, which decides {measure.name}"
             hint = "run the older one again, or compare by f1_c"

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
@@ -30,10 +30,9 @@ FORM_FACTS = ("answer_schema", "answer_example")
 """The names by which templates say the JSON that is asked for."""
 
 _LARGEST_BYTES = 256 * 1024
-_BLOCKS = ("system", "user")
-_COMMON_BLOCKS = (*_BLOCKS, "caption")
+_COMMON_BLOCKS = ("system", "user", "caption")
 _ALL_BLOCKS = (*_COMMON_BLOCKS, "answer", "turn", "check")
-"""Blocks that bundled templates have; another would say its text to nobody."""
+"""Blocks that bundled templates have; nothing would send another."""
 _HEAD = (nodes.Assign, nodes.AssignBlock, nodes.FromImport, nodes.Import, nodes.Macro)
 """Statements outside of blocks that the blocks can use."""
 _NAMING = (nodes.Extends, nodes.Include, nodes.Import, nodes.FromImport)
@@ -45,11 +44,6 @@ def form_facts(form: AnswerForm[Any] | None) -> dict[str, object]:
         return {"answer_format": "text", **dict.fromkeys(FORM_FACTS)}
     facts = (json.dumps(form.schema), form.example)
     return {"answer_format": "json_schema", **dict(zip(FORM_FACTS, facts, strict=True))}
-
-
-def response_format(form: AnswerForm[Any] | None) -> Mapping[str, object] | None:
-    """Return what a request says of the form of the answer; nothing for text."""
-    return None if form is None else form.response_format
 
 
 class Prompt(Protocol):
@@ -89,81 +83,6 @@ class OfficialPrompt:
         return (Message("user", (*pictures, self.text)),)
 
 
-@dataclass(frozen=True)
-class _Source:
-    path: Path
-    text: str
-    tree: nodes.Template
-    naming: tuple[Any, ...]
-    """Statements that name other files."""
-
-
-def _read(path: Path) -> _Source:
-    try:
-        text = read_text(path, _LARGEST_BYTES)
-    except (OSError, ValueError) as error:
-        why = reason_of(error) if isinstance(error, OSError) else f"it {error}"
-        raise PromptError(Problem(str(path), f"cannot be read: {why}")) from error
-    try:
-        tree = jinja2.Environment().parse(text)
-        return _Source(path, text, tree, tuple(tree.find_all(_NAMING)))
-    except Exception as error:
-        # Python has bounds of its own on how deep a text may be nested.
-        line = getattr(error, "lineno", None)
-        where = str(path) if line is None else f"{path}:{line}"
-        raise PromptError(Problem(where, f"is not valid Jinja: {reason_of(error)}")) from error
-
-
-def _read_included(main: _Source, folders: Sequence[Path]) -> dict[str, _Source]:
-    """Read what a template includes or imports, at any depth, by the names it uses."""
-    included: dict[str, _Source] = {}
-    todo = [main]
-    while todo:
-        source = todo.pop()
-        for node in source.naming:
-            where = f"{source.path}:{node.lineno}"
-            if isinstance(node, nodes.Extends):
-                hint = "use {% include %} or {% import %}"
-                raise PromptError(Problem(where, "a prompt cannot extend another", hint=hint))
-            for name, path in _named(node, folders, where):
-                if name not in included:
-                    included[name] = _read(path)
-                    todo.append(included[name])
-    return included
-
-
-def _named(node: Any, folders: Sequence[Path], where: str) -> list[tuple[str, Path]]:
-    """Return the files that a statement names; PromptError where there is none.
-
-    Beside templates lie other files, which may hold keys: only files that end in .j2 may be sent.
-    """
-    named = list(jinja2.meta.find_referenced_templates(nodes.Template([node])))
-    names = [name for name in named if name]
-    if not names or len(names) < len(named):
-        message = "includes a file that is not named in quotes: what is sent would not be known"
-        raise PromptError(Problem(where, message))
-    found = []
-    for name in names:
-        inside = PurePosixPath(name)
-        if inside.is_absolute() or ".." in inside.parts or "\\" in name:
-            allowed = "a file beside the template, or below it"
-            raise PromptError(
-                Problem(where, "includes a file of another folder", "", name, allowed)
-            )
-        path = next((folder / inside for folder in folders if (folder / inside).is_file()), None)
-        if path is None:
-            continue
-        real = path.resolve()
-        if real.suffix != ".j2" or any(part.startswith(".") for part in (*inside.parts, real.name)):
-            allowed = "a file that ends in .j2, of which no part begins with a dot"
-            raise PromptError(Problem(where, "includes what is no template", "", name, allowed))
-        found.append((name, path))
-    if not found and not getattr(node, "ignore_missing", False):
-        allowed = f"a file in {' or '.join(map(str, folders))}"
-        raise PromptError(Problem(where, "no such file", "", ", ".join(names), allowed))
-    return found
-
-
 class TemplatePrompt:
     """A Jinja template with a block `user` and, if wanted, blocks `system` and `caption`.
 
@@ -181,11 +100,13 @@ class TemplatePrompt:
         """`like` is the template in whose place it stands: it may have the blocks of that one."""
         self.name = name
         self._path = path
-        self._main = _read(path)
-        self._included = _read_included(self._main, (path.parent, bundled("prompts")))
-        digest = hashlib.sha256(self._main.text.encode())
-        for inner, source in sorted(self._included.items()):
-            digest.update(f"\0{inner}\0{hex_digest(source.text)}".encode())
+        self._texts = {"": (path, _text_of(path))}
+        self._trees = {"": _tree_of(path, self._texts[""][1])}
+        self._read_included((path.parent, bundled("prompts")))
+        digest = hashlib.sha256(self._texts[""][1].encode())
+        for inner, (_, text) in sorted(self._texts.items()):
+            if inner:
+                digest.update(f"\0{inner}\0{hex_digest(text)}".encode())
         self.version = digest.hexdigest()
         self._environment = ImmutableSandboxedEnvironment(
             loader=jinja2.FunctionLoader(self._load),
@@ -196,17 +117,19 @@ class TemplatePrompt:
         # It draws words at random: a prompt is the same whenever it is made.
         del self._environment.globals["lipsum"]
         try:
-            tree = self._environment.parse(self._main.text)
-            self._template = self._compiled(tree)
-            tree = self._environment.parse(self._main.text)
-            tree.body = [node for node in tree.body if isinstance(node, _HEAD)]
-            self._head = self._compiled(tree)
+            self._template = self._compiled(head_alone=False)
+            self._head = self._compiled(head_alone=True)
         except Exception as error:
             # Python compiles what Jinja makes of it, and has bounds of its own.
             message = f"is not valid Jinja: {reason_of(error)}"
             raise PromptError(Problem(str(path), message)) from error
         self.require("user", "and, if wanted, a block system")
-        self._check_blocks(_ALL_BLOCKS if like is None else (*_COMMON_BLOCKS, *like.blocks))
+        known = _ALL_BLOCKS if like is None else tuple({*_COMMON_BLOCKS, *like.blocks})
+        for node in self._trees[""].body:
+            if isinstance(node, nodes.Block) and node.name not in known:
+                where, hint = f"{path}:{node.lineno}", did_you_mean(node.name, known)
+                allowed, message = ", ".join(sorted(known)), "is a block that nothing uses"
+                raise PromptError(Problem(where, message, "", node.name, allowed, hint))
 
     @property
     def blocks(self) -> tuple[str, ...]:
@@ -216,25 +139,23 @@ class TemplatePrompt:
     @property
     def included(self) -> tuple[Path, ...]:
         """Files that it includes or imports."""
-        return tuple(source.path for source in self._included.values())
+        return tuple(path for name, (path, _) in self._texts.items() if name)
 
     @property
     def unsent_line(self) -> int | None:
         """The first line with text that stands outside of blocks, and so is sent to nobody."""
-        for node in self._main.tree.body:
-            parts = node.nodes if isinstance(node, nodes.Output) else []
-            for part in parts:
+        for node in self._trees[""].body:
+            for part in node.nodes if isinstance(node, nodes.Output) else ():
                 if isinstance(part, nodes.TemplateData) and part.data.strip():
-                    before = len(part.data) - len(part.data.lstrip())
-                    return part.lineno + part.data[:before].count("\n")
+                    before = part.data[: len(part.data) - len(part.data.lstrip())]
+                    return part.lineno + before.count("\n")
         return None
 
     @property
     def says_form(self) -> bool:
         """True if it uses a name that tells the JSON that is asked for."""
         find = jinja2.meta.find_undeclared_variables
-        sources = (self._main, *self._included.values())
-        return any(not find(one.tree).isdisjoint(FORM_FACTS) for one in sources)
+        return any(not find(tree).isdisjoint(FORM_FACTS) for tree in self._trees.values())
 
     def require(self, block: str, more: str) -> None:
         """Raise PromptError where the template lacks a block; `more` is told of what is allowed."""
@@ -248,11 +169,11 @@ class TemplatePrompt:
         self, pictures: Sequence[Image], facts: Mapping[str, object]
     ) -> tuple[Message, ...]:
         """Return a system message, where that block gives text, and one of the user."""
-        texts = {name: self.text(name, facts) for name in _BLOCKS}
-        if not texts["user"]:
+        system, user = self.text("system", facts), self.text("user", facts)
+        if not user:
             raise PromptError(Problem(str(self._path), "says nothing", "block user"))
-        system = (Message("system", (texts["system"],)),) if texts["system"] else ()
-        return (*system, Message("user", (*self._captioned(pictures, facts), texts["user"])))
+        first = (Message("system", (system,)),) if system else ()
+        return (*first, Message("user", (*self._captioned(pictures, facts), user)))
 
     def text(self, block: str, facts: Mapping[str, object]) -> str:
         """Render a block of the template, "" for one that it lacks; raises PromptError."""
@@ -275,24 +196,31 @@ class TemplatePrompt:
             problem = Problem(where, message, f"block {block}", "", known, hint)
             raise PromptError(problem) from error
 
+    def _read_included(self, folders: Sequence[Path]) -> None:
+        """Read what the template includes or imports, at any depth, by the names it uses."""
+        todo = [""]
+        while todo:
+            source = todo.pop()
+            for node in self._trees[source].find_all(_NAMING):
+                for name, path in _named(node, folders, f"{self._texts[source][0]}:{node.lineno}"):
+                    if name not in self._texts:
+                        self._texts[name] = (path, _text_of(path))
+                        self._trees[name] = _tree_of(path, self._texts[name][1])
+                        todo.append(name)
+
     def _load(self, name: str) -> tuple[str, str, None] | None:
-        source = self._included.get(name)
-        return None if source is None else (source.text, str(source.path), None)
+        if name not in self._texts:
+            return None
+        path, text = self._texts[name]
+        return text, str(path), None
 
-    def _compiled(self, tree: nodes.Template) -> jinja2.Template:
+    def _compiled(self, *, head_alone: bool) -> jinja2.Template:
+        tree = self._environment.parse(self._texts[""][1])
+        if head_alone:
+            tree.body = [node for node in tree.body if isinstance(node, _HEAD)]
         code = self._environment.compile(tree, filename=str(self._path))
-        return jinja2.Template.from_code(
-            self._environment, code, self._environment.make_globals(None)
-        )
-
-    def _check_blocks(self, used: Iterable[str]) -> None:
-        """Raise PromptError for a block that no other is around and that nothing would say."""
-        known = tuple(dict.fromkeys(used))
-        for node in self._main.tree.body:
-            if isinstance(node, nodes.Block) and node.name not in known:
-                where, hint = f"{self._path}:{node.lineno}", did_you_mean(node.name, known)
-                allowed, message = ", ".join(known), "is a block that nothing uses"
-                raise PromptError(Problem(where, message, "", node.name, allowed, hint))
+        known = self._environment.make_globals(None)
+        return jinja2.Template.from_code(self._environment, code, known)
 
     def _captioned(
         self, pictures: Sequence[Image], facts: Mapping[str, object]
@@ -314,10 +242,62 @@ class TemplatePrompt:
 
     def _place_of(self, error: Exception) -> str:
         """Return the file and line at which rendering failed."""
-        files = {str(self._path), *(str(source.path) for source in self._included.values())}
+        files = {str(path) for path, _ in self._texts.values()}
         trace, place = error.__traceback__, f"{self._path}:1"
         while trace is not None:
             if trace.tb_frame.f_code.co_filename in files:
                 place = f"{trace.tb_frame.f_code.co_filename}:{trace.tb_lineno}"
             trace = trace.tb_next
         return place
+
+
+def _text_of(path: Path) -> str:
+    try:
+        return read_text(path, _LARGEST_BYTES)
+    except (OSError, ValueError) as error:
+        why = reason_of(error) if isinstance(error, OSError) else f"it {error}"
+        raise PromptError(Problem(str(path), f"cannot be read: {why}")) from error
+
+
+def _tree_of(path: Path, text: str) -> nodes.Template:
+    try:
+        tree = jinja2.Environment().parse(text)
+        # A text may be nested so deep that its tree is parsed and cannot be walked.
+        list(tree.find_all(_NAMING))
+    except Exception as error:
+        line = getattr(error, "lineno", None)
+        where = str(path) if line is None else f"{path}:{line}"
+        raise PromptError(Problem(where, f"is not valid Jinja: {reason_of(error)}")) from error
+    return tree
+
+
+def _named(node: Any, folders: Sequence[Path], where: str) -> list[tuple[str, Path]]:
+    """Return the files that a statement names; PromptError where there is none.
+
+    Beside templates lie other files, which may hold keys: only files that end in .j2 may be sent.
+    """
+    if isinstance(node, nodes.Extends):
+        hint = "use {% include %} or {% import %}"
+        raise PromptError(Problem(where, "a prompt cannot extend another", hint=hint))
+    named = list(jinja2.meta.find_referenced_templates(nodes.Template([node])))
+    names = [name for name in named if name]
+    if not names or len(names) < len(named):
+        message = "includes a file that is not named in quotes: what is sent would not be known"
+        raise PromptError(Problem(where, message))
+    found = []
+    for name in names:
+        inside = PurePosixPath(name)
+        path = next((folder / inside for folder in folders if (folder / inside).is_file()), None)
+        parts = inside.parts if path is None else (*inside.parts, path.resolve().name)
+        is_outside = inside.is_absolute() or "\\" in name
+        is_hidden = any(part.startswith(".") for part in parts)
+        if is_outside or is_hidden or (path is not None and not parts[-1].endswith(".j2")):
+            allowed = "a file that ends in .j2, beside the template or below it, no part of whose "
+            allowed += "path begins with a dot"
+            raise PromptError(Problem(where, "includes what is no template", "", name, allowed))
+        if path is not None:
+            found.append((name, path))
+    if not found and not getattr(node, "ignore_missing", False):
+        allowed = f"a file in {' or '.join(map(str, folders))}"
+        raise PromptError(Problem(where, "no such file", "", ", ".join(names), allowed))
+    return found

@@ -1,4 +1,4 @@
-"""Questions with four options, in 16 subtasks."""
+"""Questions with four options, in 16 subtasks: the track `vqa`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import csv
 import functools
 import json
 from collections import Counter
-from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -37,15 +37,7 @@ from phyblock.data import (
     read_questions,
     read_version,
 )
-from phyblock.domain import (
-    LETTERS,
-    SUBTASKS,
-    Question,
-    QuestionPicture,
-    Scene,
-    Subtask,
-    is_picture_option,
-)
+from phyblock.domain import LETTERS, SUBTASKS, Question, Scene, Subtask, is_picture_option
 from phyblock.domain.question import rotated, rotated_label
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.files import OutFolder, read_picture, writing
@@ -65,23 +57,17 @@ from phyblock.sim.question_pictures import (
     sheet_size_px,
 )
 from phyblock.stable import hex_digest
-from phyblock.tracks.base import (
-    AskedOnce,
-    Opening,
-    TrackKind,
-    picture_folder,
-    picture_style,
-    template_prompt,
-)
+from phyblock.tracks.base import Opening, SingleTrack
 from phyblock.tracks.baselines import Choice, Guesses, Picking, Spot
-from phyblock.tracks.items import Elsewhere, Examples, examples_of, spread, stratified
+from phyblock.tracks.items import Elsewhere, examples_of, spread, stratified
 from phyblock.tracks.measures import ItemExport, TrackReport
-from phyblock.tracks.pictures import Drawing, Studio, Workshop, render_workers, to_image
-from phyblock.tracks.prompts import Prompt, form_facts
-from phyblock.types import AnswerFormat, Background, DataFormat
+from phyblock.tracks.pictures import Drawing, Pictures, Workshop, picture_style
+from phyblock.tracks.prompts import form_facts
+from phyblock.types import Background, DataFormat
 
 BUILTIN_QUESTIONS = "phyblock-vqa"
 """The bundled question set that is used when a suite names none."""
+OptionsAs = Literal["images", "letters"]
 
 
 class VqaSpec(PictureControls):
@@ -240,39 +226,6 @@ class ChoiceRecord(Record):
 
 
 @dataclass(frozen=True)
-class VqaRules:
-    """The presentation of questions.
-
-    `circular`: every rotation of the options is asked; `blind`: no picture is sent;
-    `wrong_image`: the pictures are those of a question about another scene.
-    """
-
-    options_as: OptionsAs = "images"
-    circular: bool = False
-    blind: bool = False
-    wrong_image: bool = False
-    answer_format: AnswerFormat = "text"
-
-    def form(self, question: Question) -> AnswerForm[str] | None:
-        """The form in which an answer is asked for; None where that is text."""
-        if self.answer_format == "text":
-            return None
-        return choice_form(question.options, question.subtask == "OR")
-
-    def read(self, question: Question, text: str) -> ParsedAnswer:
-        """The answer that a reply gives."""
-        return parse_answer(text, question.options, question.subtask == "OR")
-
-    def right_answer(self, question: Question) -> str:
-        """A right answer in the form that is asked for."""
-        form, letters = self.form(question), question.answer_letters
-        if form is None:
-            return choice_text(question.answer)
-        value = list(letters) if question.subtask == "OR" else letters
-        return form.write(value, f"The right answer is {', '.join(letters)}.")
-
-
-@dataclass(frozen=True)
 class ChoiceSubject:
     """One of several options is asked for, of a question as it is shown.
 
@@ -291,171 +244,34 @@ def _random_choice(subject: ChoiceSubject, rng: np.random.Generator) -> str:
     return choice_text([int(rng.integers(n))])
 
 
-def _oracle_choice(subject: ChoiceSubject, _: np.random.Generator) -> str:
-    return choice_text(subject.question.answer)
-
-
-def _majority_choice(subject: ChoiceSubject, _: np.random.Generator) -> str:
-    return choice_text(subject.guess("majority"))
-
-
-def _text_choice(subject: ChoiceSubject, _: np.random.Generator) -> str:
-    return choice_text(subject.guess("text-only"))
-
-
 def choice_text(indices: Iterable[int]) -> str:
-    """An answer in the benchmark's own reply form."""
+    """Return an answer in the benchmark's own reply form."""
     return "Answer: " + ", ".join(LETTERS[index] for index in indices)
 
 
-CHOICE_RULES = {
+CHOICE_RULES: Mapping[str, Callable[..., str]] = {
     "random": _random_choice,
-    "oracle": _oracle_choice,
-    "majority": _majority_choice,
-    "text-only": _text_choice,
+    "oracle": lambda subject, _: choice_text(subject.question.answer),
+    "majority": lambda subject, _: choice_text(subject.guess("majority")),
+    "text-only": lambda subject, _: choice_text(subject.guess("text-only")),
 }
-"""Rules by name of the baseline."""
 
 
 def pick_answer(subject: ChoiceSubject) -> Picking:
-    """The letters of the options, with the texts or the pictures that they are."""
+    """Return the choices of a person: the options, by their texts or the pictures that they are."""
     options = subject.question.options
     is_ordering = subject.question.subtask == "OR"
     picked = len(options) if is_ordering else 1
-    return Picking(
-        tuple(
-            Choice(letter, "", (Spot(letter),))
-            if is_picture_option(option)
-            else Choice(letter, option)
-            for letter, option in zip(LETTERS, options, strict=False)
-        ),
-        least=picked,
-        most=picked,
-        repeats=False,
-        noun="place" if is_ordering else "option",
-        write=lambda picks: choice_text([pick.place for pick in picks]),
+    choices = tuple(
+        Choice(letter, "", (Spot(letter),)) if is_picture_option(option) else Choice(letter, option)
+        for letter, option in zip(LETTERS, options, strict=False)
     )
+    noun = "place" if is_ordering else "option"
 
+    def write(picks: Sequence[Any]) -> str:
+        return choice_text([pick.place for pick in picks])
 
-OptionsAs = Literal["images", "letters"]
-SHEET = "options"
-"""The label of the sheet that holds all options."""
-
-_ORDER = ("scene", "block", *LETTERS)
-_MOST_CELL_PX = 1024
-
-
-@dataclass(frozen=True)
-class ShownQuestion:
-    """A question as it is shown, with the picture files, by label, that its data set brings."""
-
-    question: Question
-    files: Mapping[str, Path]
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Labels of its pictures in the order sent: the scene, the block, then the options."""
-        known = {picture.label for picture in self.question.pictures} | set(self.files)
-        return tuple(label for label in _ORDER if label in known)
-
-
-class QuestionPictures(Studio):
-    """The pictures of questions under one style, as many as the question has.
-
-    First the scene, then the block by itself where there is one, then the options A to D: each a
-    picture of its own (`images`), or all on one sheet (`letters`). Questions bring backgrounds of
-    their own, which `background` overrides; those that bring none have the style's.
-    """
-
-    def __init__(
-        self,
-        folder: Path,
-        style: PictureStyle,
-        options_as: OptionsAs,
-        shop: Workshop | int,
-        background: Background | None = None,
-    ) -> None:
-        super().__init__(folder, shop)
-        self._background = background
-        self._style = style
-        self._options_as = options_as
-
-    async def of(self, shown: ShownQuestion) -> tuple[Image, ...]:
-        """The pictures of one question as they are sent.
-
-        Raises DataError when a file is missing or no picture, StoreError when the cache folder
-        cannot be written.
-        """
-        drawings = self._drawings(shown)
-        name = " ".join(f"{drawing.label}={drawing.key}" for drawing in drawings)
-        recent = self.recalled(name)
-        return recent or self.remembered(name, await self.images(drawings))
-
-    def outline(self, shown: ShownQuestion) -> tuple[tuple[Image, ...], bool]:
-        """The pictures as far as they are at hand, and whether all are; nothing is rendered."""
-        drawings = self._drawings(shown)
-        side = self._style.size_px
-        images, are_real = self.outlined(drawings, (side, side))
-        if are_real:
-            return images, True
-        sheet = sheet_size_px(len(LETTERS), self._cell_px)
-        return tuple(
-            Image(b"", image.label, *sheet) if image.label == SHEET else image for image in images
-        ), False
-
-    def keys(self, shown: ShownQuestion) -> tuple[str, ...]:
-        """Return what decides the pixels of a question's pictures."""
-        return tuple(drawing.key for drawing in self._drawings(shown))
-
-    @property
-    def _cell_px(self) -> int:
-        return min(self._style.size_px, _MOST_CELL_PX)
-
-    def _drawings(self, shown: ShownQuestion) -> tuple[Drawing, ...]:
-        drawings = [self._drawing(shown, label) for label in shown.labels]
-        options = [drawing for drawing in drawings if drawing.label in LETTERS]
-        if not options or self._options_as == "images":
-            return tuple(drawings)
-        letters = "".join(drawing.label for drawing in options)
-        parts = " ".join(drawing.key for drawing in options)
-        text = f"sheet {LETTERED_VERSION} {self._cell_px} {letters} {parts}"
-        key = hex_digest(text)
-        makes = tuple(drawing.make for drawing in options)
-        sheet = Drawing(SHEET, key, partial(_sheet, makes, letters, self._cell_px))
-        return (*(drawing for drawing in drawings if drawing.label not in LETTERS), sheet)
-
-    def _drawing(self, shown: ShownQuestion, label: str) -> Drawing:
-        if label in shown.files:
-            path = shown.files[label]
-            key = hex_digest(read_picture(path))
-            return Drawing(label, key, partial(read_picture, path))
-        recipe = _recipe(shown.question, label)
-        recipe = replace(recipe, background=self._background or recipe.background)
-        key = question_key(recipe, self._style)
-        return Drawing(label, key, partial(question_png, recipe, self._style))
-
-    async def image(self, drawing: Drawing) -> Image:
-        """A picture from the cache, or made now; files are read and not copied into the cache."""
-        if isinstance(drawing.make, partial) and drawing.make.func is read_picture:
-            return to_image(drawing.make(), drawing.label)
-        return await super().image(drawing)
-
-    def kept(self, drawing: Drawing) -> Image | None:
-        """A picture that is at hand."""
-        if isinstance(drawing.make, partial) and drawing.make.func is read_picture:
-            return to_image(drawing.make(), drawing.label)
-        return super().kept(drawing)
-
-
-def _recipe(question: Question, label: str) -> QuestionPicture:
-    for recipe in question.pictures:
-        if recipe.label == label:
-            return recipe
-    raise DataError(Problem(f"question {question.id}", "has no such picture", "pictures", label))
-
-
-def _sheet(makes: Sequence[Callable[[], bytes]], letters: str, side_px: int) -> bytes:
-    return lettered_sheet_png([make() for make in makes], letters, side_px)
+    return Picking(choices, least=picked, most=picked, repeats=False, noun=noun, write=write)
 
 
 @dataclass(frozen=True)
@@ -467,21 +283,31 @@ class AskedQuestion:
     is_one_of_many: bool = False
 
     @functools.cached_property
-    def shown(self) -> ShownQuestion:
-        """The question with its options and the files of their pictures rotated."""
-        n = len(self.task.question.options)
-        files = {rotated_label(at, self.rotation, n): path for at, path in self.task.files.items()}
-        return ShownQuestion(rotated(self.task.question, self.rotation), files)
-
-    @property
     def question(self) -> Question:
         """The question as it is shown."""
-        return self.shown.question
+        return rotated(self.task.question, self.rotation)
+
+    @functools.cached_property
+    def files(self) -> Mapping[str, Path]:
+        """Picture files that its data set brings, by the labels under which they are shown."""
+        n = len(self.task.question.options)
+        return {rotated_label(at, self.rotation, n): path for at, path in self.task.files.items()}
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of its pictures in the order sent: the scene, the block, then the options."""
+        known = {picture.label for picture in self.question.pictures} | set(self.files)
+        return tuple(label for label in ("scene", "block", *LETTERS) if label in known)
 
     @property
     def key(self) -> str:
         """The question's id, with the rotation where all are asked."""
-        return f"{self.task.key}-r{self.rotation}" if self.is_one_of_many else self.task.key
+        return self.shown_as if self.is_one_of_many else self.task.key
+
+    @property
+    def shown_as(self) -> str:
+        """A name that tells apart what can be shown of the question."""
+        return f"{self.task.key}-r{self.rotation}"
 
     @property
     def scene(self) -> Scene:
@@ -489,9 +315,61 @@ class AskedQuestion:
         return self.task.scene
 
 
+SHEET = "options"
+"""The label of the sheet that holds all options."""
+_MOST_CELL_PX = 1024
+
+
+class QuestionPictures(Pictures):
+    """The pictures of questions: the scene, one block by itself where there is one, the options.
+
+    Options that are pictures are sent apart (`images`), or all on one sheet (`letters`). Questions
+    bring backgrounds of their own, which `background` overrides; those that bring none have the
+    style's.
+    """
+
+    def __init__(
+        self,
+        shop: Workshop,
+        style: PictureStyle,
+        options_as: OptionsAs,
+        background: Background | None = None,
+    ) -> None:
+        super().__init__(shop)
+        self._style, self._options_as, self._background = style, options_as, background
+
+    def draw(self, item: AskedQuestion) -> tuple[Drawing, ...]:
+        """Return the pictures of a question; DataError for a picture that is not there."""
+        drawings = [self._drawing(item, label) for label in item.labels]
+        options = [drawing for drawing in drawings if drawing.label in LETTERS]
+        if not options or self._options_as == "images":
+            return tuple(drawings)
+        cell_px = min(self._style.size_px, _MOST_CELL_PX)
+        letters = "".join(drawing.label for drawing in options)
+        parts = " ".join(drawing.key for drawing in options)
+        key = hex_digest(f"sheet {LETTERED_VERSION} {cell_px} {letters} {parts}")
+        make = partial(_sheet, tuple(drawing.make for drawing in options), letters, cell_px)
+        sheet = Drawing(SHEET, key, make, sheet_size_px(len(options), cell_px))
+        return (*(drawing for drawing in drawings if drawing.label not in LETTERS), sheet)
+
+    def _drawing(self, item: AskedQuestion, label: str) -> Drawing:
+        if label in item.files:
+            path = item.files[label]
+            key = hex_digest(read_picture(path))
+            return Drawing(label, key, partial(read_picture, path), is_file=True)
+        recipe = next(one for one in item.question.pictures if one.label == label)
+        recipe = replace(recipe, background=self._background or recipe.background)
+        key, make = question_key(recipe, self._style), partial(question_png, recipe, self._style)
+        return Drawing(label, key, make, (self._style.size_px, self._style.size_px))
+
+
+def _sheet(makes: Sequence[Callable[[], bytes]], letters: str, side_px: int) -> bytes:
+    return lettered_sheet_png([make() for make in makes], letters, side_px)
+
+
 @dataclass(frozen=True)
 class ChoiceJudgement:
-    """A reply as it was parsed, and whether it is right."""
+    """A reply as it was read, and the right letters."""
 
     parsed: ParsedAnswer
     right: str
@@ -502,7 +380,7 @@ class ChoiceJudgement:
         return self.parsed.rule is not None
 
     def fields(self) -> dict[str, Any]:
-        """`parse`, `scores` (none: there are no steps) and `answer` of the record."""
+        """Return `parse`, `scores` (none: there are no steps) and `answer` of the record."""
         given = self.parsed.letters
         problem = {"problem": self.parsed.problem} if self.parsed.problem else {}
         return {
@@ -512,66 +390,127 @@ class ChoiceJudgement:
         }
 
 
-class Vqa(AskedOnce[AskedQuestion, QuestionPictures]):
-    """Prompt, parse and score of the track."""
+class Vqa(SingleTrack[AskedQuestion]):
+    """Asks questions with four options."""
 
     name = "vqa"
+    title = "VQA"
+    item = "question"
+    asks = "multiple-choice questions"
+    section = (name, VqaSpec, "The questions of the vqa track, and how they are shown.")
+    template = bundled("prompts", "vqa.j2")
+    json_template = bundled("prompts", "vqa_json.j2")
+    prompt_field = (name, "prompt")
+    subject = ChoiceSubject
+    baselines = CHOICE_RULES
+    by_hand = staticmethod(pick_answer)
+    record = ChoiceRecord
+    tables = ("table2", "letters")
+    varies = ("prompt", "background", "examples", "repeats")
+    no_examples = ""
 
-    def __init__(
-        self,
-        rules: VqaRules,
-        questions: QuestionSet,
-        tasks: Sequence[QuestionTask],
-        prompt: Prompt | None = None,
-        pictures: QuestionPictures | None = None,
-        examples: Examples[AskedQuestion] | None = None,
-    ) -> None:
-        """Ask `tasks` out of `questions`, of which all serve as wrong pictures and for baselines.
-
-        `prompt` and `pictures` are None where every model is a recording. Raises SpecError where
-        wrong pictures are wanted and some question has no other scene to take them from.
-        """
-        super().__init__(prompt, pictures, examples)
-        rotations = range(len(LETTERS)) if rules.circular else range(1)
-        self.rules = rules
-        self.items = tuple(
-            AskedQuestion(task, rotation, is_one_of_many=rules.circular)
-            for task in tasks
-            for rotation in rotations
+    def __init__(self, opening: Opening) -> None:
+        """Select questions; SpecError where there is none, or wrong pictures cannot be had."""
+        suite = opening.suite
+        self.spec = spec = suite.section(VqaSpec)
+        folder = suite.files.folders[self.name]
+        self.questions = known = open_questions(spec.format, folder, opening.dataset)
+        tasks = select_questions(
+            known.tasks, spec.subtasks, suite.levels, spec.per_subtask, opening.limit
         )
-        self._questions = questions
-        self._guesses = Guesses([task.question for task in questions.tasks])
-        self._elsewhere: Elsewhere[QuestionTask] | None = None
-        if rules.wrong_image:
-            self._elsewhere = elsewhere_in(questions)
+        if not tasks:
+            where = suite.where("vqa", "subtasks")
+            found = ", ".join(sorted({task.question.subtask for task in known.tasks}))
+            message = "no question is of these subtasks and levels"
+            raise SpecError(Problem(where, message, "vqa.subtasks", found=f"questions of {found}"))
+        self.items = tuple(
+            AskedQuestion(task, rotation, is_one_of_many=spec.circular)
+            for task in tasks
+            for rotation in range(spec.rotations)
+        )
+        self._guesses = Guesses([task.question for task in known.tasks])
+        self._elsewhere = Elsewhere(known.tasks, _sort_of) if spec.wrong_image else None
+        if self._elsewhere is not None:
             self._elsewhere.check(tasks, "question", "vqa.wrong_image")
+        super().__init__(opening)
+        if self.shop is not None:
+            pool = map(AskedQuestion, known.tasks)
+            asked = [AskedQuestion(task) for task in tasks]
+            self.examples = examples_of(suite, pool, asked, "question", _subtask)
+
+    @classmethod
+    def report(cls) -> TrackReport:
+        """Return what tables and figures are made by."""
+        from phyblock.tracks.vqa_results import REPORT
+
+        return REPORT
+
+    @classmethod
+    def data_folder(cls, suite: Suite) -> tuple[str, tuple[str, ...], bool] | None:
+        """Return the folder of the question set, which may be a bundled one."""
+        spec = suite.section(VqaSpec)
+        return spec.path, ("vqa", "path"), spec.format == "builtin"
+
+    @classmethod
+    def data_root(cls, manifest: Manifest) -> str | None:
+        """Return where a run found its questions."""
+        return None if manifest.questions is None else manifest.questions.root
+
+    @classmethod
+    def manifest(cls, suite: Suite) -> Mapping[str, Any]:
+        """Return the question set of a run."""
+        spec, root = suite.section(VqaSpec), suite.files.folders[cls.name]
+        about = {"format": spec.format, "root": str(root), "version": read_version(root)}
+        return {"questions": about}
+
+    def open_pictures(self, shop: Workshop) -> Pictures:
+        """Return the pictures of questions as a suite wants them."""
+        images = self.suite.images
+        style = picture_style(images)
+        return QuestionPictures(shop, style, self.spec.options_as, images.background)
 
     def about(self, item: AskedQuestion) -> dict[str, Any]:
-        """The question and how it is shown."""
+        """Return the question and how it is shown."""
         return {
             "question": {
                 "id": item.question.id,
                 "subtask": item.question.subtask,
                 "category": item.question.category,
                 "rotation": item.rotation,
-                "options_as": self.rules.options_as,
-                "blind": self.rules.blind,
-                "wrong_image": self.rules.wrong_image,
+                "options_as": self.spec.options_as,
+                "blind": self.spec.blind,
+                "wrong_image": self.spec.wrong_image,
             }
         }
 
     def identity(self) -> dict[str, Any]:
-        """Digests of all questions, of those asked, the prompt and the pictures."""
-        counts = Counter(item.question.subtask for item in self.items)
-        keys = [item.key for item in self.items]
+        """Return digests of all questions, of those asked, the prompt and the pictures."""
         return {
-            "questions": self._questions.sha256,
-            "asked": hex_digest(json.dumps(keys)),
-            "by_subtask": dict(counts),
+            "questions": self.questions.sha256,
+            "asked": hex_digest(json.dumps([item.key for item in self.items])),
+            "by_subtask": dict(Counter(item.question.subtask for item in self.items)),
             **super().identity(),
         }
 
-    def facts(self, item: AskedQuestion, pictures: tuple[Image, ...]) -> dict[str, object]:
+    def drawn(self, item: AskedQuestion, seed: int | None = None) -> AskedQuestion | None:
+        """Return the question with its own pictures, or with those of another scene.
+
+        Which other one depends on the question and the seed alone, so it is the same for all
+        models and for all rotations.
+        """
+        if self.spec.blind:
+            return None
+        if self._elsewhere is None or seed is None:
+            return item
+        return AskedQuestion(self._elsewhere.of(item.task, seed), item.rotation)
+
+    def form(self, item: AskedQuestion) -> AnswerForm[str] | None:
+        """Return the form in which an answer is asked for; None where that is text."""
+        if self.suite.answer_format == "text":
+            return None
+        return choice_form(item.question.options, item.question.subtask == "OR")
+
+    def facts(self, item: AskedQuestion, pictures: Sequence[Image]) -> dict[str, object]:
         """Return the variables of templates; nothing in it gives the answer away."""
         question = item.question
         letters = LETTERS[: len(question.options)]
@@ -584,46 +523,34 @@ class Vqa(AskedOnce[AskedQuestion, QuestionPictures]):
             "letters": list(letters),
             "is_ordering": question.subtask == "OR",
             "pictures": [picture.label for picture in pictures],
-            "is_blind": self.rules.blind,
-            **form_facts(self._form(item)),
+            "is_blind": self.spec.blind,
+            **form_facts(self.form(item)),
         }
 
-    def judge(self, item: AskedQuestion, text: str | None) -> ChoiceJudgement:
-        """Read and score a reply; None, where there is no reply, is no answer."""
-        question = item.question
-        parsed = ParsedAnswer(None, None)
-        if text is not None:
-            parsed = self.rules.read(question, text)
-        return ChoiceJudgement(parsed, question.answer_letters)
-
-    def _subject(self, item: AskedQuestion) -> ChoiceSubject:
+    def subject_of(self, item: AskedQuestion) -> ChoiceSubject:
+        """Return what baselines answer about."""
         question = item.question
         return ChoiceSubject(question, lambda probe: self._guesses.guess(probe, question))
 
-    def _form(self, item: AskedQuestion) -> AnswerForm[str] | None:
-        return self.rules.form(item.question)
+    def right_answer(self, item: AskedQuestion) -> str:
+        """Return the answer of a worked example."""
+        form, letters = self.form(item), item.question.answer_letters
+        if form is None:
+            return choice_text(item.question.answer)
+        value = list(letters) if item.question.subtask == "OR" else letters
+        return form.write(value, f"The right answer is {', '.join(letters)}.")
 
-    def _right_answer(self, item: AskedQuestion) -> str:
-        return self.rules.right_answer(item.question)
-
-    def _pictured(self, item: AskedQuestion) -> ShownQuestion | None:
-        return None if self.rules.blind else item.shown
-
-    def _pictured_for(self, item: AskedQuestion, seed: int) -> ShownQuestion | None:
-        """The question with its own pictures, or with those of another scene.
-
-        Which other one depends on the question and the seed alone, so it is the same for all
-        models and for all rotations.
-        """
-        if self._elsewhere is None:
-            return self._pictured(item)
-        other = self._elsewhere.of(item.task, seed)
-        return self._pictured(AskedQuestion(other, item.rotation))
+    def judge(self, item: AskedQuestion, text: str | None) -> ChoiceJudgement:
+        """Read and score a reply; None, where there is no reply, is no answer."""
+        question, parsed = item.question, ParsedAnswer(None, None)
+        if text is not None:
+            parsed = parse_answer(text, question.options, question.subtask == "OR")
+        return ChoiceJudgement(parsed, question.answer_letters)
 
 
-def elsewhere_in(questions: QuestionSet) -> Elsewhere[QuestionTask]:
-    """Return the pool of wrong pictures of a question: others that show what it shows."""
-    return Elsewhere(questions.tasks, _sort_of)
+def _subtask(item: AskedQuestion) -> str:
+    """Return what a question and its worked examples share."""
+    return item.task.question.subtask
 
 
 def _sort_of(task: QuestionTask) -> tuple[object, ...]:
@@ -632,49 +559,7 @@ def _sort_of(task: QuestionTask) -> tuple[object, ...]:
         (picture.label, *sorted(mark.letter for mark in picture.marks))
         for picture in task.question.pictures
     )
-    return (task.question.subtask, ShownQuestion(task.question, task.files).labels, *marks)
-
-
-def open_vqa(opening: Opening) -> Vqa:
-    """The track; SpecError, DataError or PromptError with what is wrong."""
-    suite = opening.suite
-    spec = suite.section(VqaSpec)
-    questions = open_questions(spec.format, suite.files.folders[Vqa.name], opening.dataset)
-    tasks = select_questions(
-        questions.tasks, spec.subtasks, suite.levels, spec.per_subtask, opening.limit
-    )
-    if not tasks:
-        where = suite.where("vqa", "subtasks")
-        found = ", ".join(sorted({task.question.subtask for task in questions.tasks}))
-        message = "no question is of these subtasks and levels"
-        raise SpecError(Problem(where, message, "vqa.subtasks", found=f"questions of {found}"))
-    shown = (spec.options_as, spec.circular, spec.blind, spec.wrong_image)
-    rules = VqaRules(*shown, suite.answer_format)
-    if not opening.with_prompts:
-        return Vqa(rules, questions, tasks)
-    pictures = QuestionPictures(
-        picture_folder(),
-        picture_style(suite.images),
-        spec.options_as,
-        opening.shop,
-        suite.images.background,
-    )
-    elsewhere = elsewhere_in(questions) if rules.wrong_image else None
-
-    def stand_ins(item: AskedQuestion) -> Iterator[AskedQuestion]:
-        others = () if elsewhere is None else elsewhere.each(item.task, suite.seeds)
-        return map(AskedQuestion, others)
-
-    if elsewhere is not None:
-        elsewhere.check(tasks, "question", "vqa.wrong_image")
-    pool, items = map(AskedQuestion, questions.tasks), [AskedQuestion(task) for task in tasks]
-    examples = examples_of(suite, pool, items, "question", _subtask, stand_ins)
-    return Vqa(rules, questions, tasks, template_prompt(suite, Vqa.name), pictures, examples)
-
-
-def _subtask(item: AskedQuestion) -> str:
-    """Return what a question and its worked examples share."""
-    return item.task.question.subtask
+    return (task.question.subtask, AskedQuestion(task).labels, *marks)
 
 
 def open_questions(format_name: str, path: Path, dataset: Dataset) -> QuestionSet:
@@ -695,224 +580,35 @@ def select_questions(
     per_subtask: int | None,
     limit: int | None,
 ) -> tuple[QuestionTask, ...]:
-    """The questions of these subtasks about scenes of these levels, in the order of the set.
+    """Return the questions of these subtasks about scenes of these levels, in the set's order.
 
     Of each subtask at most `per_subtask` are kept, and `limit` in all, shared over the subtasks;
     those kept are spread evenly over the set, and a higher limit keeps them.
     """
-    groups = [
-        [task for task in tasks if task.question.subtask == name and _is_of(task, levels)]
-        for name in SUBTASKS
-        if name in subtasks
-    ]
-    groups = [group for group in groups if group]
-    sizes = [
-        len(group) if per_subtask is None else min(per_subtask, len(group)) for group in groups
-    ]
-    shares = sizes if limit is None else stratified(sizes, limit)
+    groups: dict[str, list[QuestionTask]] = {name: [] for name in SUBTASKS if name in subtasks}
+    for task in tasks:
+        if task.question.subtask in groups and set(task.scene.levels) & set(levels):
+            groups[task.question.subtask].append(task)
+    found = [group for group in groups.values() if group]
+    shares = [min(per_subtask or len(group), len(group)) for group in found]
+    if limit is not None:
+        shares = stratified(shares, limit)
     kept = {
         group[place].key
-        for group, share in zip(groups, shares, strict=True)
+        for group, share in zip(found, shares, strict=True)
         for place in spread(len(group), share)
     }
     return tuple(task for task in tasks if task.key in kept)
 
 
-def _is_of(task: QuestionTask, levels: Sequence[int]) -> bool:
-    return bool(set(task.scene.levels) & set(levels))
-
-
-def _questions(suite: Suite) -> tuple[str, tuple[str, ...], bool]:
-    spec = suite.section(VqaSpec)
-    return spec.path, ("vqa", "path"), spec.format == "builtin"
-
-
-def _manifest(suite: Suite) -> Mapping[str, Any]:
-    spec = suite.section(VqaSpec)
-    root = suite.files.folders[Vqa.name]
-    questions = {"format": spec.format, "root": str(root), "version": read_version(root)}
-    return {"questions": questions}
-
-
-def _found_at(manifest: Manifest) -> str | None:
-    return None if manifest.questions is None else manifest.questions.root
-
-
-def _report() -> TrackReport:
-    from phyblock.tracks.vqa_results import REPORT
-
-    return REPORT
-
-
-TRACK = TrackKind(
-    name=Vqa.name,
-    title="VQA",
-    item="question",
-    about="multiple-choice questions",
-    open=open_vqa,
-    report=_report,
-    subject=ChoiceSubject,
-    baselines=CHOICE_RULES,
-    by_hand=pick_answer,
-    section=("vqa", VqaSpec, "The questions of the vqa track, and how they are shown."),
-    record=ChoiceRecord,
-    template=bundled("prompts", "vqa.j2"),
-    json_template=bundled("prompts", "vqa_json.j2"),
-    prompt_field=("vqa", "prompt"),
-    tables=("table2", "letters"),
-    own_data=_questions,
-    manifest=_manifest,
-    own_root=_found_at,
-    no_examples="",
-    varies=("prompt", "background", "examples", "repeats"),
-)
-
-
 MCQ_FILE, ORDERING_FILE = "PhyBlock_MCQ.tsv", "PhyBlock_Ordering.tsv"
-_TSV = ("index", "question", *LETTERS, "answer", "category", "l2-category", "scene")
-_LEVELS = (1, 2, 3, 4)
-_FILES = {
+EXPORT_FILES = {
     "vlmevalkit": (MCQ_FILE, ORDERING_FILE),
-    "hf": ("questions.parquet", "README.md", "dataset/"),
+    "hf": ("dataset/", "questions.parquet", "README.md"),
 }
-"""What each format writes, as far as it is known before it is made."""
+"""The files of each format of export."""
+_COLUMNS = ("index", "question", *LETTERS, "answer", "category", "l2-category", "scene")
 _AT_ONCE = 4
-
-_Drawn = tuple[QuestionTask, tuple[Image, ...]]
-
-
-def export_questions(
-    tasks: Sequence[QuestionTask], pictures: QuestionPictures, form: str, folder: Path
-) -> tuple[Path, ...]:
-    """Write questions and their pictures into `folder`; what was written.
-
-    Raises StoreError where the folder cannot be written or a file is in the way that we never
-    wrote, SpecError where a package is missing,
-    DataError for a picture that cannot be had.
-    """
-    out = OutFolder(folder)
-    out.check(_FILES[form])
-    with writing(folder), out.making() as made:
-        files = _FORMATS[form](tasks, pictures, made)
-    return tuple(folder / file.relative_to(made) for file in files)
-
-
-def _vlmevalkit(
-    tasks: Sequence[QuestionTask], pictures: QuestionPictures, folder: Path
-) -> tuple[Path, ...]:
-    """Two TSV files: of one right letter, and of ordering, whose answer is four letters.
-
-    Put into `$LMUData`, the first is a multiple-choice set of VLMEvalKit by its file name. Pictures
-    are base64; those of several are lists, with names in `image_path`.
-    """
-    return asyncio.run(_write_tsv(tasks, pictures, folder))
-
-
-async def _write_tsv(
-    tasks: Sequence[QuestionTask], pictures: QuestionPictures, folder: Path
-) -> tuple[Path, ...]:
-    paths = (folder / MCQ_FILE, folder / ORDERING_FILE)
-    with contextlib.ExitStack() as stack:
-        files = [
-            stack.enter_context(path.open("w", newline="", encoding="utf-8")) for path in paths
-        ]
-        writers = [csv.writer(file, delimiter="\t", lineterminator="\n") for file in files]
-        for writer in writers:
-            writer.writerow((*_TSV, "image", "image_path"))
-        async for task, drawn in _drawn(tasks, pictures):
-            is_ordering = len(task.question.answer) > 1
-            writers[is_ordering].writerow(_tsv_row(task, drawn))
-    return paths
-
-
-def _tsv_row(task: QuestionTask, drawn: Sequence[Image]) -> tuple[str, ...]:
-    question = task.question
-    coded = [base64.b64encode(image.data).decode() for image in drawn]
-    names = [f"{question.id}-{image.label}.png" for image in drawn]
-    options = [_option(option, place, drawn) for place, option in enumerate(question.options)]
-    several = len(drawn) > 1
-    return (
-        question.id,
-        question.text,
-        *options,
-        question.answer_letters,
-        question.subtask,
-        question.category,
-        question.scene.id,
-        repr(coded) if several else coded[0],
-        repr(names) if several else names[0],
-    )
-
-
-def _option(option: str, place: int, drawn: Sequence[Image]) -> str:
-    """An option's text; a picture is named by where it stands among those that are sent."""
-    if not is_picture_option(option):
-        return option
-    labels = [image.label for image in drawn]
-    return f"Picture {labels.index(LETTERS[place]) + 1}"
-
-
-def _hugging_face(
-    tasks: Sequence[QuestionTask], pictures: QuestionPictures, folder: Path
-) -> tuple[Path, ...]:
-    """A folder for `load_from_disk`, and a Parquet file with pictures inside for `load_dataset`."""
-    needs("datasets", "hf", "hf")
-    from datasets import Dataset, Features, Value, utils  # type: ignore[import-untyped]
-    from datasets import Image as HfImage
-
-    texts = ("id", "subtask", "category", "scene", "wording", "question", "answer", "evidence")
-    features = Features(
-        {
-            **{name: Value("string") for name in texts},
-            "options": [Value("string")],
-            "levels": [Value("int64")],
-            "labels": [Value("string")],
-            "images": [HfImage()],
-        }
-    )
-    utils.disable_progress_bars()
-    rows = asyncio.run(_rows(tasks, pictures))
-    dataset = Dataset.from_list(rows, features=features)
-    dataset.save_to_disk(folder / "dataset")
-    path = folder / "questions.parquet"
-    dataset.to_parquet(path)
-    (folder / "README.md").write_text(_CARD, encoding="utf-8")
-    return folder / "dataset", path
-
-
-async def _rows(tasks: Sequence[QuestionTask], pictures: QuestionPictures) -> list[dict[str, Any]]:
-    return [
-        {
-            "id": task.question.id,
-            "subtask": task.question.subtask,
-            "category": task.question.category,
-            "scene": task.question.scene.id,
-            "wording": task.question.wording,
-            "question": task.question.text,
-            "answer": task.question.answer_letters,
-            "evidence": json.dumps(task.question.evidence, sort_keys=True),
-            "options": list(task.question.options),
-            "levels": list(task.question.scene.levels),
-            "labels": [image.label for image in drawn],
-            "images": [{"bytes": image.data, "path": f"{image.label}.png"} for image in drawn],
-        }
-        async for task, drawn in _drawn(tasks, pictures)
-    ]
-
-
-async def _drawn(
-    tasks: Sequence[QuestionTask], pictures: QuestionPictures
-) -> AsyncIterator[_Drawn]:
-    """Questions with their pictures in the order in which models get them, a few at a time."""
-    for start in range(0, len(tasks), _AT_ONCE):
-        some = tasks[start : start + _AT_ONCE]
-        drawn = await asyncio.gather(
-            *(pictures.of(ShownQuestion(task.question, task.files)) for task in some)
-        )
-        for task, images in zip(some, drawn, strict=True):
-            yield task, images
-
-
 _CARD = """---
 configs:
 - config_name: default
@@ -924,25 +620,110 @@ One row a question: `question`, four `options`, `answer` (a letter; four for ord
 `images` in the order sent with their `labels` (`scene`, `block`, or the letter of an option).
 """
 
-_FORMATS: dict[
-    str, Callable[[Sequence[QuestionTask], QuestionPictures, Path], tuple[Path, ...]]
-] = {"vlmevalkit": _vlmevalkit, "hf": _hugging_face}
-"""Formats of questions by the word after `--to`."""
+
+def export_questions(
+    tasks: Sequence[QuestionTask], pictures: Pictures, form: str, folder: Path
+) -> tuple[Path, ...]:
+    """Write questions and their pictures into `folder` in a form of `EXPORT_FILES`; the files.
+
+    `vlmevalkit`: two TSV files, of one right letter and of ordering; put into `$LMUData`, the first
+    is a multiple-choice set of VLMEvalKit by its file name. `hf`: a folder for `load_from_disk`,
+    and a Parquet file with pictures inside for `load_dataset`. Raises StoreError where the folder
+    cannot be written or a file is in the way that we never wrote, SpecError where a package is
+    missing, DataError for a picture that cannot be had.
+    """
+    out = OutFolder(folder)
+    out.check(EXPORT_FILES[form])
+    with writing(folder), out.making() as made:
+        if form == "hf":
+            needs("datasets", "hf", "hf")
+            asyncio.run(_write_hugging_face(tasks, pictures, made))
+        else:
+            asyncio.run(_write_tsv(tasks, pictures, made))
+    return tuple(folder / name for name in EXPORT_FILES[form] if name != "README.md")
+
+
+async def _write_tsv(tasks: Sequence[QuestionTask], pictures: Pictures, folder: Path) -> None:
+    """Write pictures as base64; those of several are lists, with names in `image_path`."""
+    with contextlib.ExitStack() as stack:
+        opened = partial(Path.open, mode="w", newline="", encoding="utf-8")
+        files = [stack.enter_context(opened(folder / n)) for n in (MCQ_FILE, ORDERING_FILE)]
+        writers = [csv.writer(file, delimiter="\t", lineterminator="\n") for file in files]
+        for writer in writers:
+            writer.writerow((*_COLUMNS, "image", "image_path"))
+        async for question, images in _drawn(tasks, pictures):
+            labels = [image.label for image in images]
+            coded = [base64.b64encode(image.data).decode() for image in images]
+            names = [f"{question.id}-{label}.png" for label in labels]
+            # A picture is named by where it stands among those that are sent.
+            options = [
+                f"Picture {labels.index(LETTERS[at]) + 1}" if is_picture_option(option) else option
+                for at, option in enumerate(question.options)
+            ]
+            about = (question.subtask, question.category, question.scene.id)
+            sent = (repr(coded), repr(names)) if len(images) > 1 else (coded[0], names[0])
+            row = (question.id, question.text, *options, question.answer_letters, *about, *sent)
+            writers[len(question.answer) > 1].writerow(row)
+
+
+async def _write_hugging_face(
+    tasks: Sequence[QuestionTask], pictures: Pictures, folder: Path
+) -> None:
+    from datasets import Dataset, Features, Value, utils  # type: ignore[import-untyped]
+    from datasets import Image as HfImage
+
+    rows = [
+        {
+            "id": question.id,
+            "subtask": question.subtask,
+            "category": question.category,
+            "scene": question.scene.id,
+            "wording": question.wording,
+            "question": question.text,
+            "answer": question.answer_letters,
+            "evidence": json.dumps(question.evidence, sort_keys=True),
+            "options": list(question.options),
+            "levels": list(question.scene.levels),
+            "labels": [image.label for image in images],
+            "images": [{"bytes": image.data, "path": f"{image.label}.png"} for image in images],
+        }
+        async for question, images in _drawn(tasks, pictures)
+    ]
+    texts = ("id", "subtask", "category", "scene", "wording", "question", "answer", "evidence")
+    lists = {"options": Value("string"), "levels": Value("int64"), "labels": Value("string")}
+    features = {name: Value("string") for name in texts} | {n: [v] for n, v in lists.items()}
+    utils.disable_progress_bars()
+    dataset = Dataset.from_list(rows, features=Features({**features, "images": [HfImage()]}))
+    dataset.save_to_disk(folder / "dataset")
+    dataset.to_parquet(folder / "questions.parquet")
+    (folder / "README.md").write_text(_CARD, encoding="utf-8")
+
+
+async def _drawn(
+    tasks: Sequence[QuestionTask], pictures: Pictures
+) -> AsyncIterator[tuple[Question, tuple[Image, ...]]]:
+    """Yield questions with their pictures in the order in which models get them."""
+    for start in range(0, len(tasks), _AT_ONCE):
+        some = tasks[start : start + _AT_ONCE]
+        drawn = await asyncio.gather(*(pictures.of(AskedQuestion(task)) for task in some))
+        for task, images in zip(some, drawn, strict=True):
+            yield task.question, images
 
 
 def _write(
     form: str, out: Path, questions: str, scenes: Dataset, limit: int | None, size_px: int
 ) -> tuple[Path, ...]:
-    """As `ItemExport` says; a `limit` is shared over subtasks."""
+    """Write as `ItemExport` says; a `limit` is shared over subtasks."""
     asked = open_questions("builtin", find_questions(questions), scenes)
-    tasks = select_questions(asked.tasks, SUBTASKS, _LEVELS, None, limit)
-    style = PictureStyle(size_px=size_px)
-    pictures = QuestionPictures(picture_folder(), style, "images", render_workers())
+    tasks = select_questions(asked.tasks, SUBTASKS, (1, 2, 3, 4), None, limit)
+    shop = Workshop()
     try:
+        pictures = QuestionPictures(shop, PictureStyle(size_px=size_px), "images")
         return export_questions(tasks, pictures, form, out)
     finally:
-        pictures.close()
+        shop.close()
 
 
-QUESTION_EXPORT = ItemExport(tuple(_FORMATS), BUILTIN_QUESTIONS, _write)
+QUESTION_EXPORT = ItemExport(tuple(EXPORT_FILES), BUILTIN_QUESTIONS, _write)
 """What `phyblock export --questions` writes."""
+TRACK = Vqa

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
-import json
 from collections import Counter, OrderedDict
-from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Annotated, Any, ClassVar, Literal, get_args
@@ -13,7 +11,6 @@ from typing import Annotated, Any, ClassVar, Literal, get_args
 import numpy as np
 from pydantic import Field
 
-from phyblock.config.suite import Suite
 from phyblock.config.validation import Count, Flag, PictureControls, TemplateName
 from phyblock.data import AssemblyTask
 from phyblock.domain import Block, CandidateSet, Plan, Scene
@@ -24,33 +21,39 @@ from phyblock.records.line import Line, Whole
 from phyblock.records.record import AskedTurn, Course, Record
 from phyblock.records.reply import Reply
 from phyblock.resources import bundled
-from phyblock.scoring.counts import Counts
-from phyblock.scoring.plan import ERROR_TYPES, ErrorType
+from phyblock.scoring.plan import ERROR_TYPES
 from phyblock.scoring.steps import Assembly, MoveOutcome, attempted_counts, placed_counts
 from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, Settled, settle
 from phyblock.sim.engine import described_engine
 from phyblock.sim.pictures import PictureStyle, goal_style
 from phyblock.sim.question_pictures import question_key, question_png, state_picture
-from phyblock.stable import hex_digest
-from phyblock.tracks.base import (
-    Opening,
-    TrackKind,
-    assembly_pictures,
-    check_drawn,
-    engine_identity,
-    task_showing,
-    template_prompt,
-)
+from phyblock.tracks.base import EpisodeTrack, Opening, SceneTrack, engine_identity
 from phyblock.tracks.baselines import Choice, Pick, Picking, candidate_choices
 from phyblock.tracks.full_planning import PLAN_COLUMNS, POSE_COUNTS, PlanParse, plan_row
 from phyblock.tracks.goal_blind import BlindGuesses
-from phyblock.tracks.items import Showing, TaskShowing, file_plan, select_tasks, showing_fields
+from phyblock.tracks.items import file_plan
 from phyblock.tracks.measures import TrackReport
-from phyblock.tracks.pictures import Drawing, Pictures
-from phyblock.tracks.prompts import TemplatePrompt, form_facts, response_format
-from phyblock.types import AnswerFormat, CandidateScale, Gating, Physics, Setting
+from phyblock.tracks.pictures import Drawing, ScenePictures, outlined
+from phyblock.tracks.prompts import Prompt, TemplatePrompt
+from phyblock.types import Gating, Physics, Setting
 
 PositiveUsd = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
+Feedback = Literal["none", "success", "error_type"]
+History = Literal["text", "turns"]
+StepOutcome = MoveOutcome | Literal["done"] | MoveProblem
+"""What became of a step; a problem is a reply in which no single operation could be read."""
+Ending = Literal[
+    "completed",
+    "done",
+    "collapsed",
+    "max_steps",
+    "max_failures",
+    "max_repeats",
+    "max_tokens",
+    "max_cost",
+    "unanswered",
+]
+ENDINGS: tuple[Ending, ...] = get_args(Ending)
 
 
 class StepsSpec(PictureControls):
@@ -107,6 +110,10 @@ class StepsSpec(PictureControls):
     prompt: TemplateName = Field(
         default="default", description="default, or the path of a .j2 template."
     )
+
+    def most_steps(self, n_blocks: int) -> int:
+        """Return the most steps for a goal of so many blocks: by default twice as many."""
+        return 2 * n_blocks if self.max_steps is None else self.max_steps
 
 
 class MoveParse(Line):
@@ -215,67 +222,6 @@ class EpisodeRecord(Record):
         return tuple(turn for turn in self.turns if turn.outcome is not None)
 
 
-Ending = Literal[
-    "completed",
-    "done",
-    "collapsed",
-    "max_steps",
-    "max_failures",
-    "max_repeats",
-    "max_tokens",
-    "max_cost",
-    "unanswered",
-]
-ENDINGS: tuple[Ending, ...] = get_args(Ending)
-
-
-@dataclass(frozen=True)
-class StepLimits:
-    """Limits that end an episode, whatever the model does; None is no bound.
-
-    `steps` None is twice the number of blocks, so that every episode ends. `failures` are failed
-    steps in a row, `repeats` failures in a row of one and the same operation; `tokens` and `usd`
-    are those of all replies, a number that is not known counting as 0.
-    """
-
-    steps: int | None = None
-    failures: int | None = 5
-    repeats: int | None = 3
-    tokens: int | None = None
-    usd: float | None = None
-
-    def max_steps(self, n_blocks: int) -> int:
-        """Steps at most for a goal of so many blocks."""
-        return 2 * n_blocks if self.steps is None else self.steps
-
-
-@dataclass(frozen=True)
-class StepRules:
-    """Rules of playing and scoring episodes.
-
-    The simulator lets a move succeed under `accepts`; scores are counted under all `settings`.
-    Reasons are a part of the JSON that is asked for where `cot`.
-    """
-
-    accepts: Setting = "A"
-    settings: tuple[Setting, ...] = ("A", "B")
-    gating: Gating = "aov"
-    physics: Physics = "off"
-    samples: int = 1
-    limits: StepLimits = StepLimits()
-    answer_format: AnswerFormat = "text"
-    cot: bool = True
-
-    def form(self, n_candidates: int) -> AnswerForm[ParsedMove] | None:
-        """The form in which an operation is asked for; None where that is text."""
-        return None if self.answer_format == "text" else move_form(n_candidates, reasons=self.cot)
-
-    def written(self, operation: str, n_candidates: int) -> str:
-        """A reply that names an operation and nothing else, as it is shown in a conversation."""
-        form = self.form(n_candidates)
-        return operation if form is None else form.write(operation)
-
-
 @dataclass
 class Tally:
     """The use of an episode's limits."""
@@ -299,14 +245,15 @@ class Tally:
         self.repeats = self.repeats + 1 if is_repeat else 1
         self.last_failed = move
 
-    def ending(self, limits: StepLimits, n_blocks: int) -> Ending | None:
-        """The first limit that is reached, or None."""
+    def ending(self, spec: StepsSpec, n_blocks: int) -> Ending | None:
+        """Return the first limit of a suite that is reached, or None."""
+        repeats = self.repeats if self.last_failed is not None else 0
         reached: tuple[tuple[Ending, float, float | None], ...] = (
-            ("max_repeats", self.repeats if self.last_failed is not None else 0, limits.repeats),
-            ("max_failures", self.failures, limits.failures),
-            ("max_steps", self.steps, limits.max_steps(n_blocks)),
-            ("max_tokens", self.tokens, limits.tokens),
-            ("max_cost", self.usd, limits.usd),
+            ("max_repeats", repeats, spec.max_repeats),
+            ("max_failures", self.failures, spec.max_failures),
+            ("max_steps", self.steps, spec.most_steps(n_blocks)),
+            ("max_tokens", self.tokens, spec.max_episode_tokens),
+            ("max_cost", self.usd, spec.max_episode_usd),
         )
         return next((name for name, n, most in reached if most is not None and n >= most), None)
 
@@ -326,135 +273,6 @@ def majority(replies: Sequence[ParsedMove]) -> int:
         for place, one in enumerate(replies)
         if one.problem is None and (one.move, one.is_done) == chosen
     )
-
-
-Feedback = Literal["none", "success", "error_type"]
-History = Literal["text", "turns"]
-StepOutcome = MoveOutcome | Literal["done"] | MoveProblem
-"""What became of a step; a problem is a reply in which no single operation could be read."""
-
-_FORMAT: Mapping[str, str] = {
-    "empty": "the answer was empty",
-    "thoughts_only": "the answer was empty",
-    "no_move": "no operation could be read",
-    "several_moves": "more than one operation was given",
-}
-_REASONS: Mapping[str, str] = {
-    "shape_not_in_gt": "the goal has no block of this type and color",
-    "overflow": "every such block of the goal is already placed",
-    "incorrect_orientation": "no such block that is missing has this orientation",
-    "dependency_not_met": "what must be there before it is not there yet",
-    "invalid": "no candidate has this number",
-}
-_NO_TEXT = "(no answer)"
-
-
-@dataclass(frozen=True)
-class PastStep:
-    """A step that was taken: the operation, what became of it, the reply that stands for it, and
-    the picture that it was chosen from (None where none is sent).
-    """
-
-    operation: str
-    outcome: StepOutcome
-    reply: str
-    seen: Image | None
-
-    def report(self, feedback: Feedback) -> str:
-        """Return the message to the model about it."""
-        if feedback == "none":
-            return ""
-        if self.outcome == "placed":
-            return "it worked, the block is placed"
-        why = _FORMAT.get(self.outcome, "")
-        if feedback == "error_type":
-            why = why or _REASONS[self.outcome]
-        return f"it failed, {why}" if why else "it failed, nothing was placed"
-
-
-@dataclass(frozen=True)
-class StepPrompt:
-    """A template with its rules; `memory` is how many earlier steps are shown, None for all.
-
-    By `gating` and the setting `accepts` a move succeeds, of which the model is told; with
-    `is_blind` it is not shown the goal. `form` is that of an answer with so many candidates, None
-    for text.
-    """
-
-    template: TemplatePrompt
-    feedback: Feedback
-    history: History
-    memory: int | None
-    cot: bool
-    gating: Gating = "aov"
-    accepts: Setting = "A"
-    is_blind: bool = False
-    form: Callable[[int], AnswerForm[ParsedMove] | None] = lambda _: None
-
-    def __post_init__(self) -> None:
-        """Raise PromptError where the template has no text for the turns of a conversation."""
-        if self.history == "turns":
-            self.template.require("turn", "for the later messages of history: turns")
-
-    def messages(
-        self,
-        fixed: Sequence[Image],
-        current: Image,
-        past: Sequence[PastStep],
-        n_candidates: int,
-        max_steps: int,
-        candidate_scale: CandidateScale | None = None,
-    ) -> tuple[Message, ...]:
-        """The messages of the step after `past`; `fixed` are the goal and the candidates.
-
-        `candidate_scale` is None where the pictures are not drawn here.
-        """
-        hidden = 0 if self.memory is None else max(0, len(past) - self.memory)
-        facts: dict[str, object] = {
-            "n_candidates": n_candidates,
-            "candidate_scale": candidate_scale,
-            "max_steps": max_steps,
-            "cot": self.cot,
-            "gating": self.gating,
-            "setting": self.accepts,
-            "is_blind": self.is_blind,
-            "n_hidden": hidden,
-            **form_facts(self.form(n_candidates)),
-        }
-        facts["answer"] = self.template.text("answer", facts)
-        if self.history == "text":
-            return self._first(fixed, current, facts, past, hidden, len(past) + 1)
-        shown = list(past[hidden:])
-        seen = [step.seen or current for step in shown] + [current]
-        messages = list(self._first(fixed, seen[0], facts, (), hidden, hidden + 1))
-        for number, (step, picture) in enumerate(zip(shown, seen[1:], strict=True), hidden + 2):
-            facts_of_turn = {"told": step.report(self.feedback), "step": number, "history": []}
-            text = self.template.text(
-                "turn", {**facts, **facts_of_turn, "pictures": [picture.label]}
-            )
-            messages.append(Message("assistant", (step.reply.strip() or _NO_TEXT,)))
-            messages.append(Message("user", (picture, text)))
-        return tuple(messages)
-
-    def _first(
-        self,
-        fixed: Sequence[Image],
-        current: Image,
-        facts: Mapping[str, object],
-        past: Sequence[PastStep],
-        hidden: int,
-        step: int,
-    ) -> tuple[Message, ...]:
-        """The message with the goal and the candidates, and a system message if there is one."""
-        pictures = (*fixed, current)
-        history = [
-            {"step": number, "operation": one.operation, "told": one.report(self.feedback)}
-            for number, one in enumerate(past[hidden:], hidden + 1)
-        ]
-        last = past[-1].report(self.feedback) if past else ""
-        labels = [picture.label for picture in pictures]
-        more = {"pictures": labels, "step": step, "history": history, "told": last}
-        return self.template.messages(pictures, {**facts, **more})
 
 
 @dataclass(frozen=True)
@@ -533,7 +351,7 @@ def step_text(index: int | None) -> str:
     return "Next plan: Done" if index is None else f"Next plan: Move({index})"
 
 
-STEP_RULES = {
+STEP_RULES: Mapping[str, Callable[..., str]] = {
     "random": _random_step,
     "oracle": _oracle_step,
     "oracle-no-orientation": _unoriented_step,
@@ -542,13 +360,12 @@ STEP_RULES = {
     "goal-blind": _next_guess,
     "first-pose": _first_pose,
 }
-"""Rules by name of the baseline."""
 STEP_FLOORS = ("goal-blind", "all-candidates", "random", "repeat")
-"""Those that never see the goal."""
+"""The baselines that never see the goal."""
 
 
 def pick_step(subject: StepSubject) -> Picking:
-    """The candidates, and after them the end."""
+    """Return the choices of a person: the candidates, and after them the end."""
     n_candidates = len(subject.candidates)
 
     def write(picks: Sequence[Pick]) -> str:
@@ -559,101 +376,299 @@ def pick_step(subject: StepSubject) -> Picking:
     return Picking(choices, least=1, most=1, repeats=False, noun="step", write=write)
 
 
-def state_keys(record: Any, task: AssemblyTask, style: PictureStyle) -> Iterator[str]:
-    """The names in the cache of what stood before each step of an episode."""
-    if not isinstance(record, EpisodeRecord):
-        return
-    wide = goal_style(task.scene, style)
-    world: tuple[int, ...] = ()
-    for turn in record.turns:
-        blocks = [task.scene.blocks[vertex] for vertex in world]
-        yield question_key(state_picture(task.scene, blocks, wide), wide)
-        if turn.outcome is not None:
-            world = turn.world
-
-
+_FORMAT: Mapping[str, str] = {
+    "empty": "the answer was empty",
+    "thoughts_only": "the answer was empty",
+    "no_move": "no operation could be read",
+    "several_moves": "more than one operation was given",
+}
+_REASONS: Mapping[str, str] = {
+    "shape_not_in_gt": "the goal has no block of this type and color",
+    "overflow": "every such block of the goal is already placed",
+    "incorrect_orientation": "no such block that is missing has this orientation",
+    "dependency_not_met": "what must be there before it is not there yet",
+    "invalid": "no candidate has this number",
+}
+_NO_TEXT = "(no answer)"
 _NOT_TRIED = ("done", *get_args(MoveProblem))
 """Outcomes of steps in which no move was attempted."""
+_KEPT = 4096
+"""States whose fall or stand is remembered."""
 
 
 @dataclass(frozen=True)
-class Desk:
-    """The services that an episode needs.
-
-    `settle` lets blocks go at their goal poses; `write` gives the messages of the step after the
-    given ones, with the picture of the assembly that is among them, and is None for models that
-    need no messages; `version` is that of the prompt. `guess` gives a plan that was learned
-    without the goal.
+class PastStep:
+    """A step that was taken: the operation, what became of it, the reply that stands for it, and
+    the picture that it was chosen from (None where none is sent).
     """
 
-    settle: Callable[[Sequence[Block]], Awaitable[Settled]]
-    guess: Callable[[], Plan] = Plan
-    write: (
-        Callable[
-            [Sequence[PastStep], Sequence[Block]], Awaitable[tuple[tuple[Message, ...], Image]]
-        ]
-        | None
-    ) = None
-    version: str = ""
+    operation: str
+    outcome: StepOutcome
+    reply: str
+    seen: Image | None
+
+    def report(self, feedback: Feedback) -> str:
+        """Return the message to the model about it."""
+        if feedback == "none":
+            return ""
+        if self.outcome == "placed":
+            return "it worked, the block is placed"
+        why = _FORMAT.get(self.outcome, "")
+        if feedback == "error_type":
+            why = why or _REASONS[self.outcome]
+        return f"it failed, {why}" if why else "it failed, nothing was placed"
+
+
+_LIKELY = PastStep("Move(1)", "placed", "Next plan: Move(1)", None)
+
+
+class StepPlanning(SceneTrack, EpisodeTrack[AssemblyTask]):
+    """Plays episodes of one operation a step; see `StepEpisode`."""
+
+    name = "step_planning"
+    title = "Step planning"
+    item = "episode"
+    asks = "step by step in the simulator"
+    section = ("steps", StepsSpec, "The rules of the step_planning track.")
+    template = bundled("prompts", "step_planning.j2")
+    json_template = bundled("prompts", "step_planning_json.j2")
+    prompt_field = ("steps", "prompt")
+    subject = StepSubject
+    baselines = STEP_RULES
+    by_hand = staticmethod(pick_step)
+    record = EpisodeRecord
+    counted = (POSE_COUNTS,)
+    tables = ("table3", "endings", "moves")
+    varies = ("prompt", "background", "view", "candidate_order", "layout", "repeats")
+    no_examples = "one would be an episode of several turns, each with a picture of its own"
+    drawn_here = "step planning draws every state, so the goal must be drawn as well"
+
+    def __init__(self, opening: Opening) -> None:
+        """Open the track."""
+        self.spec = opening.suite.section(StepsSpec)
+        super().__init__(opening)
+        self.accepts = self.spec.setting or self.suite.settings[0]
+        self._guesses = BlindGuesses(self.suite.candidates.order, self.pool, self.accepts)
+        self._settled: OrderedDict[tuple[Block, ...], Settled] = OrderedDict()
+
+    @classmethod
+    def report(cls) -> TrackReport:
+        """Return what tables and figures are made by."""
+        from phyblock.tracks.step_planning_results import REPORT
+
+        return REPORT
+
+    @classmethod
+    def physics(cls, suite: Mapping[str, Any]) -> bool:
+        """True if a suite, as a manifest holds it, simulates states."""
+        section = suite.get("steps")
+        return not isinstance(section, Mapping) or section.get("physics") != "off"
+
+    def open_prompt(self) -> Prompt:
+        """Return the template; PromptError where it has no text for the turns of a conversation."""
+        prompt = super().open_prompt()
+        if self.spec.history == "turns" and isinstance(prompt, TemplatePrompt):
+            prompt.require("turn", "for the later messages of history: turns")
+        return prompt
+
+    def about(self, item: AssemblyTask) -> dict[str, Any]:
+        """Return the most steps that an episode of it can take, the physics engine, where there is
+        one, and how the scene is shown.
+        """
+        engine = {} if self.spec.physics == "off" else {"engine": described_engine()}
+        return {
+            "max_steps": self.spec.most_steps(len(item.scene)),
+            **engine,
+            **super().about(item),
+        }
+
+    def identity(self) -> dict[str, Any]:
+        """Return what decides its results, with the physics engine where that is not PyBullet."""
+        engine = {} if self.spec.physics == "off" else engine_identity()
+        return {**super().identity(), **engine}
+
+    def form(self, item: AssemblyTask) -> AnswerForm[ParsedMove] | None:
+        """Return the form in which an operation is asked for; None where that is text."""
+        if self.suite.answer_format == "text":
+            return None
+        return move_form(len(item.candidates), reasons=self.spec.cot)
+
+    def guess(self, item: AssemblyTask) -> Plan:
+        """Return a plan that was learned without the goal."""
+        return self._guesses.plan(item)
+
+    def start(
+        self, item: AssemblyTask, seed: int, params: Mapping[str, object], *, with_messages: bool
+    ) -> StepEpisode:
+        """Return an episode that has not begun."""
+        return StepEpisode(self, item, seed, params, with_messages=with_messages)
+
+    def again(self, item: AssemblyTask, record: Record) -> StepEpisode:
+        """Return the episode of a record before its first reply; what falls is what fell then."""
+        turns = record.steps if isinstance(record, EpisodeRecord) else ()
+        fell = {turn.world: turn.fallen for turn in turns if turn.outcome == "placed"}
+        return StepEpisode(self, item, record.seed, {}, with_messages=False, fell=fell)
+
+    def outlines(self, item: AssemblyTask) -> Iterator[tuple[Request, bool]]:
+        """Yield as many requests as an episode can have, made without rendering.
+
+        Each step is taken to have placed a block. Only the first request can be a real one, and
+        with several samples none, since their seeds are not those of the run.
+        """
+        samples = self.spec.samples
+        right = Assembly(item.scene, item.candidates, self.accepts, self.spec.gating).right_moves()
+        guess = partial(self.guess, item)
+        subject = StepSubject(item.scene, item.candidates, right, (), guess=guess)
+        for step in range(self.spec.most_steps(len(item.scene))):
+            request = Request(f"{item.key}/{step + 1}", 0, (), {}, "", subject)
+            is_real = step == 0 and samples == 1
+            if self.pictures is not None and self.prompt is not None:
+                fixed, is_known = self.pictures.outline(item)
+                drawing = self._drawing(item, ())
+                (current,), is_kept = outlined(self.pictures.shop, (drawing,))
+                form, is_real = self.form(item), is_real and is_known and is_kept
+                request = replace(
+                    request,
+                    messages=self.messages(item, fixed, current, [_LIKELY] * step),
+                    prompt_version=self.prompt.version,
+                    response_format=None if form is None else form.response_format,
+                )
+            yield from ((replace(request, seed=sample), is_real) for sample in range(samples))
+
+    async def next_messages(
+        self, item: AssemblyTask, past: Sequence[PastStep], blocks: Sequence[Block]
+    ) -> tuple[tuple[Message, ...], Image]:
+        """Return the messages of the step after `past`, and the picture of the blocks."""
+        assert self.pictures is not None
+        fixed = await self.pictures.of(item)
+        current = await self.pictures.shop.image(self._drawing(item, blocks))
+        return self.messages(item, fixed, current, past), current
+
+    def messages(
+        self,
+        item: AssemblyTask,
+        fixed: Sequence[Image],
+        current: Image,
+        past: Sequence[PastStep],
+    ) -> tuple[Message, ...]:
+        """Return the messages of the step after `past`; `fixed` are the goal and the candidates.
+
+        Earlier steps are a text in one message, or the turns of a conversation.
+        """
+        assert isinstance(self.prompt, TemplatePrompt)
+        spec, prompt = self.spec, self.prompt
+        hidden = 0 if spec.memory is None else max(0, len(past) - spec.memory)
+        facts: dict[str, object] = {
+            **self.facts(item, ()),
+            "max_steps": spec.most_steps(len(item.scene)),
+            "cot": spec.cot,
+            "gating": spec.gating,
+            "setting": self.accepts,
+            "n_hidden": hidden,
+        }
+        facts["answer"] = prompt.text("answer", facts)
+        shown = list(enumerate(past[hidden:], hidden + 1))
+
+        def first(current: Image, history: Any, told: str, step: int) -> tuple[Message, ...]:
+            pictures = (*fixed, current)
+            more = {"pictures": [picture.label for picture in pictures], "step": step}
+            return prompt.messages(pictures, {**facts, **more, "history": history, "told": told})
+
+        if spec.history == "text":
+            told = [one.report(spec.feedback) for _, one in shown]
+            history = [
+                {"step": number, "operation": one.operation, "told": report}
+                for (number, one), report in zip(shown, told, strict=True)
+            ]
+            last = past[-1].report(spec.feedback) if past else ""
+            return first(current, history, last, len(past) + 1)
+        seen = [step.seen or current for _, step in shown] + [current]
+        messages = list(first(seen[0], [], "", hidden + 1))
+        for (number, one), picture in zip(shown, seen[1:], strict=True):
+            of_turn = {"told": one.report(spec.feedback), "step": number + 1, "history": []}
+            text = prompt.text("turn", {**facts, **of_turn, "pictures": [picture.label]})
+            messages.append(Message("assistant", (one.reply.strip() or _NO_TEXT,)))
+            messages.append(Message("user", (picture, text)))
+        return tuple(messages)
+
+    async def settle(self, blocks: Sequence[Block]) -> Settled:
+        """Return the fate of blocks that are let go at their goal poses."""
+        state = tuple(blocks)
+        if state not in self._settled:
+            trial = DEFAULT_TRIAL if self.spec.physics == "strict" else ONE_SETTING
+            self._settled[state] = await self.work_out(partial(settle, state, trial))
+            if len(self._settled) > _KEPT:
+                self._settled.popitem(last=False)
+        return self._settled[state]
+
+    def _drawing(self, item: AssemblyTask, blocks: Sequence[Block]) -> Drawing:
+        assert isinstance(self.pictures, ScenePictures)
+        style = self.pictures.style_of(item)
+        recipe = state_picture(item.scene, blocks, style)
+        key, make = question_key(recipe, style), partial(question_png, recipe, style)
+        return Drawing(recipe.label, key, make, (style.size_px, style.size_px))
 
 
 class StepEpisode:
     """Asks for one operation after another until the goal stands or a limit is reached.
 
-    With several samples a step, each is a request of its own, and the vote follows the last.
+    With several samples a step, each is a request of its own, and the vote follows the last. What
+    falls is simulated, or told by `fell`, the orders of blocks that fell by the vertices that
+    stood.
     """
 
     def __init__(
         self,
+        track: StepPlanning,
         task: AssemblyTask,
         seed: int,
         params: Mapping[str, object],
-        rules: StepRules,
-        desk: Desk,
+        *,
+        with_messages: bool,
+        fell: Mapping[tuple[int, ...], tuple[int, ...]] | None = None,
     ) -> None:
         self.ending: Ending | None = None
-        self._task = task
-        self._seed = seed
-        self._params = params
-        self._rules = rules
-        self._desk = desk
-        self._form = rules.form(len(task.candidates))
-        self._assembly = Assembly(task.scene, task.candidates, rules.accepts, rules.gating)
+        self._track, self._spec, self._task = track, track.spec, task
+        self._seed, self._params, self._fell = seed, params, fell
+        self._is_shown = with_messages and track.pictures is not None
+        self._assembly = Assembly(task.scene, task.candidates, track.accepts, self._spec.gating)
         self._tally = Tally()
         self._past: list[PastStep] = []
         self._turns: list[dict[str, Any]] = []
         self._votes: list[tuple[ParsedMove, str]] = []
         self._seen: Image | None = None
-        self._settled = True
+        self._is_settled = True
 
     async def request(self) -> Request | None:
-        """The next request, or None when the episode has ended."""
-        if not self._settled:
+        """Return the next request, or None when the episode has ended."""
+        if not self._is_settled:
             await self._settle()
         if self.ending is not None:
             return None
+        track, task, assembly = self._track, self._task, self._assembly
         messages: tuple[Message, ...] = ()
-        if self._desk.write is not None:
-            messages, self._seen = await self._desk.write(self._past, self._blocks())
-        sample, samples = len(self._votes), self._rules.samples
-        key = f"{self._task.key}/{self._tally.steps + 1}"
+        if self._is_shown:
+            messages, self._seen = await track.next_messages(task, self._past, self._blocks())
+        sample, samples = len(self._votes), self._spec.samples
+        key = f"{task.key}/{self._tally.steps + 1}"
+        form = track.form(task)
         subject = StepSubject(
-            self._task.scene,
-            self._task.candidates,
-            self._assembly.right_moves(),
-            self._assembly.exact_moves(),
+            task.scene,
+            task.candidates,
+            assembly.right_moves(),
+            assembly.exact_moves(),
             self._tally.last_failed,
             self._tally.steps,
-            self._desk.guess,
+            partial(track.guess, task),
         )
         return Request(
             key if samples == 1 else f"{key}.{sample + 1}",
             self._seed * samples + sample,
             messages,
             self._params,
-            self._desk.version,
+            track.prompt.version if self._is_shown and track.prompt else "",
             subject,
-            response_format(self._form),
+            None if form is None else form.response_format,
         )
 
     def take(self, request: Request, reply: Reply) -> None:
@@ -674,7 +689,7 @@ class StepEpisode:
             }
         )
         self._votes.append((parsed, reply.text))
-        if len(self._votes) == self._rules.samples:
+        if len(self._votes) == self._spec.samples:
             self._step()
 
     @property
@@ -690,7 +705,8 @@ class StepEpisode:
     @property
     def steps(self) -> list[int]:
         """The candidates of all moves that were attempted, in order."""
-        return [turn["parse"]["move"] for turn in self._turns if _is_attempt(turn)]
+        tried = (turn for turn in self._turns if turn["outcome"] not in (None, *_NOT_TRIED))
+        return [turn["parse"]["move"] for turn in tried]
 
     def fields(self) -> dict[str, Any]:
         """Return the fields of the record about the episode (docs/results.md)."""
@@ -705,11 +721,9 @@ class StepEpisode:
                 "dropped": [],
             },
             "scores": [
-                score
-                for setting in self._rules.settings
-                for score in self._scores(setting, len(plan))
+                one for setting in self._track.suite.settings for one in self._scores(setting)
             ],
-            "setting": self._rules.accepts,
+            "setting": self._track.accepts,
             "ending": self.ending or "unanswered",
             "outcomes": self.outcomes,
             "progress": [sum(placed[: count + 1]) for count in range(len(placed))],
@@ -717,345 +731,89 @@ class StepEpisode:
         }
 
     def _step(self) -> None:
-        """Take the step that the votes name."""
+        """Take the step that the votes name, and end where a limit is reached."""
         at = majority([parsed for parsed, _ in self._votes])
-        parsed, text = self._votes[at]
+        parsed, reply = self._votes[at]
         turn = self._turns[len(self._turns) - len(self._votes) + at]
-        samples = len(self._votes)
-        self._votes.clear()
         operation = "Done" if parsed.is_done else f"Move({parsed.move})"
         operation = operation if parsed.problem is None else "(no operation)"
+        if len(self._votes) > 1:
+            # In a conversation the operation alone speaks for all votes.
+            form = None if parsed.problem else self._track.form(self._task)
+            reply = operation if form is None else form.write(operation)
+        self._votes.clear()
         outcome: StepOutcome = "done"
         if parsed.problem is not None:
             outcome = parsed.problem
         elif parsed.move is not None:
             move = self._assembly.move(parsed.move)
-            outcome = move.outcome
-            turn["placed"] = move.vertex
+            outcome, turn["placed"] = move.outcome, move.vertex
             turn["swapped"] = [list(pair) for pair in move.swapped]
         turn["outcome"] = outcome
         turn["world"] = list(self._assembly.vertices)
-        reply = text
-        if samples > 1 and parsed.problem is None:
-            reply = self._rules.written(operation, len(self._task.candidates))
-        elif samples > 1:
-            reply = operation
         self._past.append(PastStep(operation, outcome, reply, self._seen))
         self._tally.count(parsed.move, is_placed=outcome == "placed")
-        self._settled = outcome != "placed" or self._rules.physics == "off"
-        self._end(outcome)
-
-    def _end(self, outcome: StepOutcome) -> None:
+        self._is_settled = outcome != "placed" or self._spec.physics == "off"
         if self._assembly.is_complete:
             self.ending = "completed"
         elif outcome == "done":
             self.ending = "done"
         else:
-            self.ending = self._tally.ending(self._rules.limits, len(self._task.scene))
+            self.ending = self._tally.ending(self._spec, len(self._task.scene))
 
     async def _settle(self) -> None:
         """Let the assembly go; what falls is put back, or ends the episode."""
-        settled = await self._desk.settle(self._blocks())
-        self._settled = True
+        if self._fell is None:
+            fallen = (await self._track.settle(self._blocks())).fallen
+        else:
+            fallen = self._fell.get(tuple(self._assembly.vertices), ())
+        self._is_settled = True
         turn = next(turn for turn in reversed(self._turns) if turn["outcome"] is not None)
-        turn["fallen"] = list(settled.fallen)
-        if not settled.stands and self._rules.physics == "strict":
+        turn["fallen"] = list(fallen)
+        if fallen and self._spec.physics == "strict":
             self.ending = "collapsed"
 
     def _blocks(self) -> tuple[Block, ...]:
         return tuple(self._task.scene.blocks[vertex] for vertex in self._assembly.vertices)
 
-    def _fallen(self) -> list[int]:
-        """The vertices that lie on the ground after a collapse."""
-        if self.ending != "collapsed":
-            return []
-        fallen = next(turn["fallen"] for turn in reversed(self._turns) if turn.get("fallen"))
-        blocks = self._task.scene.blocks
-        return [v for v in self._assembly.vertices if blocks[v].order in fallen]
-
-    def _scores(self, setting: Setting, attempts: int) -> list[dict[str, Any]]:
-        """Counts over the blocks in the world, and over every move that was attempted."""
-        scene, candidates = self._task.scene, self._task.candidates
-        chosen = self._assembly.chosen
-        placed = placed_counts(scene, candidates, setting, chosen, self._fallen())
-        outcomes = self.outcomes
-        errors = {name: outcomes.count(name) for name in ERROR_TYPES}
+    def _scores(self, setting: Setting) -> list[dict[str, Any]]:
+        """Return counts over the blocks in the world, and over every move that was attempted."""
+        scene, assembly = self._task.scene, self._assembly
+        on_ground: list[int] = []
+        if self.ending == "collapsed":
+            fell = next(turn["fallen"] for turn in reversed(self._turns) if turn.get("fallen"))
+            on_ground = [v for v in assembly.vertices if scene.blocks[v].order in fell]
+        placed = placed_counts(scene, self._task.candidates, setting, assembly.chosen, on_ground)
+        attempted = attempted_counts(placed, len(self.steps))
+        errors = {name: self.outcomes.count(name) for name in ERROR_TYPES}
         return [
-            _score("placed", setting, placed, None),
-            _score("attempted", setting, attempted_counts(placed, attempts), errors),
+            {
+                "criterion": criterion,
+                "matcher": None,
+                "setting": setting,
+                "tp": counts.tp,
+                "fp": counts.fp,
+                "fn": counts.fn,
+                "errors": wrong,
+            }
+            for criterion, counts, wrong in (
+                ("placed", placed, None),
+                ("attempted", attempted, errors),
+            )
         ]
 
 
-def _is_attempt(turn: Mapping[str, Any]) -> bool:
-    return turn["outcome"] is not None and turn["outcome"] not in _NOT_TRIED
+def state_keys(record: Any, task: AssemblyTask, style: PictureStyle) -> Iterator[str]:
+    """Yield the names in the cache of what stood before each step of an episode."""
+    if not isinstance(record, EpisodeRecord):
+        return
+    wide = goal_style(task.scene, style)
+    world: tuple[int, ...] = ()
+    for turn in record.turns:
+        blocks = [task.scene.blocks[vertex] for vertex in world]
+        yield question_key(state_picture(task.scene, blocks, wide), wide)
+        if turn.outcome is not None:
+            world = turn.world
 
 
-def _score(
-    criterion: str, setting: Setting, counts: Counts, errors: Mapping[ErrorType, int] | None
-) -> dict[str, Any]:
-    return {
-        "criterion": criterion,
-        "matcher": None,
-        "setting": setting,
-        "tp": counts.tp,
-        "fp": counts.fp,
-        "fn": counts.fn,
-        "errors": errors,
-    }
-
-
-_KEPT = 4096
-"""States whose fall or stand is remembered."""
-_LIKELY = PastStep("Move(1)", "placed", "Next plan: Move(1)", None)
-
-
-@dataclass(frozen=True)
-class _Sight:
-    """The view of a model: a prompt and the pictures in it."""
-
-    prompt: StepPrompt
-    pictures: Pictures
-
-
-_PLAIN = TaskShowing(Showing())
-
-
-class StepPlanning:
-    """Episodes of one operation a step; see `StepEpisode`."""
-
-    name = "step_planning"
-
-    def __init__(
-        self,
-        rules: StepRules,
-        prompt: StepPrompt | None = None,
-        pictures: Pictures | None = None,
-        items: Sequence[AssemblyTask] = (),
-        showing: TaskShowing = _PLAIN,
-        pool: Sequence[AssemblyTask] = (),
-    ) -> None:
-        """`prompt` and `pictures` are None where every model is a recording; from `pool`, else
-        `items`, baselines learn.
-        """
-        self.rules = rules
-        self.items = items
-        self.template = "" if prompt is None else prompt.template.name
-        self._showing = showing
-        self._guesses = BlindGuesses(showing, pool or items, rules.accepts)
-        self._sight = _Sight(prompt, pictures) if prompt and pictures else None
-        self._settled: OrderedDict[tuple[Block, ...], Settled] = OrderedDict()
-
-    def shown(self, item: AssemblyTask, seed: int) -> AssemblyTask:
-        """The scene as a seed shows it."""
-        return self._showing.of(item, seed)
-
-    def about(self, item: AssemblyTask) -> dict[str, Any]:
-        """The most steps that an episode of it can take, the physics engine, where there is one,
-        and how the scene is shown.
-        """
-        engine = {} if self.rules.physics == "off" else {"engine": described_engine()}
-        most = self.rules.limits.max_steps(len(item.scene))
-        return {"max_steps": most, **engine, **showing_fields(item)}
-
-    def identity(self) -> dict[str, Any]:
-        """Name and version of the prompt, a digest of all that decides the pictures, and the
-        physics engine where blocks are let go in another one than PyBullet.
-        """
-        engine = {} if self.rules.physics == "off" else engine_identity()
-        if self._sight is None:
-            return {"prompt": None, "pictures": None, **engine}
-        template = self._sight.prompt.template
-        keys = [self._sight.pictures.keys(task) for task in self._showing.each(self.items)]
-        return {
-            "prompt": {"name": template.name, "version": template.version},
-            "pictures": hex_digest(json.dumps(keys)),
-            **engine,
-        }
-
-    def start(
-        self, item: AssemblyTask, seed: int, params: Mapping[str, object], *, with_messages: bool
-    ) -> StepEpisode:
-        """An episode that has not begun."""
-        desk = Desk(self._settle, partial(self._guesses.plan, item))
-        if with_messages and self._sight is not None:
-            version = self._sight.prompt.template.version
-            desk = replace(desk, write=partial(self._write, self._sight, item), version=version)
-        return StepEpisode(item, seed, params, self.rules, desk)
-
-    def again(self, item: AssemblyTask, record: Record) -> StepEpisode:
-        """The episode of a record before its first reply; what falls is what fell then."""
-        fell = {
-            tuple(item.scene.blocks[vertex] for vertex in turn.world): turn.fallen
-            for turn in (record.steps if isinstance(record, EpisodeRecord) else ())
-            if turn.outcome == "placed"
-        }
-
-        async def settle_again(blocks: Sequence[Block]) -> Settled:
-            state = tuple(blocks)
-            return Settled(fell.get(state, ()), state)
-
-        return StepEpisode(item, record.seed, {}, self.rules, Desk(settle_again))
-
-    def outlines(self, item: AssemblyTask) -> Iterator[tuple[Request, bool]]:
-        """As many requests as an episode can have, made without rendering.
-
-        Each step is taken to have placed a block. Only the first request can be a real one, and
-        with several samples none, since their seeds are not those of the run.
-        """
-        rules = self.rules
-        assembly = Assembly(item.scene, item.candidates, rules.accepts, rules.gating)
-        guess = partial(self._guesses.plan, item)
-        right = assembly.right_moves()
-        subject = StepSubject(item.scene, item.candidates, right, (), guess=guess)
-        for step in range(rules.limits.max_steps(len(item.scene))):
-            for sample in range(rules.samples):
-                request = Request(f"{item.key}/{step + 1}", sample, (), {}, "", subject)
-                yield self._outline(item, request, [_LIKELY] * step)
-
-    def close(self) -> None:
-        """Stop the worker processes."""
-        if self._sight is not None:
-            self._sight.pictures.close()
-
-    def _outline(
-        self, item: AssemblyTask, request: Request, past: Sequence[PastStep]
-    ) -> tuple[Request, bool]:
-        is_real = not past and self.rules.samples == 1
-        if self._sight is None:
-            return request, is_real
-        pictures = self._sight.pictures
-        fixed, is_fixed_real = pictures.outline(item)
-        drawing = self._drawing(self._sight, item, ())
-        side = pictures.style_of(item).size_px
-        (current,), is_current_real = pictures.outlined((drawing,), (side, side))
-        messages = self._messages(self._sight, item, fixed, current, past)
-        version = self._sight.prompt.template.version
-        request = replace(
-            request,
-            messages=messages,
-            prompt_version=version,
-            response_format=response_format(self.rules.form(len(item.candidates))),
-        )
-        return request, is_real and is_fixed_real and is_current_real
-
-    async def _write(
-        self,
-        sight: _Sight,
-        item: AssemblyTask,
-        past: Sequence[PastStep],
-        blocks: Sequence[Block],
-    ) -> tuple[tuple[Message, ...], Image]:
-        """The messages of the step after `past`, and the picture of the assembly among them."""
-        fixed = await sight.pictures.of(item)
-        current = await sight.pictures.image(self._drawing(sight, item, blocks))
-        return self._messages(sight, item, fixed, current, past), current
-
-    def _messages(
-        self,
-        sight: _Sight,
-        item: AssemblyTask,
-        fixed: Sequence[Image],
-        current: Image,
-        past: Sequence[PastStep],
-    ) -> tuple[Message, ...]:
-        most = self.rules.limits.max_steps(len(item.scene))
-        scale = sight.pictures.candidate_scale
-        return sight.prompt.messages(fixed, current, past, len(item.candidates), most, scale)
-
-    def _drawing(self, sight: _Sight, item: AssemblyTask, blocks: Sequence[Block]) -> Drawing:
-        style = sight.pictures.style_of(item)
-        recipe = state_picture(item.scene, blocks, style)
-        return Drawing(
-            recipe.label, question_key(recipe, style), partial(question_png, recipe, style)
-        )
-
-    async def _settle(self, blocks: Sequence[Block]) -> Settled:
-        """Return the fate of blocks, computed in another process, or in a thread without one."""
-        state = tuple(blocks)
-        if state not in self._settled:
-            trial = DEFAULT_TRIAL if self.rules.physics == "strict" else ONE_SETTING
-            work = partial(settle, state, trial)
-            self._settled[state] = (
-                await asyncio.to_thread(work)
-                if self._sight is None
-                else await self._sight.pictures.work_out(work)
-            )
-            if len(self._settled) > _KEPT:
-                self._settled.popitem(last=False)
-        return self._settled[state]
-
-
-def open_step_planning(opening: Opening) -> StepPlanning:
-    """The track; SpecError, DataError or PromptError with what is wrong."""
-    suite = opening.suite
-    tasks = select_tasks(opening.dataset.tasks, suite.levels, opening.limit)
-    rules = _rules(suite)
-    pool = opening.dataset.tasks
-    showing = task_showing(suite, StepsSpec, "steps", tasks, pool)
-    if not opening.with_prompts:
-        return StepPlanning(rules, items=tasks, showing=showing, pool=pool)
-    check_drawn(suite, "step planning draws every state, so the goal must be drawn as well")
-    steps = suite.section(StepsSpec)
-    shown = (steps.feedback, steps.history, steps.memory, steps.cot)
-    template = template_prompt(suite, StepPlanning.name)
-    rules_shown = (rules.gating, rules.accepts, steps.blind, rules.form)
-    prompt = StepPrompt(template, *shown, *rules_shown)
-    return StepPlanning(rules, prompt, assembly_pictures(suite, opening.shop), tasks, showing, pool)
-
-
-def _rules(suite: Suite) -> StepRules:
-    """Return the rules by which a suite plays episodes."""
-    steps = suite.section(StepsSpec)
-    limits = StepLimits(
-        steps.max_steps,
-        steps.max_failures,
-        steps.max_repeats,
-        steps.max_episode_tokens,
-        steps.max_episode_usd,
-    )
-    accepts = steps.setting or suite.settings[0]
-    return StepRules(
-        accepts,
-        suite.settings,
-        steps.gating,
-        steps.physics,
-        steps.samples,
-        limits,
-        suite.answer_format,
-        steps.cot,
-    )
-
-
-def _physics(suite: Mapping[str, Any]) -> bool:
-    section = suite.get("steps")
-    return not isinstance(section, Mapping) or section.get("physics") != "off"
-
-
-def _report() -> TrackReport:
-    from phyblock.tracks.step_planning_results import REPORT
-
-    return REPORT
-
-
-TRACK = TrackKind(
-    name=StepPlanning.name,
-    title="Step planning",
-    item="episode",
-    about="step by step in the simulator",
-    open=open_step_planning,
-    report=_report,
-    subject=StepSubject,
-    baselines=STEP_RULES,
-    by_hand=pick_step,
-    physics=_physics,
-    plays=True,
-    section=("steps", StepsSpec, "The rules of the step_planning track."),
-    record=EpisodeRecord,
-    template=bundled("prompts", "step_planning.j2"),
-    json_template=bundled("prompts", "step_planning_json.j2"),
-    prompt_field=("steps", "prompt"),
-    counted=(POSE_COUNTS,),
-    tables=("table3", "endings", "moves"),
-    no_examples="one would be an episode of several turns, each with a picture of its own",
-    varies=("prompt", "background", "view", "candidate_order", "layout", "repeats"),
-)
+TRACK = StepPlanning

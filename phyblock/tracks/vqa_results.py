@@ -23,13 +23,12 @@ from phyblock.tracks.measures import (
     TrackReport,
     share,
 )
-from phyblock.tracks.pictures import block_entry, rounded
+from phyblock.tracks.pictures import Workshop, block_entry, rounded
 from phyblock.tracks.questions import (
     QUESTION_EXPORT,
     AskedQuestion,
     ChoiceRecord,
     QuestionPictures,
-    ShownQuestion,
     VqaSpec,
     open_questions,
 )
@@ -215,18 +214,18 @@ def question_items(run: Run, dataset: Dataset) -> PageItems:
     def pictures(folder: Path, style: PictureStyle) -> QuestionPictures:
         # Null is each question's own, which no style can say.
         ground = run.manifest.suite["images"]["background"] and style.background
-        return QuestionPictures(folder, style, shown.options_as, 1, ground)
+        return QuestionPictures(Workshop(1, folder), style, shown.options_as, ground)
 
     return PageItems(lambda record: _shown(record, by_id), _entry, pictures)
 
 
-def _shown(record: Record, questions: Mapping[str, QuestionTask]) -> ShownQuestion | None:
+def _shown(record: Record, questions: Mapping[str, QuestionTask]) -> AskedQuestion | None:
     if not isinstance(record, ChoiceRecord) or record.question.id not in questions:
         return None
-    return AskedQuestion(questions[record.question.id], record.question.rotation).shown
+    return AskedQuestion(questions[record.question.id], record.question.rotation)
 
 
-def _entry(shown: ShownQuestion) -> dict[str, Any]:
+def _entry(shown: AskedQuestion) -> dict[str, Any]:
     return question_entry(shown.question)
 
 

@@ -17,7 +17,6 @@ from phyblock.records.line import Amount, problems_of
 from phyblock.records.manifest import MANIFEST
 from phyblock.run.plan import RunPlan
 from phyblock.tracks import SingleTrack
-from phyblock.tracks.base import shown_item
 from phyblock.tracks.baselines import Picking, picks_of
 from phyblock.web.server import assets
 from phyblock.web.session import Given, Person, Place, picking_of, pictures_of, shown
@@ -66,7 +65,7 @@ async def export_session(
     with out.alone(), out.making() as new:
         (new / _PICTURES).mkdir()
         for number, sample in enumerate(plan.samples(person.model), 1):
-            item, track = shown_item(sample.track, sample.item, sample.seed), sample.track
+            item, track = sample.track.shown(sample.item, sample.seed), sample.track
             assert isinstance(track, SingleTrack)
             request = await track.request(item, sample.seed, config.params, with_messages=True)
             names = []
@@ -159,7 +158,7 @@ def read_answers(path: Path, plan: RunPlan, person: Person) -> dict[int, Given]:
     for number, sample in enumerate(plan.samples(person.model), 1):
         if problems or number not in given:
             continue
-        item = shown_item(sample.track, sample.item, sample.seed)
+        item = sample.track.shown(sample.item, sample.seed)
         request, _ = next(iter(sample.track.outlines(item)))
         picks = given[number].picks
         try:

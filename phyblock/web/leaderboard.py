@@ -37,7 +37,7 @@ from phyblock.results.estimates import (
 from phyblock.results.load import Run, load_run
 from phyblock.results.tables import cost_frame, coverage_frame
 from phyblock.stable import hex_digest
-from phyblock.tracks.base import CARRYING, READER, kind_of
+from phyblock.tracks.base import CARRYING, kind_of
 from phyblock.tracks.pictures import kit, scene_entry
 from phyblock.web.pack import (
     IN_INDEX,
@@ -63,7 +63,7 @@ _SCRIPTS = (
     *("replay.js", "site.js"),
 )
 _STYLES = ("base.css", "samples.css", "reply.css", "site.css")
-_MAY_DIFFER = ("pictures", READER)
+_MAY_DIFFER = ("pictures",)
 """Parts of a track's identity: digests of pictures, which change with their size; the reader."""
 _CONTROLS = frozenset({"blind", "wrong_image", "prompt", "path"})
 """Parts of a track's section of the suite that are shown with the run, or known by their digest."""

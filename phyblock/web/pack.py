@@ -33,10 +33,9 @@ from phyblock.results.design import Design
 from phyblock.results.load import Run
 from phyblock.run.plan import recorded_dataset
 from phyblock.sim.pictures import PictureStyle
-from phyblock.tracks import PicturePolicy, Pictures
 from phyblock.tracks.base import kind_of, kinds
 from phyblock.tracks.measures import Listing, PageItems
-from phyblock.tracks.pictures import Drawing, Studio
+from phyblock.tracks.pictures import Drawing, ScenePictures, Workshop
 
 _CHUNK_CHARACTERS = 400_000
 _COUNTED = ("tp", "fp", "fn", "wrong")
@@ -385,12 +384,12 @@ class PictureShelf:
         self._cache = cache_dir() / "pictures"
         self._room = _MOST_COPIED_BYTES
 
-    def add_scenes(self, tasks: Iterable[AssemblyTask], policy: PicturePolicy) -> None:
-        """Keep goals and candidates of tasks as they were shown, drawn as `policy` says."""
-        pictures = Pictures(self._cache, policy, 1)
+    def add_scenes(self, tasks: Iterable[AssemblyTask], images: ImagesSpec) -> None:
+        """Keep goals and candidates of tasks as they were shown, drawn as `images` says."""
+        pictures = ScenePictures(Workshop(1, self._cache), images)
         for task in tasks:
             found, are_real = pictures.outline(task)
-            keys = pictures.keys(task) if policy.source == "render" else [""] * len(found)
+            keys = pictures.keys(task) if images.source == "render" else [""] * len(found)
             self._keep(found if are_real else None, keys)
 
     def add_items(self, items: PageItems, asked: Iterable[Any], style: PictureStyle) -> None:
@@ -402,9 +401,9 @@ class PictureShelf:
 
     def add_kept(self, keys: Iterable[str]) -> None:
         """Keep pictures by their names in the cache."""
-        studio = Studio(self._cache, 1)
+        shop = Workshop(1, self._cache)
         for key in dict.fromkeys(keys):
-            found = studio.kept(Drawing("", key, bytes))
+            found = shop.kept(Drawing("", key, bytes))
             self._keep(None if found is None else (found,), (key,))
 
     def _keep(self, images: Sequence[Image] | None, keys: Sequence[str]) -> None:

@@ -40,10 +40,10 @@ from phyblock.results.load import Run
 from phyblock.results.tables import TablesWritten, coverage_frame, table_files
 from phyblock.results.text import NO_VALUE, captioned, number, spread
 from phyblock.run.store import run_folder
-from phyblock.tracks.base import kind_of, picture_policy
+from phyblock.tracks.base import kind_of
 from phyblock.tracks.items import in_order
 from phyblock.tracks.measures import Better, HeadlineColumn
-from phyblock.tracks.pictures import kit, scene_entry
+from phyblock.tracks.pictures import kit, picture_style, scene_entry
 from phyblock.web.pack import (
     Item,
     Pack,
@@ -500,13 +500,13 @@ def _keep_pictures(
     with out.making(_PICTURES) as new:
         shelf = PictureShelf(new, out.path / _PICTURES)
         for images in images_of(run):
-            policy = picture_policy(images)
+            style = picture_style(images)
             if sources.tasks:
-                shelf.add_scenes(_scenes(run, sources.tasks), policy)
-                shelf.add_kept(states_sent(run.path, places, sources.tasks, policy.style))
+                shelf.add_scenes(_scenes(run, sources.tasks), images)
+                shelf.add_kept(states_sent(run.path, places, sources.tasks, style))
             for track, items in sources.items.items():
                 shown = [one for item, one in asked.items() if item.track == track]
-                shelf.add_items(items, shown, policy.style)
+                shelf.add_items(items, shown, style)
     return {digest: f"{_PICTURES}{name}" for digest, name in shelf.names.items()}, shelf.is_whole
 
 
@@ -519,7 +519,7 @@ def _scenes(run: Run, tasks: Mapping[str, AssemblyTask]) -> Iterator[AssemblyTas
     for scene, form in dict.fromkeys(zip(asked["scene"], forms, strict=True)):
         task, shown = tasks.get(scene), json.loads(form)
         if task is not None and shown:
-            yield in_order(task, shown["order"], tasks.get(shown["goal"]), some=True)
+            yield in_order(task, shown["order"], tasks.get(shown["goal"]))
         elif task is not None:
             yield task
 

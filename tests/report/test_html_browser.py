@@ -19,7 +19,7 @@ from phyblock.web.report import write_report
 from tests.browser import expect
 from tests.report.browser import ReportVisit
 from tests.report.html_run import HOSTILE, HOSTILE_SAMPLE, many
-from tests.tracks.test_fourth_track import TRACK as COUNTING
+from tests.tracks.test_added_track import Counting
 from tests.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -487,7 +487,7 @@ def _large_run(made: Workspace, folder: Path) -> Path:
 def test_a_track_of_ones_own_is_shown_by_what_it_reads_and_by_what_is_better_in_it(
     browser: Browser, workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    registry.register_track(COUNTING)
+    registry.register_track(Counting)
     try:
         monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
         suite = workspace.write_suite(tracks=["counting"], models=["random"])

@@ -13,8 +13,8 @@ from phyblock.results.compare import compare_runs
 from phyblock.results.load import load_run
 from phyblock.run.rescore import rescore
 from phyblock.sim.engine import ENGINES, described_engine, installed_engines
-from phyblock.tracks.step_planning import StepPlanning, StepRules
 from phyblock.types import Physics
+from tests.tracks.opened import track_of
 from tests.workspace import Raw, Workspace, candidates
 
 SMALL = ("--set", "images.size_px=128", "--set", "seeds=[0]", "--no-report")
@@ -92,5 +92,5 @@ def test_a_step_run_in_pybullet_is_told_as_it_always_was(
     if physics != "off" and "pybullet" not in installed_engines():
         pytest.skip("PyBullet is not installed")
     monkeypatch.setenv("PHYBLOCK_PHYSICS", "pybullet")
-    track = StepPlanning(StepRules(physics=physics))
+    track = track_of("step_planning", steps={"physics": physics})
     assert track.identity() == {"prompt": None, "pictures": None}

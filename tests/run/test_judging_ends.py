@@ -73,8 +73,7 @@ def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
 
     async def fatal(track: PosePlanning, item: Any, text: str | None, earlier: Any) -> Any:
         if text is not None and item.key == SCENES[0]["id"]:
-            assert track._pictures is not None
-            await track._pictures.work_out(partial(killed, marks, 2))
+            await track.work_out(partial(killed, marks, 2))
         return await whole(track, item, text, earlier)
 
     monkeypatch.setattr(PosePlanning, "judge_apart", fatal)

@@ -4,25 +4,33 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.data import AssemblyTask, read_builtin
-from phyblock.sim.pictures import PictureStyle
-from phyblock.tracks import PicturePolicy, Pictures, TemplatePrompt
-from phyblock.tracks.full_planning import FullPlanning, PlanningRules
+from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
+from phyblock.tracks.full_planning import pose_choices, pose_counts
+from phyblock.tracks.goal_blind import goal_blind_plans
+from phyblock.tracks.items import Presentation
+from phyblock.tracks.pictures import Workshop
 from tests.data.broken import write_scenes
+from tests.tracks.opened import track_of
 from tests.workspace import SCENES
-
-RULES = PlanningRules("steps", ("A", "B"), ("optimal", "paper"), "selection")
 
 
 @pytest.fixture(scope="module")
-def task(tmp_path_factory: pytest.TempPathFactory) -> AssemblyTask:
-    """A red cube under a blue one; candidate 1 is the red cube, 3 the blue one."""
-    return read_builtin(write_scenes(tmp_path_factory.mktemp("data"), SCENES[0])).tasks[0]
+def tasks(tmp_path_factory: pytest.TempPathFactory) -> tuple[AssemblyTask, ...]:
+    """The first is a red cube under a blue one; candidate 1 is the red cube, 3 the blue one."""
+    return read_builtin(write_scenes(tmp_path_factory.mktemp("data"), *SCENES)).tasks
+
+
+@pytest.fixture(scope="module")
+def track(tasks: tuple[AssemblyTask, ...]) -> Any:
+    return track_of("full_planning", tasks, scoring={"level1": "selection"})
 
 
 def steps(*numbers: int) -> str:
@@ -41,9 +49,9 @@ def steps(*numbers: int) -> str:
     ],
 )
 def test_a_reply_is_scored_under_every_setting_and_matcher(
-    task: AssemblyTask, text: str | None, counts: tuple[int, int, int]
+    track: Any, text: str | None, counts: tuple[int, int, int]
 ) -> None:
-    judged = FullPlanning(RULES).judge(task, text)
+    judged = track.judge(track.items[0], text)
     aov = [score for score in judged.scores if score.criterion == "aov"]
     assert {(s.setting, s.matcher) for s in aov} == {
         (setting, matcher) for setting in "AB" for matcher in ("optimal", "paper")
@@ -54,35 +62,110 @@ def test_a_reply_is_scored_under_every_setting_and_matcher(
 
 
 @given(st.text(max_size=300) | st.lists(st.integers(-2, 20), max_size=8).map(lambda n: steps(*n)))
-def test_any_reply_is_judged_and_every_goal_block_accounted_for(
-    task: AssemblyTask, text: str
-) -> None:
-    judged = FullPlanning(RULES).judge(task, text)
+def test_any_reply_is_judged_and_every_goal_block_accounted_for(track: Any, text: str) -> None:
+    task = track.items[0]
+    judged = track.judge(task, text)
     for score in judged.scores:
         assert score.counts.tp + score.counts.fn == len(task.scene)
         assert score.counts.tp + score.counts.fp == len(judged.parsed.plan.steps)
     assert all(1 <= step <= len(task.candidates) for step in judged.parsed.plan.steps)
 
 
-def test_a_request_holds_the_question_and_the_seed(task: AssemblyTask, tmp_path: Path) -> None:
+def test_a_request_holds_the_question_and_the_seed(
+    tasks: tuple[AssemblyTask, ...], tmp_path: Path
+) -> None:
     path = tmp_path / "mine.j2"
     path.write_text("{% block user %}{{ pictures | join }}{% endblock %}", encoding="utf-8")
-    policy = PicturePolicy("render", "separate", ("candidates", "goal"), PictureStyle(size_px=128))
-    pictures = Pictures(tmp_path / "cache", policy, shop=1)
-    prompt = TemplatePrompt(path, "mine.j2")
-    track = FullPlanning(RULES, prompt, pictures)
+    images = {"layout": "separate", "order": ["candidates", "goal"]}
+    shop = Workshop(1, tmp_path / "cache")
+    track = track_of("full_planning", tasks, shop, images=images, prompt=str(path))
     try:
-        asked = asyncio.run(track.request(task, 7, {"top_p": 0.5}, with_messages=True))
-        bare = asyncio.run(track.request(task, 7, {}, with_messages=False))
-        ((outline, real),) = track.outlines(task)
+        asked = asyncio.run(track.request(tasks[0], 7, {"top_p": 0.5}, with_messages=True))
+        bare = asyncio.run(track.request(tasks[0], 7, {}, with_messages=False))
+        ((outline, real),) = track.outlines(tasks[0])
     finally:
-        pictures.close()
+        track.close()
     (message,) = asked.messages
     *sent, text = message.parts
-    assert [picture.label for picture in sent] == ["candidates", "goal"]  # type: ignore[union-attr]
+    assert [picture.label for picture in sent] == ["candidates", "goal"]
     assert text == "candidatesgoal"
     assert (asked.key, asked.seed, asked.params) == ("t1", 7, {"top_p": 0.5})
-    assert asked.prompt_version == prompt.version
-    assert bare.messages == ()
-    assert real
-    assert outline.messages == asked.messages
+    assert asked.prompt_version == track.prompt.version
+    assert (bare.messages, real, outline.messages) == ((), True, asked.messages)
+
+
+def test_facts_hold_what_is_shown_alone(track: Any) -> None:
+    for task in track.items:
+        assert track.facts(task, [SimpleNamespace(label="goal")]) == {
+            "pictures": ["goal"],
+            "n_candidates": len(task.candidates),
+            "candidate_scale": None,
+            "is_blind": False,
+            "answer_format": "text",
+            "answer_schema": None,
+            "answer_example": None,
+        }
+
+
+def test_learned_plans_are_those_of_the_order_shown(tasks: tuple[AssemblyTask, ...]) -> None:
+    track = track_of("full_planning", tasks, limit=2, candidates={"order": "shuffled"})
+    for seed in (0, 7):
+        shown = [Presentation("shuffled").of(task, seed) for task in tasks]
+        plans = goal_blind_plans(
+            [one.scene for one in shown], {one.key: one.candidates for one in shown}, "A"
+        )
+        for task in track.items:
+            ((request, _),) = track.outlines(track.shown(task, seed))
+            assert request.subject.guess() == plans[task.key] != Plan()
+
+
+UP, OVER, ASIDE = (0.0, 0.0, 0.0), (90.0, 0.0, 0.0), (0.0, 0.0, 90.0)
+SCENE = Scene(
+    "poses",
+    (2,),
+    (
+        Block(1, "cuboid2", "red", (0, 0, 0.025), UP, (), 1),
+        Block(2, "arch", "blue", (0, 0, 0.1), UP, (1,), 2),
+        Block(3, "cube", "green", (0, 0, 0.2), UP, (2,), 3),
+    ),
+    ("poses",),
+)
+CANDIDATES = CandidateSet(
+    (
+        Candidate("cuboid2", "red", UP),
+        Candidate("cuboid2", "red", OVER),
+        Candidate("arch", "blue", ASIDE),
+        Candidate("arch", "blue", UP),
+        Candidate("cube", "green", UP),
+        Candidate("triangle", "red", UP),
+        Candidate("triangle", "red", OVER),
+    )
+)
+plans = st.lists(st.integers(-1, 9), max_size=10)
+
+
+@pytest.mark.parametrize(
+    ("plan", "counts"),
+    [
+        ([1, 4, 5, 6], (1, 1, 1, 1)),
+        ([2, 1, 3, 4], (0, 1, 0, 1)),
+        ([4], (0, 0, 1, 1)),
+        ([5, 6, 7, 0, 99], (0, 0, 0, 0)),
+    ],
+)
+def test_the_first_pose_named_of_a_kind_counts(
+    plan: list[int], counts: tuple[int, int, int, int]
+) -> None:
+    task = AssemblyTask(SCENE, CANDIDATES)
+    assert pose_counts(task, SimpleNamespace(steps=plan)) == counts
+
+
+@given(plans, st.permutations(range(1, 8)))
+def test_the_order_of_the_list_moves_choices_between_first_and_later_alone(
+    plan: list[int], order: list[int]
+) -> None:
+    shown = CandidateSet(tuple(CANDIDATES[number] for number in order))
+    there = [order.index(n) + 1 if 1 <= n <= 7 else n for n in plan]
+    here = sorted(is_right for _, is_right in pose_choices(SCENE, CANDIDATES, plan))
+    assert here == sorted(is_right for _, is_right in pose_choices(SCENE, shown, there))
+    assert len(here) <= len(set(plan))

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 import sys
-from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -26,17 +27,15 @@ from phyblock.run.records import begun, judged
 from phyblock.run.rescore import rescore
 from phyblock.scoring.plan import Goal
 from phyblock.scoring.pose import POSE_ERRORS, PoseFit, pose_errors
-from phyblock.sim.dynamics import ExecutionLimits, execute
+from phyblock.sim.dynamics import execute
 from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import center_cm, put
 from phyblock.tracks import pose_planning as pose_track
-from phyblock.tracks.full_planning import FullPlanning, PlanningRules
 from phyblock.tracks.items import ShownTask
 from phyblock.tracks.pose_planning import (
     POSE_RULES,
     PosePlanning,
     PoseRecord,
-    PoseRules,
     PoseSpec,
     PoseSubject,
     worlds_of,
@@ -49,11 +48,18 @@ from tests.data.broken import write_scenes
 from tests.servers.chassis import Faults, Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 from tests.sim.structures import block_types, eulers
+from tests.tracks.opened import BUILT_IN, track_of
 from tests.workspace import SCENES, Workspace
 
-RULES = PoseRules("candidate", ("A", "B"), ("optimal", "paper"), ExecutionLimits(), 1.0, 10.0)
-FREE = replace(RULES, rotation="free")
 STANDS = "Step1: block 1 at (0, 0, 2.5)\nStep2: block 3 at (0, 0, 7.5)"
+
+
+@functools.cache
+def poses(rotation: str = "candidate", form: str = "text") -> PosePlanning:
+    """The track, judging in this process."""
+    fields = {"pose": {"rotation": rotation}, "answer_format": form}
+    track: PosePlanning = track_of("pose_planning", BUILT_IN.tasks[:1], **fields)
+    return track
 
 
 @pytest.fixture(scope="module")
@@ -85,14 +91,14 @@ def test_a_block_is_put_where_its_box_is_said_to_be(
     assert put(PoseStep(2, (0, 0, 0)), kept) is None
 
 
-@pytest.mark.parametrize("rules", [RULES, FREE], ids=["candidate", "free"])
+@pytest.mark.parametrize("rotation", ["candidate", "free"])
 def test_true_poses_in_a_random_valid_order_are_right_and_stand(
-    built_in: list[AssemblyTask], rules: PoseRules
+    built_in: list[AssemblyTask], rotation: str
 ) -> None:
-    track = PosePlanning(rules)
+    track = poses(rotation)
     for seed, item in enumerate(built_in):
         shown = track.shown(item, seed)
-        subject = PoseSubject(shown.scene, shown.candidates, rules.is_free)
+        subject = track.subject_of(shown)
         found = track.judge(shown, POSE_RULES["oracle"](subject, np.random.default_rng(seed)))
         n = len(item.scene)
         assert [score.right for score in found.poses] == [(n,) * 4] * 2
@@ -131,7 +137,7 @@ def test_a_reply_is_read_scored_and_carried_out(
     errors: list[str | None],
     reached: int,
 ) -> None:
-    track = PosePlanning(RULES)
+    track = poses()
     found = track.judge(task, text)
     assert found.poses[0].right == right
     assert [step.end for step in found.ended.steps] == ends
@@ -161,12 +167,12 @@ def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(
     built_in: list[AssemblyTask], baseline: str
 ) -> None:
     item = built_in[0]
-    track = PosePlanning(RULES)
+    track = poses()
     subject = PoseSubject(item.scene, item.candidates, is_free=False)
     text = POSE_RULES[baseline](subject, np.random.default_rng(1))
     found = track.judge(item, text)
     blocks = [put(step, item.candidates) for step in found.parsed.plan.steps]
-    worlds = execute(blocks, RULES.limits).worlds
+    worlds = execute(blocks, PoseSpec().limits).worlds
     record = judged(begun("s", track.name, "m", item, 0, None), item, found)
     assert isinstance(record, PoseRecord)
     assert record.pose is not None
@@ -189,9 +195,10 @@ def test_without_poses_a_plan_is_scored_as_full_planning_scores_it(numbers: list
     task = _TASK
     steps = [PoseStep(n, (20.0 * place, 0.0, 2.5)) for place, n in enumerate(numbers)]
     plain = "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(numbers, 1))
-    rules = PlanningRules("steps", ("A", "B"), ("optimal", "paper"), None)
-    wanted = FullPlanning(rules).judge(task, plain if numbers else None).fields()["scores"]
-    assert PosePlanning(RULES).judge(task, written(steps)).fields()["scores"] == wanted
+    full = track_of("full_planning", BUILT_IN.tasks[:1])
+    found = full.judge(task, plain if numbers else None).fields()["scores"]
+    wanted = [score for score in found if score["criterion"] == "aov"]
+    assert poses().judge(task, written(steps)).fields()["scores"] == wanted
 
 
 @pytest.fixture(autouse=True)
@@ -204,7 +211,7 @@ _TASK: AssemblyTask
 
 
 def test_with_free_rotation_each_kind_is_shown_once_upright(built_in: list[AssemblyTask]) -> None:
-    track = PosePlanning(FREE)
+    track = poses("free")
     for item in built_in:
         shown = track.shown(item, 0)
         assert isinstance(shown, ShownTask)
@@ -374,19 +381,16 @@ def test_a_view_that_is_none_or_cannot_carry_the_sheet_is_said(
 
 
 def test_the_prompt_says_every_view_and_what_a_place_means() -> None:
-    pictures = tuple(
-        SentPicture(b"", label, 8, 8) for label in ("goal, oblique", "goal, top", "blocks")
-    )
-    for name, rules in (("pose_planning.j2", RULES), ("pose_planning_json.j2", RULES),
-                        ("pose_planning.j2", FREE), ("pose_planning_json.j2", FREE)):  # fmt: skip
-        is_json = "json" in name
-        asked = replace(rules, answer_format="json_schema") if is_json else rules
-        track = PosePlanning(asked)
+    labels = ("goal, oblique", "goal, top", "blocks")
+    pictures = tuple(SentPicture(b"", label, 8, 8) for label in labels)
+    for rotation, form in product(("candidate", "free"), ("text", "json_schema")):
+        track, is_free, is_json = poses(rotation, form), rotation == "free", form != "text"
+        name = "pose_planning_json.j2" if is_json else "pose_planning.j2"
         prompt = TemplatePrompt(bundled("prompts", name), "default")
         facts = track.facts(_TASK, pictures)
         texts = [part for m in prompt.messages(pictures, facts) for part in m.parts]
         said = " ".join(part for part in texts if isinstance(part, str))
         assert "Picture 2: goal, top" in said
-        assert ("turned" in said.split("exactly this form")[1]) == rules.is_free or is_json
-        assert ("RX" in said) == rules.is_free
-        assert (pose_form(16, free=rules.is_free).example in said) == is_json
+        assert ("turned" in said.split("exactly this form")[1]) == is_free or is_json
+        assert ("RX" in said) == is_free
+        assert (pose_form(16, free=is_free).example in said) == is_json

@@ -1,189 +1,228 @@
-"""Prompts: blocks become messages, pictures stand first and in order, nothing is given away."""
+"""Prompts: blocks become messages, files are included, faults are named, nothing is given away."""
 
 from __future__ import annotations
 
+import contextlib
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from phyblock.data import official_prompt, read_builtin, recorded_models
+from phyblock.data import official_prompt, recorded_models
 from phyblock.errors import PromptError
 from phyblock.models.request import Image, Message
 from phyblock.parsing.answer import choice_form
 from phyblock.parsing.move import move_form, parse_move
 from phyblock.parsing.plan import parse_plan, plan_form
-from phyblock.parsing.structured import AnswerForm
 from phyblock.resources import bundled
-from phyblock.tracks import OfficialPrompt, TemplatePrompt, kinds
-from phyblock.tracks.full_planning import FullPlanning, PlanningRules
-from phyblock.tracks.prompts import form_facts
+from phyblock.tracks import TemplatePrompt, kinds
+from phyblock.tracks.prompts import OfficialPrompt, form_facts
+from tests.fuzz.strategies import TEMPLATES
 from tests.workspace import Workspace
 
-GOAL = Image(b"goal", "goal", 8, 8)
-GRID = Image(b"grid", "candidates", 8, 8)
-BOTH = Image(b"both", "composite", 16, 8)
+GOAL, GRID = Image(b"goal", "goal", 8, 8), Image(b"grid", "candidates", 8, 8)
 FACTS = {"pictures": ["goal", "candidates"], "n_candidates": 16, "candidate_scale": "common"}
+MACROS = "{% macro twice(x) %}{{ x }}{{ x }}{% endmacro %}{% set rules = 'R' %}"
 
 
-def template(folder: Path, text: str) -> TemplatePrompt:
-    path = folder / "mine.j2"
-    path.write_text(text, encoding="utf-8")
-    return TemplatePrompt(path, "mine.j2")
+def prompt(folder: Path, body: str, **files: str) -> TemplatePrompt:
+    """A template with this block `user`, or with blocks of its own; other files are `NAME.j2`."""
+    for name, text in files.items():
+        (folder / f"{name}.j2").write_text(text, encoding="utf-8")
+    whole = body if "block" in body else f"{{% block user %}}{body}{{% endblock %}}"
+    (folder / "mine.j2").write_text(whole, encoding="utf-8")
+    return TemplatePrompt(folder / "mine.j2", "mine")
 
 
-def test_blocks_become_messages_with_the_pictures_before_the_user_text(tmp_path: Path) -> None:
-    system = "{% block system %} Be short. {% endblock %}"
-    prompt = template(tmp_path, system + "{% block user %}\n{{ n_candidates }}\n{% endblock %}")
-    assert prompt.messages((GRID, GOAL), FACTS) == (
+def bundled_prompt(name: str) -> TemplatePrompt:
+    return TemplatePrompt(bundled("prompts", f"{name}.j2"), "default")
+
+
+def test_blocks_become_messages_with_captioned_pictures_before_the_user_text(
+    tmp_path: Path,
+) -> None:
+    blocks = "{% block system %} Be short. {% endblock %} not sent "
+    blocks += "{% block caption %}{{ number }}. {{ label }}{% endblock %}"
+    user = "{% block user %}\n{{ n_candidates }}{% block mine %}!{% endblock %}\n{% endblock %}"
+    made = prompt(tmp_path, blocks + user)
+    assert made.messages((GRID, GOAL), FACTS) == (
         Message("system", ("Be short.",)),
-        Message("user", (GRID, GOAL, "16")),
+        Message("user", ("1. candidates", GRID, "2. goal", GOAL, "16!")),
     )
-
-
-@pytest.mark.parametrize("system", ["", "{% block system %} \n {% endblock %}"])
-def test_an_empty_system_part_is_not_sent(tmp_path: Path, system: str) -> None:
-    prompt = template(tmp_path, system + "{% block user %}Build.{% endblock %}")
-    assert prompt.messages((BOTH,), FACTS) == (Message("user", (BOTH, "Build.")),)
-
-
-def test_text_outside_the_blocks_is_not_sent(tmp_path: Path) -> None:
-    prompt = template(tmp_path, "Before {% block user %}in{% endblock %} after")
-    assert prompt.messages((), FACTS) == (Message("user", ("in",)),)
-
-
-def test_the_version_follows_the_text_alone(tmp_path: Path) -> None:
-    one = template(tmp_path, "{% block user %}a{% endblock %}")
-    (tmp_path / "other").mkdir()
-    assert template(tmp_path / "other", "{% block user %}a{% endblock %}").version == one.version
-    assert template(tmp_path, "{% block user %}b{% endblock %}").version != one.version
+    bare = prompt(tmp_path, "{% block system %} \n {% endblock %}{% block user %}a{% endblock %}")
+    assert bare.messages((GOAL,), FACTS) == (Message("user", (GOAL, "a")),)
 
 
 @pytest.mark.parametrize(
-    ("text", "where", "said"),
+    ("body", "said"),
     [
-        ("{% block user %}\n\n{% if %}{% endblock %}", ":3", "is not valid Jinja"),
-        ("{% block usr %}{% endblock %}", "", "has no user block"),
-        ("{% block user %}\n{{ goal }}\n{% endblock %}", ":2", "'goal' is undefined"),
-        ("{% block user %}\n\n{{ 1 // 0 }}{% endblock %}", ":3", "division"),
-        ("{% block user %}{{ pictures.__class__ }}{% endblock %}", ":1", "is unsafe"),
-        ("{% block user %}\n {% if 0 %}a{% endif %}\n{% endblock %}", "", "says nothing"),
-        (
-            "{% block sytem %}Be short.{% endblock %}\n{% block user %}a{% endblock %}",
-            ":1",
-            "is a block that nothing uses",
-        ),
+        ("a{% include 'rules.j2' %}", "aof 16"),
+        ("{% include ['gone.j2', 'rules.j2'] %}", "of 16"),
+        ("a{% include 'gone.j2' ignore missing %}", "a"),
+        ("{% import 'macros.j2' as m %}{{ m.twice('x') }}{{ m.rules }}", "xxR"),
+        ("{% from 'macros.j2' import twice %}{% block user %}{{ twice('x') }}{% endblock %}", "xx"),
+        (MACROS + "{% block user %}{{ twice(rules) }}{% endblock %}", "RR"),
+        ("{% include 'outer.j2' %}", "(of 16)"),
+        ("{% for p in pictures %}{{ loop.index }} {{ p }};{% endfor %}", "1 goal;2 candidates;"),
     ],
 )
-def test_what_is_wrong_is_said_with_file_and_line(
-    tmp_path: Path, text: str, where: str, said: str
+def test_parts_are_included_and_imported(tmp_path: Path, body: str, said: str) -> None:
+    files = {"rules": "of {{ n_candidates }}", "outer": "({% include 'rules.j2' %})"}
+    made = prompt(tmp_path, body, macros=MACROS, **files)
+    for name in (*files, "macros"):
+        # What is edited later is not said.
+        (tmp_path / f"{name}.j2").write_text("new", encoding="utf-8")
+    assert made.messages((), FACTS) == (Message("user", (said,)),)
+
+
+@given(first=st.text("ab", max_size=3), second=st.text("ab", max_size=3))
+@settings(max_examples=15, deadline=None)
+def test_an_edit_of_what_is_included_is_another_prompt(
+    tmp_path_factory: pytest.TempPathFactory, first: str, second: str
 ) -> None:
-    with pytest.raises(PromptError) as caught:
-        template(tmp_path, text).messages((BOTH,), FACTS)
-    (problem,) = caught.value.problems
-    assert problem.where == f"{tmp_path / 'mine.j2'}{where}"
-    assert said in problem.message
-
-
-def test_a_block_inside_another_is_a_part_of_it(tmp_path: Path) -> None:
-    prompt = template(tmp_path, "{% block user %}a{% block mine %}b{% endblock %}{% endblock %}")
-    assert prompt.messages((), FACTS) == (Message("user", ("ab",)),)
+    versions = [
+        prompt(
+            tmp_path_factory.mktemp("prompts"),
+            "a{% include 'outer.j2' %}",
+            outer="({% include 'rules.j2' %})",
+            rules=text,
+        ).version
+        for text in (first, second)
+    ]
+    assert (versions[0] == versions[1]) == (first == second)
 
 
 @pytest.mark.parametrize(
-    "labels",
-    [("composite",), ("goal", "candidates"), ("candidates", "goal"), ("candidates",)],
-)
-@pytest.mark.parametrize("scale", ["common", "fit", None])
-def test_the_default_prompt_speaks_of_the_pictures_that_are_sent(
-    labels: tuple[str, ...], scale: str | None
+    ("body", "part", "where", "said"),
+    [
+        ("\n\n{% if %}", "", "mine.j2:3", "is not valid Jinja"),
+        ("{% block usr %}{% endblock %}", "", "mine.j2", "has no user block"),
+        ("\n{{ goal }}\n", "", "mine.j2:2", "'goal' is undefined"),
+        ("\n\n{{ 1 // 0 }}", "", "mine.j2:3", "division"),
+        ("{{ pictures.__class__ }}", "", "mine.j2:1", "is unsafe"),
+        ("\n {% if 0 %}a{% endif %}\n", "", "mine.j2", "says nothing"),
+        ("{% block sytem %}{% endblock %}{% block user %}a{% endblock %}", "", "mine.j2:1",
+         "is a block that nothing uses"),
+        ("{% include 'gone.j2' %}", "", "mine.j2:1", "no such file"),
+        ("\n{% include n_candidates %}", "", "mine.j2:2", "not named in quotes"),
+        ("{% include '../mine.j2' %}", "", "mine.j2:1", "no template"),
+        ("{% include '/etc/hostname' %}", "", "mine.j2:1", "no template"),
+        ("{% include 'link.j2' %}", "", "mine.j2:1", "no template"),
+        ("{% include '.env' %}", "", "mine.j2:1", "no template"),
+        ("{% include 'keys.txt' %}", "", "mine.j2:1", "no template"),
+        ("{% include 'inside.j2' %}", "", "mine.j2:1", "no template"),
+        ("{% set n_candidates = 4 %}{% block user %}a{% endblock %}", "", "mine.j2:1",
+         "n_candidates, set outside of the blocks, is a fact"),
+        ("{% extends 'part.j2' %}{% block user %}{% endblock %}", "", "mine.j2:1", "extend"),
+        ("{% include 'part.j2' %}", "a\n\n{{ wrong }}", "part.j2:3", "'wrong' is undefined"),
+        ("{% include 'part.j2' %}", "a\n{% if %}", "part.j2:2", "is not valid Jinja"),
+        ("{% include 'part.j2' %}", "\n{% include 'gone.j2' %}", "part.j2:2", "no such file"),
+        ("{% import 'part.j2' as p %}{{ p.f() }}",
+         "{% macro f() %}\n{{ 1 // 0 }}{% endmacro %}", "part.j2:2", "division"),
+        ("{% include 'part.j2' %}", "{% include 'part.j2' %}", "part.j2:1", "nested too deeply"),
+        ("{% include 'part.j2' %}", "x" * 300_000, "part.j2", "cannot be read"),
+        ("{{ " + "(" * 5_000 + "1" + ")" * 5_000 + " }}", "", "mine.j2", "is not valid Jinja"),
+        ("{{ 1" + " + 1" * 20_000 + " }}", "", "mine.j2", "is not valid Jinja"),
+        ("{{ 0x" + "f" * 10_000 + " }}", "", "mine.j2", "is not valid Jinja"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_with_file_and_line(
+    tmp_path: Path, body: str, part: str, where: str, said: str
 ) -> None:
-    prompt = TemplatePrompt(bundled("prompts", "full_planning.j2"), "default")
-    sent = tuple(Image(b"", label, 8, 8) for label in labels)
-    is_blind = labels == ("candidates",)
-    facts = {"pictures": list(labels), "n_candidates": 9, "candidate_scale": scale}
-    facts["is_blind"] = is_blind
-    system, user = prompt.messages(sent, facts)
-    assert (system.role, user.role) == ("system", "user")
-    *pictures, text = user.parts
-    assert pictures == list(sent)
-    assert isinstance(text, str)
-    assert "grid of 9 blocks" in text
-    assert ("drawn at one scale" in text) == (scale == "common")
-    assert ("drawn to fill its cell" in text) == (scale == "fit")
-    assert ("goal, a finished structure of blocks, is not available" in text) == is_blind
-    assert ("study the goal" in text) != is_blind
-    if is_blind:
-        assert "one picture: the candidates" in text
-    elif len(labels) == 2:
-        assert "in this order: " + ", then ".join(labels) in text
-    else:
-        assert "left half shows the goal" in text
-    # The form that is asked for is read, and the example in it is no plan.
-    assert parse_plan(text, 16, "steps").plan.steps == ()
-    assert parse_plan("Step1: Move block with index 4", 16, "steps").plan.steps == (4,)
+    (tmp_path / "secret.txt").write_text("secret", encoding="utf-8")
+    folder = tmp_path / "prompts"
+    folder.mkdir()
+    for name in (".env", "keys.txt"):
+        (folder / name).write_text("secret", encoding="utf-8")
+    (folder / "inside.j2").symlink_to(".env")
+    (folder / "link.j2").symlink_to(tmp_path / "secret.txt")
+    with pytest.raises(PromptError) as caught:
+        prompt(folder, body, part=part).messages((), FACTS)
+    (problem,) = caught.value.problems
+    assert said in problem.message
+    assert where in problem.where
 
 
-def test_facts_hold_what_is_shown_alone(workspace: Workspace) -> None:
-    track = FullPlanning(PlanningRules("steps", ("A",), ("optimal",), None))
-    for task in read_builtin(workspace.root / "data").tasks:
-        facts = track.facts(task, (GOAL, GRID))
-        assert facts == {
-            "pictures": ["goal", "candidates"],
-            "n_candidates": len(task.candidates),
-            "candidate_scale": None,
-            "is_blind": False,
-            "answer_format": "text",
-            "answer_schema": None,
-            "answer_example": None,
-        }
+def test_a_macro_that_sees_no_facts_is_told_how(tmp_path: Path) -> None:
+    part = "{% macro f() %}{{ n_candidates }}{% endmacro %}"
+    body = "{% import 'part.j2' as p CONTEXT %}{{ p.f() }}"
+    with pytest.raises(PromptError, match=r"hint: .* with context"):
+        prompt(tmp_path, body.replace("CONTEXT", ""), part=part).messages((), FACTS)
+    told = prompt(tmp_path, body.replace("CONTEXT", "with context"), part=part)
+    assert str(FACTS["n_candidates"]) in str(told.messages((), FACTS)[-1].parts[-1])
+
+
+@settings(deadline=None, max_examples=40)
+@given(TEMPLATES)
+def test_any_bytes_are_a_prompt_or_a_prompt_error(
+    tmp_path_factory: pytest.TempPathFactory, data: bytes
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "law.j2"
+    path.write_bytes(data)
+    with contextlib.suppress(PromptError):
+        (message,) = TemplatePrompt(path, "mine").messages((), FACTS)
+        assert isinstance(message, Message)
+
+
+def test_validate_names_what_is_included(workspace: Workspace) -> None:
+    folder = workspace.root / "prompts"
+    folder.mkdir()
+    workspace.write_suite(models=["alpha"])
+    workspace.write_models("http://127.0.0.1:9", "alpha")
+    body = "{% block user %}{% include 'rules.j2' %}{% endblock %}"
+    (folder / "full_planning.j2").write_text(body, encoding="utf-8")
+    (folder / "rules.j2").write_text("Build.", encoding="utf-8")
+    done = workspace.phyblock("validate", "suite.yaml")
+    assert done.code == 0, done.err
+    assert "full_planning.j2 (with rules.j2)" in done.out.replace("\n", "")
 
 
 def test_the_official_prompt_is_the_recorded_text_to_the_letter(official_checkout: Path) -> None:
     text = official_prompt(official_checkout)
-    prompt = OfficialPrompt(text)
-    assert prompt.messages((GOAL, GRID), FACTS) == (Message("user", (GOAL, GRID, text)),)
+    sent = OfficialPrompt(text).messages((GOAL, GRID), FACTS)
+    assert sent == (Message("user", (GOAL, GRID, text)),)
     recorded = [
         json.loads(path.read_bytes())
         for name, folder in recorded_models(official_checkout).items()
         if name.startswith("InternVL")
         for path in folder.glob("*.json")
     ]
-    assert recorded
     # Marks of the two pictures stand before the text, the goal's first.
     assert {raw["instruction"] for raw in recorded} == {"<IMG_CONTEXT>" * 2 + text}
     assert all("cand" not in raw["image"][0] and "cand" in raw["image"][1] for raw in recorded)
 
 
-def rendered(name: str, facts: dict[str, object]) -> str:
-    """The text of a bundled prompt."""
-    *_, user = TemplatePrompt(bundled("prompts", f"{name}.j2"), "default").messages((), facts)
-    return "\n".join(part for part in user.parts if isinstance(part, str))
-
-
-def both_ways(name: str, facts: dict[str, object], form: AnswerForm[Any]) -> tuple[str, str]:
-    """A bundled prompt that asks for text, and the one that asks for JSON."""
-    text, asked = (
-        rendered(f"{name}{ending}", {**facts, **form_facts(known)})
-        for ending, known in (("", None), ("_json", form))
-    )
-    assert form.example in asked
-    assert json.dumps(form.schema) in asked
-    return text, asked
-
-
 @pytest.mark.parametrize("labels", [("composite",), ("goal", "candidates"), ("candidates",)])
 @pytest.mark.parametrize("scale", ["common", "fit", None])
-def test_a_plan_is_asked_for_in_the_same_words_in_both_formats(
+def test_the_default_prompt_speaks_of_what_is_sent_in_both_formats(
     labels: tuple[str, ...], scale: str | None
 ) -> None:
+    sent = tuple(Image(b"", label, 8, 8) for label in labels)
+    is_blind, form = labels == ("candidates",), plan_form(9)
     facts = {"pictures": list(labels), "n_candidates": 9, "candidate_scale": scale}
-    facts["is_blind"] = labels == ("candidates",)
-    text, asked = both_ways("full_planning", facts, plan_form(9))
-    head, mark, _ = text.partition("End your answer with the plan")
+    facts["is_blind"] = is_blind
+    _, user = bundled_prompt("full_planning").messages(sent, facts)
+    *pictures, text = user.parts
+    assert (pictures, isinstance(text, str)) == (list(sent), True)
+    assert "grid of 9 blocks" in str(text)
+    assert ("drawn at one scale" in str(text)) == (scale == "common")
+    assert ("drawn to fill its cell" in str(text)) == (scale == "fit")
+    assert ("goal, a finished structure of blocks, is not available" in str(text)) == is_blind
+    where = {
+        ("composite",): "left half shows the goal",
+        ("candidates",): "one picture: the candidates",
+    }
+    assert where.get(labels, "in this order: goal, then candidates") in str(text)
+    asked = bundled_prompt("full_planning_json").text("user", {**facts, **form_facts(form)})
+    head, mark, _ = str(text).partition("End your answer with the plan")
     assert mark
     assert asked.startswith(f"{head}Answer with one JSON object")
+    assert form.example in asked
+    assert json.dumps(form.schema) in asked
+    # The example in the form that is asked for is no plan.
+    assert parse_plan(str(text), 16, "steps").plan.steps == ()
     assert parse_plan(asked, 9).rule is None
 
 
@@ -196,7 +235,8 @@ def test_a_question_is_asked_in_the_same_words_in_both_formats(
     facts: dict[str, object] = {"question": "Which?", "options": options, "letters": list("ABCD")}
     facts |= {"is_ordering": is_ordering, "pictures": ["scene"], "is_blind": is_blind}
     form = choice_form([f"text {x}" for x in "ABCD"], is_ordering)
-    text, asked = both_ways("vqa", facts, form)
+    text = bundled_prompt("vqa").text("user", {**facts, **form_facts(None)})
+    asked = bundled_prompt("vqa_json").text("user", {**facts, **form_facts(form)})
     head, mark, _ = text.partition(" Give a short reason")
     assert mark
     assert asked.startswith(f"{head} Answer with one JSON object")
@@ -204,28 +244,21 @@ def test_a_question_is_asked_in_the_same_words_in_both_formats(
 
 
 @pytest.mark.parametrize("cot", [True, False])
-@pytest.mark.parametrize("setting", ["A", "B"])
-def test_a_step_is_asked_for_in_the_same_words_in_both_formats(setting: str, cot: bool) -> None:
+def test_a_step_is_asked_for_in_the_same_words_in_both_formats(cot: bool) -> None:
     past = {"step": 1, "operation": "Move(2)", "told": "it worked"}
     facts: dict[str, object] = {
         "pictures": ["goal", "candidates", "current"], "n_candidates": 9, "candidate_scale": "fit",
-        "step": 3, "max_steps": 8, "setting": setting, "gating": "aov", "history": [past],
+        "step": 3, "max_steps": 8, "setting": "A", "gating": "aov", "history": [past],
         "n_hidden": 1, "told": "it worked", "cot": cot, "is_blind": False, "answer": "(answer)",
     }  # fmt: skip
+    text, asked = bundled_prompt("step_planning"), bundled_prompt("step_planning_json")
+    assert all(text.text(b, facts) == asked.text(b, facts) for b in ("system", "user", "turn"))
     form = move_form(9, reasons=cot)
-    templates = [
-        TemplatePrompt(bundled("prompts", f"step_planning{ending}.j2"), "default")
-        for ending in ("", "_json")
-    ]
-    for block in ("system", "user", "turn"):
-        one, other = (template.text(block, facts) for template in templates)
-        assert one == other
-    facts |= form_facts(form)
-    asked = templates[1].text("answer", facts)
-    assert form.example in asked
-    assert json.dumps(form.schema) in asked
-    assert ("first think" in asked) == cot
-    assert parse_move(asked).problem is not None
+    answer = asked.text("answer", {**facts, **form_facts(form)})
+    assert form.example in answer
+    assert json.dumps(form.schema) in answer
+    assert ("first think" in answer) == cot
+    assert parse_move(answer).problem is not None
 
 
 def test_only_prompts_for_json_say_the_form() -> None:

@@ -1,4 +1,4 @@
-"""A measure is added in one place: how many steps of a plan its goal cannot need."""
+"""A measure is added in one place; a name or counts that clash are refused."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import json
 import sys
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,17 @@ import pytest
 
 from phyblock import registry
 from phyblock.cli.main import phyblock
+from phyblock.errors import StoreError
+from phyblock.results.estimates import track_estimates, track_measures
+from phyblock.results.load import load_run
 from phyblock.results.tables import write_tables
 from phyblock.run.rescore import rescore
 from phyblock.scoring.counts import ratio_of
+from phyblock.tracks import kind_of
+from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.measures import Measure, SampleCounts
 from phyblock.web.report import write_report
+from tests.report.factory import manifest, record, write_run
 from tests.vqa_set import write_questions
 from tests.workspace import Workspace
 
@@ -127,23 +134,6 @@ def first_is_placed(_: Any, episode: Any) -> tuple[float, float]:
     return episode.fields()["outcomes"][:1] == ["placed"], 1
 
 
-def test_episodes_are_counted_when_they_have_ended(
-    here: Workspace, request: pytest.FixtureRequest
-) -> None:
-    counted = SampleCounts("first_steps", ("placed", "n"), sample=first_is_placed)
-    measure = Measure("first_step", "First step", counted, ratio_of, "first steps that placed")
-    registry.add_measure("step_planning", measure)
-    request.addfinalizer(lambda: registry.remove_measure("step_planning", "first_step"))
-    here.write_suite(tracks=["step_planning"], steps={"physics": "off"}, levels=[3])
-    assert not command("run", "suite.yaml", "--out", here.out, "--no-report")
-    assert {record["counts"]["first_steps"][1] for record in here.records()} == {1}
-    with (here.out / "tables" / "estimates.csv").open(newline="") as file:
-        values = {
-            row["model"]: row for row in csv.DictReader(file) if row["measure"] == measure.name
-        }
-    assert float(values["oracle"]["value"]) == 1
-
-
 def is_right(_: Any, judged: Any) -> tuple[float, float]:
     return judged.fields()["answer"]["correct"], 1
 
@@ -194,3 +184,66 @@ def test_an_episode_that_would_have_asked_otherwise_is_no_longer_final(
     assert (first["outcome"], first["error"]["kind"]) == ("api_error", "retryable")
     assert first["turns"] == lines[0]["turns"]
     assert not any(line["error"] for line in others)
+
+
+SAMPLED = SampleCounts("sampled", ("part", "whole"), sample=lambda _, __: (1, 2))
+HALF = Measure("half", "Half", SAMPLED, ratio_of, "one of two")
+
+
+@pytest.fixture
+def half() -> Iterator[None]:
+    registry.add_measure("full_planning", HALF)
+    yield
+    registry.remove_measure("full_planning", "half")
+
+
+@pytest.mark.parametrize(
+    "more",
+    [{}, {"name": "steps"}, {"name": "table1"}, {"name": "mine", "tables": ("errors",)}],
+)
+def test_a_name_that_is_taken_is_refused(more: dict[str, Any]) -> None:
+    kind = type("Taken", (FullPlanning,), {"tables": (), **more})
+    with pytest.raises(ValueError, match="has this name"):
+        registry.register_track(kind)
+    assert kind not in registry.known_tracks().values()
+
+
+@pytest.mark.usefixtures("half")
+@pytest.mark.parametrize(
+    "other", [HALF, replace(HALF, name="other", counted=replace(SAMPLED, columns=("a", "b")))]
+)
+def test_two_measures_or_counts_of_one_name_are_refused(
+    other: Measure, request: pytest.FixtureRequest
+) -> None:
+    registry.add_measure("full_planning", other)
+    request.addfinalizer(lambda: registry.add_measure("full_planning", HALF))
+    request.addfinalizer(lambda: registry.remove_measure("full_planning", other.name))
+    with pytest.raises(ValueError, match="are called"):
+        track_measures("full_planning")
+
+
+@pytest.mark.parametrize("track", sorted(registry.known_tracks()))
+def test_a_track_counts_all_that_its_own_measures_need(track: str) -> None:
+    """A measure in the report whose counts the kind does not name would never be counted."""
+    kind = kind_of(track)
+    needed = {one.counted for one in kind.report().measures if one.counted.sample is not None}
+    assert needed == set(kind.counted)
+
+
+@pytest.mark.usefixtures("half")
+def test_samples_that_lack_counts_are_not_counted(tmp_path: Path) -> None:
+    records = [record(scene="001") | {"counts": {"sampled": [1, 2]}}]
+    records += [record(scene="002") | {"counts": {"sampled": []}}, record(scene="003")]
+    written = write_tables(write_run(tmp_path / "run", records, manifest()))
+    (row,) = written.run.estimates.query("cell == 'overall' and measure == 'half'").to_dict(
+        "records"
+    )
+    assert (row["value"], row["n"]) == (0.5, 1)
+
+
+@pytest.mark.usefixtures("half")
+def test_counts_of_another_measure_name_the_file(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run", [record() | {"counts": {"sampled": [1]}}], manifest())
+    assert json.loads((folder / "records.jsonl").read_text())["counts"] == {"sampled": [1]}
+    with pytest.raises(StoreError, match=r"records.jsonl: counts.sampled: was counted in another"):
+        track_estimates(load_run(folder), "full_planning")

@@ -1,4 +1,4 @@
-"""What leads the headline of a track is drawn, compared and ranked by, wherever else it stands."""
+"""A track that is added from outside: from YAML to the report, led by either of its measures."""
 
 from __future__ import annotations
 
@@ -7,39 +7,144 @@ import math
 import re
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, ClassVar
 from xml.etree.ElementTree import fromstring
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from phyblock import registry
 from phyblock.cli.main import phyblock
+from phyblock.data import AssemblyTask
 from phyblock.errors import SpecError
 from phyblock.results.compare import comparable, compare_models
 from phyblock.results.estimates import main_column
 from phyblock.results.load import Run, load_run
 from phyblock.results.tables import write_tables
-from phyblock.tracks import TrackKind
-from phyblock.tracks.measures import WHOLE, HeadlineColumn, Measure
+from phyblock.scoring.counts import mean_of, ratio_of
+from phyblock.tracks import SceneTrack, SingleTrack
+from phyblock.tracks.measures import WHOLE, HeadlineColumn, Measure, SampleCounts, TrackReport
 from phyblock.web.leaderboard import SiteRun, all_values, board_of, entries_of, values_of
 from phyblock.web.pack import Sources
 from phyblock.web.report import headlines, write_report
-from tests.tracks.test_fourth_track import ERROR, EXACT, TRACK
+from tests.servers.chassis import Running, Seen
+from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
 
 
-def led_by(leading: Measure, *measures: Measure) -> TrackKind:
+@dataclass(frozen=True)
+class CountSubject:
+    right: int
+
+
+@dataclass(frozen=True)
+class Said:
+    number: int | None
+
+    @property
+    def is_read(self) -> bool:
+        return self.number is not None
+
+    def fields(self) -> dict[str, Any]:
+        return {"parse": {"rule": "number" if self.is_read else None, "number": self.number}}
+
+
+def count(item: AssemblyTask, said: Said) -> tuple[float, float, float]:
+    off = abs((said.number or 0) - len(item.scene))
+    return off, off == 0, 1
+
+
+COUNTS = SampleCounts("blocks", ("off", "exact", "n"), sample=count)
+ERROR = Measure(
+    "error", "Error", COUNTS, lambda sums: mean_of(sums[..., [0, 2]]),
+    "blocks too many or too few", unit="blocks", better="lower", most=math.inf,
+)  # fmt: skip
+EXACT = Measure("exact", "Exact", COUNTS, lambda s: ratio_of(s[..., 1:]), "right counts")
+
+
+class Counting(SceneTrack, SingleTrack[AssemblyTask]):
+    name = "counting"
+    title = "Counting"
+    asks = "how many blocks a goal has"
+    template = Path(__file__).with_name("counting.j2")
+    subject = CountSubject
+    baselines: ClassVar = {
+        "oracle": lambda subject, _: str(subject.right),
+        "random": lambda _, rng: str(np.random.Generator.integers(rng, 5, 9)),
+    }
+    counted = (COUNTS,)
+
+    @classmethod
+    def report(cls) -> TrackReport:
+        return TrackReport((ERROR, EXACT), short="count_error")
+
+    def subject_of(self, item: AssemblyTask) -> CountSubject:
+        return CountSubject(len(item.scene))
+
+    def judge(self, item: AssemblyTask, text: str | None) -> Said:
+        del item
+        found = re.findall(r"\d+", text or "")
+        return Said(int(found[-1]) if found else None)
+
+
+class Counter(OpenAIChat):
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        body = super().reply(seen, ending)
+        body["choices"][0]["message"]["content"] = "There are 3 blocks."
+        return body
+
+
+def test_a_track_runs_from_yaml_to_the_report(
+    workspace: Workspace,
+    monkeypatch: pytest.MonkeyPatch,
+    request: pytest.FixtureRequest,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    registry.register_track(Counting)
+    request.addfinalizer(lambda: registry.unregister_track("counting"))
+    monkeypatch.chdir(workspace.root)
+    monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
+    monkeypatch.setattr(sys, "argv", ["phyblock"])
+    workspace.write_suite(tracks=["counting"], models=["counter", "oracle", "random"])
+    run = ["run", "suite.yaml", "--out", "out"]
+    with Running(Counter()) as running:
+        workspace.write_models(running.url, "counter")
+        assert not phyblock.main(run, standalone_mode=False)
+        whole = workspace.records()
+        text = (workspace.out / "records.jsonl").read_text()
+        (workspace.out / "records.jsonl").write_text(text[: len(text) // 2])
+        assert not phyblock.main(run, standalone_mode=False)
+        assert running.server.requests == 5
+    assert "Counting, suite trial" in capsys.readouterr().out
+    assert sorted(r["sample"] for r in workspace.records()) == sorted(r["sample"] for r in whole)
+    estimates = pd.read_csv(workspace.out / "tables" / "estimates.csv")
+    error = estimates[estimates["measure"] == "error"].set_index("model")
+    assert error.loc[["counter", "oracle"], "value"].tolist() == [0.6, 0]
+    assert error.loc["counter", "lo"] < 0.6 < error.loc["counter", "hi"]
+    for file in ("tables/counting.md", "tables/counting.tex"):
+        assert (workspace.out / file).exists(), file
+    assert "Counting" in (workspace.out / "report.html").read_text("utf-8")
+    for more in ("compare --out out", "compare --measure exact", "export --to csv"):
+        verb, *options = more.split()
+        assert not phyblock.main([verb, "out", *options], standalone_mode=False)
+    assert pd.read_csv(workspace.out / "comparison.csv")["verdict"].notna().all()
+    assert len(pd.read_csv(workspace.out / "export" / "csv" / "records.csv")) == len(whole) == 15
+
+
+def led_by(leading: Measure, *measures: Measure) -> type[Counting]:
     """The track with these measures, the leading one behind what stands first."""
     columns = tuple(HeadlineColumn(m.name, WHOLE.name, m.heading) for m in measures)
     main = leading.heading
-    report = replace(TRACK.report(), measures=measures, headline=lambda _: columns, main=main)
-    return replace(TRACK, report=lambda: report)
+    report = replace(Counting.report(), measures=measures, headline=lambda _: columns, main=main)
+    return type("Led", (Counting,), {"report": classmethod(lambda _: report)})
 
 
 @pytest.fixture
 def run(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> Iterator[Run]:
-    registry.register_track(TRACK)
+    registry.register_track(Counting)
     monkeypatch.chdir(workspace.root)
     monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
     monkeypatch.setattr(sys, "argv", ["phyblock"])
@@ -47,16 +152,16 @@ def run(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> Iterator[Run]:
     words = ["run", "suite.yaml", "--out", "out", "--no-report"]
     assert not phyblock.main(words, standalone_mode=False)
     yield load_run(workspace.out)
-    registry.unregister_track(TRACK.name)
+    registry.unregister_track(Counting.name)
 
 
-def show(kind: TrackKind) -> None:
-    registry.unregister_track(TRACK.name)
+def show(kind: type[Counting]) -> None:
+    registry.unregister_track(Counting.name)
     registry.register_track(kind)
 
 
 def test_the_leading_measure_leads_everywhere(run: Run) -> None:
-    for kind, leading in ((TRACK, ERROR), (led_by(EXACT, ERROR, EXACT), EXACT)):
+    for kind, leading in ((Counting, ERROR), (led_by(EXACT, ERROR, EXACT), EXACT)):
         show(kind)
         assert comparable(run, "counting").measure == leading
         assert compare_models(run).name == leading.heading

@@ -1,0 +1,44 @@
+"""Tracks opened for tests: on a suite of these fields, without a file of data."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from phyblock.config.suite import Suite, load_suite
+from phyblock.data import AssemblyTask, Dataset, read_builtin
+from phyblock.resources import bundled
+from phyblock.tracks import Opening, open_tracks
+from phyblock.tracks.pictures import Workshop
+
+DATA = bundled("benchmarks", "data")
+BUILT_IN = read_builtin(DATA / "phyblock-400")
+
+
+def suite_of(**fields: Any) -> Suite:
+    """A suite of these fields; pictures are as small as can be."""
+    images = {"size_px": 128, **fields.pop("images", {})}
+    whole = {"name": "s", "models": ["oracle"], "images": images, **fields}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "suite.yaml"
+        path.write_text(yaml.safe_dump(whole), encoding="utf-8")
+        return load_suite(path, data_dir=DATA)
+
+
+def track_of(
+    name: str,
+    tasks: Sequence[AssemblyTask] = BUILT_IN.tasks,
+    shop: Workshop | None = None,
+    limit: int | None = None,
+    **fields: Any,
+) -> Any:
+    """A track about these scenes; with prompts and pictures where there is a shop to draw them."""
+    suite = suite_of(tracks=[name], **fields)
+    dataset = Dataset("test", Path("."), tuple(tasks))
+    opening = Opening(suite, dataset, limit, shop is not None, shop or Workshop(1))
+    (track,) = open_tracks(opening, [name])
+    return track

@@ -1,0 +1,368 @@
+"""What answers without a model: guesses of questions, plans without the goal, picks of people."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from phyblock.domain import (
+    COLORS,
+    KIT_PALETTE,
+    LETTERS,
+    Block,
+    Candidate,
+    CandidateSet,
+    Plan,
+    Question,
+    Scene,
+)
+from phyblock.domain.question import rotated
+from phyblock.parsing.answer import parse_answer
+from phyblock.parsing.move import parse_move
+from phyblock.parsing.plan import parse_plan
+from phyblock.parsing.poses import parse_poses
+from phyblock.scoring.counts import micro
+from phyblock.scoring.plan import Goal, match_plan
+from phyblock.sim.pictures import joined_size_px
+from phyblock.tracks.baselines import FOLDS, PROBES, Folds, Guesses, Picking, Spot, picks_of
+from phyblock.tracks.full_planning import PlanSubject, pick_plan
+from phyblock.tracks.goal_blind import KEYS, chances, goal_blind_plans, related, units
+from phyblock.tracks.pose_planning import PoseSubject, pick_poses
+from phyblock.tracks.questions import ChoiceSubject, pick_answer
+from phyblock.tracks.step_planning import StepSubject, pick_step
+from phyblock.types import Setting
+from tests.tracks.opened import BUILT_IN
+
+WORDS = ("cube", "arch", "cylinder", "cuboid", "cone", "prism")
+
+
+def question(
+    number: int, options: tuple[str, ...], answer: tuple[int, ...], subtask: str = "SH"
+) -> Question:
+    scene = Scene(f"s{number}", (2,), (), (f"base{number % 40}",))
+    text = f"Which one is it, {WORDS[number % 6]} or not?"
+    return Question(f"{subtask.lower()}-{number}", subtask, scene, text, options, answer)  # type: ignore[arg-type]
+
+
+def made_by(
+    rule: Callable[[np.random.Generator], tuple[list[str], int]], n: int = 200
+) -> list[Question]:
+    rng = np.random.default_rng(3)
+    found = []
+    for number in range(n):
+        options, right = rule(rng)
+        found.append(question(number, tuple(options), (right,)))
+    return found
+
+
+def fair(rng: np.random.Generator) -> tuple[list[str], int]:
+    return [str(word) for word in rng.permutation(WORDS)[:4]], int(rng.integers(4))
+
+
+def cube_is_right(rng: np.random.Generator) -> tuple[list[str], int]:
+    options, _ = fair(rng)
+    options[0] = "cube"
+    options[1:] = [word for word in rng.permutation(WORDS) if word != "cube"][:3]
+    order = rng.permutation(4)
+    return [str(options[int(place)]) for place in order], list(order).index(0)
+
+
+def largest_is_right(rng: np.random.Generator) -> tuple[list[str], int]:
+    numbers = rng.integers(0, 100_000, 4)
+    return [f"{number} cm" for number in numbers], int(numbers.argmax())
+
+
+def most_alike_is_right(rng: np.random.Generator) -> tuple[list[str], int]:
+    a, b, c, d, e, f = (str(one) for one in rng.permutation(WORDS))
+    options = [f"{a} {b}", f"{a} {c}", f"{d} {b}", f"{e} {f}"]
+    order = rng.permutation(4)
+    return [options[int(place)] for place in order], list(order).index(0)
+
+
+def accuracy(probe: str, questions: list[Question]) -> float:
+    guesses = Guesses(questions)
+    return sum(guesses.guess(probe, one) == one.answer for one in questions) / len(questions)
+
+
+@pytest.mark.parametrize("probe", list(PROBES))
+def test_fair_questions_are_guessed_by_chance(probe: str) -> None:
+    assert accuracy(probe, made_by(fair)) < 0.36
+
+
+@pytest.mark.parametrize("probe", list(PROBES))
+def test_an_answer_that_is_right_more_often_is_found(probe: str) -> None:
+    assert accuracy(probe, made_by(cube_is_right)) == 1.0
+
+
+@pytest.mark.parametrize("rule", [largest_is_right, most_alike_is_right])
+def test_the_text_probe_finds_what_frequencies_do_not_tell(
+    rule: Callable[[np.random.Generator], tuple[list[str], int]],
+) -> None:
+    questions = made_by(rule)
+    assert accuracy("text-only", questions) > 0.9
+    assert accuracy("majority", questions) < 0.5
+
+
+def test_no_question_is_answered_by_its_own_scenes_answers() -> None:
+    """Each base scene has a word of its own that is always right: it cannot be learned."""
+    found = []
+    for number in range(80):
+        rng = np.random.default_rng(number)
+        options = [f"word{number % 40}", *(f"only{number}-{n}" for n in range(3))]
+        order = [int(place) for place in rng.permutation(4)]
+        shown = tuple(options[place] for place in order)
+        found.append(question(number, shown, (order.index(0),)))
+    assert accuracy("majority", found) < 0.5
+
+
+def test_what_is_learned_from_shares_no_base_scene_with_what_is_answered() -> None:
+    plain = made_by(fair, 120)
+    found = [
+        replace(one, scene=replace(one.scene, parents=(f"base{n % 40}", f"base{n * 7 % 40}")))
+        for n, one in enumerate(plain)
+    ]
+    folds = Folds(found)
+    for fold in range(FOLDS):
+        held_out = {base for q in found if folds.of(q) == fold for base in q.scene.parents[:1]}
+        known = folds.known(fold, "SH")
+        assert held_out
+        assert known
+        assert all(held_out.isdisjoint(question.scene.parents) for question in known)
+
+
+def test_a_rotated_question_is_answered_with_the_same_words() -> None:
+    questions = made_by(cube_is_right, 40)
+    guesses = Guesses(questions)
+    for one in questions:
+        for by in range(4):
+            turned = rotated(one, by)
+            (guess,) = guesses.guess("majority", turned)
+            assert turned.options[guess] == "cube"
+
+
+def test_letters_of_pictures_and_orders_go_by_frequency() -> None:
+    pictures = tuple(f"<img{i}>" for i in range(1, 5))
+    questions = [question(n, pictures, (2,) if n % 3 else (0,)) for n in range(60)]
+    orders = [question(n, pictures, (3, 1, 0, 2), "OR") for n in range(20)]
+    guesses = Guesses([*questions, *orders])
+    for probe in PROBES:
+        assert {guesses.guess(probe, one) for one in questions} == {(2,)}
+        assert {guesses.guess(probe, one) for one in orders} == {(3, 1, 0, 2)}
+
+
+KIT = tuple(Candidate(*kind, (0.0, 0.0, 0.0)) for kind in KIT_PALETTE)
+
+
+def scene(name: str, needed: tuple[Candidate, ...], parents: tuple[str, ...] = ()) -> Scene:
+    """Blocks beside one another: any order is right."""
+    blocks = tuple(
+        Block(order, one.type, one.color, (0.0, 0.0, 0.0), one.euler_deg, (), 1)
+        for order, one in enumerate(needed, 1)
+    )
+    return Scene(name, (2,), blocks, parents or (name,))
+
+
+def f1(scenes: list[Scene], sets: dict[str, CandidateSet], plans, setting: Setting) -> float:
+    counts = [
+        match_plan(Goal(one, sets[one.id], setting), plans[one.id], "optimal").counts
+        for one in scenes
+    ]
+    return micro(counts).f1 or 0.0
+
+
+@st.composite
+def drawn_sets(draw: st.DrawFn) -> tuple[list[Scene], dict[str, CandidateSet]]:
+    """Scenes of one to three blocks, some of them made from others, each with a set of the kit."""
+    scenes: list[Scene] = []
+    sets = {}
+    for number in range(draw(st.integers(2, 8))):
+        offered = draw(st.permutations(KIT))[: draw(st.integers(3, 8))]
+        needed = tuple(draw(st.lists(st.sampled_from(offered), min_size=1, max_size=3)))
+        names = [one.id for one in scenes]
+        parents = draw(st.lists(st.sampled_from(names), max_size=2)) if names else []
+        scenes.append(scene(f"s{number}", needed, tuple(dict.fromkeys(parents))))
+        sets[f"s{number}"] = CandidateSet(tuple(offered))
+    return scenes, sets
+
+
+@given(drawn_sets(), st.sampled_from(["A", "B"]), st.booleans())
+@settings(deadline=None, max_examples=25)
+def test_a_plan_names_candidates_of_its_set(drawn, setting: Setting, repeats: bool) -> None:
+    scenes, sets = drawn
+    plans = goal_blind_plans(scenes, sets, setting, repeats=repeats)
+    assert set(plans) == set(sets)
+    for name, plan in plans.items():
+        assert plan.steps
+        assert all(1 <= step <= len(sets[name]) for step in plan.steps)
+        assert repeats or len(set(plan.steps)) == len(plan)
+
+
+@given(drawn_sets(), st.sampled_from(["A", "B"]), st.data())
+@settings(deadline=None, max_examples=25)
+def test_no_goal_has_a_part_in_what_is_learned_for_its_own_base_scene(
+    drawn, setting: Setting, data: st.DataObject
+) -> None:
+    """Another goal in place of a scene's own changes no chance in the scenes it is related to."""
+    scenes, sets = drawn
+    at = data.draw(st.integers(0, len(scenes) - 1))
+    own = sets[scenes[at].id].candidates
+    others = tuple(data.draw(st.lists(st.sampled_from(own), min_size=1, max_size=5)))
+    changed = [*scenes[:at], scene(scenes[at].id, others, scenes[at].parents), *scenes[at + 1 :]]
+    kin = related(scenes)
+    offered = [units(sets[one.id], setting) for one in scenes]
+    goals = [[Goal(one, sets[one.id], setting) for one in known] for known in (scenes, changed)]
+    for key in KEYS:
+        before, after = (chances(offered, known, kin, key) for known in goals)
+        for place in kin[at]:
+            np.testing.assert_array_equal(before[place], after[place])
+
+
+@pytest.mark.parametrize("setting", ["A", "B"])
+def test_a_planted_tell_is_found(setting: Setting) -> None:
+    rng = np.random.default_rng(3)
+    scenes, sets = [], {}
+    for number in range(40):
+        offered = [KIT[int(i)] for i in rng.permutation(len(KIT))[:8]]
+        red = [one for one in offered if one.color == COLORS[0]] or offered[:1]
+        scenes.append(scene(f"s{number}", tuple(red)))
+        sets[f"s{number}"] = CandidateSet(tuple(offered))
+    every = {name: Plan(tuple(range(1, 9))) for name in sets}
+    learned = goal_blind_plans(scenes, sets, setting)
+    evenly = goal_blind_plans(scenes, sets, setting, [lambda _: None])
+    assert f1(scenes, sets, learned, setting) > 0.8
+    assert f1(scenes, sets, every, setting) < 0.5
+    assert f1(scenes, sets, evenly, setting) < 0.5
+
+
+def test_what_has_none_to_learn_from_names_every_candidate_once() -> None:
+    first = scene("s0", KIT[:2])
+    scenes = [first, replace(first, id="s1", parents=("s0",))]
+    sets = {one.id: CandidateSet(KIT) for one in scenes}
+    plan = Plan(tuple(range(1, len(KIT) + 1)))
+    assert goal_blind_plans(scenes, sets, "A") == {"s0": plan, "s1": plan}
+    assert goal_blind_plans([], {}, "A") == {}
+
+
+TASK = BUILT_IN.tasks[0]
+N = len(TASK.candidates)
+TEXTS = ("a red cube", "place B", "Done", "the arch")
+PICTURES = tuple(f"<img{n}>" for n in range(1, 5))
+
+
+@given(st.lists(st.integers(0, N - 1), min_size=1, max_size=99))
+def test_a_plan_is_read_as_it_was_picked(picks: list[int]) -> None:
+    reply = pick_plan(PlanSubject(TASK.scene, TASK.candidates)).reply(picks_of(picks))
+    steps = tuple(pick + 1 for pick in picks)
+    assert parse_plan(reply, N).plan.steps == steps
+    assert parse_plan(reply, N, "official").plan.steps == steps
+
+
+@pytest.mark.parametrize("pick", range(N + 1))
+def test_a_step_is_read_as_it_was_picked(pick: int) -> None:
+    picking = pick_step(StepSubject(TASK.scene, TASK.candidates, (), ()))
+    reply, wanted = picking.reply(picks_of([pick])), pick + 1 if pick < N else "Done"
+    parsed = parse_move(reply)
+    assert ("Done" if parsed.is_done else parsed.move) == wanted
+
+
+@given(st.permutations(range(4)), st.sampled_from([TEXTS, PICTURES]), st.booleans())
+def test_an_answer_is_read_as_it_was_picked(
+    order: list[int], options: tuple[str, ...], is_ordering: bool
+) -> None:
+    subtask = "OR" if is_ordering else "SH"
+    question = Question("q", subtask, TASK.scene, "Which?", options, (0,))
+    picks = order if is_ordering else order[:1]
+    reply = pick_answer(ChoiceSubject(question, {}.__getitem__)).reply(picks_of(picks))
+    letters = "".join(LETTERS[pick] for pick in picks)
+    assert parse_answer(reply, options, is_ordering).letters == letters
+
+
+CENTIMETERS = st.integers(-100_000, 100_000).map(lambda n: n / 100)
+DEGREES = st.integers(-3600, 3600).map(lambda n: n / 10)
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.integers(0, N - 1),
+            st.tuples(CENTIMETERS, CENTIMETERS, CENTIMETERS),
+            st.tuples(DEGREES, DEGREES, DEGREES),
+        ),
+        min_size=1,
+        max_size=100,
+    ),
+    st.booleans(),
+)
+def test_places_and_turns_are_read_as_they_were_given(
+    steps: list[tuple[int, tuple[float, ...], tuple[float, ...]]], is_free: bool
+) -> None:
+    picking = pick_poses(PoseSubject(TASK.scene, TASK.candidates, is_free))
+    numbers = [(*place, *turn) if is_free else place for _, place, turn in steps]
+    reply = picking.reply(picks_of([pick for pick, _, _ in steps], numbers))
+    read = parse_poses(reply, N, free=is_free).plan.steps
+    assert [step.candidate - 1 for step in read] == [pick for pick, _, _ in steps]
+    given_numbers = [(*step.center_cm, *(step.euler_deg or ())) for step in read]
+    assert given_numbers == numbers
+
+
+@pytest.mark.parametrize(
+    ("numbers", "error"),
+    [
+        ([], "0 numbers with a pick in place of 3"),
+        ([[1, 2]], "2 numbers with a pick in place of 3"),
+        ([[1, 2, 3, 0, 0, 0]], "6 numbers with a pick in place of 3"),
+        ([[1, 2, 3], [1, 2, 3]], "numbers of 2 picks"),
+        ([[1, -1000.5, 3]], "y -1000.5 outside of ±1000 cm"),
+        ([[1, 2, float("nan")]], "z nan outside"),
+        ([[1, 2, float("inf")]], "z inf outside"),
+        ([[0.125, 2, 3]], "x 0.125 with more than 2 decimals"),
+        ([[10**400, 2, 3]], "outside of the range of numbers"),
+    ],
+)
+def test_numbers_that_are_lacking_or_not_allowed_are_refused(
+    numbers: list[list[float]], error: str
+) -> None:
+    picking = pick_poses(PoseSubject(TASK.scene, TASK.candidates, is_free=False))
+    with pytest.raises(ValueError, match=error):
+        picking.reply(picks_of([0], numbers))
+
+
+def picking(least: int = 1, most: int = 3, *, repeats: bool = False) -> Picking:
+    choices = pick_plan(PlanSubject(TASK.scene, TASK.candidates)).choices[:4]
+    return Picking(
+        choices,
+        least,
+        most,
+        repeats,
+        "step",
+        lambda picks: "-".join(str(pick.place) for pick in picks),
+    )
+
+
+@settings(max_examples=50)
+@given(st.lists(st.integers(-2, 6), max_size=5), st.booleans())
+def test_picks_that_make_no_answer_are_refused(picks: list[int], repeats: bool) -> None:
+    is_right = 1 <= len(picks) <= 3 and all(0 <= pick < 4 for pick in picks)
+    is_right = is_right and (repeats or len(set(picks)) == len(picks))
+    if is_right:
+        assert picking(repeats=repeats).reply(picks_of(picks)) == "-".join(map(str, picks))
+    else:
+        with pytest.raises(ValueError, match="holds"):
+            picking(repeats=repeats).reply(picks_of(picks))
+
+
+@pytest.mark.parametrize("side", [128, 511, 1024])
+def test_candidates_are_clicked_where_the_grid_is_drawn(side: int) -> None:
+    """Corners of cells, in pixels, in the composite and in the grid by itself."""
+    for width, start in ((joined_size_px(side)[0], joined_size_px(side)[0] - side), (side, 0)):
+        for cell in range(16):
+            left, top, wide, high = Spot("composite", cell).box(width, side)
+            row, column = divmod(cell, 4)
+            assert left * width == pytest.approx(start + column * side / 4)
+            assert top * side == pytest.approx(row * side / 4)
+            assert (wide * width, high * side) == pytest.approx((side / 4, side / 4))

@@ -1,0 +1,226 @@
+"""Pictures of samples: drawn once, in the layout asked for, kept by content."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PIL import Image as PillowImage
+
+from phyblock.config.suite import ImagesSpec
+from phyblock.data import AssemblyTask, read_builtin, read_official
+from phyblock.errors import DataError, StoreError
+from phyblock.models.request import Image
+from phyblock.sim.pictures import candidates_png, goal_png
+from phyblock.tracks.items import Presentation, ShownTask, other_goals
+from phyblock.tracks.pictures import ScenePictures, Workshop, picture_style
+from tests.data.broken import write_scenes
+from tests.fuzz.strategies import png_header
+from tests.workspace import SCENES
+
+COMPOSITE = ImagesSpec(size_px=128)
+GOAL_FIRST = ImagesSpec(size_px=128, layout="separate")
+GOAL_LAST = ImagesSpec(size_px=128, layout="separate", order=("candidates", "goal"))
+OWN = ImagesSpec(source="dataset")
+
+
+@pytest.fixture(scope="module")
+def tasks(tmp_path_factory: pytest.TempPathFactory) -> tuple[AssemblyTask, ...]:
+    return read_builtin(write_scenes(tmp_path_factory.mktemp("data"), *SCENES)).tasks
+
+
+@pytest.fixture
+def shop(pictures_dir: Path) -> Iterator[Workshop]:
+    made = Workshop(1, pictures_dir)
+    yield made
+    made.close()
+
+
+def draw(
+    folder: Path, images: ImagesSpec, tasks: Sequence[AssemblyTask]
+) -> tuple[list[tuple[Image, ...]], int]:
+    """Pictures of all tasks, asked for at once, and how many were drawn for them."""
+
+    async def ask(pictures: ScenePictures) -> list[tuple[Image, ...]]:
+        return list(await asyncio.gather(*(pictures.of(task) for task in tasks)))
+
+    shop = Workshop(1, folder)
+    try:
+        return asyncio.run(ask(ScenePictures(shop, images))), shop.rendered
+    finally:
+        shop.close()
+
+
+def opened(image: Image) -> PillowImage.Image:
+    with PillowImage.open(io.BytesIO(image.data)) as picture:
+        return picture.convert("RGB")
+
+
+def test_a_picture_is_drawn_once_however_often_and_by_whomever_it_is_asked_for(
+    tasks: tuple[AssemblyTask, ...], tmp_path: Path
+) -> None:
+    tasks = tasks[:2]
+    first, drawn = draw(tmp_path, COMPOSITE, [*tasks, *tasks, *tasks])
+    assert drawn == 2
+    assert first[0] == first[2] == first[4] != first[1]
+    assert [picture.label for picture in first[0]] == ["composite"]
+    assert (first[0][0].width_px, first[0][0].height_px) == opened(first[0][0]).size
+    assert draw(tmp_path, COMPOSITE, tasks) == (first[:2], 0)
+    # What a power cut left of a file is not sent: it is drawn again, to the same bytes.
+    for path in tmp_path.rglob("*.png"):
+        path.write_bytes(path.read_bytes()[:-20])
+    assert draw(tmp_path, COMPOSITE, tasks) == (first[:2], 2)
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def test_layout_and_order_are_those_of_the_suite(
+    tasks: tuple[AssemblyTask, ...], tmp_path: Path
+) -> None:
+    tasks = tasks[:2]
+    ((goal, grid), (other_goal, other_grid)), drawn = draw(tmp_path, GOAL_FIRST, tasks)
+    assert drawn == 3, "both tasks have the same candidates"
+    assert (goal.label, grid.label) == ("goal", "candidates")
+    assert grid == other_grid
+    assert goal.data != other_goal.data
+    assert draw(tmp_path, GOAL_LAST, tasks) == ([(grid, goal), (grid, other_goal)], 0)
+    (((both,)), _), _ = draw(tmp_path, COMPOSITE, tasks)
+    whole, side = opened(both), goal.width_px
+    assert whole.size == (both.width_px, both.height_px)
+    assert whole.crop((0, 0, side, side)).tobytes() == opened(goal).tobytes()
+    right = whole.crop((both.width_px - side, 0, both.width_px, side))
+    assert right.tobytes() == opened(grid).tobytes()
+
+
+def test_an_outline_draws_nothing_and_has_the_real_sizes(
+    tasks: tuple[AssemblyTask, ...], tmp_path: Path
+) -> None:
+    for images in (COMPOSITE, GOAL_FIRST):
+        shop = Workshop(1, tmp_path / images.layout)
+        pictures = ScenePictures(shop, images)
+        outlined, real = pictures.outline(tasks[0])
+        assert not real
+        assert {picture.data for picture in outlined} == {b""}
+        (made, *_), _ = draw(tmp_path / images.layout, images, tasks[:1])
+        assert [(p.label, p.height_px) for p in outlined] == [(p.label, p.height_px) for p in made]
+        assert pictures.outline(tasks[0]) == (made, True)
+        assert shop.rendered == 0
+
+
+def test_keys_follow_content_and_style_alone(tasks: tuple[AssemblyTask, ...]) -> None:
+    def keys(images: ImagesSpec, task: AssemblyTask) -> tuple[str, ...]:
+        return ScenePictures(Workshop(1), images).keys(task)
+
+    larger = ImagesSpec(size_px=256)
+    every = (COMPOSITE, larger, GOAL_FIRST, GOAL_LAST)
+    assert len({keys(images, task) for images in every for task in tasks[:2]}) == 8
+    assert set(keys(GOAL_FIRST, tasks[0])) == set(keys(GOAL_LAST, tasks[0]))
+
+
+@pytest.mark.parametrize("layout", ["separate", "composite"])
+def test_pictures_follow_what_is_shown(
+    tasks: tuple[AssemblyTask, ...], layout: Any, shop: Workshop
+) -> None:
+    images = ImagesSpec(size_px=128, layout=layout)
+    style, pictures = picture_style(images), ScenePictures(shop, images)
+
+    def sent(task: AssemblyTask) -> tuple[Image, ...]:
+        return asyncio.run(pictures.of(task))
+
+    plain = sent(tasks[0])
+    blind = Presentation("shuffled", blind=True).of(tasks[0], 1)
+    (grid,) = sent(blind)
+    assert grid.data == candidates_png(blind.candidates, style)
+    assert pictures.outline(blind) == ((grid,), True)
+    wrong = Presentation(elsewhere=other_goals(tasks)).of(tasks[0], 0)
+    assert isinstance(wrong, ShownTask)
+    assert wrong.goal is not None
+    other = sent(wrong)
+    assert [image.label for image in other] == [image.label for image in plain]
+    if layout == "separate":
+        assert other[0].data == goal_png(wrong.goal.scene, style) != plain[0].data
+        assert other[1] == plain[1]
+    assert pictures.keys(wrong) != pictures.keys(tasks[0]) != pictures.keys(blind)
+
+
+@pytest.fixture
+def composite_task(tasks: tuple[AssemblyTask, ...], tmp_path: Path) -> AssemblyTask:
+    """A task with a picture of its own: a red half, a gap, a blue half."""
+    picture = PillowImage.new("RGB", (514, 256), "white")
+    picture.paste("red", (0, 0, 255, 256))
+    picture.paste("blue", (259, 0, 514, 256))
+    path = tmp_path / "own.png"
+    picture.save(path)
+    return AssemblyTask(tasks[0].scene, tasks[0].candidates, path)
+
+
+@pytest.mark.parametrize("order", [("goal", "candidates"), ("candidates", "goal")])
+def test_the_data_sets_picture_is_sent_byte_for_byte_or_parted_in_two_halves(
+    composite_task: AssemblyTask, tmp_path: Path, order: Any
+) -> None:
+    assert composite_task.composite is not None
+    (((picture,),), drawn) = draw(tmp_path / "cache", OWN, [composite_task])
+    assert picture.data == composite_task.composite.read_bytes()
+    assert (picture.label, picture.width_px, picture.height_px, drawn) == ("composite", 514, 256, 0)
+    apart = ImagesSpec(source="dataset", layout="separate", order=order)
+    ((pair,), _) = draw(tmp_path / "cache", apart, [composite_task])
+    assert tuple(picture.label for picture in pair) == order
+    colors = {"goal": (255, 0, 0), "candidates": (0, 0, 255)}
+    for picture in pair:
+        assert opened(picture).getcolors() == [(255 * 256, colors[picture.label])]
+    before = ScenePictures(Workshop(1), OWN).keys(composite_task)
+    PillowImage.new("RGB", (514, 256), "green").save(composite_task.composite)
+    assert ScenePictures(Workshop(1), OWN).keys(composite_task) != before
+    with pytest.raises(DataError, match="has no picture of it"):
+        draw(tmp_path, OWN, [replace(composite_task, composite=None)])
+
+
+def test_pictures_of_the_data_set_can_leave_out_or_exchange_the_goal(
+    official_checkout: Path,
+) -> None:
+    pool = [one for one in read_official(official_checkout).tasks if one.composite is not None]
+    task = pool[0]
+    blind = Presentation(blind=True).of(task, 0)
+    wrong = Presentation(elsewhere=other_goals(pool)).of(task, 0)
+    assert isinstance(wrong, ShownTask)
+    assert wrong.goal is not None
+    separate = ImagesSpec(source="dataset", layout="separate")
+    apart, joined = (ScenePictures(Workshop(1), images) for images in (separate, OWN))
+
+    def sent(pictures: ScenePictures, task: AssemblyTask) -> tuple[Image, ...]:
+        return asyncio.run(pictures.of(task))
+
+    goal, grid = sent(apart, task)
+    assert sent(apart, blind) == sent(joined, blind) == (grid,)
+    assert sent(apart, wrong) == (sent(apart, wrong.goal)[0], grid)
+    (composite,) = sent(joined, wrong)
+    assert composite.label == "composite"
+    assert composite.data != sent(joined, task)[0].data
+    assert len(apart.keys(wrong)) == 2
+    assert goal != sent(apart, wrong)[0]
+
+
+@pytest.mark.parametrize("size", [(30_000, 30_000), (1, 1), (0, 9)])
+def test_what_is_no_picture_in_the_cache_is_drawn_anew(
+    tasks: tuple[AssemblyTask, ...], tmp_path: Path, size: tuple[int, int]
+) -> None:
+    pictures = ScenePictures(Workshop(1, tmp_path), COMPOSITE)
+    (key,) = pictures.keys(tasks[0])
+    (tmp_path / key[:2]).mkdir()
+    (tmp_path / key[:2] / f"{key}.png").write_bytes(png_header(*size))
+    (outline,), are_real = pictures.outline(tasks[0])
+    assert (outline.data, are_real) == (b"", False)
+
+
+def test_a_cache_that_cannot_be_written_is_said_so(
+    tasks: tuple[AssemblyTask, ...], tmp_path: Path
+) -> None:
+    taken = tmp_path / "taken"
+    taken.write_text("mine", encoding="utf-8")
+    with pytest.raises(StoreError, match="PHYBLOCK_CACHE"):
+        draw(taken, COMPOSITE, tasks[:1])
+    assert taken.read_text(encoding="utf-8") == "mine"

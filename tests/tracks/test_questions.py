@@ -1,0 +1,514 @@
+"""The track of questions: selection, what is sent in which order, judging, baselines, export."""
+
+from __future__ import annotations
+
+import ast
+import asyncio
+import base64
+import csv
+import io
+import sys
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image as PillowImage
+
+from phyblock.config.models import ModelConfig
+from phyblock.data import QuestionSet, QuestionTask, read_builtin, read_questions
+from phyblock.domain import LETTERS, SUBTASKS, Question, Scene, Subtask, is_picture_option
+from phyblock.domain.question import rotated
+from phyblock.errors import DataError, SpecError, StoreError
+from phyblock.models.replay import BaselineModel
+from phyblock.models.request import Image, Request
+from phyblock.parsing.answer import parse_answer
+from phyblock.sim.pictures import PictureStyle
+from phyblock.sim.question_pictures import question_key, question_png
+from phyblock.tracks import questions
+from phyblock.tracks.pictures import Workshop
+from phyblock.tracks.questions import (
+    AskedQuestion,
+    ChoiceSubject,
+    QuestionPictures,
+    Vqa,
+    export_questions,
+    select_questions,
+)
+from tests.tracks.opened import track_of
+from tests.vqa_set import write_questions
+from tests.workspace import Workspace
+
+STYLE = PictureStyle(size_px=128)
+LEVELS = (1, 2, 3, 4)
+OPTIONS = ("cube", "arch", "cylinder", "cuboid")
+
+
+@pytest.fixture(scope="module")
+def question_set(tmp_path_factory: pytest.TempPathFactory) -> QuestionSet:
+    root = tmp_path_factory.mktemp("vqa")
+    scenes = read_builtin(Workspace(root, root / "pictures").write_scenes())
+    return read_questions(write_questions(root / "questions"), scenes)
+
+
+@pytest.fixture(scope="module")
+def shop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
+    made = Workshop(1, tmp_path_factory.mktemp("pictures"))
+    yield made
+    made.close()
+
+
+def opened(found: QuestionSet, shop: Workshop | None, size_px: int = 128, **vqa: Any) -> Vqa:
+    """The track on a set of questions that is in no file."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(questions, "open_questions", lambda *_: found)
+        track: Vqa = track_of("vqa", shop=shop, images={"size_px": size_px}, vqa=vqa)
+    return track
+
+
+def of_tasks(found: QuestionSet, tasks: Sequence[QuestionTask]) -> QuestionSet:
+    return QuestionSet("some", found.root, tuple(tasks))
+
+
+def ask(track: Vqa, *keys: str, seed: int = 0) -> list[Request]:
+    async def all_of_them() -> list[Request]:
+        items = [item for item in track.items if not keys or item.key in keys]
+        return [await track.request(item, seed, {}, with_messages=True) for item in items]
+
+    return asyncio.run(all_of_them())
+
+
+def user_parts(request: Request) -> tuple[str | Image, ...]:
+    return request.messages[-1].parts
+
+
+def images(request: Request) -> list[Image]:
+    return [part for part in user_parts(request) if isinstance(part, Image)]
+
+
+def text_of(request: Request) -> str:
+    last = user_parts(request)[-1]
+    assert isinstance(last, str)
+    return last
+
+
+def test_every_picture_is_announced_and_sent_in_order(
+    question_set: QuestionSet, shop: Workshop
+) -> None:
+    track = opened(question_set, shop)
+    names = ("sh-000", "ad-000", "vp-000", "or-000")
+    asked = {request.key: request for request in ask(track, *names)}
+    requests = [asked[name] for name in names]
+    captions = [
+        [part for part in user_parts(request)[:-1] if isinstance(part, str)] for request in requests
+    ]
+    assert captions == [
+        ["Picture:"],
+        ["First picture:", "Second picture, one block by itself:"],
+        ["First picture:", "Picture A:", "Picture B:", "Picture C:", "Picture D:"],
+        ["Picture A:", "Picture B:", "Picture C:", "Picture D:"],
+    ]
+    for request in requests:
+        subject = request.subject
+        assert isinstance(subject, ChoiceSubject)
+        recipes = {picture.label: picture for picture in subject.question.pictures}
+        for image in images(request):
+            assert image.data == question_png(recipes[image.label], STYLE)
+        parts = user_parts(request)[:-1]
+        assert [isinstance(part, str) for part in parts] == [True, False] * (len(parts) // 2)
+
+
+def test_the_text_says_question_options_and_form(question_set: QuestionSet, shop: Workshop) -> None:
+    track = opened(question_set, shop, blind=True)
+    requests = {request.key: request for request in ask(track)}
+    for key, request in requests.items():
+        subject = request.subject
+        assert isinstance(subject, ChoiceSubject)
+        text = text_of(request)
+        assert f"Question: {subject.question.text}" in text
+        assert "\n\n\n" not in text
+        asked_form = "Answer: W, X, Y, Z" if key.startswith("or") else "Answer: X"
+        assert asked_form in text.splitlines()
+        if "<img1>" in subject.question.options:
+            assert "<img" not in text
+            assert "the pictures A, B, C and D." in text
+        else:
+            for letter, option in zip(LETTERS, subject.question.options, strict=True):
+                assert f"{letter}. {option}" in text.splitlines()
+
+
+def test_the_answer_stands_in_no_message(question_set: QuestionSet, shop: Workshop) -> None:
+    """Questions that differ in the right answer alone are asked alike."""
+    turned = [
+        replace(task, question=replace(task.question, answer=_other(task.question.answer)))
+        for task in question_set.tasks
+    ]
+    rules = {"blind": True}
+    asked = ask(opened(question_set, shop, **rules))
+    again = ask(opened(of_tasks(question_set, turned), shop, **rules))
+    assert [r.messages for r in asked] == [r.messages for r in again]
+
+
+def _other(answer: tuple[int, ...]) -> tuple[int, ...]:
+    return tuple((index + 1) % 4 for index in answer)
+
+
+def test_blind_sends_no_picture(question_set: QuestionSet, shop: Workshop) -> None:
+    requests = ask(opened(question_set, shop, blind=True))
+    assert len(requests) == len(question_set.tasks)
+    assert all(len(user_parts(request)) == 1 for request in requests)
+    assert all("not available" in text_of(request) for request in requests)
+
+
+def test_options_on_one_sheet(question_set: QuestionSet, shop: Workshop) -> None:
+    rules = {"options_as": "letters"}
+    (request,) = ask(opened(question_set, shop, **rules), "vp-000")
+    scene, sheet = images(request)
+    assert (scene.label, sheet.label) == ("scene", "options")
+    subject = request.subject
+    assert isinstance(subject, ChoiceSubject)
+    with PillowImage.open(io.BytesIO(sheet.data)) as sheet_picture:
+        whole = np.asarray(sheet_picture.convert("RGB"), dtype=np.int16)
+    side = STYLE.size_px
+    assert whole.shape[:2] == (sheet.height_px, sheet.width_px) == (2 * side + 2, 2 * side + 2)
+    recipes = {picture.label: picture for picture in subject.question.pictures}
+    for place, letter in enumerate(LETTERS):
+        row, column = divmod(place, 2)
+        cell = whole[row * (side + 2) :, column * (side + 2) :][:side, :side]
+        with PillowImage.open(io.BytesIO(question_png(recipes[letter], STYLE))) as alone:
+            lone = np.asarray(alone.convert("RGB"), dtype=np.int16)
+        assert (cell[side // 4 :] == lone[side // 4 :]).all()
+        assert (cell[: side // 8, : side // 8] != lone[: side // 8, : side // 8]).any()
+
+
+def test_circular_asks_every_rotation_and_moves_pictures_with_their_letters(
+    question_set: QuestionSet, shop: Workshop
+) -> None:
+    track = opened(question_set, shop, circular=True)
+    assert len(track.items) == 4 * len(question_set.tasks)
+    keys = [f"vp-000-r{by}" for by in range(4)]
+    shown = [{i.label: i.sha256 for i in images(request)} for request in ask(track, *keys)]
+    for by in range(4):
+        assert shown[by]["scene"] == shown[0]["scene"]
+        for place, letter in enumerate(LETTERS):
+            assert shown[by][letter] == shown[0][LETTERS[(place + by) % 4]]
+    assert len(set(shown[0].values())) == 5
+
+
+@given(first=st.integers(0, 3), second=st.integers(0, 3), data=st.data())
+def test_a_rotation_keeps_what_is_right_and_rotations_add_up(
+    question_set: QuestionSet, first: int, second: int, data: st.DataObject
+) -> None:
+    question = data.draw(st.sampled_from(question_set.tasks)).question
+    turned = rotated(question, first)
+    for before, after in zip(question.answer, turned.answer, strict=True):
+        assert _meaning(turned, after) == _meaning(question, before)
+    assert rotated(turned, second) == rotated(question, (first + second) % 4)
+    assert rotated(question, 0) == question
+
+
+def _meaning(question: Question, index: int) -> object:
+    """What an option is: its picture, its place in the world, or its words."""
+    letter = LETTERS[index]
+    for picture in question.pictures:
+        if picture.label == letter:
+            return picture.blocks, picture.view_deg
+        for mark in picture.marks:
+            if mark.letter == letter:
+                return mark.position_m
+    return question.options[index]
+
+
+def test_wrong_pictures_are_of_another_scene_and_depend_on_the_seed_alone(
+    question_set: QuestionSet, shop: Workshop
+) -> None:
+    own = {r.key: r for r in ask(opened(question_set, shop))}
+    rules = {"wrong_image": True}
+    seen = [
+        {r.key: r for r in ask(opened(question_set, shop, **rules), seed=seed)}
+        for seed in (0, 0, 1)
+    ]
+    assert own.keys() == seen[0].keys()
+    for key, request in own.items():
+        wrong = seen[0][key]
+        assert [i.label for i in images(wrong)] == [i.label for i in images(request)]
+        assert not {i.sha256 for i in images(wrong)} & {i.sha256 for i in images(request)}
+        assert text_of(wrong) == text_of(request)
+        assert wrong.messages == seen[1][key].messages
+    assert any(seen[2][key].messages != seen[0][key].messages for key in own)
+
+
+def test_wrong_pictures_have_the_marks_that_the_text_speaks_of(
+    question_set: QuestionSet, shop: Workshop
+) -> None:
+    """Of two other questions about places, one marks none: it never stands in."""
+    first, second, third, *_ = [t for t in question_set.tasks if t.question.subtask == "AD"]
+    scene, *rest = second.question.pictures
+    bare = replace(second.question, pictures=(replace(scene, marks=()), *rest))
+    three = of_tasks(question_set, [first, replace(second, question=bare), third])
+    track = opened(three, shop, wrong_image=True, per_subtask=1)
+    for seed in range(8):
+        (request,) = ask(track, seed=seed)
+        sent = {image.label: image.data for image in images(request)}
+        shown = {picture.label: picture for picture in third.question.pictures}
+        assert sent == {label: question_png(recipe, STYLE) for label, recipe in shown.items()}
+
+
+def test_wrong_pictures_need_another_scene(question_set: QuestionSet) -> None:
+    with pytest.raises(SpecError, match="about another scene"):
+        opened(of_tasks(question_set, question_set.tasks[:1]), None, wrong_image=True)
+
+
+@pytest.mark.parametrize(
+    ("options_as", "wanted"),
+    [("images", [(128, 128)] * 5), ("letters", [(128, 128), (258, 258)])],
+)
+def test_outlines_tell_the_sizes_of_pictures_that_are_not_drawn_yet(
+    question_set: QuestionSet, tmp_path: Path, options_as: str, wanted: list[tuple[int, int]]
+) -> None:
+    fresh = Workshop(1, tmp_path)
+    track = opened(question_set, fresh, options_as=options_as)
+    item = next(item for item in track.items if item.key == "vp-000")
+    ((request, is_real),) = track.outlines(item)
+    assert not is_real
+    assert [(i.width_px, i.height_px) for i in images(request)] == wanted
+    (asked,) = ask(track, "vp-000")
+    assert [(i.width_px, i.height_px) for i in images(asked)] == wanted
+    assert list(track.outlines(item)) == [(asked, True)]
+    fresh.close()
+
+
+def test_identity_follows_questions_prompt_and_pictures(
+    question_set: QuestionSet, shop: Workshop
+) -> None:
+    def identity(found: QuestionSet = question_set, size_px: int = 128, **vqa: Any) -> str:
+        return repr(opened(found, shop, size_px, **vqa).identity())
+
+    base = identity()
+    assert identity() == base
+    others = [
+        identity(size_px=256),
+        identity(of_tasks(question_set, question_set.tasks[:7])),
+        identity(blind=True),
+        identity(circular=True),
+    ]
+    assert len({base, *others}) == 5
+
+
+def test_questions_keep_their_background_unless_a_suite_gives_one(
+    question_set: QuestionSet, shop: Workshop
+) -> None:
+    asked = next(task.question for task in question_set.tasks if task.key == "vp-000")
+    lawn = replace(asked, pictures=tuple(replace(p, background="lawn") for p in asked.pictures))
+    bare = [replace(picture, background=None) for picture in asked.pictures]
+    for question, ground, drawn in (
+        (asked, None, "checkerboard"),
+        (lawn, None, "lawn"),
+        (lawn, "white", "white"),
+        (asked, "white", "white"),
+    ):
+        pictures = QuestionPictures(shop, STYLE, "images", ground)  # type: ignore[arg-type]
+        style = replace(STYLE, background=drawn)
+        wanted = tuple(question_key(picture, style) for picture in bare)
+        assert pictures.keys(AskedQuestion(QuestionTask(question))) == wanted
+
+
+def test_judging_reads_scores_and_says_what_was_right(question_set: QuestionSet) -> None:
+    track = opened(question_set, None)
+    for item in track.items:
+        right = item.question.answer_letters
+        good = track.judge(item, f"I looked closely.\nAnswer: {', '.join(right)}")
+        assert good.fields() == {
+            "parse": {"rule": "answer_line", "letters": right},
+            "scores": [],
+            "answer": {"right": right, "given": right, "correct": True},
+        }
+        for text in (None, "I cannot tell."):
+            bad = track.judge(item, text)
+            assert not bad.is_read
+            assert bad.fields()["answer"] == {"right": right, "given": None, "correct": False}
+
+
+def test_a_picture_file_that_is_broken_is_named(
+    question_set: QuestionSet, tmp_path: Path, shop: Workshop
+) -> None:
+    broken = tmp_path / "broken.png"
+    broken.write_bytes(b"no picture")
+    task = QuestionTask(question_set.tasks[0].question, {"scene": broken})
+    with pytest.raises(DataError, match=r"broken\.png"):
+        ask(opened(of_tasks(question_set, [task]), shop))
+
+
+def answer(
+    name: str, subtask: Subtask, key: str, guesses: Mapping[str, tuple[int, ...]] | None = None
+) -> str:
+    right = (2, 0, 3, 1) if subtask == "OR" else (2,)
+    question = Question("q", subtask, Scene("s", (1,), (), ()), "?", OPTIONS, right)
+    model = BaselineModel(ModelConfig(name=name))
+    subject = ChoiceSubject(question, (guesses or {}).__getitem__)
+    reply = asyncio.run(model.ask(Request(key, 0, (), {}, "", subject)))
+    letters = parse_answer(reply.text, OPTIONS, subtask == "OR").letters
+    assert letters is not None
+    return letters
+
+
+def test_baselines_answer_by_chance_rightly_or_as_they_guess() -> None:
+    found = Counter(answer("random", "SH", f"q{n}") for n in range(400))
+    assert set(found) == set(LETTERS)
+    assert all(70 <= count <= 130 for count in found.values())
+    orders = {answer("random", "OR", f"q{n}") for n in range(300)}
+    assert len(orders) == 24
+    assert {"".join(sorted(order)) for order in orders} == {LETTERS}
+    assert (answer("oracle", "SH", "q"), answer("oracle", "OR", "q")) == ("C", "CADB")
+    for name in ("majority", "text-only"):
+        assert answer(name, "SH", "q", {name: (1,)}) == "B"
+        assert answer(name, "OR", "q", {name: (3, 2, 1, 0)}) == "DCBA"
+    with pytest.raises(SpecError, match="has no rule"):
+        answer("all-candidates", "SH", "q")
+
+
+def task_of(number: int, subtask: Subtask) -> QuestionTask:
+    scene = Scene(f"s{number}", (number % 4 + 1,), (), ())
+    question = Question(f"q{number}", subtask, scene, "?", ("a", "b", "c", "d"), (0,))
+    return QuestionTask(question)
+
+
+tasks = st.lists(st.sampled_from(SUBTASKS[:4]), max_size=60).map(
+    lambda names: [task_of(number, name) for number, name in enumerate(names)]
+)
+some = st.lists(st.sampled_from(SUBTASKS[:7]), min_size=1, unique=True)
+
+
+@given(tasks, some, st.none() | st.integers(1, 5), st.none() | st.integers(1, 40))
+def test_no_more_than_wanted_of_each_and_in_all(
+    given_tasks: list[QuestionTask],
+    subtasks: list[Subtask],
+    per_subtask: int | None,
+    limit: int | None,
+) -> None:
+    chosen = select_questions(given_tasks, subtasks, LEVELS, per_subtask, limit)
+    found = Counter(one.question.subtask for one in given_tasks)
+    counts = Counter(one.question.subtask for one in chosen)
+    most = {name: min(found[name], per_subtask or found[name]) for name in subtasks}
+    assert all(counts[name] <= most.get(name, 0) for name in SUBTASKS)
+    assert len(chosen) == min(sum(most.values()), limit or sum(most.values()))
+    positions = [given_tasks.index(one) for one in chosen]
+    assert positions == sorted(set(positions))
+
+
+@given(tasks, some, st.integers(1, 5), st.integers(1, 40))
+def test_a_higher_limit_asks_all_that_a_lower_one_asks(
+    given_tasks: list[QuestionTask], subtasks: list[Subtask], per_subtask: int, limit: int
+) -> None:
+    def keys(most_of_each: int | None, most: int | None) -> set[str]:
+        kept = select_questions(given_tasks, subtasks, LEVELS, most_of_each, most)
+        return {task.key for task in kept}
+
+    assert keys(None, limit) <= keys(None, limit + 1)
+    assert keys(per_subtask, None) <= keys(per_subtask + 1, None)
+    assert keys(per_subtask, limit) <= keys(per_subtask, limit + 1)
+
+
+@given(tasks, st.lists(st.sampled_from(LEVELS), min_size=1, unique=True))
+def test_levels_are_those_of_the_scenes(given_tasks: list[QuestionTask], levels: list[int]) -> None:
+    chosen = select_questions(given_tasks, SUBTASKS, levels, None, None)
+    assert list(chosen) == [one for one in given_tasks if set(one.scene.levels) & set(levels)]
+
+
+def test_those_kept_are_spread_over_the_set() -> None:
+    many = [task_of(number, "SH") for number in range(100)]
+    chosen = select_questions(many, ["SH"], LEVELS, 4, None)
+    assert [many.index(one) for one in chosen] == [0, 25, 50, 75]
+
+
+def export(found: QuestionSet, shop: Workshop, form: str, folder: Path) -> tuple[Path, ...]:
+    return export_questions(found.tasks, QuestionPictures(shop, STYLE, "images"), form, folder)
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    csv.field_size_limit(10**8)
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file, delimiter="\t"))
+
+
+def test_tsv_files_are_as_vlmevalkit_reads_them(
+    question_set: QuestionSet, shop: Workshop, tmp_path: Path
+) -> None:
+    files = export_questions(
+        question_set.tasks, QuestionPictures(shop, STYLE, "images"), "vlmevalkit", tmp_path / "out"
+    )
+    choice, ordering = (rows_of(file) for file in files)
+    asked = {task.key: task.question for task in question_set.tasks}
+    assert {row["index"] for row in (*choice, *ordering)} == set(asked)
+    assert len(choice) + len(ordering) == len(asked)
+    for row in (*choice, *ordering):
+        question = asked[row["index"]]
+        assert row["answer"] == question.answer_letters
+        assert (row["category"], row["l2-category"]) == (question.subtask, question.category)
+        # VLMEvalKit takes lists in brackets apart, and anything else for one picture.
+        several = row["image"].startswith("[")
+        coded = ast.literal_eval(row["image"]) if several else [row["image"]]
+        names = ast.literal_eval(row["image_path"]) if several else [row["image_path"]]
+        assert len(coded) == len(names) == len(question.pictures)
+        assert len(set(names)) == len(names)
+        for data in coded:
+            assert len(data) > 64
+            with PillowImage.open(io.BytesIO(base64.b64decode(data))) as picture:
+                assert picture.size == (128, 128)
+        for letter, option in zip(LETTERS, question.options, strict=True):
+            if is_picture_option(option):
+                place = int(row[letter].removeprefix("Picture ")) - 1
+                assert names[place] == f"{question.id}-{letter}.png"
+            else:
+                assert row[letter] == option
+    assert all(len(row["answer"]) == 1 for row in choice)
+    assert all(len(row["answer"]) == 4 for row in ordering)
+
+
+def test_a_hugging_face_dataset_has_questions_and_pictures(
+    question_set: QuestionSet, shop: Workshop, tmp_path: Path
+) -> None:
+    datasets = pytest.importorskip("datasets", reason="the package datasets is not installed")
+    saved, parquet = export_questions(
+        question_set.tasks, QuestionPictures(shop, STYLE, "images"), "hf", tmp_path / "out"
+    )
+    assert (saved, parquet) == (
+        tmp_path / "out" / "dataset",
+        tmp_path / "out" / "questions.parquet",
+    )
+    from_disk = datasets.load_from_disk(str(saved))
+    loaded = datasets.load_dataset(
+        str(tmp_path / "out"), cache_dir=str(tmp_path / "cache"), split="train"
+    )
+    for rows in (from_disk, loaded):
+        assert rows["id"][:] == [task.key for task in question_set.tasks]
+        for row, task in zip(rows, question_set.tasks, strict=True):
+            assert row["answer"] == task.question.answer_letters
+            assert row["options"] == list(task.question.options)
+            assert [image.size for image in row["images"]] == [(128, 128)] * len(row["labels"])
+
+
+def test_what_cannot_be_written_is_said(
+    question_set: QuestionSet,
+    shop: Workshop,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(StoreError, match="cannot be written"):
+        export_questions(
+            question_set.tasks,
+            QuestionPictures(shop, STYLE, "images"),
+            "vlmevalkit",
+            tmp_path / "file" / "out",
+        )
+    monkeypatch.setitem(sys.modules, "datasets", None)
+    with pytest.raises(SpecError, match=r"phyblock\[hf\]"):
+        export_questions(
+            question_set.tasks, QuestionPictures(shop, STYLE, "images"), "hf", tmp_path / "out"
+        )

@@ -1,0 +1,499 @@
+"""Step planning: what each reply does, what ends an episode, what is recorded and what is asked."""
+
+from __future__ import annotations
+
+import asyncio
+import functools
+import json
+import zlib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from phyblock.data import AssemblyTask, read_official
+from phyblock.domain import Block, Candidate, CandidateSet, Scene
+from phyblock.errors import PromptError
+from phyblock.models.request import Image, Message, Request
+from phyblock.parsing.move import MOVE_PROBLEMS, parse_move
+from phyblock.records.reply import Reply, Usage
+from phyblock.scoring.steps import MOVE_OUTCOMES
+from phyblock.tracks.pictures import Workshop
+from phyblock.tracks.step_planning import (
+    ENDINGS,
+    STEP_RULES,
+    Feedback,
+    PastStep,
+    StepPlanning,
+    StepSubject,
+    Tally,
+    majority,
+)
+from phyblock.types import SETTINGS, Setting
+from tests.parsing.test_move import REPLIES
+from tests.tracks.opened import BUILT_IN, track_of
+
+OPEN = {"max_failures": None, "max_repeats": None}
+GOAL, CANDIDATES = Image(b"g", "goal", 1, 1), Image(b"c", "candidates", 1, 1)
+
+Agent = Callable[[Request], Reply | str]
+
+
+def made(form: str = "text", shop: Workshop | None = None, **steps: Any) -> StepPlanning:
+    """The track; nothing is simulated unless that is asked for."""
+    return _made(form, shop, json.dumps({"physics": "off", **steps}))
+
+
+@functools.cache
+def _made(form: str, shop: Workshop | None, steps: str) -> Any:
+    fields = {"answer_format": form, "steps": json.loads(steps)}
+    return track_of("step_planning", BUILT_IN.tasks[:1], shop, **fields)
+
+
+def tower(*colors: str) -> AssemblyTask:
+    """Cubes one on another; candidates are five colors of cube, and a red arch that is no use."""
+    blocks = tuple(
+        Block(i, "cube", c, (0, 0, 0.05 * i - 0.025), (0, 0, 0), (i - 1,) if i > 1 else (), i)  # type: ignore[arg-type]
+        for i, c in enumerate(colors, 1)
+    )
+    cubes = [Candidate("cube", c, (0, 0, 0)) for c in ("red", "yellow", "blue", "green", "orange")]  # type: ignore[arg-type]
+    arch = Candidate("arch", "red", (0, 0, 0))
+    return AssemblyTask(Scene("tower", (3,), blocks, ("tower",)), CandidateSet((*cubes, arch)))
+
+
+def seesaw() -> AssemblyTask:
+    """A bar that tips unless the second cube is there before it."""
+    blocks = (
+        Block(1, "cube", "red", (0, 0, 0.025), (0, 0, 0), (), 1),
+        Block(2, "cube", "blue", (0.11, 0, 0.025), (0, 0, 0), (), 1),
+        Block(3, "cuboid3", "yellow", (0.055, 0, 0.0625), (0, 0, 0), (1,), 2),
+    )
+    numbered = tuple(Candidate(b.type, b.color, b.euler_deg) for b in blocks)
+    return AssemblyTask(Scene("seesaw", (2,), blocks, ("seesaw",)), CandidateSet(numbered))
+
+
+def scripted(*texts: str) -> Agent:
+    """Says these texts one after another, then Done."""
+    left = list(texts)
+    return lambda _: left.pop(0) if left else "Done"
+
+
+def baseline(name: str) -> Agent:
+    rule = STEP_RULES[name]
+
+    def ask(request: Request) -> str:
+        seed = zlib.crc32(f"{name} {request.key} {request.seed}".encode())
+        return rule(request.subject, np.random.default_rng(seed))
+
+    return ask
+
+
+def play(
+    task: AssemblyTask, agent: Agent, track: StepPlanning | None = None, seed: int = 0
+) -> tuple[dict[str, Any], list[Request]]:
+    episode = (track or made(**OPEN)).start(task, seed, {}, with_messages=False)
+
+    async def requests() -> list[Request]:
+        asked = []
+        while (request := await episode.request()) is not None:
+            asked.append(request)
+            reply = agent(request)
+            episode.take(request, reply if isinstance(reply, Reply) else Reply(text=reply))
+            assert len(asked) < 500, "the episode does not end"
+        return asked
+
+    asked = asyncio.run(requests())
+    return episode.fields(), asked
+
+
+def scores(fields: dict[str, Any], criterion: str, setting: Setting = "A") -> tuple[int, int, int]:
+    (found,) = [
+        s for s in fields["scores"] if (s["criterion"], s["setting"]) == (criterion, setting)
+    ]
+    return found["tp"], found["fp"], found["fn"]
+
+
+def test_each_reply_has_its_outcome() -> None:
+    fields, requests = play(
+        tower("red", "blue", "red"),
+        scripted(
+            "Move(6)", "Move(3)", "Move(1)", "Move(99)", "hm", "", "Move(1) Move(2)",
+            "Move(2)\nDone", "Move(3)", "Next plan: Move(1)",
+        ),
+        made(max_steps=20, max_failures=None),
+    )  # fmt: skip
+    assert fields["outcomes"] == [
+        *("shape_not_in_gt", "dependency_not_met", "placed", "invalid", "no_move", "empty"),
+        *("several_moves", "several_moves", "placed", "placed"),
+    ]
+    assert fields["ending"] == "completed"
+    assert fields["progress"] == [0, 0, 1, 1, 1, 1, 1, 1, 2, 3]
+    assert [turn["placed"] for turn in fields["turns"]] == [None, None, 0, *[None] * 5, 1, 2]
+    assert fields["turns"][-1]["world"] == [0, 1, 2]
+    assert fields["parse"]["plan"] == [6, 3, 1, 99, 3, 1]
+    assert scores(fields, "placed") == (3, 0, 0)
+    assert scores(fields, "attempted") == (3, 3, 0)
+    assert len(requests) == len(fields["turns"]) == 10
+
+
+@given(
+    st.lists(st.sampled_from([*(f"Move({n})" for n in range(1, 7)), "Done"]), max_size=8),
+    st.sampled_from([1, 3]),
+)
+def test_an_episode_goes_the_same_way_in_json(operations: list[str], samples: int) -> None:
+    task = tower("red", "blue", "red")
+    text, asked = (made(form, samples=samples, **OPEN) for form in ("text", "json_schema"))
+    form = asked.form(task)
+    assert form is not None
+    told = [form.write(operation, "Move(2) comes later.") for operation in operations]
+    (one, _), (other, requests) = (
+        play(task, scripted(*operations), text),
+        play(task, scripted(*told), asked),
+    )
+    assert all(request.response_format == form.response_format for request in requests)
+    said = [turn.pop("parse") for turn in other["turns"]]
+    for turn in one["turns"]:
+        turn.pop("parse")
+    assert one == other
+    assert {parse["rule"] for parse in said[: len(told)]} <= {"json"}
+    broken = ('{"operation": "Move(1)"', '{"operation": 1.5}', '{"operation": "Done"}')
+    fields, _ = play(tower("red", "blue"), scripted(*broken), made("json_schema", **OPEN))
+    assert fields["outcomes"] == ["placed", "no_move", "done"]
+
+
+def test_an_episode_ends_with_done_or_without_a_reply_and_what_is_missing_is_missed() -> None:
+    fields, _ = play(tower("red", "blue"), scripted("Move(1)", "Done", "Move(3)"))
+    assert (fields["ending"], fields["outcomes"]) == ("done", ["placed", "done"])
+    assert scores(fields, "placed") == scores(fields, "attempted") == (1, 0, 1)
+    episode = made().start(tower("red"), 0, {}, with_messages=False)
+    fields = episode.fields()
+    assert not episode.is_read
+    assert (fields["ending"], fields["outcomes"], fields["turns"]) == ("unanswered", [], [])
+    assert scores(fields, "placed") == (0, 0, 1)
+
+
+def usage(text: str, tokens: int | None, usd: float | None) -> Agent:
+    return lambda _: Reply(
+        text=text,
+        usage=Usage(prompt_tokens=tokens, completion_tokens=10 if tokens else None),
+        cost_usd=usd,
+    )
+
+
+@pytest.mark.parametrize(
+    ("limits", "agent", "ending", "steps"),
+    [
+        (OPEN, scripted(*["Move(6)"] * 50), "max_steps", 6),
+        ({"max_steps": 4, "max_failures": 9}, scripted(*["?"] * 50), "max_steps", 4),
+        ({"max_failures": 3, "max_repeats": None}, scripted(*["Move(6)"] * 50), "max_failures", 3),
+        ({"max_failures": 2}, scripted("Move(1)", "Move(6)", "?", "Move(3)"), "max_failures", 3),
+        ({"max_failures": 9, "max_repeats": 2}, scripted(*["Move(6)"] * 50), "max_repeats", 2),
+        ({"max_failures": 9, "max_repeats": 2},
+         scripted("Move(6)", "Move(5)", "Move(6)", "Move(6)"), "max_repeats", 4),
+        ({"max_episode_tokens": 200}, usage("Move(1)", 100, None), "max_tokens", 2),
+        ({"max_episode_usd": 0.25}, usage("?", None, 0.1), "max_cost", 3),
+        ({"max_episode_tokens": 1, "max_episode_usd": 0.01, "max_failures": 2},
+         usage("?", None, None), "max_failures", 2),
+        ({"max_steps": 3}, scripted("Move(1)", "Move(1)", "Move(3)"), "completed", 3),
+    ],
+)  # fmt: skip
+def test_limits_end_an_episode(
+    limits: dict[str, Any], agent: Agent, ending: str, steps: int
+) -> None:
+    fields, _ = play(tower("red", "red", "blue"), agent, made(**limits))
+    assert (fields["ending"], len(fields["outcomes"])) == (ending, steps)
+
+
+def test_no_hostile_reply_stops_an_episode() -> None:
+    """Each of them has its named outcome, and what follows is played as if it had not been."""
+    allowed = {*MOVE_OUTCOMES, *MOVE_PROBLEMS, "done"}
+    for text, _ in REPLIES:
+        fields, _ = play(tower("red", "blue"), scripted(text, "Move(1)", "Move(3)"))
+        assert set(fields["outcomes"]) <= allowed, text
+        expected = "done" if fields["outcomes"][0] == "done" else "completed"
+        assert fields["ending"] == expected, text
+        json.dumps(fields, allow_nan=False)
+
+
+@settings(deadline=None)
+@given(st.lists(st.sampled_from(["Move(1)", "Move(3)", "Move(6)", "?", "Move(40)"]), max_size=60))
+def test_whatever_is_said_the_default_limits_end_it_the_same_way(texts: list[str]) -> None:
+    task = tower("red", "blue", "red", "blue")
+    fields, requests = play(task, scripted(*texts), made(), seed=3)
+    assert play(task, scripted(*texts), made(), seed=3) == (fields, requests)
+    assert len(requests) <= 8
+    assert fields["ending"] in ENDINGS
+    tp, fp, fn = scores(fields, "attempted")
+    assert tp + fn == 4
+    assert tp + fp == len(fields["parse"]["plan"])
+    assert tp == fields["outcomes"].count("placed")
+
+
+@pytest.mark.parametrize("accepts", SETTINGS)
+def test_the_oracle_completes_every_built_in_scene(accepts: Setting) -> None:
+    """Also where orientations do not matter to the simulator, it makes no mistake in them."""
+    for task in BUILT_IN.tasks:
+        fields, _ = play(task, baseline("oracle"), made(setting=accepts))
+        assert fields["ending"] == "completed"
+        for setting in SETTINGS:
+            assert scores(fields, "attempted", setting) == (len(task.scene), 0, 0), task.scene.id
+
+
+def test_the_oracle_completes_every_official_scene(official_checkout: Path) -> None:
+    for task in read_official(official_checkout).tasks:
+        fields, _ = play(task, baseline("oracle"), made())
+        assert fields["ending"] == "completed", task.scene.id
+        assert scores(fields, "attempted") == (len(task.scene), 0, 0)
+
+
+def test_a_turned_block_is_placed_in_b_and_wrong_in_a() -> None:
+    """The oracle without orientation: what setting B lets pass is counted in setting A."""
+    blocks = (
+        Block(1, "arch", "red", (0, 0, 0.025), (0, 0, 0), (), 1),
+        Block(2, "cube", "red", (0, 0, 0.075), (0, 0, 0), (1,), 2),
+    )
+    looks = [("arch", 0), ("arch", 90), ("cube", 0)]
+    numbered = tuple(Candidate(t, "red", (0, 0, turn)) for t, turn in looks)  # type: ignore[arg-type]
+    task = AssemblyTask(Scene("s", (2,), blocks, ("s",)), CandidateSet(numbered))
+    agent = baseline("oracle-no-orientation")
+    in_b, _ = play(task, agent, made(setting="B"))
+    assert in_b["ending"] == "completed"
+    assert in_b["parse"]["plan"] == [2, 3]
+    assert (scores(in_b, "placed", "A"), scores(in_b, "placed", "B")) == ((1, 1, 1), (2, 0, 0))
+    in_a, _ = play(task, agent, made(setting="A"))
+    assert in_a["ending"] == "max_repeats"
+    assert set(in_a["outcomes"]) == {"incorrect_orientation"}
+
+
+@pytest.mark.parametrize(
+    ("physics", "ending", "placed", "fallen"),
+    [("off", "completed", (3, 0, 0), [None] * 3), ("settle", "completed", (3, 0, 0), [[], [3], []]),
+     ("strict", "collapsed", (1, 1, 2), [[], [3]])],
+)  # fmt: skip
+def test_a_collapse_ends_an_episode_under_strict_physics_alone(
+    physics: str, ending: str, placed: tuple[int, int, int], fallen: list[Any]
+) -> None:
+    track = made(physics=physics, **OPEN)
+    fields, _ = play(seesaw(), scripted("Move(1)", "Move(3)", "Move(2)"), track)
+    assert (fields["ending"], scores(fields, "placed")) == (ending, placed)
+    assert [turn.get("fallen") for turn in fields["turns"]] == fallen
+    fields, _ = play(seesaw(), scripted("Move(1)", "Move(2)", "Move(3)"), track)
+    assert fields["ending"] == "completed"
+
+
+def test_layers_gate_where_that_is_asked_for() -> None:
+    outcomes = {}
+    for gating in ("aov", "layer"):
+        said = scripted("Move(1)", "Move(3)", "Move(2)", "Move(3)")
+        outcomes[gating] = play(seesaw(), said, made(gating=gating, **OPEN))[0]["outcomes"]
+    assert outcomes["aov"] == ["placed"] * 3
+    assert outcomes["layer"] == ["placed", "dependency_not_met", "placed", "placed"]
+
+
+def test_several_samples_a_step_are_voted_on() -> None:
+    track = made(samples=3, **OPEN)
+    said = scripted("Move(6)", "Move(1)", "So, Move(1)", "?", "Done", "Move(3)", "?", "!", "")
+    fields, requests = play(tower("red", "blue", "blue"), said, track, seed=4)
+    assert fields["outcomes"] == ["placed", "done"]
+    assert [turn["outcome"] for turn in fields["turns"]] == [
+        *(None, "placed", None),
+        *(None, "done", None),
+    ]
+    assert [request.seed for request in requests] == [12, 13, 14] * 2
+    keys = [request.key for request in requests]
+    assert len(set(keys)) == len(keys) == 6
+    assert scores(fields, "attempted") == (1, 0, 2)
+
+
+def test_a_tie_goes_to_what_was_said_first_and_the_unread_have_no_vote() -> None:
+    def chosen(*texts: str) -> int:
+        return majority([parse_move(text) for text in texts])
+
+    assert chosen("Move(2)", "Move(1)") == 0
+    assert chosen("?", "?", "Move(1)") == 2
+    assert chosen("Move(2)", "Move(1)", "Done", "Move(1)") == 1
+    assert chosen("?", "") == 0
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.tuples(st.integers(1, 3), st.booleans()), max_size=20))
+def test_a_tally_counts_runs_of_failures(steps: Sequence[tuple[int, bool]]) -> None:
+    tally = Tally()
+    for move, is_placed in steps:
+        tally.count(move, is_placed=is_placed)
+    ends = [place for place, (_, is_placed) in enumerate(steps) if is_placed]
+    tail = steps[ends[-1] + 1 :] if ends else steps
+    same = next((n for n, s in enumerate(reversed(tail)) if s[0] != tail[-1][0]), len(tail))
+    assert (tally.steps, tally.failures, tally.repeats) == (len(steps), len(tail), same)
+
+
+def test_a_request_tells_baselines_what_is_right() -> None:
+    _, requests = play(tower("red", "blue"), scripted("Move(6)", "Move(1)", "Move(3)"))
+    subjects = [request.subject for request in requests]
+    assert [(s.valid, s.exact, s.last_failed) for s in subjects if isinstance(s, StepSubject)] == [
+        ((1,), (1,), None),
+        ((1,), (1,), 6),
+        ((3,), (3,), None),
+    ]
+
+
+def test_outlines_are_as_many_as_an_episode_can_have() -> None:
+    task = tower("red", "blue")
+    real = {
+        n: [is_real for _, is_real in made(**rules).outlines(task)]
+        for n, rules in enumerate(({"samples": 2}, {}, {"max_steps": 1}))
+    }
+    # Seeds of several samples are not those of runs.
+    assert real == {0: [False] * 8, 1: [True, False, False, False], 2: [True]}
+
+
+@pytest.fixture(scope="module")
+def shop(pictures_dir: Path) -> Any:
+    shop = Workshop(1, pictures_dir)
+    yield shop
+    shop.close()
+
+
+def current(n: int) -> Image:
+    return Image(f"state {n}".encode(), "current", 1, 1)
+
+
+def past(*outcomes: str) -> list[PastStep]:
+    return [
+        PastStep(f"Move({n})", outcome, f"reply {n}", current(n))  # type: ignore[arg-type]
+        for n, outcome in enumerate(outcomes, 1)
+    ]
+
+
+def ask(
+    shop: Workshop, steps: list[PastStep], fixed: Sequence[Image] = (GOAL, CANDIDATES), **how: Any
+) -> tuple[Message, ...]:
+    """The messages of the step after these, of a goal of four blocks."""
+    task = tower("red", "blue", "red", "blue")
+    return made(shop=shop, **how).messages(task, fixed, current(len(steps) + 1), steps)
+
+
+def text(message: Message) -> str:
+    return next(part for part in message.parts if isinstance(part, str))
+
+
+def pictures(message: Message) -> list[bytes]:
+    return [part.data for part in message.parts if isinstance(part, Image)]
+
+
+def test_one_message_holds_goal_candidates_current_picture_and_history_in_this_order(
+    shop: Workshop,
+) -> None:
+    system, user = ask(shop, past("placed", "overflow"))
+    assert (system.role, user.role) == ("system", "user")
+    assert pictures(user) == [b"g", b"c", b"state 3"]
+    assert isinstance(user.parts[-1], str)
+    said = text(user)
+    assert "1. Move(1): it worked, the block is placed\n2. Move(2): it failed" in said
+    assert "step 3 of at most 8" in said
+    assert said.index("Your steps so far") > said.index("Move(N) takes")
+    assert "so far" not in text(ask(shop, [])[1])
+
+
+def test_turns_are_a_conversation_in_which_every_state_is_seen_once(shop: Workshop) -> None:
+    messages = ask(shop, past("placed", "overflow"), history="turns")
+    assert [message.role for message in messages] == [
+        *("system", "user", "assistant", "user", "assistant", "user")
+    ]
+    seen = [picture for message in messages for picture in pictures(message)]
+    assert seen == [b"g", b"c", b"state 1", b"state 2", b"state 3"]
+    assert [text(messages[n]) for n in (2, 4)] == ["reply 1", "reply 2"]
+    assert "It worked" in text(messages[3])
+    assert "It failed" in text(messages[5])
+    assert "step 3 of at most 8" in text(messages[5])
+    empty = [PastStep("(no operation)", "empty", " ", current(1))]
+    assert text(ask(shop, empty, history="turns")[2]) == "(no answer)"
+
+
+@pytest.mark.parametrize("history", ["text", "turns"])
+@settings(deadline=None)
+@given(st.integers(0, 12), st.integers(1, 5))
+def test_memory_bounds_what_is_shown_and_always_ends_with_the_state_as_it_is(
+    shop: Workshop, history: str, n: int, memory: int
+) -> None:
+    messages = ask(shop, past(*["placed"] * n), history=history, memory=memory)
+    shown = [pictures(message) for message in messages if message.role == "user"]
+    assert shown[0][:2] == [b"g", b"c"]
+    assert shown[-1][-1] == f"state {n + 1}".encode()
+    kept = min(n, memory)
+    everything = "\n".join(text(message) for message in messages)
+    assert len(messages) == 2 + (2 * kept if history == "turns" else 0)
+    assert (f"({n - memory} earlier step" in everything) == (n > memory)
+    for place in range(1, n + 1):
+        told = f"Move({place}):" in everything or f"reply {place}\n" in everything + "\n"
+        assert told == (place > n - kept)
+
+
+@pytest.mark.parametrize("feedback", get_args(Feedback))
+def test_feedback_tells_no_more_than_it_may(feedback: Feedback) -> None:
+    outcomes = [*MOVE_OUTCOMES, *MOVE_PROBLEMS]
+    told = {outcome: past(outcome)[0].report(feedback) for outcome in outcomes}
+    if feedback == "none":
+        assert set(told.values()) == {""}
+        return
+    assert told["placed"] == "it worked, the block is placed"
+    wrong = {told[outcome] for outcome in MOVE_OUTCOMES if outcome != "placed"}
+    assert len(wrong) == (5 if feedback == "error_type" else 1)
+    assert all(words.startswith("it failed") for words in wrong)
+    assert told["no_move"] == "it failed, no operation could be read"
+
+
+@pytest.mark.parametrize(
+    ("rules", "said", "unsaid"),
+    [
+        ({"cot": True}, ["First think"], []),
+        ({"cot": False}, ["one line and nothing else"], ["First think"]),
+        ({"gating": "layer"}, ["every block of the layers below"], []),
+        ({"setting": "A"}, ["same type, color and orientation that"], ["counts as a mistake"]),
+        ({"setting": "B"}, ["same type and color that", "counts as a mistake"], []),
+    ],
+)
+def test_the_model_is_told_what_the_simulator_goes_by(
+    shop: Workshop, rules: dict[str, Any], said: list[str], unsaid: list[str]
+) -> None:
+    told = text(ask(shop, [], **rules)[1])
+    assert all(words in told for words in said)
+    assert not any(words in told for words in unsaid)
+
+
+def test_pictures_of_states_are_drawn_and_kept(tmp_path: Path) -> None:
+    """An episode sees one picture a state; a second episode finds them all."""
+
+    async def play(track: StepPlanning, task: AssemblyTask) -> list[list[bytes]]:
+        episode = track.start(task, 0, {}, with_messages=True)
+        seen = []
+        while (request := await episode.request()) is not None:
+            seen.append(pictures(request.messages[1]))
+            move = request.subject.valid[0]  # type: ignore[attr-defined]
+            episode.take(request, Reply(text=f"Move({move})"))
+        return seen
+
+    found, task = [], BUILT_IN.tasks[0]
+    for expected in (2 + len(task.scene), 0):
+        shop = Workshop(1, tmp_path)
+        images = {"layout": "separate"}
+        track = track_of("step_planning", [task], shop, images=images, steps={"physics": "settle"})
+        found.append(asyncio.run(play(track, task)))
+        assert shop.rendered == expected
+        outlines = list(track.outlines(task))
+        assert [is_real for _, is_real in outlines] == [True] + [False] * (len(outlines) - 1)
+        track.close()
+    assert found[0] == found[1]
+    assert len({step[2] for step in found[0]}) == len(task.scene)
+
+
+def test_a_template_without_turns_is_no_conversation(tmp_path: Path, shop: Workshop) -> None:
+    path = tmp_path / "mine.j2"
+    path.write_text("{% block user %}Go on.{% endblock %}", encoding="utf-8")
+    made(shop=shop, prompt=str(path))
+    with pytest.raises(PromptError, match=r"mine\.j2.*has no turn block"):
+        made(shop=shop, prompt=str(path), history="turns")
