@@ -317,6 +317,9 @@ class ModelConfig(Section):
     ] = Field(default=(), alias="price", json_schema_extra=_say_one_or_list)
     """Price, or a list of prices by the day from which they hold; null: litellm's price map, or
     unknown."""
+    max_cost_usd: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] | None = None
+    """The model is asked no more before it costs more than this in a run [USD]; null: the run's
+    limit alone."""
     seed: SendMode = "auto"
     """auto: seeds are sent until the provider refuses one, then repeats are independent. always: a
     refused seed is an error. never: none is sent."""

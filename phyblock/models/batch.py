@@ -24,7 +24,7 @@ from phyblock.models.batch_providers import PROVIDERS, BatchProvider, BatchStatu
 from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.client import Answer, Client, HttpClient, SeedRefusedError
 from phyblock.models.costs import (
-    Budget,
+    ModelBudget,
     Prices,
     counted,
     estimate,
@@ -70,7 +70,7 @@ class BatchModel:
     client: Callable[[HttpClient], Client]
     files: BatchFiles
     cache: ReplyCache | None
-    budget: Budget | None
+    budget: ModelBudget | None
     prices: Prices | None
     policy: RetryPolicy
     observer: Observer
@@ -169,7 +169,7 @@ class BatchModel:
         self._given.add(key)
         self._settle(key, batch, cost_usd)
         if self.budget is not None:
-            self.budget.learn(self.name, estimate(self.config, request), reply.usage)
+            self.budget.learn(estimate(self.config, request), reply.usage)
         billed_usd, attempts = self._billed_usd.get(key), self._failures[key] + 1
         reply = reply.model_copy(
             update={"cost_usd": cost_usd, "billed_usd": billed_usd, "attempts": attempts}
@@ -252,7 +252,7 @@ class BatchModel:
         expected = estimate(self.config, request)
         if self.budget is None:
             return most_usd(prices, expected, day, batched=True)
-        return self.budget.most_usd(self.name, prices, expected, day, batched=True)
+        return self.budget.most_usd(prices, expected, day, batched=True)
 
     def _settle(self, key: str, batch: Batch, usd: float | None) -> None:
         """Count what a request cost, once; None is all that it can have cost."""

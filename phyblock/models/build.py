@@ -35,7 +35,7 @@ def build_model(
 
     `overall` bounds what all models of a run have under way together; `observer` hears of the
     model, `tell` of its servers. `batches` is where a model that is asked so keeps them. Raises
-    SpecError for an unknown baseline, a model without a price under a budget or a provider without
+    SpecError for an unknown baseline, a model without a price under a limit or a provider without
     batches, DataError for missing recordings.
     """
     if config.kind == "baseline":
@@ -48,7 +48,9 @@ def build_model(
             Problem(f"model {config.name}", "needs a provider", "id", config.id, hint=hint)
         )
     policy = policy or RetryPolicy()
-    prices = prices_of(config) if budget is None else require_prices(config)
+    own = None if budget is None else budget.of(config.name, config.max_cost_usd)
+    is_limited = own is not None and own.is_limited
+    prices = require_prices(config) if is_limited else prices_of(config)
 
     def client(at: ModelConfig, http: HttpClient | None = None) -> Client:
         return (OpenAIClient if at.is_direct else LitellmClient)(at, http)
@@ -60,7 +62,7 @@ def build_model(
             client=lambda http: client(config, http),
             files=batches,
             cache=cache,
-            budget=budget,
+            budget=own,
             prices=prices,
             policy=policy,
             observer=observer,
@@ -80,7 +82,7 @@ def build_model(
         servers,
         limits,
         cache=cache,
-        budget=budget,
+        budget=own,
         prices=prices,
         policy=policy,
         observer=observer,

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from phyblock.config.models import BatchRateSpec, ModelConfig, RateSpec, host_of
-from phyblock.errors import BudgetReachedError, ModelError, Problem, SpecError
+from phyblock.errors import BudgetReachedError, ModelError, Problem, SpecError, UnavailableError
 from phyblock.models.keys import KEYLESS
 from phyblock.models.request import Image, Request, wire_params
 from phyblock.records.reply import Reply, Usage
@@ -322,58 +322,97 @@ class Budget:
     """A cost limit for a whole run: room is reserved before a call and settled after it.
 
     What was spent never becomes less, and a cost that is not known counts as the most that was
-    reserved. Of each model the largest ratio of real to estimated prompt tokens is remembered, so
-    that pictures which a provider counts higher than the estimate soon are reserved for.
+    reserved. Without `max_cost_usd` it only counts. `of_models` is what each model has cost before.
     """
 
-    def __init__(self, max_cost_usd: float, spent_usd: float = 0.0) -> None:
-        self._max_usd = _amount(max_cost_usd)
+    def __init__(
+        self,
+        max_cost_usd: float | None = None,
+        spent_usd: float = 0.0,
+        of_models: Mapping[str, float] | None = None,
+    ) -> None:
+        self.max_usd = math.inf if max_cost_usd is None else _amount(max_cost_usd)
+        self.spent_usd = _amount(spent_usd)
+        """The cost of settled calls, what was spent at the start included."""
+        self.held_usd = 0.0
+        self.holds = 0
+        self.changed = asyncio.Event()
+        self._of_models = dict(of_models or {})
+
+    def of(self, model: str, max_cost_usd: float | None = None) -> ModelBudget:
+        """Return the part of it that a model spends, which may have a limit of its own."""
+        return ModelBudget(self, max_cost_usd, self._of_models.get(model, 0.0))
+
+
+class ModelBudget:
+    """The calls of one model within a run's budget, and what their replies have told of its costs.
+
+    The largest ratios of real to estimated tokens are remembered, of prompts and of replies, so
+    that a provider that counts higher is soon reserved for. Under a limit one call is sent first,
+    and then at most one more at once than have been settled: 1, 2, 4, ...
+    """
+
+    def __init__(self, run: Budget, max_cost_usd: float | None, spent_usd: float) -> None:
+        self._run = run
+        self._max_usd = math.inf if max_cost_usd is None else _amount(max_cost_usd)
         self._spent_usd = _amount(spent_usd)
         self._held: dict[int, float] = {}
         self._held_usd = 0.0
         self._next = 0
-        self._changed = asyncio.Event()
-        self._ratio: dict[str, float] = {}
+        self._under_way: set[int] = set()
+        self._settled = 0
+        self._prompt_ratio = self._reply_ratio = 1.0
 
     @property
-    def spent_usd(self) -> float:
-        """The cost of settled calls, what was `spent_usd` at the start included."""
-        return self._spent_usd
+    def is_limited(self) -> bool:
+        """True if a limit holds the model, its own or the run's."""
+        return min(self._max_usd, self._run.max_usd) < math.inf
 
     def most_usd(
-        self, model: str, prices: Prices, expected: Estimate, day: date, *, batched: bool = False
+        self, prices: Prices, expected: Estimate, day: date, *, batched: bool = False
     ) -> float:
         """Return the most that a call can cost, as far as the model is known by now."""
-        return most_usd(prices, expected, day, self._ratio.get(model, 1.0), batched=batched)
+        longest = math.ceil(expected.most_completion_tokens * self._reply_ratio)
+        known = replace(expected, most_completion_tokens=longest)
+        return most_usd(prices, known, day, self._prompt_ratio, batched=batched)
 
     async def reserve(self, most_usd: Callable[[], float]) -> int:
         """Hold the most that a call can cost, waiting for calls under way to settle; return the
         reservation's number.
 
-        `most_usd` is asked anew whenever a call has settled, since more is known of the model then.
-        Raises BudgetReachedError when it does not fit although nothing is under way.
+        `most_usd` is asked again whenever a call has settled, since more is known of the model
+        then. Raises BudgetReachedError when it does not fit into the run's limit although nothing
+        is under way, UnavailableError when it does not fit into the model's own.
         """
-        usd = _amount(most_usd())
-        while not self.fits(usd):
-            if not self._held:
-                raise BudgetReachedError(
-                    f"max_cost_usd {self._max_usd:g} is reached: {self._spent_usd:.4f} spent, "
-                    f"the next call can cost {usd:.4f}"
-                )
-            self._changed.clear()
-            await self._changed.wait()
+        run = self._run
+        while True:
             usd = _amount(most_usd())
-        return self.hold(usd)
+            if not self._held and self._spent_usd + usd > self._max_usd:
+                spent = f"{self._spent_usd:.4f} spent, the next call can cost {usd:.4f}"
+                raise UnavailableError(f"its max_cost_usd {self._max_usd:g} is reached: {spent}")
+            is_slow = self.is_limited and len(self._under_way) > self._settled
+            if self.fits(usd) and not is_slow:
+                number = self.hold(usd)
+                self._under_way.add(number)
+                return number
+            if not run.holds and run.spent_usd + usd > run.max_usd:
+                spent = f"{run.spent_usd:.4f} spent, the next call can cost {usd:.4f}"
+                raise BudgetReachedError(f"max_cost_usd {run.max_usd:g} is reached: {spent}")
+            run.changed.clear()
+            await run.changed.wait()
 
     def fits(self, usd: float) -> bool:
-        """True if a further cost would stay within the limit."""
-        return self._spent_usd + self._held_usd + usd <= self._max_usd
+        """True if a further cost would stay within the limits."""
+        is_own = self._spent_usd + self._held_usd + usd <= self._max_usd
+        return is_own and self._run.spent_usd + self._run.held_usd + usd <= self._run.max_usd
 
     def hold(self, usd: float) -> int:
         """Make a reservation, whether it fits or not; return its number."""
         self._next += 1
         self._held[self._next] = _amount(usd)
         self._held_usd += usd
+        self._run.held_usd += usd
+        self._run.holds += 1
         return self._next
 
     def settle(self, reservation: int, usd: float | None) -> float:
@@ -381,18 +420,30 @@ class Budget:
         held, as None does. Return what was counted [US dollars].
         """
         held = self._held.pop(reservation)
-        # Rounding of a sum that goes up and down must not add up over a run.
-        self._held_usd = max(0.0, self._held_usd - held) if self._held else 0.0
+        self._under_way.discard(reservation)
+        self._settled += 1
         counted = usd if usd is not None and _is_amount(usd) else held
         self._spent_usd += counted
-        self._changed.set()
+        run = self._run
+        run.holds -= 1
+        # Rounding of a sum that goes up and down must not add up over a run.
+        self._held_usd = max(0.0, self._held_usd - held) if self._held else 0.0
+        run.held_usd = max(0.0, run.held_usd - held) if run.holds else 0.0
+        run.spent_usd += counted
+        run.changed.set()
         return counted
 
-    def learn(self, model: str, expected: Estimate, usage: Usage) -> None:
+    def learn(self, expected: Estimate, usage: Usage) -> None:
         """Compare an estimate with plausible counts of the provider."""
-        if usage.prompt_tokens is not None and expected.prompt_tokens > 0:
-            ratio = min(usage.prompt_tokens / expected.prompt_tokens, _MOST_TIMES_EXPECTED)
-            self._ratio[model] = max(self._ratio.get(model, 1.0), ratio)
+
+        def ratio(known: float, real: int | None, estimated: int) -> float:
+            if real is None or estimated <= 0:
+                return known
+            return max(known, min(real / estimated, _MOST_TIMES_EXPECTED))
+
+        self._prompt_ratio = ratio(self._prompt_ratio, usage.prompt_tokens, expected.prompt_tokens)
+        longest = expected.most_completion_tokens
+        self._reply_ratio = ratio(self._reply_ratio, usage.completion_tokens, longest)
 
 
 def _amount(usd: float) -> float:

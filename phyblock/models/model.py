@@ -22,8 +22,8 @@ from phyblock.errors import (
 from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.client import SeedRefusedError
 from phyblock.models.costs import (
-    Budget,
     Estimate,
+    ModelBudget,
     Prices,
     counted,
     estimate,
@@ -180,7 +180,7 @@ class ChatModel:
         limits: Limits,
         *,
         cache: ReplyCache | None,
-        budget: Budget | None,
+        budget: ModelBudget | None,
         prices: Prices | None,
         policy: RetryPolicy,
         observer: Observer,
@@ -326,9 +326,7 @@ class ChatModel:
         budget, prices, expected = self._budget, self._prices, call.expected
         held: int | None = None
         if budget is not None and prices is not None:
-            held = await budget.reserve(
-                lambda: budget.most_usd(self.name, prices, expected, today())
-            )
+            held = await budget.reserve(lambda: budget.most_usd(prices, expected, today()))
         call.sent += 1
         server.sent += 1
         server.under_way += 1
@@ -343,7 +341,7 @@ class ChatModel:
             reply = counted(reply, expected)
             spent_usd = self._cost_usd(reply)
             if budget is not None:
-                budget.learn(self.name, expected, reply.usage)
+                budget.learn(expected, reply.usage)
             return reply
         except UnavailableError:
             spent_usd = 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -117,18 +118,18 @@ class Standing:
     """The newest record of every sample that counts, summed up, and what the run cost so far.
 
     `batches` are all lines about batches, oldest first. `limit_usd` is what the cost limit counted,
-    of every line, also of those that later ones replaced.
+    of every line, also of those that later ones replaced, by model.
     """
 
     samples: dict[str, Summary] = field(default_factory=dict)
-    limit_usd: float = 0.0
+    limit_usd: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     batches: list[BatchLine] = field(default_factory=list)
 
     def add(self, record: Record) -> None:
         """Take in a record as it was read, oldest first."""
         self.samples[record.sample] = Summary.of(record)
-        self.limit_usd += record.limit_usd
+        self.limit_usd[record.model] += record.limit_usd
 
     def add_turn(self, turn: Turn) -> None:
         """Take in an answered turn of an episode."""
-        self.limit_usd += turn.reply.limit_usd
+        self.limit_usd[turn.sample.split("/")[1]] += turn.reply.limit_usd

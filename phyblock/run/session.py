@@ -93,9 +93,9 @@ class Session:
             limits = plan.suite.limits
             overall = asyncio.Semaphore(limits.max_concurrency)
             halt = Halt()
-            budget = None
-            if limits.max_cost_usd is not None:
-                budget = Budget(limits.max_cost_usd, self._store.standing.limit_usd)
+            standing = self._store.standing
+            spent_usd = sum(standing.limit_usd.values())
+            budget = Budget(limits.max_cost_usd, spent_usd, standing.limit_usd)
             policy = RetryPolicy(
                 limits.max_attempts, limits.retry_for_s, limits.max_connection_failures
             )

@@ -103,7 +103,7 @@ async def command(
         ended |= dict.fromkeys(left, error)
     else:
         # Or others would wait for it.
-        assert budget is None or not budget._held
+        assert budget is None or not budget.holds
     finally:
         await model.aclose()
         if cache is not None:

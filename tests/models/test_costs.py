@@ -247,18 +247,19 @@ def test_a_budget_is_never_passed_and_stops_only_when_nothing_more_fits(
 ) -> None:
     async def main() -> None:
         budget = Budget(limit)
+        own = budget.of("m")
         refused: list[float] = []
 
         async def call(most: float, share: float, steps: int) -> None:
             try:
-                held = await budget.reserve(lambda: most)
+                held = await own.reserve(lambda: most)
             except BudgetReachedError:
                 refused.append(most)
                 assert budget.spent_usd + most > limit
                 return
             for _ in range(steps):
                 await asyncio.sleep(0)
-            budget.settle(held, most * share)
+            own.settle(held, most * share)
             assert budget.spent_usd <= limit + 1e-9
 
         await asyncio.gather(*(call(*one) for one in calls))
@@ -270,39 +271,39 @@ def test_a_budget_is_never_passed_and_stops_only_when_nothing_more_fits(
 def test_a_reservation_without_a_known_cost_counts_in_full() -> None:
     async def main() -> None:
         budget = Budget(1.0, spent_usd=0.25)
-        budget.settle(await budget.reserve(lambda: 0.5), None)
+        own = budget.of("m")
+        own.settle(await own.reserve(lambda: 0.5), None)
         assert budget.spent_usd == 0.75
         with pytest.raises(BudgetReachedError, match=r"0\.7500 spent"):
-            await budget.reserve(lambda: 0.5)
+            await own.reserve(lambda: 0.5)
 
     run(main)
 
 
 def test_a_call_that_waits_reserves_what_was_learned_meanwhile() -> None:
-    budget, price = Budget(1.0), Prices.flat(100.0, 0.0)
+    own, price = Budget(1.0).of("m"), Prices.flat(100.0, 0.0)
     expected = Estimate(4000, 100, 100)
 
     async def main() -> None:
-        first = await budget.reserve(lambda: budget.most_usd("m", price, expected, DAY))
-        second = asyncio.create_task(
-            budget.reserve(lambda: budget.most_usd("m", price, expected, DAY))
-        )
+        first = await own.reserve(lambda: own.most_usd(price, expected, DAY))
+        second = asyncio.create_task(own.reserve(lambda: own.most_usd(price, expected, DAY)))
         await asyncio.sleep(0)
-        budget.learn("m", expected, Usage(prompt_tokens=8000, completion_tokens=1))
-        budget.settle(first, 0.8)
+        own.learn(expected, Usage(prompt_tokens=8000, completion_tokens=1))
+        own.settle(first, 0.8)
         with pytest.raises(BudgetReachedError, match=r"can cost 1\.2"):
             await second
 
     run(main)
 
 
-def test_a_provider_that_counts_pictures_higher_is_reserved_for() -> None:
+@pytest.mark.parametrize("told", [(20_000, 10), (1000, 5000)])
+def test_a_provider_that_counts_higher_is_reserved_for(told: tuple[int, int]) -> None:
     budget, price = Budget(1.0), Prices.flat(1.0, 1.0)
-    expected = Estimate(1000, 100, 100)
-    before = budget.most_usd("m", price, expected, DAY)
-    budget.learn("m", expected, Usage(prompt_tokens=20_000, completion_tokens=10))
-    assert budget.most_usd("m", price, expected, DAY) > 10 * before
-    assert budget.most_usd("n", price, expected, DAY) == before
+    expected, own, other = Estimate(1000, 100, 100), budget.of("m"), budget.of("n")
+    before = own.most_usd(price, expected, DAY)
+    own.learn(expected, Usage(prompt_tokens=told[0], completion_tokens=told[1]))
+    assert own.most_usd(price, expected, DAY) > 4 * before
+    assert other.most_usd(price, expected, DAY) == before
 
 
 strange = st.one_of(
@@ -340,6 +341,67 @@ def test_only_counts_that_can_be_true_are_known(
         assert usage.completion_tokens == completion
 
 
+@given(
+    st.floats(0.01, 5),
+    st.lists(st.tuples(st.integers(1, 90_000), st.integers(1, 9000)), min_size=1, max_size=40),
+    st.integers(1, 16),
+)
+def test_a_call_costs_no_more_than_was_held_once_a_reply_like_it_has_come(
+    limit: float, told: list[tuple[int, int]], width: int
+) -> None:
+    """Whatever a server counts, the limit is passed at most by calls that were under way then.
+
+    The first call is alone, and never are more under way than one more than were answered.
+    """
+    price, expected = Prices.flat(10.0, 100.0), Estimate(1000, 100, 100)
+
+    async def main() -> None:
+        budget = Budget(limit)
+        own = budget.of("m")
+        room = asyncio.Semaphore(width)
+        longest, over_usd, under_way, answered = (0, 0), 0.0, 0, 0
+
+        async def call(tokens: tuple[int, int]) -> None:
+            nonlocal longest, over_usd, under_way, answered
+            async with room:
+                known = (0, 0)
+                try:
+                    held = await own.reserve(lambda: own.most_usd(price, expected, DAY))
+                except BudgetReachedError:
+                    return
+                known, held_usd = longest, own.most_usd(price, expected, DAY)
+                under_way += 1
+                assert under_way <= answered + 1
+                await asyncio.sleep(0)
+                prompt, reply = tokens
+                usd = (10.0 * prompt + 100.0 * reply) / 1e6
+                if prompt <= known[0] and reply <= known[1]:
+                    assert usd <= held_usd
+                over_usd += max(0.0, usd - held_usd)
+                own.learn(expected, Usage(prompt_tokens=prompt, completion_tokens=reply))
+                own.settle(held, usd)
+                longest = (max(longest[0], prompt), max(longest[1], reply))
+                under_way, answered = under_way - 1, answered + 1
+                assert budget.spent_usd <= limit + over_usd + 1e-9
+
+        await asyncio.gather(*map(call, told))
+
+    run(main)
+
+
+def test_a_limit_of_one_model_stops_that_model_alone() -> None:
+    async def main() -> None:
+        budget = Budget(10.0, 0.5, {"a": 0.5})
+        capped, other = budget.of("a", 1.0), budget.of("b")
+        capped.settle(await capped.reserve(lambda: 0.25), 0.25)
+        with pytest.raises(UnavailableError, match=r"its max_cost_usd 1 is reached: 0\.7500 spent"):
+            await capped.reserve(lambda: 0.3)
+        other.settle(await other.reserve(lambda: 5.0), 5.0)
+        assert budget.spent_usd == 5.75
+
+    run(main)
+
+
 amounts = st.one_of(st.none(), st.floats(), st.floats(0, 2))
 
 
@@ -349,13 +411,14 @@ def test_what_was_spent_never_becomes_less_and_an_unknown_cost_is_the_dearest(
 ) -> None:
     async def main() -> None:
         budget = Budget(1000.0)
+        own = budget.of("m")
         for most, cost in calls:
             before = budget.spent_usd
             try:
-                held = await budget.reserve(functools.partial(float, most))
+                held = await own.reserve(functools.partial(float, most))
             except BudgetReachedError:
                 break
-            counted = budget.settle(held, cost)
+            counted = own.settle(held, cost)
             is_known = cost is not None and 0 <= cost < float("inf")
             assert counted == (cost if is_known else most)
             assert budget.spent_usd == before + counted >= before
@@ -365,13 +428,13 @@ def test_what_was_spent_never_becomes_less_and_an_unknown_cost_is_the_dearest(
 
 @given(st.lists(st.tuples(st.integers(0, 5000), st.none() | st.integers(0, 10**9)), max_size=20))
 def test_what_is_learned_stays_within_bounds(counts: list[tuple[int, int | None]]) -> None:
-    budget, price = Budget(1.0), Prices.flat(1.0, 1.0)
+    own, price = Budget(1.0).of("m"), Prices.flat(1.0, 1.0)
     expected = Estimate(1000, 100, 100)
-    plain = budget.most_usd("m", price, expected, DAY)
+    plain = own.most_usd(price, expected, DAY)
     last = plain
     for asked, told in counts:
-        budget.learn("m", Estimate(asked, 1, 1), Usage(prompt_tokens=told))
-        most = budget.most_usd("m", price, expected, DAY)
+        own.learn(Estimate(asked, 1, 1), Usage(prompt_tokens=told, completion_tokens=told))
+        most = own.most_usd(price, expected, DAY)
         assert last <= most <= 100 * plain
         last = most
 
@@ -383,7 +446,7 @@ def test_no_budget_is_made_of_what_is_no_amount(usd: float) -> None:
     with pytest.raises(ValueError, match="no amount"):
         Budget(1.0, usd)
     with pytest.raises(ValueError, match="no amount"):
-        run(lambda: Budget(1.0).reserve(lambda: usd))
+        run(lambda: Budget(1.0).of("m").reserve(lambda: usd))
 
 
 class Counting(OpenAIChat):

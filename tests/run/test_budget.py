@@ -56,6 +56,49 @@ def test_the_limit_is_not_passed_and_a_higher_one_goes_on(workspace: Workspace) 
         assert server.requests == 60
 
 
+class Counting(OpenAIChat):
+    """Counts as many tokens as it likes."""
+
+    def __init__(self, prompt: int, completion: int) -> None:
+        super().__init__()
+        self.usage = {"prompt_tokens": prompt, "completion_tokens": completion}
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        return {**super().reply(seen, ending), "usage": self.usage}
+
+
+@pytest.mark.parametrize(("prompt", "completion"), [(40_000, 40), (1000, 2500)])
+def test_a_server_that_counts_more_than_is_expected_does_not_pass_the_limit_at_once(
+    workspace: Workspace, prompt: int, completion: int
+) -> None:
+    usd = (prompt * PRICE["input"] + completion * PRICE["output"]) / 1e6
+    with Running(Counting(prompt, completion)) as running:
+        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=100)
+        workspace.write_suite(models=["alpha"], seeds=list(range(12)))
+        done = workspace.run("--set", f"limits.max_cost_usd={5 * usd}")
+    assert done.code == 1
+    assert f"the next call can cost {usd:.1f}"[:-2] in done.out
+    assert 1 < running.server.requests <= 5
+    assert spent(workspace) <= 5 * usd
+
+
+def test_a_model_is_asked_no_more_when_its_own_limit_is_reached(workspace: Workspace) -> None:
+    with Running(OpenAIChat()) as running:
+        workspace.write_yaml("models.yaml", {
+            name: {"id": f"openai/{name}", "api_base": f"{running.url}/v1", "price": PRICE,
+                   "max_tokens": 100, "max_cost_usd": limit}
+            for name, limit in (("alpha", 3.2 * CALL_USD), ("beta", None))
+        })  # fmt: skip
+        workspace.write_suite(models=["alpha", "beta"])
+        done = workspace.run("--yes")
+        assert (done.code, "alpha was stopped: its max_cost_usd" in done.out) == (1, True)
+        asked = running.server.requests
+        assert 6 <= asked <= 8
+        workspace.run("--yes")
+        assert running.server.requests == asked
+    assert sum(record["model"] == "beta" for record in workspace.records()) == 5
+
+
 def test_nothing_is_asked_where_not_even_one_call_fits(workspace: Workspace) -> None:
     with Running(OpenAIChat()) as running:
         workspace.write_models(running.url, "alpha", price=PRICE)
