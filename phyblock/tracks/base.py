@@ -8,6 +8,7 @@ what those about scenes share is in `SceneTrack`.
 from __future__ import annotations
 
 import asyncio
+import importlib
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -26,7 +27,7 @@ from phyblock.parsing.structured import AnswerForm
 from phyblock.records.manifest import Manifest
 from phyblock.records.record import Record
 from phyblock.records.reply import Reply
-from phyblock.registry import added_measures, known_tracks
+from phyblock.registry import added_measures, known_track, known_tracks
 from phyblock.sim.engine import REFERENCE_ENGINE, physics_engine
 from phyblock.stable import hex_digest
 from phyblock.tracks.baselines import Picking
@@ -126,6 +127,8 @@ class Track(ABC, Generic[ItemT]):
     """How a person answers about a subject; None where nothing can be picked."""
     record: ClassVar[type[Record] | None] = None
     """The model of its records; None for one that adds nothing to them."""
+    results: ClassVar[str] = ""
+    """The module that holds its `REPORT`, for tracks that do not override `report`."""
     counted: ClassVar[tuple[SampleCounts, ...]] = ()
     """What its measures count of every sample as it is judged."""
     tables: ClassVar[tuple[str, ...]] = ()
@@ -156,30 +159,27 @@ class Track(ABC, Generic[ItemT]):
     @classmethod
     def report(cls) -> TrackReport:
         """Import and return what tables and figures are made by, which takes long."""
-        raise NotImplementedError(f"{cls.name} has no report")
+        report: TrackReport = importlib.import_module(cls.results).REPORT
+        return report
 
     @classmethod
-    def data_folder(cls, suite: Any) -> tuple[str, tuple[str, ...], bool] | None:
+    def data_folder(cls, _suite: Any) -> tuple[str, tuple[str, ...], bool] | None:
         """Return the folder of its own data: text, path of keys, True if it may be bundled."""
-        del suite
         return None
 
     @classmethod
-    def data_root(cls, manifest: Manifest) -> str | None:
+    def data_root(cls, _manifest: Manifest) -> str | None:
         """Return where a run found the data of its own."""
-        del manifest
         return None
 
     @classmethod
-    def manifest(cls, suite: Suite) -> Mapping[str, Any]:
+    def manifest(cls, _suite: Suite) -> Mapping[str, Any]:
         """Return what the manifest of a run holds beyond what all tracks have."""
-        del suite
         return {}
 
     @classmethod
-    def physics(cls, suite: Mapping[str, Any]) -> bool:
+    def physics(cls, _suite: Mapping[str, Any]) -> bool:
         """True if a suite, as a manifest holds it, lets blocks go in a physics engine."""
-        del suite
         return False
 
     def open_prompt(self) -> Prompt:
@@ -195,28 +195,24 @@ class Track(ABC, Generic[ItemT]):
         """Name of the prompt; "" where every model is a recording."""
         return "" if self.prompt is None else self.prompt.name
 
-    def shown(self, item: ItemT, seed: int) -> ItemT:
+    def shown(self, item: ItemT, _seed: int) -> ItemT:
         """Return the item as a seed shows it, by which it is asked, judged and counted."""
-        del seed
         return item
 
     def each_shown(self) -> Sequence[ItemT]:
         """Return all items, in every form in which they are shown."""
         return self.items
 
-    def about(self, item: ItemT) -> dict[str, Any]:
+    def about(self, _item: ItemT) -> dict[str, Any]:
         """Return the fields of records about an item besides its scene."""
-        del item
         return {}
 
-    def drawn(self, item: ItemT, seed: int | None = None) -> object | None:
+    def drawn(self, item: ItemT, _seed: int | None = None) -> object | None:
         """Return what its pictures are of, as a seed sends them; None where none is sent."""
-        del seed
         return item
 
-    def form(self, item: ItemT) -> AnswerForm[Any] | None:
+    def form(self, _item: ItemT) -> AnswerForm[Any] | None:
         """Return the form in which an answer is asked for; None where that is text."""
-        del item
         return None
 
     def identity(self) -> dict[str, Any]:
@@ -271,12 +267,13 @@ class SingleTrack(Track[ItemT]):
     def judge(self, item: ItemT, text: str | None) -> Judgement:
         """Read and score a reply; None, where there is no reply, is scored as nothing said."""
 
-    async def judge_apart(self, item: ItemT, text: str | None, earlier: Record | None) -> Judgement:
+    async def judge_apart(
+        self, item: ItemT, text: str | None, _earlier: Record | None
+    ) -> Judgement:
         """Return what `judge` does; where that takes long, beside the calls of others.
 
-        Of the `earlier` record of the same sample it may take what replies alone do not decide.
+        Of an earlier record of the same sample it may take what replies alone do not decide.
         """
-        del earlier
         return self.judge(item, text)
 
     def right_answer(self, item: ItemT) -> str:
@@ -415,14 +412,8 @@ AnyTrack = SingleTrack[Any] | EpisodeTrack[Any]
 """A track of either kind."""
 
 
-def kinds() -> Mapping[str, type[AnyTrack]]:
-    """Return every track by name, in the order in which they are listed."""
-    return known_tracks()
-
-
-def kind_of(name: str) -> type[AnyTrack]:
-    """Return the track of a name; KeyError for one that there is not."""
-    return kinds()[name]
+kinds, kind_of = known_tracks, known_track
+"""All tracks by name, and the one of a name."""
 
 
 def kinds_with_physics(suite: Mapping[str, Any]) -> tuple[type[AnyTrack], ...]:

@@ -1,12 +1,10 @@
-"""Answers guessed without looking: the most frequent one, and a classifier of the texts.
+"""What answers in place of a model: guesses from the texts of questions, and the picks of people.
 
-Both are told the answers of other questions only: questions are split into folds by the base scene
-they are about, and those of a fold are answered by rules learned from questions whose scenes have
-no base scene of that fold.
-
-Where answers are balanced over the whole set, such a probe comes out below chance: what is right
-more often than its share in the known questions is right less often in those held out. Only what
-lies above chance tells of a shortcut.
+Guesses are told the answers of other questions only: questions are split into folds by the base
+scene they are about, and those of a fold are answered by rules learned from questions whose scenes
+have no base scene of that fold. Where answers are balanced over the whole set, such a probe comes
+out below chance: what is right more often than its share in the known questions is right less often
+in those held out. Only what lies above chance tells of a shortcut.
 """
 
 from __future__ import annotations
@@ -26,12 +24,9 @@ from phyblock.stable import plain_sum
 
 Rule = Callable[[Question], tuple[int, ...]]
 """A guess: the indices that `Question.answer` would hold."""
-
 FOLDS = 5
 """Parts that a set is learned in: each is answered by what the other four teach."""
-_SEED = 0
-_STRENGTH = 0.05
-_CROSSED = 0.25
+_SEED, _STRENGTH, _CROSSED = 0, 0.05, 0.25
 _WORD = re.compile(r"[a-z]+|\d+(?:\.\d+)?")
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
@@ -84,11 +79,10 @@ def majority_rule(known: Sequence[Question]) -> Rule:
     shown = Counter(option for question in known for option in question.options)
 
     def guess(question: Question) -> tuple[int, ...]:
-        options = list(question.options)
+        options, is_ordering = list(question.options), question.subtask == "OR"
         places = [f"place {letter}" for letter in "ABCD"[: len(options)]]
-        are_letters = all(map(is_picture_option, options)) or options == places
-        if question.subtask == "OR" or are_letters:
-            first = tuple(range(len(options))) if question.subtask == "OR" else (0,)
+        if is_ordering or all(map(is_picture_option, options)) or options == places:
+            first = tuple(range(len(options))) if is_ordering else (0,)
             return min(letters, key=lambda answer: (-letters[answer], answer), default=first)
         rates = [(right[option] + 1) / (shown[option] + 4) for option in options]
         ties = [index for index, rate in enumerate(rates) if rate == max(rates)]
@@ -111,9 +105,9 @@ def text_rule(known: Sequence[Question]) -> Rule:
         from sklearn.feature_extraction import DictVectorizer  # type: ignore[import-untyped]
         from sklearn.linear_model import LogisticRegression  # type: ignore[import-untyped]
     except ImportError as error:
-        hint = "pip install 'phyblock[audit]'"
         message = "the text-only probe needs scikit-learn, which is not installed"
-        raise SpecError(Problem("text-only", message, hint=hint)) from error
+        problem = Problem("text-only", message, hint="pip install 'phyblock[audit]'")
+        raise SpecError(problem) from error
     vectorizer = DictVectorizer()
     regression = LogisticRegression(C=_STRENGTH, max_iter=1000, random_state=_SEED)
     rows = [features for q in single for features in text_features(q.text, q.options)]
@@ -190,10 +184,6 @@ def _bases(question: Question) -> tuple[str, ...]:
     return question.scene.parents or (question.scene.id,)
 
 
-_PICTURES = ("composite", "candidates")
-"""Labels of pictures that show numbered candidates: the square at their right end is the grid."""
-
-
 @dataclass(frozen=True)
 class Spot:
     """The place where a choice is seen: in the last picture of this `label`, the cell of the grid
@@ -204,7 +194,7 @@ class Spot:
     cell: int | None = None
 
     def box(self, width_px: int, height_px: int) -> tuple[float, float, float, float]:
-        """Left, top, width and height in a picture of this size, as shares of its sides."""
+        """Return left, top, width and height in a picture of this size, as shares of its sides."""
         if self.cell is None:
             return (0.0, 0.0, 1.0, 1.0)
         row, column = divmod(self.cell, GRID_COLUMNS)
@@ -226,10 +216,8 @@ class Choice:
 
 @dataclass(frozen=True)
 class NumberField:
-    """A number that goes with every pick: what it is called and its unit.
-
-    From `-most` to `most` with so many `decimals`. Keys change it by `step`, or by `leap`. `start`
-    is what stands in it at first, None where it is empty.
+    """A number that goes with every pick: its name and unit, from `-most` to `most` with so many
+    `decimals`. Keys change it by `step`, or by `leap`. `start` stands in it at first.
     """
 
     name: str
@@ -257,17 +245,15 @@ class Pick:
 
 
 def picks_of(places: Sequence[int], numbers: Sequence[Sequence[float]] = ()) -> tuple[Pick, ...]:
-    """Picks by their places, and the numbers of each where there are any.
+    """Return picks by their places, and the numbers of each where there are any.
 
     Raises ValueError where not every pick has its numbers, and for a number that fits no float.
     """
-    if not numbers:
-        return tuple(map(Pick, places))
-    if len(numbers) != len(places):
-        raise ValueError(f"holds numbers of {len(numbers)} picks, and {len(places)} picks")
-    pairs = zip(places, numbers, strict=True)
+    own = numbers or [()] * len(places)
+    if len(own) != len(places):
+        raise ValueError(f"holds numbers of {len(own)} picks, and {len(places)} picks")
     try:
-        return tuple(Pick(place, tuple(map(float, own))) for place, own in pairs)
+        return tuple(Pick(p, tuple(map(float, n))) for p, n in zip(places, own, strict=True))
     except OverflowError:
         raise ValueError("holds a number outside of the range of numbers") from None
 
@@ -290,22 +276,19 @@ class Picking:
     fields: tuple[NumberField, ...] = ()
 
     def without_cells(self) -> Picking:
-        """The same with choices that are not looked for in grids."""
-        bare = (
-            replace(one, spots=tuple(spot for spot in one.spots if spot.cell is None))
-            for one in self.choices
-        )
-        return replace(self, choices=tuple(bare))
+        """Return the same with choices that are not looked for in grids."""
+        whole = [tuple(spot for spot in one.spots if spot.cell is None) for one in self.choices]
+        pairs = zip(self.choices, whole, strict=True)
+        return replace(self, choices=tuple(replace(one, spots=spots) for one, spots in pairs))
 
     def reply(self, picks: Sequence[Pick]) -> str:
-        """The reply that picks make.
+        """Return the reply that picks make.
 
         Raises ValueError for too few or many, places that there are not, repeats where none may
         be, and numbers that are lacking or not allowed.
         """
         if not self.least <= len(picks) <= self.most:
-            bounds = f"{self.least} to {self.most}" if self.least < self.most else f"{self.least}"
-            raise ValueError(f"holds {len(picks)} picks in place of {bounds}")
+            raise ValueError(f"holds {len(picks)} picks in place of {self.least} to {self.most}")
         places = [pick.place for pick in picks]
         if not all(0 <= place < len(self.choices) for place in places):
             raise ValueError(f"holds picks outside of 0 to {len(self.choices) - 1}")
@@ -320,8 +303,13 @@ class Picking:
         return self.write(picks)
 
 
-def candidate_choices(n_candidates: int, labels: Sequence[str] = _PICTURES) -> tuple[Choice, ...]:
-    """The numbered candidates of a scene, wherever a picture with one of the labels shows them."""
+def candidate_choices(
+    n_candidates: int, labels: Sequence[str] = ("composite", "candidates")
+) -> tuple[Choice, ...]:
+    """Return the numbered candidates of a scene, wherever a picture with a label shows them.
+
+    In these pictures the square at the right end is the grid of candidates.
+    """
     return tuple(
         Choice(str(n + 1), "", tuple(Spot(label, n) for label in labels))
         for n in range(n_candidates)

@@ -25,7 +25,7 @@ from phyblock.tracks.base import Opening, SceneTrack, SingleTrack
 from phyblock.tracks.baselines import Picking, candidate_choices
 from phyblock.tracks.goal_blind import BlindGuesses
 from phyblock.tracks.items import examples_of, file_plan
-from phyblock.tracks.measures import Measure, SampleCounts, TrackReport
+from phyblock.tracks.measures import Measure, SampleCounts
 from phyblock.tracks.prompts import OfficialPrompt, Prompt
 from phyblock.types import PlanParser
 
@@ -312,6 +312,7 @@ class FullPlanning(SceneTrack, SingleTrack[AssemblyTask]):
     section = (name, PlanningSpec, "How scenes are shown in the full_planning track.")
     template = bundled("prompts", "full_planning.j2")
     json_template = bundled("prompts", "full_planning_json.j2")
+    results = "phyblock.tracks.full_planning_results"
     subject = PlanSubject
     baselines = PLAN_RULES
     by_hand = staticmethod(pick_plan)
@@ -343,13 +344,6 @@ class FullPlanning(SceneTrack, SingleTrack[AssemblyTask]):
             and all(task.candidates.index_of(block.look) for block in task.scene.blocks)
         )
         self.examples = examples_of(suite, able, self.items, "scene")
-
-    @classmethod
-    def report(cls) -> TrackReport:
-        """Return what tables and figures are made by."""
-        from phyblock.tracks.full_planning_results import REPORT
-
-        return REPORT
 
     def open_prompt(self) -> Prompt:
         """Return the official prompt or a template."""

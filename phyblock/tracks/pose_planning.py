@@ -12,9 +12,9 @@ from functools import partial
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
-from pydantic import AfterValidator, Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag
 
-from phyblock.config.validation import PictureControls, Section, TemplateName, UniqueSome, refuse
+from phyblock.config.validation import PictureControls, Section, TemplateName, UniqueSome
 from phyblock.data import AssemblyTask
 from phyblock.domain import (
     Block,
@@ -76,7 +76,7 @@ from phyblock.tracks.base import CARRYING, Opening, SceneTrack, SingleTrack, eng
 from phyblock.tracks.baselines import NumberField, Pick, Picking, candidate_choices
 from phyblock.tracks.full_planning import PLAN_COLUMNS, PlanParse, plan_row, score_fields
 from phyblock.tracks.items import ShownTask, file_plan
-from phyblock.tracks.measures import ListedScore, Listing, SampleCounts, TrackReport
+from phyblock.tracks.measures import ListedScore, Listing, SampleCounts
 from phyblock.tracks.pictures import Drawing, Pictures, Workshop, goal_of, picture_style
 from phyblock.types import SETTINGS, STEP_ENDS, Matcher, PoseRotation, Setting, StepEnd, View
 
@@ -123,12 +123,6 @@ AnyView = Annotated[
 ]
 
 
-def _check_few(views: tuple[View | ViewSpec, ...]) -> tuple[View | ViewSpec, ...]:
-    if len(views) <= MOST_VIEWS:
-        return views
-    raise refuse(f"has {len(views)} views", allowed=f"1 to {MOST_VIEWS}")
-
-
 Tolerance = Annotated[float, Field(strict=True, gt=0, le=10, allow_inf_nan=False)]
 Angle = Annotated[float, Field(strict=True, gt=0, le=90, allow_inf_nan=False)]
 
@@ -142,11 +136,7 @@ class PoseSpec(PictureControls):
         "give a number and a place. free: each kind is shown once, upright, and steps give a "
         "rotation as well.",
     )
-    views: Annotated[
-        UniqueSome[AnyView],
-        AfterValidator(_check_few),
-        Field(max_length=MOST_VIEWS),
-    ] = Field(
+    views: Annotated[UniqueSome[AnyView], Field(max_length=MOST_VIEWS)] = Field(
         default=("oblique", "top"),
         description="Where the goal is seen from, a picture each, 1 to 4 of them: "
         f"{', '.join(get_args(View))}, or an azimuth_deg and elevation_deg. Blocks are shown from "
@@ -887,6 +877,7 @@ class PosePlanning(SceneTrack, SingleTrack[AssemblyTask]):
     template = bundled("prompts", "pose_planning.j2")
     json_template = bundled("prompts", "pose_planning_json.j2")
     prompt_field = ("pose", "prompt")
+    results = "phyblock.tracks.pose_planning_results"
     subject = PoseSubject
     baselines = POSE_RULES
     by_hand = staticmethod(pick_poses)
@@ -903,16 +894,8 @@ class PosePlanning(SceneTrack, SingleTrack[AssemblyTask]):
         super().__init__(opening)
 
     @classmethod
-    def report(cls) -> TrackReport:
-        """Return what tables and figures are made by."""
-        from phyblock.tracks.pose_planning_results import REPORT
-
-        return REPORT
-
-    @classmethod
-    def physics(cls, suite: Mapping[str, Any]) -> bool:
+    def physics(cls, _suite: Mapping[str, Any]) -> bool:
         """True: every plan is carried out."""
-        del suite
         return True
 
     def open_pictures(self, shop: Workshop) -> Pictures:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+import traceback
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any, Protocol
+from typing import Any, NamedTuple
 
 import jinja2
 import jinja2.meta
@@ -46,23 +47,6 @@ def form_facts(form: AnswerForm[Any] | None) -> dict[str, object]:
     return {"answer_format": "json_schema", **dict(zip(FORM_FACTS, facts, strict=True))}
 
 
-class Prompt(Protocol):
-    """Turns pictures and facts about a sample into chat messages."""
-
-    @property
-    def name(self) -> str:
-        """Its name in records."""
-
-    @property
-    def version(self) -> str:
-        """Hex digest of the text it is made from."""
-
-    def messages(
-        self, pictures: Sequence[Image], facts: Mapping[str, object]
-    ) -> tuple[Message, ...]:
-        """Return the messages to send; pictures stand before the text, in the order given."""
-
-
 @dataclass(frozen=True)
 class OfficialPrompt:
     """The official prompt, read out of the user's own checkout; it has no system part."""
@@ -75,12 +59,15 @@ class OfficialPrompt:
         """Hex digest of the text."""
         return hex_digest(self.text)
 
-    def messages(
-        self, pictures: Sequence[Image], facts: Mapping[str, object]
-    ) -> tuple[Message, ...]:
-        """Return one user message; `facts` are not used, the text is fixed."""
-        del facts
+    def messages(self, pictures: Sequence[Image], _facts: object) -> tuple[Message, ...]:
+        """Return one user message; the text is fixed."""
         return (Message("user", (*pictures, self.text)),)
+
+
+class _Source(NamedTuple):
+    path: Path
+    text: str
+    tree: nodes.Template
 
 
 class TemplatePrompt:
@@ -100,13 +87,12 @@ class TemplatePrompt:
         """`like` is the template in whose place it stands: it may have the blocks of that one."""
         self.name = name
         self._path = path
-        self._texts = {"": (path, _text_of(path))}
-        self._trees = {"": _tree_of(path, self._texts[""][1])}
+        main = _read(path)
+        self._sources = {"": main}
         self._read_included((path.parent, bundled("prompts")))
-        digest = hashlib.sha256(self._texts[""][1].encode())
-        for inner, (_, text) in sorted(self._texts.items()):
-            if inner:
-                digest.update(f"\0{inner}\0{hex_digest(text)}".encode())
+        digest = hashlib.sha256(main.text.encode())
+        for inner, source in sorted(self._sources.items())[1:]:
+            digest.update(f"\0{inner}\0{hex_digest(source.text)}".encode())
         self.version = digest.hexdigest()
         self._environment = ImmutableSandboxedEnvironment(
             loader=jinja2.FunctionLoader(self._load),
@@ -125,7 +111,7 @@ class TemplatePrompt:
             raise PromptError(Problem(str(path), message)) from error
         self.require("user", "and, if wanted, a block system")
         known = _ALL_BLOCKS if like is None else tuple({*_COMMON_BLOCKS, *like.blocks})
-        for node in self._trees[""].body:
+        for node in main.tree.body:
             if isinstance(node, nodes.Block) and node.name not in known:
                 where, hint = f"{path}:{node.lineno}", did_you_mean(node.name, known)
                 allowed, message = ", ".join(sorted(known)), "is a block that nothing uses"
@@ -139,12 +125,12 @@ class TemplatePrompt:
     @property
     def included(self) -> tuple[Path, ...]:
         """Files that it includes or imports."""
-        return tuple(path for name, (path, _) in self._texts.items() if name)
+        return tuple(source.path for name, source in self._sources.items() if name)
 
     @property
     def unsent_line(self) -> int | None:
         """The first line with text that stands outside of blocks, and so is sent to nobody."""
-        for node in self._trees[""].body:
+        for node in self._sources[""].tree.body:
             for part in node.nodes if isinstance(node, nodes.Output) else ():
                 if isinstance(part, nodes.TemplateData) and part.data.strip():
                     before = part.data[: len(part.data) - len(part.data.lstrip())]
@@ -155,7 +141,7 @@ class TemplatePrompt:
     def says_form(self) -> bool:
         """True if it uses a name that tells the JSON that is asked for."""
         find = jinja2.meta.find_undeclared_variables
-        return any(not find(tree).isdisjoint(FORM_FACTS) for tree in self._trees.values())
+        return any(not find(one.tree).isdisjoint(FORM_FACTS) for one in self._sources.values())
 
     def require(self, block: str, more: str) -> None:
         """Raise PromptError where the template lacks a block; `more` is told of what is allowed."""
@@ -172,8 +158,13 @@ class TemplatePrompt:
         system, user = self.text("system", facts), self.text("user", facts)
         if not user:
             raise PromptError(Problem(str(self._path), "says nothing", "block user"))
+        parts: list[str | Image] = []
+        for number, picture in enumerate(pictures, 1):
+            about = {**facts, "label": picture.label, "number": number}
+            parts += [caption] if (caption := self.text("caption", about)) else []
+            parts.append(picture)
         first = (Message("system", (system,)),) if system else ()
-        return (*first, Message("user", (*self._captioned(pictures, facts), user)))
+        return (*first, Message("user", (*parts, user)))
 
     def text(self, block: str, facts: Mapping[str, object]) -> str:
         """Render a block of the template, "" for one that it lacks; raises PromptError."""
@@ -198,38 +189,26 @@ class TemplatePrompt:
 
     def _read_included(self, folders: Sequence[Path]) -> None:
         """Read what the template includes or imports, at any depth, by the names it uses."""
-        todo = [""]
+        todo = [self._sources[""]]
         while todo:
             source = todo.pop()
-            for node in self._trees[source].find_all(_NAMING):
-                for name, path in _named(node, folders, f"{self._texts[source][0]}:{node.lineno}"):
-                    if name not in self._texts:
-                        self._texts[name] = (path, _text_of(path))
-                        self._trees[name] = _tree_of(path, self._texts[name][1])
-                        todo.append(name)
+            for node in source.tree.find_all(_NAMING):
+                for name, path in _named(node, folders, f"{source.path}:{node.lineno}"):
+                    if name not in self._sources:
+                        self._sources[name] = _read(path)
+                        todo.append(self._sources[name])
 
     def _load(self, name: str) -> tuple[str, str, None] | None:
-        if name not in self._texts:
-            return None
-        path, text = self._texts[name]
-        return text, str(path), None
+        source = self._sources.get(name)
+        return None if source is None else (source.text, str(source.path), None)
 
     def _compiled(self, *, head_alone: bool) -> jinja2.Template:
-        tree = self._environment.parse(self._texts[""][1])
+        tree = self._environment.parse(self._sources[""].text)
         if head_alone:
             tree.body = [node for node in tree.body if isinstance(node, _HEAD)]
         code = self._environment.compile(tree, filename=str(self._path))
         known = self._environment.make_globals(None)
         return jinja2.Template.from_code(self._environment, code, known)
-
-    def _captioned(
-        self, pictures: Sequence[Image], facts: Mapping[str, object]
-    ) -> Iterator[str | Image]:
-        for number, picture in enumerate(pictures, 1):
-            about = {**facts, "label": picture.label, "number": number}
-            if caption := self.text("caption", about):
-                yield caption
-            yield picture
 
     def _render(self, block: str, facts: dict[str, object]) -> str:
         above = self._head.new_context(facts)
@@ -242,24 +221,22 @@ class TemplatePrompt:
 
     def _place_of(self, error: Exception) -> str:
         """Return the file and line at which rendering failed."""
-        files = {str(path) for path, _ in self._texts.values()}
-        trace, place = error.__traceback__, f"{self._path}:1"
-        while trace is not None:
-            if trace.tb_frame.f_code.co_filename in files:
-                place = f"{trace.tb_frame.f_code.co_filename}:{trace.tb_lineno}"
-            trace = trace.tb_next
-        return place
+        files = {str(source.path) for source in self._sources.values()}
+        frames = traceback.extract_tb(error.__traceback__)
+        places = [f"{one.filename}:{one.lineno}" for one in frames if one.filename in files]
+        return places[-1] if places else f"{self._path}:1"
 
 
-def _text_of(path: Path) -> str:
+Prompt = OfficialPrompt | TemplatePrompt
+"""What turns pictures and facts about a sample into chat messages."""
+
+
+def _read(path: Path) -> _Source:
     try:
-        return read_text(path, _LARGEST_BYTES)
+        text = read_text(path, _LARGEST_BYTES)
     except (OSError, ValueError) as error:
         why = reason_of(error) if isinstance(error, OSError) else f"it {error}"
         raise PromptError(Problem(str(path), f"cannot be read: {why}")) from error
-
-
-def _tree_of(path: Path, text: str) -> nodes.Template:
     try:
         tree = jinja2.Environment().parse(text)
         # A text may be nested so deep that its tree is parsed and cannot be walked.
@@ -268,7 +245,7 @@ def _tree_of(path: Path, text: str) -> nodes.Template:
         line = getattr(error, "lineno", None)
         where = str(path) if line is None else f"{path}:{line}"
         raise PromptError(Problem(where, f"is not valid Jinja: {reason_of(error)}")) from error
-    return tree
+    return _Source(path, text, tree)
 
 
 def _named(node: Any, folders: Sequence[Path], where: str) -> list[tuple[str, Path]]:

@@ -60,7 +60,7 @@ from phyblock.stable import hex_digest
 from phyblock.tracks.base import Opening, SingleTrack
 from phyblock.tracks.baselines import Choice, Guesses, Picking, Spot
 from phyblock.tracks.items import Elsewhere, examples_of, spread, stratified
-from phyblock.tracks.measures import ItemExport, TrackReport
+from phyblock.tracks.measures import ItemExport
 from phyblock.tracks.pictures import Drawing, Pictures, Workshop, picture_style
 from phyblock.tracks.prompts import form_facts
 from phyblock.types import Background, DataFormat
@@ -401,6 +401,7 @@ class Vqa(SingleTrack[AskedQuestion]):
     template = bundled("prompts", "vqa.j2")
     json_template = bundled("prompts", "vqa_json.j2")
     prompt_field = (name, "prompt")
+    results = "phyblock.tracks.vqa_results"
     subject = ChoiceSubject
     baselines = CHOICE_RULES
     by_hand = staticmethod(pick_answer)
@@ -437,13 +438,6 @@ class Vqa(SingleTrack[AskedQuestion]):
             pool = map(AskedQuestion, known.tasks)
             asked = [AskedQuestion(task) for task in tasks]
             self.examples = examples_of(suite, pool, asked, "question", _subtask)
-
-    @classmethod
-    def report(cls) -> TrackReport:
-        """Return what tables and figures are made by."""
-        from phyblock.tracks.vqa_results import REPORT
-
-        return REPORT
 
     @classmethod
     def data_folder(cls, suite: Suite) -> tuple[str, tuple[str, ...], bool] | None:

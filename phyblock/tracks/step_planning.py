@@ -32,7 +32,6 @@ from phyblock.tracks.baselines import Choice, Pick, Picking, candidate_choices
 from phyblock.tracks.full_planning import PLAN_COLUMNS, POSE_COUNTS, PlanParse, plan_row
 from phyblock.tracks.goal_blind import BlindGuesses
 from phyblock.tracks.items import file_plan
-from phyblock.tracks.measures import TrackReport
 from phyblock.tracks.pictures import Drawing, ScenePictures, outlined
 from phyblock.tracks.prompts import Prompt, TemplatePrompt
 from phyblock.types import Gating, Physics, Setting
@@ -433,6 +432,7 @@ class StepPlanning(SceneTrack, EpisodeTrack[AssemblyTask]):
     template = bundled("prompts", "step_planning.j2")
     json_template = bundled("prompts", "step_planning_json.j2")
     prompt_field = ("steps", "prompt")
+    results = "phyblock.tracks.step_planning_results"
     subject = StepSubject
     baselines = STEP_RULES
     by_hand = staticmethod(pick_step)
@@ -450,13 +450,6 @@ class StepPlanning(SceneTrack, EpisodeTrack[AssemblyTask]):
         self.accepts = self.spec.setting or self.suite.settings[0]
         self._guesses = BlindGuesses(self.suite.candidates.order, self.pool, self.accepts)
         self._settled: OrderedDict[tuple[Block, ...], Settled] = OrderedDict()
-
-    @classmethod
-    def report(cls) -> TrackReport:
-        """Return what tables and figures are made by."""
-        from phyblock.tracks.step_planning_results import REPORT
-
-        return REPORT
 
     @classmethod
     def physics(cls, suite: Mapping[str, Any]) -> bool:

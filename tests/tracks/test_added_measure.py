@@ -231,17 +231,6 @@ def test_a_track_counts_all_that_its_own_measures_need(track: str) -> None:
 
 
 @pytest.mark.usefixtures("half")
-def test_samples_that_lack_counts_are_not_counted(tmp_path: Path) -> None:
-    records = [record(scene="001") | {"counts": {"sampled": [1, 2]}}]
-    records += [record(scene="002") | {"counts": {"sampled": []}}, record(scene="003")]
-    written = write_tables(write_run(tmp_path / "run", records, manifest()))
-    (row,) = written.run.estimates.query("cell == 'overall' and measure == 'half'").to_dict(
-        "records"
-    )
-    assert (row["value"], row["n"]) == (0.5, 1)
-
-
-@pytest.mark.usefixtures("half")
 def test_counts_of_another_measure_name_the_file(tmp_path: Path) -> None:
     folder = write_run(tmp_path / "run", [record() | {"counts": {"sampled": [1]}}], manifest())
     assert json.loads((folder / "records.jsonl").read_text())["counts"] == {"sampled": [1]}

@@ -187,19 +187,6 @@ def test_shares_alone_are_drawn_on_a_scale_to_100(run: Run, measure: Measure) ->
     assert len(widths) == 1
 
 
-@pytest.mark.parametrize("measure", [ERROR, EXACT], ids=["lower", "higher"])
-def test_what_is_not_better_than_the_floor_is_marked(run: Run, measure: Measure) -> None:
-    """Whichever way is better: the oracle is right everywhere, guesses are off."""
-    floor = 0.3
-    show(led_by(floored := replace(measure, chance=lambda *_: floor), floored))
-    (table,) = headlines(run)
-    rows = {row.name: row.cells[0] for row in table.rows}
-    assert rows["Floor: chance"].value == floor * measure.scale
-    assert "†" not in rows["oracle"].below[0]
-    assert rows["random"].below[0].endswith(" †")
-    assert "best that is reached" in table.notes[0]
-
-
 @pytest.mark.parametrize(
     ("better", "most", "best"),
     [

@@ -21,7 +21,6 @@ from phyblock.domain import (
     Question,
     Scene,
 )
-from phyblock.domain.question import rotated
 from phyblock.parsing.answer import parse_answer
 from phyblock.parsing.move import parse_move
 from phyblock.parsing.plan import parse_plan
@@ -108,18 +107,6 @@ def test_the_text_probe_finds_what_frequencies_do_not_tell(
     assert accuracy("majority", questions) < 0.5
 
 
-def test_no_question_is_answered_by_its_own_scenes_answers() -> None:
-    """Each base scene has a word of its own that is always right: it cannot be learned."""
-    found = []
-    for number in range(80):
-        rng = np.random.default_rng(number)
-        options = [f"word{number % 40}", *(f"only{number}-{n}" for n in range(3))]
-        order = [int(place) for place in rng.permutation(4)]
-        shown = tuple(options[place] for place in order)
-        found.append(question(number, shown, (order.index(0),)))
-    assert accuracy("majority", found) < 0.5
-
-
 def test_what_is_learned_from_shares_no_base_scene_with_what_is_answered() -> None:
     plain = made_by(fair, 120)
     found = [
@@ -133,16 +120,6 @@ def test_what_is_learned_from_shares_no_base_scene_with_what_is_answered() -> No
         assert held_out
         assert known
         assert all(held_out.isdisjoint(question.scene.parents) for question in known)
-
-
-def test_a_rotated_question_is_answered_with_the_same_words() -> None:
-    questions = made_by(cube_is_right, 40)
-    guesses = Guesses(questions)
-    for one in questions:
-        for by in range(4):
-            turned = rotated(one, by)
-            (guess,) = guesses.guess("majority", turned)
-            assert turned.options[guess] == "cube"
 
 
 def test_letters_of_pictures_and_orders_go_by_frequency() -> None:
@@ -237,15 +214,6 @@ def test_a_planted_tell_is_found(setting: Setting) -> None:
     assert f1(scenes, sets, learned, setting) > 0.8
     assert f1(scenes, sets, every, setting) < 0.5
     assert f1(scenes, sets, evenly, setting) < 0.5
-
-
-def test_what_has_none_to_learn_from_names_every_candidate_once() -> None:
-    first = scene("s0", KIT[:2])
-    scenes = [first, replace(first, id="s1", parents=("s0",))]
-    sets = {one.id: CandidateSet(KIT) for one in scenes}
-    plan = Plan(tuple(range(1, len(KIT) + 1)))
-    assert goal_blind_plans(scenes, sets, "A") == {"s0": plan, "s1": plan}
-    assert goal_blind_plans([], {}, "A") == {}
 
 
 TASK = BUILT_IN.tasks[0]

@@ -271,6 +271,7 @@ def test_examples_are_turns_before_the_question(
     [
         ("full_planning", ["nowhere"], "examples[0]: is no scene that an example can be about"),
         ("full_planning", ["l1-001-animals"], "did you mean l1-001-animal?"),
+        ("full_planning", 16, "has fewer others to be shown as examples"),
         ("step_planning", 1, "episode of several turns"),
         ("pose_planning", 1, "the floor and the sheet of blocks"),
     ],
@@ -279,17 +280,8 @@ def test_what_cannot_be_shown_is_refused(
     shop: Workshop, name: str, examples: Any, told: str
 ) -> None:
     with pytest.raises(SpecError) as caught:
-        track_of(name, shop=shop, limit=2, examples=examples)
+        track_of(name, BUILT_IN.tasks[:9], shop, limit=2, examples=examples)
     assert told in str(caught.value)
-
-
-def test_too_few_others_are_refused(workspace: Workspace) -> None:
-    workspace.write_suite(models=["alpha"], examples=5)
-    workspace.write_models("http://127.0.0.1:9", "alpha")
-    done = workspace.phyblock("validate", "suite.yaml")
-    assert done.code == 2
-    assert "fewer others" in done.err
-    assert "suite.yaml:" in done.err
 
 
 def test_a_run_shows_examples_varies_them_and_says_which(workspace: Workspace) -> None:

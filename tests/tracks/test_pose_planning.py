@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import functools
 import sys
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -13,14 +12,11 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from PIL import Image
 
 from phyblock.cli.main import phyblock
 from phyblock.data import AssemblyTask, read_builtin
 from phyblock.domain import Block, Candidate, CandidateSet, PoseStep
 from phyblock.errors import InputError, StoreError
-from phyblock.models.request import Image as SentPicture
-from phyblock.parsing.poses import pose_form
 from phyblock.records.files import known_records
 from phyblock.resources import bundled
 from phyblock.run.records import begun, judged
@@ -42,7 +38,6 @@ from phyblock.tracks.pose_planning import (
     written,
 )
 from phyblock.tracks.pose_planning_results import pose_film, pose_table
-from phyblock.tracks.prompts import TemplatePrompt
 from phyblock.types import REFUSED_ENDS, STEP_ENDS, StepEnd
 from tests.data.broken import write_scenes
 from tests.servers.chassis import Faults, Running, Seen
@@ -259,10 +254,6 @@ class Builder(OpenAIChat):
         return body
 
 
-class Turner(Builder):
-    turned = " turned (0, 0, 0)"
-
-
 def prepared(workspace: Workspace, monkeypatch: pytest.MonkeyPatch, **pose: str) -> list[str]:
     """A suite, and the words of the command that runs it."""
     monkeypatch.chdir(workspace.root)
@@ -310,50 +301,6 @@ def test_a_run_with_faults_is_killed_resumed_and_scored_again(
     assert table.loc["builder", "completed"] == 20
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("rotation", "server"), [("candidate", Builder), ("free", Turner)])
-def test_a_run_has_a_page_figures_a_film_and_is_compared(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-    rotation: str, server: type[Builder],
-) -> None:  # fmt: skip
-    run = prepared(workspace, monkeypatch, rotation=rotation)
-    with Running(server()) as running:
-        workspace.write_models(running.url, "builder")
-        assert not phyblock.main(run[:-1], standalone_mode=False)
-    capsys.readouterr()
-    for file in ("tables/pose_errors.md", "figures/f1-tolerance.svg", "figures/pose-errors.svg"):
-        assert (workspace.out / file).exists(), file
-    assert "Pose planning" in (workspace.out / "report.html").read_text("utf-8")
-    gif, sample = workspace.root / "a.gif", "builder/t4/s0"
-    shown = ["show", "out", sample, "--gif", str(gif), "--size", "128"]
-    assert not phyblock.main(shown, standalone_mode=False)
-    assert "falls" not in capsys.readouterr().out
-    with Image.open(gif) as frames:
-        assert frames.n_frames == 4
-    for more in ("compare --measure stands --out out", "export --to csv"):
-        verb, *options = more.split()
-        assert not phyblock.main([verb, "out", *options], standalone_mode=False)
-    assert pd.read_csv(workspace.out / "comparison.csv")["verdict"].notna().all()
-
-
-def test_a_suite_says_how_poses_are_asked_for_and_what_is_wrong_with_it() -> None:
-    assert PoseSpec().views == ("oblique", "top")
-    view = {"azimuth_deg": 30.0, "elevation_deg": 50.0}
-    assert len(PoseSpec.model_validate({"views": ["top", view]}).views) == 2
-    for wrong in (
-        {"views": []},
-        {"views": ["top", "top"]},
-        {"views": ["above"]},
-        {"views": [view, "top", "side", "front", "oblique"]},
-        {"views": [{"azimuth_deg": 0.0, "elevation_deg": 0.0}]},
-        {"overlap_cm": 0},
-        {"overlap_cm": float("nan")},
-        {"rotation": "any"},
-    ):
-        with pytest.raises(ValueError, match="validation error"):
-            PoseSpec.model_validate(wrong)
-
-
 @pytest.mark.parametrize(
     ("views", "told"),
     [
@@ -378,19 +325,3 @@ def test_a_view_that_is_none_or_cannot_carry_the_sheet_is_said(
         problems = [str(problem) for problem in error.problems]
     assert len(problems) == len(told), problems
     assert all(one in problem for one, problem in zip(told, problems, strict=True))
-
-
-def test_the_prompt_says_every_view_and_what_a_place_means() -> None:
-    labels = ("goal, oblique", "goal, top", "blocks")
-    pictures = tuple(SentPicture(b"", label, 8, 8) for label in labels)
-    for rotation, form in product(("candidate", "free"), ("text", "json_schema")):
-        track, is_free, is_json = poses(rotation, form), rotation == "free", form != "text"
-        name = "pose_planning_json.j2" if is_json else "pose_planning.j2"
-        prompt = TemplatePrompt(bundled("prompts", name), "default")
-        facts = track.facts(_TASK, pictures)
-        texts = [part for m in prompt.messages(pictures, facts) for part in m.parts]
-        said = " ".join(part for part in texts if isinstance(part, str))
-        assert "Picture 2: goal, top" in said
-        assert ("turned" in said.split("exactly this form")[1]) == is_free or is_json
-        assert ("RX" in said) == is_free
-        assert (pose_form(16, free=is_free).example in said) == is_json

@@ -13,14 +13,10 @@ from hypothesis import strategies as st
 from phyblock.data import official_prompt, recorded_models
 from phyblock.errors import PromptError
 from phyblock.models.request import Image, Message
-from phyblock.parsing.answer import choice_form
-from phyblock.parsing.move import move_form, parse_move
-from phyblock.parsing.plan import parse_plan, plan_form
 from phyblock.resources import bundled
 from phyblock.tracks import TemplatePrompt, kinds
-from phyblock.tracks.prompts import OfficialPrompt, form_facts
+from phyblock.tracks.prompts import OfficialPrompt
 from tests.fuzz.strategies import TEMPLATES
-from tests.workspace import Workspace
 
 GOAL, GRID = Image(b"goal", "goal", 8, 8), Image(b"grid", "candidates", 8, 8)
 FACTS = {"pictures": ["goal", "candidates"], "n_candidates": 16, "candidate_scale": "common"}
@@ -166,19 +162,6 @@ def test_any_bytes_are_a_prompt_or_a_prompt_error(
         assert isinstance(message, Message)
 
 
-def test_validate_names_what_is_included(workspace: Workspace) -> None:
-    folder = workspace.root / "prompts"
-    folder.mkdir()
-    workspace.write_suite(models=["alpha"])
-    workspace.write_models("http://127.0.0.1:9", "alpha")
-    body = "{% block user %}{% include 'rules.j2' %}{% endblock %}"
-    (folder / "full_planning.j2").write_text(body, encoding="utf-8")
-    (folder / "rules.j2").write_text("Build.", encoding="utf-8")
-    done = workspace.phyblock("validate", "suite.yaml")
-    assert done.code == 0, done.err
-    assert "full_planning.j2 (with rules.j2)" in done.out.replace("\n", "")
-
-
 def test_the_official_prompt_is_the_recorded_text_to_the_letter(official_checkout: Path) -> None:
     text = official_prompt(official_checkout)
     sent = OfficialPrompt(text).messages((GOAL, GRID), FACTS)
@@ -192,73 +175,6 @@ def test_the_official_prompt_is_the_recorded_text_to_the_letter(official_checkou
     # Marks of the two pictures stand before the text, the goal's first.
     assert {raw["instruction"] for raw in recorded} == {"<IMG_CONTEXT>" * 2 + text}
     assert all("cand" not in raw["image"][0] and "cand" in raw["image"][1] for raw in recorded)
-
-
-@pytest.mark.parametrize("labels", [("composite",), ("goal", "candidates"), ("candidates",)])
-@pytest.mark.parametrize("scale", ["common", "fit", None])
-def test_the_default_prompt_speaks_of_what_is_sent_in_both_formats(
-    labels: tuple[str, ...], scale: str | None
-) -> None:
-    sent = tuple(Image(b"", label, 8, 8) for label in labels)
-    is_blind, form = labels == ("candidates",), plan_form(9)
-    facts = {"pictures": list(labels), "n_candidates": 9, "candidate_scale": scale}
-    facts["is_blind"] = is_blind
-    _, user = bundled_prompt("full_planning").messages(sent, facts)
-    *pictures, text = user.parts
-    assert (pictures, isinstance(text, str)) == (list(sent), True)
-    assert "grid of 9 blocks" in str(text)
-    assert ("drawn at one scale" in str(text)) == (scale == "common")
-    assert ("drawn to fill its cell" in str(text)) == (scale == "fit")
-    assert ("goal, a finished structure of blocks, is not available" in str(text)) == is_blind
-    where = {
-        ("composite",): "left half shows the goal",
-        ("candidates",): "one picture: the candidates",
-    }
-    assert where.get(labels, "in this order: goal, then candidates") in str(text)
-    asked = bundled_prompt("full_planning_json").text("user", {**facts, **form_facts(form)})
-    head, mark, _ = str(text).partition("End your answer with the plan")
-    assert mark
-    assert asked.startswith(f"{head}Answer with one JSON object")
-    assert form.example in asked
-    assert json.dumps(form.schema) in asked
-    # The example in the form that is asked for is no plan.
-    assert parse_plan(str(text), 16, "steps").plan.steps == ()
-    assert parse_plan(asked, 9).rule is None
-
-
-@pytest.mark.parametrize("is_ordering", [True, False])
-@pytest.mark.parametrize("is_blind", [True, False])
-def test_a_question_is_asked_in_the_same_words_in_both_formats(
-    is_ordering: bool, is_blind: bool
-) -> None:
-    options = [{"letter": x, "text": f"text {x}", "is_picture": is_ordering} for x in "ABCD"]
-    facts: dict[str, object] = {"question": "Which?", "options": options, "letters": list("ABCD")}
-    facts |= {"is_ordering": is_ordering, "pictures": ["scene"], "is_blind": is_blind}
-    form = choice_form([f"text {x}" for x in "ABCD"], is_ordering)
-    text = bundled_prompt("vqa").text("user", {**facts, **form_facts(None)})
-    asked = bundled_prompt("vqa_json").text("user", {**facts, **form_facts(form)})
-    head, mark, _ = text.partition(" Give a short reason")
-    assert mark
-    assert asked.startswith(f"{head} Answer with one JSON object")
-    assert form.read(asked) is None
-
-
-@pytest.mark.parametrize("cot", [True, False])
-def test_a_step_is_asked_for_in_the_same_words_in_both_formats(cot: bool) -> None:
-    past = {"step": 1, "operation": "Move(2)", "told": "it worked"}
-    facts: dict[str, object] = {
-        "pictures": ["goal", "candidates", "current"], "n_candidates": 9, "candidate_scale": "fit",
-        "step": 3, "max_steps": 8, "setting": "A", "gating": "aov", "history": [past],
-        "n_hidden": 1, "told": "it worked", "cot": cot, "is_blind": False, "answer": "(answer)",
-    }  # fmt: skip
-    text, asked = bundled_prompt("step_planning"), bundled_prompt("step_planning_json")
-    assert all(text.text(b, facts) == asked.text(b, facts) for b in ("system", "user", "turn"))
-    form = move_form(9, reasons=cot)
-    answer = asked.text("answer", {**facts, **form_facts(form)})
-    assert form.example in answer
-    assert json.dumps(form.schema) in answer
-    assert ("first think" in answer) == cot
-    assert parse_move(answer).problem is not None
 
 
 def test_only_prompts_for_json_say_the_form() -> None:

@@ -7,14 +7,12 @@ import asyncio
 import base64
 import csv
 import io
-import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -24,7 +22,7 @@ from phyblock.config.models import ModelConfig
 from phyblock.data import QuestionSet, QuestionTask, read_builtin, read_questions
 from phyblock.domain import LETTERS, SUBTASKS, Question, Scene, Subtask, is_picture_option
 from phyblock.domain.question import rotated
-from phyblock.errors import DataError, SpecError, StoreError
+from phyblock.errors import DataError, SpecError
 from phyblock.models.replay import BaselineModel
 from phyblock.models.request import Image, Request
 from phyblock.parsing.answer import parse_answer
@@ -97,51 +95,6 @@ def text_of(request: Request) -> str:
     return last
 
 
-def test_every_picture_is_announced_and_sent_in_order(
-    question_set: QuestionSet, shop: Workshop
-) -> None:
-    track = opened(question_set, shop)
-    names = ("sh-000", "ad-000", "vp-000", "or-000")
-    asked = {request.key: request for request in ask(track, *names)}
-    requests = [asked[name] for name in names]
-    captions = [
-        [part for part in user_parts(request)[:-1] if isinstance(part, str)] for request in requests
-    ]
-    assert captions == [
-        ["Picture:"],
-        ["First picture:", "Second picture, one block by itself:"],
-        ["First picture:", "Picture A:", "Picture B:", "Picture C:", "Picture D:"],
-        ["Picture A:", "Picture B:", "Picture C:", "Picture D:"],
-    ]
-    for request in requests:
-        subject = request.subject
-        assert isinstance(subject, ChoiceSubject)
-        recipes = {picture.label: picture for picture in subject.question.pictures}
-        for image in images(request):
-            assert image.data == question_png(recipes[image.label], STYLE)
-        parts = user_parts(request)[:-1]
-        assert [isinstance(part, str) for part in parts] == [True, False] * (len(parts) // 2)
-
-
-def test_the_text_says_question_options_and_form(question_set: QuestionSet, shop: Workshop) -> None:
-    track = opened(question_set, shop, blind=True)
-    requests = {request.key: request for request in ask(track)}
-    for key, request in requests.items():
-        subject = request.subject
-        assert isinstance(subject, ChoiceSubject)
-        text = text_of(request)
-        assert f"Question: {subject.question.text}" in text
-        assert "\n\n\n" not in text
-        asked_form = "Answer: W, X, Y, Z" if key.startswith("or") else "Answer: X"
-        assert asked_form in text.splitlines()
-        if "<img1>" in subject.question.options:
-            assert "<img" not in text
-            assert "the pictures A, B, C and D." in text
-        else:
-            for letter, option in zip(LETTERS, subject.question.options, strict=True):
-                assert f"{letter}. {option}" in text.splitlines()
-
-
 def test_the_answer_stands_in_no_message(question_set: QuestionSet, shop: Workshop) -> None:
     """Questions that differ in the right answer alone are asked alike."""
     turned = [
@@ -156,48 +109,6 @@ def test_the_answer_stands_in_no_message(question_set: QuestionSet, shop: Worksh
 
 def _other(answer: tuple[int, ...]) -> tuple[int, ...]:
     return tuple((index + 1) % 4 for index in answer)
-
-
-def test_blind_sends_no_picture(question_set: QuestionSet, shop: Workshop) -> None:
-    requests = ask(opened(question_set, shop, blind=True))
-    assert len(requests) == len(question_set.tasks)
-    assert all(len(user_parts(request)) == 1 for request in requests)
-    assert all("not available" in text_of(request) for request in requests)
-
-
-def test_options_on_one_sheet(question_set: QuestionSet, shop: Workshop) -> None:
-    rules = {"options_as": "letters"}
-    (request,) = ask(opened(question_set, shop, **rules), "vp-000")
-    scene, sheet = images(request)
-    assert (scene.label, sheet.label) == ("scene", "options")
-    subject = request.subject
-    assert isinstance(subject, ChoiceSubject)
-    with PillowImage.open(io.BytesIO(sheet.data)) as sheet_picture:
-        whole = np.asarray(sheet_picture.convert("RGB"), dtype=np.int16)
-    side = STYLE.size_px
-    assert whole.shape[:2] == (sheet.height_px, sheet.width_px) == (2 * side + 2, 2 * side + 2)
-    recipes = {picture.label: picture for picture in subject.question.pictures}
-    for place, letter in enumerate(LETTERS):
-        row, column = divmod(place, 2)
-        cell = whole[row * (side + 2) :, column * (side + 2) :][:side, :side]
-        with PillowImage.open(io.BytesIO(question_png(recipes[letter], STYLE))) as alone:
-            lone = np.asarray(alone.convert("RGB"), dtype=np.int16)
-        assert (cell[side // 4 :] == lone[side // 4 :]).all()
-        assert (cell[: side // 8, : side // 8] != lone[: side // 8, : side // 8]).any()
-
-
-def test_circular_asks_every_rotation_and_moves_pictures_with_their_letters(
-    question_set: QuestionSet, shop: Workshop
-) -> None:
-    track = opened(question_set, shop, circular=True)
-    assert len(track.items) == 4 * len(question_set.tasks)
-    keys = [f"vp-000-r{by}" for by in range(4)]
-    shown = [{i.label: i.sha256 for i in images(request)} for request in ask(track, *keys)]
-    for by in range(4):
-        assert shown[by]["scene"] == shown[0]["scene"]
-        for place, letter in enumerate(LETTERS):
-            assert shown[by][letter] == shown[0][LETTERS[(place + by) % 4]]
-    assert len(set(shown[0].values())) == 5
 
 
 @given(first=st.integers(0, 3), second=st.integers(0, 3), data=st.data())
@@ -257,47 +168,6 @@ def test_wrong_pictures_have_the_marks_that_the_text_speaks_of(
         sent = {image.label: image.data for image in images(request)}
         shown = {picture.label: picture for picture in third.question.pictures}
         assert sent == {label: question_png(recipe, STYLE) for label, recipe in shown.items()}
-
-
-def test_wrong_pictures_need_another_scene(question_set: QuestionSet) -> None:
-    with pytest.raises(SpecError, match="about another scene"):
-        opened(of_tasks(question_set, question_set.tasks[:1]), None, wrong_image=True)
-
-
-@pytest.mark.parametrize(
-    ("options_as", "wanted"),
-    [("images", [(128, 128)] * 5), ("letters", [(128, 128), (258, 258)])],
-)
-def test_outlines_tell_the_sizes_of_pictures_that_are_not_drawn_yet(
-    question_set: QuestionSet, tmp_path: Path, options_as: str, wanted: list[tuple[int, int]]
-) -> None:
-    fresh = Workshop(1, tmp_path)
-    track = opened(question_set, fresh, options_as=options_as)
-    item = next(item for item in track.items if item.key == "vp-000")
-    ((request, is_real),) = track.outlines(item)
-    assert not is_real
-    assert [(i.width_px, i.height_px) for i in images(request)] == wanted
-    (asked,) = ask(track, "vp-000")
-    assert [(i.width_px, i.height_px) for i in images(asked)] == wanted
-    assert list(track.outlines(item)) == [(asked, True)]
-    fresh.close()
-
-
-def test_identity_follows_questions_prompt_and_pictures(
-    question_set: QuestionSet, shop: Workshop
-) -> None:
-    def identity(found: QuestionSet = question_set, size_px: int = 128, **vqa: Any) -> str:
-        return repr(opened(found, shop, size_px, **vqa).identity())
-
-    base = identity()
-    assert identity() == base
-    others = [
-        identity(size_px=256),
-        identity(of_tasks(question_set, question_set.tasks[:7])),
-        identity(blind=True),
-        identity(circular=True),
-    ]
-    assert len({base, *others}) == 5
 
 
 def test_questions_keep_their_background_unless_a_suite_gives_one(
@@ -414,18 +284,6 @@ def test_a_higher_limit_asks_all_that_a_lower_one_asks(
     assert keys(per_subtask, limit) <= keys(per_subtask, limit + 1)
 
 
-@given(tasks, st.lists(st.sampled_from(LEVELS), min_size=1, unique=True))
-def test_levels_are_those_of_the_scenes(given_tasks: list[QuestionTask], levels: list[int]) -> None:
-    chosen = select_questions(given_tasks, SUBTASKS, levels, None, None)
-    assert list(chosen) == [one for one in given_tasks if set(one.scene.levels) & set(levels)]
-
-
-def test_those_kept_are_spread_over_the_set() -> None:
-    many = [task_of(number, "SH") for number in range(100)]
-    chosen = select_questions(many, ["SH"], LEVELS, 4, None)
-    assert [many.index(one) for one in chosen] == [0, 25, 50, 75]
-
-
 def export(found: QuestionSet, shop: Workshop, form: str, folder: Path) -> tuple[Path, ...]:
     return export_questions(found.tasks, QuestionPictures(shop, STYLE, "images"), form, folder)
 
@@ -491,24 +349,3 @@ def test_a_hugging_face_dataset_has_questions_and_pictures(
             assert row["answer"] == task.question.answer_letters
             assert row["options"] == list(task.question.options)
             assert [image.size for image in row["images"]] == [(128, 128)] * len(row["labels"])
-
-
-def test_what_cannot_be_written_is_said(
-    question_set: QuestionSet,
-    shop: Workshop,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    (tmp_path / "file").write_text("in the way")
-    with pytest.raises(StoreError, match="cannot be written"):
-        export_questions(
-            question_set.tasks,
-            QuestionPictures(shop, STYLE, "images"),
-            "vlmevalkit",
-            tmp_path / "file" / "out",
-        )
-    monkeypatch.setitem(sys.modules, "datasets", None)
-    with pytest.raises(SpecError, match=r"phyblock\[hf\]"):
-        export_questions(
-            question_set.tasks, QuestionPictures(shop, STYLE, "images"), "hf", tmp_path / "out"
-        )

@@ -19,7 +19,7 @@ from phyblock.data import AssemblyTask, read_official
 from phyblock.domain import Block, Candidate, CandidateSet, Scene
 from phyblock.errors import PromptError
 from phyblock.models.request import Image, Message, Request
-from phyblock.parsing.move import MOVE_PROBLEMS, parse_move
+from phyblock.parsing.move import MOVE_PROBLEMS
 from phyblock.records.reply import Reply, Usage
 from phyblock.scoring.steps import MOVE_OUTCOMES
 from phyblock.tracks.pictures import Workshop
@@ -29,9 +29,7 @@ from phyblock.tracks.step_planning import (
     Feedback,
     PastStep,
     StepPlanning,
-    StepSubject,
     Tally,
-    majority,
 )
 from phyblock.types import SETTINGS, Setting
 from tests.parsing.test_move import REPLIES
@@ -165,17 +163,6 @@ def test_an_episode_goes_the_same_way_in_json(operations: list[str], samples: in
     assert fields["outcomes"] == ["placed", "no_move", "done"]
 
 
-def test_an_episode_ends_with_done_or_without_a_reply_and_what_is_missing_is_missed() -> None:
-    fields, _ = play(tower("red", "blue"), scripted("Move(1)", "Done", "Move(3)"))
-    assert (fields["ending"], fields["outcomes"]) == ("done", ["placed", "done"])
-    assert scores(fields, "placed") == scores(fields, "attempted") == (1, 0, 1)
-    episode = made().start(tower("red"), 0, {}, with_messages=False)
-    fields = episode.fields()
-    assert not episode.is_read
-    assert (fields["ending"], fields["outcomes"], fields["turns"]) == ("unanswered", [], [])
-    assert scores(fields, "placed") == (0, 0, 1)
-
-
 def usage(text: str, tokens: int | None, usd: float | None) -> Agent:
     return lambda _: Reply(
         text=text,
@@ -285,15 +272,6 @@ def test_a_collapse_ends_an_episode_under_strict_physics_alone(
     assert fields["ending"] == "completed"
 
 
-def test_layers_gate_where_that_is_asked_for() -> None:
-    outcomes = {}
-    for gating in ("aov", "layer"):
-        said = scripted("Move(1)", "Move(3)", "Move(2)", "Move(3)")
-        outcomes[gating] = play(seesaw(), said, made(gating=gating, **OPEN))[0]["outcomes"]
-    assert outcomes["aov"] == ["placed"] * 3
-    assert outcomes["layer"] == ["placed", "dependency_not_met", "placed", "placed"]
-
-
 def test_several_samples_a_step_are_voted_on() -> None:
     track = made(samples=3, **OPEN)
     said = scripted("Move(6)", "Move(1)", "So, Move(1)", "?", "Done", "Move(3)", "?", "!", "")
@@ -309,16 +287,6 @@ def test_several_samples_a_step_are_voted_on() -> None:
     assert scores(fields, "attempted") == (1, 0, 2)
 
 
-def test_a_tie_goes_to_what_was_said_first_and_the_unread_have_no_vote() -> None:
-    def chosen(*texts: str) -> int:
-        return majority([parse_move(text) for text in texts])
-
-    assert chosen("Move(2)", "Move(1)") == 0
-    assert chosen("?", "?", "Move(1)") == 2
-    assert chosen("Move(2)", "Move(1)", "Done", "Move(1)") == 1
-    assert chosen("?", "") == 0
-
-
 @settings(max_examples=50, deadline=None)
 @given(st.lists(st.tuples(st.integers(1, 3), st.booleans()), max_size=20))
 def test_a_tally_counts_runs_of_failures(steps: Sequence[tuple[int, bool]]) -> None:
@@ -329,16 +297,6 @@ def test_a_tally_counts_runs_of_failures(steps: Sequence[tuple[int, bool]]) -> N
     tail = steps[ends[-1] + 1 :] if ends else steps
     same = next((n for n, s in enumerate(reversed(tail)) if s[0] != tail[-1][0]), len(tail))
     assert (tally.steps, tally.failures, tally.repeats) == (len(steps), len(tail), same)
-
-
-def test_a_request_tells_baselines_what_is_right() -> None:
-    _, requests = play(tower("red", "blue"), scripted("Move(6)", "Move(1)", "Move(3)"))
-    subjects = [request.subject for request in requests]
-    assert [(s.valid, s.exact, s.last_failed) for s in subjects if isinstance(s, StepSubject)] == [
-        ((1,), (1,), None),
-        ((1,), (1,), 6),
-        ((3,), (3,), None),
-    ]
 
 
 def test_outlines_are_as_many_as_an_episode_can_have() -> None:
@@ -383,20 +341,6 @@ def text(message: Message) -> str:
 
 def pictures(message: Message) -> list[bytes]:
     return [part.data for part in message.parts if isinstance(part, Image)]
-
-
-def test_one_message_holds_goal_candidates_current_picture_and_history_in_this_order(
-    shop: Workshop,
-) -> None:
-    system, user = ask(shop, past("placed", "overflow"))
-    assert (system.role, user.role) == ("system", "user")
-    assert pictures(user) == [b"g", b"c", b"state 3"]
-    assert isinstance(user.parts[-1], str)
-    said = text(user)
-    assert "1. Move(1): it worked, the block is placed\n2. Move(2): it failed" in said
-    assert "step 3 of at most 8" in said
-    assert said.index("Your steps so far") > said.index("Move(N) takes")
-    assert "so far" not in text(ask(shop, [])[1])
 
 
 def test_turns_are_a_conversation_in_which_every_state_is_seen_once(shop: Workshop) -> None:
@@ -445,24 +389,6 @@ def test_feedback_tells_no_more_than_it_may(feedback: Feedback) -> None:
     assert len(wrong) == (5 if feedback == "error_type" else 1)
     assert all(words.startswith("it failed") for words in wrong)
     assert told["no_move"] == "it failed, no operation could be read"
-
-
-@pytest.mark.parametrize(
-    ("rules", "said", "unsaid"),
-    [
-        ({"cot": True}, ["First think"], []),
-        ({"cot": False}, ["one line and nothing else"], ["First think"]),
-        ({"gating": "layer"}, ["every block of the layers below"], []),
-        ({"setting": "A"}, ["same type, color and orientation that"], ["counts as a mistake"]),
-        ({"setting": "B"}, ["same type and color that", "counts as a mistake"], []),
-    ],
-)
-def test_the_model_is_told_what_the_simulator_goes_by(
-    shop: Workshop, rules: dict[str, Any], said: list[str], unsaid: list[str]
-) -> None:
-    told = text(ask(shop, [], **rules)[1])
-    assert all(words in told for words in said)
-    assert not any(words in told for words in unsaid)
 
 
 def test_pictures_of_states_are_drawn_and_kept(tmp_path: Path) -> None:
