@@ -3,7 +3,7 @@
 A request is in the draft of a batch, or in the newest batch that the ledger has it in. Between the
 call that makes a batch and its id on disk nobody knows whether there is one. It is looked for under
 our name; where the provider tells no names, among the batches of that time with as many requests,
-by what the answers of each say that they answer.
+by the names of requests in their answers.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from collections import Counter
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
-from typing import Any, BinaryIO, TypeVar
+from functools import partial
+from typing import Any, TypeVar
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import ModelError, RetryableError, UnavailableError
@@ -33,15 +34,8 @@ from phyblock.models.costs import (
     reply_cost_usd,
     today,
 )
-from phyblock.models.model import (
-    FORMAT_HINT,
-    EventKind,
-    ModelEvent,
-    Observer,
-    RetryPolicy,
-    refuses_format,
-)
-from phyblock.models.request import AskLaterError, Request, wire_params
+from phyblock.models.model import EventKind, ModelEvent, Observer, RetryPolicy, format_refused
+from phyblock.models.request import AskLaterError, Request
 from phyblock.records.files import BATCHES
 from phyblock.records.reply import Reply
 
@@ -49,7 +43,6 @@ T = TypeVar("T")
 
 _FIRST_PAUSE_S = 5.0
 _CLOCKS_APART_S = 3600.0
-_HINT = "free some space and give the same command again: nothing of this batch was sent"
 
 
 class UnsureError(UnavailableError):
@@ -63,7 +56,7 @@ class BatchModel:
     `client` makes a client that sends through an HTTP client: by it requests are written and
     answers are read as those of direct calls. `_again` are requests whose answer in the newest
     batch failed, `_failures` how often; `_given` those whose answer a sample of this command has,
-    `_billed_usd` what a limit counted for each. `_strangers` are batches known not to be ours.
+    `_billed_usd` what a limit counted for each.
     """
 
     config: ModelConfig
@@ -75,9 +68,6 @@ class BatchModel:
     policy: RetryPolicy
     observer: Observer
     needs_messages: bool = field(default=True, init=False)
-    _draft: _Draft | None = field(default=None, init=False)
-    _refusal: UnavailableError | None = field(default=None, init=False)
-    _has_begun: bool = field(default=False, init=False)
 
     def __post_init__(self) -> None:
         self.name = self.config.name
@@ -85,12 +75,14 @@ class BatchModel:
         self._ledger = Ledger(self.name, self.files)
         self._earlier = {key for batch in self._ledger.batches.values() for key in batch.places}
         self._drafting = asyncio.Lock()
+        self._draft: _Draft | None = None
+        self._refusal: UnavailableError | None = None
+        self._has_begun = False
         self._takes_seed = self.config.seed != "never"
         self._again: set[str] = set()
         self._failures: Counter[str] = Counter()
         self._given: set[str] = set()
         self._billed_usd: dict[str, float] = {}
-        self._strangers: set[str] = set()
 
     # A round: begin, gather, dispatch, ask.
 
@@ -107,9 +99,9 @@ class BatchModel:
                 # A call that was cut off may still be worked on over there.
                 status = await self._find(batch, time.time() + 2 * self.files.poll_s)
                 if status is None:
-                    await self._ledger.note(batch, "lost", words="not found at the provider")
+                    await self._ledger.note(batch.token, "lost", words="not found at the provider")
                 else:
-                    await self._ledger.note(batch, "created", id=status.id)
+                    await self._ledger.note(batch.token, "created", id=status.id)
             if batch.event == "created":
                 self._following(batch)
 
@@ -120,9 +112,7 @@ class BatchModel:
             is_drafted = self._draft is not None and key in self._draft.keys
             if is_drafted or await self._is_answered(key, request, anew=anew):
                 return True
-            if self._refusal is not None:
-                return False
-            return await self._add(key, request)
+            return self._refusal is None and await self._add(key, request)
 
     async def dispatch(self) -> None:
         """See GatheringModel. What keeps a batch from being sent is raised by the next `begin`."""
@@ -158,7 +148,7 @@ class BatchModel:
             if isinstance(error, RetryableError):
                 self._again.add(key)
                 self._failures[key] += 1
-                if self._failures[key] < self.policy.attempts or not batch.is_complete:
+                if self._failures[key] < self.policy.attempts or self._refusal is not None:
                     raise AskLaterError from None
             raise
         cost_usd = reply_cost_usd(self.prices, reply, batch.created.date())
@@ -171,9 +161,8 @@ class BatchModel:
         if self.budget is not None:
             self.budget.learn(estimate(self.config, request), reply.usage)
         billed_usd, attempts = self._billed_usd.get(key), self._failures[key] + 1
-        reply = reply.model_copy(
-            update={"cost_usd": cost_usd, "billed_usd": billed_usd, "attempts": attempts}
-        )
+        update = {"cost_usd": cost_usd, "billed_usd": billed_usd, "attempts": attempts}
+        reply = reply.model_copy(update=update)
         if self.cache is not None:
             self.cache.put(key, self.config.id, reply)
         return reply
@@ -184,14 +173,12 @@ class BatchModel:
         for following in followings:
             following.cancel()
         await asyncio.gather(*followings, return_exceptions=True)
-        if self._draft is not None:
-            self._draft.drop()
         await self._provider.aclose()
 
     # The draft, and what it holds of the budget.
 
     async def _is_answered(self, key: str, request: Request, *, anew: bool) -> bool:
-        """Return whether `ask` has an answer to a request, or will have when a batch ends."""
+        """Return True if `ask` has an answer to a request, or will have when a batch ends."""
         batch = self._ledger.newest(key)
         if batch is not None and key not in self._again:
             if key in self._earlier and self.budget is not None:
@@ -203,18 +190,17 @@ class BatchModel:
             await asyncio.shield(self._following(batch))
             try:
                 await self._read(key, request, batch)
+                return True
             except ModelError as error:
                 if not anew and not isinstance(error, RetryableError):
                     return True
                 # Where it was recorded, it was counted, too.
                 self._settle(key, batch, None if may_be_billed(error) and not anew else 0.0)
                 self._again.add(key)
-            else:
-                return True
         return self.cache is not None and self.cache.get(key) is not None
 
     async def _add(self, key: str, request: Request) -> bool:
-        """Put a request into the draft, or a new one; return whether the budget had room for it."""
+        """Put a request into the draft, or a new one; False where the budget has no room for it."""
         http, seeded = await self._written(request)
         usd = self._most_usd(request)
         held: int | None = None
@@ -238,7 +224,7 @@ class BatchModel:
                 self._settle_all({} if held is None else {key: held}, 0.0)
                 return False
         if self._draft is None:
-            self._draft = _Draft(self._provider, self.files, seeded=seeded)
+            self._draft = _Draft(self._provider, seeded)
             self._draft.add(key, http, usd, held, seeded=seeded)
         return True
 
@@ -255,7 +241,7 @@ class BatchModel:
         return self.budget.most_usd(prices, expected, day, batched=True)
 
     def _settle(self, key: str, batch: Batch, usd: float | None) -> None:
-        """Count what a request cost, once; None is all that it can have cost."""
+        """Count the cost of a request, once; None is all that it can have cost."""
         if self.budget is not None and key in batch.held:
             spent_usd = self.budget.settle(batch.held.pop(key), usd)
             self._billed_usd[key] = self._billed_usd.get(key, 0.0) + spent_usd
@@ -273,12 +259,10 @@ class BatchModel:
         try:
             batch = await self._send(draft)
         except UnavailableError as error:
-            # What happened to one of which that is not known, the next command finds out.
+            # Whether one was sent of which that is not known, the next command finds out.
             self._refusal = error
             self._settle_all(draft.held, None if isinstance(error, UnsureError) else 0.0)
             return
-        finally:
-            draft.drop()
         self._again.difference_update(batch.places)
         requests = "1 request" if len(batch.places) == 1 else f"{len(batch.places):,} requests"
         self._tell(f"sent batch {batch.shown}: {requests}")
@@ -290,15 +274,16 @@ class BatchModel:
         Raises UnavailableError where it cannot be sent, and nothing was asked; UnsureError where
         that is not known.
         """
-        draft.close()
         known = [usd for usd in draft.keys.values() if usd is not None]
-        costs = known if len(known) == len(draft.keys) else []
-        batch = await self._ledger.intend(draft.token, draft.keys, costs, seeded=draft.seeded)
+        costs = tuple(known) if len(known) == len(draft.keys) else ()
+        fields = {"keys": tuple(draft.keys), "most_usd": costs, "seeded": draft.seeded}
+        await self._ledger.note(draft.token, "intended", **fields)
+        batch = self._ledger.batches[draft.token]
         batch.held = draft.held
 
         async def create() -> BatchStatus:
             try:
-                return await self._provider.create(batch.token, draft.path, file)
+                return await self._provider.create(batch.token, draft.lines)
             except RetryableError as error:
                 if error.sent == "no" or error.status == 429:
                     raise
@@ -308,83 +293,60 @@ class BatchModel:
                 return known
 
         try:
-            file = await self._patiently(lambda: self._provider.upload(batch.token, draft.path))
             status = await self._patiently(create)
         except UnsureError:
             raise
         except UnavailableError as error:
-            await self._ledger.note(batch, "lost", words=str(error))
+            await self._ledger.note(batch.token, "lost", words=str(error))
             why = f"a batch could not be sent: {error}"
             raise UnavailableError(why, status=error.status, sent=error.sent) from None
-        await self._ledger.note(batch, "created", id=status.id)
+        await self._ledger.note(batch.token, "created", id=status.id)
         return batch
 
     async def _find(self, batch: Batch, until_s: float) -> BatchStatus | None:
         """Return the batch that was being sent; None where there is none until then.
 
-        Those without a name that may be it are waited for, as none can be told before it has ended.
+        Those without a name that may be it are waited for: their answers say whose they are.
         Raises UnsureError where the list or the answers of one cannot be read.
         """
-        earliest_s = batch.created.timestamp() - _CLOCKS_APART_S
-        ours = {one.id for one in self._ledger.batches.values()}
-        unread: dict[str, str] = {}
-        is_told = False
+        strangers = {one.id for one in self._ledger.batches.values()}
 
-        async def recent() -> list[BatchStatus]:
+        async def candidates() -> list[BatchStatus]:
             found = []
             async for status in self._provider.listed():
+                earliest_s = batch.created.timestamp() - _CLOCKS_APART_S
                 if status.created_s is not None and status.created_s < earliest_s:
                     break
-                found.append(status)
-            return found
-
-        while True:
-            try:
-                listed = await self._patiently(recent)
-            except UnavailableError as error:
-                why = f"whether a batch was sent cannot be found out: {error}"
-                raise UnsureError(why, status=error.status, sent=error.sent) from None
-            running = []
-            for status in sorted(listed, key=lambda status: status.token != batch.token):
-                if status.token == batch.token:
-                    return status
                 is_like = status.total in (None, 0, len(batch.places)) and status.state != "refused"
-                if status.token is not None or not is_like:
-                    continue
-                if status.id in ours | self._strangers | unread.keys():
-                    continue
-                if status.state == "running":
-                    running.append(status.id)
-                    continue
-                try:
-                    lines = await self._results(status)
-                except ModelError as error:
-                    unread[status.id] = str(error)
-                    continue
-                if (await asyncio.to_thread(Answers, lines, self._provider, batch)).found:
-                    return status
-                self._strangers.add(status.id)
-            if running and not is_told:
-                is_told = True
-                self._tell(
-                    f"whether one of the batches {', '.join(running)} is the one that was being "
-                    "sent shows when it has ended: waiting for that"
-                )
-            elif not running and unread:
-                said = "; ".join(f"{name}: {why}" for name, why in unread.items())
-                raise UnsureError(
-                    f"a batch of {len(batch.places):,} that was being sent may be one whose "
-                    f"answers cannot be read ({said}). If it is not, remove the lines of "
-                    f"{batch.token} from {BATCHES}: its questions are then asked again, and billed "
-                    "again if it is"
-                )
-            elif not running and time.time() >= until_s:
-                return None
-            left_s = max(0.01, until_s - time.time())
-            await asyncio.sleep(self.files.poll_s if running else min(self.files.poll_s, left_s))
+                is_nameless = status.token is None and is_like and status.id not in strangers
+                if status.token == batch.token or is_nameless:
+                    found.append(status)
+            return sorted(found, key=lambda status: status.token is None)
 
-    async def _results(self, status: BatchStatus) -> bytes:
-        return await self._patiently(lambda: self._provider.results(status))
+        try:
+            while True:
+                running = False
+                for status in await self._patiently(candidates):
+                    if status.token == batch.token:
+                        return status
+                    if status.state == "running":
+                        running = True
+                        continue
+                    lines = await self._patiently(partial(self._provider.results, status))
+                    if (await asyncio.to_thread(Answers, lines, self._provider, batch)).found:
+                        return status
+                    strangers.add(status.id)
+                if not running and time.time() >= until_s:
+                    return None
+                left_s = self.files.poll_s if running else until_s - time.time()
+                await asyncio.sleep(max(0.01, min(self.files.poll_s, left_s)))
+        except UnavailableError as error:
+            raise UnsureError(
+                f"it is not known whether a batch of {len(batch.places):,} was sent: {error}. If "
+                f"it was not, remove the lines of {batch.token} from {BATCHES}: its questions are "
+                "then asked again, and billed again if it was",
+                status=error.status, sent=error.sent,
+            ) from None  # fmt: skip
 
     async def _patiently(self, call: Callable[[], Awaitable[T]]) -> T:
         """Call until it succeeds or cannot; UnavailableError where it never does."""
@@ -421,22 +383,22 @@ class BatchModel:
         if batch.event == "created":
             try:
                 status = await self._end(batch)
-                if status.state == "ended":
-                    lines = await self._results(status)
-                    with writing(path):
-                        path.parent.mkdir(parents=True, exist_ok=True)
-                        await asyncio.to_thread(atomic_write, path, lines, sync=True)
+                words = self._provider.shown(status.words)
+                if status.state == "refused":
+                    await self._ledger.note(batch.token, "lost", words=words)
+                    self._refusal = UnavailableError(f"batch {batch.shown} was refused: {words}")
+                    self._settle_all(batch.held, 0.0)
+                    return
+                lines = await self._patiently(lambda: self._provider.results(status))
             except ModelError as error:
                 # An error of its requests is another thing: these are asked again, or recorded.
                 why = f"no answers of batch {batch.shown}, which stays at the provider: {error}"
                 raise UnavailableError(why, status=error.status, sent=error.sent) from None
-            words = self._provider.shown(status.words)
-            if status.state == "refused":
-                await self._ledger.note(batch, "lost", words=words)
-                self._refusal = UnavailableError(f"batch {batch.shown} was refused: {words}")
-                self._settle_all(batch.held, 0.0)
-                return
-            await self._ledger.note(batch, "ended", words=words, is_complete=status.is_complete)
+            with writing(path):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                await asyncio.to_thread(atomic_write, path, lines, sync=True)
+            fields = {"words": words, "is_complete": status.is_complete}
+            await self._ledger.note(batch.token, "ended", **fields)
             if not status.is_complete:
                 self._refusal = UnavailableError(
                     f"batch {batch.shown} was taken back before all of it was asked: give the same "
@@ -454,9 +416,8 @@ class BatchModel:
             self._tell(f"batch {batch.shown} holds lines {said}")
 
     async def _end(self, batch: Batch) -> BatchStatus:
-        """Look at a batch now and then; return what the provider says when it has ended."""
-        pause_s, failures = min(_FIRST_PAUSE_S, self.files.poll_s), 0
-        told = ""
+        """Look at a batch now and then; return its last state."""
+        pause_s, failures, told = min(_FIRST_PAUSE_S, self.files.poll_s), 0, ""
         since = datetime.fromtimestamp(batch.created.timestamp()).strftime("%d %b %H:%M")
         while True:
             try:
@@ -479,8 +440,8 @@ class BatchModel:
     # Requests as lines and answers as replies, by the client of direct calls.
 
     async def _written(self, request: Request) -> tuple[_NoConnection, bool]:
-        """Return what a direct call would send, and whether with a seed; raises as that does before
-        it sends.
+        """Return the body and headers of a direct call, and True if it has a seed; raises as a
+        direct call does before it sends.
         """
         while True:
             http, with_seed = _NoConnection(), self._takes_seed
@@ -494,17 +455,16 @@ class BatchModel:
                 return http, with_seed
 
     async def _read(self, key: str, request: Request, batch: Batch) -> Reply:
-        """Return what a direct call would have made of the answer; raises as that does.
+        """Return the reply that a direct call would have made of the answer; raises as that does.
 
         RetryableError also where there is no answer, or none that can be read.
         """
         assert batch.answers is not None, "the batch has ended"
         answer = batch.answers.found.get(batch.places[key])
-        if answer is None and not (batch.answers.found or batch.answers.faults):
-            raise RetryableError(f"batch {batch.shown} ended with no answers", sent="no")
         if answer is None:
+            has_lines = batch.answers.found or batch.answers.faults
             why = f"batch {batch.shown} holds no answer that can be read"
-            raise RetryableError(why, status=200)
+            raise RetryableError(why, status=200) if has_lines else RetryableError(why, sent="no")
         if isinstance(answer, str):
             why = f"batch {batch.shown} ended before this was asked: {answer}"
             raise RetryableError(self._provider.shown(why), sent="no")
@@ -515,10 +475,7 @@ class BatchModel:
             self._go_without_seed()
             raise RetryableError("the provider takes no seed", sent="answered") from None
         except ModelError as error:
-            if "response_format" in wire_params(self.config, request) and refuses_format(error):
-                why = f"{error} ({FORMAT_HINT})"
-                raise UnavailableError(why, status=error.status, sent=error.sent) from None
-            raise
+            raise format_refused(self.config, request, error) or error from None
         reply = counted(reply, estimate(self.config, request))
         return reply.model_copy(update={"latency_s": 0.0, "batched": True})
 
@@ -541,11 +498,8 @@ class _NoConnection(HttpClient):
         self.headers: Mapping[str, str] = {}
         self._answer = answer
 
-    async def send(
-        self, url: str, body: bytes | BinaryIO, headers: Mapping[str, str], **_: Any
-    ) -> Answer:
+    async def send(self, url: str, body: bytes, headers: Mapping[str, str], **_: Any) -> Answer:
         """Return the answer; RetryableError where there is none: nothing was sent."""
-        assert isinstance(body, bytes)
         self.body, self.headers = body, headers
         if self._answer is None:
             raise RetryableError(f"a request to {url} is kept for a batch", sent="no")
@@ -555,55 +509,35 @@ class _NoConnection(HttpClient):
         """Nothing is open."""
 
 
+@dataclass(eq=False)
 class _Draft:
-    """A batch that is being written into a file; `keys` are its requests with the most that each
-    can cost [US dollars], None where no price is known; `held` are their reservations in the
-    budget.
+    """A batch that is being put together; `keys` are its requests with the most that each can cost
+    [US dollars], None where no price is known; `held` are their reservations.
     """
 
-    def __init__(self, provider: BatchProvider, files: BatchFiles, *, seeded: bool) -> None:
-        self.seeded = seeded
-        self.token = new_token()
-        self.path = files.requests(self.token)
-        self.keys: dict[str, float | None] = {}
-        self.held: dict[str, int] = {}
-        self._provider = provider
-        self._bytes = 0
-        head, self._between, self._tail = provider.frame(self.token)
-        with writing(self.path, _HINT):
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = self.path.open("wb")
-        self._write(head)
+    provider: BatchProvider
+    seeded: bool
+    token: str = field(default_factory=new_token)
+    keys: dict[str, float | None] = field(default_factory=dict)
+    held: dict[str, int] = field(default_factory=dict)
+    lines: list[bytes] = field(default_factory=list)
+    size: int = 0
 
     def add(
         self, key: str, http: _NoConnection, usd: float | None, held: int | None, *, seeded: bool
     ) -> bool:
-        """Write a request; return False where it does not fit, by the provider's limits and as all
-        ask with a seed or without.
+        """Take a request in; return False where it does not fit, by the bounds of a batch and as
+        all ask with a seed or without.
         """
-        name, provider = custom_id(self.token, len(self.keys)), self._provider
-        line = (self._between if self.keys else b"") + provider.line(name, http.body, http.headers)
-        size = self._bytes + len(line) + len(self._tail)
-        is_full = len(self.keys) >= provider.most_requests or size > provider.most_bytes
+        name = custom_id(self.token, len(self.keys))
+        line = self.provider.line(name, http.body, http.headers)
+        is_full = len(self.keys) >= self.provider.most_requests
+        is_full = is_full or self.size + len(line) >= self.provider.most_bytes
         if self.keys and (is_full or seeded != self.seeded):
             return False
-        self._write(line)
+        self.lines.append(line)
+        self.size += len(line) + 1
         self.keys[key] = usd
         if held is not None:
             self.held[key] = held
         return True
-
-    def close(self) -> None:
-        """End the file."""
-        self._write(self._tail)
-        with writing(self.path, _HINT):
-            self._file.close()
-
-    def drop(self) -> None:
-        """Remove the file: the batch is there, or nothing was asked."""
-        self._file.close()
-        self.path.unlink(missing_ok=True)
-
-    def _write(self, data: bytes) -> None:
-        with writing(self.path, _HINT):
-            self._bytes += self._file.write(data)

@@ -1,4 +1,4 @@
-"""The batches of a run on disk: what is in which, how far each is, and its answers.
+"""The batches of a run on disk: the requests of each, its progress, and its answers.
 
 A line says that a batch is about to be sent, with the requests in it, before anything of it leaves
 this machine. So a kill at any moment leaves a batch that has ended, one that can be asked about by
@@ -16,19 +16,16 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from phyblock.config.models import ModelConfig
-from phyblock.files import load_json, writing
+from phyblock.files import load_json
 from phyblock.models.batch_providers import PROVIDERS, UNREADABLE, BatchProvider
 from phyblock.models.client import Answer
 from phyblock.records.record import BatchEvent, BatchLine
 
-_FOLDER = "batches"
-
 
 @dataclass(frozen=True)
 class BatchFiles:
-    """Batches of a run as they are kept: the lines written so far, oldest first, and what appends
-    one and returns when it is on disk; the run's folder. A batch is looked at every `poll_s` or
-    more often.
+    """Batches of a run as they are kept: the lines written so far, oldest first, and a callback
+    that appends one and returns when it is on disk. A batch is looked at every `poll_s` at least.
     """
 
     earlier: tuple[BatchLine, ...]
@@ -36,18 +33,14 @@ class BatchFiles:
     run_folder: Path
     poll_s: float = 60.0
 
-    def requests(self, token: str) -> Path:
-        """Return the file that a batch is sent from."""
-        return self.run_folder / _FOLDER / f"{token}.requests"
-
     def answers(self, token: str) -> Path:
         """Return the file of a batch's answers, which is there once it has ended."""
-        return self.run_folder / _FOLDER / f"{token}.answers.jsonl"
+        return self.run_folder / "batches" / f"{token}.answers.jsonl"
 
 
 @dataclass(eq=False)
 class Batch:
-    """A batch: its line of intent, what became of it, and its answers when they are here.
+    """A batch: its line of intent, its newest state, and its answers when they are here.
 
     `places` are its requests by their keys in the reply cache, `held` their reservations in the
     budget. `following` is the work that ends when it has ended.
@@ -56,8 +49,6 @@ class Batch:
     intent: BatchLine
     event: BatchEvent = "intended"
     id: str = ""
-    is_complete: bool = True
-    words: str = ""
     places: dict[str, int] = field(default_factory=dict)
     held: dict[str, int] = field(default_factory=dict)
     following: asyncio.Future[None] | None = None
@@ -79,17 +70,15 @@ class Batch:
     @property
     def created(self) -> datetime:
         """When it was about to be sent, in UTC; its answers are priced by that day."""
-        time = datetime.strptime(self.intent.time, "%Y-%m-%dT%H:%M:%SZ")
-        return time.replace(tzinfo=UTC)
+        return datetime.strptime(self.intent.time, "%Y-%m-%dT%H:%M:%SZ").replace(tzinfo=UTC)
 
     def most_usd(self, key: str) -> float:
-        """Return what one of its requests can cost."""
-        costs = self.intent.most_usd
-        return costs[self.places[key]] if costs else 0.0
+        """Return the most that one of its requests can cost."""
+        return self.intent.most_usd[self.places[key]] if self.intent.most_usd else 0.0
 
 
 class Ledger:
-    """The batches of one model; every change is on disk when its method returns."""
+    """The batches of one model; every change is on disk when `note` returns."""
 
     def __init__(self, model: str, files: BatchFiles) -> None:
         self._model = model
@@ -103,35 +92,23 @@ class Ledger:
         """Return the last batch that a request went out in, or is about to."""
         return next((b for b in reversed(self.batches.values()) if key in b.places), None)
 
-    async def intend(
-        self, token: str, keys: Iterable[str], most_usd: Iterable[float], *, seeded: bool
-    ) -> Batch:
-        """Begin a batch; it counts as under way from here."""
-        requests = {"keys": tuple(keys), "most_usd": tuple(most_usd), "seeded": seeded}
-        await self._put(token, "intended", **requests)
-        return self.batches[token]
-
-    async def note(self, batch: Batch, event: BatchEvent, **fields: object) -> None:
-        """Write what became of a batch."""
-        await self._put(batch.token, event, **fields)
-
-    async def _put(self, token: str, event: BatchEvent, **fields: object) -> None:
+    async def note(self, token: str, event: BatchEvent, **fields: object) -> None:
+        """Write the newest state of a batch; one that is `intended` counts as under way."""
         time = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-        told = {"batch": token, "model": self._model, "event": event, "time": time}
-        line = BatchLine.model_validate({**told, **fields})
+        told = {"batch": token, "model": self._model, "event": event, "time": time, **fields}
+        line = BatchLine.model_validate(told)
         await self._files.put(line)
         self._take(line)
 
     def _take(self, line: BatchLine) -> None:
         if line.event == "intended":
             self.batches[line.batch] = Batch(line)
-            return
-        batch = self.batches[line.batch]
-        batch.event, batch.id = line.event, line.id or batch.id
-        batch.is_complete, batch.words = line.is_complete, line.words
-        if line.event == "lost":
+        elif line.event == "lost":
             # Its requests count as not sent in it.
-            del self.batches[batch.token]
+            self.batches.pop(line.batch).event = "lost"
+        else:
+            batch = self.batches[line.batch]
+            batch.event, batch.id = line.event, line.id or batch.id
 
 
 class Answers:
@@ -142,14 +119,15 @@ class Answers:
     def __init__(self, lines: bytes, provider: BatchProvider, batch: Batch) -> None:
         self.found: dict[int, Answer | str] = {}
         self.faults: Counter[str] = Counter()
+        places = {custom_id(batch.token, place): place for place in batch.places.values()}
         for line in filter(None, map(bytes.strip, lines.splitlines())):
             try:
                 name, answer = provider.read(load_json(line))
+                place = places.get(name)
             except UNREADABLE:
                 self.faults["that cannot be read"] += 1
                 continue
-            place = _place_of(name, batch.token)
-            if place is None or place >= len(batch.places):
+            if place is None:
                 self.faults["to what was not asked"] += 1
             elif place in self.found:
                 self.faults["to what has an answer already"] += 1
@@ -162,28 +140,9 @@ def custom_id(token: str, place: int) -> str:
     return f"{token}-{place}"
 
 
-def _place_of(name: object, token: str) -> int | None:
-    """Return the place of a request in the batch by its name; None for one of another batch."""
-    start, _, number = name.rpartition("-") if isinstance(name, str) else ("", "", "")
-    is_ours = start == token and number.isascii() and number.isdecimal() and len(number) < 10
-    return int(number) if is_ours else None
-
-
 def new_token() -> str:
     """Return a name that no other batch has; what the providers allow in names and boundaries."""
     return f"pb{secrets.token_hex(12)}"
-
-
-def remove_unfinished(run_folder: Path) -> None:
-    """Remove what killed commands left half written: it is written anew where it is needed.
-
-    Only for who holds the run folder, before it sends a batch. Raises StoreError where the disk
-    refuses.
-    """
-    folder = run_folder / _FOLDER
-    with writing(folder):
-        for path in (*folder.glob("pb*.requests"), *folder.glob(".*.part")):
-            path.unlink()
 
 
 def under_way(lines: Iterable[BatchLine]) -> dict[str, str]:

@@ -16,8 +16,7 @@ from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from pathlib import Path
-from typing import Any, BinaryIO, ClassVar, Literal, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar
 from urllib.parse import urlsplit
 
 from phyblock.config.models import ModelConfig, host_of
@@ -43,7 +42,7 @@ class BatchStatus:
     A `refused` batch asked nothing of anyone. `token` is the name that we gave it, None where the
     provider does not tell. `total` counts requests, None where it does not say, `created_s` is a
     Unix time. `results` are the addresses of the answers; with `is_complete` False some were not
-    asked, as the batch was cancelled. `words` are its own, with counts and what went wrong.
+    asked, as the batch was cancelled. `words` are its own, with counts and errors.
     """
 
     id: str
@@ -57,15 +56,15 @@ class BatchStatus:
 
 
 class BatchProvider(ABC):
-    """One provider's batches; its methods raise ModelErrors, in which no key stands.
+    """One provider's batches: `create`, `status`, `results`, and `listed` to find one again.
 
-    `most_requests` and `most_bytes` bound an upload. Everything is sent with `headers`, in which
+    Methods raise ModelErrors, in which no key stands. Everything is sent with `headers`, in which
     the model's key is put, to the model's server alone. A batch is at `url` and its id, their list
-    at `first_page`.
+    at `first_page`. Its bounds are below those of each provider, as a batch is kept in memory.
     """
 
-    most_requests: int
-    most_bytes: int
+    most_requests = 50_000
+    most_bytes = 100 * 1000**2
     headers: ClassVar[Mapping[str, str]]
 
     def __init__(self, config: ModelConfig, base: str, url: str, first_page: str) -> None:
@@ -78,21 +77,13 @@ class BatchProvider(ABC):
         self._calls = HttpClient(config.model_copy(update={"timeout_s": _CALL_S}))
         self._transfers = HttpClient(config.model_copy(update=limits))
 
-    def frame(self, token: str) -> tuple[bytes, bytes, bytes]:  # noqa: ARG002
-        """Return what stands before, between and after the lines of an upload."""
-        return b"", b"\n", b""
-
     @abstractmethod
     def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:
         """Return the line of a request with the body, and of the headers, of a direct call."""
 
-    async def upload(self, token: str, path: Path) -> str:  # noqa: ARG002
-        """Send the file, which begins nothing yet; return its name at the provider, "" for none."""
-        return ""
-
     @abstractmethod
-    async def create(self, token: str, path: Path, file: str) -> BatchStatus:
-        """Begin the batch. After a RetryableError it may have begun all the same."""
+    async def create(self, token: str, lines: Sequence[bytes]) -> BatchStatus:
+        """Begin a batch. After an error that was not `sent="no"` it may have begun all the same."""
 
     async def status(self, batch_id: str) -> BatchStatus:
         """Ask how a batch is now."""
@@ -114,8 +105,8 @@ class BatchProvider(ABC):
 
     @abstractmethod
     def read(self, line: Any) -> tuple[str, Answer | str]:
-        """Return whom a line of the results answers, and the answer as a server would have given
-        it, or why the request was never asked. Raises one of UNREADABLE for what is no such line.
+        """Return the name of a request, and its answer as a server would have given it, or the
+        reason why it was never asked. Raises one of UNREADABLE for what is no line of results.
         """
 
     def shown(self, text: str) -> str:
@@ -144,13 +135,10 @@ class BatchProvider(ABC):
         body: Any = None,
         headers: Mapping[str, str] | None = None,
     ) -> T:
-        """Send an object as JSON, or a file while it is read; read the object that is answered."""
-        if isinstance(body, Path):
-            with body.open("rb") as file:
-                answer = await self._send(self._transfers, url, file, headers)
-        else:
-            data = None if body is None else json.dumps(body).encode()
-            answer = await self._send(self._calls, url, data, headers)
+        """Send an object as JSON, or bytes as they are; read the object that is answered."""
+        http = self._transfers if isinstance(body, bytes) else self._calls
+        data = body if body is None or isinstance(body, bytes) else json.dumps(body).encode()
+        answer = await self._send(http, url, data, headers)
         with self._masked():
             try:
                 found: Any = load_json(answer.body)
@@ -166,7 +154,7 @@ class BatchProvider(ABC):
         self,
         http: HttpClient,
         url: str,
-        body: bytes | BinaryIO | None = None,
+        body: bytes | None = None,
         headers: Mapping[str, str] | None = None,
     ) -> Answer:
         with self._masked():
@@ -183,11 +171,13 @@ class BatchProvider(ABC):
             return answer
 
     @contextlib.contextmanager
-    def _masked(self) -> Iterator[None]:
+    def _masked(self, *, begins: bool = True) -> Iterator[None]:
+        """Take keys out of errors; what does not begin a batch was not sent, whatever failed."""
         try:
             yield
         except ModelError as error:
             error.args = (self.shown(str(error)),)
+            error.sent = error.sent if begins else "no"
             raise
 
 
@@ -198,31 +188,26 @@ class _OpenAI(BatchProvider):
     in its output file, errors and what expired in its error file.
     """
 
-    most_requests = 50_000
-    most_bytes = 200 * 1000**2
     headers: ClassVar[Mapping[str, str]] = {"Authorization": "Bearer {key}"}
 
     def __init__(self, config: ModelConfig) -> None:
         base = (config.api_base or OPENAI_API_BASE).rstrip("/")
         super().__init__(config, base, f"{base}/batches", f"{base}/batches?limit=100")
 
-    def frame(self, token: str) -> tuple[bytes, bytes, bytes]:
+    def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:  # noqa: ARG002
+        fields = {"custom_id": custom_id, "method": "POST", "url": "/v1/chat/completions"}
+        return _joined(fields, "body", body)
+
+    async def create(self, token: str, lines: Sequence[bytes]) -> BatchStatus:
         start = (
             f'--{token}\r\nContent-Disposition: form-data; name="purpose"\r\n\r\nbatch\r\n'
             f'--{token}\r\nContent-Disposition: form-data; name="file"; '
             f'filename="phyblock-{token}.jsonl"\r\nContent-Type: application/jsonl\r\n\r\n'
         )
-        return start.encode(), b"\n", f"\r\n--{token}--\r\n".encode()
-
-    def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:  # noqa: ARG002
-        fields = {"custom_id": custom_id, "method": "POST", "url": "/v1/chat/completions"}
-        return _joined(fields, "body", body)
-
-    async def upload(self, token: str, path: Path) -> str:
+        data = b"".join((start.encode(), b"\n".join(lines), f"\r\n--{token}--\r\n".encode()))
         form = {"Content-Type": f"multipart/form-data; boundary={token}"}
-        return await self._call(lambda made: str(made["id"]), f"{self._base}/files", path, form)
-
-    async def create(self, token: str, path: Path, file: str) -> BatchStatus:  # noqa: ARG002
+        with self._masked(begins=False):
+            file = await self._call(lambda made: str(made["id"]), f"{self._base}/files", data, form)
         body = {
             "input_file_id": file,
             "endpoint": "/v1/chat/completions",
@@ -265,8 +250,6 @@ class _Anthropic(BatchProvider):
     answer.
     """
 
-    most_requests = 100_000
-    most_bytes = 256 * 1000**2
     headers: ClassVar[Mapping[str, str]] = {"anthropic-version": "2023-06-01", "x-api-key": "{key}"}
 
     def __init__(self, config: ModelConfig) -> None:
@@ -278,26 +261,16 @@ class _Anthropic(BatchProvider):
         super().__init__(config, base, url, f"{url}?limit=100")
         self._betas: set[str] = set()
 
-    def frame(self, token: str) -> tuple[bytes, bytes, bytes]:  # noqa: ARG002
-        return b'{"requests":[', b",", b"]}"
-
     def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:
         # The batch asks for the betas that any of its requests needs.
         betas = next((v for name, v in headers.items() if name.lower() == "anthropic-beta"), "")
         self._betas |= {name.strip() for name in betas.split(",") if name.strip()}
         return _joined({"custom_id": custom_id}, "params", body)
 
-    async def create(self, token: str, path: Path, file: str) -> BatchStatus:  # noqa: ARG002
+    async def create(self, token: str, lines: Sequence[bytes]) -> BatchStatus:  # noqa: ARG002
         betas = {"anthropic-beta": ",".join(sorted(self._betas))} if self._betas else {}
-        return await self._call(self._read_status, self._url, path, betas)
-
-    async def status(self, batch_id: str) -> BatchStatus:
-        def read(batch: Any) -> BatchStatus:
-            if batch.get("archived_at"):
-                raise UnavailableError("it is archived, and its results are no longer there")
-            return self._read_status(batch)
-
-        return await self._call(read, f"{self._url}/{batch_id}")
+        data = b"".join((b'{"requests":[', b",".join(lines), b"]}"))
+        return await self._call(self._read_status, self._url, data, betas)
 
     def read(self, line: Any) -> tuple[str, Answer | str]:
         result = line["result"]
@@ -334,12 +307,8 @@ class _Anthropic(BatchProvider):
 class _Gemini(BatchProvider):
     """`/v1beta/models/{model}:batchGenerateContent` and `/v1beta/batches`: a file of requests is
     uploaded, then a batch is made of it by our name.
-
-    The provider bounds no number of requests; ours keeps an index in memory.
     """
 
-    most_requests = 100_000
-    most_bytes = 2 * 1000**3
     headers: ClassVar[Mapping[str, str]] = {"x-goog-api-key": "{key}"}
 
     def __init__(self, config: ModelConfig) -> None:
@@ -351,23 +320,23 @@ class _Gemini(BatchProvider):
     def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:  # noqa: ARG002
         return _joined({"key": custom_id}, "request", body)
 
-    async def upload(self, token: str, path: Path) -> str:
+    async def create(self, token: str, lines: Sequence[bytes]) -> BatchStatus:
+        data = b"\n".join(lines)
         announced = {
             "X-Goog-Upload-Protocol": "resumable",
             "X-Goog-Upload-Command": "start",
-            "X-Goog-Upload-Header-Content-Length": str(path.stat().st_size),
+            "X-Goog-Upload-Header-Content-Length": str(len(data)),
             "X-Goog-Upload-Header-Content-Type": "application/jsonl",
         }
-        named = json.dumps({"file": {"display_name": token}}).encode()
-        url = f"{self._base}/upload/v1beta/files"
-        answer = await self._send(self._calls, url, named, announced)
-        told = {name.lower(): value for name, value in answer.headers.items()}
-        if not (url := told.get("x-goog-upload-url", "")):
-            raise RetryableError("no address for an upload was answered", status=answer.status)
         sent = {"X-Goog-Upload-Offset": "0", "X-Goog-Upload-Command": "upload, finalize"}
-        return await self._call(lambda made: str(made["file"]["name"]), url, path, sent)
-
-    async def create(self, token: str, path: Path, file: str) -> BatchStatus:  # noqa: ARG002
+        named = json.dumps({"file": {"display_name": token}}).encode()
+        with self._masked(begins=False):
+            url = f"{self._base}/upload/v1beta/files"
+            answer = await self._send(self._calls, url, named, announced)
+            told = {name.lower(): value for name, value in answer.headers.items()}
+            if not (url := told.get("x-goog-upload-url", "")):
+                raise RetryableError("no address for an upload was answered", status=answer.status)
+            file = await self._call(lambda made: str(made["file"]["name"]), url, data, sent)
         batch = {"display_name": token, "input_config": {"file_name": file}}
         url = f"{self._url}/models/{self._config.provider_model}:batchGenerateContent"
         return await self._call(self._read_status, url, {"batch": batch})

@@ -14,10 +14,10 @@ import time
 import urllib.parse
 import urllib.request
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 from phyblock.config.models import ModelConfig, host_of
 from phyblock.errors import (
@@ -139,14 +139,12 @@ class HttpClient:
     async def send(
         self,
         url: str,
-        body: bytes | BinaryIO,
+        body: bytes,
         headers: Mapping[str, str],
         *,
         method: str = "POST",
-        sink: Callable[[bytes], object] | None = None,
     ) -> Answer:
-        """Send once and read the answer; a file is sent as it is read. `sink` takes the body of a
-        success piece by piece, and the answer then has none.
+        """Send once and read the answer.
 
         Raises UnreachableError where no connection could be made in time, and RetryableError where
         it was lost or the answer did not end in time.
@@ -177,7 +175,6 @@ class HttpClient:
                     response.close()
                     return Answer(status, found, b"", _redirect(url, found.get("Location")))
                 pieces: list[bytes] = []
-                keep = sink if sink is not None and response.ok else pieces.append
                 size = 0
                 try:
                     async for piece in response.content.iter_any():
@@ -186,7 +183,7 @@ class HttpClient:
                             response.close()
                             limit = f"{self._most_bytes / 2**20:g} MB"
                             return Answer(status, found, b"", f"the body is larger than {limit}")
-                        keep(piece)
+                        pieces.append(piece)
                 except aiohttp.ClientPayloadError:
                     response.close()
                     fault = "the body breaks off, or is not encoded as it says"

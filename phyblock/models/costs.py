@@ -1,8 +1,7 @@
-"""Prices of models: dollars a token by day, by length of the prompt, and in batches.
+"""Prices of models, estimates of the tokens of a call, and the cost limit of a run.
 
 Prices come from models.yaml, else from litellm's map of models, which is read as a file of the
-installed library: nothing heavy is imported. What neither knows is
-None, unknown.
+installed library: nothing heavy is imported. What neither knows is None, unknown.
 """
 
 from __future__ import annotations
@@ -27,7 +26,6 @@ from phyblock.models.request import Image, Request, wire_params
 from phyblock.records.reply import Reply, Usage
 from phyblock.types import ImageDetail
 
-_PER_MILLION = 1_000_000
 _MAP_FILE = "model_prices_and_context_window_backup.json"
 _MAP_KEYS = {
     "input_usd": "input_cost_per_token",
@@ -72,12 +70,11 @@ class Price:
         read_usd = self.input_usd if self.cached_usd is None else self.cached_usd
         write_usd = self.input_usd if self.cache_write_usd is None else self.cache_write_usd
         fresh = max(0, prompt - cached - written)
-        spent = fresh * self.input_usd + cached * read_usd + written * write_usd
-        return spent / _PER_MILLION
+        return (fresh * self.input_usd + cached * read_usd + written * write_usd) / 1_000_000
 
     def output_cost(self, completion: int) -> float:
         """Return US dollars of a reply."""
-        return completion * self.output_usd / _PER_MILLION
+        return completion * self.output_usd / 1_000_000
 
     def cost(self, usage: Usage) -> float | None:
         """Return US dollars of a call; None where the numbers of tokens are not known."""
@@ -90,11 +87,9 @@ class Price:
         return prompt + self.output_cost(usage.completion_tokens)
 
     def most(self, prompt: float, completion: int) -> float:
-        """Return the most US dollars that so many tokens can cost: all are put into a cache, if
-        that is dearer.
-        """
+        """Return the most US dollars that so many tokens can cost, all put into a cache."""
         dearest = max(self.input_usd, self.cache_write_usd or 0.0)
-        return (prompt * dearest + completion * self.output_usd) / _PER_MILLION
+        return (prompt * dearest + completion * self.output_usd) / 1_000_000
 
     def halved(self) -> Price:
         """Return half the price, as batches cost at OpenAI, Anthropic and Google."""
@@ -104,9 +99,7 @@ class Price:
 
 @dataclass(frozen=True)
 class Rate:
-    """The price of calls whose prompts are longer than `above_tokens`, and of those in batches,
-    where that is another.
-    """
+    """The price of calls with more prompt tokens than `above_tokens`; None in `batch`: the same."""
 
     price: Price
     above_tokens: int = 0
@@ -115,9 +108,7 @@ class Rate:
 
 @dataclass(frozen=True)
 class Tariff:
-    """The rates that hold from a day on, by rising `above_tokens`, the first of them 0; `source`
-    is where they are said.
-    """
+    """Rates from a day on, by rising `above_tokens`, the first 0; `source` is where they stand."""
 
     rates: tuple[Rate, ...]
     since: date | None = None
@@ -147,9 +138,8 @@ class Prices:
         return next(begun, None)
 
     def next_after(self, day: date) -> Tariff | None:
-        """Return the tariff that follows on that of a day."""
-        coming = (t for t in self.tariffs if t.since is not None and t.since > day)
-        return next(coming, None)
+        """Return the tariff that follows that of a day."""
+        return next((t for t in self.tariffs if t.since is not None and t.since > day), None)
 
     def at(self, day: date, prompt_tokens: int = 0, *, batched: bool = False) -> Price | None:
         """Return the price of a call; None where it is not known."""
@@ -171,8 +161,8 @@ def prices_of(config: ModelConfig) -> Prices | None:
     """Return the prices of a model: its own, before their first day those of litellm's map; None
     where neither knows any. Baselines and recordings cost nothing.
 
-    Batches whose price nobody says cost half at the provider's own address; elsewhere nothing is
-    known of them, and they cost what other calls do.
+    Batches without a price of their own cost half at the provider's own address, and as other
+    calls elsewhere.
     """
     if config.kind != "litellm":
         return _FREE
@@ -184,14 +174,10 @@ def prices_of(config: ModelConfig) -> Prices | None:
         batch = None if spec.batch is None else price(spec.batch)
         return Rate(price(spec), above_tokens, batch)
 
-    tariffs = [
-        Tariff(
-            (rate(spec), *(rate(tier, tier.above) for tier in spec.tiers)),
-            spec.since,
-            "the models file",
-        )
-        for spec in config.prices
-    ]
+    tariffs = []
+    for spec in config.prices:
+        rates = (rate(spec), *(rate(tier, tier.above) for tier in spec.tiers))
+        tariffs.append(Tariff(rates, spec.since, "the models file"))
     if not tariffs or tariffs[0].since is not None:
         tariffs = [*_mapped_tariffs(config), *tariffs]
     host, base = _HALVING_HOSTS.get(config.provider), config.api_base
@@ -224,12 +210,22 @@ def is_billed(config: ModelConfig) -> bool:
 
 
 def reply_cost_usd(prices: Prices | None, reply: Reply, day: date) -> float | None:
-    """Return US dollars of a reply that was asked for on a day, in a batch or not; None when the
-    price or the tokens are not known.
+    """Return US dollars of a reply that was asked for on a day; None when price or tokens are not
+    known.
     """
     prompt = reply.usage.prompt_tokens or 0
     price = None if prices is None else prices.at(day, prompt, batched=reply.batched)
     return None if price is None else price.cost(reply.usage)
+
+
+@functools.cache
+def _map_entries() -> dict[str, dict[str, Any]]:
+    spec = importlib.util.find_spec("litellm")
+    path = Path(spec.origin).with_name(_MAP_FILE) if spec and spec.origin else None
+    if path is None or not path.is_file():
+        return {}
+    entries: dict[str, dict[str, Any]] = json.loads(path.read_text(encoding="utf-8"))
+    return entries
 
 
 def map_entry(config: ModelConfig) -> dict[str, Any]:
@@ -247,8 +243,7 @@ def map_entry(config: ModelConfig) -> dict[str, Any]:
 def mapped_providers() -> frozenset[str]:
     """Return the providers of the map's models."""
     named = (str(entry.get("litellm_provider", "")) for entry in _map_entries().values())
-    # Some entries name none.
-    return frozenset(name for name in named if name)
+    return frozenset(filter(None, named))
 
 
 def ends_on(config: ModelConfig) -> date | None:
@@ -286,27 +281,16 @@ def _mapped_tariffs(config: ModelConfig) -> list[Tariff]:
 
 
 def _mapped_price(entry: Mapping[str, Any], ending: str) -> Price | None:
-    """Return the price in the keys that end so; what a prompt cache costs may be said without the
-    end, and is never more than what it saves.
+    """Return the price in the keys that end so; that of a cached prompt may lack the ending, and
+    is never more than that of the prompt.
     """
-    told = {name: entry.get(key + ending) for name, key in _MAP_KEYS.items()}
-    usd = {name: float(n) * _PER_MILLION for name, n in told.items() if n is not None}
+    found = {name: entry.get(key + ending) for name, key in _MAP_KEYS.items()}
+    usd = {name: float(n) * 1_000_000 for name, n in found.items() if n is not None}
     if "input_usd" not in usd or "output_usd" not in usd:
         return None
-    usual = entry.get(_MAP_KEYS["cached_usd"])
-    if usual is not None:
-        usd.setdefault("cached_usd", min(float(usual) * _PER_MILLION, usd["input_usd"]))
+    if (usual := entry.get(_MAP_KEYS["cached_usd"])) is not None:
+        usd.setdefault("cached_usd", min(float(usual) * 1_000_000, usd["input_usd"]))
     return Price(**usd)
-
-
-@functools.cache
-def _map_entries() -> dict[str, dict[str, Any]]:
-    spec = importlib.util.find_spec("litellm")
-    path = Path(spec.origin).with_name(_MAP_FILE) if spec and spec.origin else None
-    if path is None or not path.is_file():
-        return {}
-    entries: dict[str, dict[str, Any]] = json.loads(path.read_text(encoding="utf-8"))
-    return entries
 
 
 _TYPICAL_REPLY_TOKENS = 500
@@ -458,11 +442,8 @@ def _is_amount(usd: float) -> bool:
 
 @dataclass(frozen=True)
 class Estimate:
-    """Tokens of a call that was not made yet.
-
-    `prompt_tokens`: texts by their words, and pictures by their providers' rules;
-    `completion_tokens`: a usual reply, with thoughts where the model is told to think or has room
-    for them; `most_completion_tokens`: the longest possible.
+    """Tokens of a call that was not made yet: of the prompt, of a usual reply (with thoughts where
+    the model is told to think or has room for them), and of the longest one possible.
     """
 
     prompt_tokens: int
@@ -511,9 +492,8 @@ def may_be_billed(error: ModelError) -> bool:
 def counted(reply: Reply, expected: Estimate) -> Reply:
     """Return the reply with the counts alone that can be true; the others are not known.
 
-    Every request has a prompt and every reply that says something took tokens, whatever a server
-    or a library puts in the place of a count that it does not have; and no call takes a hundred
-    times what was expected of it.
+    Every request has a prompt, every reply that says something took tokens, and no call takes a
+    hundred times what was expected of it.
     """
 
     def plausible(count: int | None, least: int, expected: int) -> int | None:
@@ -527,10 +507,11 @@ def counted(reply: Reply, expected: Estimate) -> Reply:
     written = plausible(usage.cache_write_tokens, 0, expected.prompt_tokens)
     if (cached or 0) + (written or 0) > (prompt or 0):
         cached = written = None
-    said_something = bool(reply.text or reply.reasoning)
     known = Usage(
         prompt_tokens=prompt,
-        completion_tokens=plausible(usage.completion_tokens, int(said_something), longest),
+        completion_tokens=plausible(
+            usage.completion_tokens, int(bool(reply.text or reply.reasoning)), longest
+        ),
         reasoning_tokens=plausible(usage.reasoning_tokens, 0, longest),
         cached_tokens=cached,
         cache_write_tokens=written,
@@ -541,23 +522,19 @@ def counted(reply: Reply, expected: Estimate) -> Reply:
 _PIECE = re.compile(
     r"[^\r\n\w]?[A-Za-z]+|[^\W\d_a-zA-Z]{1,2}|\d{1,3}| ?[^\s\w]+[\r\n]*|_|\s*[\r\n]+|\s+(?!\S)|\s+"
 )
-_CHARS_PER_TOKEN = 4
-_MORE_OF_ANTHROPIC = 1.03
 
 
 def text_tokens(model_id: str, text: str) -> float:
     """Return about how many tokens of a model a text is; `model_id` may name any provider.
 
-    Tokenizers cut a text into words, runs of digits and of signs before they cut these into tokens,
-    and nearly every English word is one token. So pieces are counted, without the megabytes that a
-    tokenizer takes: in the bundled prompts with their questions there are as many as tokens of
-    o200k, OpenAI's vocabulary, within 1 %. Anthropic's last published vocabulary makes 3 % more of
-    them. Google says that a token is about four characters.
+    Words, runs of digits and of signs are counted, as tokenizers cut texts into them first: of the
+    bundled prompts they are within 1 % of the tokens of OpenAI's o200k. Anthropic's last published
+    vocabulary makes 3 % more of them. Google says that a token is about four characters.
     """
     name = model_id.lower()
     if "gemini" in name or "gemma" in name:
-        return len(text) / _CHARS_PER_TOKEN
-    return _pieces(text) * (_MORE_OF_ANTHROPIC if "claude" in name else 1.0)
+        return len(text) / 4
+    return _pieces(text) * (1.03 if "claude" in name else 1.0)
 
 
 @functools.lru_cache(maxsize=1024)
@@ -575,8 +552,7 @@ _Count = Callable[[float, float], float]
 
 
 def picture_tokens(model_id: str, image: Image, detail: ImageDetail | None = None) -> int:
-    """Return the tokens of a picture in a detail, or in the one that a provider takes where none is
-    asked for.
+    """Return the tokens of a picture in a detail, or in the provider's default.
 
     `model_id` may name any provider that serves the model. Models that no rule names count as
     GPT-4o does; a budget learns what a provider really counts.
@@ -593,8 +569,13 @@ def _fixed(tokens: int) -> _Count:
     return lambda _width, _height: tokens
 
 
-def _covering(side_px: int, width: float, height: float) -> int:
+def _squares(side_px: int, width: float, height: float) -> int:
     return math.ceil(width / side_px) * math.ceil(height / side_px)
+
+
+def _framed(side_px: int, extra: int) -> _Count:
+    """Square patches, and some tokens that frame them."""
+    return lambda width, height: _squares(side_px, width, height) + extra
 
 
 def _tiles(whole: int, tile: int) -> _Count:
@@ -602,7 +583,7 @@ def _tiles(whole: int, tile: int) -> _Count:
 
     def count(width: float, height: float) -> float:
         scale = min(1.0, 2048 / max(width, height), 768 / min(width, height))
-        return whole + tile * _covering(512, width * scale, height * scale)
+        return whole + tile * _squares(512, width * scale, height * scale)
 
     return count
 
@@ -615,21 +596,14 @@ def _patches(factor: float, most: int, longest_px: int = 2048) -> _Count:
     def count(width: float, height: float) -> float:
         scale = min(1.0, longest_px / max(width, height))
         width, height = (max(1, round(side * scale)) for side in (width, height))
-        if _covering(32, width, height) > most:
+        if _squares(32, width, height) > most:
             scale = math.sqrt(32**2 * most / (width * height))
-            whole = (
-                math.floor(side * scale / 32) / (side * scale / 32) for side in (width, height)
-            )
+            whole = (math.floor(s * scale / 32) / (s * scale / 32) for s in (width, height))
             scale *= min(part or 1.0 for part in whole)
             width, height = (max(1, math.floor(side * scale)) for side in (width, height))
-        return min(most, _covering(32, width, height)) * factor
+        return min(most, _squares(32, width, height)) * factor
 
     return count
-
-
-def _framed(side_px: int, extra: int) -> _Count:
-    """Square patches, and some tokens that frame them."""
-    return lambda width, height: _covering(side_px, width, height) + extra
 
 
 def _shrunk(side_px: int, longest_px: int, most: int) -> _Count:
@@ -638,19 +612,19 @@ def _shrunk(side_px: int, longest_px: int, most: int) -> _Count:
     def count(width: float, height: float) -> float:
         scale = min(1.0, longest_px / max(width, height))
         scale = min(scale, math.sqrt(most * side_px**2 / (width * height)))
-        return min(_covering(side_px, width * scale, height * scale), most)
+        return min(_squares(side_px, width * scale, height * scale), most)
 
     return count
 
 
 def _crops(width: float, height: float) -> float:
     """A small picture counts once; a larger one by the squares that cover it."""
-    return 258 if max(width, height) <= 384 else 258 * _covering(768, width, height)
+    return 258 if max(width, height) <= 384 else 258 * _squares(768, width, height)
 
 
 def _grok(width: float, height: float) -> float:
     """Tiles of 448 x 448, at most six, and one of the whole; 256 tokens each."""
-    return 256 * (min(6, _covering(448, width, height)) + 1)
+    return 256 * (min(6, _squares(448, width, height)) + 1)
 
 
 _SMALL = _patches(1.2, 2500, 512)

@@ -37,7 +37,7 @@ from phyblock.models.request import Request, wire_params
 from phyblock.models.servers import Server, Servers
 from phyblock.records.reply import Reply
 
-FORMAT_HINT = (
+_FORMAT_HINT = (
     "if the provider takes no JSON schema, set response_format: never for this model in the models "
     "file: the prompt says the form all the same"
 )
@@ -309,11 +309,10 @@ class ChatModel:
                     self._takes_seed = False
                     self._tell("seed_unsupported", "takes no seed: seeds are independent repeats")
         except ModelError as error:
-            is_asked = "response_format" in wire_params(self._config, call.request)
-            if not is_asked or self._took_format or not refuses_format(error):
+            refused = format_refused(self._config, call.request, error)
+            if refused is None or self._took_format:
                 raise
-            why = f"{error} ({FORMAT_HINT})"
-            raise UnavailableError(why, status=error.status, sent=error.sent) from None
+            raise refused from None
         self._took_format = True
         return reply
 
@@ -367,11 +366,19 @@ class ChatModel:
         self._observer(ModelEvent(self.name, kind, message, wait_s, status))
 
 
-def refuses_format(error: ModelError) -> bool:
-    """Return True if an error can mean that the provider does not take `response_format`."""
+def format_refused(
+    config: ModelConfig, request: Request, error: ModelError
+) -> UnavailableError | None:
+    """Return the error of a provider that does not take the `response_format` that was sent; None
+    where an error cannot mean that.
+    """
+    is_sent = "response_format" in wire_params(config, request)
     may_refuse = error.status in (400, 422) or error.sent == "no"
-    speaks_of_it = _SPEAKS_OF_FORMAT.search(str(error)) is not None
-    return may_refuse and speaks_of_it and not isinstance(error, RefusedError)
+    if not is_sent or not may_refuse or isinstance(error, RefusedError):
+        return None
+    if _SPEAKS_OF_FORMAT.search(str(error)) is None:
+        return None
+    return UnavailableError(f"{error} ({_FORMAT_HINT})", status=error.status, sent=error.sent)
 
 
 def takes_format(config: ModelConfig) -> bool:

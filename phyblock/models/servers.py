@@ -1,9 +1,8 @@
 """The servers of one model: the least loaded is asked, one that fails rests for a while.
 
 What a server says itself, an error 500 or a 429 too, shows that it is there. No connection, a lost
-one, or a gateway that finds nothing behind it (502, 503, 504) shows that it is not. So does a
-success that holds no reply, as long as no reply ever came: the page of a proxy while the model is
-loaded. An answer that does not come in time shows neither: some requests are slow.
+one, or a gateway that finds nothing behind it (502, 503, 504) shows that it is not. An answer that
+does not come in time shows neither: some requests are slow.
 """
 
 from __future__ import annotations
@@ -33,8 +32,9 @@ class Server:
     """One server, and what is known of it.
 
     `failures` in a row show that it is not there, of the requests `failed`, the first at
-    `down_since_s`; since then it has rested `rests` times, until `rests_until_s`. `refusal` is why
-    it is asked no more: what it says to every request, or that it was away for too long.
+    `down_since_s`; since then it has rested `rests` times, until `rests_until_s`. `unreadable`
+    counts successes without a reply before the first reply. `refusal` is the reason why it is asked
+    no more.
     """
 
     name: str
@@ -49,6 +49,7 @@ class Server:
     rests_until_s: float = float("-inf")
     was_heard: bool = False
     has_replied: bool = False
+    unreadable: int = 0
     refusal: UnavailableError | None = None
 
 
@@ -63,12 +64,8 @@ class Servers:
         self._tell = tell
 
     def rest_s(self) -> float:
-        """Return the seconds until some server may be asked.
-
-        Raises UnavailableError when none is left.
-        """
-        usable = self.usable()
-        return max(0.0, min(s.rests_until_s for s in usable) - self._policy.clock.now())
+        """Return the seconds until some server may be asked; UnavailableError when none is left."""
+        return max(0.0, min(s.rests_until_s for s in self.usable()) - self._policy.clock.now())
 
     def usable(self) -> list[Server]:
         """List the servers that are not given up; raises UnavailableError when there is none."""
@@ -104,21 +101,20 @@ class Servers:
         """Note that a request that was sent at `sent_s` failed; True if that is the server's fault,
         so that another attempt is free.
 
-        What becomes of requests that were sent before a server began to rest says nothing new.
+        Requests that were sent before a server began to rest tell nothing new when they fail.
         """
         if isinstance(error, UnavailableError):
-            is_first, server.refusal = server.refusal is None, error
-            is_left = any(other.refusal is None for other in self.all)
-            if is_first and is_left:
-                self._tell(f"{server.name} is asked no more: {error}")
-            return is_left
-        is_page = not server.has_replied and 200 <= (error.status or 0) < 300
-        if error.status is not None and not is_page:
-            server.was_heard = True
-        is_away = error.sent in ("no", "lost") or error.status in _GATEWAY or is_page
+            self._refuse(server, error)
+            return any(other.refusal is None for other in self.all)
+        server.was_heard |= error.status is not None
+        is_away = error.sent in ("no", "lost") or error.status in _GATEWAY
         if not isinstance(error, RetryableError) or not is_away:
             if error.sent == "answered":
                 self._heard(server)
+            if 200 <= (error.status or 0) < 300 and not server.has_replied:
+                server.unreadable += 1
+                if server.unreadable >= self._policy.max_connection_failures:
+                    self._give_up(server, "never gave a reply that can be read", error)
             return False
         now_s = self._policy.clock.now()
         server.down_since_s = server.down_since_s if server.failures else now_s
@@ -134,18 +130,16 @@ class Servers:
         server.rests_until_s = now_s + wait_s
         lasted_s = now_s - server.down_since_s
         tries = FAILURES_TO_REST + server.rests - 1
-        fault = "gives no reply that can be read" if is_page else "cannot be reached"
-        if not is_page and self._policy.gives_up(error, server.rests, lasted_s):
-            why = f"{server.name} could not be reached for {lasted_s:.0f} s: {error}"
-            server.refusal = UnavailableError(why, sent="no")
+        if self._policy.gives_up(error, server.rests, lasted_s):
+            self._give_up(server, f"could not be reached for {lasted_s:.0f} s", error)
         elif not server.was_heard and tries >= self._policy.max_connection_failures:
-            never = "never gave a reply that can be read" if is_page else "never answered"
-            why = f"{server.name} {never}, {tries} times in a row: {error}"
-            server.refusal = UnavailableError(why, sent="no")
+            self._give_up(server, f"never answered, {tries} times in a row", error)
         elif server.rests == 1:
-            self._tell(f"{server.name} {fault}, trying now and then: {error}")
+            self._tell(f"{server.name} cannot be reached, trying now and then: {error}")
         elif wait_s >= _WORTH_A_WORD_S:
-            self._tell(f"{server.name} still {fault}: tried {tries} times, for {lasted_s:.0f} s")
+            self._tell(
+                f"{server.name} still cannot be reached: tried {tries} times, for {lasted_s:.0f} s"
+            )
         return True
 
     def pause(self, server: Server, error: RetryableError, wait_s: float) -> None:
@@ -153,6 +147,14 @@ class Servers:
         if error.status in _TOO_MUCH:
             until_s = self._policy.clock.now() + wait_s
             server.rests_until_s = max(server.rests_until_s, until_s)
+
+    def _give_up(self, server: Server, why: str, error: ModelError) -> None:
+        self._refuse(server, UnavailableError(f"{server.name} {why}: {error}", sent="no"))
+
+    def _refuse(self, server: Server, error: UnavailableError) -> None:
+        is_first, server.refusal = server.refusal is None, error
+        if is_first and any(other.refusal is None for other in self.all):
+            self._tell(f"{server.name} is asked no more: {error}")
 
     def _heard(self, server: Server) -> None:
         if server.rests:

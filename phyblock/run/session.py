@@ -19,7 +19,6 @@ from phyblock.models import (
     RetryPolicy,
     api_key_status,
     build_model,
-    remove_unfinished,
     under_way,
 )
 from phyblock.records.files import BATCHES
@@ -86,7 +85,6 @@ class Session:
         try:
             self._store = RunStore(self._folder, plan.manifest, plan.sample_ids())
             self._check_batches(self._store)
-            remove_unfinished(self._folder)
             asks = any(m.config.kind == "litellm" for m in plan.models) or plan.extractor
             if self._use_cache and asks:
                 self._cache = ReplyCache(reply_cache_file(), self._tell)

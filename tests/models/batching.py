@@ -23,7 +23,6 @@ from phyblock.models import (
     Request,
     RetryPolicy,
     build_model,
-    remove_unfinished,
 )
 from phyblock.records.record import BatchLine
 from tests.models.factory import QUICK
@@ -69,7 +68,6 @@ async def command(
 ) -> list[Reply | Exception]:
     """Ask as one command does, in rounds; what stops the model stands where it was met."""
     cache = None if disk.cache is None else ReplyCache(disk.cache)
-    remove_unfinished(disk.folder)
     model = build_model(
         config,
         cache=cache,

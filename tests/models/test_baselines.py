@@ -105,18 +105,6 @@ def test_what_is_drawn_depends_on_seed_and_key_alone(name: str) -> None:
         assert len({answer.text for answer in forwards.values()}) > 1
 
 
-@pytest.mark.parametrize("name", PLANNERS)
-def test_they_cost_nothing_and_send_nothing(name: str) -> None:
-    answer = reply(name, make_request())
-    assert (answer.cost_usd, answer.attempts, answer.finish) == (0.0, 0, "stop")
-
-
-@pytest.mark.parametrize("name", PLANNERS)
-def test_they_do_not_look_at_what_they_are_sent(name: str) -> None:
-    whole = make_request()
-    assert reply(name, whole) == reply(name, replace(whole, messages=()))
-
-
 def test_an_oracle_without_its_candidate_is_an_error() -> None:
     poor = CandidateSet((Candidate("triangle", "orange", (0.0, 0.0, 0.0)),))
     with pytest.raises(DataError, match="no candidate looks like this block"):

@@ -26,7 +26,7 @@ from phyblock.models import (
     Usage,
     reply_key,
 )
-from tests.models.factory import ask, make_model, make_request, picture, with_fields
+from tests.models.factory import ask, make_model, make_request, with_fields
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Faults, Running
 
@@ -236,17 +236,6 @@ def test_replies_that_are_not_whole_are_not_kept(tmp_path: Path, reply: Reply) -
         assert "k" not in cache
 
 
-def test_pictures_and_prompts_do_not_enter_the_file(tmp_path: Path) -> None:
-    request = make_request("001", pictures=(picture(0x41424344), picture(0x45464748)))
-    path = tmp_path / "c.sqlite"
-    with ReplyCache(path) as cache:
-        cache.put(reply_key(CONFIG, request), CONFIG.id, REPLY)
-    stored = b"".join(file.read_bytes() for file in tmp_path.iterdir())
-    assert b"index 3" in stored
-    assert b"ABCD" not in stored
-    assert b"You assemble" not in stored
-
-
 def test_stats_count_and_clear_drops(tmp_path: Path) -> None:
     with ReplyCache(tmp_path / "c.sqlite") as cache:
         empty = cache.stats()
@@ -275,28 +264,6 @@ def test_a_file_that_is_no_cache_is_one_clear_error(tmp_path: Path, content: byt
     assert str(path) in str(caught.value)
     assert "delete the file" in str(caught.value)
     assert path.read_bytes() == content
-
-
-def test_another_programs_database_is_left_alone(tmp_path: Path) -> None:
-    path = tmp_path / "c.sqlite"
-    db = sqlite3.connect(path)
-    db.execute("CREATE TABLE letters (text)")
-    db.close()
-    before = path.read_bytes()
-    with pytest.raises(StoreError, match="no reply cache"):
-        ReplyCache(path)
-    assert path.read_bytes() == before
-
-
-def test_a_page_overwritten_in_the_middle_is_an_error_not_a_reply(tmp_path: Path) -> None:
-    path = tmp_path / "c.sqlite"
-    with ReplyCache(path) as cache:
-        for number in range(200):
-            cache.put(f"{number:064}", "openai/m", REPLY.model_copy(update={"text": "x" * 500}))
-    whole = path.read_bytes()
-    path.write_bytes(whole[:4096] + b"\xff" * (len(whole) - 4096))
-    with pytest.raises(StoreError, match="cannot be used"), ReplyCache(path) as cache:
-        cache.get(f"{7:064}")
 
 
 @pytest.mark.parametrize(
@@ -400,14 +367,3 @@ def test_what_two_samples_ask_at_the_same_time_is_asked_once(
         answers = ask(make_model(config, cache=cache), *[make_request()] * 5)
     assert server.requests == 1
     assert [answer.cached for answer in answers if isinstance(answer, Reply)].count(True) == 4
-
-
-@pytest.mark.parametrize("mode", ["length", "400"])
-def test_what_is_no_whole_reply_is_asked_by_each(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: str
-) -> None:
-    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
-    server = ROUTES["direct"].server(Faults(mode=mode, latency_s=0.01))
-    with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
-        ask(make_model(ROUTES["direct"].config(running.url), cache=cache), *[make_request()] * 3)
-    assert server.requests == 3

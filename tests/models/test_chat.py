@@ -7,18 +7,15 @@ import sqlite3
 from pathlib import Path
 
 import pytest
-from aiohttp import web
 from pydantic import ValidationError
 
 from phyblock.config.models import ModelConfig
-from phyblock.errors import RetryableError, UnavailableError
+from phyblock.errors import UnavailableError
 from phyblock.models import (
-    ModelEvent,
     Reply,
     ReplyCache,
-    RetryPolicy,
 )
-from tests.models.factory import QUICK, ask, make_model, make_request, reply_of, run, with_fields
+from tests.models.factory import ask, make_model, make_request, reply_of, run
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Faults, Running
 
@@ -45,18 +42,6 @@ def test_what_was_answered_is_not_asked_again(tmp_path: Path) -> None:
         assert (new.cached, kept.cached) == (False, True)
         assert (new.attempts, kept.attempts) == (1, 0)
         assert (new.text, new.usage, new.latency_s) == (kept.text, kept.usage, kept.latency_s)
-
-
-def test_seeds_are_kept_apart_also_where_the_provider_takes_none(tmp_path: Path) -> None:
-    server = ROUTES["direct"].server(Faults(mode="seed"))
-    requests = [make_request("001", seed) for seed in range(5)]
-    with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
-        config = ROUTES["direct"].config(running.url, max_concurrency=1)
-        ask(make_model(config, cache=cache), *requests)
-        assert cache.stats().replies == 5
-        again = ask(make_model(config, cache=cache), *requests)
-    assert server.ended == {"seed": 1, "ok": 5}
-    assert [reply.seed_sent for reply in again] == [False] * 5  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize("mode", ["length", "filtered", "blank", "400", "policy", "500", "html"])
@@ -98,17 +83,6 @@ def test_a_cache_that_takes_no_more_is_said_once_and_every_reply_comes(tmp_path:
     assert str(tmp_path / "c.sqlite") in text
 
 
-def test_a_dead_model_still_gives_what_is_cached(tmp_path: Path) -> None:
-    server = ROUTES["direct"].server()
-    with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
-        config = ROUTES["direct"].config(running.url, max_concurrency=1)
-        reply_of(make_model(config, cache=cache), make_request("001"))
-        server.faults = Faults(mode="401")
-        answers = ask(make_model(config, cache=cache), *(make_request(k) for k in ("002", "001")))
-    assert isinstance(answers[0], UnavailableError)
-    assert isinstance(answers[1], Reply)
-
-
 def test_one_dead_model_leaves_the_others_going() -> None:
     dead, alive = (ROUTES["direct"].server(Faults(mode=mode)) for mode in ("403", "ok"))
     with Running(dead) as first, Running(alive) as second:
@@ -143,42 +117,6 @@ def test_concurrency_stays_under_the_models_and_the_overall_limit() -> None:
         assert server.most_at_once == 2
 
 
-def test_a_429_is_told_and_asked_again() -> None:
-    server = ROUTES["direct"].server(Faults(rate_limited=0.5))
-    events: list[ModelEvent] = []
-    with Running(server) as running:
-        config = ROUTES["direct"].config(running.url, max_concurrency=8)
-        policy = RetryPolicy(30, 0.0, base_s=0.001, max_wait_s=0.001, max_retry_after_s=0.0)
-        answers = ask(
-            make_model(config, events=events, policy=policy),
-            *(make_request(f"{n:03}") for n in range(40)),
-        )
-    assert all(isinstance(answer, Reply) for answer in answers)
-    assert sum(event.kind == "retry" for event in events) == server.ended["429"]
-
-
-def test_a_server_that_is_not_there_is_a_connection_error(unused_port: int) -> None:
-    for name in ("direct", "openai"):
-        config = ROUTES[name].config(f"http://127.0.0.1:{unused_port}")
-        (answer,) = ask(make_model(config), make_request())
-        assert isinstance(answer, RetryableError)
-        assert answer.status is None
-
-
-@pytest.fixture
-def unused_port() -> int:
-    with Running(ROUTES["direct"].server()) as running:
-        return running.port
-
-
-def test_a_wrong_path_says_to_look_at_the_address() -> None:
-    with Running(ROUTES["direct"].server()) as running:
-        config = ROUTES["direct"].config(running.url + "/nowhere")
-        (answer,) = ask(make_model(config), make_request())
-    assert isinstance(answer, UnavailableError)
-    assert answer.status == 404
-
-
 def test_a_missing_key_sends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(KEY_VARIABLE)
     for name, route in ROUTES.items():
@@ -207,42 +145,10 @@ def test_no_key_reaches_the_cache_even_when_a_server_repeats_it(tmp_path: Path) 
     assert KEY.encode() not in b"".join(file.read_bytes() for file in tmp_path.iterdir())
 
 
-def test_attempts_count_every_request_that_was_sent() -> None:
-    server = ROUTES["direct"].server(Faults(server_error=0.4))
-    with Running(server) as running:
-        answers = ask(
-            make_model(ROUTES["direct"].config(running.url), policy=QUICK),
-            *(make_request(f"{n:03}") for n in range(20)),
-        )
-    assert sum(reply.attempts for reply in answers) == server.requests  # type: ignore[union-attr]
-
-
 def test_a_providers_key_never_goes_to_another(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XAI_API_KEY", KEY)
     with pytest.raises(ValidationError, match="needs the address"):
         ModelConfig(name="m", id="xai/grok", transport="direct")
-
-
-def test_a_redirect_is_not_followed_and_says_to_look_at_the_address() -> None:
-    class Moved(ROUTES["direct"].server):  # type: ignore[misc, name-defined]
-        def add_routes(self, app):  # type: ignore[no-untyped-def]
-            super().add_routes(app)
-            app.router.add_post("/old/chat/completions", self.moved)
-
-        async def moved(self, _):  # type: ignore[no-untyped-def]
-            self.ended["moved"] += 1
-            raise web.HTTPPermanentRedirect("/v1/chat/completions")
-
-    server = Moved()
-    with Running(server) as running:
-        config = ROUTES["direct"].config(running.url)
-        (answer,) = ask(
-            make_model(with_fields(config, api_base=f"{running.url}/old")), make_request()
-        )
-    assert isinstance(answer, UnavailableError)
-    assert answer.status == 308
-    assert "is api_base the address" in str(answer)
-    assert server.ended == {"moved": 1}
 
 
 @pytest.mark.parametrize(

@@ -66,12 +66,3 @@ def test_all_samples_finish_with_one_request_a_success_and_one_a_fault(route: st
 
 def test_all_samples_finish_over_four_replicas() -> None:
     finish_all("direct", 300, QUICK, size=2_000, replicas=4)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("route", ROUTES)
-@pytest.mark.parametrize("replicas", [1, 4])
-def test_a_thousand_large_pictures_finish_with_the_default_settings(
-    route: str, replicas: int
-) -> None:
-    finish_all(route, 1000, RetryPolicy(), size=75_000, replicas=replicas)

@@ -137,16 +137,6 @@ def test_a_provider_sends_through_our_client_to_its_server_or_not_at_all(
         assert (answer.status, server.hits) == (500, 1)
 
 
-@pytest.mark.parametrize("model_id", OWN_CLIENT)
-def test_a_provider_with_a_client_of_its_own_is_called_and_its_refusals_are_read(
-    model_id: str,
-) -> None:
-    with Running(AnyPath(429, b'{"x": 1}')) as running:
-        answer = answer_of(model_id, api_base=running.url, api_key_env=KEY_VARIABLE)
-    assert isinstance(answer, RetryableError), answer
-    assert answer.status == 429
-
-
 def test_a_reply_through_a_client_of_litellm_is_a_reply() -> None:
     body = b'{"choices": [{"message": {"role": "assistant", "content": "Step1"}}]}'
     with Running(AnyPath(200, body)) as running:
@@ -166,15 +156,6 @@ def test_what_is_missing_on_this_machine_is_no_outage(
         assert answer.sent == "no"
     # Where litellm looks for what it knows of a model, with no key and no prompt.
     assert hosts <= {"huggingface.co"}
-
-
-@pytest.mark.parametrize("extra", [{"tools": 5}, {"logit_bias": "yes"}, {"stop": {"a": 1}}])
-def test_arguments_that_litellm_chokes_on_end_a_call_and_no_run(extra: dict[str, object]) -> None:
-    with Running(OpenAIChat()) as running:
-        config = ROUTES["openai"].config(running.url)
-        request = replace(TEXT, params=extra)
-        (answer,) = ask(make_model(config, policy=RetryPolicy(1, 0.0)), request)
-    assert isinstance(answer, ModelError | Reply), answer
 
 
 def settings_of(litellm: Any) -> dict[str, object]:

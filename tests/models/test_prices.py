@@ -12,9 +12,7 @@ from hypothesis import strategies as st
 
 from phyblock.config.models import ModelConfig, load_models
 from phyblock.config.suite import Suite
-from phyblock.errors import SpecError
 from phyblock.models import (
-    Budget,
     Estimate,
     Price,
     Prices,
@@ -124,15 +122,6 @@ def test_batches_cost_half_only_where_that_is_known(
     assert own.at(DAY, batched=True) == Price(3.0, 4.0)
 
 
-def test_the_price_of_batches_can_be_told(tmp_path: Path) -> None:
-    told = "{input: 8, output: 40, batch: {input: 3, output: 4, cached: 1}}"
-    base = "api_base: https://gateway.example/v1"
-    known = prices_of(read(tmp_path, f"m: {{id: openai/mine, {base}, price: {told}}}"))
-    assert known is not None
-    assert known.at(DAY) == Price(8.0, 40.0)
-    assert known.at(DAY, batched=True) == Price(3.0, 4.0, 1.0)
-
-
 @given(
     st.lists(st.integers(0, 400), min_size=1, max_size=4, unique=True),
     st.integers(-9, 410),
@@ -230,49 +219,6 @@ m:
     assert known.at(december, 1001) == Price(3, 5, None, 6)
 
 
-def test_before_the_first_day_that_is_named_the_map_holds(tmp_path: Path) -> None:
-    text = "m: {id: openai/gpt-4o-2024-08-06, price: [{from: 2027-01-01, input: 9, output: 9}]}\n"
-    known = prices_of(read(tmp_path, text))
-    mapped = prices_of(config("openai/gpt-4o-2024-08-06"))
-    assert known is not None and mapped is not None  # noqa: PT018
-    assert known.on(DAY) == mapped.on(DAY)
-    assert known.at(date(2027, 1, 1)) == Price(9, 9)
-    coming = known.next_after(DAY)
-    assert coming is not None
-    assert coming.since == date(2027, 1, 1)
-
-
-@pytest.mark.parametrize(
-    ("price", "said"),
-    [
-        ("[{input: 1, output: 1}, {input: 2, output: 2}]", "models.yaml:1:.*from which day"),
-        (
-            "[{from: 2026-12-01, input: 1, output: 1}, {from: 2026-11-01, input: 2, output: 2}]",
-            r"price\[1\]\.from: is not later than the one before it.*a day after 2026-12-01",
-        ),
-        ("{from: soon, input: 1, output: 1}", r"m\.price\.from: is no day.*soon"),
-        ("{from: 2026-13-01, input: 1, output: 1}", "is no day"),
-        ("{input: 1}", r"m\.price\.output.* is missing"),
-        (
-            "{input: 1, output: 1, tiers: [{above: 5, input: 1, output: 1},"
-            " {above: 5, input: 1, output: 1}]}",
-            r"tiers\[1\]\.above: is not above the one before",
-        ),
-        ("{form: 2026-12-01, input: 1, output: 1}", "did you mean from"),
-        ("[]", "is empty"),
-    ],
-)
-def test_prices_that_cannot_be_meant_are_refused(tmp_path: Path, price: str, said: str) -> None:
-    with pytest.raises(SpecError, match=f"(?s){said}"):
-        read(tmp_path, f"m: {{id: openai/gpt-4o, price: {price}}}\n")
-
-
-def test_prices_are_no_part_of_what_a_model_is(tmp_path: Path) -> None:
-    plain = read(tmp_path, "m: openai/gpt-4o\n")
-    priced = read(tmp_path, "m: {id: openai/gpt-4o, price: [{input: 1, output: 2}]}\n")
-    assert plain.identity() == priced.identity()
-
-
 CACHED: dict[type[LocalServer], dict[str, Any]] = {
     OpenAIChat: {
         "usage": {
@@ -300,10 +246,6 @@ CACHED: dict[type[LocalServer], dict[str, Any]] = {
     },
 }
 """What each protocol says of a prompt of 1,000 tokens, most of them in its cache."""
-
-
-def test_every_protocol_is_among_the_routes() -> None:
-    assert {route.server for route in ROUTES.values()} == set(CACHED)
 
 
 @pytest.mark.parametrize("route", ROUTES)
@@ -346,24 +288,6 @@ def test_no_more_is_cached_than_the_prompt_holds(
     assert (read.cached_tokens or 0) >= 0
     assert (read.cache_write_tokens or 0) >= 0
     assert (read.cached_tokens or 0) + (read.cache_write_tokens or 0) <= (read.prompt_tokens or 0)
-
-
-def test_a_reply_costs_what_its_day_asks_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
-    tomorrow = (DAY + timedelta(days=1)).isoformat()
-    later = {"from": tomorrow, "input": 20, "output": 200}
-    price = [{"input": 10, "output": 100}, later]
-    paid = []
-    with Running(OpenAIChat()) as running:
-        config = ROUTES["direct"].config(running.url, price=price)
-        for days in (0, 1):
-            day = DAY + timedelta(days=days)
-            monkeypatch.setattr("phyblock.models.model.today", lambda day=day: day)
-            budget = Budget(1.0)
-            reply = reply_of(make_model(config, budget=budget), make_request())
-            paid.append(reply.cost_usd)
-            assert budget.spent_usd == pytest.approx(reply.cost_usd)
-    assert paid == pytest.approx([0.014, 0.028])
 
 
 def test_a_day_that_the_map_names_is_read() -> None:

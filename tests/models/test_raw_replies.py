@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from phyblock.errors import DataError
 from phyblock.models import Reply, Usage, read_raw_reply
-from phyblock.models.replay import token_count
 from phyblock.text import well_formed
 
 STEPS = "Step1: Move block with index 3"
@@ -196,13 +195,6 @@ def test_only_characters_that_no_file_can_hold_are_replaced(text: str) -> None:
     read = read_raw_reply({**choice({"content": f"{text}\ud800"}), "model": f"\udfff{text}"}, "x")
     for kept in (read.text, read.provider_model):
         assert kept.replace("\ufffd", "") == well_formed(text).replace("\ufffd", "")
-
-
-@given(st.one_of(st.integers(), st.floats(), st.booleans(), st.text(max_size=3), st.none()))
-def test_a_number_of_tokens_is_one_or_not_known(value: object) -> None:
-    count = token_count(value)
-    is_count = type(value) is int and 0 <= value <= 10**9
-    assert count == (value if is_count else None)
 
 
 @pytest.mark.parametrize(

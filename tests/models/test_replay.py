@@ -12,8 +12,8 @@ import pytest
 from phyblock.config.models import ModelConfig
 from phyblock.errors import DataError, RefusedError, SampleError, StoreError
 from phyblock.models import Model, Reply, Usage, build_model
-from tests.models.factory import ask, make_request
-from tests.records.damage import lines_before, plan_record
+from tests.models.factory import make_request
+from tests.records.damage import plan_record
 
 STEPS = "Step1: Move block with index 3"
 
@@ -33,11 +33,6 @@ def test_a_reply_is_found_by_key_whatever_the_seed(tmp_path: Path) -> None:
     assert not model.needs_messages
     replies = [answer(model, "007", seed) for seed in (0, 1)]
     assert replies == [Reply(text=STEPS, finish="unknown", cost_usd=0.0, attempts=0)] * 2
-
-
-def test_a_missing_reply_is_none(tmp_path: Path) -> None:
-    (tmp_path / "007.json").write_text(json.dumps(STEPS))
-    assert answer(replay(tmp_path), "008") is None
 
 
 def test_a_file_may_say_more_after_the_key(tmp_path: Path) -> None:
@@ -115,29 +110,6 @@ def test_a_run_of_our_own_is_matched_by_model_key_and_seed(tmp_path: Path) -> No
     assert answer(model, "007", 3) is None
     assert answer(model, "008", 1) is None
     assert answer(model, "009", 1) is None
-
-
-def test_a_run_of_several_tracks_answers_each_with_its_own(tmp_path: Path) -> None:
-    asked = json.loads(lines_before()[2])
-    (tmp_path / "records.jsonl").write_text(
-        record("m", "007", 1, reply=Reply(text="a plan").model_dump())
-        + json.dumps({**asked, "model": "m", "key": "007", "seed": 1})
-    )
-    asked = [replace(make_request("007", 1), track=name) for name in ("full_planning", "other")]
-    plan, nothing = ask(replay(tmp_path), *asked)
-    assert isinstance(plan, Reply)
-    assert (plan.text, nothing) == ("a plan", None)
-
-
-def test_of_a_varied_run_the_reference_answers(tmp_path: Path) -> None:
-    varied = {"candidate_order": "shuffled", "repeats": "2"}
-    (tmp_path / "records.jsonl").write_text(
-        record("m", "007", 1, reply=Reply(text="asked plainly").model_dump())
-        + record("m", "007", 1, variant=varied, reply=Reply(text="asked otherwise").model_dump())
-    )
-    found = answer(replay(tmp_path), "007", 1)
-    assert found is not None
-    assert found.text == "asked plainly"
 
 
 @pytest.mark.parametrize(("kind", "error"), [("sample", SampleError), ("refused", RefusedError)])

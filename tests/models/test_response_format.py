@@ -9,14 +9,13 @@ from typing import Any
 import pytest
 from aiohttp import web
 
-from phyblock.config.models import ModelConfig, load_models
+from phyblock.config.models import ModelConfig
 from phyblock.config.suite import Suite
 from phyblock.errors import ModelError, RefusedError, SampleError, UnavailableError
-from phyblock.models import Reply, Request, reply_key, takes_format
+from phyblock.models import Reply, Request, reply_key
 from phyblock.parsing.answer import choice_form
 from phyblock.parsing.move import move_form
 from phyblock.parsing.plan import parse_plan, plan_form
-from phyblock.resources import bundled
 from phyblock.run.models import to_config
 from tests.models.factory import ask, make_model, make_request, reply_of, with_fields
 from tests.models.routes import KEY_VARIABLE, ROUTES
@@ -76,13 +75,6 @@ def test_the_schema_arrives_as_it_is_declared_and_the_reply_is_read() -> None:
     }
     parsed = parse_plan(reply.text, 16)
     assert (parsed.plan.steps, parsed.rule) == ((1, 2, 3), "json")
-
-
-def test_nothing_but_the_field_is_sent_more_and_without_it_nothing_is_other_than_before() -> None:
-    plain = arrived("direct", make_request("017", 42)).raw
-    assert arrived("direct", asking()).raw == plain
-    whole = arrived("direct", asking(), response_format="always").raw
-    assert {name: value for name, value in whole.items() if name != "response_format"} == plain
 
 
 def test_the_cache_tells_formats_apart_and_knows_texts_as_it_did() -> None:
@@ -153,16 +145,6 @@ def test_who_is_sent_a_schema(fields: dict[str, str], sends: bool) -> None:
     spec = ModelConfig.model_validate(fields)
     assert to_config("m", spec, JSON_SUITE).sends_format is sends
     assert not to_config("m", spec, Suite(name="s", models=("m",))).sends_format
-
-
-@pytest.mark.slow
-def test_litellm_is_believed_about_every_model_of_the_models_file() -> None:
-    import litellm
-
-    for name, spec in load_models(bundled("models.yaml")).items():
-        config = to_config(name, spec, JSON_SUITE)
-        if config.api_base is None:
-            assert takes_format(config) == litellm.supports_response_schema(config.id), name
 
 
 @pytest.mark.slow

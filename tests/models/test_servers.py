@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from contextlib import ExitStack
 from typing import Any
 
 import pytest
-from aiohttp import web
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -28,12 +26,11 @@ from phyblock.models.servers import FAILURES_TO_REST, Server, Servers
 from tests.models.factory import QUICK, ask, make_model, make_request, run, with_fields
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.models.test_limits import FakeTime
-from tests.servers.chassis import Faults, Running, Seen, kill, start
+from tests.servers.chassis import Faults, Running, kill, start
 from tests.servers.openai_chat import OpenAIChat
 
 REFUSED = UnreachableError("connection refused")
 LOST = RetryableError("connection refused", sent="lost")
-PAGE = RetryableError("HTTP 200: malformed reply", status=200)
 
 
 @pytest.fixture(autouse=True)
@@ -129,42 +126,23 @@ def test_an_outage_loses_nothing_and_costs_few_attempts(
     assert client.failed <= 2 * width + FAILURES_TO_REST + 30
 
 
-@settings(max_examples=20, deadline=None)
-@given(st.floats(1, 100, allow_nan=False), st.floats(0.1, 20, allow_nan=False), st.integers(2, 64))
-def test_pages_that_a_proxy_shows_while_the_model_is_loaded_lose_nothing(
-    lasts_s: float, takes_s: float, width: int
-) -> None:
-    time = FakeTime()
-    client = Outage(time, 0.0, lasts_s, takes_s, PAGE)
-    answers, _ = ask_through(client, time, samples=80, width=width)
-    assert [type(answer) for answer in answers] == [Reply] * 80
-    assert client.failed <= 2 * width + FAILURES_TO_REST + 30
-
-
 @pytest.mark.parametrize("width", [2, 8, 32])
-@pytest.mark.parametrize(
-    ("error", "fault", "never"),
-    [
-        (LOST, "cannot be reached", "never answered"),
-        (PAGE, "gives no reply that can be read", "never gave a reply that can be read"),
-    ],
-)
 def test_a_wrong_address_stops_the_model_after_few_attempts_and_leaves_its_samples(
-    width: int, error: RetryableError, fault: str, never: str
+    width: int,
 ) -> None:
     time = FakeTime()
-    client = Outage(time, 0.0, float("inf"), 1.0, error)
+    client = Outage(time, 0.0, float("inf"), 1.0)
     answers, told = ask_through(client, time, samples=500, width=width)
     assert {type(answer) for answer in answers} == {UnavailableError}
     assert len(answers) == width
-    assert f"http://gone:1 {never}, 20 times in a row: {error}" in str(answers[0])
+    assert f"http://gone:1 never answered, 20 times in a row: {LOST}" in str(answers[0])
     assert client.failed <= width + FAILURES_TO_REST + 30
     first, *later = told
-    assert first.startswith(f"http://gone:1 {fault}, trying now and then: {error}")
+    assert first.startswith(f"http://gone:1 cannot be reached, trying now and then: {LOST}")
     assert 100 <= time.now_s < 220
     # A log is never silent for long, and says that it gets worse.
     assert time.now_s / 20 <= len(later) <= time.now_s / 10
-    assert all(f"still {fault}: tried " in text for text in later)
+    assert all("still cannot be reached: tried " in text for text in later)
 
 
 @settings(max_examples=20, deadline=None)
@@ -229,17 +207,6 @@ def test_whoever_is_asked_is_there_and_has_no_more_to_do_than_any_other_that_is(
             held.pop(number % len(held)).under_way -= 1
 
 
-def test_what_failed_at_one_server_is_sent_to_another() -> None:
-    servers = servers_of(2)
-    first = servers.pick()
-    second = servers.pick(failed=first)
-    assert second is not first
-    first.under_way = 2
-    assert servers.pick(failed=second) is first
-    alone = servers_of(1)
-    assert alone.pick(failed=alone.pick()) is alone.all[0]
-
-
 @pytest.mark.parametrize("status", [429, 500, 529, 400, None])
 def test_what_a_server_says_itself_and_what_is_late_is_no_outage(status: int | None) -> None:
     servers = servers_of(1)
@@ -262,15 +229,6 @@ def test_failures_of_one_request_alone_are_no_outage(status: int | None, sent: S
     assert servers.rest_s() == 0.0
     assert servers.failed(servers.all[0], error, "another", 0.0)
     assert servers.rest_s() > 0
-
-
-def test_an_answer_between_failures_keeps_a_server_in_use() -> None:
-    servers = servers_of(1)
-    for number in range(50):
-        for nth in range(FAILURES_TO_REST - 1):
-            servers.failed(servers.all[0], REFUSED, (number, nth), 0.0)
-        servers.replied(servers.all[0])
-    assert servers.rest_s() == 0.0
 
 
 @given(st.none() | st.floats(0, 1000), st.integers(0, 20))
@@ -321,17 +279,6 @@ async def answers_of(model: Model, *names: str) -> list[object]:
 
 def names(count: int) -> list[str]:
     return [f"{n:03}" for n in range(count)]
-
-
-def test_four_servers_of_one_request_at_a_time_share_the_work() -> None:
-    servers = [OpenAIChat(Faults(latency_s=0.02), width=1) for _ in range(4)]
-    with ExitStack() as stack:
-        urls = [stack.enter_context(Running(server)).url for server in servers]
-        replies = ask(make_model(at(*urls, max_concurrency=8)), *map(make_request, names(80)))
-    assert [type(reply) for reply in replies] == [Reply] * 80
-    assert [server.most_at_once for server in servers] == [1] * 4
-    assert sum(server.requests for server in servers) == 80
-    assert all(15 <= server.requests <= 25 for server in servers), [s.requests for s in servers]
 
 
 @pytest.mark.parametrize("route", ["direct", pytest.param("openai", marks=pytest.mark.slow)])
@@ -389,15 +336,6 @@ def test_a_server_that_restarts_loses_nothing_over_a_real_wire(route: str) -> No
     assert [type(answer) for answer in run(main)] == [Reply] * 60
 
 
-@pytest.mark.parametrize("route", ["direct", "openai"])
-def test_servers_that_are_all_gone_for_good_stop_the_model(route: str) -> None:
-    config = at("http://127.0.0.1:9", "http://127.0.0.1:10", max_concurrency=4, route=route)
-    answers = ask(make_model(config, policy=QUICK), *map(make_request, names(50)))
-    assert {type(answer) for answer in answers} == {UnavailableError}
-    assert "could not be reached" in str(answers[0])
-    assert "all 2 servers" in str(answers[0])
-
-
 def test_a_server_that_refuses_everything_is_left_out_and_the_last_one_stops_the_model() -> None:
     told: list[str] = []
     wrong, right = OpenAIChat(Faults(mode="404")), OpenAIChat()
@@ -413,16 +351,6 @@ def test_a_server_that_refuses_everything_is_left_out_and_the_last_one_stops_the
         stopped = ask(make_model(config), *map(make_request, names(30)))
     assert {type(answer) for answer in stopped} == {UnavailableError}
     assert wrong.requests + right.ended["404"] <= 3 * 4
-
-
-def test_a_failure_counts_as_an_attempt_wherever_it_happened() -> None:
-    with ExitStack() as stack:
-        servers = [OpenAIChat(Faults(mode="500")) for _ in range(3)]
-        urls = [stack.enter_context(Running(server)).url for server in servers]
-        (answer,) = ask(make_model(at(*urls), policy=QUICK), make_request())
-    assert isinstance(answer, RetryableError)
-    assert sum(server.requests for server in servers) == QUICK.attempts
-    assert all(server.requests >= 2 for server in servers)
 
 
 @pytest.mark.parametrize("page", ["html", "cut", "empty"])
@@ -449,25 +377,7 @@ def test_who_never_gives_a_reply_that_can_be_read_is_asked_no_more(page: str) ->
 
         later = run(main)
     assert {type(answer) for answer in alone} <= {RetryableError, UnavailableError}
-    assert f"{first.url} never gave a reply that can be read, " in str(alone[-1])
+    assert f"{first.url} never gave a reply that can be read: " in str(alone[-1])
     assert [type(answer) for answer in answers] == [Reply] * 60
-    assert told[0].startswith(f"{first.url} gives no reply that can be read, trying now and then")
+    assert told[0].startswith(f"{first.url} is asked no more: ")
     assert [type(answer) for answer in later] == [Reply, *[RetryableError] * 4]
-
-
-class SlowAtHead(OpenAIChat):
-    """Never answers about the scenes whose names begin with "slow"."""
-
-    async def _end(self, seen: Seen, ending: str, request: web.Request) -> web.StreamResponse:
-        is_slow = any(isinstance(part, str) and "Scene slow" in part for part in seen.parts)
-        return await super()._end(seen, "slow" if is_slow else ending, request)
-
-
-@pytest.mark.parametrize("route", ["direct", "openai"])
-def test_slow_requests_at_the_head_end_alone_and_the_rest_goes_on(route: str) -> None:
-    asked = [f"slow {n}" for n in range(8)] + names(12)
-    with Running(SlowAtHead()) as running:
-        policy = RetryPolicy(2, 0.0, base_s=0.001, max_wait_s=0.002)
-        config = ROUTES[route].config(running.url, timeout_s=0.5, max_concurrency=8)
-        answers = ask(make_model(config, policy=policy), *map(make_request, asked))
-    assert [type(answer) for answer in answers] == [RetryableError] * 8 + [Reply] * 12

@@ -80,14 +80,6 @@ def test_both_transports_put_the_same_json_on_the_wire(extra: dict[str, object])
     assert ("temperature" in direct) == (extra.get("temperature", 0) is not None)
 
 
-def test_a_models_own_parameters_win() -> None:
-    server = ROUTES["direct"].server()
-    with Running(server) as running:
-        config = ROUTES["direct"].config(running.url, temperature=0.1)
-        reply_of(make_model(config), make_request())
-    assert server.seen[0].params == {"temperature": 0.1, "top_p": 0.9, "max_tokens": 128}
-
-
 @pytest.mark.parametrize("route", ["direct", "openai"])
 def test_thoughts_left_in_the_text_become_reasoning(route: str) -> None:
     thinking = "<think>\nred first\n</think>\n\nStep1: Move block with index 3"
