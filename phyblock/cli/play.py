@@ -34,8 +34,9 @@ from phyblock.web.answers import (
     export_session,
     read_answers,
 )
+from phyblock.web.report import files_of, report_files
 from phyblock.web.server import Server, default_consent
-from phyblock.web.session import Person, PersonModel, PlaySession, plan_session, report_files
+from phyblock.web.session import Person, PersonModel, PlaySession, outcomes, plan_session
 
 _INTERRUPTED = 130
 _RUNS = Path("results")
@@ -116,8 +117,6 @@ def play(
         return _export(console, plan, person, export)
     folder = out or plan.folder_in(_RUNS)
     if held_run(folder, plan.manifest) is not None:
-        from phyblock.web.report import files_of
-
         run_folder(folder).check(files_of(page=True))
     if answers is not None:
         return _import(console, plan, person, folder, answers, page=not no_report)
@@ -193,9 +192,7 @@ def _serve(
     *,
     opens: bool,
 ) -> int:
-    # Tables are made of pandas, which a session does without until its end.
     from phyblock.results.load import load_run
-    from phyblock.web.session import outcomes
 
     for other in beside:
         load_run(other, texts=False)

@@ -78,13 +78,9 @@ async def export_session(
         for name, (_, content) in page.items():
             (new / name).write_bytes(content)
         head = {"format": ANSWERS_FORMAT, "run": plan.manifest.identity, "model": person.model}
-        session = {
-            "head": {**head, "consent": person.consent_sha256},
-            "name": person.name,
-            "text": person.consent,
-            "questions": questions,
-        }
-        script = f"const SESSION = {json.dumps(session)};\n"
+        head["consent"] = person.consent_sha256
+        session = {"head": head, "name": person.name, "text": person.consent}
+        script = f"const SESSION = {json.dumps({**session, 'questions': questions})};\n"
         (new / "questions.js").write_text(script, encoding="utf-8")
         drawn = {path.relative_to(new).as_posix() for path in (new / _PICTURES).iterdir()}
         # What an earlier session left behind may be of scenes that this one does not show.

@@ -7,10 +7,9 @@ import math
 import os
 import re
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -36,16 +35,18 @@ from phyblock.results.estimates import (
 )
 from phyblock.results.load import Run, load_run
 from phyblock.results.tables import cost_frame, coverage_frame
-from phyblock.stable import hex_digest
 from phyblock.tracks.base import CARRYING, kind_of
-from phyblock.tracks.pictures import kit, scene_entry
+from phyblock.tracks.pictures import kit
 from phyblock.web.pack import (
     IN_INDEX,
+    Columns,
     Numbers,
     Pack,
     Sources,
+    build_of,
     fill,
     open_sources,
+    pack_scenes,
     read_places,
     records_at,
     write_script,
@@ -54,8 +55,6 @@ from phyblock.web.report import shortfalls
 
 INDEX = "index.html"
 _DATA = "data/"
-_LAYOUT = 1
-"""Version of the data's layout."""
 _PARTIAL = re.compile(r"\.[0-9a-f]{32}\.part")
 _SCRIPTS = (
     *("dom.js", "chunks.js", "solid.js", "steps.js", "poses.js", "runs.js", "stage.js"),
@@ -64,16 +63,15 @@ _SCRIPTS = (
 )
 _STYLES = ("base.css", "samples.css", "reply.css", "site.css")
 _MAY_DIFFER = ("pictures",)
-"""Parts of a track's identity: digests of pictures, which change with their size; the reader."""
+"""Parts of a track's identity: digests of pictures, which change with their size."""
 _CONTROLS = frozenset({"blind", "wrong_image", "prompt", "path"})
 """Parts of a track's section of the suite that are shown with the run, or known by their digest."""
-_HINT = "make a site of each"
-_CARRYING_HINT = (
-    "run the older one again, as phyblock score leaves what was carried out as it was, or make a "
-    "site of each"
-)
-_SCENES = "dataset.sha256"
-_SCENES_HINT = "give all runs the same levels and --limit, or make a site of each"
+_HINTS = {
+    "sha256": "give all runs the same levels and --limit, or make a site of each",
+    CARRYING: "run the older one again, as phyblock score leaves what was carried out as it was, "
+    "or make a site of each",
+}
+"""Hints by the last part of the name of what differs."""
 _LABELS = ("published", "size_b", "served_at")
 """Parts of a manifest's model that do not decide its replies."""
 _LONGEST = {"text": 6000, "reasoning": 2000}
@@ -201,15 +199,14 @@ def _check_place(folder: OutFolder) -> None:
 
 
 def _build(runs: Sequence[SiteRun], title: str) -> str:
-    """Return a name for what the site shows: the same runs, written again, have the same files."""
-    told: list[Any] = [_LAYOUT, version("phyblock"), title]
+    told: list[Any] = [title]
     for one in runs:
         digests = [digest_of_file(one.run.path / name) for name in (MANIFEST, RECORDS)]
         if one.is_verified:
             # Its manifest names this machine's data.
             digests[0] = one.run.manifest.identity
         told.append([*digests, one.is_verified, bool(one.sources.lacking)])
-    return hex_digest(json.dumps(told))[:12]
+    return build_of(*told)
 
 
 def open_runs(paths: Sequence[Path], data: Sequence[Path], kept: ExitStack) -> tuple[SiteRun, ...]:
@@ -267,25 +264,11 @@ def check_runs_alike(runs: Sequence[SiteRun]) -> None:
 def _differences(one: SiteRun, first: SiteRun) -> Iterator[Problem]:
     shared = [track for track in one.tracks if track in first.tracks]
     told, wanted = (dict(_facts(side.run, shared)) for side in (one, first))
+    message = f"cannot stand in one table with {first.where}"
     for name, value in told.items():
-        other = wanted.get(name)
         # A recording was asked elsewhere, and a baseline is asked in no words.
-        if value is None or other is None or value == other:
-            continue
-        message = f"cannot stand in one table with {first.where}"
-        if name == _SCENES:
-            counts = [
-                ", ".join(f"{side.run.manifest.items.get(t, 0):,} of {t}" for t in shared)
-                for side in (one, first)
-            ]
-            found, allowed = (
-                f"{count}, scenes {digest[:12]}"
-                for count, digest in zip(counts, (value, other), strict=True)
-            )
-            message += ": other scenes were asked about"
-            yield Problem(one.where, message, name, found, allowed, _SCENES_HINT)
-        else:
-            hint = _CARRYING_HINT if name.endswith(f".{CARRYING}") else _HINT
+        if None not in (value, other := wanted.get(name)) and value != other:
+            hint = _HINTS.get(name.rpartition(".")[2], "make a site of each")
             yield Problem(one.where, message, name, str(value), str(other), hint)
 
 
@@ -298,7 +281,7 @@ def _facts(run: Run, shared: Sequence[str]) -> Iterator[tuple[str, Any]]:
     if not shared:
         return
     if data is not None:
-        yield _SCENES, data.sha256
+        yield "dataset.sha256", data.sha256[:12]
     if (asked := manifest.questions) is not None:
         yield "questions.version", asked.version
     yield "scoring.matchers", suite.scoring.matchers[0]
@@ -310,31 +293,27 @@ def _facts(run: Run, shared: Sequence[str]) -> Iterator[tuple[str, Any]]:
     for track in shared:
         identity = manifest.tracks.get(track, {})
         for key, value in identity.items():
+            if isinstance(value, Mapping) and {"name", "version"} <= value.keys():
+                # A prompt by its name and digest.
+                value = f"{value['name']} ({str(value['version'])[:12]})"
             if key not in _MAY_DIFFER:
-                if isinstance(value, Mapping) and {"name", "version"} <= value.keys():
-                    # A prompt by its name and digest.
-                    yield f"tracks.{track}.{key}", f"{value['name']} ({str(value['version'])[:12]})"
-                else:
-                    yield f"tracks.{track}.{key}", value
+                yield f"tracks.{track}.{key}", value
+        held: list[tuple[str, BaseModel, frozenset[str]]] = []
         if identity.get("pictures") is not None:
-            yield from _section("images", run.section("images", ImagesSpec), {"size_px"})
+            held.append(("images", run.section("images", ImagesSpec), frozenset({"size_px"})))
         if (section := kind_of(track).section) is not None:
-            yield from _section(section[0], run.section(*section[:2]), _CONTROLS)
-
-
-def _section(name: str, held: BaseModel, without: Collection[str]) -> Iterator[tuple[str, Any]]:
-    """Yield what a section of the suite says, its defaults as well."""
-    for key in type(held).model_fields:
-        if key not in without:
-            yield f"{name}.{key}", str(getattr(held, key))
+            held.append((section[0], run.section(*section[:2]), _CONTROLS))
+        for name, values, without in held:
+            for key in type(values).model_fields.keys() - without:
+                yield f"{name}.{key}", str(getattr(values, key))
 
 
 def entries_of(runs: Sequence[SiteRun]) -> tuple[Entry, ...]:
     """Return every model of every run.
 
     A model that two runs asked in different tracks is one row, where it is the same model with the
-    same parameters. Asked in the same track it is a row for each run: names are then told apart by
-    the date of the run, and by its identity where that is not enough.
+    same parameters. Asked in the same track it is a row for each run, told apart by the date and
+    the identity of the run.
     """
     found: list[tuple[str, Entry]] = []
     for number, one in enumerate(runs):
@@ -353,18 +332,13 @@ def entries_of(runs: Sequence[SiteRun]) -> tuple[Entry, ...]:
                 found.append((identity, entry))
             entry.runs |= dict.fromkeys(one.tracks, number)
     entries = tuple(entry for _, entry in found)
-    forms = []
-    for entry in entries:
-        first = min(entry.runs.values())
-        name, one = entry.model.name, runs[first]
-        day, tag = one.date, f"{one.date}, run {one.run.manifest.identity[:8]}"
-        forms.append((name, f"{name} ({day})", f"{name} ({tag})", f"{name} ({tag}, {first + 1})"))
-    for form in zip(*forms, strict=True):
-        # The shortest name that no other has.
-        used = Counter(entry.name or name for entry, name in zip(entries, form, strict=True))
-        for entry, name in zip(entries, form, strict=True):
-            if not entry.name and used[name] == 1:
-                entry.name = name
+    used = Counter(entry.model.name for entry in entries)
+    for place, entry in enumerate(entries):
+        entry.name, one = entry.model.name, runs[min(entry.runs.values())]
+        if used[entry.name] > 1:
+            entry.name += f" ({one.date}, run {one.run.manifest.identity[:8]})"
+        if entry.name in {other.name for other in entries[:place]}:
+            entry.name += f" ({place + 1})"
     return entries
 
 
@@ -391,39 +365,34 @@ def values_of(run: Run, track: str) -> TrackValues:
         suite = design.suite.model_copy(update={"settings": (setting,)} if setting else {})
         in_setting = design.model_copy(update={"suite": suite})
         values[setting] = headline_of(run, track, in_setting)
-    return TrackValues(values, samples, _costs(run, track, samples, what.measure.best))
+    return TrackValues(values, samples, _facts_of(run, track, samples, what.measure.best))
 
 
-def _costs(
+def _facts_of(
     run: Run, track: str, samples: Mapping[str, Mapping[Key, float]], best: float
 ) -> dict[str, dict[str, Any]]:
     """Return by model what its samples of a track took and came to; None where it is not known.
 
     `solved` samples are worth all that a sample can be; None where a sample may always be worth
-    more. Costs [US dollars] are at the prices of the replies, cached ones included. `asked` are the
-    first and the last day, UTC, on which the run got a reply that it had asked for itself, one of
-    recordings and of cached replies being unknown; `cached` counts the latter.
+    more. Costs [US dollars] are at the prices of the replies, cached ones included.
     """
     costs, outcomes = (
         frame[frame["track"] == track].set_index("model").to_dict("index")
         for frame in (cost_frame(run), coverage_frame(run))
     )
-    records = run.records[run.records["track"] == track]
-    sent = records["attempts"].fillna(0).astype("int64") > 0
-    times = records.loc[sent & records["time"].notna(), ["model", "time"]]
-    by_model = times.groupby("model")["time"]
-    days = {str(model): (min(of)[:10], max(of)[:10]) for model, of in by_model}
+
+    def known(value: Any) -> Any:
+        if not isinstance(value, float):
+            return value
+        return None if math.isnan(value) else float(f"{value:.6g}")
+
     found = {}
     for model, row in outcomes.items():
-        cost = {
-            name: None if isinstance(value, float) and math.isnan(value) else value
-            for name, value in costs[model].items()
-        }
-        solved = None
+        cost, solved, whole = costs[model], None, None
         if not math.isnan(best):
             solved = sum(value == best for value in samples.get(str(model), {}).values())
-        price = cost["cost_per_100_usd"]
-        whole = None if price is None else price / 100 * int(row["replies"])
+        if known(price := cost["cost_per_100_usd"]) is not None and solved:
+            whole = price / 100 * int(row["replies"]) / solved
         facts = {
             "expected": int(row["expected"]),
             "done": int(row["recorded"]),
@@ -433,14 +402,9 @@ def _costs(
             "completion_tokens": cost["completion_tokens"],
             "latency_s": cost["latency_median_s"],
             "usd_per_100": price,
-            "usd_per_solved": whole / solved if whole is not None and solved else None,
-            "asked": days.get(str(model)),
-            "cached": int(row["cached"]),
+            "usd_per_solved": whole,
         }
-        found[str(model)] = {
-            name: float(f"{value:.6g}") if isinstance(value, float) else value
-            for name, value in facts.items()
-        }
+        found[str(model)] = {name: known(value) for name, value in facts.items()}
     return found
 
 
@@ -474,44 +438,28 @@ def board_of(
 
     Raises SpecError for runs that cannot be compared.
     """
-    first: dict[str, int] = {}
-    for number, one in enumerate(runs):
-        for track in one.tracks:
-            first.setdefault(track, number)
+    first = {track: n for n in reversed(range(len(runs))) for track in reversed(runs[n].tracks)}
     numbers = {entry.name: _values(entry, values) for entry in entries}
     ranges: dict[str, Mapping[str, tuple[int, int]]] = {}
     tracks: list[dict[str, Any]] = []
     columns: list[dict[str, Any]] = []
-    for track, place in first.items():
+    about: dict[str, Any]
+    told: dict[str, Any]
+    for track, place in sorted(first.items(), key=lambda one: one[1]):
         kind, run, measure = kind_of(track), runs[place].run, main_measure(runs[place].run, track)
         heading = main_column(run, track).heading
-        tracks.append(
-            {
-                "name": track,
-                "title": kind.title,
-                "item": kind.item,
-                "main": heading,
-                "unit": measure.unit,
-                "better": measure.better,
-                "best": None if math.isnan(measure.best) else measure.best,
-                "notes": list(kind.report().notes(run)),
-                "physics": kind.physics(run.manifest.suite),
-            }
-        )
+        about = {"name": track, "title": kind.title, "item": kind.item, "main": heading}
+        about |= {"unit": measure.unit, "better": measure.better}
+        about["best"] = None if math.isnan(measure.best) else measure.best
+        about["notes"] = list(kind.report().notes(run))
+        tracks.append({**about, "physics": kind.physics(run.manifest.suite)})
         measures = {one.name: one for one in track_measures(track)}
-        columns += [
-            {
-                "id": _id(track, setting, column.heading),
-                "track": track,
-                "setting": setting,
-                "heading": column.heading,
-                "unit": measures[column.measure].unit,
-                "better": measures[column.measure].better,
-                "share": measures[column.measure].is_share,
-            }
-            for setting in values[place, track].values
-            for column in headline_columns(run, track)
-        ]
+        for setting in values[place, track].values:
+            for column in headline_columns(run, track):
+                of = measures[column.measure]
+                told = {"track": track, "setting": setting, "heading": column.heading}
+                told |= {"unit": of.unit, "better": of.better, "share": of.is_share}
+                columns.append({"id": _id(track, setting, column.heading), **told})
         main = _id(track, next(iter(values[place, track].values)), heading)
         ranked = [entry for entry in entries if main in numbers[entry.name]]
         ranges[track] = rank_ranges_of(track, ranked, runs, values)
@@ -583,10 +531,8 @@ def _write_samples(
     """
     packs = {kind: Pack(folder, kind, build) for kind in ("replays", "scenes", "questions")}
     scenes, numbered, tracks, outcomes, ways = (Numbers() for _ in range(5))
-    names = ("track", "key", "scene", "levels", "part", "question")
-    items: dict[str, list[Any]] = {name: [] for name in names}
-    names = ("entry", "item", "seed", "way", "outcome", "score")
-    rows: dict[str, list[int | None]] = {name: [] for name in names}
+    items = Columns("track", "key", "scene", "levels", "part", "question")
+    rows = Columns("entry", "item", "seed", "way", "outcome", "score")
     owner = {
         (number, track, entry.model.name): place
         for place, entry in enumerate(entries)
@@ -594,41 +540,32 @@ def _write_samples(
     }
     for number, one in enumerate(runs):
         for record in _records(one):
-            if (record.track, record.item) not in numbered:
-                known = one.sources.items.get(record.track)
+            track, item = record.track, record.item
+            if (track, item) not in numbered:
+                known = one.sources.items.get(track)
                 shown = known.shown(record) if known else None
-                question = (
-                    packs["questions"].add(dict(known.entry(shown))) if known and shown else -1
+                items.add(
+                    track=tracks.of(track),
+                    key=item,
+                    scene=scenes.of(record.scene),
+                    levels=list(record.levels),
+                    part=record.part,
+                    question=packs["questions"].add(dict(known.entry(shown)))
+                    if known and shown
+                    else -1,
                 )
-                about = (
-                    tracks.of(record.track),
-                    record.item,
-                    scenes.of(record.scene),
-                    list(record.levels),
-                    record.part,
-                    question,
-                )
-                for column, value in zip(items.values(), about, strict=True):
-                    column.append(value)
-            worth = values[number, record.track].samples.get(record.model, {})
-            score = worth.get((record.scene, record.item, record.seed, record.way.key))
-            sample = (
-                owner[number, record.track, record.model],
-                numbered.of((record.track, record.item)),
-                record.seed,
-                ways.of(record.way.key),
-                outcomes.of(record.outcome),
-                None if score is None else round(score * 10),
+            worth = values[number, track].samples.get(record.model, {})
+            score = worth.get((record.scene, item, record.seed, record.way.key))
+            rows.add(
+                entry=owner[number, track, record.model],
+                item=numbered.of((track, item)),
+                seed=record.seed,
+                way=ways.of(record.way.key),
+                outcome=outcomes.of(record.outcome),
+                score=None if score is None else round(score * 10),
             )
-            for of_row, told in zip(rows.values(), sample, strict=True):
-                of_row.append(told)
             packs["replays"].add(_replay(record, one.run))
-    is_drawn = False
-    for scene in scenes:
-        tasks = (one.sources.tasks.get(scene) for one in runs)
-        task = next((task for task in tasks if task is not None), None)
-        is_drawn |= task is not None
-        packs["scenes"].add(task and scene_entry(task.scene, task.candidates))
+    is_drawn = pack_scenes(scenes, [one.sources for one in runs], packs["scenes"])
     for pack in packs.values():
         pack.close()
     parts: dict[str, str] = {}
@@ -643,7 +580,7 @@ def _write_samples(
         "scenes": list(scenes),
         "starts": {kind: pack.starts for kind, pack in packs.items()},
         "parts": parts,
-        "lacking": "" if is_drawn else next((one.sources.lacking for one in runs), ""),
+        "lacking": "" if is_drawn else runs[0].sources.lacking,
     }
 
 
@@ -653,9 +590,9 @@ def _records(one: SiteRun) -> Iterator[Record]:
     """
     order = {name: place for place, name in enumerate(one.run.design.model_names)}
     places = read_places(one.run.path, one.run.design)
-    places = [place for place in places if place.track in one.tracks]
-    places.sort(key=lambda place: order.get(place.model, len(order)))
-    yield from records_at(one.run.path, places)
+    known = (place for place in places if place.track in one.tracks)
+    ordered = sorted(known, key=lambda place: order.get(place.model, len(order)))
+    yield from records_at(one.run.path, ordered)
 
 
 def _replay(record: Record, run: Run) -> dict[str, Any]:

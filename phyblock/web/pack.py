@@ -8,13 +8,13 @@ model said is ever read as code.
 from __future__ import annotations
 
 import base64
-import errno
 import hashlib
 import json
 import os
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -32,16 +32,22 @@ from phyblock.resources import cache_dir
 from phyblock.results.design import Design
 from phyblock.results.load import Run
 from phyblock.run.plan import recorded_dataset
-from phyblock.sim.pictures import PictureStyle
+from phyblock.stable import hex_digest
 from phyblock.tracks.base import kind_of, kinds
-from phyblock.tracks.measures import Listing, PageItems
-from phyblock.tracks.pictures import Drawing, ScenePictures, Workshop
+from phyblock.tracks.items import in_order
+from phyblock.tracks.measures import PageItems
+from phyblock.tracks.pictures import (
+    Drawing,
+    ScenePictures,
+    Workshop,
+    picture_style,
+    scene_entry,
+)
 
+_LAYOUT = 6
+"""Version of the scripts."""
 _CHUNK_CHARACTERS = 400_000
-_COUNTED = ("tp", "fp", "fn", "wrong")
 _DIGITS = 24
-_MOST_COPIED_BYTES = 256 * 2**20
-_NO_LINKS = (errno.EXDEV, errno.EPERM, errno.EMLINK, errno.ENOTSUP)
 _ONLY_IN_TABLES = ("errors", "blocks", *Score.FURTHER)
 IN_INDEX = frozenset(
     {
@@ -49,7 +55,7 @@ IN_INDEX = frozenset(
         *("variant", "outcome", "run"),
     }
 )
-"""Fields of records that the index has, or that are of no use on a page."""
+"""Fields of records that an index has, or that are of no use on a page."""
 
 
 class Pack:
@@ -99,6 +105,11 @@ def _write(folder: Path, name: str, build: str, text: str) -> None:
     (folder / f"{name}.js").write_text(script, encoding="ascii")
 
 
+def build_of(*told: object) -> str:
+    """Return a name for what a page shows: the same runs, written again, have the same files."""
+    return hex_digest(json.dumps([_LAYOUT, version("phyblock"), *told]))[:12]
+
+
 class Place(NamedTuple):
     """The place of the newest record of a sample in `records.jsonl` [bytes], and its sort keys."""
 
@@ -136,73 +147,75 @@ def read_places(folder: Path, design: Design) -> list[Place]:
     return sorted(newest.values(), key=order)
 
 
+def records_at(folder: Path, places: Iterable[Place]) -> Iterable[Record]:
+    """Read the records at these places, one at a time."""
+    return RecordLines(folder).at(place.start for place in places)
+
+
 class Numbers(dict[Any, int]):
     """Distinct values, numbered from 0 in the order in which they come."""
+
+    def __init__(self, values: Iterable[Any] = ()) -> None:
+        super().__init__({value: n for n, value in enumerate(dict.fromkeys(values))})
 
     def of(self, value: Any) -> int:
         """Return the number of a value, the next one where it is new."""
         return self.setdefault(value, len(self))
 
 
+class Columns(dict[str, list[Any]]):
+    """Lists of one length, by name."""
+
+    def __init__(self, *names: str) -> None:
+        super().__init__({name: [] for name in names})
+
+    def add(self, **row: Any) -> None:
+        """Append a value to each list."""
+        for name, value in row.items():
+            self[name].append(value)
+
+
 class SampleIndex:
-    """Columns over all samples, and over the items that they are about."""
+    """Columns over all samples of a run, and over the items that they are about."""
 
     def __init__(self, design: Design) -> None:
-        self._design = design
-        self._listings: dict[str, tuple[Listing, ...]] = {
-            track: kind_of(track).report().listings(design) for track in design.suite.tracks
-        }
-        self.scenes, self.items = Numbers(), Numbers()
+        tracks = design.suite.tracks
+        self._matcher = design.matcher
+        self._listings = {name: kind_of(name).report().listings(design) for name in tracks}
         # A model and a track without any record are in the run as well.
-        self._tracks, self._models = Numbers(), Numbers()
-        for numbers, names in (
-            (self._tracks, design.suite.tracks),
-            (self._models, design.model_names),
-        ):
-            for name in names:
-                numbers.of(name)
+        self._tracks, self._models = Numbers(tracks), Numbers(design.model_names)
+        self.scenes, self.items = Numbers(), Numbers()
         self._outcomes, self._subtasks, self._variants = Numbers(), Numbers(), Numbers()
-        self._about: dict[str, list[Any]] = {"scene": [], "levels": [], "subtask": []}
-        names = ("track", "model", "item", "seed", "variant", "outcome", "correct")
-        self._rows: dict[str, list[Any]] = {name: [] for name in names}
-        self._scores: dict[str, dict[str, list[float | None]]] = {
-            listing.name: {part: [] for part in _COUNTED}
-            for listings in self._listings.values()
-            for listing in listings
-        }
+        self._about = Columns("scene", "levels", "subtask")
+        self._rows = Columns("track", "model", "item", "seed", "variant", "outcome", "correct")
+        names = {listing.name: None for group in self._listings.values() for listing in group}
+        self._scores = {name: Columns("tp", "fp", "fn", "wrong") for name in names}
 
     def add(self, record: Record) -> None:
         """Append the sample of a record."""
         item = Item(record.track, record.item)
         if item not in self.items:
-            part = record.part
-            self._about["scene"].append(self.scenes.of(record.scene))
-            self._about["levels"].append(record.levels)
-            self._about["subtask"].append(None if part is None else self._subtasks.of(part))
-        row = {
-            "track": self._tracks.of(record.track),
-            "model": self._models.of(record.model),
-            "item": self.items.of(item),
-            "seed": record.seed,
-            "variant": self._variants.of(record.way.key),
-            "outcome": self._outcomes.of(record.outcome),
-            "correct": None if record.is_correct is None else int(record.is_correct),
-        }
-        for name, value in row.items():
-            self._rows[name].append(value)
+            part = None if record.part is None else self._subtasks.of(record.part)
+            self._about.add(scene=self.scenes.of(record.scene), levels=record.levels, subtask=part)
+        self._rows.add(
+            track=self._tracks.of(record.track),
+            model=self._models.of(record.model),
+            item=self.items.of(item),
+            seed=record.seed,
+            variant=self._variants.of(record.way.key),
+            outcome=self._outcomes.of(record.outcome),
+            correct=None if record.is_correct is None else int(record.is_correct),
+        )
         listings = {listing.name: listing for listing in self._listings.get(record.track, ())}
-        for setting, columns in self._scores.items():
-            listing = listings.get(setting)
+        for name, columns in self._scores.items():
+            listing = listings.get(name)
             listed = listing.score(record) if listing else None
-            counts: Sequence[float | None] = [None] * len(_COUNTED)
-            if listing and listed:
-                # A bit for each type of wrong step.
-                wrong = sum(
-                    1 << n for n, name in enumerate(listing.errors) if name in listed.errors
-                )
-                counts = (listed.tp, listed.fp, listed.fn, wrong)
-            for part, count in zip(_COUNTED, counts, strict=True):
-                columns[part].append(count)
+            if listing is None or listed is None:
+                columns.add(tp=None, fp=None, fn=None, wrong=None)
+                continue
+            # A bit for each type of wrong step.
+            wrong = sum(1 << n for n, name in enumerate(listing.errors) if name in listed.errors)
+            columns.add(tp=listed.tp, fp=listed.fp, fn=listed.fn, wrong=wrong)
 
     def columns(self, questions: Mapping[Item, int]) -> dict[str, Any]:
         """Return the index as the page takes it; `questions` numbers items that have a question."""
@@ -223,7 +236,7 @@ class SampleIndex:
                 ]
                 for track in self._tracks
             ],
-            "matcher": self._design.matcher,
+            "matcher": self._matcher,
             "items": {
                 "key": [item.key for item in self.items],
                 **self._about,
@@ -233,45 +246,31 @@ class SampleIndex:
         }
 
 
-def records_at(folder: Path, places: Iterable[Place]) -> Iterable[Record]:
-    """Read the records at these places, one at a time."""
-    return RecordLines(folder).at(place.start for place in places)
-
-
-def pack_prompts(folder: Path, pack: Pack) -> dict[str, int]:
-    """Pack the prompts of a run as they were sent, and number them by digest."""
-    return {
-        line.sha256: pack.add([message.fields() for message in line.messages])
-        for _, line in PromptLines(folder)
-    }
-
-
 def pack_samples(
     folder: Path,
     places: Iterable[Place],
     index: SampleIndex,
     pack: Pack,
-    prompts: Mapping[str, int],
+    prompts: Pack,
     pictures: Mapping[str, str],
 ) -> None:
-    """Pack the newest record of every sample, and add it to the index.
+    """Pack the newest record of every sample and the prompts as sent, and add it to the index.
 
     `pictures` are addresses of pictures as seen from the page, by the digest of their bytes.
     """
+    sent_as = {
+        line.sha256: prompts.add([message.fields() for message in line.messages])
+        for _, line in PromptLines(folder)
+    }
 
     def sent(prompt: SentPrompt | None) -> dict[str, Any] | None:
         if prompt is None:
             return None
-        images = [
-            {
-                "label": image.label,
-                "width_px": image.width_px,
-                "height_px": image.height_px,
-                "file": pictures.get(image.sha256),
-            }
-            for image in prompt.images
-        ]
-        return {"template": prompt.template, "n": prompts.get(prompt.messages), "images": images}
+        images = []
+        for image in prompt.images:
+            size = {"width_px": image.width_px, "height_px": image.height_px}
+            images.append({"label": image.label, **size, "file": pictures.get(image.sha256)})
+        return {"template": prompt.template, "n": sent_as.get(prompt.messages), "images": images}
 
     for record in records_at(folder, places):
         index.add(record)
@@ -282,10 +281,20 @@ def pack_samples(
             for score in record.scores
         ]
         if record.asked_turns:
-            entry["turns"] = [
-                {**turn.fields(), "prompt": sent(turn.prompt)} for turn in record.asked_turns
-            ]
+            turns = record.asked_turns
+            entry["turns"] = [{**turn.fields(), "prompt": sent(turn.prompt)} for turn in turns]
         pack.add(entry)
+
+
+def pack_scenes(scenes: Iterable[str], sources: Sequence[Sources], pack: Pack) -> bool:
+    """Pack the scenes of these names from the first source that has each; False if none has any."""
+    is_drawn = False
+    for scene in scenes:
+        tasks = (source.tasks.get(scene) for source in sources)
+        task = next((task for task in tasks if task is not None), None)
+        is_drawn |= task is not None
+        pack.add(task and scene_entry(task.scene, task.candidates))
+    return is_drawn
 
 
 def items_shown(
@@ -333,8 +342,76 @@ def open_sources(run: Run, data: Path | None) -> Sources:
         return Sources(lacking=f"Nothing can be drawn without the data set ({said}); {how}.")
 
 
-def images_of(run: Run) -> tuple[ImagesSpec, ...]:
-    """Return what a run's suite says of pictures, in every condition that has other ones."""
+def has_pictures(run: Run, places: Sequence[Place]) -> bool:
+    """True if a model's first record of any track tells of a picture that was sent."""
+    first = {(place.track, place.model): place for place in reversed(places)}
+    prompts = (record.prompt for record in records_at(run.path, first.values()))
+    return any(prompt is not None and prompt.images for prompt in prompts)
+
+
+def keep_pictures(
+    run: Run,
+    sources: Sources,
+    asked: Mapping[Item, Any],
+    places: Sequence[Place],
+    folder: Path,
+    earlier: Path,
+) -> dict[str, str]:
+    """Put the pictures that were sent into `folder`, unless `earlier` holds them; return their
+    names by the digest of their bytes.
+
+    Nothing is rendered: a picture that is not in the cache is left out. Files are hard links into
+    the cache where that is possible, else copies. Raises OSError where the disk refuses.
+    """
+    cache, names = cache_dir() / "pictures", {}
+    for image, key in _cached(run, sources, asked, places, cache):
+        name = f"{image.sha256[:_DIGITS]}.png"
+        path = folder / name
+        if not path.exists() and not (earlier / name).exists():
+            try:
+                os.link(cache / key[:2] / f"{key}.png", path)
+            except OSError:
+                atomic_write(path, image.data)
+        names[image.sha256] = name
+    return names
+
+
+def _cached(
+    run: Run,
+    sources: Sources,
+    asked: Mapping[Item, Any],
+    places: Sequence[Place],
+    cache: Path,
+) -> Iterator[tuple[Image, str]]:
+    """Yield what is at hand of the pictures of a run, with names in the cache, "" outside of it."""
+    for images in _images_of(run):
+        shop, style = Workshop(1, cache), picture_style(images)
+        goals = ScenePictures(shop, images)
+        for task in _tasks_shown(run, sources.tasks):
+            found, are_real = goals.outline(task)
+            if are_real:
+                is_drawn = images.source == "render"
+                yield from zip(
+                    found, goals.keys(task) if is_drawn else [""] * len(found), strict=True
+                )
+        views = {name: kind.report().episodes for name, kind in kinds().items()}
+        for record in records_at(run.path, (place for place in places if views.get(place.track))):
+            view, scene = views[record.track], sources.tasks.get(record.scene)
+            if view is None or scene is None or record.prompt is None:
+                continue
+            for key in view.state_keys(record, scene, style):
+                if (state := shop.kept(Drawing("", key, bytes))) is not None:
+                    yield state, key
+        for track, items in sources.items.items():
+            pictures = items.pictures(cache, style)
+            for shown in (one for item, one in asked.items() if item.track == track):
+                outlined, are_real = pictures.outline(shown)
+                if are_real:
+                    yield from zip(outlined, pictures.keys(shown), strict=True)
+
+
+def _images_of(run: Run) -> Iterable[ImagesSpec]:
+    """What a run's suite says of pictures, in every condition that has other ones."""
     vary, images = run.design.suite.vary, run.section("images", ImagesSpec)
     found = {images: None}
     for variant in vary.variants:
@@ -345,95 +422,21 @@ def images_of(run: Run) -> tuple[ImagesSpec, ...]:
             if path[:1] == ("images",)
         }
         found[with_values(images, values)] = None
-    return tuple(found)
+    return found
 
 
-def pictures_sent(folder: Path, places: Sequence[Place]) -> bool:
-    """True if a model's first record of any track tells of a picture that was sent."""
-    first = {(place.track, place.model): place for place in reversed(places)}
-    return any(
-        record.prompt is not None and record.prompt.images
-        for record in records_at(folder, first.values())
-    )
-
-
-def states_sent(
-    folder: Path, places: Iterable[Place], tasks: Mapping[str, AssemblyTask], style: PictureStyle
-) -> Iterator[str]:
-    """Yield names in the cache of the pictures that single turns of episodes were sent."""
-    views = {name: kind.report().episodes for name, kind in kinds().items()}
-    for record in records_at(folder, (place for place in places if views.get(place.track))):
-        view, task = views[record.track], tasks.get(record.scene)
-        if view is not None and task is not None and record.prompt is not None:
-            yield from view.state_keys(record, task, style)
-
-
-class PictureShelf:
-    """A folder of pictures named by digest: `names` of those that are there, `is_whole` if all are.
-
-    Nothing is rendered: a picture that is not in the cache is left out. Pictures are hard links
-    into the cache; on a file system where that is not possible they are copied, up to 256 MiB.
-    Methods raise OSError where the disk refuses.
+def _tasks_shown(run: Run, tasks: Mapping[str, AssemblyTask]) -> Iterator[AssemblyTask]:
+    """Yield scenes that were asked about as such, whose names are those of the items, in every
+    form in which they were shown.
     """
-
-    def __init__(self, folder: Path, earlier: Path) -> None:
-        """Put pictures into `folder` unless `earlier` holds them."""
-        self.names: dict[str, str] = {}
-        self.is_whole = True
-        self._folder, self._earlier = folder, earlier
-        self._cache = cache_dir() / "pictures"
-        self._room = _MOST_COPIED_BYTES
-
-    def add_scenes(self, tasks: Iterable[AssemblyTask], images: ImagesSpec) -> None:
-        """Keep goals and candidates of tasks as they were shown, drawn as `images` says."""
-        pictures = ScenePictures(Workshop(1, self._cache), images)
-        for task in tasks:
-            found, are_real = pictures.outline(task)
-            keys = pictures.keys(task) if images.source == "render" else [""] * len(found)
-            self._keep(found if are_real else None, keys)
-
-    def add_items(self, items: PageItems, asked: Iterable[Any], style: PictureStyle) -> None:
-        """Keep the pictures of what was asked about."""
-        pictures = items.pictures(self._cache, style)
-        for shown in asked:
-            found, are_real = pictures.outline(shown)
-            self._keep(found if are_real else None, pictures.keys(shown) if are_real else ())
-
-    def add_kept(self, keys: Iterable[str]) -> None:
-        """Keep pictures by their names in the cache."""
-        shop = Workshop(1, self._cache)
-        for key in dict.fromkeys(keys):
-            found = shop.kept(Drawing("", key, bytes))
-            self._keep(None if found is None else (found,), (key,))
-
-    def _keep(self, images: Sequence[Image] | None, keys: Sequence[str]) -> None:
-        if images is None:
-            self.is_whole = False
-            return
-        for image, key in zip(images, keys, strict=True):
-            name = f"{image.sha256[:_DIGITS]}.png"
-            path, source = self._folder / name, self._cache / key[:2] / f"{key}.png"
-            is_there = (self._earlier / name).exists() or path.exists()
-            if is_there or self._put(path, image.data, source if key else None):
-                self.names[image.sha256] = name
-            else:
-                self.is_whole = False
-
-    def _put(self, path: Path, data: bytes, source: Path | None) -> bool:
-        """Link or copy a picture; False where it would have to be copied and there is no room."""
-        if source is not None and source.is_file():
-            try:
-                os.link(source, path)
-            except OSError as error:
-                if error.errno not in _NO_LINKS:
-                    raise
-            else:
-                return True
-        self._room -= len(data)
-        if self._room < 0:
-            return False
-        atomic_write(path, data)
-        return True
+    asked = run.records[run.records["item"] == run.records["scene"]]
+    forms = asked["shown"].map(json.dumps)
+    for scene, form in dict.fromkeys(zip(asked["scene"], forms, strict=True)):
+        task, shown = tasks.get(scene), json.loads(form)
+        if task is not None and shown:
+            yield in_order(task, shown["order"], tasks.get(shown["goal"]))
+        elif task is not None:
+            yield task
 
 
 def asset(name: str) -> bytes:

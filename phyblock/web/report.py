@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
-import hashlib
-import json
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from importlib.metadata import version
 from itertools import groupby
 from pathlib import Path
 from typing import Any, Literal
@@ -18,22 +14,18 @@ from urllib.parse import urlencode
 
 import pandas as pd
 
-from phyblock.data import AssemblyTask
-from phyblock.files import OutFolder, writing
+from phyblock.files import OutFolder, digest_of_file, writing
 from phyblock.records.files import PROMPTS, RECORDS, STOPPED, read_stopped
 from phyblock.records.manifest import MANIFEST
 from phyblock.results.compare import compare_models
 from phyblock.results.design import WITHOUT_REPLY
 from phyblock.results.estimates import (
-    Floor,
     Value,
-    blind_baselines,
     headline_columns,
     headline_floors,
     headline_of,
     main_column,
     main_measure,
-    track_measures,
 )
 from phyblock.results.figures import figure_files, figure_titles, write_figures
 from phyblock.results.load import Run
@@ -41,25 +33,20 @@ from phyblock.results.tables import TablesWritten, coverage_frame, table_files
 from phyblock.results.text import NO_VALUE, captioned, number, spread
 from phyblock.run.store import run_folder
 from phyblock.tracks.base import kind_of
-from phyblock.tracks.items import in_order
-from phyblock.tracks.measures import Better, HeadlineColumn
-from phyblock.tracks.pictures import kit, picture_style, scene_entry
+from phyblock.tracks.pictures import kit
 from phyblock.web.pack import (
-    Item,
     Pack,
-    PictureShelf,
-    Place,
     SampleIndex,
     Sources,
+    build_of,
     fill,
-    images_of,
+    has_pictures,
     items_shown,
+    keep_pictures,
     open_sources,
-    pack_prompts,
     pack_samples,
-    pictures_sent,
+    pack_scenes,
     read_places,
-    states_sent,
     write_script,
 )
 
@@ -73,23 +60,14 @@ _STYLES = ("base.css", "results.css", "samples.css", "reply.css", "matrix.css", 
 REPORT_FILE = "report.html"
 _FOLDER = "report"
 _PICTURES = f"{_FOLDER}/pictures/"
-_LAYOUT = 5
-"""Version of the scripts' folder; those of the first were not listed as ours."""
 _NOT_SHOWN = ("table1",)
 """Tables that a headline table replaces."""
 _MOST_NAMED = 6
 _MOST_CHARACTERS = 160
-_NOT_BETTER = "†"
-_BELOW = "Below each value stands its 95 % interval, from leaving out each base scene in turn."
-_SEEDS = (
-    "Values pool {} seeds; mean ± standard deviation over single seeds stands below the main one."
-)
+_INTERVAL = "Below the first value stands its 95 % interval, from leaving out each base scene."
+_SEEDS = "Values pool {} seeds, whose mean ± standard deviation stands there as well."
 _RANKS = (
     "Rank: the places that a model may have, by paired tests of all models with Holm's correction."
-)
-_FLOOR = (
-    "The floor is the best that is reached without seeing the goal; "
-    f"{_NOT_BETTER} marks intervals that are not wholly better than it."
 )
 
 
@@ -126,10 +104,9 @@ class Row:
 
 @dataclass(frozen=True)
 class Headline:
-    """A headline table: `columns` head the cells, `references` are marked in every strip.
-
-    The first column is what models are ranked by. Where it `has_strips`, as a share has, they draw
-    it from 0 to 100 %.
+    """A headline table, whose first column is what models are ranked by: models, baselines,
+    values for scale. Where it `has_strips`, as a share has, they draw it from 0 to 100 %, with
+    `references` marked in each.
     """
 
     track: str
@@ -147,106 +124,73 @@ class Headline:
 
 
 def headlines(run: Run) -> list[Headline]:
-    """Return the headline table of every track: models by the main value, baselines, references."""
+    """Return the headline table of every track."""
     return [_headline(run, track) for track in run.design.suite.tracks]
 
 
 def _headline(run: Run, track: str) -> Headline:
-    kind, report = kind_of(track), kind_of(track).report()
+    kind, report, measure = kind_of(track), kind_of(track).report(), main_measure(run, track)
     main = main_column(run, track).heading
     columns = sorted(headline_columns(run, track), key=lambda column: column.heading != main)
-    floors, references = headline_floors(run, track), report.references(run)
-    published = report.published(run)
-    rows = _model_rows(run, track, columns, floors, published)
-    scales: dict[str, Mapping[str, float]] = {}
-    if floors:
-        names = ", ".join(dict.fromkeys(floor.name for floor in floors.values()))
-        scales[f"Floor: {names}"] = {heading: floor.value for heading, floor in floors.items()}
-    for name, numbers in {**scales, **references}.items():
-        cells = [_plain(numbers.get(column.heading)) for column in columns]
-        rows.append(Row(name, "reference", (*cells, *([Cell("")] if published else []))))
-    seeds = len(run.design.suite.seeds)
-    notes = [
-        *report.notes(run),
-        *([report.reference_note] if report.reference_note else []),
-        *([_RANKS] if any(row.rank for row in rows) else []),
-        *([_SEEDS.format(seeds)] if seeds > 1 else []),
-        *([_FLOOR] if floors else []),
-        *([_BELOW] if any(cell.below for row in rows for cell in row.cells) else []),
-    ]
-    return Headline(
-        track,
-        captioned(kind.title, (*report.showing(run), *run.varied_words)),
-        (*(column.heading for column in columns), *(["Published"] if published else [])),
-        tuple(rows),
-        (" ".join(notes),),
-        main_measure(run, track).is_share,
-        {
-            name.partition(" ")[0].rstrip(","): numbers[main]
-            for name, numbers in references.items()
-            if main in numbers
-        },
-    )
-
-
-def _model_rows(
-    run: Run,
-    track: str,
-    columns: Sequence[HeadlineColumn],
-    floors: Mapping[str, Floor],
-    published: Mapping[str, float],
-) -> list[Row]:
-    """Models, then baselines, the best first; the first column is the main one."""
-    values, measures = headline_of(run, track), {one.name: one for one in track_measures(track)}
-    better = [measures[column.measure].better for column in columns]
-    queries = [samples_query(run, track, column.cell) for column in columns]
-    own_floors = blind_baselines(run, track)
+    headings = tuple(column.heading for column in columns)
+    values, references = headline_of(run, track), report.references(run)
     ranks, lacking = rank_texts(run, track), shortfalls(run, track)
     rules = {model.name for model in run.manifest.models if model.is_baseline}
     rows = []
     for name in run.design.model_names:
         of_model = urlencode({"model": name})
-        found = [values.get((name, column.heading)) for column in columns]
-        cells = []
-        for place, (column, value) in enumerate(zip(columns, found, strict=True)):
-            floor = None if name in own_floors else floors.get(column.heading)
-            query = f"{queries[place]}&{of_model}"
-            cells.append(_cell(value, floor, better[place], query, seeds=not place))
-        if published:
-            cells.append(_plain(published.get(name), NO_VALUE))
-        strip, main = None, found[0]
-        if main and not math.isnan(main.value) and measures[columns[0].measure].is_share:
-            ends = (main.value, main.value) if math.isnan(main.lo) else (main.lo, main.hi)
-            strip = (main.value, *ends)
-        query = f"{urlencode({'track': track})}&{of_model}"
-        kind: Literal["model", "baseline"] = "baseline" if name in rules else "model"
+        queries = [f"{samples_query(run, track, column.cell)}&{of_model}" for column in columns]
+        found = [values.get((name, heading)) for heading in headings]
+        cells = tuple(map(_cell, found, queries, (True, *[False] * len(columns))))
+        strip, first = None, found[0]
+        if first and not math.isnan(first.value) and measure.is_share:
+            ends = (first.value, first.value) if math.isnan(first.lo) else (first.lo, first.hi)
+            strip = (first.value, *ends)
         told = ranks.get(name, ""), lacking.get(name, "")
-        rows.append(Row(name, kind, tuple(cells), strip, *told, query))
+        query = f"{urlencode({'track': track})}&{of_model}"
+        rows.append(Row(name, "baseline" if name in rules else "model", cells, strip, *told, query))
+    sign = 1 if measure.better == "lower" else -1
+    rows.sort(
+        key=lambda row: (
+            row.kind != "model",
+            row.cells[0].value is None,
+            sign * (row.cells[0].value or 0.0),
+        )
+    )
+    floors = headline_floors(run, track)
+    names = ", ".join(dict.fromkeys(floor.name for floor in floors.values()))
+    scales = {f"Floor: {names}": {heading: floor.value for heading, floor in floors.items()}}
+    for name, numbers in {**(scales if floors else {}), **references}.items():
+        given = (numbers.get(heading) for heading in headings)
+        plain = (Cell("") if value is None else Cell(number(value), value) for value in given)
+        rows.append(Row(name, "reference", tuple(plain)))
+    seeds = len(run.design.suite.seeds)
+    notes = [
+        *report.notes(run),
+        *([report.reference_note] if report.reference_note else []),
+        *([_RANKS] if ranks else []),
+        *([_INTERVAL] if any(row.cells[0].below for row in rows) else []),
+        *([_SEEDS.format(seeds)] if seeds > 1 else []),
+    ]
+    marks = {
+        name.partition(" ")[0].rstrip(","): numbers[main]
+        for name, numbers in references.items()
+        if main in numbers
+    }
+    title = captioned(kind.title, (*report.showing(run), *run.varied_words))
+    note = (" ".join(notes),)
+    return Headline(track, title, headings, tuple(rows), note, measure.is_share, marks)
 
-    def place_of(row: Row) -> tuple[bool, bool, float]:
-        value = row.cells[0].value
-        number = value or 0.0
-        return row.kind != "model", value is None, number if better[0] == "lower" else -number
 
-    return sorted(rows, key=place_of)
-
-
-def _cell(
-    value: Value | None, floor: Floor | None, better: Better, query: str, *, seeds: bool
-) -> Cell:
+def _cell(value: Value | None, query: str, is_main: bool) -> Cell:
     if value is None or math.isnan(value.value):
         return Cell(NO_VALUE, query=query)
-    below = [] if math.isnan(value.lo) else [f"{number(value.lo)} to {number(value.hi)}"]
-    if below and floor is not None and not floor.is_below(value, better):
-        below[0] += f" {_NOT_BETTER}"
-    if seeds and not math.isnan(value.sd):
+    below = []
+    if is_main and not math.isnan(value.lo):
+        below.append(f"{number(value.lo)} to {number(value.hi)}")
+    if is_main and not math.isnan(value.sd):
         below.append(f"seeds {spread(value.mean, value.sd)}")
     return Cell(number(value.value), value.value, tuple(below), query)
-
-
-def _plain(value: float | None, blank: str = "") -> Cell:
-    """Return a number with nothing under it."""
-    return Cell(blank) if value is None else Cell(number(value), value)
 
 
 def rank_texts(run: Run, track: str) -> dict[str, str]:
@@ -290,83 +234,52 @@ def _part_groups(run: Run, track: str) -> dict[str, dict[str, Any]]:
 
 def cautions(run: Run) -> tuple[str, ...]:
     """Return what a reader must know before any number, the gravest first; () for a whole run."""
-    table, stopped = coverage_frame(run), read_stopped(run.path)
+    table, stopped, told = coverage_frame(run), read_stopped(run.path), []
     expected, recorded = int(table["expected"].sum()), int(table["recorded"].sum())
-    told = [*_unanswered(run, table, stopped.models)]
     if recorded < expected:
-        text = f"This run is not finished: {recorded:,} of {expected:,} samples have a record."
-        told.insert(0, text)
+        told.append(
+            f"This run is not finished: {recorded:,} of {expected:,} samples have a record."
+        )
+    tracks = run.design.suite.tracks
+    lacking = [
+        f"{model}{f', {kind_of(track).title}' if len(tracks) > 1 else ''}: {said}."
+        for track in tracks
+        for model, said in shortfalls(run, track).items()
+    ]
+    told += lacking[:_MOST_NAMED]
+    if (rest := len(lacking) - _MOST_NAMED) > 0:
+        told.append(f"And {rest} more lack replies: see the table of coverage.")
     if stopped.run:
         told.append(f"The last session was stopped: {_short(stopped.run)}.")
     if run.is_cut:
         told.append("The last line of records.jsonl was cut off and is ignored.")
     limit, items = run.manifest.limit, run.design.items
-    if cut := [name for name in run.design.suite.tracks if limit and items.get(name, 0) >= limit]:
-        kinds = [(items[name], kind_of(name)) for name in cut]
-        counts = ", ".join(f"{n:,} {kind.item}s of {kind.title}" for n, kind in kinds)
+    if cut := [name for name in tracks if limit and items.get(name, 0) >= limit]:
+        asked = [(items[name], kind_of(name)) for name in cut]
+        counts = ", ".join(f"{n:,} {kind.item}s of {kind.title}" for n, kind in asked)
         told.append(f"A limit was set: {counts} were asked about, not all of the suite.")
     return tuple(told)
 
 
-def _unanswered(run: Run, table: pd.DataFrame, stopped: Mapping[str, str]) -> Iterator[str]:
-    """Yield sentences on models that lack replies: those without any first."""
-    found: list[tuple[float, str]] = []
-    reasons = _reasons(run)
-    counted = "left out of its values" if run.design.outcomes_left_out else "counted as wrong"
-    for model, rows in table.groupby("model", sort=False):
-        names = ("expected", "api_error", "missing", "not_run")
-        expected, failed, missing, not_run = (int(rows[name].sum()) for name in names)
-        answered = expected - failed - missing - not_run
-        if answered == expected:
-            continue
-        parts = []
-        if model in stopped:
-            parts.append(f"stopped ({_short(stopped[str(model)])})")
-        if failed:
-            many = "the one call" if failed == 1 else f"all {failed:,} calls"
-            if answered:
-                many = "1 call" if failed == 1 else f"{failed:,} calls"
-            reason, times = reasons.get(str(model), ("", failed))
-            often = "" if times == failed else f", {times:,} times"
-            parts.append(f"{many} failed{f' ({reason}{often})' if reason else ''}")
-        if missing:
-            parts.append(f"{missing:,} of {expected:,} replies are missing, {counted}")
-        if not_run:
-            parts.append(f"{not_run:,} of {expected:,} samples were not asked")
-        found.append((answered / expected, f"{model}: {'; '.join(parts)}."))
-    texts = [text for _, text in sorted(found, key=lambda one: one[0])]
-    yield from texts[:_MOST_NAMED]
-    if (rest := len(texts) - _MOST_NAMED) > 0:
-        yield f"And {rest} more models lack replies: see the table of coverage."
-
-
 def shortfalls(run: Run, track: str) -> Mapping[str, str]:
     """Return by model that lacks replies in a track how many it has, and why it has no more."""
-    table, reasons = coverage_frame(run), _reasons(run, track)
-    stopped = read_stopped(run.path).models
-    found = {}
-    for row in table[table["track"] == track].to_dict("records"):
-        answered = row["recorded"] - sum(row[name] for name in WITHOUT_REPLY)
-        if answered < row["expected"]:
-            model = str(row["model"])
-            why = _short(stopped[model]) if model in stopped else reasons.get(model, ("",))[0]
-            text = f"{answered:,} of {row['expected']:,} answered"
-            found[model] = f"{text}: {why}" if why else text
-    return found
-
-
-def _reasons(run: Run, track: str = "") -> Mapping[str, tuple[str, int]]:
-    """Return by model the most frequent reason of failed calls, and how often it was given."""
-    rows = run.records.dropna(subset=["error_kind"])
-    rows = rows[rows["track"] == track] if track else rows
-    counted: dict[str, Counter[str]] = {}
-    for row in rows[["model", "error_kind", "error_status", "error_message"]].to_dict("records"):
+    table, stopped = coverage_frame(run), read_stopped(run.path).models
+    failed = run.records[run.records["error_kind"].notna() & (run.records["track"] == track)]
+    reasons: dict[str, Counter[str]] = {}
+    for row in failed[["model", "error_kind", "error_status", "error_message"]].to_dict("records"):
         status = row["error_status"]
         message = " ".join(str(row["error_message"] or row["error_kind"]).split())
         if not pd.isna(status) and str(status) not in message:
             message = f"HTTP {status}: {message}"
-        counted.setdefault(str(row["model"]), Counter())[_short(message)] += 1
-    return {model: reasons.most_common(1)[0] for model, reasons in counted.items()}
+        reasons.setdefault(str(row["model"]), Counter())[_short(message)] += 1
+    found = {}
+    for row in table[table["track"] == track].to_dict("records"):
+        model, answered = str(row["model"]), row["recorded"] - sum(row[n] for n in WITHOUT_REPLY)
+        if answered < row["expected"]:
+            why = [_short(stopped[model])] if model in stopped else []
+            why = why or [reason for reason, _ in reasons.get(model, Counter()).most_common(1)]
+            found[model] = ": ".join([f"{answered:,} of {row['expected']:,} answered", *why])
+    return found
 
 
 def _short(message: str) -> str:
@@ -375,28 +288,9 @@ def _short(message: str) -> str:
     return text if len(text) <= _MOST_CHARACTERS else f"{text[:_MOST_CHARACTERS].rstrip()} …"
 
 
-@dataclass(frozen=True)
-class PageWritten:
-    """The page, all `files` of it and of figures, and the `pictures` that were sent, beside it.
-
-    `is_whole` says that nothing was lacking that a later writing might find.
-    """
-
-    path: Path
-    files: tuple[Path, ...]
-    pictures: tuple[Path, ...]
-    is_whole: bool
-
-
 def write_report(written: TablesWritten, data: Path | None = None, *, figures: bool = True) -> Path:
-    """Write figures and page as `write_page` does, and return the page's path."""
-    return write_page(written, data, figures=figures).path
-
-
-def write_page(
-    written: TablesWritten, data: Path | None = None, *, figures: bool = True
-) -> PageWritten:
-    """Write figures, `report.html` and `report/` of a run whose tables were written.
+    """Write figures, `report.html` and `report/` of a run whose tables were written; return the
+    page.
 
     The page draws goals, candidates and assemblies from the scenes: `data` is where the data set is
     now, if it has moved; where it cannot be read, the page says so and shows the rest. Pictures
@@ -410,19 +304,18 @@ def write_page(
     out.check(page_files())
     with out.alone(), writing(run.path / REPORT_FILE):
         drawn = write_figures(run) if figures else ()
-        build = _build(run, sources)
+        paths = [run.path / name for name in (MANIFEST, RECORDS, PROMPTS, STOPPED)]
+        build = build_of(sources.lacking, [digest_of_file(p) for p in paths if p.exists()])
         own = f"{_FOLDER}/{build}/"
         out.claim([REPORT_FILE])
         with out.making(own) as new:
-            pictures, is_whole = _write_data(run, sources, out, new, build)
-            scripts = [run.path / own / script.name for script in new.iterdir()]
+            _write_data(run, sources, out, new, build)
             page = _page(written, drawn, build)
         (path,) = out.write({REPORT_FILE: page})
         # A page of an earlier build that is still open says that it was written again.
         lasting = (own, _PICTURES)
         out.remove(name for name in out.names(f"{_FOLDER}/") if not name.startswith(lasting))
-    kept = tuple(run.path / address for address in pictures.values())
-    return PageWritten(path, (*drawn, *scripts, path), kept, is_whole and not sources.lacking)
+    return path
 
 
 def files_of(*, page: bool) -> tuple[str, ...]:
@@ -435,34 +328,27 @@ def page_files() -> tuple[str, ...]:
     return (REPORT_FILE, f"{_FOLDER}/", _PICTURES)
 
 
-def _build(run: Run, sources: Sources) -> str:
-    """Return a name for what the page shows: the same run, written again, has the same files."""
-    digest = hashlib.sha256(f"{_LAYOUT} {version('phyblock')} {sources.lacking}".encode())
-    for name in (MANIFEST, RECORDS, PROMPTS, STOPPED):
-        with contextlib.suppress(FileNotFoundError), (run.path / name).open("rb") as file:
-            while chunk := file.read(2**20):
-                digest.update(chunk)
-    return digest.hexdigest()[:12]
+def report_files(folder: Path) -> dict[str, Path]:
+    """Return the report's page and what it loads, by their names below the run folder."""
+    found = [folder / REPORT_FILE]
+    for place in (_FOLDER, "figures"):
+        found += (path for path in sorted((folder / place).rglob("*")) if path.is_file())
+    return {path.relative_to(folder).as_posix(): path for path in found if not path.is_symlink()}
 
 
-def _write_data(
-    run: Run, sources: Sources, out: OutFolder, new: Path, build: str
-) -> tuple[dict[str, str], bool]:
-    """Write the scripts; return the pictures as `_keep_pictures` does."""
-    kinds = ("records", "scenes", "questions", "prompts")
-    packs = {kind: Pack(new, kind, build) for kind in kinds}
-    places = read_places(run.path, run.design)
+def _write_data(run: Run, sources: Sources, out: OutFolder, new: Path, build: str) -> None:
+    """Write the scripts and the pictures."""
+    packs = {kind: Pack(new, kind, build) for kind in ("records", "scenes", "questions", "prompts")}
+    places, tracks = read_places(run.path, run.design), run.design.suite.tracks
     asked = items_shown(run.path, places, sources.items)
     pictures: dict[str, str] = {}
-    is_whole = True
-    if pictures_sent(run.path, places):
-        pictures, is_whole = _keep_pictures(run, sources, asked, places, out)
-    prompts = pack_prompts(run.path, packs["prompts"])
+    if has_pictures(run, places):
+        with out.making(_PICTURES) as folder:
+            kept = keep_pictures(run, sources, asked, places, folder, out.path / _PICTURES)
+        pictures = {digest: f"{_PICTURES}{name}" for digest, name in kept.items()}
     index = SampleIndex(run.design)
-    pack_samples(run.path, places, index, packs["records"], prompts, pictures)
-    for scene in index.scenes if sources.tasks else ():
-        task = sources.tasks.get(scene)
-        packs["scenes"].add(task and scene_entry(task.scene, task.candidates))
+    pack_samples(run.path, places, index, packs["records"], packs["prompts"], pictures)
+    pack_scenes(index.scenes if sources.tasks else (), [sources], packs["scenes"])
     questions = {
         item: packs["questions"].add(dict(sources.items[item.track].entry(shown)))
         for item, shown in asked.items()
@@ -471,7 +357,7 @@ def _write_data(
         pack.close()
     names: dict[str, str] = {}
     groups: dict[str, dict[str, Any]] = {}
-    for track in run.design.suite.tracks:
+    for track in tracks:
         names |= kind_of(track).report().part_names
         groups |= _part_groups(run, track)
     content: dict[str, Any] = {
@@ -483,45 +369,9 @@ def _write_data(
         "subtask_names": names,
         "subtask_groups": groups,
         "cautions": cautions(run),
-        "shortfalls": {track: shortfalls(run, track) for track in run.design.suite.tracks},
+        "shortfalls": {track: shortfalls(run, track) for track in tracks},
     }
     write_script(new, "index", build, content)
-    return pictures, is_whole
-
-
-def _keep_pictures(
-    run: Run,
-    sources: Sources,
-    asked: Mapping[Item, Any],
-    places: Sequence[Place],
-    out: OutFolder,
-) -> tuple[dict[str, str], bool]:
-    """Return addresses of the pictures at hand, from the page, by digest; and if all are."""
-    with out.making(_PICTURES) as new:
-        shelf = PictureShelf(new, out.path / _PICTURES)
-        for images in images_of(run):
-            style = picture_style(images)
-            if sources.tasks:
-                shelf.add_scenes(_scenes(run, sources.tasks), images)
-                shelf.add_kept(states_sent(run.path, places, sources.tasks, style))
-            for track, items in sources.items.items():
-                shown = [one for item, one in asked.items() if item.track == track]
-                shelf.add_items(items, shown, style)
-    return {digest: f"{_PICTURES}{name}" for digest, name in shelf.names.items()}, shelf.is_whole
-
-
-def _scenes(run: Run, tasks: Mapping[str, AssemblyTask]) -> Iterator[AssemblyTask]:
-    """Yield scenes that were asked about as such, in every form in which they were shown: their
-    names are those of the items.
-    """
-    asked = run.records[run.records["item"] == run.records["scene"]]
-    forms = asked["shown"].map(json.dumps)
-    for scene, form in dict.fromkeys(zip(asked["scene"], forms, strict=True)):
-        task, shown = tasks.get(scene), json.loads(form)
-        if task is not None and shown:
-            yield in_order(task, shown["order"], tasks.get(shown["goal"]))
-        elif task is not None:
-            yield task
 
 
 def _page(written: TablesWritten, figures: Sequence[Path], build: str) -> str:
@@ -530,26 +380,25 @@ def _page(written: TablesWritten, figures: Sequence[Path], build: str) -> str:
     manifest, design, table = run.manifest, run.design, coverage_frame(run)
     answered = int(table["recorded"].sum() - table[list(WITHOUT_REPLY)].sum().sum())
     expected = int(table["expected"].sum())
-    done = f"{answered:,}" if answered == expected else f"{answered:,} of {expected:,}"
     facts = {
         "Data": manifest.dataset.name if manifest.dataset else "",
         "Scenes": f"{design.scenes:,}",
         "Models": f"{len(design.model_names)}",
         "Seeds": f"{len(design.suite.seeds)}",
-        "Samples": done,
+        "Samples": f"{answered:,}" if answered == expected else f"{answered:,} of {expected:,}",
         "Made": manifest.created[:10],
         "phyblock": manifest.versions.get("phyblock"),
         "Run": manifest.identity[:12],
     }
-    # A suite that was cut short still speaks of all that is in it.
-    about = f"The whole suite: {design.suite.description}" if manifest.limit else ""
+    about = design.suite.description
     spans = partial(groupby, key=lambda column: column.group)
     return fill(
         "report.html.j2",
         _SCRIPTS,
         _STYLES,
         title=design.suite.name or run.path.name,
-        about=about if design.suite.description and about else design.suite.description,
+        # A suite that was cut short still speaks of all that is in it.
+        about=f"The whole suite: {about}" if manifest.limit and about else about,
         facts=[(name, text) for name, text in facts.items() if text],
         cautions=cautions(run),
         models=frozenset(design.model_names),

@@ -33,8 +33,6 @@ _SHARED = (
     *("ending.js", "play.js"),
 )
 _KINDS = {"css": "text/css", "js": "text/javascript", "html": "text/html", "svg": "image/svg+xml"}
-
-
 HOST = "127.0.0.1"
 LARGEST_BODY_BYTES = 16 * 1024
 """Of a request; an answer is some hundred bytes long."""
@@ -44,8 +42,13 @@ _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-_FRAMED_POLICY = "frame-ancestors 'none'"
-"""Of files that bring a policy of their own."""
+_HEADERS = {
+    "X-Content-Type-Options": "nosniff",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-store",
+}
 _USED = (
     b"This address opens the page once, and was opened already. Open the one in the terminal. "
     b"If it was not you who opened it, end the session with Ctrl-C and give the command again."
@@ -77,46 +80,29 @@ def default_consent(*, offline: bool) -> str:
 class Server:
     """A server of one session until it is closed; a context manager.
 
-    `address` is what a browser opens, with a token that nobody can guess. Raises SpecError for a
-    port that is taken.
+    `address` is what a browser opens, with a token that nobody can guess; `one_time_address` leads
+    on to it when it is opened first, and never again. `finished` is set by the page when the person
+    is through. Raises SpecError for a port that is taken.
     """
 
     def __init__(self, session: PlaySession, port: int = 0) -> None:
+        self.finished = threading.Event()
         self._session = session
-        self._token = secrets.token_urlsafe(24)
-        self._code = secrets.token_urlsafe(24)
+        self._token, self._code = secrets.token_urlsafe(24), secrets.token_urlsafe(24)
         self._code_used = threading.Lock()
         self._assets = assets("served.js")
         self._files: Mapping[str, Path] = {}
-        self.finished = threading.Event()
-        """Set by the page when the person is through."""
         handler = type("Handler", (_Handler,), {"server_of": self})
         try:
             self._http = _Listener((HOST, port), handler)
         except OSError as error:
             problem = Problem("--port", f"cannot be used: {reason_of(error)}", found=str(port))
             raise SpecError(problem) from error
+        self.port = int(self._http.server_address[1])
+        self.hosts = (f"{HOST}:{self.port}", f"localhost:{self.port}")
+        self.address = f"http://{self.hosts[0]}/{self._token}/"
+        self.one_time_address = f"http://{self.hosts[0]}/{self._code}/"
         self._thread = threading.Thread(target=self._http.serve_forever, daemon=True)
-
-    @property
-    def port(self) -> int:
-        """The port that it listens on."""
-        return int(self._http.server_address[1])
-
-    @property
-    def hosts(self) -> tuple[str, ...]:
-        """The names by which a browser calls this server."""
-        return (f"{HOST}:{self.port}", f"localhost:{self.port}")
-
-    @property
-    def address(self) -> str:
-        """The address of the page."""
-        return f"http://{HOST}:{self.port}/{self._token}/"
-
-    @property
-    def one_time_address(self) -> str:
-        """An address that leads on to the page when it is opened first, and never again."""
-        return f"http://{HOST}:{self.port}/{self._code}/"
 
     def __enter__(self) -> Server:
         self._thread.start()
@@ -147,8 +133,7 @@ class Server:
     def get(self, name: str, query: str) -> tuple[str, bytes, str] | None:
         """Return type, content and policy of what stands under a name; None where nothing does."""
         if name in self._assets:
-            kind, content = self._assets[name]
-            return kind, content, _POLICY
+            return *self._assets[name], _POLICY
         if name == "state" and (asked := _STATE.fullmatch(query)):
             told = self._session.state(int(asked[1] or -1), _WAIT_S)
             return "application/json", json.dumps(told).encode(), _POLICY
@@ -157,7 +142,8 @@ class Server:
             return None if picture is None else ("image/png", picture.data, _POLICY)
         if name in self._files:
             kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
-            return kind, self._files[name].read_bytes(), _FRAMED_POLICY
+            # These bring a policy of their own.
+            return kind, self._files[name].read_bytes(), "frame-ancestors 'none'"
         return None
 
     def post(self, name: str, body: Mapping[str, Any]) -> bool:
@@ -210,20 +196,16 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Give a file of the page, the state, or a picture."""
-        name, query = self._admitted(changes=False)
-        if name is None:
-            return
-        found = self.server_of.get(name, query)
-        if found is None:
-            self._refuse(404)
-            return
-        kind, content, policy = found
-        self._send(200, kind, content, policy)
+        if (asked := self._admitted(changes=False)) is not None:
+            found = self.server_of.get(*asked)
+            if found is None:
+                self._refuse(404)
+            else:
+                self._send(200, *found)
 
     def do_POST(self) -> None:
         """Take an answer, a pause, an agreement, an end."""
-        name, _ = self._admitted(changes=True)
-        if name is None:
+        if (asked := self._admitted(changes=True)) is None:
             return
         length = self.headers.get("Content-Length", "")
         if not length.isascii() or not length.isdigit():
@@ -234,37 +216,40 @@ class _Handler(BaseHTTPRequestHandler):
             return
         try:
             body = load_json(self.rfile.read(int(length)))
-            is_known = self.server_of.post(name, body if isinstance(body, dict) else {})
+            is_known = self.server_of.post(asked[0], body if isinstance(body, dict) else {})
         except NotNowError:
             self._refuse(409)
         except ValueError as error:
             self._refuse(400, str(error).encode())
         else:
             if is_known:
-                self._send(200, "application/json", b"{}", _POLICY)
+                self._send(200, "application/json", b"{}")
             else:
                 self._refuse(404)
 
-    def _admitted(self, *, changes: bool) -> tuple[str | None, str]:
+    def _admitted(self, *, changes: bool) -> tuple[str, str] | None:
         """Return the name that is asked for and its query; None where the request was refused."""
         try:
             split = urlsplit(self.path)
         except ValueError:
             self._refuse(400)
-            return None, ""
-        if split.netloc:
-            # A whole address is for proxies, and Pythons differ in which hosts they take.
-            self._refuse(404)
-            return None, ""
+            return None
         hosts, origin = self.headers.get_all("Host", []), self.headers.get("Origin")
         origins = [f"http://{host}" for host in self.server_of.hosts]
         name = self.server_of.below(split.path)
-        if len(hosts) != 1 or hosts[0] not in self.server_of.hosts:
+        if split.netloc:
+            # A whole address is for proxies, and Pythons differ in which hosts they take.
+            self._refuse(404)
+        elif len(hosts) != 1 or hosts[0] not in self.server_of.hosts:
             self._refuse(421)
         elif (origin is None and changes) or (origin is not None and origin not in origins):
             self._refuse(403)
         elif not changes and self.server_of.is_code(split.path):
-            self._lead_on()
+            page = self.server_of.use_code()
+            if page is None:
+                self._refuse(410, _USED)
+            else:
+                self._send(303, "text/plain", b"", Location=page)
         elif name is None:
             self._refuse(404)
         elif changes and self.headers.get("Content-Type") != "application/json":
@@ -273,34 +258,23 @@ class _Handler(BaseHTTPRequestHandler):
             self._refuse(411)
         else:
             return name, split.query
-        return None, ""
-
-    def _lead_on(self) -> None:
-        page = self.server_of.use_code()
-        if page is None:
-            self._refuse(410, _USED)
-        else:
-            self._send(303, "text/plain", b"", _POLICY, Location=page)
+        return None
 
     def _refuse(self, status: int, why: bytes = b"") -> None:
         self.close_connection = True
-        self._send(status, "text/plain", why, _POLICY)
+        self._send(status, "text/plain", why)
 
-    def _send(self, status: int, kind: str, content: bytes, policy: str, **more: str) -> None:
+    def _send(
+        self, status: int, kind: str, content: bytes, policy: str = _POLICY, **more: str
+    ) -> None:
         self.send_response(status)
         is_text = kind.startswith("text/") or kind.endswith(("json", "javascript"))
-        self.send_header("Content-Type", f"{kind}; charset=utf-8" if is_text else kind)
-        self.send_header("Content-Length", str(len(content)))
-        self.send_header("Content-Security-Policy", policy)
-        self.send_header("X-Content-Type-Options", "nosniff")
-        self.send_header("Cross-Origin-Resource-Policy", "same-origin")
-        self.send_header("Cross-Origin-Opener-Policy", "same-origin")
-        self.send_header("Referrer-Policy", "no-referrer")
-        self.send_header("Cache-Control", "no-store")
-        for name, value in more.items():
-            self.send_header(name, value)
+        more |= {"Content-Type": f"{kind}; charset=utf-8" if is_text else kind}
+        more |= {"Content-Length": str(len(content)), "Content-Security-Policy": policy}
         if self.close_connection:
-            self.send_header("Connection", "close")
+            more["Connection"] = "close"
+        for name, value in {**_HEADERS, **more}.items():
+            self.send_header(name, value)
         self.end_headers()
         self.wfile.write(content)
 

@@ -4,11 +4,10 @@ scores of a model.
 The run asks in its loop and waits; the server's threads read the question on show, and take an
 answer. No question is shown before the answer to the last one is on disk, as the run sees to.
 
-The order of items is a row of a Williams design. Over its rows every item stands in every place
+The order of items is a row of a Williams design, over whose rows every item stands in every place
 equally often and follows every other equally often, so that neither practice nor what came just
-before favors an item (Williams, E. J. 1949, "Experimental designs balanced for the estimation of
-residual effects of treatments", Australian Journal of Scientific Research A 2, 149-168). An even
-number of items has as many rows, an odd one twice as many.
+before favors an item (E. J. Williams 1949, Australian Journal of Scientific Research A 2, 149-168).
+An even number of items has as many rows, an odd one twice as many.
 """
 
 from __future__ import annotations
@@ -18,8 +17,8 @@ import re
 import signal
 import threading
 import time
-from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -33,9 +32,9 @@ from phyblock.errors import Problem, SpecError
 from phyblock.models import HaltedError, Image, Reply, Request, Usage
 from phyblock.records.files import read_records
 from phyblock.records.record import Record
-from phyblock.results.compare import Comparable, Part, check_alike, comparable
+from phyblock.results.compare import check_alike, comparable
 from phyblock.results.design import Design
-from phyblock.results.load import Run, load_run
+from phyblock.results.load import load_run
 from phyblock.run.events import RunEvent, RunStarted, SampleDone
 from phyblock.run.execute import RunResult
 from phyblock.run.models import PlannedModel
@@ -46,11 +45,9 @@ from phyblock.text import one_line
 from phyblock.tracks import Item
 from phyblock.tracks.base import kind_of, kinds
 from phyblock.tracks.baselines import Pick, Picking
-from phyblock.web.report import REPORT_FILE, page_files
 
 _ItemT = TypeVar("_ItemT", bound=Item)
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,39}")
-_FIGURES = "figures"
 Phase = Literal["consent", "waiting", "question", "paused", "done", "closed"]
 
 
@@ -161,8 +158,7 @@ class PersonModel:
         self, name: str, suite: Suite, answer: Callable[[Request, Picking], Awaitable[Given]]
     ) -> None:
         self.name = name
-        self._suite = suite
-        self._answer = answer
+        self._suite, self._answer = suite, answer
 
     async def ask(self, request: Request) -> Reply:
         """Return the reply, in the form that the prompt asks for; raises what `answer` raises."""
@@ -204,9 +200,8 @@ def shown(
     Nothing else of an item is in it: no name, no scene, no answer. `addresses` are those of its
     pictures, in order.
     """
-    pictures = pictures_of(request)
-    last = {picture.label: number for number, picture in enumerate(pictures)}
-    left = iter(addresses)
+    pictures, left = pictures_of(request), iter(addresses)
+    last = {picture.label: (n, picture) for n, picture in enumerate(pictures)}
 
     def part_of(part: str | Image) -> dict[str, Any]:
         if isinstance(part, str):
@@ -217,15 +212,10 @@ def shown(
     choices = []
     for choice in picking.choices:
         # The picture's number, and shares of its sides.
+        seen = [(spot, *last[spot.label]) for spot in choice.spots if spot.label in last]
         spots = [
-            {
-                "picture": last[spot.label],
-                "box": spot.box(
-                    pictures[last[spot.label]].width_px, pictures[last[spot.label]].height_px
-                ),
-            }
-            for spot in choice.spots
-            if spot.label in last
+            {"picture": n, "box": spot.box(picture.width_px, picture.height_px)}
+            for spot, n, picture in seen
         ]
         choices.append({"name": choice.name, "text": choice.text, "spots": spots})
     return {
@@ -235,10 +225,7 @@ def shown(
             for message in request.messages
         ],
         "choices": choices,
-        "least": picking.least,
-        "most": picking.most,
-        "repeats": picking.repeats,
-        "noun": picking.noun,
+        **{name: getattr(picking, name) for name in ("least", "most", "repeats", "noun")},
         "fields": [asdict(field) for field in picking.fields],
     }
 
@@ -247,40 +234,20 @@ class NotNowError(Exception):
     """The page sent what is not waited for: another page was faster, or no question is shown."""
 
 
-class Stopwatch:
-    """Time that runs between `go` and `rest` [s]."""
-
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
-        self._before_s = 0.0
-        self._since: float | None = None
-
-    def go(self) -> None:
-        """Run, from now on unless it does already."""
-        if self._since is None:
-            self._since = self._clock()
-
-    def rest(self) -> None:
-        """Stand still."""
-        self._before_s, self._since = self.elapsed_s, None
-
-    @property
-    def elapsed_s(self) -> float:
-        """The time that it ran."""
-        running = 0.0 if self._since is None else self._clock() - self._since
-        return self._before_s + running
-
-
 @dataclass
 class _Asked:
-    """A question that waits for its answer."""
+    """A question that waits for its answer, and for how long it was on show [s]."""
 
     request: Request
     picking: Picking
     place: Place
-    answer: asyncio.Future[Given]
-    loop: asyncio.AbstractEventLoop
-    watch: Stopwatch
+    answer: Future[Given]
+    before_s: float = 0.0
+    since_s: float | None = None
+
+    def seen_s(self, now_s: float) -> float:
+        """Return the time that the question was on show."""
+        return self.before_s + (0.0 if self.since_s is None else now_s - self.since_s)
 
 
 class PlaySession:
@@ -288,12 +255,12 @@ class PlaySession:
 
     def __init__(self, of: int, clock: Callable[[], float] = time.monotonic) -> None:
         self._of, self._done, self._turns = of, 0, 0
-        self._about: Mapping[str, Any] = {}
         self._clock = clock
         self._changed = threading.Condition()
         self._number = 0
         self._phase: Phase = "waiting"
         self._asked: _Asked | None = None
+        self._about: Mapping[str, Any] = {}
         self._results: Mapping[str, Any] | None = None
 
     async def run(
@@ -315,35 +282,41 @@ class PlaySession:
                 self._done += event.record.is_final
                 self._turns = 0
 
-        model = PersonModel(person.model, plan.suite, self.ask)
-        present = {model.name: model}
-        async with Session(plan, folder, watch, use_cache=False, present=present) as opened:
+        model, loop = PersonModel(person.model, plan.suite, self.ask), asyncio.get_running_loop()
+        signals = (signal.SIGINT, signal.SIGTERM)
+        async with Session(
+            plan, folder, watch, use_cache=False, present={model.name: model}
+        ) as opened:
 
             def interrupted() -> None:
                 opened.executor.interrupt()
                 self.close()
 
-            with _on_signals(interrupted):
-                try:
-                    return await opened.run()
-                except BaseException:
-                    self.close()
-                    raise
+            for one in signals:
+                loop.add_signal_handler(one, interrupted)
+            try:
+                return await opened.run()
+            except BaseException:
+                self.close()
+                raise
+            finally:
+                for one in signals:
+                    loop.remove_signal_handler(one)
 
     async def ask(self, request: Request, picking: Picking) -> Given:
         """Return what the person picks; HaltedError where the session is closed first."""
-        loop = asyncio.get_running_loop()
-        answer: asyncio.Future[Given] = loop.create_future()
-        watch = Stopwatch(self._clock)
+        answer: Future[Given] = Future()
+        # From now on it can be settled, whoever has stopped waiting.
+        answer.set_running_or_notify_cancel()
         with self._changed:
             if self._phase == "closed":
                 raise HaltedError("the session was closed")
             self._turns += 1
             place = Place(self._done + 1, self._of, self._turns)
-            self._asked = _Asked(request, picking, place, answer, loop, watch)
+            self._asked = _Asked(request, picking, place, answer)
             if self._phase == "waiting":
                 self._go_to("question")
-        return await answer
+        return await asyncio.wrap_future(answer)
 
     def state(self, after: int, wait_s: float = 0.0) -> dict[str, Any]:
         """Return what a page shows; wait for a change after number `after`, this long at most."""
@@ -355,13 +328,13 @@ class PlaySession:
             elif self._phase == "done":
                 told["results"] = self._results
             elif self._asked is not None and self._phase == "question":
-                asked = self._asked
+                asked, now_s = self._asked, self._clock()
                 # The clock starts when the question is first given out.
-                asked.watch.go()
+                asked.since_s = now_s if asked.since_s is None else asked.since_s
                 count = len(pictures_of(asked.request))
                 addresses = [f"picture/{self._number}/{n}" for n in range(count)]
                 told["question"] = shown(asked.request, asked.picking, asked.place, addresses)
-                told["elapsed_s"] = asked.watch.elapsed_s
+                told["elapsed_s"] = asked.seen_s(now_s)
             return told
 
     def picture(self, change: int, number: int) -> Image | None:
@@ -391,21 +364,18 @@ class PlaySession:
         no answer.
         """
         with self._changed:
-            self._expect("question", change)
-            asked = self._asked
-            assert asked is not None
+            asked = self._on_show(change)
             asked.picking.reply(picks)
-            given = Given(tuple(picks), round(asked.watch.elapsed_s, 3))
             self._asked = None
             self._go_to("waiting")
-            asked.loop.call_soon_threadsafe(_settle, asked.answer, given)
+            seen_s = round(asked.seen_s(self._clock()), 3)
+            asked.answer.set_result(Given(tuple(picks), seen_s))
 
     def pause(self) -> None:
         """Hide the question and stop the clock."""
         with self._changed:
-            self._expect("question")
-            assert self._asked is not None
-            self._asked.watch.rest()
+            asked = self._on_show()
+            asked.before_s, asked.since_s = asked.seen_s(self._clock()), None
             self._go_to("paused")
 
     def resume(self) -> None:
@@ -426,48 +396,21 @@ class PlaySession:
             asked, self._asked = self._asked, None
             self._go_to("closed")
         if asked is not None:
-            asked.loop.call_soon_threadsafe(_settle, asked.answer, None)
+            asked.answer.set_exception(HaltedError("the session was closed"))
 
     def _expect(self, phase: Phase, change: int | None = None) -> None:
         if self._phase != phase or change not in (None, self._number):
             raise NotNowError
 
+    def _on_show(self, change: int | None = None) -> _Asked:
+        self._expect("question", change)
+        assert self._asked is not None
+        return self._asked
+
     def _go_to(self, phase: Phase) -> None:
         self._phase = phase
         self._number += 1
         self._changed.notify_all()
-
-
-def _settle(answer: asyncio.Future[Given], given: Given | None) -> None:
-    if answer.done():
-        return
-    if given is None:
-        answer.set_exception(HaltedError("the session was closed"))
-    else:
-        answer.set_result(given)
-
-
-@contextmanager
-def _on_signals(act: Callable[[], None]) -> Iterator[None]:
-    loop = asyncio.get_running_loop()
-    for name in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(name, act)
-    try:
-        yield
-    finally:
-        for name in (signal.SIGINT, signal.SIGTERM):
-            loop.remove_signal_handler(name)
-
-
-def report_files(folder: Path) -> Mapping[str, Path]:
-    """Return the report's page and what it loads, by their names below the run folder."""
-    below = (name.rstrip("/") for name in page_files() if name.endswith("/"))
-    found = {REPORT_FILE: folder / REPORT_FILE}
-    for place in (*below, _FIGURES):
-        for path in sorted((folder / place).rglob("*")):
-            if path.is_file() and not path.is_symlink():
-                found[path.relative_to(folder).as_posix()] = path
-    return found
 
 
 def outcomes(folder: Path, person: str, beside: Sequence[Path]) -> dict[str, Any]:
@@ -478,23 +421,23 @@ def outcomes(folder: Path, person: str, beside: Sequence[Path]) -> dict[str, Any
     """
     run = load_run(folder, texts=False)
     others = [load_run(path, texts=False) for path in beside]
-    records = list(read_records(folder))
-    notes: list[str] = []
-    tracks = []
+    records, notes, tracks = list(read_records(folder)), [], []
     for track in run.design.suite.tracks:
-        what = comparable(run, track)
-        part = what.parts[-1]
-        values = dict(_values(run, what, part, run.design))
-        own, rest = values.pop(person, {}), list(values.items())
-        for other in others:
+        kind, what = kind_of(track), comparable(run, track)
+        measure, part = what.measure, what.parts[-1]
+        rest: list[tuple[str, dict[str, float]]] = []
+        for other in [run, *others]:
             if track not in other.design.suite.tracks:
                 continue
             try:
-                check_alike(other, run, [part.cell], track, what.measure)
+                check_alike(other, run, [part.cell], track, measure)
             except SpecError as error:
                 notes.append(f"Left out, as it cannot be compared: {one_line(str(error))}")
-            else:
-                rest += _values(other, what, part, run.design)
+                continue
+            for model, values in what.values(other, part, run.design):
+                means = values.groupby(level="item").mean()
+                rest.append((model, {str(item): float(mean) for item, mean in means.items()}))
+        own = next((found for name, found in rest if name == person), {})
         rows = [
             {
                 "key": record.item,
@@ -504,26 +447,16 @@ def outcomes(folder: Path, person: str, beside: Sequence[Path]) -> dict[str, Any
                 "others": [
                     {"name": name, "value": found[record.item]}
                     for name, found in rest
-                    if record.item in found
+                    if record.item in found and found is not own
                 ],
                 **_went(record, run.design),
             }
             for record in records
             if record.track == track
         ]
-        kind, measure = kind_of(track), what.measure
         about = {"title": kind.title, "item": kind.item, "measure": measure.heading}
         tracks.append({**about, "unit": measure.unit, "better": measure.better, "rows": rows})
     return {"tracks": tracks, "notes": list(dict.fromkeys(notes))}
-
-
-def _values(
-    run: Run, what: Comparable, part: Part, design: Design
-) -> Iterator[tuple[str, dict[str, float]]]:
-    """Yield what every model of a run reaches in each item, the mean over its samples [percent]."""
-    for model, values in what.values(run, part, design):
-        means = values.groupby(level="item").mean()
-        yield model, {str(item): float(mean) for item, mean in means.items()}
 
 
 def _went(record: Record, design: Design) -> dict[str, Any]:

@@ -24,18 +24,6 @@ const Table = (() => {
   const dollars = (value) => (value === null || value === undefined ? DASH
     : value === 0 ? "0" : value >= 1 ? text(value, 2) : value.toPrecision(2));
 
-  const ASKED = "The days on which the run asked for replies, UTC; not known of recorded and cached replies";
-
-  /** The days on which a row was asked; "" where that is not known. */
-  function asked(row) {
-    const days = Object.values(row.facts).filter((fact) => fact.asked).map(({ asked: [first, last] }) =>
-      (first === last ? first : `${first} to ${last}`));
-    return [...new Set(days)].sort().join(", ");
-  }
-
-  /** That these are not the days of all replies. */
-  const earlier = (row) => (asked(row) && Object.values(row.facts).some((fact) => fact.cached) ? "some earlier, cached" : "");
-
   /** A value column: what stands in a row, and how it is sorted. */
   function valueColumn(column, track, several) {
     const share = column.unit ? `${column.unit === "%" ? "%" : column.unit}` : "";
@@ -68,15 +56,14 @@ const Table = (() => {
   }
 
   function rowColumns(board) {
-    const plain = (id, heading, value, shown = value, { about = "", below = () => "" } = {}) => ({
+    const plain = (id, heading, value, shown = value, about = "") => ({
       id, heading, group: "", setting: "", about, better: "higher", value,
-      cell: (row) => ({ text: shown(row) || DASH, below: below(row), isText: true }) });
+      cell: (row) => ({ text: shown(row) || DASH, isText: true }) });
     const of = (row, what) => [...new Set(Object.values(row.runs).map((n) => what(board.runs[n])).filter(Boolean))].join(", ");
     return [
       plain("size", "Size (B)", (row) => row.size_b, (row) => (row.size_b === null ? DASH : String(row.size_b))),
-      plain("date", "Asked on", asked, asked, { about: ASKED, below: earlier }),
-      plain("begun", "Run begun", (row) => of(row, (run) => run.date), (row) => of(row, (run) => run.date),
-        { about: "The day on which the run was begun, UTC: recorded replies were scored then" }),
+      plain("date", "Run begun", (row) => of(row, (run) => run.date), (row) => of(row, (run) => run.date),
+        "The day on which the run was begun, UTC: recorded replies were scored then"),
       plain("seeds", "Seeds", (row) => board.runs[Object.values(row.runs)[0]].seeds, (row) => of(row, (run) => String(run.seeds))),
       plain("asked", "Asked how", (row) => of(row, (run) => run.asked.join(", ")), (row) => of(row, (run) => run.asked.join(", ")) || DASH),
       plain("run", "Run", (row) => of(row, (run) => run.id), (row) => of(row, (run) => run.id)),
@@ -117,7 +104,7 @@ const Table = (() => {
     return [
       ...mainFirst(of(first).filter((column) => column.setting === main(first).setting), first).map((column) => column.id),
       solved, told ? `${first.name}/completion_tokens` : null,
-      ...others.map((track) => main(track).id), board.rows.some(asked) ? "date" : null,
+      ...others.map((track) => main(track).id),
     ].filter(Boolean);
   }
 
@@ -163,7 +150,7 @@ const Table = (() => {
       svg("circle", { cx: 2 + value, cy: 6, r: 2.5 }));
   }
 
-  return { groups, usual, sorted, rank, lacking, isCut, asked, strip, text, dollars, ASKED, DASH };
+  return { groups, usual, sorted, rank, lacking, isCut, strip, text, dollars, DASH };
 })();
 
 /** An element of a drawing. */

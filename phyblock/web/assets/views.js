@@ -156,7 +156,6 @@ const Views = (() => {
     const facts = [
       ["Kind", { litellm: "asked over the network", replay: "a recording", baseline: "a baseline: a rule" }[row.kind] || row.kind],
       ["Parameters", row.size_b === null ? null : `${row.size_b} billion`],
-      ["Asked on", Table.asked(row)],
       ...runs.flatMap((run) => [["Run", `${run.suite || "run"} ${run.id}, begun ${run.date || "on an unknown day"}`],
         ["Scored again", run.verified ? "yes, from a bundle" : "no: taken from a run folder"],
         ["Seeds", String(run.seeds)], ["Asked how", run.asked.join(", ") || null]]),

@@ -1,0 +1,235 @@
+"""Runs, their report and their site, made once, and visits to them by one browser."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+from urllib.parse import quote, urlencode
+
+import pytest
+
+from tests.browser import Visit, expect
+from tests.servers.chassis import Faults, Running
+from tests.servers.openai_chat import OpenAIChat
+from tests.vqa_set import questions, write_questions
+from tests.workspace import Workspace
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+HOSTILE = (
+    "<script>window.hacked = 1</script><img src=x onerror='window.hacked = 2'>"
+    "</pre></script><!--<script>\u2028'\\');window.hacked = 3//\ud83d\n"
+    "Step1: Move block with index 1"
+)
+MARKUP = """# Plan
+Look [here](javascript:window.hacked=4) and ![x](http://127.0.0.1/p.png): **first** `3`.
+
+> <b onmouseover="window.hacked=5">quote</b>
+
+1. Move block with index 9. It is green.
+2. Move block with index 3
+
+| block | why |
+|---|---|
+| 3 | *base* |
+"""
+NAME = "<img src=x onerror='window.hacked=1'>\"&"
+"""What a model and a scene of the site are called."""
+SUBTASKS = ("SH", "OR", "AD")
+VIEWPORT = {"width": 1400, "height": 1000}
+
+
+class ReportVisit(Visit):
+    """A report's page, by its file."""
+
+    def __init__(self, page: Page, path: Path) -> None:
+        super().__init__(page)
+        self.path = path
+
+    def open(self, view: str = "results") -> Page:
+        self.page.goto(f"{self.path.as_uri()}#{view}")
+        if view.startswith("samples"):
+            self.page.wait_for_selector("#list [role=option]")
+        return self.page
+
+    def show(self, sample: str, **words: str) -> Page:
+        more = "".join(f"&{name}={word}" for name, word in words.items())
+        self.page.goto(f"{self.path.as_uri()}#samples?s={sample.replace('/', '%2F')}{more}")
+        self.page.wait_for_selector("#detail .tabs")
+        return self.page
+
+    def count(self) -> str:
+        return self.page.inner_text("#list-status")
+
+    @property
+    def hash(self) -> str:
+        """What the address says behind `#`."""
+        found: str = self.page.evaluate("location.hash")
+        return found.removeprefix("#")
+
+
+class SiteVisit(Visit):
+    """A site's page, by its file."""
+
+    def __init__(self, page: Page, path: Path) -> None:
+        super().__init__(page)
+        self.path = path
+
+    def open(self, view: str = "", **words: str) -> Page:
+        """Open a view and wait until it is shown."""
+        query = f"?{urlencode(words, quote_via=quote)}" if words else ""
+        self.page.goto("about:blank")
+        self.page.goto(f"{self.path.as_uri()}#{view}{query}")
+        expect(self.page.locator("html")).to_have_attribute("data-shown", view or "board")
+        return self.page
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+    """A run, with its report, of two baselines on five scenes and six questions, two seeds each.
+
+    One reply says `HOSTILE`, one `MARKUP`, which plans 9, 3; one is missing. No test changes it.
+    """
+    made = Workspace(tmp_path_factory.mktemp("page"), pictures_dir)
+    made.write_scenes()
+    write_questions(made.root / "questions", questions(per_subtask=2, subtasks=SUBTASKS))
+    made.write_suite(
+        tracks=["full_planning", "vqa", "step_planning"],
+        vqa={"path": "./questions", "subtasks": list(SUBTASKS)},
+        steps={"physics": "off"},
+        seeds=[0, 1],
+    )
+    done = made.run()
+    assert done.code == 0, done.err
+    path = made.out / "records.jsonl"
+    lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    for record in lines:
+        if record["sample"] == "full_planning/random/t3/s0":
+            record["reply"]["text"] = record["reply"]["reasoning"] = HOSTILE
+            record["parse"]["rule"] = HOSTILE
+        if record["sample"] == "full_planning/oracle/t5/s1":
+            record["reply"]["text"] = MARKUP
+            record["parse"]["plan"] = [9, 3]
+            for score in record["scores"]:
+                if score.get("placed"):
+                    score["placed"], score["why"] = [None, 0], ["shape_not_in_gt", None]
+        if record["sample"] == "full_planning/random/t4/s0":
+            record.update(reply=None, outcome="missing", scores=[], parse=None)
+    path.write_text("".join(json.dumps(record) + "\n" for record in lines), encoding="utf-8")
+    done = made.phyblock("report", made.out)
+    assert done.code == 0, done.err
+    return made
+
+
+@pytest.fixture(scope="session")
+def troubled(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+    """A run of two models, of which one has no key, limited to two items of each track."""
+    troubled = Workspace(tmp_path_factory.mktemp("troubled"), pictures_dir)
+    troubled.write_scenes()
+    troubled.write_suite(
+        models=["alpha", "locked"],
+        seeds=[0],
+        limit=2,
+        tracks=["full_planning", "step_planning"],
+        steps={"physics": "off"},
+        description="The 400 scenes.",
+    )
+    with Running(OpenAIChat()) as good, Running(OpenAIChat(Faults(mode="401"))) as bad:
+        ways = {"alpha": good.url, "locked": bad.url}
+        entries = {
+            name: {"id": f"hosted_vllm/{name}", "api_base": f"{url}/v1"}
+            for name, url in ways.items()
+        }
+        troubled.write_yaml("models.yaml", entries)
+        troubled.run()
+    troubled.phyblock("report", troubled.out)
+    return troubled
+
+
+@pytest.fixture(scope="session")
+def runs(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+    """`first`: two baselines in four tracks; `later.zip`: a bundle of two in one of them."""
+    made = Workspace(tmp_path_factory.mktemp("site"), pictures_dir)
+    made.write_scenes()
+    write_questions(made.root / "questions", questions(per_subtask=2, subtasks=["SH", "OR"]))
+    fields = {"vqa": {"path": "./questions", "subtasks": ["SH", "OR"]}, "seeds": [0]}
+    tracks = ["full_planning", "vqa", "step_planning", "pose_planning"]
+    made.write_suite(tracks=tracks, steps={"physics": "off"}, **fields)
+    made.out = made.root / "first"
+    assert made.run().code == 0
+    made.write_suite(name="later", models=["random", "all-candidates"], seeds=[0, 1])
+    made.out = made.root / "later"
+    assert made.run().code == 0
+    done = made.phyblock("bundle", "later", "--out", "later.zip")
+    assert done.code == 0, done.err
+    return made
+
+
+@pytest.fixture(scope="session")
+def site(runs: Workspace) -> Path:
+    """The page of a site of a bundle and a run whose model `random` and scene `t3` are `NAME`."""
+    source, folder = runs.root / "first", runs.root / "hostile"
+    folder.mkdir()
+    manifest = (source / "run.yaml").read_text(encoding="utf-8")
+    renamed = manifest.replace("name: random", f'name: "{json.dumps(NAME)[1:-1]}"')
+    (folder / "run.yaml").write_text(renamed, encoding="utf-8")
+    lines = []
+    for line in (source / "records.jsonl").read_text(encoding="utf-8").splitlines():
+        record = json.loads(line)
+        hostile = {"random": NAME, "t3": NAME}
+        for field in ("model", "key", "scene"):
+            record[field] = hostile.get(record[field], record[field])
+        record["sample"] = f"{record['track']}/{record['model']}/{record['key']}/s{record['seed']}"
+        if record["model"] == NAME:
+            record["reply"]["text"] = record["reply"]["reasoning"] = HOSTILE
+        lines.append(json.dumps(record) + "\n")
+    (folder / "records.jsonl").write_text("".join(lines), encoding="utf-8")
+    data = ("--data", "data", "--data", "questions")
+    named = ("--title", f"A site {NAME}", "--out", "site")
+    done = runs.phyblock("site", "hostile", "later.zip", *data, *named)
+    assert done.code == 0, done.err
+    assert "4 models, 58 samples" in done.out
+    return runs.root / "site" / "index.html"
+
+
+@pytest.fixture
+def visiting(browser: Browser) -> Iterator[Callable[[Path], ReportVisit]]:
+    """Visits to reports by their paths, which may complain of nothing and ask for nothing else."""
+    visits: list[ReportVisit] = []
+
+    def visit(path: Path) -> ReportVisit:
+        page = browser.new_page(viewport=VIEWPORT, color_scheme="light")  # type: ignore[arg-type]
+        visits.append(ReportVisit(page, path))
+        return visits[-1]
+
+    yield visit
+    for one in visits:
+        assert one.page.evaluate("window.hacked") is None
+        one.page.close()
+        assert one.complaints == []
+        assert one.asked_elsewhere("file://") == []
+
+
+@pytest.fixture
+def visit(visiting: Callable[[Path], ReportVisit], made: Workspace) -> ReportVisit:
+    return visiting(made.out / "report.html")
+
+
+@pytest.fixture
+def trouble(visiting: Callable[[Path], ReportVisit], troubled: Workspace) -> ReportVisit:
+    return visiting(troubled.out / "report.html")
+
+
+@pytest.fixture
+def site_visit(browser: Browser, site: Path) -> Iterator[SiteVisit]:
+    page = browser.new_page(viewport=VIEWPORT, color_scheme="light")  # type: ignore[arg-type]
+    visit = SiteVisit(page, site)
+    yield visit
+    hacked = page.evaluate("window.hacked")
+    page.close()
+    assert visit.complaints == []
+    assert visit.asked_elsewhere(site.parent.as_uri()) == []
+    assert hacked is None

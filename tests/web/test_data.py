@@ -1,0 +1,503 @@
+"""The data of pages: what is packed comes back, headlines are those of tables, runs agree."""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+import re
+import zlib
+from bisect import bisect_right
+from collections.abc import Collection, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phyblock.errors import DataError, SpecError, StoreError
+from phyblock.records.files import known_records
+from phyblock.records.record import Record
+from phyblock.results.design import read_design
+from phyblock.results.estimates import headline_of, track_measures
+from phyblock.results.load import load_run
+from phyblock.results.tables import write_tables
+from phyblock.tracks.base import kind_of
+from phyblock.web import leaderboard
+from phyblock.web.leaderboard import (
+    SiteRun,
+    all_values,
+    board_of,
+    check_runs_alike,
+    entries_of,
+    open_runs,
+    values_of,
+    write_site,
+)
+from phyblock.web.pack import Pack, SampleIndex, Sources, pack_samples, read_places
+from phyblock.web.report import cautions, headlines, rank_texts, write_report
+from tests.report.factory import laws, manifest, record, record_lists, run_of, score, write_run
+from tests.workspace import Workspace
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.text(),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(), inner, max_size=4),
+    max_leaves=12,
+)
+SCENES = [str(number) for number in range(12)]
+
+
+def unpacked(script: Path) -> Any:
+    """The data of a script: JSON, deflated, in base 64."""
+    text = script.read_text(encoding="ascii")
+    (packed,) = re.findall(r"^phyblockTake\('[^']*','[^']*','([A-Za-z0-9+/=]*)'\)\n$", text)
+    return json.loads(zlib.decompress(base64.b64decode(packed)))
+
+
+def entries_in(folder: Path, pack: Pack, kind: str) -> list[Any]:
+    pack.close()
+    chunks = [unpacked(folder / f"{kind}-{n}.js") for n in range(len(pack.starts))]
+    return [entry for chunk in chunks for entry in chunk]
+
+
+class Report:
+    """What a page reads out of a folder of scripts."""
+
+    def __init__(self, run: Path, data: Path | None = None) -> None:
+        path = write_report(write_tables(run), data, figures=False)
+        self.page = path.read_text(encoding="utf-8")
+        self.folder = run / self.page.partition('data-folder="')[2].partition('"')[0]
+        self.index = unpacked(self.folder / "index.js")
+
+    def entry(self, kind: str, number: int) -> Any:
+        starts = self.index["starts"][kind]
+        chunk = bisect_right(starts, number) - 1
+        return unpacked(self.folder / f"{kind}-{chunk}.js")[number - starts[chunk]]
+
+
+@laws
+@given(st.lists(JSON, max_size=6))
+def test_what_is_packed_comes_back(
+    tmp_path_factory: pytest.TempPathFactory, entries: list[Any]
+) -> None:
+    folder = tmp_path_factory.mktemp("pack")
+    pack = Pack(folder, "records", "build")
+    assert [pack.add(entry) for entry in entries] == list(range(len(entries)))
+    assert entries_in(folder, pack, "records") == entries
+
+
+def test_chunks_stay_small_and_say_where_they_start(tmp_path: Path) -> None:
+    pack = Pack(tmp_path, "records", "build")
+    entries = [f"{n}" + "x" * (90_000 + 1000 * n) for n in range(20)]
+    for entry in entries:
+        pack.add(entry)
+    assert entries_in(tmp_path, pack, "records") == entries
+    sizes = [path.stat().st_size for path in tmp_path.iterdir()]
+    assert len(sizes) == len(pack.starts) > 5
+    assert max(sizes) < 320_000
+    for n, start in enumerate(pack.starts):
+        assert unpacked(tmp_path / f"records-{n}.js")[0] == entries[start]
+
+
+@laws
+@given(record_lists(), st.randoms(use_true_random=False))
+def test_the_newest_record_of_every_sample_is_there_once(
+    tmp_path_factory: pytest.TempPathFactory, records: list[dict[str, Any]], random: Any
+) -> None:
+    folder = tmp_path_factory.mktemp("run")
+    facts = manifest()
+    stale = [
+        {**one, "outcome": "missing", "reply": None} for one in records if random.random() < 0.5
+    ]
+    write_run(folder, [*stale, *records], facts)
+    design = read_design(facts)
+    index, pack = SampleIndex(design), Pack(folder, "records", "build")
+    prompts = Pack(folder, "prompts", "build")
+    pack_samples(folder, read_places(folder, design), index, pack, prompts, {})
+    columns = index.columns({})
+    entries = entries_in(folder, pack, "records")
+    by_name = {one["sample"]: one for one in records}
+    rows = columns["rows"]
+    assert len(entries) == len(rows["item"]) == len(by_name)
+    for row, entry in enumerate(entries):
+        model = columns["models"][rows["model"][row]]
+        key = columns["items"]["key"][rows["item"][row]]
+        one = by_name.pop(f"full_planning/{model}/{key}/s{rows['seed'][row]}")
+        assert entry["reply"] == one["reply"]
+        assert columns["outcomes"][rows["outcome"][row]] == one["outcome"]
+        for place, setting in enumerate("AB"):
+            found = next(
+                s for s in one["scores"] if (s["setting"], s["matcher"]) == (setting, "optimal")
+            )
+            counts = {name: rows["scores"][setting][name][row] for name in ("tp", "fp", "fn")}
+            assert counts == {name: found[name] for name in counts}
+            bits = rows["scores"][setting]["wrong"][row]
+            names = columns["listings"][0][place]["errors"]
+            wrong = {name for n, name in enumerate(names) if bits >> n & 1}
+            assert wrong == {name for name, count in found["errors"].items() if count}
+
+
+def test_every_text_of_the_page_is_escaped_and_only_our_script_may_run(tmp_path: Path) -> None:
+    hostile = "<script>alert(1)</script><img src=x onerror=alert(2)>\"'&"
+    facts = manifest(models=[hostile])
+    facts["suite"] |= {"name": hostile, "description": hostile}
+    folder = write_run(tmp_path / "run", [record(hostile, scores=[score(1, 0, 1)])], facts)
+    page = Report(folder).page
+    assert not (folder / "figures").exists()
+    assert "<script>alert" not in page
+    assert "<img src=x" not in page
+    assert page.count("<script>") == 1
+    assert page.count("&lt;script&gt;alert(1)") > 3
+    policy = page.partition('Content-Security-Policy" content="')[2].partition('"')[0]
+    assert policy.startswith("default-src 'none'; script-src 'sha256-".replace("'", "&#39;"))
+    for outside in ("unsafe", "http", "//cdn", "@import"):
+        assert outside not in policy
+    assert not re.search(r"https?://|@import", page)
+
+
+def test_a_report_is_replaced_as_a_whole(tmp_path: Path) -> None:
+    empty = Report(write_run(tmp_path / "run", [], manifest()))
+    assert empty.index["rows"]["item"] == []
+    assert set(map(tuple, empty.index["starts"].values())) == {()}
+    second = Report(
+        write_run(tmp_path / "run", [record("beta", scores=[score(0, 1, 2)])], manifest())
+    )
+    assert second.folder != empty.folder
+    assert not empty.folder.exists()
+    index = second.index
+    assert [index["models"][model] for model in index["rows"]["model"]] == ["beta"]
+
+
+def test_a_file_in_the_place_of_the_folder_is_said(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run", [record(scores=[score(1, 0, 1)])], manifest())
+    (folder / "report").write_text("in the way")
+    with pytest.raises(StoreError, match="report: cannot be written in: it is no folder"):
+        Report(folder)
+    assert not (folder / "report.html").exists()
+
+
+def test_scenes_are_drawn_from_where_they_are_and_from_no_other_data(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    workspace.write_suite(models=["oracle"])
+    assert workspace.run().code == 0
+    out, data = workspace.out, workspace.root / "data"
+    report = Report(out)
+    scene = report.entry("scenes", report.index["scenes"].index("t5"))
+    assert [block["candidate"] for block in scene["blocks"]] == [3, 3, 1, 2]
+    assert [block["depend"] for block in scene["blocks"]] == [[], [0], [1], [2]]
+    assert report.index["no_scenes"] == ""
+    moved = data.rename(tmp_path / "elsewhere")
+    report = Report(out)
+    assert report.index["starts"]["scenes"] == []
+    assert "the data set of the run is not there" in report.index["no_scenes"]
+    assert report.entry("records", 0)["reply"]["text"]
+    assert Report(out, moved).index["starts"]["scenes"] == [0]
+    path = moved.rename(data) / "scenes.jsonl"
+    path.write_text(path.read_text().replace('"levels": [3]', '"levels": [4]', 1))
+    with pytest.raises(DataError, match="is not the data set that the run was made on"):
+        Report(out, data)
+    assert "or it was changed since" in Report(out).index["no_scenes"]
+
+
+def test_prompts_and_pictures_as_sent_are_there(troubled: Workspace) -> None:
+    (index,) = (troubled.out / "report").glob("*/index.js")
+    records, prompts = (unpacked(index.parent / f"{kind}-0.js") for kind in ("records", "prompts"))
+    sent = [one["prompt"] for one in records]
+    images = []
+    for prompt in filter(None, sent):
+        assert "user" in [message["role"] for message in prompts[prompt["n"]]]
+        images += [image["file"] for image in prompt["images"]]
+    assert images
+    for file in filter(None, images):
+        assert (troubled.out / file).read_bytes().startswith(b"\x89PNG")
+
+
+def test_headlines_say_what_tables_say(made: Workspace) -> None:
+    run = load_run(made.out, texts=False)
+    for table in headlines(run):
+        values = headline_of(run, table.track)
+        rows = [row for row in table.rows if row.kind != "reference"]
+        assert [row.kind for row in rows] == ["baseline"] * len(rows)
+        for row in rows:
+            for heading, cell in zip(table.columns, row.cells, strict=True):
+                value = values.get((row.name, heading))
+                known = value is not None and not math.isnan(value.value)
+                assert cell.value == (value.value if known and value else None)
+            first = values[row.name, table.columns[0]]
+            assert (row.strip or (0,))[0] == first.value
+            assert row.cells[0].below[0] == f"{first.lo:.1f} to {first.hi:.1f}"
+    steps = headlines(run)[-1]
+    assert steps.columns[:2] == ("F1 of attempts", "Completed")
+    assert {row.name: row.cells[0].value for row in steps.rows}["oracle"] == 100
+
+
+def test_models_stand_by_rank_with_the_places_that_tests_leave_open() -> None:
+    facts = {**manifest(models=["low", "high", "middle"], seeds=[0]), "scenes": 40}
+    values = {"high": (4, 0, 0), "middle": (2, 2, 2), "low": (2, 2, 2)}
+    records = [
+        {**record(model, f"{n:03}", scores=[score(*counts)]), "levels": [2], "parents": [f"{n:03}"]}
+        for model, counts in values.items()
+        for n in range(40)
+    ]
+    (headline,) = headlines(run_of(records, facts))
+    models = [row for row in headline.rows if row.kind == "model"]
+    assert models[0].name == "high"
+    ranks = {"high": "1", "middle": "2 to 3", "low": "2 to 3"}
+    assert {row.name: row.rank for row in models} == ranks
+    level = dict(zip(headline.columns, models[0].cells, strict=True))["Level 2"]
+    assert level.query == "track=full_planning&level=2&model=high"
+
+
+def test_a_run_says_what_it_is_not() -> None:
+    facts = {**manifest(models=["alpha", "beta"], seeds=[0]), "scenes": 3}
+    facts["items"] = {"full_planning": 3}
+    scenes = ("001", "002", "003")
+    answered = [record("alpha", scene, scores=[score(1, 1, 1)]) for scene in scenes]
+    failed = [record("beta", scene, outcome="api_error") for scene in scenes]
+    assert cautions(run_of(answered, {**facts, "models": facts["models"][:1]})) == ()
+    lacking = "beta: 0 of 3 answered: HTTP 429: busy."
+    assert cautions(run_of([*answered, *failed], facts)) == (lacking,)
+    assert cautions(run_of([*answered, failed[0]], facts)) == (
+        "This run is not finished: 4 of 6 samples have a record.",
+        lacking,
+    )
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def data_of(runs: Workspace) -> list[Path]:
+    return [runs.root / "data", runs.root / "questions"]
+
+
+def test_runs_and_bundles_become_one_folder_the_same_every_time(
+    runs: Workspace, tmp_path: Path
+) -> None:
+    paths = [runs.root / "first", runs.root / "later.zip"]
+    found = write_site(paths, tmp_path / "a", data_of(runs))
+    assert (found.models, found.samples, found.lacking) == (4, 58, "")
+    write_site(paths, tmp_path / "b", data_of(runs))
+    assert tree(tmp_path / "a") == tree(tmp_path / "b")
+    assert str(runs.root).encode() not in b"".join(tree(tmp_path / "a").values())
+    replays = [e for path in (tmp_path / "a").glob("data/*/replays-*.js") for e in unpacked(path)]
+    shown, added = set().union(*replays), set()
+    for line in (runs.root / "first" / "records.jsonl").read_text(encoding="utf-8").splitlines():
+        fields = known_records().validate_json(line)
+        own = type(fields).model_fields.keys() - Record.model_fields.keys()
+        added |= {name for name in own if getattr(fields, name) is not None}
+    assert {"pose", "progress"} <= added <= shown
+    assert not {"prompt", "time", "counts"} & shown
+
+
+def test_the_board_says_what_tables_and_comparisons_say(runs: Workspace) -> None:
+    with ExitStack() as kept:
+        opened = open_runs([runs.root / "first"], (), kept)
+        board = board_of(opened, entries_of(opened), all_values(opened))
+    rows = {row["name"]: row for row in board["rows"]}
+    assert rows["oracle"]["values"]["full_planning/A/Overall F1"][0] == 100.0
+    facts = rows["oracle"]["facts"]["full_planning"]
+    assert (facts["expected"], facts["done"], facts["solved"]) == (5, 5, 5)
+    assert not any(row["ranks"] for row in board["rows"])
+    settings = {column["setting"] for column in board["columns"] if column["track"] == "vqa"}
+    assert settings == {""}
+
+
+def planned(
+    seed: int = 0, rules: Sequence[str] = (), left_out: Collection[str] = (), **right: int
+) -> SiteRun:
+    """A run of models by how many of four steps of every scene they have right; `rules` are
+    baselines among them, and of scenes `left_out` the first has no record.
+    """
+    records = [
+        record(model, scene, seed, [score(n, 4 - n, 4 - n, setting=setting) for setting in "AB"])
+        for place, (model, n) in enumerate(right.items())
+        for scene in SCENES
+        if place or scene not in left_out
+    ]
+    facts = manifest(models=right, seeds=[seed], items={"full_planning": len(SCENES)})
+    for model in facts["models"]:
+        model["kind"] = "baseline" if model["name"] in rules else "litellm"
+    return SiteRun("run", run_of(records, facts), False, Sources())
+
+
+def test_only_whole_models_have_ranks_the_same_on_the_site_and_in_the_report() -> None:
+    def board(*runs: SiteRun) -> dict[str, dict[str, Any]]:
+        rows = board_of(runs, entries_of(runs), all_values(runs))["rows"]
+        return {row["name"]: row for row in rows}
+
+    def ranks_of(*runs: SiteRun) -> dict[str, Any]:
+        return {name: row["ranks"].get("full_planning") for name, row in board(*runs).items()}
+
+    # Models without a common sample are not told apart.
+    ranks = ranks_of(planned(a=4), planned(b=1), planned(9, c=0))
+    assert ranks == {"a": [1, 2], "b": [2, 3], "c": [1, 3]}
+    run = planned(rules=["rule"], rule=4, a=3, b=1)
+    assert ranks_of(run) == {"rule": None, "a": [1, 1], "b": [2, 2]}
+    assert rank_texts(run.run, "full_planning") == {"a": "1", "b": "2"}
+    run = planned(left_out=SCENES[1:], cherry=4, a=3, b=1)
+    assert ranks_of(run) == {"cherry": None, "a": [1, 1], "b": [2, 2]}
+    lacking = board(run)["cherry"]["lacking"]["full_planning"]
+    assert lacking == f"1 of {len(SCENES)} answered"
+
+
+def test_a_sample_without_a_value_has_none() -> None:
+    nothing = [score(0, 0, 0, setting=setting) for setting in "AB"]
+    records = [record("a", "000", 0, nothing), record("a", "001", 0, [score(1, 1, 1)])]
+    run = run_of(records, manifest(models=["a"], seeds=[0]))
+    assert values_of(run, "full_planning").samples == {"a": {("001", "001", 0, ""): 50.0}}
+
+
+def site_run(where: str, **facts: Any) -> SiteRun:
+    return SiteRun(where, run_of([], manifest(**facts)), False, Sources())
+
+
+def in_track(track: str, **more: Any) -> dict[str, Any]:
+    """Facts of a run of one track alone, with its identity."""
+    facts = manifest()
+    return {
+        "suite": {**facts["suite"], "tracks": [track]},
+        "dataset": {"name": "d", "sha256": "0" * 64, "version": 2},
+        "tracks": {track: {"prompt": {"name": "p", "version": "a" * 64}}},
+        "created": "2026-11-22T10:00:00+00:00",
+        **more,
+    }
+
+
+def test_a_model_asked_different_things_is_one_row_and_the_same_things_two() -> None:
+    plan, vqa = (site_run(track, **in_track(track)) for track in ("full_planning", "vqa"))
+    one = entries_of([plan, vqa])
+    assert [entry.name for entry in one] == ["alpha", "beta"]
+    assert one[0].runs == {"full_planning": 0, "vqa": 1}
+    later = site_run("x", **in_track("full_planning", created="2026-11-23", identity="1" * 64))
+    names = [entry.name for entry in entries_of([plan, later])]
+    assert names[::2] == [
+        "alpha (2026-11-22, run 00000000)",
+        "alpha (2026-11-23, run 11111111)",
+    ]
+    assert len(set(names)) == len(names)
+
+
+def shown(images: dict[str, Any], digest: str) -> dict[str, Any]:
+    facts = in_track("full_planning")
+    tracks = {"full_planning": {**facts["tracks"]["full_planning"], "pictures": digest}}
+    return {"suite": {**facts["suite"], "images": images}, "tracks": tracks}
+
+
+def of_data(name: str = "d", sha256: str = "0", version: int = 2) -> dict[str, Any]:
+    return {"dataset": {"name": name, "sha256": sha256 * 64, "version": version}}
+
+
+PROMPTED = {"full_planning": {"prompt": {"name": "p", "version": "b" * 64}}}
+MEMBERSHIP = {**manifest(level1="membership")["suite"], "tracks": ["full_planning"]}
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        (shown({"background": "lawn"}, "b"), "images.background"),
+        (shown({"size_px": 512, "view": "top"}, "b"), "images.view"),
+        (of_data(version=3), "dataset.version"),
+        (of_data(name="e"), "dataset.name"),
+        (of_data(sha256="1"), "dataset.sha256"),
+        ({"tracks": PROMPTED}, "tracks.full_planning.prompt"),
+        ({"suite": MEMBERSHIP}, "scoring.level1"),
+    ],
+)
+def test_runs_that_differ_in_what_decides_are_refused_with_what_differs(
+    change: dict[str, Any], field: str
+) -> None:
+    first = site_run("one", **in_track("full_planning", **shown({}, "a")))
+    other = site_run("two", **in_track("full_planning", **change))
+    with pytest.raises(SpecError) as caught:
+        check_runs_alike([first, other])
+    (problem,) = caught.value.problems
+    assert (problem.where, problem.field) == ("two", field)
+    assert ("--limit" in problem.hint) == (field == "dataset.sha256")
+
+
+def test_a_recording_and_a_larger_picture_stand_beside_any_other() -> None:
+    first = site_run("one", **in_track("full_planning"))
+    larger = site_run("two", **in_track("full_planning", **shown({"size_px": 512}, "b")))
+    check_runs_alike([site_run("one", **in_track("full_planning", **shown({}, "a"))), larger])
+    asked = {"full_planning": {"prompt": None, "pictures": None}}
+    check_runs_alike([first, site_run("two", **in_track("full_planning", tracks=asked))])
+
+
+@pytest.mark.parametrize(("before", "after"), [(2, 1), (1, 2)])
+def test_plans_that_were_carried_out_otherwise_do_not_stand_in_one_table(
+    before: int, after: int
+) -> None:
+    def carried(where: str, version: int | None) -> SiteRun:
+        facts = in_track("pose_planning")
+        facts["tracks"]["pose_planning"]["carrying"] = version
+        return site_run(where, **facts)
+
+    first, other = carried("one", before), carried("two", after)
+    with pytest.raises(SpecError, match="run the older one again") as caught:
+        check_runs_alike([first, other])
+    assert caught.value.problems[0].field == "tracks.pose_planning.carrying"
+    measures = {measure.name: measure for measure in track_measures("pose_planning")}
+    check = kind_of("pose_planning").report().check_alike
+    assert check is not None
+    check(other.run, first.run, [], measures["f1_c"])
+    with pytest.raises(SpecError, match="carried plans out otherwise"):
+        check(other.run, first.run, [], measures["final_iou"])
+    check_runs_alike([first, carried("same", before)])
+    check_runs_alike([carried("old", None), carried("1", 1)])
+
+
+def test_a_folder_of_somebody_else_is_refused_and_left_as_it_is(
+    runs: Workspace, tmp_path: Path
+) -> None:
+    theirs = tmp_path / "thesis"
+    (theirs / "data").mkdir(parents=True)
+    (theirs / "data" / "a.js").write_text("mine")
+    for folder in (theirs, runs.root / "first"):
+        before = tree(folder)
+        with pytest.raises(StoreError, match="is not empty and holds no site"):
+            write_site([runs.root / "first"], folder)
+        assert tree(folder) == before
+
+
+def test_a_build_that_was_stopped_never_looks_whole_and_what_is_not_ours_stays(
+    runs: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "site"
+    write_site([runs.root / "later"], out, title="One")
+    (out / "CNAME").write_text("example.org")
+    before = tree(out)
+
+    def stopped(*_: object, **__: object) -> str:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(leaderboard, "fill", stopped)
+        for place in (tmp_path / "new", out):
+            with pytest.raises(KeyboardInterrupt):
+                write_site([runs.root / "later"], place, title="Two")
+    assert not (tmp_path / "new" / "index.html").exists()
+    left = tree(out)
+    kept = [name for name in before if name != ".generated"]
+    assert {name: left[name] for name in kept} == {name: before[name] for name in kept}
+    write_site([runs.root / "later"], tmp_path / "new", title="Two")
+    write_site([runs.root / "later"], out, title="Two")
+    assert (out / "CNAME").read_text() == "example.org"
+    assert tree(out).keys() - {"CNAME"} == tree(tmp_path / "new").keys()
+    assert "<title>Two" in (out / "index.html").read_text(encoding="utf-8")
+
+
+def test_a_run_given_twice_and_a_broken_bundle_are_refused(runs: Workspace, tmp_path: Path) -> None:
+    paths = [runs.root / "later", runs.root / "later.zip"]
+    with pytest.raises(SpecError, match="is the same run as"):
+        write_site(paths, tmp_path / "s", data_of(runs))
+    whole = (runs.root / "later.zip").read_bytes()
+    (runs.root / "cut.zip").write_bytes(whole[:-100])
+    done = runs.phyblock("site", "first", "cut.zip", "--out", "refused")
+    assert done.code == 2
+    assert "cut.zip" in done.err
+    assert not (runs.root / "refused").exists()

@@ -1,0 +1,629 @@
+"""Report and site in a real browser, opened from disk: views, addresses, keys, hostile texts."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+import pytest
+import yaml
+
+from phyblock import registry, run_suite
+from phyblock.results.tables import write_tables
+from phyblock.scoring.plan import ERROR_TYPES
+from phyblock.web.leaderboard import write_site
+from phyblock.web.report import write_report
+from tests.browser import expect
+from tests.report.factory import manifest, write_run
+from tests.tracks.test_added_track import Counting
+from tests.web.conftest import HOSTILE, MARKUP, NAME, ReportVisit, SiteVisit
+from tests.workspace import Workspace
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+Visiting = Callable[[Path], ReportVisit]
+PHONE = {"width": 390, "height": 844}
+WIDE = "document.documentElement.scrollWidth <= innerWidth"
+
+
+def painted(page: Page, selector: str) -> int:
+    """How many pixels of a canvas are drawn."""
+    script = """canvas => {
+        const copy = new OffscreenCanvas(canvas.width, canvas.height);
+        const context = copy.getContext("2d", { willReadFrequently: true });
+        context.drawImage(canvas, 0, 0);
+        const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
+        return new Uint32Array(data.buffer).filter(pixel => pixel >>> 24).length;
+    }"""
+    count: int = page.eval_on_selector(selector, script)
+    return count
+
+
+STRUCTURE = """() => {
+  const seen = (one) => one.checkVisibility();
+  const all = (selector) => [...document.querySelectorAll(selector)].filter(seen);
+  const named = (one) => one.getAttribute("aria-label") || one.getAttribute("alt")
+    || one.textContent.trim() || one.labels?.[0]?.textContent.trim()
+    || one.querySelector("img")?.alt;
+  const levels = all("h1, h2, h3, h4").map((one) => Number(one.tagName[1]));
+  const ids = [...document.querySelectorAll("[id]")].map((one) => one.id);
+  const refer = ["aria-controls", "aria-labelledby", "aria-activedescendant"];
+  const within = "a[tabindex='0'], button, a:not([tabindex])";
+  return {
+    nameless: all("a, button, input, select, summary, img, [role=img]")
+      .filter((one) => !named(one)).map((one) => one.outerHTML.slice(0, 80)),
+    h1: levels.filter((level) => level === 1).length,
+    jumps: levels.filter((level, i) => i && level > levels[i - 1] + 1),
+    twice: ids.filter((id, i) => ids.indexOf(id) !== i),
+    lost: refer.flatMap((name) => all(`[${name}]`).map((one) => one.getAttribute(name)))
+      .filter((id) => !document.getElementById(id)),
+    unreached: all("*").filter((one) => {
+      const { overflowX, overflowY } = getComputedStyle(one);
+      const isLarger = one.scrollHeight > one.clientHeight + 1
+        || one.scrollWidth > one.clientWidth + 1;
+      return /auto|scroll/.test(overflowX + overflowY) && isLarger && one.tabIndex < 0
+        && !one.querySelector(within);
+    }).map((one) => one.className),
+  };
+}"""
+SOUND: dict[str, Any] = {
+    **{"nameless": [], "h1": 1, "jumps": [], "twice": [], "lost": []},
+    "unreached": [],
+}
+CONTRAST = """() => {
+  const parse = (text) => text.match(/[\\d.]+/g).map(Number);
+  const over = (top, below) => {
+    const a = top[3] ?? 1;
+    return [0, 1, 2].map((i) => a * top[i] + (1 - a) * below[i]);
+  };
+  const light = (rgb) => rgb.map((x) => x / 255)
+    .map((x) => (x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4))
+    .reduce((sum, x, i) => sum + x * [0.2126, 0.7152, 0.0722][i], 0);
+  const ownText = (one) => [...one.childNodes].filter((n) => n.nodeType === 3)
+    .map((n) => n.data.trim()).join("");
+  const wrong = [];
+  for (const one of document.querySelectorAll("body *")) {
+    const isSeen = one.getBoundingClientRect().width > 3;
+    if (!ownText(one) || !isSeen || one.closest("svg, script, style, noscript")) continue;
+    const layers = [];
+    for (let at = one; at; at = at.parentElement) {
+      layers.unshift(parse(getComputedStyle(at).backgroundColor));
+    }
+    const ground = layers.reduce((below, top) => over(top, below), [255, 255, 255]);
+    const ink = over(parse(getComputedStyle(one).color), ground);
+    const [a, b] = [light(ink), light(ground)].sort((x, y) => y - x);
+    const ratio = (a + 0.05) / (b + 0.05);
+    if (ratio < 4.5) wrong.push(`${ownText(one).slice(0, 30)}: ${ratio.toFixed(2)}`);
+  }
+  return wrong;
+}"""
+"""Texts that stand out too little from what is behind them, with their ratio (WCAG AA: 4.5)."""
+
+
+def test_results_stand_in_the_page_before_anything_is_loaded(visit: ReportVisit) -> None:
+    page = visit.open()
+    assert page.inner_text("h1") == "trial"
+    assert {"Full planning", "VQA"} <= set(page.locator(".headline h2").all_inner_texts())
+    assert not any("/report/" in url for url in visit.requests)
+    for picture in page.locator(".figures img").all():
+        picture.scroll_into_view_if_needed()
+        picture.evaluate("image => image.decode()")
+    page.get_by_text("Coverage, suite trial").click()
+    assert page.get_by_text("Expected").first.is_visible()
+    page.get_by_role("button", name="Level 3").first.click()
+    assert page.locator(".headline th[aria-sort=descending]").inner_text().startswith("Level 3")
+    assert visit.hash == "results?sort=full_planning.4.down"
+    # Ties go to even, and what only looks like one when it is printed goes where it lies.
+    values = [n / 32 for n in range(-400, 400) if n] + [0.15, 1.005, 2.675, 99.95]
+    texts = page.evaluate("values => values.map(value => Words.fixed(value, 1))", values)
+    plain = [f"{value:.1f}".replace("-0", "0") for value in values]
+    assert [text.replace("-0", "0") for text in texts] == plain
+    for track, place, words, count in (
+        ("Full planning", 4, "track=full_planning&level=3&model=oracle", 4),
+        ("VQA", 2, "track=vqa&subtask=object_property&model=oracle", 4),
+    ):
+        headline = visit.open().locator(".headline", has_text=track)
+        links = headline.locator("tbody tr", has_text="oracle").first.get_by_role("link")
+        # The first of a row is its name.
+        assert links.nth(place).get_attribute("href") == f"#samples?{words}"
+        visit.open(f"samples?{words}")
+        assert visit.count() == f"{count} samples"
+
+
+def test_filters_and_search_narrow_the_list_and_stand_in_the_address(visit: ReportVisit) -> None:
+    page = visit.open("samples")
+    assert visit.count() == "20 samples"
+    for name, label, count in (
+        ("model", "oracle", "10 samples"),
+        ("seed", "Seed 1", "5 samples"),
+        ("level", "Level 3", "2 samples"),
+        ("error", "Overflow", "No sample passes these filters."),
+    ):
+        page.select_option(f"#filter-{name}", label=label)
+        assert visit.count() == count
+    for name in ("model", "seed", "level", "error"):
+        page.select_option(f"#filter-{name}", label="All")
+    page.select_option("#filter-outcome", label="Missing")
+    assert page.locator(".row-name").all_inner_texts() == ["t4"]
+    page.select_option("#filter-outcome", label="All")
+    page.fill("#search", "it is green")
+    page.keyboard.press("Enter")
+    expect(page.locator("#list-status")).to_have_text("1 sample")
+    expect(page.locator("#sample-title")).to_contain_text("oracle · seed 1")
+    page.fill("#search", "")
+    page.select_option("#filter-sort", label="Best first")
+    assert page.locator(".row-model").first.inner_text().startswith("oracle")
+    page.locator("#list [role=option]", has_text="t5").filter(has_text="seed 1").first.click()
+    page.select_option("#compare", "random")
+    expect(page.locator("canvas.stage")).to_have_count(2)
+    page.wait_for_timeout(400)
+    address = visit.hash
+    assert {"order=best", "with=random"} <= set(address.partition("?")[2].split("&"))
+    page.goto("about:blank")
+    visit.open(address)
+    expect(page.locator("canvas.stage")).to_have_count(2)
+    assert page.input_value("#filter-sort") == "best"
+    assert visit.hash == address
+
+
+def test_keys_go_through_the_list_and_back_through_what_was_seen(visit: ReportVisit) -> None:
+    page = visit.open()
+    page.get_by_role("link", name="Samples").click()
+    title = page.locator("#sample-title")
+    expect(title).to_contain_text("t1")
+    seen = [title.inner_text()]
+    for key in "jj":
+        page.keyboard.press(key)
+        seen.append(title.inner_text())
+    assert len(set(seen)) == 3
+    page.keyboard.press("k")
+    assert title.inner_text() == seen[1]
+    for wanted in (seen[2], seen[1], seen[0]):
+        page.go_back()
+        expect(title).to_have_text(wanted)
+    page.keyboard.press("/")
+    page.keyboard.type("jk")
+    assert page.input_value("#search") == "jk"
+    page.goto(f"{visit.path.as_uri()}#samples?s=full_planning%2Fnobody%2Ft5%2Fs0&model=nobody")
+    expect(page.locator("#warning")).to_contain_text("model “nobody”")
+    assert "has no sample" in page.inner_text("#detail")
+
+
+def test_a_sample_is_drawn_played_and_turned(visit: ReportVisit) -> None:
+    page = visit.page
+    page.clock.install()
+    visit.show("full_planning/oracle/t5/s0")
+    assert page.locator(".cells li").count() == 16
+    for canvas, least in (("canvas.goal", 1000), (".cells canvas", 100), ("canvas.stage", 1000)):
+        assert painted(page, canvas) > least
+    assert "F1 100.0" in page.inner_text(".facts")
+    assert page.locator(".strip button.right").count() == 4
+    assert "Nothing was sent: oracle is a rule" in page.text_content("#panel-saw")  # type: ignore[operator]
+    where = page.locator(".controls output")
+    assert where.inner_text() == "End"
+    page.locator("#scrub").fill("0")
+    empty = painted(page, "canvas.stage")
+    page.locator("#detail").focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    assert where.inner_text() == "Step 2 of 4"
+    assert painted(page, "canvas.stage") > empty
+    page.keyboard.press(" ")
+    assert page.inner_text("#play") == "Pause"
+    page.clock.run_for(10_000)
+    expect(where).to_have_text("End")
+    picture = "canvas => canvas.toDataURL()"
+    before = page.eval_on_selector("canvas.stage", picture)
+    box = page.locator("canvas.stage").bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + 100, box["y"] + 100)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 160, box["y"] + 80)
+    page.mouse.up()
+    assert page.eval_on_selector("canvas.stage", picture) != before
+    page.locator("canvas.stage").dblclick()
+    assert page.eval_on_selector("canvas.stage", picture) == before
+
+
+def test_a_wrong_step_says_why_with_the_sentence(visit: ReportVisit) -> None:
+    page = visit.show("full_planning/oracle/t5/s1", step="1", numbers="off")
+    why = page.locator(".why")
+    expect(why).to_contain_text("Glowing: what was tried, in the place of block 1")
+    expect(page.locator(".said").first).to_contain_text("The goal has no green cylinder.")
+    assert why.locator(".quote").inner_text() == "1. Move block with index 9."
+    page.locator("#scrub").fill("2")
+    assert page.locator(".why .quote").inner_text() == "2. Move block with index 3"
+    visit.show("full_planning/random/t5/s0")
+    page.locator(".strip button.wrong").first.click()
+    assert "Possible here (outlined): 3 (blue cube)." in page.inner_text(".said")
+    told = page.evaluate("all => all.map((one) => Words.reason(one, 'red arch'))", ERROR_TYPES)
+    assert len({*told} - {name.replace("_", " ") for name in ERROR_TYPES}) == len(ERROR_TYPES)
+
+
+def test_questions_and_episodes_are_shown(visit: ReportVisit) -> None:
+    page = visit.open("samples?track=vqa")
+    assert visit.count() == "24 samples"
+    page.select_option("#filter-subtask", label="SH shape")
+    page.select_option("#filter-answer", label="Right")
+    page.select_option("#filter-model", label="oracle")
+    assert visit.count() == "4 samples"
+    visit.show("vqa/oracle/sh-000/s0")
+    assert page.locator(".options .mark").all_inner_texts() == ["✓ right", "✓ given"]
+    assert painted(page, ".pictures canvas") > 1000
+    page.locator("summary", has_text="Evidence").click()
+    assert "{" not in page.locator("dl.evidence").first.inner_text()
+    visit.show("vqa/oracle/or-000/s0")
+    expect(page.locator(".options canvas")).to_have_count(4)
+    visit.show("step_planning/oracle/t5/s0")
+    assert page.locator(".turns > li").count() == 4
+    assert "goal completed" in page.inner_text(".facts")
+    page.locator("#scrub").fill("1")
+    assert "Turn 1" in page.inner_text(".said")
+
+
+def test_a_plan_with_poses_as_it_was_given_and_carried_out(
+    visiting: Visiting, workspace: Workspace
+) -> None:
+    workspace.write_suite(tracks=["pose_planning"], models=["oracle", "oracle-2d"], limit=1)
+    assert workspace.run().code == 0
+    visit = visiting(write_report(write_tables(workspace.out), figures=False))
+    # The second block is refused: it would stand in the first.
+    for model, n_carried in (("oracle", "2 blocks"), ("oracle-2d", "1 block")):
+        page = visit.show(f"pose_planning/{model}/t1/s0")
+        labels = [canvas.get_attribute("aria-label") for canvas in page.locator(".stage").all()]
+        assert labels == ["As given: 2 blocks", f"Carried out: {n_carried}"]
+    page.locator(".strip button.wrong").click()
+    assert "Refused: it would share space with others" in page.inner_text(".said")
+    # One scene was asked about once, so that a sample is worth what its model is.
+    found = pd.read_csv(workspace.out / "tables" / "estimates.csv", keep_default_na=False)
+    value = {
+        (row["measure"], row["model"]): f"{100 * float(row['value']):.1f}"
+        for row in found[found["cell"] == "overall"].to_dict("records")
+    }
+    page = visit.open("samples")
+    for setting in ("C", "A", "B"):
+        page.select_option("#filter-setting", label=setting)
+        marks = page.locator(".row-mark .number").all_inner_texts()
+        assert marks == [value[f"f1_{setting.lower()}", m] for m in ("oracle", "oracle-2d")]
+
+
+def test_what_a_model_saw_is_shown_pixel_for_pixel_or_said_not_to_be_kept(
+    trouble: ReportVisit,
+    troubled: Workspace,
+    visiting: Visiting,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sent = {record["track"]: record for record in troubled.records() if record["model"] == "alpha"}
+    page = trouble.show(sent["full_planning"]["sample"])
+    assert page.get_by_role("tab", selected=True).inner_text() == "What the model saw"
+    assert "Step1: Move block with index N" in page.inner_text(".prompt")
+    picture = page.locator("#panel-saw img").first
+    picture.evaluate("image => image.decode()")
+    (image,) = sent["full_planning"]["prompt"]["images"]
+    sides = "image => [image.naturalWidth, image.naturalHeight, image.clientWidth]"
+    size = [image["width_px"], image["height_px"], image["width_px"]]
+    assert picture.evaluate(sides) == size
+    assert image["sha256"].startswith((picture.get_attribute("src") or "").split("/")[-1][:24])
+    trouble.show(sent["step_planning"]["sample"])
+    expect(page.locator("#panel-saw .turns .prompt pre").first).to_be_visible()
+    shutil.copytree(troubled.out, tmp_path / "run")
+    shutil.rmtree(tmp_path / "run" / "report")
+    monkeypatch.setenv("PHYBLOCK_CACHE", str(tmp_path / "cache"))
+    other = visiting(write_report(write_tables(tmp_path / "run"), figures=False))
+    other.show(sent["full_planning"]["sample"], tab="saw")
+    notice = other.page.locator("#panel-saw .notice")
+    expect(notice).to_contain_text("is not kept beside this page")
+
+
+def test_a_run_in_trouble_says_so_first(
+    trouble: ReportVisit, visiting: Visiting, tmp_path: Path
+) -> None:
+    page = trouble.open()
+    caution = page.inner_text(".caution")
+    assert "This run is not finished:" in caution
+    assert "locked, Full planning: 0 of 2 answered: HTTP 401: Incorrect API key" in caution
+    assert "A limit was set: 2 scenes of Full planning, 2 episodes of Step planning" in caution
+    assert page.inner_text(".lead") == "The whole suite: The 400 scenes."
+    page.locator(".headline a", has_text="locked").first.click()
+    expect(page.locator("#list-status")).to_contain_text("no sample of locked here: 0 of 2")
+    folder = write_run(tmp_path / "run", [], manifest())
+    empty = visiting(write_report(write_tables(folder), figures=False))
+    empty.open("matrix")
+    expect(empty.page.locator("#matrix-none")).to_contain_text("This run is not finished: 0 of ")
+
+
+def test_a_report_without_data_or_scripts_shows_what_it_has(
+    visiting: Visiting, browser: Browser, made: Workspace, tmp_path: Path
+) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(made.out, folder)
+    facts = yaml.safe_load((folder / "run.yaml").read_text())
+    facts["dataset"]["root"] = "gone"
+    (folder / "run.yaml").write_text(yaml.safe_dump(facts))
+    visit = visiting(write_report(write_tables(folder), figures=False))
+    page = visit.show("full_planning/oracle/t5/s0")
+    assert "Nothing can be drawn without the data set" in page.inner_text("#detail")
+    assert page.locator(".strip button.right").count() == 4
+    assert "Step1" in page.inner_text(".markdown")
+    shutil.copy(made.out / "report.html", tmp_path)
+    bare = browser.new_page()
+    bare.goto(f"{(tmp_path / 'report.html').as_uri()}#samples")
+    expect(bare.locator("#detail .notice")).to_contain_text("belongs beside this page")
+    bare.close()
+
+
+def test_a_matrix_cell_opens_a_replay(visit: ReportVisit) -> None:
+    page = visit.open("matrix")
+    page.locator(".matrix-cell a").first.focus()
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("ArrowRight")
+    cell = page.locator(".matrix-cell a:focus")
+    assert cell.get_attribute("data-at") == "1.1"
+    key, model = (cell.get_attribute("title") or "").partition(":")[0].split(", ")
+    page.keyboard.press("Enter")
+    expect(page.locator("#sample-title .title-key")).to_have_text(key)
+    expect(page.locator("#sample-title")).to_contain_text(model)
+    page.go_back()
+    expect(page.locator(".matrix-cell a").first).to_be_visible()
+
+
+def test_hostile_replies_and_markup_do_nothing(visit: ReportVisit) -> None:
+    page = visit.show("full_planning/random/t3/s0")
+    page.locator("summary", has_text="Raw text").last.click()
+    # Half a pair of surrogates, which no output could hold, is read as "?".
+    text = HOSTILE.encode("utf-8", "replace").decode()
+    assert page.locator("pre.reply").last.inner_text() == text
+    assert page.locator("#detail script, #detail img, #detail a").count() == 0
+    assert "<script>window.hacked = 1</script>" in page.locator(".markdown").last.inner_text()
+    visit.show("full_planning/oracle/t5/s1")
+    reply = page.locator(".markdown").last
+    assert reply.locator(".md-heading").inner_text() == "Plan"
+    assert reply.locator("ol > li").count() == 2
+    assert reply.locator("tbody td").all_inner_texts() == ["3", "base"]
+    assert "here (javascript:window.hacked=4)" in reply.inner_text()
+    assert reply.locator("a, img, b, [onmouseover]").count() == 0
+    page.locator("summary", has_text="Raw text").click()
+    assert page.locator("pre.reply").inner_text() == MARKUP
+
+
+def test_even_markup_in_the_page_may_run_nothing(browser: Browser, made: Workspace) -> None:
+    page = browser.new_page()
+    page.goto((made.out / "report.html").as_uri())
+    refused: list[str] = []
+    page.on("console", lambda message: refused.append(message.text))
+    page.evaluate(
+        """() => {
+            document.body.insertAdjacentHTML("beforeend", "<img src=x onerror='window.hacked=1'>");
+            const script = document.createElement("script");
+            script.textContent = "window.hacked = 2";
+            document.body.append(script);
+        }"""
+    )
+    page.wait_for_timeout(200)
+    assert page.evaluate("window.hacked") is None
+    assert sum("Content Security Policy" in text for text in refused) >= 2
+    page.close()
+
+
+PARTS = (
+    *("\n", "\n\n", " ", "    ", "# ", "- ", "* ", "1. ", "> ", "|", "\n|---|---|\n", "`", "**"),
+    *("_", "*", "[", "](http://x.y)", "![", "\n```\n", "---", "\\", "<script>alert(1)</script>"),
+    *("<img src=x onerror=alert(1)>", "</p>", "&lt;", "\t", "javascript:alert(1)", "\r\n", "("),
+)
+TAGS = (
+    *("P", "STRONG", "EM", "CODE", "PRE", "UL", "OL", "LI", "BLOCKQUOTE", "HR", "DIV"),
+    *("TABLE", "THEAD", "TBODY", "TR", "TH", "TD"),
+)
+
+
+def test_markdown_of_any_text_loses_no_word_and_makes_no_element_of_its(visit: ReportVisit) -> None:
+    draw, texts = Random(7), []
+    for _ in range(400):
+        parts = (draw.choice(PARTS) for _ in range(draw.randrange(1, 40)))
+        words = (f"{part}w{n}x" * draw.randrange(3) + part for n, part in enumerate(parts))
+        texts.append("".join(words))
+    # As long and as hostile as it may be, it is read to its end.
+    texts += [
+        ((part * (4900 // len(part)) + "\n") * 80)
+        for part in ("*", "`", "[", "_", "> ", "1. ", "|", "\\", "*a*", "![](", "- a\n\n")
+    ]
+    made = visit.open().evaluate(
+        """texts => texts.map((text) => {
+            const place = document.createElement("div");
+            for (const one of Markdown.render(text)) place.append(one);
+            const all = [...place.querySelectorAll("*")];
+            const names = all.flatMap((one) => [one.tagName, ...one.getAttributeNames()]);
+            return [place.textContent, all.length, [...new Set(names)]];
+        })""",
+        texts,
+    )
+    allowed = {*TAGS, "class", "value", "scope", "tabindex"}
+    for text, (shown, count, names) in zip(texts, made, strict=True):
+        assert set(names) <= allowed, text[:80]
+        assert 0 <= count <= len(text) + 1, text[:80]
+        assert set(re.findall(r"w\d+x", text)) <= set(re.findall(r"w\d+x", shown)), text[:80]
+    for form in (
+        "Step {i}: Move block with index {n}",
+        "{i}. Place block {n} on top.",
+        "**Step {i}**: take number {n}. It is wide.",
+        "{i}) Move({n})",
+    ):
+        plan = [draw.randrange(1, 17) for _ in range(8)]
+        said = [form.format(i=i, n=n) for i, n in enumerate(plan, 1)]
+        text = "\n".join(["There are 16 candidates, of which 3 are red.", "", *said, "", "Done."])
+        found = visit.page.evaluate("([text, plan]) => Quotes.ofPlan(text, plan)", [text, plan])
+        assert all(one and one in line for one, line in zip(found, said, strict=True)), text
+
+
+def test_on_paper_everything_is_open(visit: ReportVisit) -> None:
+    page = visit.open()
+    page.emulate_media(media="print", color_scheme="dark")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert page.locator("details:not([open])").count() == 0
+    paper = "getComputedStyle(document.documentElement).backgroundColor"
+    assert page.evaluate(paper) == "rgb(255, 255, 255)"
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert page.locator("details[open]").count() == 0
+    page.emulate_media(media="screen")
+    visit.show("full_planning/oracle/t5/s1", step="1")
+    page.emulate_media(media="print")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    for part in ("#panel-saw", "#panel-did", ".markdown", "canvas.stage", ".why .quote"):
+        assert page.locator(part).first.is_visible(), part
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "results",
+        "matrix",
+        "samples?s=full_planning%2Frandom%2Ft5%2Fs1&with=oracle",
+        "samples?s=vqa%2Frandom%2For-000%2Fs0&with=oracle&track=vqa",
+        "samples?s=step_planning%2Frandom%2Ft5%2Fs0&track=step_planning",
+    ],
+)
+def test_every_view_of_a_report_can_be_read_and_reached(visit: ReportVisit, address: str) -> None:
+    page = visit.open(address)
+    if address.startswith("samples"):
+        page.wait_for_selector("#detail .tabs")
+    assert page.evaluate(STRUCTURE) == SOUND
+    light = page.evaluate("getComputedStyle(document.documentElement).backgroundColor")
+    page.locator("#theme").click()
+    assert page.evaluate("getComputedStyle(document.documentElement).backgroundColor") != light
+    page.set_viewport_size(PHONE)
+    assert page.evaluate(WIDE)
+
+
+def replay(**more: str) -> dict[str, str]:
+    return {"m": "oracle", "t": "full_planning", "i": "t5", "n": "0", **more}
+
+
+VIEWS: dict[str, tuple[str, dict[str, str], int]] = {
+    "board": ("board", {}, 0),
+    "model": ("model", {"m": NAME}, 0),
+    "scenes": ("scenes", {}, 0),
+    "scene": ("scene", {"s": "t5"}, 0),
+    "lost scene": ("scene", {"s": NAME}, 0),
+    "replay": ("replay", replay(m=NAME, b="oracle"), 2),
+    "episode": ("replay", replay(t="step_planning"), 1),
+    "poses": ("replay", replay(t="pose_planning"), 2),
+    "question": ("replay", {"m": NAME, "t": "vqa", "i": "sh-000", "n": "0"}, 0),
+}
+
+
+@pytest.mark.parametrize("name", VIEWS)
+def test_every_view_of_a_site_can_be_read_and_hostile_names_do_nothing(
+    site_visit: SiteVisit, name: str
+) -> None:
+    view, words, stages = VIEWS[name]
+    page = site_visit.open(view, **words)
+    found = page.evaluate(STRUCTURE)
+    assert {**found, "unreached": []} == SOUND
+    for scheme in ("light", "dark"):
+        page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+        assert page.evaluate(CONTRAST) == []
+    page.set_viewport_size(PHONE)  # type: ignore[arg-type]
+    assert page.evaluate(WIDE)
+    assert words.get("m", "") in page.inner_text("main")
+    if stages:
+        assert page.locator("canvas.stage").count() == stages
+
+
+def test_the_board_is_sorted_and_its_columns_are_chosen_by_keyboard(site_visit: SiteVisit) -> None:
+    page = site_visit.open()
+    names = page.locator(".board tbody th a")
+    assert names.first.inner_text() == "oracle"
+    page.locator(".board th button").first.focus()
+    page.keyboard.press("Enter")
+    expect(page.locator("th[aria-sort=ascending]")).to_have_count(1)
+    assert names.last.inner_text() == "oracle"
+    # What was pressed keeps the focus, so that it can be pressed again.
+    page.keyboard.press("Enter")
+    expect(page.locator("th[aria-sort=descending]")).to_have_count(1)
+    before = page.locator(".board thead button").count()
+    page.locator("summary").press("Enter")
+    box = page.get_by_role("group", name="Full planning, setting B").get_by_label("Overall F1")
+    box.focus()
+    page.keyboard.press("Space")
+    expect(page.locator(".board thead button")).to_have_count(before + 1)
+    page.go_back()
+    expect(page.locator(".board thead button")).to_have_count(before)
+    page.select_option("#by", label="VQA: Overall")
+    expect(page.locator("caption")).to_have_text("Models ranked by VQA, Overall")
+
+
+CROWD = """(count) => {
+  const board = { tracks: [], rows: Array.from({ length: count }, (_, i) => ({
+    name: `model-number-${i}`, kind: "litellm", lacking: {},
+    values: { f1: [30 + (i * 7) % 23, 25 + (i * 7) % 23, 34 + (i * 7) % 23] },
+    facts: { plan: { completion_tokens: 300 + (i * 37) % 400, done: i ? 8 : 5, expected: 8 } },
+  })) };
+  const column = { id: "f1", heading: "F1", unit: "%" };
+  const { drawing } = Chart.draw(board, { name: "plan" }, column, "completion_tokens");
+  document.querySelector("main").replaceChildren(el("div", { class: "scroll" }, drawing));
+  const boxes = (selector) => [...drawing.querySelectorAll(selector)].map((one) => one.getBBox());
+  const meet = (a, b) => a.x < b.x + b.width && b.x < a.x + a.width
+    && a.y < b.y + b.height && b.y < a.y + a.height;
+  const names = boxes(".point text");
+  const all = [...names, ...boxes(".point circle")];
+  return names.flatMap((a, i) => all.slice(i + 1).filter((b) => meet(a, b))).length;
+}"""
+"""Draw made-up models close to each other: how many names meet another name or a point."""
+
+
+def test_from_the_board_to_a_replay_and_back(site_visit: SiteVisit) -> None:
+    page = site_visit.open()
+    page.get_by_role("link", name="oracle").first.click()
+    expect(page.locator("h1")).to_have_text("oracle")
+    assert page.evaluate("document.activeElement.id") == "content"
+    page.get_by_role("link", name="t5").first.click()
+    expect(page.locator("output")).to_have_text("End")
+    page.keyboard.press("ArrowLeft")
+    expect(page.locator("output")).to_have_text("Step 4 of 4")
+    page.select_option("#beside", label=NAME)
+    expect(page.locator(".sides.two .stage")).to_have_count(2)
+    page.select_option("#setting", index=1)
+    expect(page.locator("#setting")).to_have_value("B")
+    for _ in range(2):
+        page.go_back()
+    expect(page.locator(".stage")).to_have_count(1)
+    page.get_by_role("link", name="t5").click()
+    assert page.locator(".answers li").count() >= 4
+    for view in ("model", "scene", "replay", "nothing"):
+        site_visit.open(view, m="<b>x", s="<b>y", i="z")
+        expect(page.locator("h1")).to_contain_text("There is no such")
+    site_visit.open("replay", m="oracle", t="vqa", i="sh-000", n="0")
+    assert "✓ right, given" in page.inner_text(".options")
+    for count in (6, 18):
+        assert site_visit.open().evaluate(CROWD, count) == 0
+
+
+def test_a_track_of_ones_own_is_shown_by_what_it_reads_and_by_what_is_better_in_it(
+    visiting: Visiting, workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    registry.register_track(Counting)
+    try:
+        monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
+        suite = workspace.write_suite(tracks=["counting"], models=["random"])
+        run_suite(suite, out=workspace.out)
+        path = write_report(write_tables(workspace.out), figures=False)
+        write_site([workspace.out], workspace.root / "site")
+    finally:
+        registry.unregister_track("counting")
+    (record, *_) = workspace.records()
+    page = visiting(path).open("samples")
+    number = record["parse"]["number"]
+    expect(page.locator("#detail .parsed")).to_have_text(f"number {number} read by the rule number")
+    # The fewer blocks a count is off, the better.
+    page.goto(f"{(workspace.root / 'site' / 'index.html').as_uri()}#scenes?t=counting")
+    shades = page.locator(".tiles .shade")
+    expect(shades).to_have_count(5)
+    errors = [float(text) for text in shades.all_inner_texts()]
+    assert errors == sorted(errors, reverse=True)

@@ -1,0 +1,449 @@
+"""A sitting at the desk: the order of tasks, the session, the server that refuses others."""
+
+from __future__ import annotations
+
+import asyncio
+import http.client
+import json
+import socket
+import struct
+import threading
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phyblock.config.suite import load_suite
+from phyblock.errors import SpecError
+from phyblock.models import HaltedError, Image, Message, Request
+from phyblock.run.execute import RunResult
+from phyblock.tracks.baselines import Choice, Picking, Spot, picks_of
+from phyblock.web.server import LARGEST_BODY_BYTES, Server
+from phyblock.web.session import (
+    Given,
+    NotNowError,
+    Person,
+    PlaySession,
+    arranged,
+    plan_session,
+    williams_row,
+    williams_rows,
+)
+from tests.workspace import SCENES, Workspace
+
+WELCOME = {"name": "ada", "consent": "May we?", "done": 0, "of": 2}
+PICTURE = Image(b"pixels", "candidates", 64, 64)
+PICKING = Picking(
+    (Choice("1", "", (Spot("candidates", 0),)), Choice("2", "", (Spot("candidates", 1),))),
+    least=1,
+    most=3,
+    repeats=True,
+    noun="step",
+    write=lambda picks: " ".join(str(pick.place) for pick in picks),
+)
+
+
+@given(st.integers(1, 24))
+def test_over_the_rows_every_item_has_every_place_and_every_predecessor_equally_often(
+    n: int,
+) -> None:
+    rows = [williams_row(n, row) for row in range(williams_rows(n))]
+    places = Counter((item, place) for row in rows for place, item in enumerate(row))
+    follows = Counter(pair for row in rows for pair in pairwise(row))
+    assert len(places) == n * n
+    assert len(set(places.values())) == 1
+    assert len(follows) == n * (n - 1)
+    assert len(set(follows.values())) <= 1
+
+
+@dataclass(frozen=True)
+class Thing:
+    key: str
+
+
+@given(st.sets(st.text(max_size=4), max_size=20), st.integers(0, 2**40), st.randoms())
+def test_a_row_holds_every_item_once_in_whatever_order_they_come(
+    keys: set[str], row: int, random: object
+) -> None:
+    things = [Thing(key) for key in sorted(keys)]
+    mixed = list(things)
+    random.shuffle(mixed)  # type: ignore[attr-defined]
+    shown = arranged(things, row)  # type: ignore[type-var]
+    assert sorted(thing.key for thing in shown) == sorted(keys)
+    assert shown == arranged(mixed, row)  # type: ignore[type-var]
+
+
+def test_a_name_alone_draws_a_row_that_stays() -> None:
+    ada, again, bob = (Person(name, None, "May we?").row for name in ("ada", "ada", "bob"))
+    assert ada == again != bob
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+async def asked(clock: Clock) -> tuple[PlaySession, asyncio.Task[Given]]:
+    """A session that asks for consent, and its first question."""
+    session = PlaySession(2, clock)
+    session.welcome(WELCOME)
+    message = Message("user", ("Look:", PICTURE, "What comes first?"))
+    request = Request("secret-scene", 0, (message,), {}, "v", {"answer": "secret-answer"})
+    task = asyncio.create_task(session.ask(request, PICKING))
+    await asyncio.sleep(0)
+    return session, task
+
+
+def test_nothing_is_shown_before_consent_and_no_name_or_answer_ever() -> None:
+    async def play() -> None:
+        session, task = await asked(Clock())
+        told = session.state(-1)
+        assert told["phase"] == "consent"
+        assert "question" not in told
+        assert session.picture(told["change"], 0) is None
+        session.agree()
+        told = session.state(-1)
+        parts = told["question"]["messages"][0]["parts"]
+        assert [part.get("text") for part in parts] == ["Look:", None, "What comes first?"]
+        assert "secret" not in json.dumps(told)
+        assert session.picture(told["change"], 0) is PICTURE
+        assert session.picture(told["change"], 1) is session.picture(told["change"] - 1, 0) is None
+        session.close()
+        with pytest.raises(HaltedError):
+            await task
+
+    asyncio.run(play())
+
+
+def test_the_clock_runs_from_the_first_look_and_stands_still_in_pauses() -> None:
+    async def play() -> Given:
+        clock = Clock()
+        session, task = await asked(clock)
+        for now, act in (
+            (100.0, session.agree),
+            (200.0, lambda: session.state(-1)),
+            (203.0, session.pause),
+            (400.0, session.resume),
+        ):
+            clock.now = now
+            act()
+        clock.now = 401.0
+        assert session.state(-1)["elapsed_s"] == 3.0
+        clock.now = 403.5
+        session.answer(session.state(-1)["change"], picks_of([1, 0, 1]))
+        return await task
+
+    assert asyncio.run(play()) == Given(picks_of([1, 0, 1]), 5.5)
+
+
+def test_an_answer_counts_once_and_only_for_what_lies_there() -> None:
+    async def play() -> None:
+        session, task = await asked(Clock())
+        session.agree()
+        change = session.state(-1)["change"]
+        with pytest.raises(NotNowError):
+            session.answer(change - 1, picks_of([0]))
+        with pytest.raises(ValueError, match="holds 0 picks"):
+            session.answer(change, [])
+        session.answer(change, picks_of([0]))
+        for late in (change, change + 1):
+            with pytest.raises(NotNowError):
+                session.answer(late, picks_of([1]))
+        assert (await task).picks == picks_of([0])
+        assert session.state(-1)["phase"] == "waiting"
+
+    asyncio.run(play())
+
+
+def played(suite: Path, picks: Sequence[int]) -> tuple[RunResult, list[str]]:
+    """Sit down, pick these one after another, and close the sitting; what was shown."""
+    person = Person("ada", None, "May we?")
+    plan = plan_session(load_suite(suite, data_dir=suite.parent), person, None)
+    session = PlaySession(plan.samples_per_model)
+    shown: list[str] = []
+
+    async def sat() -> RunResult:
+        left = list(picks)
+        run = asyncio.create_task(session.run(plan, person, suite.parent / "out", lambda: None))
+        while not run.done():
+            await asyncio.sleep(0.01)
+            told = session.state(-1)
+            if told["phase"] == "consent":
+                session.agree()
+            elif told["phase"] == "question" and left:
+                shown.append(json.dumps(told["question"]["messages"]))
+                session.answer(told["change"], picks_of([left.pop(0)]))
+            elif told["phase"] == "question":
+                session.close()
+        return await run
+
+    return asyncio.run(sat()), shown
+
+
+def test_an_episode_goes_on_where_the_sitting_was_closed(
+    tmp_path: Path, pictures_dir: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    workspace = Workspace(tmp_path, pictures_dir)
+    workspace.write_scenes(SCENES[0])
+    monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
+    suite = workspace.write_suite(tracks=["step_planning"], steps={"physics": "off"})
+    red, blue = 0, 2
+    result, shown = played(suite, [blue, red])
+    assert (result.settled, result.left) == (0, 1)
+    assert ["This is step 1 of" in shown[0], "This is step 2 of" in shown[1]] == [True, True]
+    result, shown = played(suite, [blue])
+    assert (result.settled, result.left) == (1, 0)
+    assert "This is step 3 of" in shown[0]
+    (record,) = map(json.loads, (tmp_path / "out" / "records.jsonl").read_text().splitlines())
+    assert record["outcomes"] == ["dependency_not_met", "placed", "placed"]
+    moves = ["Next plan: Move(3)", "Next plan: Move(1)", "Next plan: Move(3)"]
+    assert [turn["reply"]["text"] for turn in record["turns"]] == moves
+
+
+@pytest.fixture(scope="module")
+def session() -> PlaySession:
+    session = PlaySession(1)
+    session.welcome(WELCOME)
+    return session
+
+
+@pytest.fixture(scope="module")
+def server(session: PlaySession) -> Iterator[Server]:
+    with Server(session) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def idle(server: Server) -> int:
+    """How many threads run while nothing is asked."""
+    assert server.port
+    return threading.active_count()
+
+
+def token(server: Server) -> str:
+    return server.address.rstrip("/").rpartition("/")[2]
+
+
+class Answer(NamedTuple):
+    status: int
+    headers: dict[str, str]
+    body: bytes
+
+
+def ask(
+    server: Server,
+    method: str = "GET",
+    path: str = "/{token}/state",
+    body: bytes | None = None,
+    **headers: str | None,
+) -> Answer:
+    """A request as a page of the server makes it, but for what is given; None leaves out."""
+    usual: dict[str, str | None] = {"Host": server.hosts[0]}
+    if method == "POST":
+        usual["Origin"] = f"http://{server.hosts[0]}"
+        usual["Content-Type"] = "application/json"
+        usual["Content-Length"] = str(len(body or b""))
+    given = {name.replace("_", "-"): value for name, value in headers.items()}
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)
+    connection.putrequest(method, path.format(token=token(server)), skip_host=True)
+    for name, value in {**usual, **given}.items():
+        if value is not None:
+            connection.putheader(name, value.format(port=server.port))
+    connection.endheaders(body)
+    answer = connection.getresponse()
+    found = Answer(answer.status, dict(answer.headers), answer.read())
+    connection.close()
+    return found
+
+
+def test_it_listens_on_the_loopback_address_alone(server: Server, session: PlaySession) -> None:
+    assert server.address.startswith(f"http://127.0.0.1:{server.port}/")
+    # The whole of 127/8 is this machine: another address of it is not answered.
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.2", server.port), timeout=5)
+    with pytest.raises(SpecError, match="--port: cannot be used"):
+        Server(session, server.port)
+
+
+def test_a_page_of_its_own_is_answered_and_may_load_nothing_from_elsewhere(server: Server) -> None:
+    for host in server.hosts:
+        assert ask(server, Host=host).status == 200
+    answer = ask(server, path="/{token}/")
+    assert answer.status == 200
+    assert "default-src 'none'" in answer.headers["Content-Security-Policy"]
+    assert answer.headers["X-Content-Type-Options"] == "nosniff"
+    assert "Access-Control-Allow-Origin" not in answer.headers
+
+
+NOT_OURS = (
+    *("/", "/state", "//state", "/wrong/state", "/{token}", "/{token}x/state", "/<script>"),
+    *("/{token}/../../etc/passwd", "/{token}/%2e%2e/%2e%2e/etc/passwd", "/{token}//etc/passwd"),
+    *("/{token}/picture/0/0", "/{token}/picture/-1/../0", "/{token}/records.jsonl"),
+    *("/{token}/report.html", "/{token}/state?after=x", "http://evil.example/{token}/state"),
+)
+
+
+@pytest.mark.parametrize(
+    ("status", "method", "headers"),
+    [
+        *(
+            (421, "GET", {"Host": host})
+            for host in ("evil.example:{port}", "127.0.0.1", "[::1]:{port}", "", None)
+        ),
+        *(
+            (403, method, {"Origin": origin})
+            for method in ("GET", "POST")
+            for origin in ("http://evil.example", "null", "https://127.0.0.1:{port}")
+        ),
+        *((404, "GET", {"path": path}) for path in NOT_OURS),
+        *((501, method, {}) for method in ("PUT", "DELETE", "OPTIONS", "HEAD")),
+        (404, "POST", {"path": "/{token}/shutdown"}),
+    ],
+)
+def test_others_are_refused_and_told_nothing(
+    server: Server, status: int, method: str, headers: dict[str, str | None]
+) -> None:
+    path = headers.get("path") or "/{token}/state"
+    about = {name: value for name, value in headers.items() if name != "path"}
+    answer = ask(server, method, path, b"{}" if method == "POST" else None, **about)
+    assert (answer.status, answer.body) == (status, b"")
+
+
+@pytest.mark.parametrize(
+    ("status", "body", "headers"),
+    [
+        (403, b"{}", {"Origin": None}),
+        (411, None, {"Content_Length": None}),
+        (411, b"{}", {"Content_Length": "-2"}),
+        (411, b"{}", {"Transfer_Encoding": "chunked"}),
+        (413, None, {"Content_Length": str(LARGEST_BODY_BYTES + 1)}),
+        (413, None, {"Content_Length": "9" * 400}),
+        (415, b"{}", {"Content_Type": "text/plain"}),
+        *(
+            (400, body, {})
+            for body in (
+                *(b"{", b"[" * 5000, b"NaN", b"{}", b'{"change": true, "picks": []}'),
+                b'{"change": 1, "picks": ["0"]}',
+                *(
+                    b'{"change": 1, "picks": [0], "numbers": ' + numbers + b"}"
+                    for numbers in (b'[["2.5"]]', b"[[true]]", b"[1]", b"[[1], [2]]")
+                ),
+                b'{"change": 1, "picks": [0], "numbers": [[1' + b"0" * 300 + b"]]}",
+            )
+        ),
+        (409, b'{"change": 1, "picks": [0]}', {}),
+    ],
+)
+def test_what_is_no_answer_is_refused_and_changes_nothing(
+    server: Server,
+    session: PlaySession,
+    status: int,
+    body: bytes | None,
+    headers: dict[str, str | None],
+) -> None:
+    before = session.state(-1)
+    answer = ask(server, "POST", "/{token}/answer", body, **headers)
+    assert answer.status == status
+    assert bool(answer.body) == (status == 400)
+    assert session.state(-1) == before
+
+
+def until_idle(idle: int) -> None:
+    """Wait until every request is through."""
+    end = time.monotonic() + 10
+    while threading.active_count() > idle:
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+def test_only_files_that_were_named_are_served_and_a_fault_of_ours_is_seen(
+    server: Server, tmp_path: Path, idle: int, capfd: pytest.CaptureFixture[str]
+) -> None:
+    names = ("report.html", "run.yaml", "gone.html")
+    for name in names[:2]:
+        (tmp_path / name).write_text("secret", encoding="utf-8")
+    server.show_files({name: tmp_path / name for name in names if name != "run.yaml"})
+    assert ask(server, path="/{token}/report.html").status == 200
+    assert ask(server, path="/{token}/run.yaml").status == 404
+    with pytest.raises(http.client.RemoteDisconnected):
+        ask(server, path="/{token}/gone.html")
+    until_idle(idle)
+    server.show_files({})
+    assert "FileNotFoundError" in capfd.readouterr().err
+
+
+def send(server: Server, content: bytes) -> socket.socket:
+    connection = socket.create_connection(("127.0.0.1", server.port), timeout=10)
+    connection.sendall(content)
+    return connection
+
+
+ADDRESSES = ["http://[", "//[::1", "http://[x]/{token}/state", "/{token}/state?after=[", "*"]
+TARGETS = st.one_of(
+    st.sampled_from(ADDRESSES),
+    st.text(st.characters(min_codepoint=33, max_codepoint=255), min_size=1, max_size=30),
+)
+
+
+@given(target=TARGETS, method=st.sampled_from(["GET", "POST"]))
+def test_whatever_is_asked_for_is_answered_with_a_refusal(
+    server: Server, target: str, method: str
+) -> None:
+    asked = target.replace("{token}", token(server))
+    lines = f"{method} {asked} HTTP/1.1\r\nHost: {server.hosts[0]}\r\nConnection: close\r\n\r\n"
+    with send(server, lines.encode("latin-1")) as connection, connection.makefile("rb") as answer:
+        status, _, rest = answer.read().partition(b"\r\n")
+    # Without a version there is no line of status, and nothing else.
+    assert status == b"" or status.split()[1] in (b"400", b"403", b"404")
+    assert rest.partition(b"\r\n\r\n")[2] == b""
+
+
+@pytest.mark.parametrize("resets", [True, False])
+def test_who_leaves_while_waiting_leaves_no_word_on_the_terminal(
+    server: Server,
+    session: PlaySession,
+    resets: bool,
+    idle: int,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    # Threads of earlier requests may still be about to end, and would be taken for this one's.
+    until_idle(idle)
+    path = f"/{token(server)}/state?after={session.state(-1)['change']}"
+    lines = f"GET {path} HTTP/1.1\r\nHost: {server.hosts[0]}\r\n\r\n"
+    # The second is asked for on the same connection, which is gone when it is read.
+    connection = send(server, 2 * lines.encode())
+    while threading.active_count() == idle:
+        time.sleep(0.005)
+    if resets:
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    connection.close()
+    session.welcome(session.state(-1)["about"])
+    until_idle(idle)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_the_address_for_a_browser_leads_on_once_and_does_not_tell_the_token(
+    server: Server,
+) -> None:
+    origin, code = server.one_time_address.rstrip("/").rsplit("/", 1)
+    assert origin == f"http://{server.hosts[0]}"
+    assert code != token(server)
+    assert ask(server, path=f"/{code}/state").status == 404
+    assert ask(server, "POST", f"/{code}/", b"{}").status == 404
+    assert ask(server, path=f"/{code}/", Host="evil.example").status == 421
+    assert ask(server, path=f"/{code}/", Origin="http://evil.example").status == 403
+    first = ask(server, path=f"/{code}/")
+    assert (first.status, first.headers["Location"]) == (303, f"/{token(server)}/")
+    again = ask(server, path=f"/{code}/")
+    assert again.status == 410
+    assert token(server) not in str(again)
