@@ -95,31 +95,9 @@ def _place_case(place: str, is_there: bool, content: bytes) -> Case:
 
 _PLACES = st.sampled_from(
     [
-        ".",
-        "thesis",
-        "fresh",
-        "a/b/c",
-        "~/x",
-        "$HOME/x",
-        "-x",
-        "=1+1",
-        ":b:",
-        "a\nb",
-        "[red]x",
-        "x" * 300,
-        "d/" * 3000,
-        "\udcff",
-        "data",
-        "suite.yaml",
-        "suite.yaml/x",
-        "/proc/x",
-        "/dev/null",
-        "cache",
-        "..x",
-        "a b",
-        "\u202e",
-        "%s",
-        "{x}",
+        *(".", "thesis", "fresh", "a/b/c", "~/x", "$HOME/x", "-x", "=1+1", ":b:", "a\nb"),
+        *("[red]x", "x" * 300, "d/" * 3000, "\udcff", "data", "suite.yaml", "suite.yaml/x"),
+        *("/proc/x", "/dev/null", "cache", "..x", "a b", "\u202e", "%s", "{x}"),
     ]
 )
 _VERBS = (
@@ -160,32 +138,10 @@ _SOUND_REPLY = {
 }  # fmt: skip
 _STEPS = st.sampled_from(
     [
-        "Step1: Move block with index 1",
-        "Step 2:",
-        "Move(3)",
-        "index",
-        "1",
-        "-1",
-        "9" * 400,
-        "\n",
-        "Answer: A",
-        "=1+1",
-        "<script>",
-        "\ud800",
-        "\u202e",
-        "```json",
-        "[1, 2]",
-        "{",
-        "<think>",
-        "\0",
-        "٣",
-        "①",
-        "Step" * 2000,
-        "1, " * 3000,
-        "Next plan: Done",
-        ":b:",
-        "[red]",
-        "\x1b[31m",
+        *("Step1: Move block with index 1", "Step 2:", "Move(3)", "index", "1", "-1"),
+        *("9" * 400, "\n", "Answer: A", "=1+1", "<script>", "\ud800", "\u202e", "```json"),
+        *("[1, 2]", "{", "<think>", "\0", "٣", "①", "Step" * 2000, "1, " * 3000),
+        *("Next plan: Done", ":b:", "[red]", "\x1b[31m"),
     ]
 )
 

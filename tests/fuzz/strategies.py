@@ -23,18 +23,8 @@ from tests.config.strategies import SUITES as SOUND_SUITES
 from tests.workspace import tower
 
 __all__ = [
-    "CANDIDATES",
-    "MODELS_FILES",
-    "NASTY_TOKENS",
-    "OVERRIDES",
-    "PICTURES",
-    "QUESTIONS",
-    "SCENES",
-    "SUITES",
-    "TEMPLATES",
-    "broken",
-    "png_header",
-    "sound_question",
+    *("CANDIDATES", "MODELS_FILES", "NASTY_TOKENS", "OVERRIDES", "PICTURES", "QUESTIONS"),
+    *("SCENES", "SUITES", "TEMPLATES", "broken", "png_header", "sound_question"),
 ]
 
 JSON_TOKENS = (

@@ -20,11 +20,14 @@ from tests.fuzz.sizes import fuzzed
 from tests.models.batching import Disk, Killing, command, run_command
 from tests.models.factory import QUICK, make_request
 from tests.models.routes import KEY_VARIABLE, ROUTES
-from tests.servers.anthropic_batches import AnthropicBatches
-from tests.servers.batches import BatchFaults, BatchServer
+from tests.servers.batches import (
+    AnthropicBatches,
+    BatchFaults,
+    BatchServer,
+    GeminiBatches,
+    OpenAIBatches,
+)
 from tests.servers.chassis import Running
-from tests.servers.gemini_batches import GeminiBatches
-from tests.servers.openai_batches import OpenAIBatches
 
 pytestmark = pytest.mark.fuzz
 

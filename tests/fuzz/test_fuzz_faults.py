@@ -36,13 +36,7 @@ _CELLS = [
     for n, (track, transport) in enumerate((t, w) for w in _TRANSPORTS for t in _TRACKS)
 ]
 _PASSING = (
-    "429",
-    "500",
-    "reset",
-    "cut",
-    "html",
-    "empty",
-    "400",
+    *("429", "500", "reset", "cut", "html", "empty", "400"),
     *tuple(name for name, fault in WIRE_FAULTS.items() if fault.ending != "unavailable"),
 )
 _STOPPING = tuple(name for name, fault in WIRE_FAULTS.items() if fault.ending == "unavailable")

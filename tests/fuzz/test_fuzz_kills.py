@@ -1,5 +1,6 @@
-"""kill -9 at random moments of each track: nothing answered is lost, and of what was answered no
-more is asked again than was under way when a kill came.
+"""kill -9 at random moments of each track, with one server and with four that fail, die and come
+back: nothing answered is lost, and of what was answered no more is asked again than was under way
+when a kill or a death came.
 """
 
 from __future__ import annotations
@@ -11,26 +12,26 @@ import signal
 import sqlite3
 import time
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
 
-from tests.fuzz.ledger import LedgerAgent, LedgerChat, kept_in
+from tests.fuzz.ledger import Ledger, LedgerAgent, LedgerChat, kept_in
 from tests.fuzz.sizes import KILLS, SEED
-from tests.servers.chassis import Faults, Running
+from tests.servers.chassis import FAULTS, Faults, Running
 from tests.vqa_set import questions, vqa_suite, write_questions
 from tests.workspace import SCENES, Workspace
 
 AT_ONCE = 6
-LATENCY_S = 0.03
-TRACKS: dict[str, dict[str, Any]] = {
-    "full_planning": {},
-    "vqa": vqa_suite(subtasks=["SH", "CO"]),
-    "step_planning": {"tracks": ["step_planning"], "steps": {"physics": "off"}},
+TRACKS: dict[str, tuple[int, dict[str, Any]]] = {
+    "full_planning": (5, {}),
+    "vqa": (8, vqa_suite(subtasks=["SH", "CO"])),
+    "step_planning": (30, {"tracks": ["step_planning"], "steps": {"physics": "off"}}),
 }
-_ASKED_PER_SEED = {"full_planning": 5, "vqa": 8, "step_planning": 30}
-"""About so many requests."""
-_ASKED_PER_KILL = 12
+"""By track: about how many requests a seed makes, and the suite."""
+_ASKED_PER_EVENT = 12
+_LONGEST_WAIT_S = 120.0
 
 
 def on_disk(workspace: Workspace) -> set[tuple[str, str]]:
@@ -45,49 +46,82 @@ def on_disk(workspace: Workspace) -> set[tuple[str, str]]:
     return found
 
 
-def run_until_killed(workspace: Workspace, server: LedgerChat, draw: random.Random) -> None:
-    """Kill a run after some further requests and a little time, and let the server settle."""
-    target = len(server.ledger.entries) + draw.randrange(1, _ASKED_PER_KILL)
+def run_until_killed(
+    workspace: Workspace, servers: Sequence[Running], ledger: Ledger, draw: random.Random
+) -> tuple[int, int]:
+    """A run that is killed; of several servers some die and come back before: deaths of both."""
+    deaths = 0
     with workspace.start() as process:
-        while process.poll() is None and len(server.ledger.entries) < target:
-            time.sleep(0.002)
-        time.sleep(draw.random() / 20)
+        for _ in range(1 if len(servers) == 1 else 4):
+            target = len(ledger.entries) + draw.randrange(1, _ASKED_PER_EVENT)
+            give_up_s = time.monotonic() + _LONGEST_WAIT_S
+            while process.poll() is None and len(ledger.entries) < target:
+                assert time.monotonic() < give_up_s, "the run hangs"
+                time.sleep(0.002)
+            if len(servers) == 1:
+                time.sleep(draw.random() / 20)
+                continue
+            alive = [server for server in servers if server.is_alive]
+            dead = [server for server in servers if not server.is_alive]
+            if dead and (len(alive) == 1 or draw.random() < 0.4):
+                draw.choice(dead).come_back()
+            else:
+                draw.choice(alive).die()
+                deaths += 1
         process.kill()
         process.communicate()
-    assert process.returncode == -signal.SIGKILL, "the run ended before it was killed"
     seen = -1
-    while server.at_once or seen != len(server.ledger.entries):
-        seen = len(server.ledger.entries)
+    while any(server.server.at_once for server in servers) or seen != len(ledger.entries):
+        seen = len(ledger.entries)
         time.sleep(0.05)
+    return deaths, int(process.returncode == -signal.SIGKILL)
 
 
 @pytest.mark.fuzz
 @pytest.mark.slow
+@pytest.mark.parametrize("count", [1, 4])
 @pytest.mark.parametrize("track", TRACKS)
-def test_kills(workspace: Workspace, tallies: dict[str, Counter[str]], track: str) -> None:
-    kills = -(-KILLS // len(TRACKS))
-    draw = random.Random(f"{SEED} {track}")
+def test_kills(
+    workspace: Workspace, tallies: dict[str, Counter[str]], track: str, count: int
+) -> None:
+    asked_per_seed, fields = TRACKS[track]
+    rounds = -(-KILLS // len(TRACKS))
+    draw = random.Random(f"{SEED} {track} {count}")
     write_questions(workspace.root / "questions", questions(SCENES, 4, ("SH", "CO")))
-    server = (LedgerAgent if track == "step_planning" else LedgerChat)(Faults(latency_s=LATENCY_S))
-    ledger = server.ledger
-    under_way: Counter[tuple[str, str]] = Counter()
-    with Running(server) as running:
-        workspace.write_models(running.url, "alpha")
-        seeds = list(range(kills * (_ASKED_PER_KILL + AT_ONCE) // _ASKED_PER_SEED[track] + 2))
-        fields = {"images": {"size_px": 128}, **TRACKS[track]}
-        limits = {"max_concurrency": AT_ONCE}
-        workspace.write_suite(**{**fields, "models": ["alpha"], "seeds": seeds, "limits": limits})
-        for _ in range(kills):
-            run_until_killed(workspace, server, draw)
-            missing = {entry.key for entry in ledger.entries} - on_disk(workspace)
-            assert len(missing) <= AT_ONCE, "more is missing than was under way"
+    kind, ledger = (LedgerAgent if track == "step_planning" else LedgerChat), Ledger()
+    names = () if count == 1 else FAULTS
+    seeds = range(rounds * (1 if count == 1 else 4) * (_ASKED_PER_EVENT + AT_ONCE)
+                  // asked_per_seed + 2)  # fmt: skip
+    workspace.write_suite(
+        **{"images": {"size_px": 128}, **fields, "models": ["alpha"], "seeds": list(seeds)},
+        limits={"max_concurrency": AT_ONCE},
+    )
+    tally, under_way = Counter[str](), Counter[tuple[str, str]]()
+    with contextlib.ExitStack() as stack:
+        servers = []
+        for n in range(count):
+            faults = {"seed": 1 + SEED + n, "retry_after": "0", "latency_s": 0.03}
+            spread = Faults.spread(names, 0.15, **faults) if names else Faults(latency_s=0.03)
+            servers.append(stack.enter_context(Running(kind(spread, ledger=ledger))))
+        bases = [f"{server.url}/v1" for server in servers]
+        for _ in range(rounds):
+            # The order of the addresses may change.
+            workspace.write_models("", "alpha", api_base=draw.sample(bases, count))
+            deaths, killed = run_until_killed(workspace, servers, ledger, draw)
+            tally.update({"deaths of servers": deaths, "kills": killed})
+            missing = ledger.answered() - on_disk(workspace)
+            assert len(missing) <= AT_ONCE * (deaths + killed), "more is lost than was under way"
             under_way.update(missing)
-        done = workspace.run()
-    assert (done.code, done.err) == (0, "")
+        for server in servers:
+            server.come_back()
+        done = workspace.run("--yes")
+    assert done.code == 0, done.out + done.err
     assert not ledger.answered() - kept_in(workspace.out)
-    asked = Counter(entry.key for entry in ledger.entries)
-    for key, count in asked.items():
-        assert count <= 1 + under_way[key], "asked again, though its reply stood on disk"
-    again = sum(count - 1 for count in asked.values())
-    told = {"kills": kills, "lost": 0, "under way at a kill": sum(under_way.values())}
-    tallies[f"kills, {track}"] = Counter({**told, "asked again": again})
+    replies = Counter(entry.key for entry in ledger.entries if entry.comes_to == "reply")
+    if count == 1:
+        assert tally["kills"] == rounds, "a run ended before it was killed"
+        twice = {key: times for key, times in replies.items() if times > 1 + under_way[key]}
+        assert not twice, "asked again, though its reply stood on disk"
+    again = sum(replies.values()) - len(replies)
+    assert again <= AT_ONCE * (tally["deaths of servers"] + tally["kills"])
+    tallies[f"kills, {track}, {count}"] = tally + Counter({"asked again": again}) + ledger.faults

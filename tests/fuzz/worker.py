@@ -24,7 +24,6 @@ from typing import Any
 
 from tests.fork_server import Done
 from tests.fuzz.deeds import Deed, watch_deeds
-from tests.fuzz.sabotage import SABOTAGES
 
 __all__ = ["LONGEST_S", "Ended", "Worker"]
 
@@ -52,12 +51,11 @@ class Ended:
 
 
 class Worker:
-    """The client's side; a context manager. `sabotage` breaks phyblock on purpose (see there)."""
+    """The client's side; a context manager."""
 
-    def __init__(self, scratch: Path, sabotage: str = "", longest_s: float = LONGEST_S) -> None:
+    def __init__(self, scratch: Path, longest_s: float = LONGEST_S) -> None:
         self._longest_s = longest_s
         self._out, self._err = scratch / "stdout", scratch / "stderr"
-        self._sabotage = sabotage
         self._process: subprocess.Popen[bytes] | None = None
 
     def __enter__(self) -> Worker:
@@ -93,7 +91,7 @@ class Worker:
     def _start(self) -> subprocess.Popen[bytes]:
         """A worker that has imported everything."""
         process = subprocess.Popen(
-            [sys.executable, "-m", "tests.fuzz.worker", self._sabotage],
+            [sys.executable, "-m", "tests.fuzz.worker"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             cwd=_ROOT,
@@ -118,7 +116,7 @@ class Worker:
             self._process = None
 
 
-def serve(sabotage: str) -> None:
+def serve() -> None:
     """Answer orders until there are no more."""
     import phyblock.cli
     import phyblock.making.cli
@@ -128,8 +126,6 @@ def serve(sabotage: str) -> None:
         for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
             importlib.import_module(module.name)
     resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY_BYTES, _MOST_MEMORY_BYTES))
-    if sabotage:
-        SABOTAGES[sabotage]()
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     orders = os.fdopen(os.dup(0), encoding="utf-8")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
@@ -174,4 +170,4 @@ def _code_of(main: Any) -> int:
 
 
 if __name__ == "__main__":
-    serve(sys.argv[1])
+    serve()

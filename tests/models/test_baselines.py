@@ -46,13 +46,6 @@ def test_random_draws_four_candidates(key: str, seed: int) -> None:
     assert all(1 <= index <= len(CANDIDATES) for index in drawn)
 
 
-def test_random_is_uniform_with_replacement() -> None:
-    drawn = [n for seed in range(500) for n in steps("random", make_request("000", seed))]
-    share = [drawn.count(index) / len(drawn) for index in range(1, 6)]
-    assert all(abs(one - 0.2) < 0.04 for one in share)
-    assert any(len(set(steps("random", make_request("000", seed)))) < 4 for seed in range(20))
-
-
 @given(keys)
 def test_all_candidates_names_each_once(key: str) -> None:
     assert steps("all-candidates", make_request(key)) == [1, 2, 3, 4, 5]

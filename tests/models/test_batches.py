@@ -32,11 +32,14 @@ from phyblock.models.batch_providers import PROVIDERS
 from tests.models.batching import Disk, Killing, command, run_command
 from tests.models.factory import QUICK, ask, make_model, make_request, with_fields
 from tests.models.routes import KEY_VARIABLE, ROUTES
-from tests.servers.anthropic_batches import AnthropicBatches
-from tests.servers.batches import BatchFaults, BatchServer
+from tests.servers.batches import (
+    AnthropicBatches,
+    BatchFaults,
+    BatchServer,
+    GeminiBatches,
+    OpenAIBatches,
+)
 from tests.servers.chassis import Running
-from tests.servers.gemini_batches import GeminiBatches
-from tests.servers.openai_batches import OpenAIBatches
 
 KEY = "sk-not-a-real-key-1234"
 SERVERS: dict[str, type[BatchServer]] = {

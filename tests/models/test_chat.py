@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
-import sqlite3
 from pathlib import Path
 
 import pytest
@@ -15,7 +13,7 @@ from phyblock.models import (
     Reply,
     ReplyCache,
 )
-from tests.models.factory import ask, make_model, make_request, reply_of, run
+from tests.models.factory import ask, make_model, make_request, reply_of
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Faults, Running
 
@@ -54,67 +52,6 @@ def test_what_is_no_whole_reply_is_asked_again(tmp_path: Path, mode: str) -> Non
         ask(make_model(config, cache=cache), make_request())
         assert server.requests == 2 * before
         assert cache.stats().replies == 0
-
-
-def refuse_after(path: Path, replies: int) -> None:
-    """Make a cache that takes so many replies and not one more."""
-    ReplyCache(path).close()
-    db = sqlite3.connect(path)
-    db.execute(
-        f"CREATE TRIGGER full BEFORE INSERT ON replies WHEN (SELECT count(*) FROM replies) >= "
-        f"{replies} BEGIN SELECT RAISE(ABORT, 'the disk is full'); END"
-    )
-    db.close()
-
-
-def test_a_cache_that_takes_no_more_is_said_once_and_every_reply_comes(tmp_path: Path) -> None:
-    refuse_after(tmp_path / "c.sqlite", 3)
-    said: list[str] = []
-    server = ROUTES["direct"].server(Faults(latency_s=0.01))
-    requests = [make_request(f"{n:03}") for n in range(20)]
-    with Running(server) as running:
-        config = ROUTES["direct"].config(running.url, max_concurrency=4)
-        with ReplyCache(tmp_path / "c.sqlite", said.append) as cache:
-            answers = ask(make_model(config, cache=cache), *requests)
-    assert {type(answer) for answer in answers} == {Reply}
-    assert server.ended == {"ok": 20}
-    (text,) = said
-    assert "the disk is full" in text
-    assert str(tmp_path / "c.sqlite") in text
-
-
-def test_one_dead_model_leaves_the_others_going() -> None:
-    dead, alive = (ROUTES["direct"].server(Faults(mode=mode)) for mode in ("403", "ok"))
-    with Running(dead) as first, Running(alive) as second:
-        models = [
-            make_model(ROUTES["direct"].config(running.url), overall=gate)
-            for gate in [asyncio.Semaphore(4)]
-            for running in (first, second)
-        ]
-
-        async def main() -> list[object]:
-            asked = (m.ask(make_request(f"{n:03}")) for n in range(20) for m in models)
-            answers = await asyncio.gather(*asked, return_exceptions=True)
-            for model in models:
-                await model.aclose()
-            return list(answers)
-
-        answers = run(main)
-    assert [type(answer) for answer in answers] == [UnavailableError, Reply] * 20
-    assert alive.requests == 20
-    assert dead.requests <= 4
-
-
-def test_concurrency_stays_under_the_models_and_the_overall_limit() -> None:
-    server = ROUTES["direct"].server(Faults(latency_s=0.01))
-    requests = [make_request(f"{n:03}") for n in range(30)]
-    with Running(server) as running:
-        config = ROUTES["direct"].config(running.url, max_concurrency=5)
-        ask(make_model(config), *requests)
-        assert server.most_at_once == 5
-        server.most_at_once = 0
-        ask(make_model(config, overall=asyncio.Semaphore(2)), *requests)
-        assert server.most_at_once == 2
 
 
 def test_a_missing_key_sends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

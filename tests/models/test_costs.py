@@ -463,37 +463,6 @@ def test_a_server_that_does_not_count_stops_within_the_limit(
         assert reply.usage == Usage()
 
 
-def test_a_run_stops_before_its_limit_and_answers_say_what_they_cost(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
-    # A call really costs (1000 * 10 + 40 * 100) / 1e6 = 0.014 dollars.
-    server = ROUTES["direct"].server(Faults(rate_limited=0.2, latency_s=0.001))
-    budget = Budget(0.3)
-    with Running(server) as running:
-        model = make_model(
-            ROUTES["direct"].config(
-                running.url, price={"input": 10.0, "output": 100.0}, max_concurrency=8
-            ),
-            budget=budget,
-        )
-
-        async def main() -> list[Reply | BaseException | None]:
-            try:
-                asked = (model.ask(make_request(f"{n:03}")) for n in range(60))
-                return await asyncio.gather(*asked, return_exceptions=True)
-            finally:
-                await model.aclose()
-
-        answers = run(main)
-    replies = [answer for answer in answers if isinstance(answer, Reply)]
-    assert {type(answer) for answer in answers} == {Reply, BudgetReachedError}
-    assert all(reply.cost_usd == pytest.approx(0.014) for reply in replies)
-    assert len(replies) == server.ended["ok"]
-    assert budget.spent_usd == pytest.approx(0.014 * len(replies))
-    assert 0.25 < budget.spent_usd <= 0.3
-
-
 @pytest.mark.parametrize(("mode", "is_counted"), [("html", True), ("reset", True), ("500", False)])
 def test_a_failure_that_may_have_been_billed_counts_against_the_budget(
     monkeypatch: pytest.MonkeyPatch, mode: str, is_counted: bool

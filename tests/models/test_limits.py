@@ -6,7 +6,6 @@ import asyncio
 import heapq
 import itertools
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -134,29 +133,6 @@ def test_tokens_really_taken_replace_the_estimate() -> None:
 
 def test_a_request_larger_than_the_limit_waits_for_an_empty_window_only() -> None:
     assert starts_of(100, (500, 500), (1, 1), (500, 500)) == [0, WINDOW_S, 2 * WINDOW_S]
-
-
-def test_all_models_together_keep_to_the_overall_limit() -> None:
-    async def main() -> int:
-        time = FakeTime()
-        overall = asyncio.Semaphore(3)
-        models = [Limits(5, overall, clock=time.clock) for _ in range(4)]
-        inside = most = 0
-
-        async def call(limits: Limits) -> None:
-            nonlocal inside, most
-            async with limits.slot(0):
-                inside += 1
-                most = max(most, inside)
-                await time.sleep(1)
-                inside -= 1
-
-        tasks = [asyncio.create_task(call(limits)) for limits in models * 5]
-        await time.run_until_done(*tasks)
-        assert time.now_s == pytest.approx(7)
-        return most
-
-    assert run(main) == 3
 
 
 def test_a_model_waiting_for_its_minute_holds_no_place_that_another_could_use() -> None:

@@ -137,14 +137,6 @@ def test_a_provider_sends_through_our_client_to_its_server_or_not_at_all(
         assert (answer.status, server.hits) == (500, 1)
 
 
-def test_a_reply_through_a_client_of_litellm_is_a_reply() -> None:
-    body = b'{"choices": [{"message": {"role": "assistant", "content": "Step1"}}]}'
-    with Running(AnyPath(200, body)) as running:
-        answer = answer_of("amazon_nova/m", api_base=running.url, api_key_env=KEY_VARIABLE)
-    assert isinstance(answer, Reply), answer
-    assert answer.text == "Step1"
-
-
 def test_what_is_missing_on_this_machine_is_no_outage(
     monkeypatch: pytest.MonkeyPatch, hosts: set[str]
 ) -> None:
@@ -245,33 +237,3 @@ def test_the_first_call_imports_litellm_quietly_and_reads_no_key_file(tmp_path: 
     assert done.stdout == "1000\nTrue None\nFalse False None\n"
     assert done.stderr == ""
     assert [seen.key for seen in running.server.seen] == ["no-key"]
-
-
-def test_two_calls_of_the_caller_and_of_ours_do_not_meet(monkeypatch: pytest.MonkeyPatch) -> None:
-    """litellm's own calls in the same task go past our client and are as they were."""
-    import asyncio
-
-    import litellm
-
-    async def both() -> tuple[Any, Any]:
-        ours = make_model(ROUTES["openai"].config(running.url))
-        message = {"role": "user", "content": "?"}
-
-        async def theirs() -> Any:
-            return await litellm.acompletion(
-                "openai/m", [message], api_base=f"{running.url}/v1", api_key="sk-another-key"
-            )
-
-        found = await asyncio.gather(theirs(), ours.ask(make_request()), theirs())
-        await ours.aclose()
-        return found[0], found[2]
-
-    monkeypatch.setenv("NO_PROXY", "*")
-    with Running(OpenAIChat()) as running:
-        first, second = asyncio.run(both())
-    assert first.choices[0].message.content == second.choices[0].message.content
-    assert sorted(seen.key for seen in running.server.seen) == [
-        "sk-another-key",
-        "sk-another-key",
-        "sk-not-a-real-key-1234",
-    ]

@@ -8,8 +8,6 @@ from pathlib import Path
 
 import pytest
 
-import phyblock.models
-
 ROOT = Path(__file__).parents[2]
 
 CACHED = """
@@ -38,12 +36,6 @@ def python(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         command, capture_output=True, text=True, check=True, cwd=ROOT, env=environment
     )
-
-
-def test_every_public_name_is_there() -> None:
-    for name in phyblock.models.__all__:
-        assert hasattr(phyblock.models, name)
-    assert sorted(phyblock.models.__all__) == phyblock.models.__all__
 
 
 @pytest.mark.parametrize("code", ["import sys, phyblock.models", CACHED])

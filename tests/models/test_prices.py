@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from datetime import date, timedelta
-from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.config.models import ModelConfig, load_models
-from phyblock.config.suite import Suite
+from phyblock.config.models import ModelConfig
 from phyblock.models import (
     Estimate,
     Price,
@@ -27,7 +25,6 @@ from phyblock.models import (
     reply_cost_usd,
 )
 from phyblock.models.costs import counted, map_entry
-from phyblock.run.models import to_config
 from tests.models.factory import make_model, make_request, reply_of, with_fields
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.anthropic_messages import AnthropicMessages
@@ -36,7 +33,6 @@ from tests.servers.gemini_generate import GeminiGenerate
 from tests.servers.openai_chat import OpenAIChat
 
 DAY = date(2026, 11, 22)
-SUITE = Suite(name="s", models=("m",))
 
 usd = st.floats(0, 100)
 prices = st.builds(Price, usd, usd, st.none() | usd, st.none() | usd)
@@ -44,12 +40,6 @@ prices = st.builds(Price, usd, usd, st.none() | usd, st.none() | usd)
 
 def config(model_id: str, **fields: Any) -> ModelConfig:
     return ModelConfig(name="m", id=model_id, **fields)
-
-
-def read(tmp_path: Path, text: str) -> ModelConfig:
-    path = tmp_path / "models.yaml"
-    path.write_text(text)
-    return to_config("m", load_models(path)["m"], SUITE)
 
 
 @given(
@@ -198,25 +188,6 @@ def test_a_model_that_has_tiers_alone_has_a_price() -> None:
     assert usual is not None and long is not None  # noqa: PT018
     assert (usual.input_usd, long.input_usd) == pytest.approx((0.2, 0.3))
     assert known.on(DAY).source.startswith("litellm ")  # type: ignore[union-attr]
-
-
-def test_prices_by_day_and_tier_are_read(tmp_path: Path) -> None:
-    text = """\
-m:
-  id: openai/gpt-4o-2024-08-06
-  price:
-    - {input: 1, output: 2, cached: 0.5}
-    - from: 2026-12-01
-      input: 2
-      output: 4
-      tiers: [{above: 1000, input: 3, output: 5, cache_write: 6}]
-"""
-    known = prices_of(read(tmp_path, text))
-    assert known is not None
-    december = date(2026, 12, 1)
-    assert known.at(DAY) == Price(1, 2, 0.5)
-    assert known.at(december, 1000) == Price(2, 4)
-    assert known.at(december, 1001) == Price(3, 5, None, 6)
 
 
 CACHED: dict[type[LocalServer], dict[str, Any]] = {

@@ -123,15 +123,6 @@ def test_a_recorded_error_is_raised_again(
     assert caught.value.status == 400
 
 
-def test_the_only_model_of_a_run_needs_no_name_and_others_do(tmp_path: Path) -> None:
-    path = tmp_path / "records.jsonl"
-    path.write_text(record("gpt", "007", 1))
-    assert answer(replay(tmp_path, "mine"), "007", 1) is not None
-    path.write_text(record("gpt", "007", 1) + record("qwen", "007", 1))
-    with pytest.raises(DataError, match="no records of this model"):
-        replay(tmp_path, "mine")
-
-
 @pytest.mark.parametrize("line", ["{", "[]", '{"model": "m"}', "7"])
 def test_a_broken_record_is_an_error_at_its_line(tmp_path: Path, line: str) -> None:
     (tmp_path / "records.jsonl").write_text(record("m", "007", 1) + line + "\n")

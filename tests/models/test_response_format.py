@@ -12,12 +12,12 @@ from aiohttp import web
 from phyblock.config.models import ModelConfig
 from phyblock.config.suite import Suite
 from phyblock.errors import ModelError, RefusedError, SampleError, UnavailableError
-from phyblock.models import Reply, Request, reply_key
+from phyblock.models import Reply, Request
 from phyblock.parsing.answer import choice_form
 from phyblock.parsing.move import move_form
 from phyblock.parsing.plan import parse_plan, plan_form
 from phyblock.run.models import to_config
-from tests.models.factory import ask, make_model, make_request, reply_of, with_fields
+from tests.models.factory import ask, make_model, make_request, reply_of
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Running, Seen
 from tests.servers.openai_chat import OpenAIChat
@@ -75,22 +75,6 @@ def test_the_schema_arrives_as_it_is_declared_and_the_reply_is_read() -> None:
     }
     parsed = parse_plan(reply.text, 16)
     assert (parsed.plan.steps, parsed.rule) == ((1, 2, 3), "json")
-
-
-def test_the_cache_tells_formats_apart_and_knows_texts_as_it_did() -> None:
-    config = ModelConfig(name="m", id="openai/m")
-    assert "response_format" not in config.identity()
-    keys = {
-        reply_key(with_fields(config, response_format=sends), request)
-        for sends in ("never", "always")
-        for request in (
-            asking(),
-            replace(asking(), response_format=choice_form("ab", False).schema),
-        )
-    }
-    assert len(keys) == 3
-    # A model that is sent no schema was asked by its messages alone.
-    assert reply_key(config, asking()) == reply_key(config, make_request("017", 42))
 
 
 SPEAKING = (

@@ -224,23 +224,3 @@ def test_a_bug_of_ours_is_neither_sent_again_nor_charged(monkeypatch: pytest.Mon
 
         run(main)
         assert (calls, budget.spent_usd) == (1, 0.0)
-
-
-@pytest.mark.usefixtures("_key")
-def test_after_a_429_all_wait_as_long_as_the_server_says() -> None:
-    server = ROUTES["direct"].server(Faults(mode="429", retry_after="100"))
-
-    async def main(url: str) -> None:
-        model = make_model(ROUTES["direct"].config(url, max_concurrency=2), policy=RetryPolicy())
-        asked = [asyncio.create_task(model.ask(make_request(f"{n:03}"))) for n in range(20)]
-        while not server.ended["429"]:
-            await asyncio.sleep(0.001)
-        await asyncio.sleep(0.3)
-        for task in asked:
-            task.cancel()
-        await asyncio.gather(*asked, return_exceptions=True)
-        await model.aclose()
-
-    with Running(server) as running:
-        run(lambda: main(running.url))
-    assert server.requests <= 2

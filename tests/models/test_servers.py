@@ -159,17 +159,6 @@ def test_a_server_that_has_answered_is_tried_for_as_long_as_the_policy_says(
     assert begins_s + 290 <= time.now_s < begins_s + 420
 
 
-def test_all_go_on_soon_when_a_server_answers_again() -> None:
-    time = FakeTime()
-    client = Outage(time, 0.0, 100.0, 1.0)
-    answers, told = ask_through(client, time, samples=16, width=16)
-    assert len(answers) == 16
-    assert time.now_s < 100 + 15 + 5 * 1.0
-    *while_away, back = told[1:]
-    assert all("still cannot be reached" in text for text in while_away)
-    assert back.partition(" after")[0] == "http://gone:1 answers again"
-
-
 def servers_of(count: int, policy: RetryPolicy | None = None) -> Servers:
     made = [Server(f"http://replica:{n}", None) for n in range(count)]  # type: ignore[arg-type]
     return Servers(made, policy or RetryPolicy(), lambda _: None)

@@ -15,11 +15,14 @@ from typing import Any
 
 import pytest
 
-from tests.servers.anthropic_batches import AnthropicBatches
-from tests.servers.batches import BatchFaults, BatchServer
+from tests.servers.batches import (
+    AnthropicBatches,
+    BatchFaults,
+    BatchServer,
+    GeminiBatches,
+    OpenAIBatches,
+)
 from tests.servers.chassis import Running
-from tests.servers.gemini_batches import GeminiBatches
-from tests.servers.openai_batches import OpenAIBatches
 from tests.vqa_set import questions, write_questions
 from tests.workspace import Workspace
 

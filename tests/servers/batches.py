@@ -1,4 +1,5 @@
-"""What the local servers of batches share: what was made, how each ends, moments to break off.
+"""Servers of batches in three protocols: made, looked at, answered; with faults and moments to
+break off.
 
 A batch answers each of its requests as the server would answer it alone, and counts it as asked.
 """
@@ -9,16 +10,22 @@ import itertools
 import json
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from typing import Any
 
 from aiohttp import web
 
+from tests.servers.anthropic_messages import AnthropicMessages
 from tests.servers.chassis import LocalServer, Seen
 from tests.servers.faults import reset_connection
+from tests.servers.gemini_generate import GeminiGenerate
+from tests.servers.openai_chat import OpenAIChat
 
 NEVER_ASKED = ("expired", "cancelled")
+ODD = ("broken", "twice", "stranger")
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 @dataclass(frozen=True)
@@ -59,13 +66,13 @@ class Made:
 class BatchServer(LocalServer):
     """One protocol's batches; `asked` counts each request that was worked on, by sample."""
 
-    batch_faults: BatchFaults = BatchFaults()
     page = 2
 
     def __init__(self, *args: Any, batch: BatchFaults | None = None, **options: Any) -> None:
         super().__init__(*args, **options)
         self.batch_faults = batch or BatchFaults()
         self.made: list[Made] = []
+        self.files: list[list[dict[str, Any]]] = []
         self.asked: Counter[str] = Counter()
         self.calls: list[str] = []
         self.keys: set[str] = set()
@@ -81,42 +88,41 @@ class BatchServer(LocalServer):
         """A line of the results."""
         raise NotImplementedError
 
-    async def guarded(
-        self, kind: str, request: web.Request, work: Callable[[], Any]
-    ) -> web.StreamResponse:
-        """Do a call's work, or what it meets; moments lie before and after it."""
-        self.calls.append(kind)
-        self.keys.add(self.key_of(request))
-        self.moment(next(self._moments), f"{kind} arrived")
-        if self.batch_faults.key not in (None, self.key_of(request)):
-            return web.json_response(self.error(401, "401", "Incorrect API key"), status=401)
-        faults = self.batch_faults.calls.get(kind, ())
-        fault = faults[self._met[kind]] if self._met[kind] < len(faults) else ""
-        self._met[kind] += 1
-        if fault == "reset":
-            return reset_connection(request)
-        if fault.isdigit():
-            return web.json_response(self.error(int(fault), fault, "went wrong"), status=int(fault))
-        response = await work()
-        self.moment(next(self._moments), f"{kind} done")
-        if fault == "done-reset":
-            return reset_connection(request)
-        assert isinstance(response, web.StreamResponse)
-        return response
-
     def told(self, made: Made) -> dict[str, Any]:
         """What the provider says of a batch."""
         raise NotImplementedError
 
-    async def look_at(self, request: web.Request) -> web.StreamResponse:
+    def call(self, kind: str, work: Callable[[web.Request], Awaitable[Any]]) -> Handler:
+        """A handler that does a call's work, or what it meets; moments lie before and after."""
+
+        async def handle(request: web.Request) -> web.StreamResponse:
+            self.calls.append(kind)
+            key = self.key_of(request)
+            self.keys.add(key)
+            self.moment(next(self._moments), f"{kind} arrived")
+            if self.batch_faults.key not in (None, key):
+                return web.json_response(self.error(401, "401", "Incorrect API key"), status=401)
+            faults = self.batch_faults.calls.get(kind, ())
+            fault = faults[self._met[kind]] if self._met[kind] < len(faults) else ""
+            self._met[kind] += 1
+            if fault == "reset":
+                return reset_connection(request)
+            if fault.isdigit():
+                error = self.error(int(fault), fault, "went wrong")
+                return web.json_response(error, status=int(fault))
+            done = await work(request)
+            self.moment(next(self._moments), f"{kind} done")
+            if fault == "done-reset":
+                return reset_connection(request)
+            return done if isinstance(done, web.StreamResponse) else web.json_response(done)
+
+        return handle
+
+    async def look_at(self, request: web.Request) -> dict[str, Any]:
         """A call that looks at a batch."""
-
-        async def work() -> web.Response:
-            made = self.find(request.match_info["id"])
-            self.look(made)
-            return web.json_response(self.told(made))
-
-        return await self.guarded("look", request, work)
+        made = self.find(request)
+        self.look(made)
+        return self.told(made)
 
     def listed(self, start: int) -> tuple[list[dict[str, Any]], bool]:
         """A page of batches, the newest first, and whether there are more."""
@@ -131,9 +137,7 @@ class BatchServer(LocalServer):
         newest = [made.id for made in reversed(self.made)]
         return newest.index(batch_id) + 1 if batch_id else 0
 
-    def make(
-        self, token: str, requests: list[tuple[str, dict[str, Any]]], call: web.Request
-    ) -> Made:
+    def make(self, token: str, requests: list[Any], call: web.Request) -> dict[str, Any]:
         """Begin a batch, which works on its requests whether it is looked at or not."""
         number = len(self.made)
         made = Made(f"batch-{number}", token, requests, number, time.time())
@@ -146,10 +150,11 @@ class BatchServer(LocalServer):
             is_asked = self.batch_faults.ends.get(number) != "refused"
             if is_asked and faults.get(place) not in NEVER_ASKED:
                 self.asked[seen.sample] += 1
-        return made
+        return self.told(made)
 
-    def find(self, batch_id: str) -> Made:
-        return next(made for made in self.made if made.id == batch_id)
+    def find(self, request: web.Request) -> Made:
+        wanted = request.match_info["id"].removeprefix("out-").partition(".")[0]
+        return next(made for made in self.made if made.id == wanted)
 
     def look(self, made: Made) -> None:
         """Bring a batch nearer to its end."""
@@ -173,4 +178,217 @@ class BatchServer(LocalServer):
                 made.lines.append(json.dumps(self.line("nobody-7", seen, "ok")))
 
 
-ODD = ("broken", "twice", "stranger")
+class OpenAIBatches(BatchServer, OpenAIChat):
+    """/v1/files and /v1/batches; with `forgets_names` it keeps no metadata."""
+
+    forgets_names = False
+
+    def add_routes(self, app: web.Application) -> None:
+        super().add_routes(app)
+        app.router.add_post("/v1/files", self.call("upload", self._upload))
+        app.router.add_get("/v1/files/{id}/content", self.call("results", self._content))
+        app.router.add_post("/v1/batches", self.call("create", self._create))
+        app.router.add_get("/v1/batches", self.call("list", self._list))
+        app.router.add_get("/v1/batches/{id}", self.call("look", self.look_at))
+
+    def key_of(self, request: web.Request) -> str:
+        return request.headers.get("Authorization", "").removeprefix("Bearer ")
+
+    def line(self, custom_id: str, seen: Seen, ending: str) -> dict[str, Any]:
+        response, error = None, None
+        if ending in NEVER_ASKED:
+            error = {"code": f"batch_{ending}", "message": "This request could not be executed"}
+        elif ending.isdigit():
+            body = self.error(int(ending), ending, "went wrong")
+            response = {"status_code": int(ending), "request_id": "r", "body": body}
+        else:
+            response = {"status_code": 200, "request_id": "r", "body": self.reply(seen, ending)}
+        return {"id": "l", "custom_id": custom_id, "response": response, "error": error}
+
+    async def _upload(self, request: web.Request) -> dict[str, Any]:
+        form = await request.post()
+        assert form["purpose"] == "batch"
+        file = form["file"]
+        assert isinstance(file, web.FileField)
+        self.files.append([json.loads(line) for line in file.file.read().splitlines()])
+        return {"id": f"file-{len(self.files) - 1}", "object": "file", "purpose": "batch"}
+
+    async def _create(self, request: web.Request) -> dict[str, Any]:
+        body = await request.json()
+        assert (body["endpoint"], body["completion_window"]) == ("/v1/chat/completions", "24h")
+        lines = self.files[int(body["input_file_id"].removeprefix("file-"))]
+        assert {(line["method"], line["url"]) for line in lines} == {("POST", body["endpoint"])}
+        requests = [(line["custom_id"], line["body"]) for line in lines]
+        return self.make(body["metadata"]["phyblock"], requests, request)
+
+    async def _list(self, request: web.Request) -> dict[str, Any]:
+        rows, more = self.listed(self.after(request.query.get("after")))
+        return {"object": "list", "data": rows, "has_more": more}
+
+    async def _content(self, request: web.Request) -> web.Response:
+        is_bad = request.match_info["id"].endswith(".bad")
+        lines = [line for line in self.find(request).lines if _failed(line) == is_bad]
+        return web.Response(text="\n".join(lines), content_type="application/jsonl")
+
+    def told(self, made: Made) -> dict[str, Any]:
+        words = {"running": "in_progress", "ended": "completed", "refused": "failed"}
+        has_ended = made.state not in ("running", "refused")
+        done, bad = len(made.lines), sum(map(_failed, made.lines))
+        errors = {"data": [{"code": "token_limit_exceeded", "message": "Enqueued token limit"}]}
+        return {
+            "id": made.id,
+            "object": "batch",
+            "status": words.get(made.state, made.state),
+            "metadata": None if self.forgets_names else {"phyblock": made.token},
+            "request_counts": {
+                "total": len(made.requests), "completed": done - bad, "failed": bad,
+            },
+            "created_at": int(made.created_s),
+            "errors": errors if made.state == "refused" else None,
+            "output_file_id": f"{made.id}.good" if has_ended and done > bad else None,
+            "error_file_id": f"{made.id}.bad" if has_ended and bad else None,
+        }  # fmt: skip
+
+
+def _failed(line: str) -> bool:
+    try:
+        response = json.loads(line)["response"]
+    except ValueError:
+        return False
+    return response is None or response["status_code"] != 200
+
+
+class AnthropicBatches(BatchServer, AnthropicMessages):
+    """/v1/messages/batches."""
+
+    def add_routes(self, app: web.Application) -> None:
+        super().add_routes(app)
+        path = "/v1/messages/batches"
+        app.router.add_post(path, self.call("create", self._create))
+        app.router.add_get(path, self.call("list", self._list))
+        app.router.add_get(path + "/{id}", self.call("look", self.look_at))
+        app.router.add_get(path + "/{id}/results", self.call("results", self._results))
+
+    def key_of(self, request: web.Request) -> str:
+        assert request.headers["anthropic-version"] == "2023-06-01"
+        return request.headers["x-api-key"]
+
+    def line(self, custom_id: str, seen: Seen, ending: str) -> dict[str, Any]:
+        kinds = {"400": "invalid_request_error", "500": "api_error", "429": "rate_limit_error"}
+        if ending in NEVER_ASKED:
+            result: dict[str, Any] = {"type": ending.replace("ll", "l")}
+        elif ending.isdigit():
+            error = {"type": kinds[ending], "message": "went wrong"}
+            result = {"type": "errored", "error": {"type": "error", "error": error}}
+        else:
+            result = {"type": "succeeded", "message": self.reply(seen, ending)}
+        return {"custom_id": custom_id, "result": result}
+
+    async def _create(self, request: web.Request) -> dict[str, Any]:
+        body = await request.json()
+        requests = [(one["custom_id"], one["params"]) for one in body["requests"]]
+        assert all(len(name) <= 64 for name, _ in requests)
+        return self.make(requests[0][0].rpartition("-")[0], requests, request)
+
+    async def _list(self, request: web.Request) -> dict[str, Any]:
+        rows, more = self.listed(self.after(request.query.get("after_id")))
+        return {"data": rows, "has_more": more, "last_id": ""}
+
+    async def _results(self, request: web.Request) -> web.Response:
+        # In no order of the requests.
+        text = "".join(f"{line}\n" for line in reversed(self.find(request).lines))
+        return web.Response(text=text, content_type="application/x-jsonl")
+
+    def told(self, made: Made) -> dict[str, Any]:
+        has_ended = made.state != "running"
+        kinds = [line.split('"type": "', 1)[-1].split('"', 1)[0] for line in made.lines]
+        names = ("succeeded", "errored", "canceled", "expired")
+        counts = {name: kinds.count(name) for name in names}
+        counts["processing"] = len(made.requests) - sum(counts.values())
+        created = datetime.fromtimestamp(made.created_s, UTC)
+        # The provider names its own address, whichever gateway it was asked through.
+        own = f"https://api.anthropic.com/v1/messages/batches/{made.id}/results"
+        return {
+            "id": made.id,
+            "type": "message_batch",
+            "processing_status": "ended" if has_ended else "in_progress",
+            "request_counts": counts,
+            "archived_at": None,
+            "created_at": created.isoformat().replace("+00:00", "Z"),
+            "results_url": own if has_ended else None,
+        }
+
+
+class GeminiBatches(BatchServer, GeminiGenerate):
+    """/upload/v1beta/files, :batchGenerateContent, /v1beta/batches, /download/v1beta/files."""
+
+    def add_routes(self, app: web.Application) -> None:
+        create = self.call("create", self._create)
+        app.router.add_post("/upload/v1beta/files", self.call("upload", self._announce))
+        app.router.add_post("/upload/v1beta/sent", self._upload)
+        app.router.add_post("/v1beta/models/{name}:batchGenerateContent", create)
+        app.router.add_get("/v1beta/batches", self.call("list", self._list))
+        app.router.add_get("/v1beta/batches/{id}", self.call("look", self.look_at))
+        results = self.call("results", self._results)
+        app.router.add_get("/download/v1beta/files/{id}:download", results)
+        super().add_routes(app)
+
+    def key_of(self, request: web.Request) -> str:
+        return request.headers["x-goog-api-key"]
+
+    def line(self, custom_id: str, seen: Seen, ending: str) -> dict[str, Any]:
+        codes = {"400": 3, "429": 8, "500": 13, "cancelled": 1, "expired": 1}
+        if ending in codes:
+            return {"key": custom_id, "error": {"code": codes[ending], "message": "went wrong"}}
+        return {"response": self.reply(seen, ending), "key": custom_id}
+
+    async def _announce(self, request: web.Request) -> web.Response:
+        assert request.headers["X-Goog-Upload-Command"] == "start"
+        size = request.headers["X-Goog-Upload-Header-Content-Length"]
+        url = f"http://{request.host}/upload/v1beta/sent?bytes={size}"
+        return web.json_response({}, headers={"X-Goog-Upload-URL": url})
+
+    async def _upload(self, request: web.Request) -> web.StreamResponse:
+        assert request.headers["X-Goog-Upload-Command"] == "upload, finalize"
+        data = await request.read()
+        assert len(data) == int(request.query["bytes"])
+        self.files.append([json.loads(line) for line in data.splitlines()])
+        return web.json_response({"file": {"name": f"files/in-{len(self.files) - 1}"}})
+
+    async def _create(self, request: web.Request) -> dict[str, Any]:
+        batch = (await request.json())["batch"]
+        number = int(batch["input_config"]["file_name"].rpartition("-")[2])
+        requests = [(line["key"], line["request"]) for line in self.files[number]]
+        return self.make(batch["display_name"], requests, request)
+
+    async def _list(self, request: web.Request) -> dict[str, Any]:
+        start = int(request.query.get("pageToken", 0))
+        rows, more = self.listed(start)
+        return {"operations": rows, **({"nextPageToken": str(start + len(rows))} if more else {})}
+
+    async def _results(self, request: web.Request) -> web.Response:
+        assert request.query["alt"] == "media"
+        text = "\n".join(self.find(request).lines)
+        return web.Response(text=text, content_type="application/jsonl")
+
+    def told(self, made: Made) -> dict[str, Any]:
+        words = {"running": "RUNNING", "ended": "SUCCEEDED", "refused": "FAILED"}
+        has_results = made.state in ("ended", "cancelled") and made.lines
+        created = datetime.fromtimestamp(made.created_s, UTC).isoformat()
+        output = {"responsesFile": f"files/out-{made.id}"}
+        answered = sum('"response"' in line for line in made.lines)
+        counts = {
+            "requestCount": str(len(made.requests)), "successfulRequestCount": str(answered),
+        }  # fmt: skip
+        return {
+            "name": f"batches/{made.id}",
+            "metadata": {
+                "displayName": made.token,
+                "state": f"BATCH_STATE_{words.get(made.state, made.state.upper())}",
+                "createTime": created.replace("+00:00", "123Z"),
+                "batchStats": counts,
+                **({"output": output} if has_results else {}),
+            },
+            "done": made.state != "running",
+            **({"response": output} if made.state == "ended" else {}),
+        }
