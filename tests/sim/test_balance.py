@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import functools
 import math
-from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.optimize import nnls  # type: ignore[import-untyped]
 
 from phyblock.data import read_builtin
 from phyblock.domain import Block, BlockType
@@ -24,7 +21,7 @@ from phyblock.sim.balance import (
     surely_stands,
 )
 from phyblock.sim.dynamics import groups
-from tests.sim.structures import block, counterweighted_beam, tower, turned
+from tests.sim.structures import block, tower, turned
 
 HALF_CUBE_M = 0.025
 offsets_m = st.floats(-0.045, 0.045)
@@ -43,13 +40,6 @@ def test_a_cube_stands_on_another_as_far_as_its_middle_is_over_it(
     if abs(abs(inside_m) - MARGIN_M) > 2e-3:
         assert surely_stands(pair) is (inside_m > MARGIN_M)
         assert surely_falls(pair) is (inside_m < -MARGIN_M)
-
-
-@given(offset_m=offsets_m)
-def test_nothing_both_stands_and_falls_for_sure(offset_m: float) -> None:
-    plank = [*tower(2), block(3, "cuboid3", (offset_m, 0, 0.1125))]
-    assert not (surely_stands(plank) and surely_falls(plank))
-    assert is_balanced(plank) or not surely_stands(plank)
 
 
 @pytest.mark.parametrize(
@@ -116,44 +106,6 @@ def test_a_balance_nearer_than_the_margin_is_no_sure_fall(off_m: float, falls: b
     ridge_m = 0.05 / 2**0.5
     ridge = [block(1, "triangle", (0, 0, 0)), block(2, "cuboid1", (off_m, off_m, ridge_m + 0.0125))]
     assert surely_falls(ridge) is falls
-
-
-def test_a_weight_that_holds_a_plank_is_needed() -> None:
-    beam = counterweighted_beam()[:2]
-    beam += [block(n, "cylinder", (0, y, 0.125)) for n, y in ((3, 0.05), (4, -0.05))]
-    assert surely_stands(beam)
-    assert not is_balanced(beam[:3])
-    assert surely_falls([*beam[:2], replace(beam[2], position_m=(0, 0.07, 0.125))])
-
-
-def test_a_block_in_the_air_is_not_borne() -> None:
-    assert surely_falls([*tower(1), block(2, "cube", (0, 0, 0.08))])
-    assert is_balanced([])
-
-
-@pytest.mark.parametrize("offset_m", [-0.04, -0.021, 0.0, 0.019, 0.033])
-def test_where_least_squares_find_no_end_the_verdict_is_the_same(
-    offset_m: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A solver that is cut short must not make blocks fall that stand, or stand that fall."""
-    pair = [*tower(2), block(3, "cuboid3", (offset_m, 0, 0.1125), (0, 0, 30))]
-
-    def verdicts() -> tuple[bool, ...]:
-        return is_balanced(pair), surely_stands(pair), surely_falls(pair)
-
-    before = verdicts()
-    monkeypatch.setattr("scipy.optimize.nnls", functools.partial(nnls, maxiter=1))
-    assert verdicts() == before
-
-
-@pytest.mark.parametrize(("friction", "stays"), [(0.9, False), (1.1, True)])
-def test_friction_decides_on_a_slope(friction: float, stays: bool) -> None:
-    """The slope of a triangle on its long side falls by 45 degrees: a coefficient of 1 holds."""
-    wedge = block(1, "triangle", (0, 0, 0))
-    middle_m, out_m, up_m = 0.0707107 / 4, 0.0125 / 2**0.5, 0.01 / 2**0.5
-    at_m = (0, middle_m + out_m - up_m, middle_m + out_m + up_m)
-    slab = block(2, "cuboid1", at_m, (-45, 0, 0))
-    assert is_balanced([wedge, slab], friction) is stays
 
 
 def test_what_the_data_set_holds_stands() -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,12 +13,9 @@ from phyblock.domain import Block, BlockType, euler_deg_to_matrix
 from phyblock.domain.blocks import SHAPES
 from phyblock.scoring.pose import blocks_reached, overlap_volume, placed
 from phyblock.sim.contact import VOXEL_M, filled_voxels, find_overlaps, voxel_iou
-from phyblock.sim.dynamics import DEFAULT_TRIAL, ExecutionLimits, execute
+from phyblock.sim.dynamics import ExecutionLimits, execute
 from phyblock.sim.engine import (
-    Physics,
     PhysicsEngine,
-    Pose,
-    Velocity,
     installed_engines,
     physics_engine,
 )
@@ -136,49 +131,6 @@ def test_what_falls_upon_others_that_stand_apart_moves_them(engine: PhysicsEngin
     assert [step.end for step in done.steps[:2]] == ["stands", "stands"]
     assert done.steps[2].end in ("falls", "knocks_over")
     assert not find_overlaps(done.blocks, 0.002)
-
-
-class CreepingSimulation:
-    """Everything goes to one side for ever, slowly, and never rests."""
-
-    def __init__(self) -> None:
-        self._poses: dict[int, Pose] = {}
-
-    def add(self, number: int, _: BlockType, pose: Pose) -> None:
-        self._poses[number] = pose
-
-    def remove(self, number: int) -> None:
-        del self._poses[number]
-
-    def pose(self, number: int) -> Pose:
-        return self._poses[number]
-
-    def velocity(self, _: int) -> Velocity:
-        return Velocity((0.01, 0.0, 0.0), (0.0, 0.0, 0.0))
-
-    def set_velocity(self, number: int, velocity: Velocity) -> None:
-        raise NotImplementedError
-
-    def step(self, n: int) -> None:
-        for number, pose in self._poses.items():
-            way_m = np.array([CREEP_M_S * n * Physics().time_step_s, 0.0, 0.0])
-            self._poses[number] = Pose(pose.position_m + way_m, pose.quat_xyzw)
-
-
-class CreepingEngine:
-    name = "creeping"
-    versions: Mapping[str, str] = {"creeping": "1"}
-
-    @contextlib.contextmanager
-    def open(self, physics: Physics) -> Iterator[CreepingSimulation]:  # noqa: ARG002
-        yield CreepingSimulation()
-
-
-def test_what_an_engine_lets_creep_stands_where_it_was_put() -> None:
-    done = execute(tower(3), engine=CreepingEngine())
-    assert [step.end for step in done.steps] == ["stands"] * 3
-    assert done.steps[0].moved_cm == pytest.approx(100 * CREEP_M_S * DEFAULT_TRIAL.duration_s)
-    assert voxel_iou(tower(3), done.blocks) == 1
 
 
 @settings(max_examples=40)

@@ -13,7 +13,6 @@ from numpy.testing import assert_allclose
 
 from phyblock.domain import BLOCK_TYPES, SHAPES, Block, BlockType
 from phyblock.errors import InputError
-from phyblock.sim.dynamics import settle
 from phyblock.sim.engine import (
     ENGINES,
     GRAVITY_M_S2,
@@ -70,13 +69,6 @@ def fall(engine: PhysicsEngine, blocks: list[Block], steps: int) -> str:
         return bits(opened, blocks)
 
 
-def test_an_engine_says_what_it_is(engine: PhysicsEngine) -> None:
-    assert engine.name
-    assert all(name and version for name, version in engine.versions.items())
-    assert engine.versions
-    assert {engine: 1}[engine] == 1
-
-
 @given(block_types, heights, eulers)
 @settings(max_examples=20)
 def test_a_block_is_where_it_was_put_and_at_rest(
@@ -105,16 +97,6 @@ def test_a_velocity_is_the_one_that_was_set(simulation: Simulation) -> None:
     simulation.set_velocity(2, given_one)
     assert_allclose(simulation.velocity(2), given_one)
     assert_allclose(simulation.velocity(1), 0.0)
-
-
-def test_a_number_is_free_again_when_its_block_is_gone(simulation: Simulation) -> None:
-    add_all(simulation, tower(2))
-    simulation.remove(2)
-    other = block(2, "arch", (0.4, 0.0, 0.025), (0.0, 0.0, 90.0))
-    add_all(simulation, [other])
-    simulation.step(24)
-    assert simulation.pose(2).distance_m(Pose.goal(other)) < 0.001
-    assert simulation.pose(1).distance_m(Pose.goal(tower(1)[0])) < 0.001
 
 
 def test_the_same_calls_give_the_same_bits_beside_others(engine: PhysicsEngine) -> None:
@@ -181,28 +163,6 @@ def test_an_engine_that_is_not_installed_is_refused_with_where_to_get_it(
     assert installed_engines() == ()
     with pytest.raises(InputError, match="is not installed"):
         physics_engine()
-
-
-@pytest.mark.parametrize("name", installed_engines())
-def test_the_engine_that_is_there_is_used(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    library = ENGINES[name].library
-    monkeypatch.setattr(
-        "phyblock.sim.engine.find_spec", lambda module: module if module == library else None
-    )
-    assert physics_engine().name == name
-    assert installed_engines() == (name,)
-
-
-def test_what_was_found_by_one_engine_is_not_told_as_the_others(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    found = set()
-    for name in installed_engines():
-        monkeypatch.setenv("PHYBLOCK_PHYSICS", name)
-        settled = settle(counterweighted_beam()[:3])
-        assert settled.fallen
-        found.add(settled.blocks)
-    assert len(found) == len(installed_engines())
 
 
 @pytest.mark.parametrize("word", ["bullet", "", "phyblock.sim.mujoco:MujocoEngine"])

@@ -22,33 +22,12 @@ def is_closed(mesh: Mesh) -> bool:
 
 
 @every_type
-def test_solid_is_closed_and_faces_outward(block_type: BlockType) -> None:
-    solid = solid_mesh(block_type)
-    assert is_closed(solid)
-    assert solid.volume_m3 > 0
-
-
-@every_type
 def test_mass_and_extent_are_those_of_the_block_library(block_type: BlockType) -> None:
     solid, shape = solid_mesh(block_type), SHAPES[block_type]
     assert_allclose(solid.volume_m3, shape.volume_m3, rtol=1e-9)
     assert_allclose(solid.center_of_mass_m, shape.center_of_mass_m, atol=1e-9)
     assert_allclose(solid.vertices_m.min(axis=0), shape.low_m, atol=1e-9)
     assert_allclose(solid.vertices_m.max(axis=0), shape.high_m, atol=1e-9)
-
-
-@every_type
-def test_principal_axes_of_inertia_are_the_body_axes(block_type: BlockType) -> None:
-    inertia = solid_mesh(block_type).inertia_m2
-    assert_allclose(inertia, np.diag(np.diag(inertia)), atol=1e-12)
-    one, two, three = sorted(np.diag(inertia))
-    assert 0 < one <= two <= three < one + two
-
-
-def test_inertia_of_a_box_is_the_textbook_one() -> None:
-    x, y, z = 0.15, 0.05, 0.025
-    expected = np.array([y * y + z * z, x * x + z * z, x * x + y * y]) / 12
-    assert_allclose(np.diag(solid_mesh("cuboid3").inertia_m2), expected, rtol=1e-9)
 
 
 @every_type
@@ -75,15 +54,6 @@ def test_inset_moves_every_plane_by_that_much(block_type: BlockType) -> None:
 
 
 @every_type
-def test_separating_axes_name_every_face_and_edge(block_type: BlockType) -> None:
-    for piece in collision_pieces(block_type):
-        planes = ConvexHull(piece.vertices_m).equations[:, :3]
-        alike = np.abs(planes @ piece.face_normals.T).max(axis=1)
-        assert_allclose(alike, 1.0, atol=1e-9)
-        assert_allclose(np.linalg.norm(piece.edge_directions, axis=1), 1.0)
-
-
-@every_type
 def test_what_is_drawn_is_the_solid_made_round(block_type: BlockType) -> None:
     """Full circles hold 2 % more than 18-gons, and half circles 2 % more than ten chords."""
     drawn, solid, shape = drawn_mesh(block_type), solid_mesh(block_type), SHAPES[block_type]
@@ -102,22 +72,6 @@ def test_a_round_side_is_one_face(
     mesh_of: Callable[[BlockType], Mesh], block_type: BlockType
 ) -> None:
     assert len(set(mesh_of(block_type).faces.tolist())) == FACES.get(block_type, 6)
-
-
-@every_type
-def test_normals_at_corners_are_those_of_flat_faces_and_bend_with_round_ones(
-    block_type: BlockType,
-) -> None:
-    mesh = drawn_mesh(block_type)
-    off = np.abs(mesh.corner_normals - mesh.normals[:, None]).max(axis=(1, 2))
-    flat = np.array([np.ptp(mesh.normals[mesh.faces == face], axis=0).max() for face in mesh.faces])
-    assert off[flat < 1e-9].max() < 1e-9
-    assert (off[flat > 1e-9] > 0.01).all()
-    assert_allclose(np.linalg.norm(mesh.corner_normals, axis=2), 1.0)
-    if block_type == "cylinder":
-        side = flat > 1e-9
-        outward = mesh.corners_m[side] * [1, 1, 0] / 0.025
-        assert_allclose(mesh.corner_normals[side], outward, atol=1e-9)
 
 
 @pytest.mark.parametrize(("block_type", "color"), KIT_PALETTE)

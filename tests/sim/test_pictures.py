@@ -1,152 +1,272 @@
+"""Pictures: cameras that cut nothing off, blocks that stand out, the same bytes for one recipe."""
+
 from __future__ import annotations
 
 import hashlib
 import io
 import itertools
 import pickle
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
+from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from numpy.typing import NDArray
+from PIL import Image, ImageSequence
 
-from phyblock.domain import KIT_PALETTE, Candidate, CandidateSet, Scene
+from phyblock.data import read_builtin, read_official, read_questions
+from phyblock.domain import BLOCK_TYPES, KIT_PALETTE, SHAPES, Candidate, CandidateSet, Color, Scene
+from phyblock.domain.question import Mark, QuestionPicture
 from phyblock.errors import DataError
 from phyblock.making.poses import POSES
 from phyblock.making.scenes.candidates import make_candidates
+from phyblock.sim import ruled
+from phyblock.sim.backgrounds import PERIOD_M, TEXTURED, sample, surface_map
+from phyblock.sim.camera import VIEWS, Camera, Window, frame, view_axes
+from phyblock.sim.engine import Pose, quat_xyzw_to_euler_deg
+from phyblock.sim.film import (
+    FilmStep,
+    animation,
+    episode_gif,
+    episode_images,
+    exploded_blocks,
+    marked_png,
+    step_images,
+)
 from phyblock.sim.pictures import (
+    COLOR_RGB,
     LABEL_STRIP,
+    DrawnBlock,
     PictureStyle,
+    camera_for,
     candidate_camera,
-    candidates_grid,
     candidates_key,
     candidates_png,
-    composite_png,
+    common_distance_m,
+    drawn,
+    goal_camera,
     goal_key,
     goal_png,
+    goal_style,
     on_the_floor,
     picture,
+    segments,
     shoot,
-    thumbnail,
 )
-from phyblock.types import BACKGROUNDS
-from tests.designs.scenes import designed_scene
-from tests.sim.structures import block, scene_of
+from phyblock.sim.question_pictures import (
+    block_mark,
+    drawn_blocks,
+    is_inside,
+    question_camera,
+    question_key,
+    question_png,
+    seen,
+    seen_order,
+    state_picture,
+)
+from phyblock.sim.ruled import box_cm, kit_key, ruled_key, ruled_png
+from phyblock.types import BACKGROUNDS, Background
+from tests.designs.scenes import designed_scene, designed_scenes
+from tests.sim.structures import block, clouds, scene_of, tower
 
-SMALL = PictureStyle(size_px=128)
+DATA = Path(__file__).parents[2] / "benchmarks" / "data"
+BUILT_IN = read_builtin(DATA / "phyblock-400")
+TASK = BUILT_IN.tasks[0]
+STYLE, SMALL = PictureStyle(), PictureStyle(size_px=128)
+MARGIN, LEAST_CONTRAST = 0.16, 3.0
 EVERY_LOOK = [
-    Candidate(block_type, color, euler)
-    for block_type, color in KIT_PALETTE
-    for euler in POSES[block_type].values()
+    Candidate(kind, color, euler) for kind, color in KIT_PALETTE for euler in POSES[kind].values()
+]
+VIEW = (45.0, 22.0)
+TOWER = (*tower(2), block(3, "cube", (0.1, 0.0, 0.025)))
+PLAIN = QuestionPicture("scene", TOWER, VIEW)
+MARKED = replace(PLAIN, marks=(Mark("A", (0.0, 0.0, 0.1)), Mark("B", (0.1, 0.0, 0.05))))
+angles = st.floats(-180, 180, allow_nan=False)
+elevations = st.floats(1, 90, allow_nan=False)
+coordinates = st.floats(-1, 1, allow_nan=False)
+windows = st.builds(
+    Window, st.floats(-1, -0.2), st.floats(0.1, 1), st.floats(-1, -0.3), st.floats(0.2, 1)
+)
+slowly = [
+    pytest.param(name, marks=pytest.mark.slow if name in TEXTURED else ()) for name in BACKGROUNDS
 ]
 
 
-def designed(name: str) -> Scene:
-    return designed_scene(name)
-
-
-def opened(png: bytes) -> np.ndarray:
+def pixels(png: bytes) -> NDArray[np.int64]:
     with Image.open(io.BytesIO(png)) as image:
-        return np.asarray(image.convert("RGB"))
+        return np.asarray(image.convert("RGB")).astype(np.int64)
 
 
-SIZED = list(zip(itertools.cycle([128, 130]), BACKGROUNDS))
+def projected(scene: Scene, style: PictureStyle) -> NDArray[np.float64]:
+    corners = np.vstack([block.vertices_m for block in drawn(scene.blocks)])
+    return goal_camera(scene, style).project(corners)
 
 
-@pytest.mark.parametrize(
-    ("size_px", "background"),
-    [*SIZED[:2], *(pytest.param(*one, marks=pytest.mark.slow) for one in SIZED[2:])],
+@given(angles, elevations)
+def test_axes_are_a_right_handed_frame(azimuth_deg: float, elevation_deg: float) -> None:
+    """But for their rounding to 12 decimals."""
+    axes = view_axes(azimuth_deg, elevation_deg)
+    right, up, forward = axes
+    assert_allclose(axes @ axes.T, np.eye(3), atol=1e-11)
+    assert_allclose(np.cross(right, up), -forward, atol=1e-11)
+    assert up[2] >= -1e-12
+    assert right[2] == 0
+
+
+@given(
+    st.lists(st.tuples(coordinates, coordinates, coordinates), min_size=1, max_size=20),
+    angles,
+    elevations,
+    windows,
+    st.floats(0.1, 2.1),
 )
-def test_pictures_are_squares_of_the_size_asked_for(size_px: int, background: str) -> None:
-    scene = designed("l1-gate")
-    style = PictureStyle(size_px=size_px, background=background)
-    goal, grid = goal_png(scene, style), candidates_png(make_candidates(scene), style)
-    assert opened(goal).shape == opened(grid).shape == (size_px, size_px, 3)
-    height, width, _ = opened(composite_png(goal, grid)).shape
-    assert height == size_px
-    assert 2 * size_px < width < 2.1 * size_px
+def test_framing_keeps_every_point_in_the_window_and_comes_as_close_as_it_may(
+    cloud, azimuth, elevation, window, near_m
+) -> None:
+    where = np.array(cloud)
+    camera = frame(where, view_axes(azimuth, elevation), window, near_m)
+    across, up = camera.project(where).T
+    assert window.left - 1e-9 <= across.min() <= across.max() <= window.right + 1e-9
+    assert window.bottom - 1e-9 <= up.min() <= up.max() <= window.top + 1e-9
+    depths = (where - camera.eye_m) @ camera.axes[2]
+    assert depths.min() >= near_m - 1e-9
+    assert camera.near_m < depths.min() <= depths.max() < camera.far_m
+    spans = np.ptp([across, up], axis=1) / [window.right - window.left, window.top - window.bottom]
+    is_close = depths.min() == pytest.approx(near_m, abs=1e-6)
+    assert spans.max() == pytest.approx(1.0, abs=1e-6) or is_close
 
 
-def test_composite_is_goal_gap_and_grid() -> None:
-    goal = goal_png(designed("l1-gate"), SMALL)
-    grid = candidates_png(make_candidates(designed("l1-gate")), SMALL)
-    whole = opened(composite_png(goal, grid))
-    assert np.array_equal(whole[:, :128], opened(goal))
-    assert np.array_equal(whole[:, -128:], opened(grid))
-    assert np.all(whole[:, 128:-128] == 255)
+@given(clouds(), angles, elevations)
+def test_a_goal_picture_never_cuts_a_block_off(blocks, azimuth_deg, elevation_deg) -> None:
+    style = PictureStyle(azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
+    assert np.abs(projected(scene_of(blocks), style)).max() <= 1 - MARGIN + 1e-9
 
 
-def test_blocks_show_in_their_colors() -> None:
-    """Most saturated pixel of a one-block picture: red is red, blue is blue, and so on."""
-    strongest = {"red": (1, 0, 0), "green": (0, 1, 0), "blue": (0, 0, 1), "yellow": (1, 1, 0)}
-    for color, channels in strongest.items():
-        scene = scene_of([block(1, "cube", (0.0, 0.0, 0.025), color=color)])
-        pixels = opened(goal_png(scene, replace(SMALL, background="white"))).astype(int)
-        middle = pixels[60:68, 50:60].reshape(-1, 3).mean(axis=0)
-        bright = tuple(int(channel > 0.6 * middle.max()) for channel in middle)
-        assert bright == channels
+@pytest.mark.parametrize("view", sorted(VIEWS))
+def test_the_renderer_draws_where_the_camera_says(view: str, official_checkout: Path) -> None:
+    style = PictureStyle.from_view(view)
+    for task in read_official(official_checkout).tasks:
+        assert np.abs(projected(task.scene, style)).max() <= 1 - MARGIN + 1e-9, task.scene.id
+    scene = designed_scene("l2-rocket")
+    camera, blocks = goal_camera(scene, style), drawn(scene.blocks)
+    rows, columns = np.nonzero(shoot(blocks, camera, 512).block >= 0)
+    places = np.vstack([camera.to_pixels(block.vertices_m, 512) for block in blocks])
+    found = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
+    assert_allclose(found, [*places.min(axis=0), *places.max(axis=0)], atol=3.0)
 
 
-@pytest.mark.parametrize("elevation_deg", [1.0, 22.0, 90.0])
-def test_any_elevation_can_be_drawn(elevation_deg: float) -> None:
-    pixels = opened(goal_png(designed("l2-throne"), replace(SMALL, elevation_deg=elevation_deg)))
-    assert pixels.std() > 10
+def lies_between_planes(blocks: Sequence[DrawnBlock], camera: Camera) -> bool:
+    points = np.vstack([one.vertices_m for one in blocks])
+    depths = (points - camera.eye_m) @ camera.axes[2]
+    return bool(0 < camera.near_m < depths.min() and depths.max() < camera.far_m)
 
 
-@pytest.mark.parametrize("candidate", EVERY_LOOK, ids=lambda c: f"{c.type}-{c.color}-{c.euler_deg}")
-def test_a_candidate_fills_its_cell_and_leaves_room_for_its_number(candidate: Candidate) -> None:
-    one = on_the_floor(candidate.type, candidate.color, candidate.euler_deg)
-    size_px = 128
-    shot = shoot([one], candidate_camera(one, PictureStyle()), size_px)
-    rows, columns = np.nonzero(shot.block >= 0)
-    assert rows.max() < size_px * (1 - LABEL_STRIP)
-    assert rows.min() > 0.04 * size_px
-    assert 0.04 * size_px < columns.min() <= columns.max() < 0.96 * size_px
-    share = max(np.ptp(rows) / (1 - LABEL_STRIP), np.ptp(columns)) / size_px
-    assert 0.6 < share < 0.95
+@pytest.mark.parametrize("every", [16, pytest.param(1, marks=pytest.mark.slow)])
+def test_no_built_in_picture_is_cut_open_and_blocks_of_wide_goals_are_large(every: int) -> None:
+    for task in BUILT_IN.tasks[::every]:
+        style = goal_style(task.scene, STYLE)
+        camera, exploded = goal_camera(task.scene, style), exploded_blocks(task.scene)
+        assert lies_between_planes(drawn(task.scene.blocks), camera)
+        assert lies_between_planes(exploded, camera_for(exploded, STYLE, task.scene.id))
+        places = np.array([one.position_m for one in task.scene.blocks])
+        farthest_m = ((places - camera.eye_m) @ camera.axes[2]).max()
+        assert 0.05 / camera.width_m(farthest_m) * style.size_px >= 0.08 * STYLE.size_px
+    for task in read_questions(DATA / "phyblock-vqa", BUILT_IN).tasks[::every]:
+        for recipe in task.question.pictures:
+            assert lies_between_planes(drawn_blocks(recipe), question_camera(recipe, STYLE)), recipe
 
 
-@pytest.mark.parametrize("background", BACKGROUNDS)
-@pytest.mark.parametrize("size_px", [128, 256, 512, 1024])
-def test_numbers_stay_in_the_strip_below_the_blocks(size_px: int, background: str) -> None:
-    cell_px = size_px // 4
-    style = PictureStyle(size_px, background)
-    cubes = CandidateSet((Candidate("cube", "red", (0.0, 0.0, 0.0)),) * 16)
-    sheet, (block, *_), distance_m = candidates_grid(cubes, style)
-    grid = np.asarray(sheet).astype(int)
-    plain = np.asarray(thumbnail(block, style, cell_px, distance_m)).astype(int)
-    for row, column in itertools.product(range(4), range(4)):
-        cell = grid[row * cell_px : (row + 1) * cell_px, column * cell_px : (column + 1) * cell_px]
-        ink = np.abs(cell - plain)[2:-2, 2:-2].max(axis=-1) > 20
-        assert ink.any()
-        assert np.nonzero(ink)[0].min() + 2 >= (1 - LABEL_STRIP) * cell_px
-        assert np.nonzero(ink)[1].min() + 2 > cell_px / 2
+@given(st.lists(st.sampled_from(EVERY_LOOK), min_size=1, max_size=16), st.floats(1, 89))
+@settings(max_examples=30, deadline=None)
+def test_all_candidates_of_a_grid_have_one_scale_and_the_largest_fills_its_cell(
+    looks, elevation: float
+) -> None:
+    style = replace(STYLE, elevation_deg=elevation)
+    blocks = [on_the_floor(*look.look[:2], look.euler_deg) for look in looks]
+    distance_m = common_distance_m(blocks, style)
+    fullest = []
+    for one in blocks:
+        camera = candidate_camera(one, style, distance_m)
+        depths = (one.vertices_m - camera.eye_m) @ camera.axes[2]
+        assert (depths.min() + depths.max()) / 2 == pytest.approx(distance_m)
+        shown = camera.project(one.vertices_m)
+        assert np.abs(shown).max() < 0.87
+        fullest.append(max(np.ptp(shown, axis=0) / [1.72, 1.40]))
+    assert max(fullest) == pytest.approx(1.0, abs=1e-6)
 
 
-def test_no_two_looks_have_the_same_picture() -> None:
-    style = PictureStyle()
-    pixels = {}
+def test_every_look_has_a_picture_of_its_own_that_fills_its_cell_above_the_number() -> None:
+    found: dict[object, NDArray[np.int64]] = {}
     for candidate in EVERY_LOOK:
         one = on_the_floor(candidate.type, candidate.color, candidate.euler_deg)
-        image = picture([one], candidate_camera(one, style), "white", 64)
-        pixels.setdefault(candidate.look, np.asarray(image).astype(int))
-    for one, other in itertools.combinations(pixels.values(), 2):
-        assert (np.abs(one - other).max(axis=-1) > 45).mean() > 0.01
+        camera = candidate_camera(one, STYLE)
+        rows, columns = np.nonzero(shoot([one], camera, 128).block >= 0)
+        assert 0.04 * 128 < rows.min() <= rows.max() < 128 * (1 - LABEL_STRIP)
+        assert 0.04 * 128 < columns.min() <= columns.max() < 0.96 * 128
+        share = max(np.ptp(rows) / (1 - LABEL_STRIP), np.ptp(columns)) / 128
+        assert 0.6 < share < 0.95
+        image = picture([one], camera, "white", 64)
+        found.setdefault(candidate.look, np.asarray(image).astype(np.int64))
+    for one_look, other in itertools.combinations(found.values(), 2):
+        assert (np.abs(one_look - other).max(axis=-1) > 45).mean() > 0.01
 
 
-def test_places_without_a_candidate_stay_empty() -> None:
-    one = CandidateSet((Candidate("cube", "red", (0.0, 0.0, 0.0)),))
-    grid = opened(candidates_png(one, SMALL)).astype(int)
-    red = (grid[..., 0] > 150) & (grid[..., 1] < 90)
-    assert red[:32, :32].any()
-    assert not red[32:].any()
-    assert not red[:, 32:].any()
+def luminance(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Relative luminance of colors (..., 3), 0..255, as WCAG 2.2 defines it."""
+    share = rgb / 255
+    linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    total: NDArray[np.float64] = linear @ np.array([0.2126, 0.7152, 0.0722])
+    return total
+
+
+@pytest.mark.parametrize("background", slowly)
+@pytest.mark.parametrize("color", COLOR_RGB)
+def test_every_face_stands_out_from_the_floor(background: Background, color: Color) -> None:
+    """By a contrast of 3:1, its own or that of the line round it, along nine tenths of its edge.
+
+    The floor is taken nine pixels to the side, where it may be in shadow.
+    """
+    one, size_px = on_the_floor("cube", color, (0.0, 0.0, 0.0)), 256
+    camera = camera_for([one], STYLE, "cube")
+    light = luminance(np.asarray(picture([one], camera, background, size_px), dtype=np.float64))
+    inside = np.pad(segments([one], camera, size_px) >= 0, 4)
+    rows, columns = np.nonzero(inside & ~np.roll(inside, 1, 1) | inside & ~np.roll(inside, -1, 1))
+    clear = []
+    for row, column in zip(rows - 4, columns - 4, strict=True):
+        way = -1 if inside[row + 4, column + 5] else 1
+        line, ground = light[row, column - 3 : column + 4], light[row, column + 9 * way]
+        high, low = np.maximum(line, ground), np.minimum(line, ground)
+        clear.append(((high + 0.05) / (low + 0.05)).max() >= LEAST_CONTRAST)
+    assert np.mean(clear) >= 0.9
+
+
+@pytest.mark.parametrize("surface", TEXTURED)
+def test_a_surface_is_seamless_and_its_mean_color_far_away(surface: Background) -> None:
+    """A step across the seam is no larger than steps elsewhere."""
+    texture = surface_map(surface)[0].astype(np.int16)
+    for axis in (0, 1):
+        steps = np.abs(np.diff(texture, axis=axis)).mean(axis=(1 - axis, 2))
+        seam = np.abs(texture.take(0, axis) - texture.take(-1, axis)).mean()
+        assert seam <= steps.max() + 1e-3
+    at_m = ((np.arange(24) + 0.31) / 24 * PERIOD_M).astype(np.float32)
+    x_m, y_m = np.meshgrid(at_m, at_m)
+    near, far = (
+        sample(surface, x_m, y_m, np.full(x_m.shape, width_m, dtype=np.float32))
+        for width_m in (0.0001, 2 * PERIOD_M)
+    )
+    assert near.std(axis=(0, 1)).min() > 2
+    assert np.ptp(far, axis=(0, 1)).max() < 0.01
+    assert np.abs(far - texture.mean(axis=(0, 1), dtype=np.float64)).max() < 0.51
 
 
 def test_the_same_bytes_in_every_process() -> None:
-    scene = designed("l3-torii")
+    scene = designed_scene("l3-torii")
     candidates = make_candidates(scene)
     here = [goal_png(scene, SMALL), candidates_png(candidates, SMALL)]
     assert [goal_png(scene, SMALL), candidates_png(candidates, SMALL)] == here
@@ -155,43 +275,203 @@ def test_the_same_bytes_in_every_process() -> None:
         grids = [pool.submit(candidates_png, candidates, SMALL) for _ in range(2)]
         assert {job.result() for job in goals} == {here[0]}
         assert {job.result() for job in grids} == {here[1]}
-    assert b"tIME" not in here[0]
-    assert b"tEXt" not in here[0]
+    assert not any(chunk in here[0] for chunk in (b"tIME", b"tEXt"))
 
 
 def test_keys_name_the_content_and_not_the_scene() -> None:
-    scene = designed("l1-gate")
-    other = designed("l1-dog")
+    scene, other = designed_scene("l1-gate"), designed_scene("l1-dog")
     assert goal_key(scene, SMALL) == goal_key(replace(scene, id="another", levels=(4,)), SMALL)
-    turned = replace(
-        scene, blocks=(replace(scene.blocks[0], euler_deg=(0.0, 0.0, 90.0)), *scene.blocks[1:])
-    )
-    keys = {
-        goal_key(scene, SMALL),
-        goal_key(other, SMALL),
-        goal_key(turned, SMALL),
-        goal_key(scene, replace(SMALL, size_px=256)),
-        goal_key(scene, replace(SMALL, background="white")),
-        goal_key(scene, replace(SMALL, azimuth_deg=10.0)),
-        goal_key(scene, replace(SMALL, elevation_deg=10.0)),
-        candidates_key(make_candidates(scene), SMALL),
-        candidates_key(make_candidates(other), SMALL),
-    }
-    assert len(keys) == 9
+    first = replace(scene.blocks[0], euler_deg=(0.0, 0.0, 90.0))
+    turned = replace(scene, blocks=(first, *scene.blocks[1:]))
+    styles = [
+        replace(SMALL, **change)
+        for change in (
+            {"size_px": 256},
+            {"background": "white"},
+            {"azimuth_deg": 10.0},
+            {"elevation_deg": 10.0},
+        )
+    ]
+    keys = {goal_key(one, SMALL) for one in (scene, other, turned)}
+    keys |= {goal_key(scene, style) for style in styles}
+    keys |= {candidates_key(make_candidates(one), SMALL) for one in (scene, other)}
+    kit = CandidateSet(tuple(Candidate(name, "red", (0.0, 0.0, 90.0)) for name in BLOCK_TYPES))
+    keys |= {ruled_key(scene, SMALL), ruled_key(other, SMALL), kit_key(kit, SMALL)}
+    keys |= {kit_key(CandidateSet(kit.candidates[:-1]), SMALL)}
+    assert len(keys) == 13
     assert all(len(key) == hashlib.sha256().digest_size * 2 for key in keys)
 
 
 def test_a_style_is_checked_and_can_be_sent_to_a_process() -> None:
     assert pickle.loads(pickle.dumps(SMALL)) == SMALL
-    assert len({SMALL, replace(SMALL), PictureStyle()}) == 2
     bad = [{"size_px": 10}, {"background": "lava"}, {"elevation_deg": -5.0}]
     for wrong in [*bad, {"azimuth_deg": float("nan")}]:
         with pytest.raises(ValueError, match=next(iter(wrong))):
             PictureStyle(**wrong)
     with pytest.raises(ValueError, match="oblique"):
         PictureStyle.from_view("below")
-
-
-def test_a_scene_without_blocks_has_no_picture() -> None:
     with pytest.raises(DataError, match="empty"):
         goal_png(scene_of([], "empty"), SMALL)
+
+
+@given(angles, st.floats(-85, 85), angles)
+def test_any_orientation_comes_back_from_its_quaternion(x: float, y: float, z: float) -> None:
+    pose = Pose.goal(replace(TOWER[0], euler_deg=(x, y, z)))
+    back = replace(TOWER[0], euler_deg=quat_xyzw_to_euler_deg(pose.quat_xyzw))
+    assert Pose.goal(back).angle_deg(pose) < 0.01
+
+
+@settings(max_examples=12, deadline=None)
+@given(angles, angles, angles, st.floats(0, 360), st.floats(5, 90))
+def test_no_picture_of_a_question_cuts_anything_off_whatever_the_pose(
+    x: float, y: float, z: float, azimuth: float, elevation: float
+) -> None:
+    tilted = replace(TOWER[1], euler_deg=(x, y, z))
+    assert is_inside(QuestionPicture("scene", (TOWER[0], tilted), (azimuth, elevation)))
+
+
+@pytest.mark.parametrize("background", slowly)
+def test_marks_change_the_picture_on_every_background(background: Background) -> None:
+    style = PictureStyle(256, background)
+    marked, plain = (pixels(question_png(one, style)) for one in (MARKED, PLAIN))
+    assert 300 < (np.abs(marked - plain).max(axis=2) > 60).sum() < 3000
+    own = replace(PLAIN, background=background)
+    assert question_png(own, replace(STYLE, size_px=256)) == question_png(PLAIN, style)
+
+
+def test_keys_of_questions_differ_exactly_where_pixels_may() -> None:
+    others = [
+        MARKED,
+        replace(PLAIN, view_deg=(50.0, 22.0)),
+        replace(PLAIN, blocks=TOWER[:2]),
+        replace(PLAIN, framed=TOWER[:1]),
+        replace(PLAIN, blocks=(*TOWER[:2], replace(TOWER[2], color="blue"))),
+        *(replace(PLAIN, background=name) for name in BACKGROUNDS if name != STYLE.background),
+    ]
+    keys = {question_key(one, STYLE) for one in (PLAIN, *others)}
+    assert len(keys) == len(others) + 1
+    assert question_key(replace(PLAIN, label="A"), STYLE) == question_key(PLAIN, STYLE)
+    turned = replace(STYLE, azimuth_deg=200.0)
+    assert question_key(PLAIN, turned) == question_key(PLAIN, STYLE)
+    assert question_key(PLAIN, replace(STYLE, size_px=256)) not in keys
+    high, low = (QuestionPicture("block", (one,), VIEW) for one in (TOWER[1], TOWER[0]))
+    assert question_key(high, STYLE) == question_key(low, STYLE)
+
+
+def test_a_mark_on_a_block_shows_on_that_block() -> None:
+    shot = seen(PLAIN)
+    for one in TOWER:
+        mark = block_mark(PLAIN, shot, one.order, "A")
+        assert mark is not None
+        assert seen_order(PLAIN, shot, mark.position_m) == one.order
+
+
+def test_a_state_is_seen_as_the_goal_is_and_changes_where_a_block_comes() -> None:
+    scene = TASK.scene
+    states = [
+        question_png(state_picture(scene, scene.blocks[:count], SMALL), SMALL)
+        for count in range(len(scene) + 1)
+    ]
+    assert states[-1] == goal_png(scene, SMALL)
+    for before, after in itertools.pairwise(map(pixels, states)):
+        assert 0 < (before != after).any(axis=2).mean() < 0.5
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(st.tuples(*[st.floats(-0.4, 0.4)] * 2, st.floats(0.025, 0.3)), min_size=1, max_size=4),
+    st.floats(0, 360),
+    st.floats(5, 90),
+)
+def test_all_that_is_ruled_and_written_is_in_the_picture(
+    places: list[tuple[float, float, float]], azimuth_deg: float, elevation_deg: float
+) -> None:
+    blocks = drawn([block(n, "cube", place) for n, place in enumerate(places, 1)])
+    style = replace(SMALL, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
+    field = ruled._field(blocks, style)
+    camera = ruled._camera(blocks, field, style)
+    beyond = [(*field.x, field.beyond(0, 5)), (*field.y, field.beyond(1, 5)), (0.0,)]
+    ends = np.array([*itertools.product(*beyond)])
+    assert np.abs(camera.project(ends / 100)).max() <= 1
+    points = np.vstack([one.vertices_m for one in blocks]) * 100
+    for axis, (low, high) in enumerate((field.x, field.y)):
+        assert low % 5 == high % 5 == 0
+        assert low <= points[:, axis].min() - 3 + 1e-6
+        assert points[:, axis].max() + 3 - 1e-6 <= high
+    # The numbers are on the sides from which it is seen.
+    middle = np.array([sum(field.x) / 2, sum(field.y) / 2])
+    near = np.array([field.near_x, field.near_y]) - middle
+    assert near @ -camera.axes[2, :2] >= -1e-6
+
+
+@pytest.mark.parametrize("block_type", BLOCK_TYPES)
+def test_the_sheet_says_the_dimensions_of_a_block_as_it_is_turned(block_type) -> None:
+    assert ruled_png(scene_of(tower(2)), SMALL) == ruled_png(scene_of(tower(2)), SMALL)
+    upright = np.array(SHAPES[block_type].high_m) - np.array(SHAPES[block_type].low_m)
+    for yaw_deg, sides in ((0.0, upright), (90.0, upright[[1, 0, 2]])):
+        low, high = box_cm(on_the_floor(block_type, "red", (0.0, 0.0, yaw_deg)))
+        assert (high - low) / 100 == pytest.approx(sides, abs=0.001)
+        assert low[2] == pytest.approx(0)
+
+
+@pytest.mark.parametrize("scene", designed_scenes(), ids=lambda scene: scene.id)
+def test_exploding_parts_what_stands_on_one_another(scene: Scene) -> None:
+    before, after = drawn(scene.blocks), exploded_blocks(scene)
+    number = {b.order: v for v, b in enumerate(scene.blocks)}
+    for vertex, one in enumerate(scene.blocks):
+        for order in one.depend:
+            rises = [
+                blocks[vertex].vertices_m[:, 2].min() - blocks[number[order]].vertices_m[:, 2].max()
+                for blocks in (before, after)
+            ]
+            assert rises[1] >= rises[0] + 0.034
+    places = np.vstack([one.vertices_m for one in after])
+    assert np.abs(camera_for(after, SMALL, scene.id).project(places)).max() < 0.85
+
+
+@pytest.mark.parametrize("kind", ["gif", "webp"])
+def test_an_animation_shows_every_step_for_ever(kind: str) -> None:
+    scene = designed_scene("l2-rocket")
+    with Image.open(io.BytesIO(animation(scene, SMALL, kind))) as image:
+        shown = [one.convert("RGB") for one in ImageSequence.Iterator(image)]
+        assert image.info["loop"] == 0
+    steps = [np.asarray(one).astype(int) for one in step_images(scene, SMALL)]
+    frames = [np.asarray(one).astype(int) for one in shown]
+    assert len(frames) == len(steps) == len(scene)
+    assert np.array_equal(steps[-1], pixels(goal_png(scene, SMALL)))
+    for one, step in zip(frames, steps, strict=True):
+        assert np.abs(one - step).mean() < (3 if kind == "gif" else 1e-9)
+    backward = Scene("backward", (1,), scene.blocks[::-1], ("backward",))
+    with pytest.raises(DataError, match="backward"):
+        step_images(backward, SMALL)
+
+
+def test_marked_blocks_keep_their_colors_and_others_fade() -> None:
+    sides = (("red", -0.06), ("blue", 0.06))
+    blocks = [block(n, "cube", (0.0, y, 0.025), color=c) for n, (c, y) in enumerate(sides, 1)]
+    style, scene = PictureStyle.from_view("front", 128, "white"), scene_of(blocks)
+    plain, marked = (pixels(marked_png(scene, named, style)) for named in ([], [2]))
+    assert np.array_equal(plain, pixels(goal_png(scene, style)))
+    shown = np.pad(shoot(drawn(blocks), goal_camera(scene, style), 128).block, 2)
+    inside = {n: (shown[4:, 4:] == n) & (shown[:-4, :-4] == n) for n in (0, 1)}
+    assert np.array_equal(marked[inside[1]], plain[inside[1]])
+    assert (255 - marked[inside[0]]).mean() < 0.45 * (255 - plain[inside[0]]).mean()
+
+
+def test_frames_of_an_episode_show_goal_candidates_and_world() -> None:
+    blocks = TASK.scene.blocks
+    told: list[tuple[str, int | None, int]] = [("plain", None, 0), ("good", 2, 1), ("bad", 7, 1)]
+    told += [("bad", 40, 1), ("good", None, len(blocks))]
+    steps = [FilmStep("a step", tone, number, blocks[:n]) for tone, number, n in told]  # type: ignore[arg-type]
+    images = episode_images(TASK.scene, TASK.candidates, steps, SMALL)
+    goal = pixels(goal_png(TASK.scene, SMALL))
+    begun, placed, wrong, invalid, done = (np.asarray(image) for image in images)
+    for one in (begun, placed, wrong, invalid, done):
+        assert np.array_equal(one[-128:, :128], goal)
+    assert np.array_equal(done[-128:, -128:], goal)
+    assert np.array_equal(placed[-128:, -128:], wrong[-128:, -128:])
+    changed = np.argwhere((wrong[-128:, 131:259] != invalid[-128:, 131:259]).any(axis=2))
+    # Candidate 7 of the grid of 4 by 4: second row, third column.
+    assert (changed.min(axis=0).tolist(), changed.max(axis=0).tolist()) == ([32, 64], [63, 95])
+    with Image.open(io.BytesIO(episode_gif(images))) as gif:
+        assert (gif.n_frames, gif.size) == (len(steps), images[0].size)

@@ -116,48 +116,11 @@ def test_a_sunken_block_overlaps_by_what_it_was_sunk(depth_m) -> None:
     assert overlap.depth_m == pytest.approx(depth_m, abs=1e-9)
 
 
-def test_a_block_in_the_ground_overlaps_the_ground() -> None:
-    (overlap,) = find_overlaps([block(4, "cube", (0.0, 0.0, 0.02))])
-    assert (overlap.first, overlap.second) == (GROUND, 4)
-    assert overlap.depth_m == pytest.approx(0.005)
-
-
-def test_neighbors_side_by_side_carry_nothing() -> None:
-    left, right = block(1, "cube", (0.0, 0.0, 0.025)), block(2, "cube", (0.0, 0.05, 0.025))
-    assert support_graph([left, right]) == {1: {GROUND}, 2: {GROUND}}
-    assert find_overlaps([left, right]) == ()
-
-
-def test_blocks_that_meet_in_an_edge_carry_nothing() -> None:
-    stair = [block(1, "cube", (0.0, 0.0, 0.025)), block(2, "cube", (0.0, 0.05, 0.075))]
-    assert support_graph(stair)[2] == frozenset()
-
-
 def test_a_cylinder_on_its_ridge_rests_on_what_it_lies_on() -> None:
     """Turned so that a vertex of the 18-gon is lowest: a line of contact, with no area."""
     plank = block(1, "cuboid3", (0.0, 0.0, 0.0125))
     log = block(2, "cylinder", (0.0, 0.0, 0.05), (0.0, 90.0, 0.0))
     assert support_graph([plank, log])[2] == {1}
-
-
-def crests(*heights_m: float) -> list[Block]:
-    """Domes on slabs side by side along y, their crests at these heights."""
-    domes = []
-    for i, height_m in enumerate(heights_m):
-        place = (0.0, -0.025 + 0.05 * i, height_m - 0.025)
-        domes.append(block(i + 1, "semi_cylinder", place))
-    return domes
-
-
-def test_a_slab_whose_edges_lie_on_two_crests_rests_on_both() -> None:
-    slab = block(3, "cuboid1", (0.0, 0.0, 0.0375))
-    assert support_graph([*crests(0.025, 0.025), slab])[3] == {1, 2}
-
-
-def test_an_edge_along_a_rim_carries_nothing_beside_a_face_that_does() -> None:
-    dome, cube = crests(0.05)[0], block(2, "cube", (0.0, 0.025, 0.025))
-    slab = block(3, "cuboid1", (0.0, 0.0, 0.0625))
-    assert support_graph([dome, cube, slab])[3] == {2}
 
 
 def test_a_plank_rests_on_both_its_posts_and_nothing_under_the_arch() -> None:
@@ -169,14 +132,6 @@ def test_a_plank_rests_on_both_its_posts_and_nothing_under_the_arch() -> None:
     assert graph[3] == {1, 2}
     assert graph[4] == {3}
     assert graph[5] == {3}
-
-
-def test_official_annotation_errors_are_found(official_checkout: Path) -> None:
-    sample = {*OVERLAPPING, *FLOATING, "000", "069", "120", "250", "399"}
-    tasks = [t for t in read_official(official_checkout).tasks if t.scene.id in sample]
-    overlapping, floating = _broken(tasks)
-    assert overlapping == OVERLAPPING
-    assert floating == FLOATING
 
 
 @pytest.mark.slow

@@ -1,0 +1,243 @@
+"""Blocks let go: worlds, trials, building steps, states of a structure, removals and pushes."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from phyblock.data import read_builtin, read_official
+from phyblock.domain import Block, BlockType
+from phyblock.errors import SimulationError
+from phyblock.making.poses import POSES
+from phyblock.sim.contact import drop_height_m
+from phyblock.sim.dynamics import (
+    DEFAULT_TRIAL,
+    ONE_SETTING,
+    Settled,
+    Site,
+    Trial,
+    check,
+    check_steps,
+    groups,
+    settle,
+)
+from phyblock.sim.engine import ENGINES, Physics, Pose, World
+from phyblock.sim.outcomes import OUTCOME_SETTINGS, Push, after, after_removal, holds
+from tests.designs.pad import Pad
+from tests.designs.scenes import designed_scenes
+from tests.sim.structures import block, counterweighted_beam, tower
+from tests.sim.test_support import FLOATING
+
+BUILT_IN = read_builtin(Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400").tasks
+SCENES = {scene.id: scene.blocks for scene in designed_scenes()}
+FIRST = replace(DEFAULT_TRIAL, physics=DEFAULT_TRIAL.physics[:1])
+LINE_BALANCED = {"bowl", "bowl-turned"}
+SEESAW = (
+    block(1, "cube", (0, 0, 0.025)),
+    Block(2, "cuboid3", "yellow", (0.055, 0, 0.0625), (0, 0, 0), (1,), 2),
+    block(3, "cube", (0.11, 0, 0.025), color="blue"),
+)
+"""A bar whose middle is far from the cube it lies on: it tips until a second cube is there."""
+
+
+def poses_as_hex(blocks: Sequence[Block], duration_s: float) -> str:
+    with World() as world:
+        world.place(*blocks)
+        world.step(duration_s)
+        rows = [np.concatenate([p.position_m, p.quat_xyzw]) for p in world.poses().values()]
+    return np.stack(rows).tobytes().hex()
+
+
+@pytest.mark.parametrize(
+    ("block_type", "pose"),
+    [(t, p) for t, poses in POSES.items() for p in poses if p not in LINE_BALANCED],
+)
+def test_a_block_stays_where_it_is_laid_down(block_type: BlockType, pose: str) -> None:
+    lifted = block(1, block_type, (0.0, 0.0, 0.5), POSES[block_type][pose])
+    down = replace(lifted, position_m=(0.0, 0.0, 0.5 - drop_height_m(lifted, [])))
+    with World() as world:
+        world.place(down)
+        world.step(0.5)
+        assert world.pose(1).distance_m(Pose.goal(down)) < 0.001
+        assert world.pose(1).angle_deg(Pose.goal(down)) < 1.0
+
+
+def test_the_same_scene_gives_the_same_bits_in_another_process_that_loads_engines_late() -> None:
+    blocks = counterweighted_beam()[:3]
+    here = poses_as_hex(blocks, 0.5)
+    assert poses_as_hex(blocks, 0.5) == here
+    libraries = {engine.library for engine in ENGINES.values()}
+    code = (
+        "import sys, phyblock.sim, phyblock.making.scenes\n"
+        f"assert {libraries}.isdisjoint(sys.modules)\n"
+        "from tests.sim.structures import counterweighted_beam\n"
+        "from tests.sim.test_dynamics import poses_as_hex\n"
+        "print(poses_as_hex(counterweighted_beam()[:3], 0.5))\n"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert (answer.stdout.strip(), answer.stderr) == (here, "")
+
+
+def test_wrong_use_is_said() -> None:
+    world = World()
+    with pytest.raises(SimulationError, match="not open"):
+        world.step(0.1)
+    with world:
+        world.place(block(1, "cube", (0.0, 0.0, 0.025)))
+        with pytest.raises(SimulationError, match="already"):
+            world.place(block(1, "cube", (0.0, 0.0, 0.025)))
+        with pytest.raises(SimulationError, match="not in the world"):
+            world.remove(2)
+    with pytest.raises(SimulationError, match="not open"):
+        world.place(block(1, "cube", (0.0, 0.0, 0.025)))
+
+
+@pytest.mark.parametrize(
+    ("name", "stands"),
+    [("000", True), ("018", True), ("089", True), ("040", False), ("116", False), ("184", False)],
+)
+def test_official_scenes_stand_unless_a_block_floats(
+    name: str, stands: bool, official_checkout: Path
+) -> None:
+    scenes = {task.scene.id: task.scene for task in read_official(official_checkout).tasks}
+    quick = Trial(duration_s=1.0, physics=(Physics(),))
+    assert check(scenes[name].blocks, quick).stable == stands
+
+
+@pytest.mark.slow
+def test_of_all_official_scenes_only_the_floating_fall(official_checkout: Path) -> None:
+    trial = Trial(physics=(Physics(),))
+    tasks = read_official(official_checkout).tasks
+    assert {t.scene.id for t in tasks if not check(t.scene.blocks, trial).stable} == FLOATING
+
+
+@pytest.mark.parametrize("name", ["l1-dolmen", "l2-rocket", "l4-playground"])
+def test_steps_stand_as_the_long_trial_says(name: str) -> None:
+    blocks = SCENES[name]
+    assert [step.fallen for step in check_steps(blocks, FIRST)] == [()] * len(blocks)
+    assert all(check(blocks[:count], FIRST).stable for count in range(1, 5))
+
+
+def test_what_falls_midway_or_slowly_is_named_at_its_step() -> None:
+    sketch = Pad()
+    sketch.put("cube")
+    sketch.put("cuboid3", pose="flat-y")
+    sketch.pair("cube", 2.8)
+    steps = [(), (), (2, 3), ()]
+    assert [step.fallen for step in check_steps(sketch.blocks, FIRST)] == steps
+    assert [check(sketch.blocks[:n], FIRST).fallen for n in range(1, 5)] == steps
+    # The load reaches 0.1 mm past the balance point: the slowest fall that a grid can hold.
+    slow = Pad()
+    slow.put("cube")
+    slow.put("cuboid3", 1.004, pose="flat-y")
+    assert not check(slow.blocks, FIRST).stable
+
+
+def test_groups_are_what_nothing_brings_near() -> None:
+    sketch = Pad()
+    for y in (-4, 4):
+        sketch.put("arch", y)
+        sketch.put("triangle", y)
+    assert [[b.order for b in group] for group in groups(sketch.blocks)] == [[1, 2], [3, 4]]
+    assert len(groups(sketch.blocks, reach_m=0.2)) == 1
+    assert groups([]) == ()
+
+
+@pytest.mark.parametrize("trial", [ONE_SETTING, DEFAULT_TRIAL], ids=["one", "default"])
+def test_a_site_gives_the_same_verdict_whatever_was_tried_on_it_before(trial: Trial) -> None:
+    structures = [task.scene.blocks for task in BUILT_IN[::150]]
+    structures += [SEESAW[:2], structures[0][:1], SEESAW, ()]
+    with closing(Site(trial)) as site:
+        first = [site.settle(blocks) for blocks in structures]
+        again = [site.settle(blocks) for blocks in reversed(structures)][::-1]
+        site.close()
+        assert site.settle(SEESAW).stands
+    alone = []
+    for blocks in structures:
+        with closing(Site(trial)) as site:
+            alone.append(site.settle(blocks))
+    assert first == again == alone == [settle(blocks, trial) for blocks in structures]
+    tipped = settle(SEESAW[:2])
+    assert tipped.fallen == check(SEESAW[:2]).fallen == (2,)
+    assert tipped.blocks[0] == SEESAW[0]
+    assert tipped.blocks[1].position_m[2] < SEESAW[1].position_m[2] - 0.01
+
+
+def elsewhere(blocks: Sequence[Block]) -> tuple[Block, ...]:
+    """The same arrangement in another place and in one color."""
+    places = ((b.position_m[0] + 0.3, *b.position_m[1:]) for b in blocks)
+    return tuple(
+        replace(b, color="green", position_m=place) for b, place in zip(blocks, places, strict=True)
+    )
+
+
+def test_an_arrangement_is_tried_once_wherever_it_stands(monkeypatch: pytest.MonkeyPatch) -> None:
+    simulated: list[float] = []
+    step = World.step
+
+    def counted(world: World, duration_s: float) -> None:
+        simulated.append(duration_s)
+        step(world, duration_s)
+
+    monkeypatch.setattr(World, "step", counted)
+    with closing(Site(ONE_SETTING)) as site:
+        assert site.settle(SEESAW).stands
+        once = len(simulated)
+        moved = elsewhere(SEESAW)
+        assert site.settle(moved) == Settled((), moved)
+        third = tuple(replace(b, order=b.order + 10) for b in elsewhere(moved))
+        assert site.settle((*SEESAW, *third)).stands, "two apart are each the one"
+        assert len(simulated) == once > 0
+        assert site.settle(SEESAW[:2]).fallen == (2,)
+        fell = len(simulated)
+        assert site.settle(SEESAW[:2]).fallen == (2,)
+        assert len(simulated) == fell > once
+
+
+def test_what_rests_on_a_removed_block_moves_and_nothing_else() -> None:
+    three = (*tower(2), block(3, "cube", (0.1, 0.0, 0.025)))
+    assert after(three).settled == three
+    outcome = after_removal(three, 1)
+    assert outcome.is_clear
+    assert outcome.moved == (2,)
+    assert outcome == after_removal(three, 1)
+    fallen = next(block for block in outcome.settled if block.order == 2)
+    assert abs(fallen.position_m[2] - 0.025) < 0.002
+    assert after_removal(three, 3).moved == ()
+
+
+@pytest.mark.parametrize(("over_m", "verdict"), [(0.025, None), (0.035, False), (0.015, True)])
+def test_weight_just_over_an_edge_is_not_clear(over_m: float, verdict: bool | None) -> None:
+    """A cube half of which hangs over falls in every level world, and stays on many a table."""
+    assert holds((tower(1)[0], block(2, "cube", (over_m, 0.0, 0.075))), 2) is verdict
+
+
+@pytest.mark.parametrize("direction", [(1.0, 0.0), (0.0, -1.0)])
+@pytest.mark.parametrize("height", [1, 2])
+def test_a_block_that_slides_goes_as_far_as_it_is_pushed_with_its_load(
+    direction: tuple[float, float], height: int
+) -> None:
+    push = Push(1, direction)
+    outcome = after(tower(height), push)
+    assert outcome.is_clear
+    assert outcome.moved == tuple(range(1, height + 1))
+    settled = outcome.settled[0]
+    gone_m = sum(p * d for p, d in zip(settled.position_m, direction, strict=False))
+    assert gone_m == pytest.approx(push.distance_m, abs=0.005)
+
+
+def test_what_ends_otherwise_in_another_setting_is_not_told() -> None:
+    """The top of a tower falls in each setting, and comes to lie elsewhere in some."""
+    push = Push(4, (1.0, 0.0))
+    alone = [after(tower(4), push, settings=[setting]) for setting in OUTCOME_SETTINGS]
+    assert all(outcome.is_clear and outcome.moved == (4,) for outcome in alone)
+    assert not after(tower(4), push).is_clear
