@@ -9,7 +9,6 @@ import re
 import zlib
 from bisect import bisect_right
 from collections.abc import Collection, Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +20,9 @@ from phyblock.errors import DataError, SpecError, StoreError
 from phyblock.records.files import known_records
 from phyblock.records.record import Record
 from phyblock.results.design import read_design
-from phyblock.results.estimates import headline_of, track_measures
+from phyblock.results.estimates import headline_of
 from phyblock.results.load import load_run
 from phyblock.results.tables import write_tables
-from phyblock.tracks.base import kind_of
 from phyblock.web import leaderboard
 from phyblock.web.leaderboard import (
     SiteRun,
@@ -32,12 +30,10 @@ from phyblock.web.leaderboard import (
     board_of,
     check_runs_alike,
     entries_of,
-    open_runs,
-    values_of,
     write_site,
 )
 from phyblock.web.pack import Pack, SampleIndex, Sources, pack_samples, read_places
-from phyblock.web.report import cautions, headlines, rank_texts, write_report
+from phyblock.web.report import headlines, rank_texts, write_report
 from tests.report.factory import laws, manifest, record, record_lists, run_of, score, write_run
 from tests.workspace import Workspace
 
@@ -86,19 +82,6 @@ def test_what_is_packed_comes_back(
     pack = Pack(folder, "records", "build")
     assert [pack.add(entry) for entry in entries] == list(range(len(entries)))
     assert entries_in(folder, pack, "records") == entries
-
-
-def test_chunks_stay_small_and_say_where_they_start(tmp_path: Path) -> None:
-    pack = Pack(tmp_path, "records", "build")
-    entries = [f"{n}" + "x" * (90_000 + 1000 * n) for n in range(20)]
-    for entry in entries:
-        pack.add(entry)
-    assert entries_in(tmp_path, pack, "records") == entries
-    sizes = [path.stat().st_size for path in tmp_path.iterdir()]
-    assert len(sizes) == len(pack.starts) > 5
-    assert max(sizes) < 320_000
-    for n, start in enumerate(pack.starts):
-        assert unpacked(tmp_path / f"records-{n}.js")[0] == entries[start]
 
 
 @laws
@@ -170,14 +153,6 @@ def test_a_report_is_replaced_as_a_whole(tmp_path: Path) -> None:
     assert [index["models"][model] for model in index["rows"]["model"]] == ["beta"]
 
 
-def test_a_file_in_the_place_of_the_folder_is_said(tmp_path: Path) -> None:
-    folder = write_run(tmp_path / "run", [record(scores=[score(1, 0, 1)])], manifest())
-    (folder / "report").write_text("in the way")
-    with pytest.raises(StoreError, match="report: cannot be written in: it is no folder"):
-        Report(folder)
-    assert not (folder / "report.html").exists()
-
-
 def test_scenes_are_drawn_from_where_they_are_and_from_no_other_data(
     workspace: Workspace, tmp_path: Path
 ) -> None:
@@ -234,38 +209,6 @@ def test_headlines_say_what_tables_say(made: Workspace) -> None:
     assert {row.name: row.cells[0].value for row in steps.rows}["oracle"] == 100
 
 
-def test_models_stand_by_rank_with_the_places_that_tests_leave_open() -> None:
-    facts = {**manifest(models=["low", "high", "middle"], seeds=[0]), "scenes": 40}
-    values = {"high": (4, 0, 0), "middle": (2, 2, 2), "low": (2, 2, 2)}
-    records = [
-        {**record(model, f"{n:03}", scores=[score(*counts)]), "levels": [2], "parents": [f"{n:03}"]}
-        for model, counts in values.items()
-        for n in range(40)
-    ]
-    (headline,) = headlines(run_of(records, facts))
-    models = [row for row in headline.rows if row.kind == "model"]
-    assert models[0].name == "high"
-    ranks = {"high": "1", "middle": "2 to 3", "low": "2 to 3"}
-    assert {row.name: row.rank for row in models} == ranks
-    level = dict(zip(headline.columns, models[0].cells, strict=True))["Level 2"]
-    assert level.query == "track=full_planning&level=2&model=high"
-
-
-def test_a_run_says_what_it_is_not() -> None:
-    facts = {**manifest(models=["alpha", "beta"], seeds=[0]), "scenes": 3}
-    facts["items"] = {"full_planning": 3}
-    scenes = ("001", "002", "003")
-    answered = [record("alpha", scene, scores=[score(1, 1, 1)]) for scene in scenes]
-    failed = [record("beta", scene, outcome="api_error") for scene in scenes]
-    assert cautions(run_of(answered, {**facts, "models": facts["models"][:1]})) == ()
-    lacking = "beta: 0 of 3 answered: HTTP 429: busy."
-    assert cautions(run_of([*answered, *failed], facts)) == (lacking,)
-    assert cautions(run_of([*answered, failed[0]], facts)) == (
-        "This run is not finished: 4 of 6 samples have a record.",
-        lacking,
-    )
-
-
 def tree(folder: Path) -> dict[str, bytes]:
     files = (path for path in folder.rglob("*") if path.is_file())
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
@@ -292,19 +235,6 @@ def test_runs_and_bundles_become_one_folder_the_same_every_time(
         added |= {name for name in own if getattr(fields, name) is not None}
     assert {"pose", "progress"} <= added <= shown
     assert not {"prompt", "time", "counts"} & shown
-
-
-def test_the_board_says_what_tables_and_comparisons_say(runs: Workspace) -> None:
-    with ExitStack() as kept:
-        opened = open_runs([runs.root / "first"], (), kept)
-        board = board_of(opened, entries_of(opened), all_values(opened))
-    rows = {row["name"]: row for row in board["rows"]}
-    assert rows["oracle"]["values"]["full_planning/A/Overall F1"][0] == 100.0
-    facts = rows["oracle"]["facts"]["full_planning"]
-    assert (facts["expected"], facts["done"], facts["solved"]) == (5, 5, 5)
-    assert not any(row["ranks"] for row in board["rows"])
-    settings = {column["setting"] for column in board["columns"] if column["track"] == "vqa"}
-    assert settings == {""}
 
 
 def planned(
@@ -343,13 +273,6 @@ def test_only_whole_models_have_ranks_the_same_on_the_site_and_in_the_report() -
     assert ranks_of(run) == {"cherry": None, "a": [1, 1], "b": [2, 2]}
     lacking = board(run)["cherry"]["lacking"]["full_planning"]
     assert lacking == f"1 of {len(SCENES)} answered"
-
-
-def test_a_sample_without_a_value_has_none() -> None:
-    nothing = [score(0, 0, 0, setting=setting) for setting in "AB"]
-    records = [record("a", "000", 0, nothing), record("a", "001", 0, [score(1, 1, 1)])]
-    run = run_of(records, manifest(models=["a"], seeds=[0]))
-    assert values_of(run, "full_planning").samples == {"a": {("001", "001", 0, ""): 50.0}}
 
 
 def site_run(where: str, **facts: Any) -> SiteRun:
@@ -393,6 +316,7 @@ def of_data(name: str = "d", sha256: str = "0", version: int = 2) -> dict[str, A
 
 
 PROMPTED = {"full_planning": {"prompt": {"name": "p", "version": "b" * 64}}}
+CARRIED = {"full_planning": {"carrying": 2}}
 MEMBERSHIP = {**manifest(level1="membership")["suite"], "tracks": ["full_planning"]}
 
 
@@ -400,18 +324,18 @@ MEMBERSHIP = {**manifest(level1="membership")["suite"], "tracks": ["full_plannin
     ("change", "field"),
     [
         (shown({"background": "lawn"}, "b"), "images.background"),
-        (shown({"size_px": 512, "view": "top"}, "b"), "images.view"),
-        (of_data(version=3), "dataset.version"),
         (of_data(name="e"), "dataset.name"),
         (of_data(sha256="1"), "dataset.sha256"),
         ({"tracks": PROMPTED}, "tracks.full_planning.prompt"),
         ({"suite": MEMBERSHIP}, "scoring.level1"),
+        ({"tracks": CARRIED}, "tracks.full_planning.carrying"),
     ],
 )
 def test_runs_that_differ_in_what_decides_are_refused_with_what_differs(
     change: dict[str, Any], field: str
 ) -> None:
     first = site_run("one", **in_track("full_planning", **shown({}, "a")))
+    first.run.manifest.tracks["full_planning"]["carrying"] = 1
     other = site_run("two", **in_track("full_planning", **change))
     with pytest.raises(SpecError) as caught:
         check_runs_alike([first, other])
@@ -426,42 +350,6 @@ def test_a_recording_and_a_larger_picture_stand_beside_any_other() -> None:
     check_runs_alike([site_run("one", **in_track("full_planning", **shown({}, "a"))), larger])
     asked = {"full_planning": {"prompt": None, "pictures": None}}
     check_runs_alike([first, site_run("two", **in_track("full_planning", tracks=asked))])
-
-
-@pytest.mark.parametrize(("before", "after"), [(2, 1), (1, 2)])
-def test_plans_that_were_carried_out_otherwise_do_not_stand_in_one_table(
-    before: int, after: int
-) -> None:
-    def carried(where: str, version: int | None) -> SiteRun:
-        facts = in_track("pose_planning")
-        facts["tracks"]["pose_planning"]["carrying"] = version
-        return site_run(where, **facts)
-
-    first, other = carried("one", before), carried("two", after)
-    with pytest.raises(SpecError, match="run the older one again") as caught:
-        check_runs_alike([first, other])
-    assert caught.value.problems[0].field == "tracks.pose_planning.carrying"
-    measures = {measure.name: measure for measure in track_measures("pose_planning")}
-    check = kind_of("pose_planning").report().check_alike
-    assert check is not None
-    check(other.run, first.run, [], measures["f1_c"])
-    with pytest.raises(SpecError, match="carried plans out otherwise"):
-        check(other.run, first.run, [], measures["final_iou"])
-    check_runs_alike([first, carried("same", before)])
-    check_runs_alike([carried("old", None), carried("1", 1)])
-
-
-def test_a_folder_of_somebody_else_is_refused_and_left_as_it_is(
-    runs: Workspace, tmp_path: Path
-) -> None:
-    theirs = tmp_path / "thesis"
-    (theirs / "data").mkdir(parents=True)
-    (theirs / "data" / "a.js").write_text("mine")
-    for folder in (theirs, runs.root / "first"):
-        before = tree(folder)
-        with pytest.raises(StoreError, match="is not empty and holds no site"):
-            write_site([runs.root / "first"], folder)
-        assert tree(folder) == before
 
 
 def test_a_build_that_was_stopped_never_looks_whole_and_what_is_not_ours_stays(
@@ -496,6 +384,14 @@ def test_a_run_given_twice_and_a_broken_bundle_are_refused(runs: Workspace, tmp_
     with pytest.raises(SpecError, match="is the same run as"):
         write_site(paths, tmp_path / "s", data_of(runs))
     whole = (runs.root / "later.zip").read_bytes()
+    theirs = tmp_path / "thesis"
+    (theirs / "data").mkdir(parents=True)
+    (theirs / "data" / "a.js").write_text("mine")
+    for folder in (theirs, runs.root / "first"):
+        before = tree(folder)
+        with pytest.raises(StoreError, match="is not empty and holds no site"):
+            write_site([runs.root / "first"], folder)
+        assert tree(folder) == before
     (runs.root / "cut.zip").write_bytes(whole[:-100])
     done = runs.phyblock("site", "first", "cut.zip", "--out", "refused")
     assert done.code == 2

