@@ -9,7 +9,7 @@ import functools
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import chain, product
 from typing import Any
 
 import numpy as np
@@ -159,26 +159,19 @@ def _left_out(
     keys: Sequence[Sequence[Hashable]],
     values: Sequence[NDArray[Any]],
     kin: Sequence[Sequence[int]],
-) -> list[tuple[Floats, Floats]]:
-    """Return for each scene sums over the unrelated ones: of the rows with each unit's key, shape
+) -> Iterator[tuple[Floats, Floats]]:
+    """Yield for each scene sums over the unrelated ones: of the rows with each unit's key, shape
     (units, 1 + columns), and of all rows, shape (1 + columns,); the first column counts rows.
     """
-    rows = [np.hstack([np.ones((len(value), 1)), value]) for value in values]
-
-    def summed(places: Sequence[int]) -> tuple[dict[Hashable, Floats], Floats]:
-        table: dict[Hashable, Floats] = defaultdict(lambda: np.zeros(rows[0].shape[1]))
-        for place in places:
-            for name, row in zip(keys[place], rows[place], strict=True):
-                table[name] += row
-        return table, sum((rows[place].sum(axis=0) for place in places), np.zeros(()))
-
-    table, whole = summed(range(len(rows)))
-    sums = []
-    for names, others in zip(keys, kin, strict=True):
-        own, whole_own = summed(others)
-        part = np.array([table[name] - own[name] for name in names]).reshape(len(names), -1)
-        sums.append((part, whole - whole_own))
-    return sums
+    row_of = {key: row for row, key in enumerate(dict.fromkeys(chain.from_iterable(keys)))}
+    rows = [[row_of[key] for key in of] for of in keys]
+    table = np.zeros((len(keys), len(row_of), 1 + values[0].shape[1]))
+    for place, value in enumerate(values):
+        np.add.at(table[place], rows[place], np.hstack([np.ones((len(value), 1)), value]))
+    total = table.sum(axis=0)
+    for place, others in enumerate(kin):
+        rest = total - table[others].sum(axis=0)
+        yield rest[rows[place]], rest.sum(axis=0)
 
 
 def _ways(
@@ -192,28 +185,32 @@ def _ways(
 ) -> Iterator[list[Plan]]:
     """Yield plans for all scenes, made in one way after another."""
     offered = [units(candidates[scene.id], setting) for scene in scenes]
-    heights = _heights(scenes, offered, goals, kin)
-    copies = range(_MOST_COPIES)
-    numbers = [
-        np.array([[u.numbers[c % len(u.numbers)] for c in copies] for u in of]) for of in offered
-    ]
-    first = [np.array([[c < len(u.numbers) for c in copies] for u in of]) for of in offered]
+    heights = [of.tolist() for of in _heights(scenes, offered, goals, kin)]
     for key in keys:
-        likely = chances(offered, goals, kin, key)
+        likely = [of.tolist() for of in chances(offered, goals, kin, key)]
         # By height; or all once by height, then all a second time.
-        for least, in_rounds, again in product(_THRESHOLDS, (False, True), {False, repeats}):
-            plans = []
-            for at_least, height, number, is_first in zip(
-                likely, heights, numbers, first, strict=True
-            ):
-                # What is likeliest is named where nothing is likely enough.
-                named = at_least >= min(least, at_least[:, 0].max())
-                at, copy = np.nonzero(named if again and least > 0 else named & is_first)
-                chosen = number[at, copy]
-                # The last key is the one that lexsort goes by first.
-                sort = (height[at], copy) if in_rounds else (copy, height[at])
-                plans.append(Plan(tuple(chosen[np.lexsort((chosen, *sort))].tolist())))
-            yield plans
+        for way in product(_THRESHOLDS, (False, True), {False, repeats}):
+            both = zip(offered, likely, heights, strict=True)
+            yield [_plan(*of_scene, *way) for of_scene in both]
+
+
+def _plan(
+    offered: Sequence[Unit],
+    likely: Sequence[Sequence[float]],
+    heights: Sequence[float],
+    least: float,
+    in_rounds: bool,
+    again: bool,
+) -> Plan:
+    """Return the candidates of units that are likely enough, or of the likeliest, by height."""
+    wanted = min(least, max(row[0] for row in likely))
+    named = [
+        (*((copy, height) if in_rounds else (height, copy)), unit.numbers[copy % len(unit.numbers)])
+        for unit, row, height in zip(offered, likely, heights, strict=True)
+        for copy, chance in enumerate(row)
+        if chance >= wanted and ((again and least > 0) or copy < len(unit.numbers))
+    ]
+    return Plan(tuple(number for *_, number in sorted(named)))
 
 
 class BlindGuesses:

@@ -7,14 +7,14 @@ import math
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
-from typing import Annotated, Any, ClassVar, Literal, get_args
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag
+from pydantic import AfterValidator, Field
 
-from phyblock.config.validation import PictureControls, Section, TemplateName, UniqueSome
+from phyblock.config.validation import PictureControls, TemplateName, UniqueSome, refuse
 from phyblock.data import AssemblyTask
 from phyblock.domain import (
     Block,
@@ -28,7 +28,7 @@ from phyblock.domain import (
     euler_deg_to_matrix,
     turn_deg,
 )
-from phyblock.errors import DataError, Problem, SpecError
+from phyblock.errors import DataError, Problem
 from phyblock.models.request import Image
 from phyblock.parsing.poses import (
     FARTHEST_PLACE_CM,
@@ -59,7 +59,7 @@ from phyblock.scoring.pose_matching import TOLERANCES_CM, TURN_TOLERANCE_DEG
 from phyblock.sim.balance import MARGIN_M, is_balanced
 from phyblock.sim.camera import VIEWS
 from phyblock.sim.contact import voxel_iou
-from phyblock.sim.dynamics import ExecutedStep, ExecutionLimits, execute, groups, settle
+from phyblock.sim.dynamics import ExecutionLimits, execute, groups, settle
 from phyblock.sim.engine import Pose, described_engine
 from phyblock.sim.geometry import (
     box_height_cm,
@@ -85,7 +85,6 @@ CARRY_VERSION = 2
 where some plan may end otherwise. Before 2 everything in the world was let go together, for 5 s
 where it crept, and voxels were whole or empty.
 """
-MOST_VIEWS = 4
 KIT_LABEL = "blocks"
 """The label of the sheet of candidates."""
 Center = tuple[float, float, float]
@@ -93,7 +92,6 @@ _LIMITS = ExecutionLimits()
 _DIGITS = 4
 _RANDOM_STEPS = 4
 _RANDOM_REACH_CM = 15.0
-_LEAST_TURN_DEG, _LEAST_DEG, _MOST_DEG = 10.0, 10.0, 75.0
 _MOST_TRIED = 200
 _MOST_SETTLED = 16
 """States that the physics engine is asked about, each of which may take a second."""
@@ -102,25 +100,15 @@ _STILL_M, _STILL_DEG = 0.001, 1.0
 _ONE_AT_A_TIME = threading.Lock()
 
 
-class ViewSpec(Section):
-    """A direction to see the goal from."""
-
-    azimuth_deg: Annotated[float, Field(strict=True, ge=-360, le=360, allow_inf_nan=False)] = Field(
-        description="0 looks from +x, 90 from +y [degrees]."
+def _oblique_first(views: tuple[View, ...]) -> tuple[View, ...]:
+    if views[0] == "oblique":
+        return views
+    message = "begins with a view in which blocks of the sheet look alike: it is seen as the goal "
+    message += "is first"
+    others = [view for view in views if view != "oblique"]
+    raise refuse(
+        message, allowed="oblique first", hint=f"views: [{', '.join(['oblique', *others])}]"
     )
-    elevation_deg: Annotated[float, Field(strict=True, ge=1, le=90, allow_inf_nan=False)] = Field(
-        description="90 looks straight down [degrees]."
-    )
-
-
-def _kind(view: object) -> str:
-    """Return the kind of view that is meant, so that it is said to be wrong as that alone."""
-    return "direction" if isinstance(view, Mapping | ViewSpec) else "name"
-
-
-AnyView = Annotated[
-    Annotated[View, Tag("name")] | Annotated[ViewSpec, Tag("direction")], Discriminator(_kind)
-]
 
 
 Tolerance = Annotated[float, Field(strict=True, gt=0, le=10, allow_inf_nan=False)]
@@ -130,40 +118,26 @@ Angle = Annotated[float, Field(strict=True, gt=0, le=90, allow_inf_nan=False)]
 class PoseSpec(PictureControls):
     """Requests of poses in the pose_planning track, and the execution of plans."""
 
-    rotation: PoseRotation = Field(
-        default="candidate",
-        description="candidate: blocks keep the orientation in which they are shown, and steps "
-        "give a number and a place. free: each kind is shown once, upright, and steps give a "
-        "rotation as well.",
-    )
-    views: Annotated[UniqueSome[AnyView], Field(max_length=MOST_VIEWS)] = Field(
-        default=("oblique", "top"),
-        description="Where the goal is seen from, a picture each, 1 to 4 of them: "
-        f"{', '.join(get_args(View))}, or an azimuth_deg and elevation_deg. Blocks are shown from "
-        "where the first one is.",
-    )
-    overlap_cm: Tolerance = Field(
-        default=_LIMITS.overlap_cm,
-        description="A block that shares space with others is moved out of them by so much at "
-        "most; one that would need more is refused [cm].",
-    )
-    stand_cm: Tolerance = Field(
-        default=_LIMITS.stand_cm,
-        description="A block that moves farther when it is let go has fallen, or was knocked over "
-        "by another [cm].",
-    )
-    stand_deg: Angle = Field(
-        default=_LIMITS.stand_deg, description="The same for how far it turns [degrees]."
-    )
-    reached_cm: Tolerance = Field(
-        default=1.0,
-        description="A block of the goal is reached where one of its kind lies so near in the end "
-        "[cm].",
-    )
-    reached_deg: Angle = Field(default=10.0, description="The same for how it is turned [degrees].")
-    prompt: TemplateName = Field(
-        default="default", description="default, or the path of a .j2 template."
-    )
+    rotation: PoseRotation = "candidate"
+    """candidate: blocks keep the orientation in which they are shown, and steps give a number and a
+    place. free: each kind is shown once, upright, and steps give a rotation as well."""
+    views: Annotated[UniqueSome[View], AfterValidator(_oblique_first)] = ("oblique", "top")
+    """Where the goal is seen from, a picture each: oblique, and any of front, side, top after it.
+    Blocks are shown from where the first one is."""
+    overlap_cm: Tolerance = _LIMITS.overlap_cm
+    """A block that shares space with others is moved out of them by so much at most; one that would
+    need more is refused [cm]."""
+    stand_cm: Tolerance = _LIMITS.stand_cm
+    """A block that moves farther when it is let go has fallen, or was knocked over by another
+    [cm]."""
+    stand_deg: Angle = _LIMITS.stand_deg
+    """The same for how far it turns [degrees]."""
+    reached_cm: Tolerance = 1.0
+    """A block of the goal is reached where one of its kind lies so near in the end [cm]."""
+    reached_deg: Angle = 10.0
+    """The same for how it is turned [degrees]."""
+    prompt: TemplateName = "default"
+    """default, or the path of a .j2 template."""
 
     @property
     def is_free(self) -> bool:
@@ -326,10 +300,9 @@ def _fits(_: Any, judged: Any) -> tuple[float, ...]:
 
 
 def _carried_counts(_: Any, judged: Any) -> tuple[float, ...]:
-    ended = judged.ended
-    ends = Counter(step.end for step in ended.steps)
-    whole = (ended.reached, judged.poses[0].n_blocks, ended.iou, ended.completed, 1)
-    return (*(ends[name] for name in STEP_ENDS), len(ended.steps), *whole)
+    ends, whole = Counter(step["end"] for step in judged.ended), judged.whole
+    of_plan = (whole["reached"], judged.poses[0].n_blocks, whole["iou"], whole["completed"], 1)
+    return (*(ends[name] for name in STEP_ENDS), len(judged.ended), *of_plan)
 
 
 def _errors(_: Any, judged: Any) -> tuple[int, ...]:
@@ -423,28 +396,12 @@ def worlds_of(
 
 
 @dataclass(frozen=True)
-class Ended:
-    """Result of a plan that was executed.
-
-    Its steps, the blocks that each of them moved (None where that was not kept), the blocks of the
-    goal that were reached, the IoU of all that stands with the goal, True if that is the whole goal
-    and nothing else, and the engine with its version.
-    """
-
-    steps: tuple[ExecutedStep, ...]
-    rests: tuple[tuple[RestingBlock, ...] | None, ...]
-    reached: int
-    iou: float
-    completed: bool
-    engine: str
-
-
-@dataclass(frozen=True)
 class PoseJudgement:
     """A reply as it was read and scored.
 
-    `fits` and `errors` have an entry for each step that was read, `kept` are those that name a
-    candidate, `in_file` is the plan in the numbers of the file, where others were shown.
+    `fits`, `ended` (how its execution ended, as records say it) and `errors` have an entry for each
+    step that was read, `kept` are those that name a candidate, `in_file` is the plan in the numbers
+    of the file, where others were shown; `whole` is what the record says of the world in the end.
     """
 
     parsed: ParsedPoses
@@ -454,7 +411,8 @@ class PoseJudgement:
     poses: tuple[PoseScore, ...]
     fits: tuple[PoseFit | None, ...]
     errors: tuple[PoseError | None, ...]
-    ended: Ended
+    ended: tuple[Mapping[str, Any], ...]
+    whole: Mapping[str, Any]
     spec: PoseSpec
 
     @property
@@ -471,7 +429,7 @@ class PoseJudgement:
         """Return `parse`, `scores` and `pose` of the record (docs/results.md)."""
         given, motion = self.parsed.plan.steps, self.poses[-1].motion
         kept = set(self.kept)
-        whole = zip(self.fits, self.ended.steps, self.ended.rests, self.errors, strict=True)
+        steps = zip(self.fits, self.ended, self.errors, strict=True)
         return {
             "parse": {
                 "parser": "poses",
@@ -489,12 +447,9 @@ class PoseJudgement:
                 "right": {score.frame: list(score.right) for score in self.poses},
                 "shift_cm": [round(part, _DIGITS) + 0.0 for part in motion.shift_cm],
                 "turn_deg": round(math.degrees(motion.turn_rad), _DIGITS) + 0.0,
-                "steps": [_outcome(*step) for step in whole],
-                "reached": self.ended.reached,
-                "iou": self.ended.iou,
-                "completed": self.ended.completed,
+                "steps": [{**_fit(fit), **end, "error": error} for fit, end, error in steps],
                 "limits": self.spec.tolerances,
-                "engine": self.ended.engine,
+                **self.whole,
             },
         }
 
@@ -504,28 +459,13 @@ def _given(step: PoseStep) -> dict[str, Any]:
     return {"block": step.candidate, "center_cm": list(step.center_cm), **turned}
 
 
-def _outcome(
-    fit: PoseFit | None,
-    end: ExecutedStep,
-    rests: tuple[RestingBlock, ...] | None,
-    error: PoseError | None,
-) -> dict[str, Any]:
-    """Return the fields of `StepOutcome`."""
-    told: dict[str, Any] = {"vertex": None}
-    if fit is not None:
-        names = ("vertex", "position_cm", "sideways_cm", "up_cm", "turn_deg", "iou")
-        told = {name: getattr(fit, name) for name in names}
-    return {
-        **told,
-        "end": end.end,
-        "moved_cm": end.moved_cm,
-        "turned_deg": end.turned_deg,
-        "gap_cm": end.gap_cm,
-        "overlap_cm": end.overlap_cm,
-        "knocked": list(end.knocked),
-        "error": error,
-        **({} if rests is None else {"rests": [rest.fields() for rest in rests]}),
-    }
+_FIT = ("vertex", "position_cm", "sideways_cm", "up_cm", "turn_deg", "iou")
+_END = ("end", "moved_cm", "turned_deg", "gap_cm", "overlap_cm", "knocked", "rests")
+_WHOLE = ("reached", "iou", "completed", "engine")
+
+
+def _fit(fit: PoseFit | None) -> dict[str, Any]:
+    return {"vertex": None} if fit is None else {name: getattr(fit, name) for name in _FIT}
 
 
 def judge_poses(
@@ -547,10 +487,10 @@ def judge_poses(
     kept = tuple(step for step in given if 1 <= step.candidate <= n)
     scorer = _scorer(item.scene, item.candidates, "B" if spec.is_free else "A")
     poses = scorer.score([_laid(step, item.candidates[step.candidate]) for step in kept])
-    ended = _ended_before(earlier, given, spec) or _carried(item, given, spec)
+    ended, whole = _ended_before(earlier, given, spec) or _carried(item, given, spec)
     found = iter(poses[0].fits)
     fits = tuple(next(found) if 1 <= step.candidate <= n else None for step in given)
-    numbers, ends = [step.candidate for step in given], [step.end for step in ended.steps]
+    numbers, ends = [step.candidate for step in given], [step["end"] for step in ended]
     named, candidates = [step.candidate for step in kept], item.candidates
     in_file = file_plan(item, named)
     if spec.is_free:
@@ -560,7 +500,11 @@ def judge_poses(
         Plan(tuple(named)), matchers, None
     )
     errors = pose_errors(scorer.goal, numbers, fits, ends)
-    return PoseJudgement(parsed, kept, in_file, scores, poses, fits, errors, ended, spec)
+    return PoseJudgement(parsed, kept, in_file, scores, poses, fits, errors, ended, whole, spec)
+
+
+Ended = tuple[tuple[Mapping[str, Any], ...], Mapping[str, Any]]
+"""How each step of a plan that was carried out ended, and the world in the end, as records say."""
 
 
 def _ended_before(
@@ -574,12 +518,8 @@ def _ended_before(
     is_same = (known, pose.limits.fields()) == (list(given), spec.tolerances)
     if not is_same or len(pose.steps) != len(given):
         return None
-    steps = tuple(
-        ExecutedStep(s.end, s.moved_cm, s.turned_deg, s.gap_cm, s.overlap_cm, s.knocked)
-        for s in pose.steps
-    )
-    rests = tuple(step.rests for step in pose.steps)
-    return Ended(steps, rests, pose.reached, pose.iou, pose.completed, pose.engine)
+    steps = tuple({n: v for n, v in step.fields().items() if n in _END} for step in pose.steps)
+    return steps, {name: getattr(pose, name) for name in _WHOLE}
 
 
 def _carried(item: AssemblyTask, given: Sequence[PoseStep], spec: PoseSpec) -> Ended:
@@ -587,12 +527,18 @@ def _carried(item: AssemblyTask, given: Sequence[PoseStep], spec: PoseSpec) -> E
     # An engine has no more than one plan at a time, whichever thread asks.
     with _ONE_AT_A_TIME:
         done = execute(blocks, spec.limits)
-    goal = item.scene.blocks
+    goal, rests = item.scene.blocks, rests_of(blocks, done.worlds)
     reached = blocks_reached(goal, done.blocks, spec.reached_cm, spec.reached_deg)
-    is_whole = reached == len(goal) == len(done.blocks)
-    iou = round(voxel_iou(goal, done.blocks), _DIGITS)
-    rests = rests_of(blocks, done.worlds)
-    return Ended(done.steps, rests, reached, iou, is_whole, described_engine())
+    steps = tuple(
+        {**asdict(step), "rests": [rest.fields() for rest in moved]}
+        for step, moved in zip(done.steps, rests, strict=True)
+    )
+    return steps, {
+        "reached": reached,
+        "iou": round(voxel_iou(goal, done.blocks), _DIGITS),
+        "completed": reached == len(goal) == len(done.blocks),
+        "engine": described_engine(),
+    }
 
 
 @functools.cache
@@ -824,19 +770,14 @@ def pick_poses(subject: PoseSubject) -> Picking:
 class PosePictures(Pictures):
     """Pictures of scenes: the goal from every view, then the sheet of the candidates."""
 
-    def __init__(
-        self, shop: Workshop, style: PictureStyle, views: tuple[View | ViewSpec, ...]
-    ) -> None:
+    def __init__(self, shop: Workshop, style: PictureStyle, views: tuple[View, ...]) -> None:
         super().__init__(shop)
         # The prompt says that the sheet has one scale, whatever other pictures of candidates have.
         style = replace(style, candidate_scale="common")
-        self._seen = []
-        for view in views:
-            azimuth_deg, elevation_deg = direction_deg(view)
-            name = f"azimuth {azimuth_deg:g}°, elevation {elevation_deg:g}°"
-            name = name if isinstance(view, ViewSpec) else view
-            seen = replace(style, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
-            self._seen.append((name, seen))
+        self._seen = [
+            (view, replace(style, azimuth_deg=VIEWS[view][0], elevation_deg=VIEWS[view][1]))
+            for view in views
+        ]
 
     def draw(self, item: AssemblyTask) -> tuple[Drawing, ...]:
         """Return the goal, where it is shown, from every view, and the sheet from the first."""
@@ -849,18 +790,6 @@ class PosePictures(Pictures):
         style = written_style(self._seen[0][1])
         key, make = kit_key(item.candidates, style), partial(kit_png, item.candidates, style)
         return (*drawings, Drawing(KIT_LABEL, key, make, (style.size_px, style.size_px)))
-
-
-def shows_three_sides(view: View | ViewSpec) -> bool:
-    """True if a block that is seen so shows its top and two sides, as the sheet of blocks needs."""
-    azimuth_deg, elevation_deg = direction_deg(view)
-    off_axis_deg = abs((azimuth_deg + 45) % 90 - 45)
-    return off_axis_deg >= _LEAST_TURN_DEG and _LEAST_DEG <= elevation_deg <= _MOST_DEG
-
-
-def direction_deg(view: View | ViewSpec) -> tuple[float, float]:
-    """Return azimuth and elevation of a view [degrees]."""
-    return (view.azimuth_deg, view.elevation_deg) if isinstance(view, ViewSpec) else VIEWS[view]
 
 
 class PosePlanning(SceneTrack, SingleTrack[AssemblyTask]):
@@ -899,24 +828,9 @@ class PosePlanning(SceneTrack, SingleTrack[AssemblyTask]):
         return True
 
     def open_pictures(self, shop: Workshop) -> Pictures:
-        """Return goals and sheets of blocks; SpecError for a first view from which blocks of the
-        sheet cannot be told apart.
-        """
+        """Return the pictures of goals and sheets of blocks."""
         super().open_pictures(shop)
-        first = self.spec.views[0]
-        if shows_three_sides(first):
-            return PosePictures(shop, picture_style(self.suite.images), self.spec.views)
-        name = first if isinstance(first, str) else "a view along an axis, or too steep or too flat"
-        problem = Problem(
-            self.suite.where("pose", "views"),
-            "the sheet of blocks is seen from the first view, and blocks look alike from there",
-            "pose.views[0]",
-            name,
-            "first oblique, or an azimuth 10 degrees off the axes and an elevation of 10 to 75; "
-            "others after it",
-            hint=f"put oblique first: views: [oblique, {name}]" if isinstance(first, str) else "",
-        )
-        raise SpecError(problem)
+        return PosePictures(shop, picture_style(self.suite.images), self.spec.views)
 
     def shown(self, item: AssemblyTask, seed: int) -> AssemblyTask:
         """Return the scene as a seed shows it; with a free rotation each kind once, upright."""

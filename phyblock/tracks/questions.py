@@ -13,7 +13,7 @@ from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -73,35 +73,22 @@ OptionsAs = Literal["images", "letters"]
 class VqaSpec(PictureControls):
     """The questions of the vqa track and how they are shown."""
 
-    format: DataFormat = Field(
-        default="builtin",
-        description="builtin: a folder with questions.jsonl. official: a folder with question "
-        "files in the official JSON form and their pictures.",
-    )
-    path: str = Field(
-        default=BUILTIN_QUESTIONS,
-        min_length=1,
-        description="The name of a bundled question set (phyblock-vqa), or a folder; relative "
-        "as dataset.path. Its scenes are those of dataset.",
-    )
-    subtasks: UniqueSome[SubtaskName] = Field(
-        default=(*SUBTASKS,), description="Subtasks to ask about."
-    )
-    per_subtask: Count | None = Field(
-        default=None, description="Questions of each subtask at most; null: all."
-    )
-    options_as: OptionsAs = Field(
-        default="images",
-        description="Options that are pictures. images: each sent apart. letters: all on one "
-        "sheet, lettered.",
-    )
-    circular: Flag = Field(
-        default=False,
-        description="Ask every rotation of the options; a question is right only if all are.",
-    )
-    prompt: TemplateName = Field(
-        default="default", description="default, or the path of a .j2 template."
-    )
+    format: DataFormat = "builtin"
+    """builtin: a folder with questions.jsonl. official: a folder with question files in the
+    official JSON form and their pictures."""
+    path: Annotated[str, Field(min_length=1)] = BUILTIN_QUESTIONS
+    """The name of a bundled question set (phyblock-vqa), or a folder; relative as dataset.path. Its
+    scenes are those of dataset."""
+    subtasks: UniqueSome[SubtaskName] = (*SUBTASKS,)
+    """Subtasks to ask about."""
+    per_subtask: Count | None = None
+    """Questions of each subtask at most; null: all."""
+    options_as: OptionsAs = "images"
+    """Options that are pictures. images: each sent apart. letters: all on one sheet, lettered."""
+    circular: Flag = False
+    """Ask every rotation of the options; a question is right only if all are."""
+    prompt: TemplateName = "default"
+    """default, or the path of a .j2 template."""
 
     @property
     def rotations(self) -> int:

@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
-from xml.etree.ElementTree import fromstring
 
 import numpy as np
 import pandas as pd
@@ -23,13 +22,12 @@ from phyblock.errors import SpecError
 from phyblock.results.compare import comparable, compare_models
 from phyblock.results.estimates import main_column
 from phyblock.results.load import Run, load_run
-from phyblock.results.tables import write_tables
 from phyblock.scoring.counts import mean_of, ratio_of
 from phyblock.tracks import SceneTrack, SingleTrack
 from phyblock.tracks.measures import WHOLE, HeadlineColumn, Measure, SampleCounts, TrackReport
 from phyblock.web.leaderboard import SiteRun, all_values, board_of, entries_of, values_of
 from phyblock.web.pack import Sources
-from phyblock.web.report import headlines, write_report
+from phyblock.web.report import headlines
 from tests.servers.chassis import Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
@@ -170,21 +168,6 @@ def test_the_leading_measure_leads_everywhere(run: Run) -> None:
         ]
         worth = values_of(run, "counting").samples["oracle"].values()
         assert set(worth) == {leading.best}
-
-
-@pytest.mark.parametrize("measure", [ERROR, EXACT], ids=["blocks", "share"])
-def test_shares_alone_are_drawn_on_a_scale_to_100(run: Run, measure: Measure) -> None:
-    show(led_by(measure, measure))
-    tables = headlines(run)
-    page = write_report(write_tables(run.path), figures=False).read_text(encoding="utf-8")
-    found = re.findall("<table.*?</table>", page, re.DOTALL)[0]
-    table = fromstring(found)
-    n_drawn = len(run.design.model_names) if measure.is_share else 0
-    assert sum(bool(row.strip) for row in tables[0].rows) == n_drawn
-    assert len(table.findall(".//svg")) == n_drawn
-    assert ("[%]" in "".join(table.itertext())) == measure.is_share
-    widths = {sum(int(cell.get("colspan", 1)) for cell in row) for row in table.findall("*/tr")}
-    assert len(widths) == 1
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from phyblock.cli.main import phyblock
 from phyblock.data import AssemblyTask, read_builtin
 from phyblock.domain import Block, Candidate, CandidateSet, PoseStep
-from phyblock.errors import InputError, StoreError
+from phyblock.errors import SpecError, StoreError
 from phyblock.records.files import known_records
 from phyblock.resources import bundled
 from phyblock.run.records import begun, judged
@@ -97,9 +97,9 @@ def test_true_poses_in_a_random_valid_order_are_right_and_stand(
         found = track.judge(shown, POSE_RULES["oracle"](subject, np.random.default_rng(seed)))
         n = len(item.scene)
         assert [score.right for score in found.poses] == [(n,) * 4] * 2
-        assert {step.end for step in found.ended.steps} == {"stands"}
-        assert (found.ended.reached, found.ended.completed) == (n, True)
-        assert found.ended.iou >= 0.98
+        assert {step["end"] for step in found.ended} == {"stands"}
+        assert (found.whole["reached"], found.whole["completed"]) == (n, True)
+        assert found.whole["iou"] >= 0.98
         assert not any(found.errors)
         assert all(score.counts.tp == n for score in found.scores)
 
@@ -135,9 +135,9 @@ def test_a_reply_is_read_scored_and_carried_out(
     track = poses()
     found = track.judge(task, text)
     assert found.poses[0].right == right
-    assert [step.end for step in found.ended.steps] == ends
+    assert [step["end"] for step in found.ended] == ends
     assert list(found.errors) == errors
-    assert found.ended.reached == reached
+    assert found.whole["reached"] == reached
     assert found.is_read == bool(ends)
     # Its record is written, read again and judged again, and says the same.
     fields = begun("s", track.name, "m", task, 0, None)
@@ -304,24 +304,14 @@ def test_a_run_with_faults_is_killed_resumed_and_scored_again(
 @pytest.mark.parametrize(
     ("views", "told"),
     [
-        (["abov"], ["is not one of the choices"]),
-        ([{"azimuth": 30, "elevation_deg": 50}], ["is missing", "is not a known key"]),
-        ([{"azimuth_deg": 30, "elevation_deg": 0}], ["is out of range"]),
-        (["top"], ["the sheet of blocks is seen from the first view, and blocks look alike"]),
-        (["front", "oblique"], ["hint: put oblique first: views: [oblique, front]"]),
-        ([{"azimuth_deg": 95, "elevation_deg": 30}], ["look alike from there"]),
-        ([{"azimuth_deg": 55, "elevation_deg": 30}, "top"], []),
+        (["abov"], "is not one of the choices"),
+        (["top"], "hint: views: [oblique, top]"),
+        (["front", "oblique"], "hint: views: [oblique, front]"),
+        (["oblique", "oblique"], "stands twice"),
     ],
 )
-def test_a_view_that_is_none_or_cannot_carry_the_sheet_is_said(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, views: list[Any], told: list[str]
-) -> None:
-    monkeypatch.chdir(workspace.root)
-    workspace.write_suite(tracks=["pose_planning"], models=["oracle"], pose={"views": views})
-    problems: list[str] = []
-    try:
-        phyblock.main(["validate", "suite.yaml"], standalone_mode=False)
-    except InputError as error:
-        problems = [str(problem) for problem in error.problems]
-    assert len(problems) == len(told), problems
-    assert all(one in problem for one, problem in zip(told, problems, strict=True))
+def test_a_view_that_is_none_or_cannot_carry_the_sheet_is_said(views: list[str], told: str) -> None:
+    with pytest.raises(SpecError) as caught:
+        track_of("pose_planning", pose={"views": views})
+    (problem,) = caught.value.problems
+    assert told in str(problem)

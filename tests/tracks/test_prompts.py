@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from phyblock.data import official_prompt, recorded_models
 from phyblock.errors import PromptError
 from phyblock.models.request import Image, Message
-from phyblock.resources import bundled
 from phyblock.tracks import TemplatePrompt, kinds
 from phyblock.tracks.prompts import OfficialPrompt
 from tests.fuzz.strategies import TEMPLATES
@@ -30,10 +29,6 @@ def prompt(folder: Path, body: str, **files: str) -> TemplatePrompt:
     whole = body if "block" in body else f"{{% block user %}}{body}{{% endblock %}}"
     (folder / "mine.j2").write_text(whole, encoding="utf-8")
     return TemplatePrompt(folder / "mine.j2", "mine")
-
-
-def bundled_prompt(name: str) -> TemplatePrompt:
-    return TemplatePrompt(bundled("prompts", f"{name}.j2"), "default")
 
 
 def test_blocks_become_messages_with_captioned_pictures_before_the_user_text(
