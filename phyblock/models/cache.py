@@ -11,7 +11,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import re
 import sqlite3
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
@@ -28,12 +27,10 @@ SCHEMA = 1
 """Version of the file's layout and of what enters a key."""
 
 _BUSY_TIMEOUT_S = 2.0
-_BUSY = re.compile(r"\b(locked|busy)\b")
 _FOREIGN = "belongs to another version of phyblock, or is no reply cache"
 _HINT = (
     "delete the file, or name another cache folder; answered samples of a run stay in its records"
 )
-_WAIT = "wait until the process that holds it has ended, or name another cache folder"
 _ELSEWHERE = "free some space, or name another cache folder with PHYBLOCK_CACHE"
 _CREATE = """
 CREATE TABLE IF NOT EXISTS replies (
@@ -224,8 +221,8 @@ class ReplyCache:
     def _unusable(self, error: sqlite3.Error) -> StoreError:
         hint = _HINT
         if isinstance(error, sqlite3.OperationalError):
-            # The disk or the place, not the content: to delete paid replies would be no help.
-            hint = _WAIT if _BUSY.search(str(error)) else _ELSEWHERE
+            # The disk, the place or another process, not the content.
+            hint = _ELSEWHERE
         return self._problem(f"cannot be used: {error}", hint=hint)
 
     def _problem(

@@ -279,17 +279,7 @@ def read_completion(body: object, latency_s: float, status: int = 200) -> Reply:
         raise malformed(status, f"no choices in it (found {found})")
     if not raw.reasoning and (match := _THINKING.match(raw.text)):
         raw = raw.model_copy(update={"reasoning": match[2], "text": match[3]})
-    # A zero stands for "not known", as litellm writes it: nothing is made of no tokens.
-    usage = raw.usage
-    unknown: dict[str, None] = {}
-    if usage.prompt_tokens == 0:
-        unknown["prompt_tokens"] = None
-    if usage.completion_tokens == 0 and (not usage.prompt_tokens or raw.text or raw.reasoning):
-        unknown["completion_tokens"] = None
-    if usage.reasoning_tokens == 0 and raw.reasoning:
-        unknown["reasoning_tokens"] = None
-    known = usage.model_copy(update=unknown) if unknown else usage
-    return raw.model_copy(update={"usage": known, "latency_s": latency_s})
+    return raw.model_copy(update={"latency_s": latency_s})
 
 
 def malformed(status: int, why: str) -> RetryableError:

@@ -512,7 +512,7 @@ def counted(reply: Reply, expected: Estimate) -> Reply:
         completion_tokens=plausible(
             usage.completion_tokens, int(bool(reply.text or reply.reasoning)), longest
         ),
-        reasoning_tokens=plausible(usage.reasoning_tokens, 0, longest),
+        reasoning_tokens=plausible(usage.reasoning_tokens, int(bool(reply.reasoning)), longest),
         cached_tokens=cached,
         cache_write_tokens=written,
     )

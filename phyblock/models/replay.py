@@ -7,6 +7,7 @@ returns None for anything that is not of its shape.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from phyblock.text import well_formed
 from phyblock.types import Finish
 
 _MOST_TOKENS = 10**9
-"""Counts above this are believed by nobody: a hundred times the longest context that there is."""
+"""A hundred times the longest context that there is."""
 
 _FINISH: Mapping[str, Finish] = {
     **dict.fromkeys(("stop", "end_turn", "stop_sequence", "eos", "eos_token"), "stop"),
@@ -49,7 +50,7 @@ class ReplayModel:
     async def ask(self, request: Request) -> Reply | None:
         """Return the reply recorded for the request, which costs nothing; None where there is none.
 
-        Raises what was recorded in its place, and DataError for a recording that cannot be read.
+        Raises the error that was recorded, and DataError for a recording that cannot be read.
         """
         reply = self._find(request)
         free = {"cost_usd": 0.0, "attempts": 0, "cached": False}
@@ -66,33 +67,24 @@ def open_replay(config: ModelConfig) -> ReplayModel:
     DataError when there is no such folder, or no JSON in it.
     """
     folder = config.recording
-    where = f"model {config.name}"
     if folder is None or not folder.is_dir():
         hint = "check the path; it is taken relative to the file that names it"
+        where = f"model {config.name}"
         problem = Problem(where, "recordings not found", "replay", str(folder), "a folder", hint)
         raise DataError(problem)
     if (folder / RECORDS).is_file():
-        records = _read_records(folder, config.name)
-        return ReplayModel(config, lambda request: _recorded(records, request))
+        return ReplayModel(config, partial(_recorded, _read_records(folder, config.name)))
     if not any(folder.glob("*.json")):
         allowed = f"a file a scene such as 000.json, or {RECORDS}"
         raise DataError(Problem(str(folder), "holds no recorded replies", allowed=allowed))
-    return ReplayModel(config, lambda request: _read_file(folder, request.key))
+    return ReplayModel(config, partial(_read_file, folder))
 
 
-def _read_file(folder: Path, key: str) -> Reply | None:
-    """Return the raw reply in `<key>.json`, or in the one `<key>_*.json`, whatever the seed."""
-    path = folder / f"{key}.json"
+def _read_file(folder: Path, request: Request) -> Reply | None:
+    """Return the raw reply in `<key>.json`, whatever the seed."""
+    path = folder / f"{request.key}.json"
     if not path.is_file():
-        escaped = "".join(f"[{char}]" if char in "*?[" else char for char in key)
-        others = sorted(found for found in folder.glob(f"{escaped}_*.json") if found.is_file())
-        if len(others) > 1:
-            names = ", ".join(other.name for other in others)
-            message = "holds more than one recording of a scene"
-            raise DataError(Problem(str(folder), message, key, names, f"one {key}*.json"))
-        if not others:
-            return None
-        path = others[0]
+        return None
     try:
         raw = load_json(read_text(path), finite=False)
     except OSError as error:
@@ -103,31 +95,27 @@ def _read_file(folder: Path, key: str) -> Reply | None:
     return read_raw_reply(raw, str(path))
 
 
-def _read_records(folder: Path, model: str) -> dict[tuple[str, str, int], Record]:
+_Records = dict[tuple[str, str, int], Record]
+
+
+def _read_records(folder: Path, model: str) -> _Records:
     """Read the records of one model by track, key and seed, the last one of a sample.
 
-    An unfinished last line, which a killed run leaves, is not there yet. A run of one model is
-    that model's whatever its name. Of a varied run the reference alone counts.
+    A run of one model is that model's whatever its name. Of a varied run only the reference counts.
     """
-    found: dict[str, dict[tuple[str, str, int], Record]] = {}
+    found: dict[str, _Records] = {}
     for _, record in RecordLines(folder):
         if not record.variant:
             found.setdefault(record.model, {})[record.track, record.key, record.seed] = record
-    if model in found:
-        return found[model]
-    if len(found) == 1:
-        return next(iter(found.values()))
+    if model in found or len(found) == 1:
+        return found.get(model) or next(iter(found.values()))
     where = str(folder / RECORDS)
-    raise DataError(
-        Problem(where, "has no records of this model", "model", model, ", ".join(found))
-    )
+    message = "has no records of this model"
+    raise DataError(Problem(where, message, "model", model, ", ".join(found)))
 
 
-def _recorded(known: Mapping[tuple[str, str, int], Record], request: Request) -> Reply | None:
-    """Return the reply recorded for the request's track, key and seed, or None.
-
-    Raises SampleError or RefusedError where that is what was recorded.
-    """
+def _recorded(known: _Records, request: Request) -> Reply | None:
+    """Return the reply recorded for a request, or None; raise the error that was recorded."""
     record = known.get((request.track, request.key, request.seed))
     error = None if record is None else record.error
     if error is not None and error.kind in ("sample", "refused"):
@@ -173,7 +161,7 @@ def read_chat_completion(raw: object) -> Reply | None:
     refusal = message.get("refusal")
     return _reply(
         text or _text(refusal),
-        "\n".join(part for part in (shown, thoughts) if part),
+        "\n".join(filter(None, (shown, thoughts))),
         "refusal" if refusal and not text else finish_of(choice.get("finish_reason")),
         _usage(_get(raw, "usage"), "prompt_tokens", "completion_tokens"),
         _get(raw, "model"),
@@ -181,7 +169,8 @@ def read_chat_completion(raw: object) -> Reply | None:
 
 
 def _read(raw: object) -> Reply | None:
-    return next((reply for reader in _READERS if (reply := reader(raw)) is not None), None)
+    readers = (read_chat_completion, _anthropic, _gemini, _single_field, _bare)
+    return next((reply for reader in readers if (reply := reader(raw)) is not None), None)
 
 
 def _anthropic(raw: object) -> Reply | None:
@@ -257,11 +246,6 @@ def _bare(raw: object) -> Reply | None:
         if isinstance(raw, Mapping):
             return _read(raw)
     return _reply(raw) if isinstance(raw, str) else None
-
-
-_READERS: tuple[Callable[[object], Reply | None], ...] = (
-    *(read_chat_completion, _anthropic, _gemini, _single_field, _bare),
-)
 
 
 def _reply(

@@ -35,15 +35,6 @@ def test_a_reply_is_found_by_key_whatever_the_seed(tmp_path: Path) -> None:
     assert replies == [Reply(text=STEPS, finish="unknown", cost_usd=0.0, attempts=0)] * 2
 
 
-def test_a_file_may_say_more_after_the_key(tmp_path: Path) -> None:
-    (tmp_path / "007_reply.json").write_text(json.dumps(STEPS))
-    (tmp_path / "0071.json").write_text(json.dumps("other"))
-    reply = answer(replay(tmp_path), "007")
-    assert reply is not None
-    assert reply.text == STEPS
-    (tmp_path / "007_again.json").write_text(json.dumps(STEPS))
-    with pytest.raises(DataError, match="more than one recording"):
-        answer(replay(tmp_path), "007")
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from typing import Any
 
 from aiohttp import web
 
-from tests.servers.chassis import LocalServer, Seen, main
+from tests.servers.chassis import LocalServer, Seen
 
 
 class AnthropicMessages(LocalServer):
@@ -61,7 +61,3 @@ def _part(part: dict[str, Any]) -> str | tuple[str, str]:
         return text
     source = part["source"]
     return source["media_type"], hashlib.sha256(base64.b64decode(source["data"])).hexdigest()
-
-
-if __name__ == "__main__":
-    main(AnthropicMessages)

@@ -77,14 +77,6 @@ def o200k_tokens(text: str) -> float:
     return len(_o200k().encode(text))
 
 
-def _claude_text_tokens(text: str) -> float:
-    return len(_claude().encode(text).ids)
-
-
-def _gemini_text_tokens(text: str) -> float:
-    return len(text) / 4
-
-
 def _contents(body: object) -> Iterator[str | tuple[int, int]]:
     """Texts and sizes of pictures in a request body of any of the three protocols."""
     if isinstance(body, list):
@@ -166,7 +158,9 @@ class BillingGemini(Billing, GeminiGenerate):
 PROVIDERS: dict[str, Callable[[], Billing]] = {
     "openai/gpt-4o-2024-08-06": lambda: BillingOpenAI(o200k_tokens, tile_tokens, 3),
     "openai/gpt-5.6": lambda: BillingOpenAI(o200k_tokens, patch_tokens, 3),
-    "anthropic/claude-opus-5-5": lambda: BillingAnthropic(_claude_text_tokens, claude_tokens),
-    "gemini/gemini-3.8-flash": lambda: BillingGemini(_gemini_text_tokens, gemini_tokens),
+    "anthropic/claude-opus-5-5": lambda: BillingAnthropic(
+        lambda text: len(_claude().encode(text).ids), claude_tokens
+    ),
+    "gemini/gemini-3.8-flash": lambda: BillingGemini(lambda text: len(text) / 4, gemini_tokens),
 }
 """By model, a server that bills as its provider does."""

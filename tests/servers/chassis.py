@@ -130,7 +130,6 @@ class LocalServer(ABC):
         self.seen: list[Seen] = []
         self.ended: Counter[str] = Counter()
         self.by_sample: Counter[str] = Counter()
-        self.answered_by_sample: Counter[str] = Counter()
         self.at_once = 0
         self.most_at_once = 0
 
@@ -154,51 +153,35 @@ class LocalServer(ABC):
     def requests(self) -> int:
         return sum(self.ended.values())
 
-    def stats(self) -> dict[str, Any]:
-        return {
-            "requests": self.requests,
-            "ended": dict(self.ended),
-            "by_sample": dict(self.by_sample),
-            "answered_by_sample": dict(self.answered_by_sample),
-            "most_at_once": self.most_at_once,
-        }
-
     def app(self) -> web.Application:
         app = web.Application(client_max_size=64 * 2**20)
         self.add_routes(app)
-        app.router.add_get("/stats", self._stats)
         return app
-
-    async def _stats(self, _: web.Request) -> web.Response:
-        return web.json_response(self.stats())
 
     async def handle(self, request: web.Request) -> web.StreamResponse:
         async with self._gate:
-            return await self._handle(request)
+            self.at_once += 1
+            self.most_at_once = max(self.most_at_once, self.at_once)
+            try:
+                return await self._handle(request)
+            finally:
+                self.at_once -= 1
 
     async def _handle(self, request: web.Request) -> web.StreamResponse:
-        self.at_once += 1
-        self.most_at_once = max(self.most_at_once, self.at_once)
-        try:
-            seen = self.read(await request.json(), request)
-            sample = seen.sample
-            if self.keep:
-                self.seen.append(seen)
-            self.by_sample[sample] += 1
-            ending = self.faults.draw(sample, self.by_sample[sample])
-            if ending == "seed" and seen.seed is None:
-                ending = "ok"
-            self.ended[ending] += 1
-            if self.faults.latency_s:
-                await asyncio.sleep(self.faults.latency_s)
-            while self.holds:
-                await asyncio.sleep(0.005)
-            response = await self._end(seen, ending, request)
-            if ending == "ok" or (ending in WIRE_FAULTS and WIRE_FAULTS[ending].ending == "reply"):
-                self.answered_by_sample[sample] += 1
-            return response
-        finally:
-            self.at_once -= 1
+        seen = self.read(await request.json(), request)
+        sample = seen.sample
+        if self.keep:
+            self.seen.append(seen)
+        self.by_sample[sample] += 1
+        ending = self.faults.draw(sample, self.by_sample[sample])
+        if ending == "seed" and seen.seed is None:
+            ending = "ok"
+        self.ended[ending] += 1
+        if self.faults.latency_s:
+            await asyncio.sleep(self.faults.latency_s)
+        while self.holds:
+            await asyncio.sleep(0.005)
+        return await self._end(seen, ending, request)
 
     async def _end(self, seen: Seen, ending: str, request: web.Request) -> web.StreamResponse:
         if ending in WIRE_FAULTS:
@@ -330,35 +313,10 @@ def main(kind: type[LocalServer]) -> None:
     parser = argparse.ArgumentParser(description=kind.__doc__)
     parser.add_argument("--port", type=int, default=0)
     parser.add_argument("--latency", type=float, default=0.0, metavar="SECONDS")
-    parser.add_argument("--rate-limited", type=float, default=0.0, metavar="SHARE")
-    parser.add_argument("--server-error", type=float, default=0.0, metavar="SHARE")
-    parser.add_argument("--reset", type=float, default=0.0, metavar="SHARE")
-    parser.add_argument("--malformed", type=float, default=0.0, metavar="SHARE")
-    parser.add_argument("--retry-after", default="1")
-    parser.add_argument("--mode", default="ok")
-    parser.add_argument("--others", default="", metavar="NAME[,NAME...]", help="names of faults")
-    parser.add_argument("--others-share", type=float, default=0.0, metavar="SHARE")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--one-at-a-time", action="store_true", help="other requests wait")
-    parser.add_argument("--elsewhere", default=ELSEWHERE, help="where redirects lead")
     given = parser.parse_args()
-    others = [name for name in given.others.split(",") if name]
-    faults = Faults.spread(
-        others,
-        given.others_share,
-        seed=given.seed,
-        rate_limited=given.rate_limited,
-        server_error=given.server_error,
-        reset=given.reset,
-        malformed=given.malformed,
-        latency_s=given.latency,
-        retry_after=given.retry_after,
-        mode=given.mode,
-    )
 
     async def serve() -> None:
-        width = 1 if given.one_at_a_time else None
-        server = kind(faults, keep=False, elsewhere=given.elsewhere, width=width)
+        server = kind(Faults(latency_s=given.latency), keep=False)
         _, port = await start(server, given.port)
         print(port, flush=True)
         await asyncio.Event().wait()

@@ -26,8 +26,6 @@ from aiohttp import web
 if TYPE_CHECKING:
     from tests.servers.chassis import LocalServer, Seen
 
-__all__ = ["WIRE_FAULTS", "Ending", "Fault", "reset_connection"]
-
 Ending = Literal["reply", "retryable", "unavailable", "sample"]
 Behaviour = Callable[["LocalServer", "Seen", web.Request], Awaitable[web.StreamResponse]]
 
@@ -231,16 +229,6 @@ def _error(message: Any, code: Any) -> dict[str, Any]:
     return {"error": {"message": message, "type": "api_error", "param": None, "code": code}}
 
 
-def _redirects() -> dict[str, Fault]:
-    return {
-        f"redirect-{status}-{'away' if away else 'here'}": Fault(
-            partial(_redirect, status=status, away=away), "unavailable"
-        )
-        for status in (301, 302, 303, 307, 308)
-        for away in (False, True)
-    }
-
-
 _DEEP = b'{"choices": ' + b"[" * 100_000 + b"]" * 100_000 + b"}"
 _QUOTA = "You exceeded your current quota"
 
@@ -294,8 +282,32 @@ _STATUSES: Mapping[str, tuple[int, Any, Mapping[str, str], Ending]] = {
 }
 """Answers by their status alone."""
 
+_CHANGES: Mapping[str, tuple[Callable[[dict[str, Any], Seen], Any], Ending]] = {
+    "null-choices": (_emptied(None), "retryable"),
+    "choices-of-strings": (_emptied(["a", "b"]), "retryable"),
+    "choices-object": (_emptied({"0": {}}), "retryable"),
+    "deep-beside-choices": (_nested, "retryable"),
+    "surrogate": (lambda body, _: _texts(body, "Step1: \ud800 index 1"), "reply"),
+    "echo-key-in-reply": (_with_key, "reply"),
+    "usage-missing": (_usage("missing"), "reply"),
+    "usage-null": (_usage(None), "reply"),
+    "usage-zero": (_usage(0), "reply"),
+    "usage-negative": (_usage(-1_000_000), "reply"),
+    "usage-huge": (_usage(10**30), "reply"),
+    "usage-true": (_usage(True), "reply"),
+    "usage-fraction": (_usage(12.5), "reply"),
+    "usage-text": (_usage("many"), "reply"),
+}
+"""Good replies in which something is changed."""
+
 WIRE_FAULTS: Mapping[str, Fault] = {
-    **_redirects(),
+    **{
+        f"redirect-{status}-{'away' if away else 'here'}": Fault(
+            partial(_redirect, status=status, away=away), "unavailable"
+        )
+        for status in (301, 302, 303, 307, 308)
+        for away in (False, True)
+    },
     "redirect-nowhere": Fault(partial(_sends, status=302), "unavailable"),
     "redirect-garbled": Fault(
         partial(_sends, status=302, headers={"Location": "http://[::1/v1"}), "unavailable"
@@ -308,22 +320,10 @@ WIRE_FAULTS: Mapping[str, Fault] = {
         name: Fault(partial(_sends, status=status, body=body, headers=headers), ending)
         for name, (status, body, headers, ending) in _STATUSES.items()
     },
-    "null-choices": Fault(partial(_changed, change=_emptied(None)), "retryable"),
-    "choices-of-strings": Fault(partial(_changed, change=_emptied(["a", "b"])), "retryable"),
-    "choices-object": Fault(partial(_changed, change=_emptied({"0": {}})), "retryable"),
-    "deep-beside-choices": Fault(partial(_changed, change=_nested), "retryable"),
-    "surrogate": Fault(
-        partial(_changed, change=lambda body, _: _texts(body, "Step1: \ud800 index 1")), "reply"
-    ),
-    "echo-key-in-reply": Fault(partial(_changed, change=_with_key), "reply"),
-    "usage-missing": Fault(partial(_changed, change=_usage("missing")), "reply"),
-    "usage-null": Fault(partial(_changed, change=_usage(None)), "reply"),
-    "usage-zero": Fault(partial(_changed, change=_usage(0)), "reply"),
-    "usage-negative": Fault(partial(_changed, change=_usage(-1_000_000)), "reply"),
-    "usage-huge": Fault(partial(_changed, change=_usage(10**30)), "reply"),
-    "usage-true": Fault(partial(_changed, change=_usage(True)), "reply"),
-    "usage-fraction": Fault(partial(_changed, change=_usage(12.5)), "reply"),
-    "usage-text": Fault(partial(_changed, change=_usage("many")), "reply"),
+    **{
+        name: Fault(partial(_changed, change=change), ending)
+        for name, (change, ending) in _CHANGES.items()
+    },
     "echo-key-json": Fault(partial(_echo, status=400, shape="json"), "sample"),
     "echo-key-cut": Fault(partial(_echo, status=400, shape="cut"), "sample"),
     "echo-key-page": Fault(partial(_echo, status=200, shape="page"), "retryable"),

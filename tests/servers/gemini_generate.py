@@ -8,7 +8,7 @@ from typing import Any
 
 from aiohttp import web
 
-from tests.servers.chassis import LocalServer, Seen, main
+from tests.servers.chassis import LocalServer, Seen
 
 
 class GeminiGenerate(LocalServer):
@@ -61,7 +61,3 @@ def _part(part: dict[str, Any]) -> str | tuple[str, str]:
     data = part.get("inline_data") or part["inlineData"]
     mime = data.get("mime_type") or data["mimeType"]
     return mime, hashlib.sha256(base64.b64decode(data["data"])).hexdigest()
-
-
-if __name__ == "__main__":
-    main(GeminiGenerate)
