@@ -25,14 +25,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from phyblock.data import AssemblyTask, read_data_set
-from phyblock.domain import (
-    BLOCK_TYPES,
-    COLORS,
-    MAX_CANDIDATES,
-    Block,
-    Candidate,
-    PoseStep,
-)
+from phyblock.domain import BLOCK_TYPES, COLORS, MAX_CANDIDATES, Block, Candidate, PoseStep
 from phyblock.errors import DataError, Problem
 from phyblock.scoring.pose import blocks_reached
 from phyblock.scoring.steps import Assembly
@@ -64,22 +57,16 @@ _KEPT_PICTURES = 64
 """Pictures of one scene that are kept; 50 MB at 512 pixels."""
 _SMALLEST_PX = 16
 _LEVELS = (1, 2, 3, 4)
-_CM = 100.0
-_HALF_TURN_DEG = 180.0
+_CM, _HALF_TURN_DEG = 100.0, 180.0
 _NEAR = (1.0, 10.0)
 """Distance and turn within which a block has reached its place [cm, degrees]."""
 
 
 def read_tasks(data: str | Path) -> tuple[AssemblyTask, ...]:
-    """The scenes of a data set: a folder with scenes.jsonl, an official checkout, a bundled name.
-
-    Raises DataError when there is no such data set, or with everything that is wrong in it.
+    """The scenes of a data set: a folder with scenes.jsonl, an official checkout, a bundled name;
+    DataError for none, or with everything that is wrong in it.
     """
     return read_data_set(str(data)).tasks
-
-
-def _rows_space(count: int) -> spaces.Box:
-    return spaces.Box(-360.0, 360.0, (count, TRAITS), np.float32)
 
 
 def _rows(blocks: Sequence[Block] | Sequence[Candidate], most: int) -> NDArray[np.float32]:
@@ -93,10 +80,9 @@ def _rows(blocks: Sequence[Block] | Sequence[Candidate], most: int) -> NDArray[n
 
 
 class _BlockPlay:
-    """Building with candidates: a right move puts its block at its goal pose, a wrong one nothing.
+    """Building with candidates, after `begin`: a right move puts its block at its goal pose.
 
-    `begin` comes before all else. `act` returns the outcome of an action, its reward, and whether
-    it was right; None for Done.
+    `act` returns the outcome of an action, its reward, and whether it was right; None for Done.
     """
 
     def __init__(
@@ -172,11 +158,10 @@ class _BlockPlay:
 
 
 class _PosePlay:
-    """Building with poses: blocks are put where actions say, let go, and lie where they rest.
+    """Building with poses, after `begin`: blocks are let go where actions say, with the tolerances
+    of `ExecutionLimits`; a goal block is reached by one of its kind within `_NEAR`.
 
-    The tolerances are those of the track with poses: a block may be moved and still stand as
-    `ExecutionLimits` says, and a goal block is reached by one of its kind within `_NEAR`. Where
-    actions turn blocks, each kind is a candidate once, upright. `begin` comes before all else.
+    Where actions turn blocks, each kind is a candidate once, upright.
     """
 
     def __init__(self, style: PictureStyle, rotation: PoseRotation, *, is_strict: bool) -> None:
@@ -239,10 +224,7 @@ class _PosePlay:
         return tuple(self._named[block.order - 1] for block in self.blocks)
 
     def right_moves(self) -> tuple[dict[str, Any], ...]:
-        """The actions that would put a goal block in its place now, those of low layers first.
-
-        Such a block is not reached, and all that it rests on is.
-        """
+        """The actions that put a goal block not reached on what is, those of low layers first."""
         scene, kit = self._scene, self.candidates
         is_there = [self._count((block,)) == 1 for block in scene.blocks]
         needs, layers = scene.graph.depends_on, scene.graph.layers
@@ -293,9 +275,8 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
     the module; `placed`: number of blocks placed as each candidate, shape (16,), uint8; `left`: the
     share of steps that is left, shape (1,), float32; where actions are poses also `world`: the
     blocks where they lie, rows as in `goal`).
-    The episode terminates with Done, with the goal complete, and under `physics="strict"` with a
-    collapse; it is truncated after `max_steps` steps (None: twice the number of blocks) or
-    `max_failures` failed moves in a row (None: no bound).
+    It terminates with Done, the goal complete, and under `physics="strict"` a collapse; it is
+    truncated after `max_steps` steps (None: twice the blocks) or `max_failures` failures in a row.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 2}  # noqa: RUF012
@@ -326,15 +307,14 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         Raises DataError for a data set or scene that is not there, ValueError for an option that
         is not among those allowed, a limit below 1, or no tasks at all.
         """
-        options: tuple[tuple[str, str, tuple[str, ...]], ...] = (
+        for name, value, allowed in (
             ("setting", setting, SETTINGS),
             ("gating", gating, GATINGS),
             ("physics", physics, get_args(Physics)),
             ("observe", observe, get_args(Observe)),
             ("action", action, get_args(Action)),
             ("rotation", rotation, get_args(PoseRotation)),
-        )
-        for name, value, allowed in options:
+        ):
             if value not in allowed:
                 raise ValueError(f"{name} is {value!r}; allowed: {', '.join(allowed)}")
         if action == "block" and rotation != "candidate":
@@ -351,14 +331,13 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         if not _SMALLEST_PX <= size_px <= LARGEST_PX:
             raise ValueError(f"size_px is {size_px}, allowed {_SMALLEST_PX}..{LARGEST_PX}")
         tasks = read_tasks(data) if isinstance(data, str | Path) else tuple(data)
-        of_levels = ""
         if levels is not None:
             if not isinstance(levels, Collection) or not set(levels) <= set(_LEVELS):
                 raise ValueError(f"levels is {levels!r}; allowed: several of {_LEVELS}, or None")
             tasks = tuple(task for task in tasks if set(task.scene.levels) & set(levels))
-            of_levels = f" of levels {sorted(levels)}"
         if not tasks:
-            raise ValueError(f"data holds no tasks{of_levels}")
+            of = "" if levels is None else f" of levels {sorted(levels)}"
+            raise ValueError(f"data holds no tasks{of}")
         self._tasks = {task.scene.id: task for task in tasks}
         self._scene = None if scene is None else self._find(scene).scene.id
         self._observe = observe
@@ -383,14 +362,15 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
             for name in ("current", "goal", "candidates")
         }
         if observe == "state":
+            goal = spaces.Box(-360.0, 360.0, (MOST_BLOCKS, TRAITS), np.float32)
             parts = {
-                "goal": _rows_space(MOST_BLOCKS),
-                "candidates": _rows_space(MAX_CANDIDATES),
+                "goal": goal,
+                "candidates": spaces.Box(-360.0, 360.0, (MAX_CANDIDATES, TRAITS), np.float32),
                 "placed": spaces.Box(0, 255, (MAX_CANDIDATES,), np.uint8),
                 "left": spaces.Box(0.0, 1.0, (1,), np.float32),
             }
             if action == "pose":
-                parts["world"] = _rows_space(MOST_BLOCKS)
+                parts["world"] = goal
         self.observation_space = cast(spaces.Space[Observation], spaces.Dict(parts))
 
     def reset(
@@ -443,8 +423,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
 
     def action_masks(self) -> NDArray[np.bool_]:
         """The numbers that mean something in this scene, shape (17,): Done, and its candidates."""
-        mask = np.zeros(MAX_CANDIDATES + 1, dtype=np.bool_)
-        mask[: len(self._play.candidates) + 1] = True
+        mask: NDArray[np.bool_] = np.arange(MAX_CANDIDATES + 1) <= len(self._play.candidates)
         return mask
 
     def _begin(self, task: AssemblyTask) -> None:
@@ -471,8 +450,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
                 "candidates": self._picture(None).copy(),
             }
         if len(goal) > MOST_BLOCKS:
-            most = f"at most {MOST_BLOCKS} fit in a state"
-            raise ValueError(f"a goal of {len(goal)} blocks; {most}")
+            raise ValueError(f"a goal of {len(goal)} blocks; at most {MOST_BLOCKS} fit in a state")
         placed = np.bincount(play.chosen, minlength=MAX_CANDIDATES + 1)[1:]
         left = 1 - self._steps / self._most_steps
         state: Observation = {

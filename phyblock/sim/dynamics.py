@@ -12,7 +12,7 @@ import contextlib
 import functools
 import threading
 import time
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -433,7 +433,7 @@ class Executor:
         if block is None:
             return ExecutedStep("no_block")
         block = replace(block, order=self._steps)
-        below_cm = depth_cm(block)
+        below_cm = -float(bounds_m(block)[0, 2]) * _CM
         if below_cm > self._limits.overlap_cm:
             return ExecutedStep("under_floor", overlap_cm=round(below_cm, _DIGITS))
         others = self.blocks
@@ -446,17 +446,24 @@ class Executor:
             x, y, z = free.position_m
             free = replace(free, position_m=(x, y, z - gap_m))
         after = self._let_go(free)
-        moved_cm, turned_deg = moved_between(Pose.goal(block), after[block.order])
-        knocked = tuple(
-            other.order
-            for other in others
-            if other.order in after
-            and not self._is_still(*moved_between(Pose.goal(other), after[other.order]))
-        )
-        end = end_of(knocked, self._is_still(moved_cm, turned_deg))
-        numbers = (moved_cm, turned_deg, gap_m * _CM, given_m * _CM)
-        moved, turned, gap, given = (round(number, _DIGITS) + 0.0 for number in numbers)
-        return ExecutedStep(end, moved, turned, gap, given, knocked)
+        moved = {
+            one.order: (
+                Pose.goal(one).distance_m(after[one.order]) * _CM,
+                Pose.goal(one).angle_deg(after[one.order]),
+            )
+            for one in (*others, block)
+            if one.order in after
+        }
+        fallen = {
+            order
+            for order, (moved_cm, turned_deg) in moved.items()
+            if not (moved_cm <= self._limits.stand_cm and turned_deg <= self._limits.stand_deg)
+        }
+        knocked = tuple(other.order for other in others if other.order in fallen)
+        end: StepEnd = "knocks_over" if knocked else "falls" if fallen else "stands"
+        numbers = (*moved[block.order], gap_m * _CM, given_m * _CM)
+        moved_cm, turned_deg, gap, given = (round(number, _DIGITS) + 0.0 for number in numbers)
+        return ExecutedStep(end, moved_cm, turned_deg, gap, given, knocked)
 
     def _let_go(self, block: Block) -> dict[int, Pose]:
         """Poses of the block and of all that it could move, once they rest."""
@@ -498,24 +505,6 @@ class Executor:
                 break
             before = after
         return set()
-
-    def _is_still(self, moved_cm: float, turned_deg: float) -> bool:
-        return moved_cm <= self._limits.stand_cm and turned_deg <= self._limits.stand_deg
-
-
-def depth_cm(block: Block) -> float:
-    """Depth to which a block reaches below the floor [cm]; negative above it."""
-    return -float(bounds_m(block)[0, 2]) * _CM
-
-
-def moved_between(start: Pose, end: Pose) -> tuple[float, float]:
-    """Distance [cm] and turn [degrees] from one pose to another."""
-    return start.distance_m(end) * _CM, start.angle_deg(end)
-
-
-def end_of(knocked: Collection[int], is_still: bool) -> StepEnd:
-    """The end of a step whose block was let go."""
-    return "knocks_over" if knocked else "stands" if is_still else "falls"
 
 
 def _out_of_others(

@@ -204,16 +204,9 @@ def episode_gif(images: Sequence[Image.Image]) -> bytes:
     """Frames as an animated GIF that repeats for ever, the last one longer."""
     # Frames of every tone have a part in the colors: the first, the middle and the last ones.
     chosen = [images[0], images[len(images) // 2], images[-1]]
-    return _animated(images, _FRAME_MS, _LAST_FRAME_MS, "gif", _stacked(chosen, 1))
-
-
-def _stacked(images: Sequence[Image.Image], columns: int) -> Image.Image:
     width, height = images[0].size
-    gap, rows = max(2, round(height * _GAP)), math.ceil(len(images) / columns)
-    columns = min(columns, len(images))
-    size = (columns * (width + gap) - gap, rows * (height + gap) - gap)
-    sheet = Image.new("RGB", size, "white")
-    for place, image in enumerate(images):
-        row, column = divmod(place, columns)
-        sheet.paste(image, (column * (width + gap), row * (height + gap)))
-    return sheet
+    step = height + max(2, round(height * _GAP))
+    sheet = Image.new("RGB", (width, 2 * step + height), "white")
+    for place, image in enumerate(chosen):
+        sheet.paste(image, (0, place * step))
+    return _animated(images, _FRAME_MS, _LAST_FRAME_MS, "gif", sheet)

@@ -438,14 +438,16 @@ def board_of(
 
     Raises SpecError for runs that cannot be compared.
     """
-    first = {track: n for n in reversed(range(len(runs))) for track in reversed(runs[n].tracks)}
+    first: dict[str, int] = {}
+    for number, one in enumerate(runs):
+        first |= {track: number for track in one.tracks if track not in first}
     numbers = {entry.name: _values(entry, values) for entry in entries}
     ranges: dict[str, Mapping[str, tuple[int, int]]] = {}
     tracks: list[dict[str, Any]] = []
     columns: list[dict[str, Any]] = []
     about: dict[str, Any]
     told: dict[str, Any]
-    for track, place in sorted(first.items(), key=lambda one: one[1]):
+    for track, place in first.items():
         kind, run, measure = kind_of(track), runs[place].run, main_measure(runs[place].run, track)
         heading = main_column(run, track).heading
         about = {"name": track, "title": kind.title, "item": kind.item, "main": heading}

@@ -157,10 +157,12 @@ def _headline(run: Run, track: str) -> Headline:
             sign * (row.cells[0].value or 0.0),
         )
     )
+    # Floors that are baselines have rows already.
     floors = headline_floors(run, track)
-    names = ", ".join(dict.fromkeys(floor.name for floor in floors.values()))
-    scales = {f"Floor: {names}": {heading: floor.value for heading, floor in floors.items()}}
-    for name, numbers in {**(scales if floors else {}), **references}.items():
+    names = dict.fromkeys(floor.name for floor in floors.values())
+    scales = {f"Floor: {', '.join(names)}": {h: floor.value for h, floor in floors.items()}}
+    is_new = not names.keys() <= {row.name for row in rows}
+    for name, numbers in {**(scales if is_new else {}), **references}.items():
         given = (numbers.get(heading) for heading in headings)
         plain = (Cell("") if value is None else Cell(number(value), value) for value in given)
         rows.append(Row(name, "reference", tuple(plain)))

@@ -454,6 +454,8 @@ def test_every_view_of_a_site_can_be_read_and_hostile_names_do_nothing(
 def test_the_board_is_sorted_by_keyboard_and_ranked_by_any_track(site_visit: SiteVisit) -> None:
     page = site_visit.open()
     names = page.locator(".board tbody th a")
+    # The first track of the suite comes first.
+    assert page.locator("#by option:checked").inner_text() == "Full planning: Overall F1"
     assert names.first.inner_text() == "oracle"
     page.locator(".board th button").first.focus()
     page.keyboard.press("Enter")
