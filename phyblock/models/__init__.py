@@ -3,7 +3,7 @@
 Importing this package imports neither litellm nor aiohttp: the first call through one of them does.
 """
 
-from phyblock.models.batch_ledger import BatchFiles, under_way, waiting_keys
+from phyblock.models.batch import BatchFiles, under_way, waiting_keys
 from phyblock.models.build import build_model
 from phyblock.models.cache import CacheStats, ReplyCache, reply_key
 from phyblock.models.costs import (

@@ -7,8 +7,7 @@ import re
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import Problem, SpecError
-from phyblock.models.batch import BatchModel
-from phyblock.models.batch_ledger import BatchFiles
+from phyblock.models.batch import BatchFiles, BatchModel
 from phyblock.models.cache import ReplyCache
 from phyblock.models.client import Client, HttpClient, OpenAIClient
 from phyblock.models.costs import Budget, prices_of, require_prices

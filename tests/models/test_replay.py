@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from phyblock.config.models import ModelConfig
-from phyblock.errors import DataError, RefusedError, SampleError, StoreError
-from phyblock.models import Model, Reply, Usage, build_model
-from tests.models.factory import make_request
+from phyblock.domain import Candidate, CandidateSet, Plan
+from phyblock.errors import DataError, RefusedError, SampleError, SpecError, StoreError
+from phyblock.models import Model, Reply, Request, Usage, build_model, read_raw_reply
+from phyblock.text import well_formed
+from phyblock.tracks.full_planning import PLAN_RULES, PlanSubject
+from tests.models.factory import CANDIDATES, SCENE, make_request
 from tests.records.damage import plan_record
 
 STEPS = "Step1: Move block with index 3"
@@ -33,8 +41,6 @@ def test_a_reply_is_found_by_key_whatever_the_seed(tmp_path: Path) -> None:
     assert not model.needs_messages
     replies = [answer(model, "007", seed) for seed in (0, 1)]
     assert replies == [Reply(text=STEPS, finish="unknown", cost_usd=0.0, attempts=0)] * 2
-
-
 
 
 @pytest.mark.parametrize(
@@ -125,3 +131,295 @@ def test_the_official_recordings_answer_for_their_scenes(official_checkout: Path
     model = replay(official_checkout / "outputs" / "claude-3-7-thinking")
     replies = [answer(model, f"{number:03}") for number in range(400)]
     assert sum(reply is not None for reply in replies) == 390
+
+
+def choice(message: object, finish: str = "stop") -> dict[str, object]:
+    return {"choices": [{"index": 0, "finish_reason": finish, "message": message}]}
+
+
+def reply(text: str, finish: Any = "unknown", reasoning: str = "", **counts: int) -> Reply:
+    return Reply(text=text, finish=finish, reasoning=reasoning, usage=Usage(**counts))
+
+
+def named(model: str, one: Reply) -> Reply:
+    return one.model_copy(update={"provider_model": model})
+
+
+PART = {"type": "text", "text": "a"}
+SHAPES: dict[str, tuple[object, Reply]] = {
+    "openai": (
+        {
+            **choice({"role": "assistant", "content": STEPS, "refusal": None}),
+            "model": "gpt",
+            "usage": {
+                "prompt_tokens": 7,
+                "completion_tokens": 5,
+                "completion_tokens_details": {"reasoning_tokens": 2},
+                "prompt_tokens_details": {"cached_tokens": 3, "cache_write_tokens": 1},
+            },
+        },
+        named("gpt", reply(STEPS, "stop", prompt_tokens=7, completion_tokens=5, reasoning_tokens=2,
+                           cached_tokens=3, cache_write_tokens=1)),
+    ),
+    "openai refusal": (
+        choice({"role": "assistant", "content": None, "refusal": "I will not"}),
+        reply("I will not", "refusal"),
+    ),
+    "openai cut": (choice({"content": ""}, "length"), reply("", "length")),
+    "reasoning beside": (
+        choice({"content": STEPS, "reasoning_content": "red"}),
+        reply(STEPS, "stop", "red"),
+    ),
+    "parts": (choice({"content": [PART, {**PART, "text": "b"}]}), reply("ab", "stop")),
+    "completion with text": (
+        {"choices": [{"text": STEPS, "finish_reason": "length"}]},
+        reply(STEPS, "length"),
+    ),
+    "anthropic": (
+        {
+            "type": "message",
+            "model": "claude",
+            "content": [{"type": "text", "text": STEPS, "citations": None}],
+            "stop_reason": "end_turn",
+            "usage": {"input_tokens": 7, "output_tokens": 5, "cache_read_input_tokens": 2},
+        },
+        named("claude", reply(STEPS, "stop", prompt_tokens=9, completion_tokens=5,
+                              cached_tokens=2)),
+    ),
+    "anthropic thinking": (
+        {
+            "content": [
+                {"type": "thinking", "thinking": "block with index 9", "signature": "x"},
+                {"type": "text", "text": STEPS},
+            ],
+            "stop_reason": "max_tokens",
+        },
+        reply(STEPS, "length", "block with index 9"),
+    ),
+    "gemini of the client": (
+        {
+            "candidates": [
+                {"content": {"parts": [{"text": STEPS, "thought": None}]}, "finish_reason": "STOP"}
+            ],
+            "model_version": "gemini",
+            "usage_metadata": {"prompt_token_count": 7, "candidates_token_count": 5},
+        },
+        named("gemini", reply(STEPS, "stop", prompt_tokens=7, completion_tokens=5)),
+    ),
+    "gemini of the wire": (
+        {
+            "candidates": [
+                {
+                    "content": {"parts": [{"text": "red", "thought": True}, {"text": STEPS}]},
+                    "finishReason": "MAX_TOKENS",
+                }
+            ],
+            "usageMetadata": {"promptTokenCount": 7, "thoughtsTokenCount": 3},
+        },
+        reply(STEPS, "length", "red", prompt_tokens=7, reasoning_tokens=3),
+    ),
+    "gemini with an enum's name": (
+        {"candidates": [{"content": {"parts": []}, "finish_reason": "FinishReason.SAFETY"}]},
+        reply("", "refusal"),
+    ),
+    "gemini blocked": (
+        {"candidates": [], "promptFeedback": {"blockReason": "SAFETY"}},
+        reply("", "refusal"),
+    ),
+    "gemini without content": (
+        {"candidates": [{"content": None, "finish_reason": "MAX_TOKENS"}]},
+        reply("", "length"),
+    ),
+    "gemini without candidates": (
+        {"candidates": None, "usage_metadata": {"prompt_token_count": 7}},
+        reply("", prompt_tokens=7),
+    ),
+    "internvl": (
+        {"instruction": "i", "input": "", "output": "gold", "image": ["a"], "predict": STEPS},
+        reply(STEPS),
+    ),
+    "predict in a list": ({"predict": [STEPS]}, reply(STEPS)),
+    "text": ({"text": STEPS, "model_id": "llava"}, reply(STEPS)),
+    "response": ({"response": STEPS}, reply(STEPS)),
+    "batch response": (
+        {"custom_id": "7", "response": {"status_code": 200, "body": choice({"content": STEPS})}},
+        reply(STEPS, "stop"),
+    ),
+    "bare": (STEPS, reply(STEPS)),
+    "bare in a list": ([STEPS], reply(STEPS)),
+    "list of one": ([choice({"content": STEPS})], reply(STEPS, "stop")),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_shape_is_read(name: str) -> None:
+    raw, expected = SHAPES[name]
+    assert read_raw_reply(raw, "000.json") == expected
+
+
+@pytest.mark.parametrize(
+    ("raw", "found"),
+    [
+        ({}, "keys "),
+        ({"error": {"message": "overloaded"}, "id": 3}, "keys error, id"),
+        ({"choices": []}, "keys choices"),
+        ([], "list"),
+        (None, "NoneType"),
+        (17, "int"),
+        ({"candidates": []}, "keys candidates"),
+        ({"content": "not a list"}, "keys content"),
+    ],
+)
+def test_another_shape_is_an_error_that_names_the_file_and_its_keys(
+    raw: object, found: str
+) -> None:
+    with pytest.raises(DataError) as caught:
+        read_raw_reply(raw, "outputs/x/007.json")
+    assert "outputs/x/007.json" in str(caught.value)
+    assert caught.value.problems[0].found == found
+
+
+WORDS = (
+    *("choices", "message", "content", "text", "output", "usage", "candidates", "parts", "value"),
+    *("finish_reason", "thinking", "response", "body", "predict", "promptFeedback", "refusal"),
+    *("model", "modelVersion", "prompt_tokens", "input_tokens", "promptTokenCount"),
+)
+texts = st.text(st.characters(), max_size=5)
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | texts,
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from(WORDS), inner, max_size=4)
+    ),
+    max_leaves=12,
+)
+
+
+@given(json_values)
+def test_any_document_is_read_or_refused_with_a_data_error(raw: object) -> None:
+    """What is read can be written: texts as UTF-8, counts as numbers."""
+    try:
+        read = read_raw_reply(raw, "x.json")
+    except DataError:
+        return
+    assert read.storable() == read
+    for text in (read.text, read.reasoning, read.provider_model):
+        text.encode()
+
+
+@given(texts)
+def test_only_characters_that_no_file_can_hold_are_replaced(text: str) -> None:
+    read = read_raw_reply({**choice({"content": f"{text}\ud800"}), "model": f"\udfff{text}"}, "x")
+    for kept in (read.text, read.provider_model):
+        assert kept.replace("\ufffd", "") == well_formed(text).replace("\ufffd", "")
+
+
+@pytest.mark.parametrize(
+    ("model", "replies"),
+    [
+        ("gpt-4o", 400),
+        ("Qwen-VL-max", 400),
+        ("claude-3-5-haiku", 400),
+        ("claude-3-7-thinking", 390),
+        ("gemini-2.0-flash", 400),
+        ("InternVL2.5-8B", 400),
+    ],
+)
+def test_the_official_recordings_are_all_read(
+    official_checkout: Path, model: str, replies: int
+) -> None:
+    files = sorted((official_checkout / "outputs" / model).glob("*.json"))
+    read = [read_raw_reply(json.loads(path.read_text()), str(path)) for path in files]
+    assert len(read) == replies
+    assert all(one.text for one in read)
+    assert all(bool(one.reasoning) == ("thinking" in model) for one in read)
+
+
+PLANNERS = list(PLAN_RULES)
+keys = st.text(min_size=1, max_size=5)
+seeds = st.integers(0, 10**6)
+
+
+def said(name: str, request: Request) -> Reply:
+    model = build_model(ModelConfig(name=name), cache=None)
+    assert not model.needs_messages
+    answer = asyncio.run(model.ask(request))
+    assert answer is not None
+    return answer
+
+
+def steps(name: str, request: Request) -> list[int]:
+    """The steps of a reply whose every line has the benchmark's form."""
+    lines = said(name, request).text.splitlines()
+    read = [re.fullmatch(r"Step(\d+): Move block with index (\d+)", line) for line in lines]
+    assert [int(match[1]) for match in read if match] == list(range(1, len(lines) + 1))
+    return [int(match[2]) for match in read if match]
+
+
+@given(keys, seeds)
+def test_random_draws_four_candidates(key: str, seed: int) -> None:
+    drawn = steps("random", make_request(key, seed))
+    assert len(drawn) == 4
+    assert all(1 <= index <= len(CANDIDATES) for index in drawn)
+
+
+@given(keys)
+def test_all_candidates_names_each_once(key: str) -> None:
+    assert steps("all-candidates", make_request(key)) == [1, 2, 3, 4, 5]
+
+
+@given(keys, seeds, st.lists(st.integers(1, 5), min_size=1).map(tuple))
+def test_goal_blind_says_what_was_learned(key: str, seed: int, plan: tuple[int, ...]) -> None:
+    subject = PlanSubject(SCENE, CANDIDATES, lambda: Plan(plan))
+    assert steps("goal-blind", replace(make_request(key, seed), subject=subject)) == list(plan)
+
+
+@given(keys, seeds)
+def test_first_pose_names_the_right_kinds_each_in_the_pose_listed_first(
+    key: str, seed: int
+) -> None:
+    subject = PlanSubject(SCENE, CANDIDATES)
+    named = steps("first-pose", replace(make_request(key, seed), subject=subject))
+    assert Counter(CANDIDATES[n].kind for n in named) == Counter(b.kind for b in SCENE.blocks)
+    for n in named:
+        assert all(CANDIDATES[other].kind != CANDIDATES[n].kind for other in range(1, n))
+
+
+@given(keys, seeds)
+def test_the_oracle_gives_a_valid_order_of_the_right_looks(key: str, seed: int) -> None:
+    given_steps = steps("oracle", make_request(key, seed))
+    looks = [CANDIDATES[index].look for index in given_steps]
+    order = [[block.look for block in SCENE.blocks].index(look) for look in looks]
+    assert SCENE.graph.is_valid(order)
+
+
+@given(keys, seeds)
+def test_without_orientation_only_the_orientation_is_wrong(key: str, seed: int) -> None:
+    given_steps = steps("oracle-no-orientation", make_request(key, seed))
+    kinds = [CANDIDATES[index].kind for index in given_steps]
+    order = [[block.kind for block in SCENE.blocks].index(kind) for kind in kinds]
+    assert SCENE.graph.is_valid(order)
+    wrong = [
+        CANDIDATES[i].look != SCENE.blocks[v].look for i, v in zip(given_steps, order, strict=True)
+    ]
+    assert wrong == [SCENE.blocks[v].type == "arch" for v in order]
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_what_is_drawn_depends_on_seed_and_key_alone(name: str) -> None:
+    many = [make_request(f"{key:03}", seed) for key in range(10) for seed in range(5)]
+    forwards = {(r.key, r.seed): said(name, r) for r in many}
+    backwards = {(r.key, r.seed): said(name, r) for r in reversed(many)}
+    assert forwards == backwards
+    if name not in ("all-candidates", "goal-blind"):
+        assert len({answer.text for answer in forwards.values()}) > 1
+
+
+def test_an_oracle_without_its_candidate_is_an_error() -> None:
+    poor = CandidateSet((Candidate("triangle", "orange", (0.0, 0.0, 0.0)),))
+    with pytest.raises(DataError, match="no candidate looks like this block"):
+        said("oracle", replace(make_request(), subject=PlanSubject(SCENE, poor)))
+
+
+def test_an_unknown_name_is_an_error_that_lists_the_known() -> None:
+    with pytest.raises(SpecError, match="oracle-no-orientation"):
+        said("orcale", make_request())
