@@ -35,7 +35,7 @@ import asyncio, sys
 from pathlib import Path
 from phyblock.resources import bundled
 from phyblock.run.plan import make_plan
-from phyblock.run.session import Session
+from phyblock.run.runner import Session
 
 folder = Path(sys.argv[1])
 suite = load_suite(folder / "soak.yaml", (), data_dir=bundled("benchmarks", "data"))

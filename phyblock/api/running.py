@@ -20,10 +20,9 @@ from phyblock.errors import Problem, SpecError
 from phyblock.results.load import Run, load_run
 from phyblock.run.estimate import spending_refused, unlimited_spending
 from phyblock.run.events import RunEvent, Stopping
-from phyblock.run.execute import RunResult
 from phyblock.run.plan import make_plan
 from phyblock.run.preflight import find_models_file
-from phyblock.run.session import Session, check_ready
+from phyblock.run.runner import RunResult, Session, check_ready
 from phyblock.text import counted
 
 __all__ = ["run_suite"]
@@ -166,7 +165,7 @@ class _RunApart:
     def _heed(self) -> None:
         """Do in the run's thread what was asked for; at the latest when the run is open."""
         if self._stops and self._session is not None:
-            self._session.executor.interrupt()
+            self._session.interrupt()
         if self._stops > 1 and self._whole is not None:
             self._whole.cancel()
             # Once, as what is answered must be written.

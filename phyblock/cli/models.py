@@ -32,9 +32,8 @@ from phyblock.models import (
 )
 from phyblock.models.litellm_client import be_quiet
 from phyblock.registry import baseline_names
-from phyblock.run.check import check_model
 from phyblock.run.models import to_config
-from phyblock.run.preflight import find_models_file
+from phyblock.run.preflight import check_model, find_models_file
 from phyblock.text import counted, did_you_mean
 
 _SOON_DAYS = 180

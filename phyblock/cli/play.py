@@ -21,10 +21,9 @@ from phyblock.config.suite import load_suite
 from phyblock.errors import Problem, SpecError, reason_of
 from phyblock.files import read_text
 from phyblock.resources import bundled
-from phyblock.run.execute import RunResult
 from phyblock.run.plan import RunPlan
 from phyblock.run.preflight import bundled_suites, find_suite, prompt_dirs
-from phyblock.run.session import Session
+from phyblock.run.runner import RunResult, Session
 from phyblock.run.store import held_run, run_folder
 from phyblock.text import counted
 from phyblock.web.answers import (

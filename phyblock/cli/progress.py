@@ -17,9 +17,9 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from phyblock.models import ModelEvent
 from phyblock.results.design import FAILURES
 from phyblock.run.events import (
-    ModelNotice,
     ModelStopped,
     RunEvent,
     RunNotice,
@@ -164,18 +164,18 @@ class ProgressView:
             for name, samples in event.earlier.items():
                 for sample in samples:
                     self._tallies[name].add(sample)
-        elif isinstance(event, ModelNotice):
+        elif isinstance(event, ModelEvent):
             tally = self._tallies[event.model]
             tally.retries += event.kind == "retry"
-            tally.notice = event.text
+            tally.notice = event.message
             if event.kind == "retry":
                 trouble = self._troubles.setdefault(event.model, _Trouble())
                 trouble.retries[event.status] += 1
                 trouble.longest_wait_s = max(trouble.longest_wait_s, event.wait_s)
-                trouble.last = event.text
+                trouble.last = event.message
             # Where it ends for a model, another event says so.
             elif self._live is None and event.kind != "unavailable":
-                self._print(f"{event.model}: {event.text}")
+                self._print(f"{event.model}: {event.message}")
         elif isinstance(event, RunNotice):
             self._print(event.text)
         elif isinstance(event, ModelStopped):

@@ -36,7 +36,6 @@ from phyblock.models.litellm_client import be_quiet
 from phyblock.resources import bundled
 from phyblock.results.text import NO_VALUE, Column, TextTable
 from phyblock.run.estimate import Estimate, estimate
-from phyblock.run.execute import Cause, RunResult
 from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.preflight import (
     asking_remarks,
@@ -47,7 +46,7 @@ from phyblock.run.preflight import (
     prompt_dirs,
 )
 from phyblock.run.rescore import rescore
-from phyblock.run.session import Session, check_ready
+from phyblock.run.runner import Cause, RunResult, Session, check_ready
 from phyblock.run.store import held_run, run_folder
 from phyblock.text import counted, one_line, plain_lines
 from phyblock.tracks import kind_of
@@ -141,10 +140,10 @@ async def _run(opened: Session, view: ProgressView) -> RunResult:
         async with opened as session:
 
             def stop() -> None:
-                if session.executor.stopping:
+                if session.stopping:
                     assert whole is not None
                     whole.cancel()
-                session.executor.interrupt()
+                session.interrupt()
 
             async def tick() -> None:
                 while True:
@@ -156,7 +155,7 @@ async def _run(opened: Session, view: ProgressView) -> RunResult:
                 try:
                     return await session.run()
                 except asyncio.CancelledError:
-                    return session.executor.result
+                    return session.result
                 finally:
                     ticking.cancel()
 

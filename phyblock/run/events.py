@@ -6,6 +6,7 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from phyblock.models import ModelEvent
 from phyblock.records.record import BatchLine, Record, Turn
 from phyblock.scoring.counts import Counts
 from phyblock.text import counted
@@ -24,19 +25,6 @@ class SampleDone:
     """A record was written."""
 
     record: Record
-
-
-@dataclass(frozen=True)
-class ModelNotice:
-    """A model's call is repeated after `wait_s`, or something else a user may want to see; `text`
-    says why in a few words, `status` is what the server answered, if it did.
-    """
-
-    model: str
-    kind: str
-    text: str
-    wait_s: float = 0.0
-    status: int | None = None
 
 
 @dataclass(frozen=True)
@@ -70,7 +58,7 @@ class Stopping:
         return f"Stopping: {self.reason}; waiting for {calls} (Ctrl-C again to give them up)."
 
 
-RunEvent = RunStarted | SampleDone | ModelNotice | RunNotice | ModelStopped | Stopping
+RunEvent = RunStarted | SampleDone | ModelEvent | RunNotice | ModelStopped | Stopping
 Watcher = Callable[[RunEvent], None]
 
 

@@ -16,7 +16,7 @@ from phyblock.config.suite import Suite, Variant
 from phyblock.data import UNNUMBERED, Dataset, read_version
 from phyblock.parsing.text import READER_VERSION
 from phyblock.records.manifest import FORMAT, Manifest
-from phyblock.run.extraction import extraction_prompt
+from phyblock.run.judge import extraction_prompt
 from phyblock.run.models import PlannedModel
 from phyblock.sim.engine import ENGINES, described_engine
 from phyblock.stable import hex_digest

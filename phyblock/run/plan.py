@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from phyblock.config.models import RECORDED, ModelConfig, with_members
 from phyblock.config.suite import Suite, Variant
 from phyblock.data import SCENES_FILE, Dataset, read_builtin, read_official
 from phyblock.errors import DataError, Problem, SpecError
+from phyblock.models import Request
 from phyblock.records.manifest import MANIFEST, Manifest
 from phyblock.registry import track_baselines
 from phyblock.resources import bundled_sets
@@ -23,9 +24,41 @@ from phyblock.run.models import (
     recorded_order,
     with_baselines,
 )
-from phyblock.run.samples import Sample
+from phyblock.stable import drawn_bytes
 from phyblock.tracks import AnyTrack, EpisodeTrack, Item, Opening, kind_of, open_tracks
 from phyblock.tracks.items import interleaved, select_tasks
+
+_SEEDS = 2**31
+"""Providers take no larger ones."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One item of a track, asked of one model with one seed; `track` asks as the variant does."""
+
+    track: AnyTrack
+    model: str
+    item: Item
+    seed: int
+    variant: Variant = field(default_factory=Variant)
+
+    @property
+    def id(self) -> str:
+        """Its name inside the run."""
+        whole = f"{self.track.name}/{self.model}/{self.item.key}/s{self.seed}"
+        return f"{whole}/{self.variant.key}" if self.variant.key else whole
+
+    def asking(self, request: Request) -> Request:
+        """Return the request as it is sent: a repeat has another seed, and so is asked anew."""
+        repeat = self.variant.repeat
+        if repeat == 1:
+            return request
+        digest = drawn_bytes("repeat", request.seed, repeat)
+        return replace(request, seed=int.from_bytes(digest[:8], "big") % _SEEDS)
+
+    def shown(self) -> Sample:
+        """Return the sample with its item as its seed shows it."""
+        return replace(self, item=self.track.shown(self.item, self.seed))
 
 
 @dataclass(frozen=True)

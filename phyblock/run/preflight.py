@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from phyblock.config.models import RECORDED
+from PIL import Image as PillowImage
+
+from phyblock.config.models import RECORDED, ModelConfig
 from phyblock.config.suite import Suite
 from phyblock.data import recorded_models
 from phyblock.errors import DataError, Problem, SpecError
+from phyblock.models import (
+    Image,
+    Message,
+    Reply,
+    Request,
+    RetryPolicy,
+    build_model,
+)
 from phyblock.records.manifest import Manifest
 from phyblock.resources import bundled
 from phyblock.run.plan import RunPlan
@@ -158,3 +169,29 @@ def _unsaid(track: str, path: Path) -> str:
         f"{path.name}, the prompt of {track}, does not use {names}: unless it says the form of the "
         "answer in words of its own, models are not told it"
     )
+
+
+_SIDE_PX = 64
+_QUESTION = "What color is this picture? Answer with one word."
+
+
+async def check_model(config: ModelConfig) -> Reply:
+    """Show the model a small red square and ask for its color; one attempt, nothing cached.
+
+    Raises the ModelError that the call met, SpecError or DataError when the model cannot be built.
+    """
+    buffer = io.BytesIO()
+    PillowImage.new("RGB", (_SIDE_PX, _SIDE_PX), (216, 49, 49)).save(buffer, "PNG")
+    picture = Image(buffer.getvalue(), "check", _SIDE_PX, _SIDE_PX)
+    messages = (Message("user", (picture, _QUESTION)),)
+    request = Request("check", 0, messages, {}, "", None)
+    model = build_model(
+        config.model_copy(update={"seed": "never", "batch": False}),
+        cache=None,
+        policy=RetryPolicy(attempts=1, retry_for_s=0.0),
+    )
+    try:
+        reply = await model.ask(request)
+    finally:
+        await model.aclose()
+    return reply or Reply(text="")

@@ -21,11 +21,9 @@ from phyblock.records.files import run_records
 from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
 from phyblock.records.record import Record
 from phyblock.records.reply import StoredError
-from phyblock.run.extraction import read_extraction
-from phyblock.run.judging import judged_apart
+from phyblock.run.judge import about_item, judged, judged_apart, read_extraction
 from phyblock.run.manifest import code_versions
 from phyblock.run.plan import CHANGED, asked_about, recorded_dataset
-from phyblock.run.records import about_item, judged
 from phyblock.run.store import check_place, locked, run_folder, write_run
 from phyblock.text import counted
 from phyblock.tracks import AnyTrack, EpisodeTrack, Item, kind_of, open_tracks

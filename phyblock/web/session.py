@@ -36,10 +36,9 @@ from phyblock.results.compare import check_alike, comparable
 from phyblock.results.design import Design
 from phyblock.results.load import load_run
 from phyblock.run.events import RunEvent, RunStarted, SampleDone
-from phyblock.run.execute import RunResult
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan, make_plan
-from phyblock.run.session import Session
+from phyblock.run.runner import RunResult, Session
 from phyblock.stable import drawn_bytes, hex_digest
 from phyblock.text import one_line
 from phyblock.tracks import Item
@@ -289,7 +288,7 @@ class PlaySession:
         ) as opened:
 
             def interrupted() -> None:
-                opened.executor.interrupt()
+                opened.interrupt()
                 self.close()
 
             for one in signals:

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from phyblock.cli.progress import ProgressView
+from phyblock.models import ModelEvent
 from phyblock.records.files import known_records
 from phyblock.run.events import (
-    ModelNotice,
     ModelStopped,
     RunEvent,
     RunNotice,
@@ -23,9 +23,9 @@ from phyblock.run.events import (
 from tests.report.factory import record
 
 
-def retry(status: int | None = 429, wait_s: float = 1.0, model: str = "alpha") -> ModelNotice:
+def retry(status: int | None = 429, wait_s: float = 1.0, model: str = "alpha") -> ModelEvent:
     text = f"HTTP {status}: busy" if status else "no connection to host"
-    return ModelNotice(model, "retry", text, wait_s, status=status)
+    return ModelEvent(model, "retry", text, wait_s, status=status)
 
 
 def done(model: str = "alpha", outcome: str = "ok") -> SampleDone:
@@ -51,7 +51,7 @@ def test_a_log_tells_of_retries_servers_and_models_that_are_stopped() -> None:
         (1.0, RunNotice("http://host:1 cannot be reached [x] :b: no connection")),
         (2.0, retry(None, 9.0)),
         (11.0, retry(None)),
-        (12.0, ModelNotice("alpha", "unavailable", "HTTP 401: no")),
+        (12.0, ModelEvent("alpha", "unavailable", "HTTP 401: no")),
         (12.0, ModelStopped("alpha", "HTTP 401: no")),
     )
     assert lines == [

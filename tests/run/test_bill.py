@@ -23,7 +23,7 @@ from phyblock.models.costs import text_tokens
 from phyblock.resources import bundled
 from phyblock.run.estimate import Estimate, estimate
 from phyblock.run.plan import RunPlan, make_plan
-from phyblock.run.session import Session
+from phyblock.run.runner import Session
 from tests.models.routes import ROUTES
 from tests.servers.billing import (
     COMPLETION,

@@ -16,7 +16,7 @@ from phyblock.api.running import run_suite
 from phyblock.cli.main import phyblock
 from phyblock.errors import SimulationError
 from phyblock.run.rescore import rescore
-from phyblock.run.shielded import to_its_end
+from phyblock.run.runner import to_its_end
 from phyblock.sim import dynamics
 from phyblock.tracks.pictures import Workshop
 from phyblock.tracks.pose_planning import PosePlanning

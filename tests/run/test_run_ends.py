@@ -16,9 +16,8 @@ from phyblock.records.files import STOPPED
 from phyblock.records.line import Line
 from phyblock.records.record import Record
 from phyblock.run.events import RunEvent, SampleDone, Stopping
-from phyblock.run.execute import Cause
 from phyblock.run.plan import make_plan
-from phyblock.run.session import Session
+from phyblock.run.runner import Cause, Session
 from phyblock.run.store import AppendFile, RecordWriter
 from phyblock.tracks.full_planning import FullPlanning
 from tests.servers.chassis import Faults, Running
@@ -113,7 +112,7 @@ def test_an_impatient_cancellation_keeps_all_that_was_answered(
         async with session(workspace, nobody, "random") as opened:
             running = asyncio.create_task(opened.run())
             await asyncio.to_thread(begun.wait, 20)
-            opened.executor.interrupt()
+            opened.interrupt()
             for _ in range(3):
                 running.cancel()
                 for _ in range(10):
@@ -121,8 +120,8 @@ def test_an_impatient_cancellation_keeps_all_that_was_answered(
             may_end.set()
             with pytest.raises(asyncio.CancelledError):
                 await running
-            assert opened.executor.result.stop is not None
-            assert opened.executor.result.stop.cause is Cause.INTERRUPTED
+            assert opened.result.stop is not None
+            assert opened.result.stop.cause is Cause.INTERRUPTED
 
     monkeypatch.setattr(AppendFile, "append", appends_slowly)
     monkeypatch.setattr(RecordWriter, "put", notes)

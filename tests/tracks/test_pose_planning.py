@@ -19,7 +19,7 @@ from phyblock.domain import Block, Candidate, CandidateSet, PoseStep
 from phyblock.errors import SpecError, StoreError
 from phyblock.records.files import known_records
 from phyblock.resources import bundled
-from phyblock.run.records import begun, judged
+from phyblock.run.judge import begun, judged
 from phyblock.run.rescore import rescore
 from phyblock.scoring.plan import Goal
 from phyblock.scoring.pose import POSE_ERRORS, PoseFit, pose_errors

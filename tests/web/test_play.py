@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from phyblock.config.suite import load_suite
 from phyblock.errors import SpecError
 from phyblock.models import HaltedError, Image, Message, Request
-from phyblock.run.execute import RunResult
+from phyblock.run.runner import RunResult
 from phyblock.tracks.baselines import Choice, Picking, Spot, picks_of
 from phyblock.web.server import LARGEST_BODY_BYTES, Server
 from phyblock.web.session import (

@@ -1,0 +1,224 @@
+"""Records of samples: what came of a request, judged by its track, for the first time or again.
+
+Where no reader can read a reply, another model may be asked to copy what it says into the asked
+form. That model is sent the text of the reply and nothing else; what it copies is kept in the
+record and read by the same readers, so that `phyblock score` needs to ask nobody.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
+from typing import Any, TypeVar
+
+from phyblock.config.models import ModelConfig
+from phyblock.errors import (
+    BudgetReachedError,
+    ModelError,
+    RefusedError,
+    RetryableError,
+    SampleError,
+    SimulationError,
+)
+from phyblock.models import AskLaterError, HaltedError, Image, Message, Model, Request
+from phyblock.records.files import known_records
+from phyblock.records.record import Extraction, Record, SentImage, SentPrompt
+from phyblock.records.reply import Reply, StoredError, Usage
+from phyblock.resources import bundled
+from phyblock.stable import plain_sum
+from phyblock.tracks import Episode, Item, Judgement, SingleTrack
+from phyblock.tracks.base import count_sample
+from phyblock.tracks.prompts import TemplatePrompt
+from phyblock.types import Outcome
+
+RULE = "extractor"
+"""The rule of a record whose reply was read out of what the model copied."""
+_N = TypeVar("_N", int, float)
+
+
+def begun(
+    sample: str, track: str, model: str, item: Item, seed: int, answer: Reply | ModelError | None
+) -> dict[str, Any]:
+    """Return the fields of a record before it is judged; None is a reply that a recording lacks."""
+    return {
+        "sample": sample,
+        "track": track,
+        "model": model,
+        "key": item.key,
+        **about_item(item),
+        "seed": seed,
+        "reply": answer.storable() if isinstance(answer, Reply) else None,
+        "error": _error(answer) if isinstance(answer, ModelError) else None,
+        "prompt": None,
+        "parse": None,
+        "scores": (),
+        "time": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def about_item(item: Item) -> dict[str, Any]:
+    """Return the fields of a record about the scene of its item."""
+    scene = item.scene
+    facts = {"scene": scene.id, "levels": scene.levels, "parents": scene.parents}
+    return {**facts, "n_blocks": len(scene)}
+
+
+def about_prompt(request: Request, template: str, digest: str) -> SentPrompt:
+    """Return the fields of a record about a prompt that is in `prompts.jsonl` under `digest`."""
+    images = tuple(
+        SentImage(
+            label=part.label, sha256=part.sha256, width_px=part.width_px, height_px=part.height_px
+        )
+        for message in request.messages
+        for part in message.parts
+        if isinstance(part, Image)
+    )
+    examples: dict[str, Any] = {"examples": request.examples} if request.examples else {}
+    version = request.prompt_version
+    return SentPrompt(
+        template=template, version=version, messages=digest, images=images, **examples
+    )
+
+
+def judged(
+    fields: Mapping[str, Any],
+    item: Item,
+    judgement: Judgement | Episode,
+    more: Mapping[str, Any] | None = None,
+) -> Record:
+    """Return the record with its outcome and what the track says and counts of it.
+
+    `fields` are those of a record that was begun, or of one that was judged before; `more` replaces
+    some of what the judgement says.
+    """
+    outcome = _outcome(fields["reply"], fields["error"], judgement.is_read)
+    told = {**fields, "outcome": outcome, **judgement.fields(), **(more or {})}
+    if counts := count_sample(fields["track"], item, judgement):
+        told["counts"] = {**fields.get("counts", {}), **counts}
+    return known_records().validate_python(told)
+
+
+async def judged_apart(
+    track: SingleTrack[Any],
+    item: Item,
+    text: str | None,
+    fields: Mapping[str, Any],
+    earlier: Record | None = None,
+) -> Record:
+    """Return the record of a reply, for the first time or again after an `earlier` one.
+
+    Where no engine could carry the reply out, it says so and can be judged again.
+    """
+    try:
+        return judged(fields, item, await track.judge_apart(item, text, earlier))
+    except SimulationError as error:
+        if text is None:
+            raise
+        lacking = StoredError(kind="unjudged", message=str(error))
+        nothing = await track.judge_apart(item, None, None)
+        return judged({**fields, "error": lacking}, item, nothing)
+
+
+def _outcome(reply: Reply | None, error: StoredError | None, readable: bool) -> Outcome:
+    if error is not None:
+        return "refusal" if error.kind == "refused" else "api_error"
+    if reply is None:
+        return "missing"
+    if reply.finish == "refusal":
+        return "refusal"
+    if reply.finish == "length":
+        return "truncated"
+    return "ok" if readable else "parse_failure"
+
+
+def _error(error: ModelError) -> StoredError:
+    kind = "unavailable"
+    if isinstance(error, RetryableError):
+        kind = "retryable"
+    elif isinstance(error, SampleError):
+        kind = "refused" if isinstance(error, RefusedError) else "sample"
+    message, billed_usd = str(error), error.billed_usd
+    fields = {"kind": kind, "status": error.status, "message": message, "billed_usd": billed_usd}
+    return StoredError.model_validate(fields)
+
+
+def pooled(replies: Sequence[Reply]) -> Reply:
+    """Return the sum of an episode's replies, with the text of the last one.
+
+    It is cut off or refused where every one of them is.
+    """
+    counts = {
+        name: _sum(getattr(reply.usage, name) for reply in replies) for name in Usage.model_fields
+    }
+    billed = [reply.billed_usd for reply in replies if reply.billed_usd is not None]
+    ends = {reply.finish for reply in replies}
+    return Reply(
+        text=replies[-1].text,
+        finish=ends.pop() if len(ends) == 1 else "stop",
+        usage=Usage(**counts),
+        cost_usd=_sum(reply.cost_usd for reply in replies),
+        billed_usd=plain_sum(billed) if billed else None,
+        latency_s=plain_sum(reply.latency_s for reply in replies),
+        provider_model=replies[-1].provider_model,
+        attempts=sum(reply.attempts for reply in replies),
+        cached=all(reply.cached for reply in replies),
+        seed_sent=all(reply.seed_sent for reply in replies),
+    )
+
+
+def _sum(values: Iterable[_N | None]) -> _N | None:
+    """Return the sum, or None where one is not known."""
+    found = list(values)
+    known = [value for value in found if value is not None]
+    return plain_sum(known) if known and len(known) == len(found) else None
+
+
+def extraction_prompt() -> TemplatePrompt:
+    """Return the prompt that extraction models are asked with."""
+    return TemplatePrompt(bundled("prompts", "extract.j2"), "extract")
+
+
+class Extractor:
+    """Asks a model what replies say that could not be read."""
+
+    def __init__(self, model: Model, config: ModelConfig) -> None:
+        self._model = model
+        self._config = config
+        self._prompt = extraction_prompt()
+
+    async def read(self, track: SingleTrack[Any], item: Item, record: Record) -> Record:
+        """Return a record judged by what the model copied, if nothing was read in its reply.
+
+        Where the model cannot be asked, the record stays as it is: its reply is paid for.
+        """
+        text = "" if record.reply is None else record.reply.text
+        if record.outcome != "parse_failure" or not text.strip():
+            return record
+        content = self._prompt.text("user", {"track": track.name, "reply": text})
+        messages, params = (Message("user", (content,)),), self._config.params
+        name, version = f"{track.name}/{item.key}", self._prompt.version
+        try:
+            reply = await self._model.ask(Request(name, 0, messages, params, version, None))
+        except (ModelError, BudgetReachedError, HaltedError, AskLaterError):
+            return record
+        if reply is None:
+            return record
+        extraction = Extraction(model=self._model.name, reply=reply.storable())
+        return await read_extraction(track, item, record, extraction)
+
+
+async def read_extraction(
+    track: SingleTrack[Any],
+    item: Item,
+    record: Record,
+    extraction: Extraction,
+    earlier: Record | None = None,
+) -> Record:
+    """Return the record of an unread reply, judged by an extraction where that can be read."""
+    given = {**record.as_given(), "extraction": extraction}
+    copied = extraction.reply.text
+    text = "" if copied.strip().strip(".").upper() == "NONE" else copied
+    again = await judged_apart(track, item, text, given, earlier)
+    if again.outcome != "ok":
+        return record.model_copy(update={"extraction": extraction})
+    return again.model_copy(update={"parse": again.parse.model_copy(update={"rule": RULE})})
