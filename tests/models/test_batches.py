@@ -8,6 +8,7 @@ import itertools
 import json
 from collections.abc import Sequence
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from phyblock.models import (
     ReplyCache,
     Request,
     reply_key,
+    today,
 )
 from phyblock.models.batch import (
     Answers,
@@ -48,6 +50,7 @@ from tests.servers.batches import (
     BatchFaults,
     BatchServer,
     GeminiBatches,
+    Made,
     OpenAIBatches,
 )
 from tests.servers.chassis import Running
@@ -533,3 +536,51 @@ def test_bodies_stand_in_lines_as_they_are(fields: dict[str, Any], name: str, bo
     line = _joined(fields, name, json.dumps(body).encode())
     assert json.loads(line) == {**fields, name: body}
     assert b"\n" not in line
+
+
+def test_an_answer_costs_what_the_day_of_its_sending_asked_for(disk: Disk) -> None:
+    dearer = {"input": 9000, "output": 9000, "batch": {"input": 4500, "output": 4500}}
+    price = [PRICE, {"from": today().isoformat(), **dearer}]
+    with Running(OpenAIBatches(batch=BatchFaults(calls={"results": ("400",)}))) as running:
+        config = with_fields(config_at("direct", running.url), price=price)
+        (stopped,) = run_command(config, disk, requests_of(1))
+        assert isinstance(stopped, UnavailableError)
+        assert disk.lines[0].most_usd
+        sent = datetime.now(UTC) - timedelta(days=1)
+        time = sent.strftime("%Y-%m-%dT%H:%M:%SZ")
+        disk.lines = [line.model_copy(update={"time": time}) for line in disk.lines]
+        (reply,) = run_command(config, disk, requests_of(1))
+    assert isinstance(reply, Reply)
+    assert reply.cost_usd == pytest.approx((1000 + 40) * 500 / 1e6)
+
+
+def test_headers_that_requests_need_go_with_their_batch(disk: Disk) -> None:
+    schema = {"type": "object", "properties": {}, "additionalProperties": False}
+    form = {"type": "json_schema", "json_schema": {"name": "a", "strict": True, "schema": schema}}
+    betas: list[str] = []
+
+    class Noting(AnthropicBatches):
+        def key_of(self, request: Any) -> str:
+            betas.append(request.headers.get("anthropic-beta", ""))
+            return super().key_of(request)
+
+    with Running(Noting()) as running:
+        fields = {"id": "anthropic/claude-sonnet-4-5", "response_format": "always"}
+        config = config_at("anthropic", running.url, **fields)
+        request = replace(make_request(), response_format=form)
+        (reply,) = run_command(config, disk, [request])
+    assert isinstance(reply, Reply)
+    assert betas[0].startswith("structured-outputs")
+    assert set(betas[2:]) == {""}
+
+
+def test_results_that_are_not_there_yet_are_not_taken_for_none(disk: Disk) -> None:
+    class Late(OpenAIBatches):
+        def told(self, made: Made) -> dict[str, Any]:
+            is_early = made.looks <= self.batch_faults.looks
+            return {**super().told(made), **({"output_file_id": None} if is_early else {})}
+
+    with Running(Late()) as running:
+        ended = run_command(config_at("direct", running.url), disk, requests_of(2))
+        assert len(texts(ended)) == 2
+        assert len(running.server.made) == 1  # type: ignore[attr-defined]
