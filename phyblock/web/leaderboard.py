@@ -8,7 +8,7 @@ import os
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
@@ -164,7 +164,14 @@ def write_site(
         check_runs_alike(runs)
         entries, values = entries_of(runs), all_values(runs)
         board = board_of(runs, entries, values)
-        build = _build(runs, title)
+        told: list[Any] = [title]
+        for one in runs:
+            # The manifest of a bundle names this machine's data.
+            manifest = one.run.manifest.identity if one.is_verified else None
+            manifest = manifest or digest_of_file(one.run.path / MANIFEST)
+            records = digest_of_file(one.run.path / RECORDS)
+            told.append([manifest, records, one.is_verified, bool(one.sources.lacking)])
+        build = build_of(*told)
         own = f"{_DATA}{build}/"
         with folder.alone(), writing(out):
             with folder.making(own) as new:
@@ -183,30 +190,16 @@ def write_site(
 def _check_place(folder: OutFolder) -> None:
     """Raise StoreError unless the folder is new, empty, or one that a site was written into."""
     out = folder.path
+    if out.exists() and not out.is_dir():
+        raise StoreError(Problem(str(out), "is no folder"))
     with writing(out, "choose another folder with --out"):
-        try:
-            found = {entry.name for entry in os.scandir(out)}
-        except FileNotFoundError:
-            return
-        except NotADirectoryError as error:
-            raise StoreError(Problem(str(out), "is no folder")) from error
+        found = {entry.name for entry in os.scandir(out)} if out.exists() else set()
     strangers = sorted(n for n in found if n != LIST and not _PARTIAL.fullmatch(n))
     if strangers and INDEX not in folder.names(INDEX) and not folder.names(_DATA):
         shown = ", ".join(strangers[:3]) + (", ..." if len(strangers) > 3 else "")
         message, hint = "is not empty and holds no site", "name a new or an empty folder with --out"
         raise StoreError(Problem(str(out), message, found=shown, hint=hint))
     folder.check([INDEX, _DATA])
-
-
-def _build(runs: Sequence[SiteRun], title: str) -> str:
-    told: list[Any] = [title]
-    for one in runs:
-        digests = [digest_of_file(one.run.path / name) for name in (MANIFEST, RECORDS)]
-        if one.is_verified:
-            # Its manifest names this machine's data.
-            digests[0] = one.run.manifest.identity
-        told.append([*digests, one.is_verified, bool(one.sources.lacking)])
-    return build_of(*told)
 
 
 def open_runs(paths: Sequence[Path], data: Sequence[Path], kept: ExitStack) -> tuple[SiteRun, ...]:
@@ -231,19 +224,13 @@ def open_runs(paths: Sequence[Path], data: Sequence[Path], kept: ExitStack) -> t
             message = f"is the same run as {seen[identity]}"
             raise SpecError(Problem(where, message, "identity", identity[:16], hint="give it once"))
         seen[identity] = where
-        opened.append(SiteRun(where, run, path.is_file(), _sources(run, data)))
+        sources = open_sources(run, None)
+        for folder in data:
+            if sources.lacking:
+                with suppress(DataError):
+                    sources = open_sources(run, folder)
+        opened.append(SiteRun(where, run, path.is_file(), sources))
     return tuple(opened)
-
-
-def _sources(run: Run, data: Sequence[Path]) -> Sources:
-    """Return what can be drawn, from the first place that has it."""
-    found = open_sources(run, None)
-    for folder in data if found.lacking else ():
-        try:
-            return open_sources(run, folder)
-        except DataError:
-            continue
-    return found
 
 
 def check_runs_alike(runs: Sequence[SiteRun]) -> None:
@@ -541,7 +528,11 @@ def _write_samples(
         for track, number in entry.runs.items()
     }
     for number, one in enumerate(runs):
-        for record in _records(one):
+        # Model by model: what one model says packs best together.
+        order = Numbers(one.run.design.model_names)
+        places = [p for p in read_places(one.run.path, one.run.design) if p.track in one.tracks]
+        places.sort(key=lambda place: order.of(place.model))
+        for record in records_at(one.run.path, places):
             track, item = record.track, record.item
             if (track, item) not in numbered:
                 known = one.sources.items.get(track)
@@ -584,17 +575,6 @@ def _write_samples(
         "parts": parts,
         "lacking": "" if is_drawn else runs[0].sources.lacking,
     }
-
-
-def _records(one: SiteRun) -> Iterator[Record]:
-    """Yield the newest record of every sample that is of the suite, model by model: what one model
-    says packs best together.
-    """
-    order = {name: place for place, name in enumerate(one.run.design.model_names)}
-    places = read_places(one.run.path, one.run.design)
-    known = (place for place in places if place.track in one.tracks)
-    ordered = sorted(known, key=lambda place: order.get(place.model, len(order)))
-    yield from records_at(one.run.path, ordered)
 
 
 def _replay(record: Record, run: Run) -> dict[str, Any]:

@@ -198,13 +198,9 @@ def _cell(value: Value | None, query: str, is_main: bool) -> Cell:
 def rank_texts(run: Run, track: str) -> dict[str, str]:
     """Return the place that each model may have by its main value; {} where there are not two."""
     main, values = main_column(run, track).heading, headline_of(run, track)
-    models = [
-        model.name
-        for model in run.manifest.models
-        if not model.is_baseline
-        and (value := values.get((model.name, main)))
-        and not math.isnan(value.value)
-    ]
+    rules = {model.name for model in run.manifest.models if model.is_baseline}
+    known = {name for (name, of), one in values.items() if of == main and not math.isnan(one.value)}
+    models = [name for name in run.design.model_names if name in known - rules]
     if len(models) < 2:
         return {}
     rows = compare_models(run, models, track).ranks.to_dict("records")
