@@ -330,6 +330,18 @@ def test_no_picture_of_a_question_cuts_anything_off_whatever_the_pose(
     assert is_inside(QuestionPicture("scene", (TOWER[0], tilted), (azimuth, elevation)))
 
 
+@given(clouds(), st.integers(1, 6), angles, elevations)
+@settings(max_examples=30, deadline=None)
+def test_no_picture_of_a_question_is_cut_open_whatever_it_frames(
+    blocks, framed, azimuth, elevation
+) -> None:
+    """Not even where blocks lie behind the place from which those in the frame are seen best."""
+    recipe = QuestionPicture(
+        "s", tuple(blocks), (azimuth, elevation), framed=tuple(blocks[:framed])
+    )
+    assert lies_between_planes(drawn_blocks(recipe), question_camera(recipe, STYLE))
+
+
 @pytest.mark.parametrize("background", slowly)
 def test_marks_change_the_picture_on_every_background(background: Background) -> None:
     style = PictureStyle(256, background)

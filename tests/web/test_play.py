@@ -384,6 +384,26 @@ def send(server: Server, content: bytes) -> socket.socket:
     return connection
 
 
+ADDRESSES = ["http://[", "//[::1", "http://[x]/{token}/state", "/{token}/state?after=[", "*"]
+TARGETS = st.one_of(
+    st.sampled_from(ADDRESSES),
+    st.text(st.characters(min_codepoint=33, max_codepoint=255), min_size=1, max_size=30),
+)
+
+
+@given(target=TARGETS, method=st.sampled_from(["GET", "POST"]))
+def test_whatever_is_asked_for_is_answered_with_a_refusal(
+    server: Server, target: str, method: str
+) -> None:
+    asked = target.replace("{token}", token(server))
+    lines = f"{method} {asked} HTTP/1.1\r\nHost: {server.hosts[0]}\r\nConnection: close\r\n\r\n"
+    with send(server, lines.encode("latin-1")) as connection, connection.makefile("rb") as answer:
+        status, _, rest = answer.read().partition(b"\r\n")
+    # Without a version there is no line of status, and nothing else.
+    assert status == b"" or status.split()[1] in (b"400", b"403", b"404")
+    assert rest.partition(b"\r\n\r\n")[2] == b""
+
+
 @pytest.mark.parametrize("resets", [True, False])
 def test_who_leaves_while_waiting_leaves_no_word_on_the_terminal(
     server: Server,
