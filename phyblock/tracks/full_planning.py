@@ -121,6 +121,8 @@ def plan_text(steps: Iterable[int]) -> str:
 
 _RANDOM_STEPS = 4
 """As in the paper's Random row."""
+_SHORT, _MOST_JUDGED = 1_000, 4_096
+"""Replies of so many characters are remembered with their judgements, and so many of them."""
 
 
 def _random_plan(subject: PlanSubject, rng: np.random.Generator) -> str:
@@ -328,6 +330,7 @@ class FullPlanning(SceneTrack, SingleTrack[AssemblyTask]):
         suite = self.suite
         self._guesses = BlindGuesses(suite.candidates.order, self.pool, suite.settings[0])
         self._scorers: dict[object, AssemblyScorer] = {}
+        self._judged: dict[object, PlanJudgement] = {}
         is_drawn = suite.images.source == "render"
         if self.shop is None:
             return
@@ -370,15 +373,21 @@ class FullPlanning(SceneTrack, SingleTrack[AssemblyTask]):
 
     def judge(self, item: AssemblyTask, text: str | None) -> PlanJudgement:
         """Read and score a reply; None, where there is no reply, is scored as an empty plan."""
-        suite, parsed = self.suite, ParsedPlan(Plan(), None)
+        suite, parsed, key = self.suite, ParsedPlan(Plan(), None), (item.key, item.candidates)
+        # Baselines that see no goal say the same with every seed.
+        if (known := self._judged.get((*key, text))) is not None:
+            return known
         if text is not None:
             parsed = parse_plan(text, len(item.candidates), suite.parser)
-        key = (item.key, item.candidates)
         if key not in self._scorers:
             self._scorers[key] = AssemblyScorer(item.scene, item.candidates, suite.settings)
         level1 = None if suite.scoring.level1 == "aov" else suite.scoring.level1
         scores = self._scorers[key].score(parsed.plan, suite.scoring.matchers, level1)
-        return PlanJudgement(suite.parser, parsed, scores, file_plan(item, parsed.plan.steps))
+        in_file = file_plan(item, parsed.plan.steps)
+        judged = PlanJudgement(suite.parser, parsed, scores, in_file)
+        if len(text or "") <= _SHORT and len(self._judged) < _MOST_JUDGED:
+            self._judged[*key, text] = judged
+        return judged
 
 
 TRACK = FullPlanning

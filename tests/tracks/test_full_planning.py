@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,7 +14,6 @@ from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.tracks.full_planning import pose_choices, pose_counts
 from phyblock.tracks.goal_blind import goal_blind_plans
 from phyblock.tracks.items import Presentation
-from phyblock.tracks.pictures import Workshop
 from tests.data.broken import write_scenes
 from tests.tracks.opened import track_of
 from tests.workspace import SCENES
@@ -69,29 +66,6 @@ def test_any_reply_is_judged_and_every_goal_block_accounted_for(track: Any, text
         assert score.counts.tp + score.counts.fn == len(task.scene)
         assert score.counts.tp + score.counts.fp == len(judged.parsed.plan.steps)
     assert all(1 <= step <= len(task.candidates) for step in judged.parsed.plan.steps)
-
-
-def test_a_request_holds_the_question_and_the_seed(
-    tasks: tuple[AssemblyTask, ...], tmp_path: Path
-) -> None:
-    path = tmp_path / "mine.j2"
-    path.write_text("{% block user %}{{ pictures | join }}{% endblock %}", encoding="utf-8")
-    images = {"layout": "separate", "order": ["candidates", "goal"]}
-    shop = Workshop(1, tmp_path / "cache")
-    track = track_of("full_planning", tasks, shop, images=images, prompt=str(path))
-    try:
-        asked = asyncio.run(track.request(tasks[0], 7, {"top_p": 0.5}, with_messages=True))
-        bare = asyncio.run(track.request(tasks[0], 7, {}, with_messages=False))
-        ((outline, real),) = track.outlines(tasks[0])
-    finally:
-        track.close()
-    (message,) = asked.messages
-    *sent, text = message.parts
-    assert [picture.label for picture in sent] == ["candidates", "goal"]
-    assert text == "candidatesgoal"
-    assert (asked.key, asked.seed, asked.params) == ("t1", 7, {"top_p": 0.5})
-    assert asked.prompt_version == track.prompt.version
-    assert (bare.messages, real, outline.messages) == ((), True, asked.messages)
 
 
 def test_facts_hold_what_is_shown_alone(track: Any) -> None:

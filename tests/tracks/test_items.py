@@ -32,10 +32,8 @@ from phyblock.tracks.items import (
 )
 from phyblock.tracks.pictures import Workshop
 from tests.data.broken import write_scenes
-from tests.servers.chassis import Running
-from tests.servers.openai_chat import OpenAIChat
 from tests.tracks.opened import BUILT_IN, track_of
-from tests.workspace import SCENES, Workspace
+from tests.workspace import SCENES
 
 SIZES = st.lists(st.integers(1, 200), min_size=1, max_size=4)
 SHUFFLED = Presentation("shuffled")
@@ -282,18 +280,3 @@ def test_what_cannot_be_shown_is_refused(
     with pytest.raises(SpecError) as caught:
         track_of(name, BUILT_IN.tasks[:9], shop, limit=2, examples=examples)
     assert told in str(caught.value)
-
-
-def test_a_run_shows_examples_varies_them_and_says_which(workspace: Workspace) -> None:
-    workspace.write_suite(models=["alpha"], seeds=[0], limit=3, vary={"examples": [0, 2]})
-    with Running(OpenAIChat()) as running:
-        workspace.write_models(running.url, "alpha")
-        done, again = workspace.run(), workspace.run()
-        assert len(running.server.seen) == 6
-    assert (done.code, again.code) == (0, 0), done.err
-    by_way = {bool(one.get("variant")): one["prompt"] for one in workspace.records()}
-    assert "examples" not in by_way[False]
-    assert len(by_way[True]["examples"]) == 2
-    labels = [image["label"] for image in by_way[True]["images"]]
-    assert labels[-1] == "composite"
-    assert labels[0] == f"example {by_way[True]['examples'][0]}: composite"
