@@ -26,7 +26,6 @@ from phyblock.models import (
     Message,
     Price,
     Prices,
-    Rate,
     Reply,
     ReplyCache,
     Request,
@@ -38,9 +37,8 @@ from phyblock.models import (
     is_unlisted,
     most_usd,
     prices_of,
-    reply_cost_usd,
 )
-from phyblock.models.costs import counted, map_entry, picture_tokens
+from phyblock.models.costs import Rate, counted, map_entry, picture_tokens, reply_cost_usd
 from phyblock.tracks.full_planning import PlanSubject
 from phyblock.types import ImageDetail
 from tests.models.factory import (

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import UnavailableError
-from phyblock.models import KeyStatus, api_key_status
-from phyblock.models.keys import api_key, hidden, secrets_of
+from phyblock.models import api_key_status
+from phyblock.models.keys import KeyStatus, api_key, hidden, secrets_of
 
 
 @pytest.fixture(autouse=True)

@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 from phyblock.config.models import ModelConfig
 from phyblock.domain import Candidate, CandidateSet, Plan
 from phyblock.errors import DataError, RefusedError, SampleError, SpecError, StoreError
-from phyblock.models import Model, Reply, Request, Usage, build_model, read_raw_reply
+from phyblock.models import Model, Reply, Request, Usage, build_model
+from phyblock.models.replay import read_raw_reply
 from phyblock.text import well_formed
 from phyblock.tracks.full_planning import PLAN_RULES, PlanSubject
 from tests.models.factory import CANDIDATES, SCENE, make_request
