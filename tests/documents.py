@@ -22,7 +22,7 @@ from phyblock.data.scenes import StoredScene
 from phyblock.records.files import known_records, record_types
 from phyblock.records.line import Line, parts
 from phyblock.records.manifest import Manifest
-from phyblock.records.record import BatchLine, Prompt, Turn
+from phyblock.records.record import BatchLine, Call, Prompt
 
 ROOT = Path(__file__).parents[1]
 SCHEMAS = Path("benchmarks", "schemas")
@@ -33,7 +33,7 @@ def make_documents() -> dict[Path, str]:
     made: dict[Path, str] = {}
     lines: dict[str, tuple[str, TypeAdapter[Any], Sequence[type[Line]]]] = {
         "record": ("record", known_records(), record_types()),
-        "turn": ("turn", TypeAdapter(Turn), (Turn,)),
+        "call": ("call", TypeAdapter(Call), (Call,)),
         "prompt": ("prompt", TypeAdapter(Prompt), (Prompt,)),
         "batch": ("batch", TypeAdapter(BatchLine), (BatchLine,)),
         "manifest": ("run.yaml", TypeAdapter(Manifest), (Manifest,)),

@@ -207,7 +207,8 @@ def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressV
     cached = (
         f" {view.cached:,} came from the reply cache (--no-cache asks anew)." if view.cached else ""
     )
-    console.print(f"{done}. Cost so far: {view.cost_text}.{cached}")
+    unanswered = f"; {result.unanswered}" if result.unanswered else ""
+    console.print(f"{done}. Cost so far: {view.cost_text}{unanswered}.{cached}")
     cause = result.stop.cause if result.stop else None
     if result.left:
         how = "raise limits.max_cost_usd and give" if cause is Cause.COST else "give"

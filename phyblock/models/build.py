@@ -15,7 +15,7 @@ from phyblock.models.limits import Limits
 from phyblock.models.litellm_client import LitellmClient
 from phyblock.models.model import ChatModel, Observer, RetryPolicy, Tell
 from phyblock.models.replay import BaselineModel, open_replay
-from phyblock.models.request import Model
+from phyblock.models.request import Journal, Model
 from phyblock.models.servers import Server, Servers
 
 
@@ -25,6 +25,7 @@ def build_model(
     cache: ReplyCache | None,
     overall: asyncio.Semaphore | None = None,
     budget: Budget | None = None,
+    journal: Journal | None = None,
     observer: Observer = lambda _: None,
     tell: Tell = lambda _: None,
     policy: RetryPolicy | None = None,
@@ -83,6 +84,7 @@ def build_model(
         cache=cache,
         budget=own,
         prices=prices,
+        journal=journal,
         policy=policy,
         observer=observer,
     )

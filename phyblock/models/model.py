@@ -29,12 +29,14 @@ from phyblock.models.costs import (
     estimate,
     map_entry,
     may_be_billed,
+    most_usd,
     reply_cost_usd,
     today,
 )
 from phyblock.models.limits import Clock, Limits
-from phyblock.models.request import Request, wire_params
+from phyblock.models.request import Journal, Request, wire_params
 from phyblock.models.servers import Server, Servers
+from phyblock.records.record import Call
 from phyblock.records.reply import Reply
 
 _FORMAT_HINT = (
@@ -160,6 +162,7 @@ class _Call:
     """
 
     request: Request
+    key: str
     expected: Estimate
     sent: int = 0
     billed_usd: float | None = None
@@ -182,6 +185,7 @@ class ChatModel:
         cache: ReplyCache | None,
         budget: ModelBudget | None,
         prices: Prices | None,
+        journal: Journal | None,
         policy: RetryPolicy,
         observer: Observer,
     ) -> None:
@@ -192,6 +196,7 @@ class ChatModel:
         self._cache = cache
         self._budget = budget
         self._prices = prices
+        self._journal = journal
         self._policy = policy
         self._observer = observer
         self._takes_seed = config.seed != "never"
@@ -207,14 +212,18 @@ class ChatModel:
         Cancelled while it waits, it gives up at once. Cancelled while a request is under way, which
         is paid for, it returns the answer; a second cancellation gives that up too.
         """
-        if self._cache is None:
-            return await self._ask(request)
+        if self._cache is None and self._journal is None:
+            return await self._ask(request, "")
         key = reply_key(self._config, request)
+        if self._journal is not None and (answered := self._journal.kept(key)) is not None:
+            return answered
+        if self._cache is None:
+            return await self._ask(request, key)
         async with self._cache.asking(key):
             kept = self._cache.get(key)
             if kept is not None:
                 return kept.model_copy(update={"cost_usd": self._cost_usd(kept)})
-            reply = await self._ask(request)
+            reply = await self._ask(request, key)
             self._cache.put(key, self._config.id, reply)
             return reply
 
@@ -228,9 +237,9 @@ class ChatModel:
         for server in self._servers.all:
             await server.client.aclose()
 
-    async def _ask(self, request: Request) -> Reply:
+    async def _ask(self, request: Request, key: str) -> Reply:
         """Send until answered; whatever ends it, what was billed is reported."""
-        call = _Call(request, estimate(self._config, request))
+        call = _Call(request, key, estimate(self._config, request))
 
         def on_retry(error: RetryableError, wait_s: float) -> None:
             if call.failed_at is not None:
@@ -252,6 +261,9 @@ class ChatModel:
             call.failure.billed_usd = call.billed_usd
             raise call.failure from None
         except ModelError as error:
+            if call.is_cancelled and isinstance(error, RetryableError) and not call.billed_usd:
+                # It would have been sent again, and nothing is known that a record could say.
+                raise asyncio.CancelledError from None
             error.billed_usd = call.billed_usd
             raise
         raise AssertionError("tenacity neither returned nor raised")
@@ -280,13 +292,7 @@ class ChatModel:
                 used = (reply.usage.prompt_tokens, reply.usage.completion_tokens)
                 if None not in used:
                     self._limits.settle(slot, sum(n for n in used if n is not None))
-                return reply.model_copy(
-                    update={
-                        "cost_usd": self._cost_usd(reply),
-                        "billed_usd": call.billed_usd,
-                        "attempts": call.sent,
-                    }
-                )
+                return reply
 
     async def _send_as_taken(self, call: _Call, server: Server) -> Reply:
         """Send with the seed and the format of the answer, as far as the provider takes them.
@@ -317,31 +323,48 @@ class ChatModel:
         return reply
 
     async def _send(self, call: _Call, server: Server, *, with_seed: bool) -> Reply:
-        """Send with the call's greatest cost reserved in the budget.
+        """Send with the call's greatest cost reserved in the budget and written in the journal.
 
         A failure that may have been billed counts in full; a model that is found unable before
         anything is sent costs nothing.
         """
-        budget, prices, expected = self._budget, self._prices, call.expected
+        budget = self._budget
         held: int | None = None
-        if budget is not None and prices is not None:
-            held = await budget.reserve(lambda: budget.most_usd(prices, expected, today()))
-        call.sent += 1
-        server.sent += 1
-        server.under_way += 1
-        spent_usd: float | None = None
-        sending = asyncio.ensure_future(server.client.complete(call.request, with_seed=with_seed))
+        if budget is not None and self._most_usd(call) is not None:
+            held = await budget.reserve(lambda: self._most_usd(call) or 0.0)
+        exchange = asyncio.ensure_future(self._exchange(call, server, held, with_seed=with_seed))
         try:
+            return await asyncio.shield(exchange)
+        except asyncio.CancelledError:
+            call.is_cancelled = True
+            return await exchange
+
+    async def _exchange(
+        self, call: _Call, server: Server, held: int | None, *, with_seed: bool
+    ) -> Reply:
+        """Write that a call is sent, send it, and write what became of it."""
+        budget, journal = self._budget, self._journal
+        written: Call | None = None
+        reply: Reply | None = None
+        spent_usd: float | None = 0.0
+        try:
+            if journal is not None:
+                sample, most_usd = call.request.sample, self._most_usd(call)
+                written = await journal.sent(self.name, sample, call.key, most_usd)
+                if call.is_cancelled:
+                    raise asyncio.CancelledError
+            call.sent += 1
+            server.sent += 1
+            server.under_way += 1
+            spent_usd = None
             try:
-                reply = await asyncio.shield(sending)
-            except asyncio.CancelledError:
-                call.is_cancelled = True
-                reply = await sending
-            reply = counted(reply, expected)
+                reply = await server.client.complete(call.request, with_seed=with_seed)
+            finally:
+                server.under_way -= 1
+            reply = counted(reply, call.expected)
             spent_usd = self._cost_usd(reply)
             if budget is not None:
-                budget.learn(expected, reply.usage)
-            return reply
+                budget.learn(call.expected, reply.usage)
         except UnavailableError:
             spent_usd = 0.0
             raise
@@ -353,9 +376,24 @@ class ChatModel:
             spent_usd = 0.0
             raise
         finally:
-            server.under_way -= 1
             if held is not None and budget is not None:
-                call.billed_usd = (call.billed_usd or 0.0) + budget.settle(held, spent_usd)
+                spent_usd = budget.settle(held, spent_usd)
+                call.billed_usd = (call.billed_usd or 0.0) + spent_usd
+            if reply is not None:
+                known = {"billed_usd": call.billed_usd, "attempts": call.sent}
+                reply = reply.model_copy(update={"cost_usd": self._cost_usd(reply), **known})
+            if journal is not None and written is not None:
+                await journal.ended(written, spent_usd, reply)
+        return reply
+
+    def _most_usd(self, call: _Call) -> float | None:
+        """Return the most that a call can cost by now; None where no price is known."""
+        day, prices = today(), self._prices
+        if prices is None or prices.on(day) is None:
+            return None
+        if self._budget is None:
+            return most_usd(prices, call.expected, day)
+        return self._budget.most_usd(prices, call.expected, day)
 
     def _cost_usd(self, reply: Reply) -> float | None:
         return reply_cost_usd(self._prices, reply, today())

@@ -17,6 +17,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import DataError, PhyblockError, Problem
+from phyblock.records.record import Call
 from phyblock.records.reply import Reply
 from phyblock.stable import hex_digest
 from phyblock.types import ImageDetail, Role
@@ -59,7 +60,8 @@ class Request:
     is looked up; `seed` is the sample's seed, which also tells repeats apart;
     `params` are sampling parameters by their OpenAI names; `prompt_version` hashes the template.
     `response_format` asks for an answer as JSON, as the OpenAI protocol does; None asks for text.
-    `examples` are the keys of worked examples that `messages` show before the question.
+    `examples` are the keys of worked examples that `messages` show before the question; `sample`
+    names the sample that it is made for.
     `subject` is what the question is about, of the type that its track says: only the rules of
     baselines look at it.
     """
@@ -73,6 +75,7 @@ class Request:
     response_format: Mapping[str, object] | None = None
     track: str = ""
     examples: tuple[str, ...] = ()
+    sample: str = ""
 
 
 class Model(Protocol):
@@ -104,6 +107,19 @@ class Model(Protocol):
 
     async def aclose(self) -> None:
         """Release connections; the model is not used afterwards."""
+
+
+class Journal(Protocol):
+    """Where calls are written before they are sent and when they have ended."""
+
+    def kept(self, key: str) -> Reply | None:
+        """Return the reply to a request that an earlier command was answered, or None."""
+
+    async def sent(self, model: str, sample: str, key: str, most_usd: float | None) -> Call:
+        """Write a call that is about to be sent."""
+
+    async def ended(self, call: Call, billed_usd: float | None, reply: Reply | None) -> None:
+        """Write what became of a call."""
 
 
 class HaltedError(PhyblockError):

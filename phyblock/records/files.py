@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import json
 import operator
-from collections.abc import Collection, Container, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
@@ -21,11 +21,11 @@ from phyblock.errors import Problem, StoreError, reason_of
 from phyblock.files import NotRegularError, open_regular, read_bytes
 from phyblock.records.line import Line, decode, problems_of
 from phyblock.records.manifest import Manifest, read_manifest
-from phyblock.records.record import BatchLine, Prompt, Record, Stopped, Turn
+from phyblock.records.record import BatchLine, Call, Prompt, Record, Stopped
 from phyblock.registry import known_tracks
 
 RECORDS = "records.jsonl"
-TURNS = "turns.jsonl"
+CALLS = "calls.jsonl"
 PROMPTS = "prompts.jsonl"
 BATCHES = "batches.jsonl"
 STOPPED = "stopped.json"
@@ -35,7 +35,7 @@ LineT = TypeVar("LineT", bound=Line)
 
 @dataclass(frozen=True)
 class Validation:
-    """Shows that records and turns are those of a run, by its digest and their names.
+    """Shows that records and calls are those of a run, by its digest and their names.
 
     `samples` are all ids of the run, where its plan is known. Records of models and seeds that the
     run does not select at present are passed over, unless it is taken as a `whole`.
@@ -53,8 +53,8 @@ class Validation:
         return self.manifest.selects(record.model, record.seed)
 
     def problem(self, where: str, line: Line) -> Problem | None:
-        """Return what shows that a record or turn is of another run, or None."""
-        if not isinstance(line, Record | Turn):
+        """Return what shows that a record or call is of another run, or None."""
+        if not isinstance(line, Record | Call):
             return None
         field, found, allowed = "sample", line.sample, line.sample
         if line.run not in ("", self.manifest.run):
@@ -64,7 +64,8 @@ class Validation:
         elif (
             self.samples is None
             or found in self.samples
-            or (line.run and (isinstance(line, Turn) or not self._selects(line)))
+            or isinstance(line, Call)
+            or (line.run and not self._selects(line))
         ):
             return None
         else:
@@ -184,18 +185,18 @@ class RecordLines(Lines[Record]):
         super().__init__(folder, known_records(), validation)
 
 
-class TurnLines(Lines[Turn]):
-    """The answered turns of a run folder's episodes, finished or not."""
+class CallLines(Lines[Call]):
+    """The calls of a run folder, each when it was sent and when it had ended."""
 
-    file = TURNS
-    noun = "turn"
+    file = CALLS
+    noun = "call"
     hint = (
-        "restore the file from a copy, or remove this line and those of the same sample below it: "
-        "these turns are then asked again"
+        "restore the file from a copy, or remove this line: its cost is then not counted, and a "
+        "reply that no record holds is asked for again"
     )
 
     def __init__(self, folder: Path, validation: Validation | None = None) -> None:
-        super().__init__(folder, TypeAdapter(Turn), validation)
+        super().__init__(folder, TypeAdapter(Call), validation)
 
 
 class PromptLines(Lines[Prompt]):
@@ -280,25 +281,6 @@ def newest_starts(lines: RecordLines, tracks: Collection[str] | None = None) -> 
         if tracks is None or record.track in tracks:
             starts[record.sample] = lines.start_bytes
     return starts
-
-
-def collect_turns(
-    lines: Iterable[tuple[str, Turn]], without: Container[str] = ()
-) -> dict[str, list[Turn]]:
-    """Return the turns of every episode that has begun, by sample id, in their order.
-
-    Samples `without` are left out. Raises StoreError where a turn is missing.
-    """
-    by_sample: dict[str, dict[int, Turn]] = {}
-    for where, line in lines:
-        if line.sample in without:
-            continue
-        turns = by_sample.setdefault(line.sample, {})
-        if not 0 <= line.turn <= len(turns):
-            message = f"is turn {line.turn} of a sample of which {len(turns)} turns are there"
-            raise StoreError(Problem(where, message, "turn", hint=TurnLines.hint))
-        turns[line.turn] = line
-    return {sample: [turns[n] for n in sorted(turns)] for sample, turns in by_sample.items()}
 
 
 def read_stopped(folder: Path) -> Stopped:

@@ -1,4 +1,4 @@
-"""The lines of a run folder: records first, then turns of episodes, prompts, batches, its end.
+"""The lines of a run folder: records first, then calls, prompts, batches, its end.
 
 `Record` declares what all tracks have in common. A track declares what it adds in a subclass of
 its own, with its name as the literal type of `track`.
@@ -278,19 +278,27 @@ class Record(Line):
         return 0.0 if self.error is None else self.error.billed_usd or 0.0
 
 
-class Turn(Line):
-    """An answered turn of an episode, finished or not."""
+class Call(Line):
+    """A call to a model: written before it is sent, and once more when it has ended."""
 
-    sample: str
-    """The sample that it is a turn of."""
-    turn: Whole
-    """Its place in the episode, from 0."""
-    reply: Reply
-    """The reply, as in a record."""
-    run: str = ""
-    """Digest of the run that it belongs to; older turns have none."""
-    messages: str = ""
-    """Digest of what was asked, which stands in `prompts.jsonl`; empty where nothing was sent."""
+    call: Whole
+    """Its number in the run, from 0."""
+    model: str
+    """The model that is asked."""
+    sample: str = ""
+    """The sample that it is made for; empty where it is for none, as an extractor's."""
+    key: str
+    """Digest of everything that decides the reply, as in the reply cache."""
+    run: str
+    """Digest of the run that it belongs to."""
+    most_usd: Usd | None = None
+    """The most that it can cost [US dollars], as far as known before it is sent; null: unknown."""
+    ended: bool = False
+    """True when its end is known: a reply, or an error."""
+    billed_usd: Usd | None = None
+    """Its cost [US dollars], at its dearest where that is not known; null: the price is unknown."""
+    reply: Reply | None = None
+    """The reply as it arrived, before it was judged; null where none came."""
 
 
 class PictureMark(Line):

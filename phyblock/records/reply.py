@@ -47,8 +47,8 @@ class Reply(Line):
     cost_usd: Usd | None = None
     """Its price [US dollars]; null: not known."""
     billed_usd: Usd | None = None
-    """Amount that `max_cost_usd` counted [US dollars], failed attempts included, a reply without
-    token counts at its dearest; null: no limit was set."""
+    """Amount that `max_cost_usd` counts [US dollars], failed attempts included, a reply without
+    token counts at its dearest; null: no price is known."""
     latency_s: Amount = 0.0
     """Time of the successful request alone [s]."""
     provider_model: str = ""

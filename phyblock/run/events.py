@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from phyblock.models import ModelEvent
-from phyblock.records.record import BatchLine, Record, Turn
+from phyblock.records.record import BatchLine, Call, Record
+from phyblock.records.reply import Reply
 from phyblock.scoring.counts import Counts
 from phyblock.text import counted
 
@@ -105,19 +106,56 @@ class Summary:
 class Standing:
     """The newest record of every sample that counts, summed up, and what the run cost so far.
 
-    `batches` are all lines about batches, oldest first. `limit_usd` is what the cost limit counted,
-    of every line, also of those that later ones replaced, by model.
+    `batches` are all lines about batches, oldest first; `calls` is how many calls were made,
+    `replies` are those that no final record holds, by key, and `unanswered` the calls whose end is
+    not known, by number: each may have been billed.
     """
 
     samples: dict[str, Summary] = field(default_factory=dict)
-    limit_usd: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     batches: list[BatchLine] = field(default_factory=list)
+    calls: int = 0
+    replies: dict[str, Reply] = field(default_factory=dict)
+    unanswered: dict[int, Call] = field(default_factory=dict)
+    _calls_usd: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+    _records_usd: dict[str, float] = field(default_factory=dict)
 
     def add(self, record: Record) -> None:
         """Take in a record as it was read, oldest first."""
         self.samples[record.sample] = Summary.of(record)
-        self.limit_usd[record.model] += record.limit_usd
+        if record.limit_usd:
+            earlier_usd = self._records_usd.get(record.sample, 0.0)
+            self._records_usd[record.sample] = earlier_usd + record.limit_usd
 
-    def add_turn(self, turn: Turn) -> None:
-        """Take in an answered turn of an episode."""
-        self.limit_usd[turn.sample.split("/")[1]] += turn.reply.limit_usd
+    def add_call(self, call: Call) -> None:
+        """Take in a line about a call, oldest first, when all records are."""
+        self.calls = max(self.calls, call.call + 1)
+        # The cost of one that went out alone is told here, that of one in a batch by its record.
+        self._records_usd.pop(call.sample, None)
+        if not call.ended:
+            self.unanswered[call.call] = call
+            return
+        self.unanswered.pop(call.call, None)
+        self._calls_usd[call.model] += call.billed_usd or 0.0
+        sample = self.samples.get(call.sample)
+        if call.reply is not None and not (sample and sample.is_final):
+            self.replies[call.key] = call.reply
+
+    @property
+    def limit_usd(self) -> dict[str, float]:
+        """What a cost limit counts, by model [US dollars]: calls whose end is not known in full."""
+        usd = dict(self._calls_usd)
+        told = [(call.model, call.most_usd or 0.0) for call in self.unanswered.values()]
+        told += [(self.samples[sample].model, cost) for sample, cost in self._records_usd.items()]
+        for model, cost in told:
+            usd[model] = usd.get(model, 0.0) + cost
+        return usd
+
+    @property
+    def unanswered_text(self) -> str:
+        """What is to be said of calls whose end is not known, or nothing."""
+        if not self.unanswered:
+            return ""
+        usd = [call.most_usd for call in self.unanswered.values()]
+        known = [cost for cost in usd if cost is not None]
+        most = f" (${sum(known):,.4f} at most)" if len(known) == len(usd) else ""
+        return f"{counted(len(usd), 'call')} may have been billed without a reply{most}"

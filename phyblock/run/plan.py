@@ -49,12 +49,12 @@ class Sample:
         return f"{whole}/{self.variant.key}" if self.variant.key else whole
 
     def asking(self, request: Request) -> Request:
-        """Return the request as it is sent: a repeat has another seed, and so is asked anew."""
-        repeat = self.variant.repeat
-        if repeat == 1:
-            return request
-        digest = drawn_bytes("repeat", request.seed, repeat)
-        return replace(request, seed=int.from_bytes(digest[:8], "big") % _SEEDS)
+        """Return the request as it is sent: a repeat has another seed, and so is sent once more."""
+        seed, repeat = request.seed, self.variant.repeat
+        if repeat != 1:
+            digest = drawn_bytes("repeat", request.seed, repeat)
+            seed = int.from_bytes(digest[:8], "big") % _SEEDS
+        return replace(request, seed=seed, sample=self.id)
 
     def shown(self) -> Sample:
         """Return the sample with its item as its seed shows it."""
@@ -88,11 +88,6 @@ class RunPlan:
         """Number of items of all tracks times seeds times ways of asking."""
         repeats = len(self.suite.seeds) * len(self.variants)
         return sum(len(track.items) for track in self.tracks) * repeats
-
-    @property
-    def has_episodes(self) -> bool:
-        """True if a track plays episodes."""
-        return any(isinstance(track, EpisodeTrack) for track in self.tracks)
 
     def folder_in(self, root: Path) -> Path:
         """Return the run's folder below `root` when none is named: the same command finds it."""

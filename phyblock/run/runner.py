@@ -43,7 +43,7 @@ from phyblock.models import (
     under_way,
 )
 from phyblock.records.files import BATCHES
-from phyblock.records.record import Record, SentPrompt, Turn
+from phyblock.records.record import Record, SentPrompt
 from phyblock.records.reply import Reply
 from phyblock.resources import reply_cache_file
 from phyblock.run.events import (
@@ -58,7 +58,7 @@ from phyblock.run.events import (
 from phyblock.run.judge import Extractor, about_prompt, begun, judged, judged_apart, pooled
 from phyblock.run.models import PlannedModel, provider_problem
 from phyblock.run.plan import RunPlan, Sample
-from phyblock.run.store import RecordWriter, RunStore
+from phyblock.run.store import CallJournal, Journaled, RecordWriter, RunStore
 from phyblock.tracks import AnyTrack, EpisodeTrack
 from phyblock.types import AskedAs
 
@@ -86,7 +86,7 @@ class Stop:
 class RunResult:
     """The result of a run: how many of its samples have a final record, how many of those are
     requests that were rejected for good, and how many are replies that could not be judged;
-    `stopped` models and why.
+    `stopped` models and why; `unanswered` says what may have been billed without a reply.
     """
 
     samples: int
@@ -95,6 +95,7 @@ class RunResult:
     unjudged: int = 0
     stopped: dict[str, str] = field(default_factory=dict)
     stop: Stop | None = None
+    unanswered: str = ""
 
     @property
     def left(self) -> int:
@@ -171,8 +172,8 @@ class Session:
             }
             self.result.failed = sum(not one.is_answered for one in self.settled.values())
             self.result.unjudged = sum(not one.is_judged for one in self.settled.values())
-            self._records, self._turns = RecordWriter(store.records), RecordWriter(store.turns)
-            self._begun = store.begun_turns(self.settled) if plan.has_episodes else {}
+            self.result.unanswered = store.standing.unanswered_text
+            self._records = RecordWriter(store.records)
             await self._open_models(stack, store)
             self._open = stack.pop_all()
         return self
@@ -211,13 +212,16 @@ class Session:
         writer = RecordWriter(store.batches)
         stack.push_async_callback(writer.drain)
         batches = BatchFiles(tuple(standing.batches), writer.put, self._folder, limits.batch_poll_s)
+        calls = RecordWriter(store.calls)
+        stack.push_async_callback(calls.drain)
+        journal = CallJournal(calls, plan.manifest.run, standing)
+        of_models = standing.limit_usd
         build = partial(
             build_model,
             cache=cache,
             overall=asyncio.Semaphore(limits.max_concurrency),
-            budget=Budget(
-                limits.max_cost_usd, sum(standing.limit_usd.values()), standing.limit_usd
-            ),
+            budget=Budget(limits.max_cost_usd, sum(of_models.values()), of_models),
+            journal=journal,
             observer=self._watch,
             tell=tell,
             policy=RetryPolicy(
@@ -225,8 +229,10 @@ class Session:
             ),
         )
         for planned in plan.models:
-            if planned.name not in self._models:
-                config = planned.config
+            config, present = planned.config, self._models.get(planned.name)
+            if present is not None:
+                self._models[planned.name] = Journaled(present, config, journal)
+            else:
                 model = build(config, batches=batches if config.batch else None)
                 self._models[planned.name] = model
             stack.push_async_callback(self._models[planned.name].aclose)
@@ -254,6 +260,8 @@ class Session:
         settled = self.settled.values()
         earlier = {name: tuple(one for one in settled if one.model == name) for name in names}
         self._watch(RunStarted(dict.fromkeys(names, self._plan.samples_per_model), earlier))
+        if self.result.unanswered:
+            self._watch(RunNotice(self.result.unanswered))
         try:
             await self._run()
         except BaseException:
@@ -302,7 +310,6 @@ class Session:
             await asyncio.sleep(0)
         await asyncio.gather(*workers, return_exceptions=True)
         await self._records.drain()
-        await self._turns.drain()
 
     async def _work(
         self, planned: PlannedModel, queue: deque[Sample], later: deque[Sample] | None = None
@@ -445,12 +452,10 @@ class Session:
         return record
 
     async def _play(self, sample: Sample, model: Model, config: ModelConfig) -> Record:
-        """Play an episode; each answered turn is on disk before the next is asked for."""
         track, item = sample.track, sample.item
         assert isinstance(track, EpisodeTrack)
         episode = track.start(item, sample.seed, config.params, with_messages=model.needs_messages)
         asked: dict[str, AskedAs] = {}
-        known = iter(self._begun.get(sample.id, ()))
         turns: list[dict[str, Any]] = []
         failed: ModelError | None = None
         while True:
@@ -461,21 +466,11 @@ class Session:
             request = sample.asking(wanted)
             asked = _asked(config, request)
             prompt = self._prompt(track, request)
-            digest = "" if prompt is None else prompt.messages
-            earlier = next(known, None)
-            # Where earlier replies led elsewhere, as another version read them, it asks anew.
-            if earlier is not None and earlier.messages == digest != "":
-                reply = earlier.reply
-            else:
-                answer = await self._answer(model, request, again=True)
-                if not isinstance(answer, Reply):
-                    failed = answer
-                    break
-                reply = answer.storable()
-                run = self._plan.manifest.run
-                await self._turns.put(
-                    Turn(sample=sample.id, turn=len(turns), reply=reply, run=run, messages=digest)
-                )
+            answer = await self._answer(model, request)
+            if not isinstance(answer, Reply):
+                failed = answer
+                break
+            reply = answer.storable()
             turns.append({"n": len(turns) + 1, "reply": reply, "prompt": prompt})
             episode.take(request, reply)
         fields = self._fields(sample, failed) | asked
@@ -485,20 +480,11 @@ class Session:
         both = zip(turns, episode.fields()["turns"], strict=True)
         return judged(fields, item, episode, {"turns": [{**one, **more} for one, more in both]})
 
-    async def _answer(
-        self, model: Model, request: Request, *, again: bool = False
-    ) -> Reply | ModelError | None:
-        """Return the reply, or the error that is this sample's alone; `again` asks a second time
-        where the model defers the request: an episode that has begun goes on.
-        """
+    async def _answer(self, model: Model, request: Request) -> Reply | ModelError | None:
+        """Return the reply, or the error that is this sample's alone."""
         try:
             with self._cancellation.scope():
-                try:
-                    return await model.ask(request)
-                except AskLaterError:
-                    if not again:
-                        raise
-                    return await model.ask(request)
+                return await model.ask(request)
         except (UnavailableError, BudgetReachedError):
             raise
         except ModelError as error:

@@ -14,35 +14,37 @@ import json
 import os
 import re
 import threading
-from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from io import FileIO
 from pathlib import Path
 from typing import Any, TypeVar
 
+from phyblock.config.models import ModelConfig
 from phyblock.config.yaml import dump_yaml
 from phyblock.errors import Problem, StoreError
 from phyblock.files import LIST, OutFolder, append_whole, atomic_write, sync_folder, writing
-from phyblock.models.request import Image, Message
+from phyblock.models.cache import reply_key
+from phyblock.models.request import Image, Message, Model, Request
 from phyblock.records.files import (
     BATCHES,
+    CALLS,
     PROMPTS,
     RECORDS,
     STOPPED,
-    TURNS,
     BatchLines,
+    CallLines,
     Lines,
     PromptLines,
     RecordLines,
-    TurnLines,
     Validation,
-    collect_turns,
     read_stopped,
     run_records,
 )
 from phyblock.records.line import Line, encodable
 from phyblock.records.manifest import MANIFEST, Manifest, ManifestModel, read_manifest
-from phyblock.records.record import PictureMark, Prompt, PromptMessage, Record, Stopped, Turn
+from phyblock.records.record import Call, PictureMark, Prompt, PromptMessage, Record, Stopped
+from phyblock.records.reply import Reply
 from phyblock.run.events import Standing
 from phyblock.run.manifest import code_versions
 from phyblock.sim.engine import PHYSICS_VARIABLE, REFERENCE_ENGINE
@@ -71,7 +73,7 @@ _NOT_IDENTITY = (
 class RunStore:
     """A run folder opened for writing; one process at a time.
 
-    `records`, `turns` and `batches` are synced line by line; `prompts` hold what could be made
+    `records`, `calls` and `batches` are synced line by line; `prompts` hold what could be made
     again. `standing` is how far the run was when it was opened.
     """
 
@@ -94,8 +96,8 @@ class RunStore:
                 self._claim(manifest)
                 records = run_records(folder, manifest, samples, whole=True)
                 self.records = self._open(records, self.standing.add)
-                turns = TurnLines(folder, self._validation)
-                self.turns = self._open(turns, self.standing.add_turn)
+                calls = CallLines(folder, self._validation)
+                self.calls = self._open(calls, self.standing.add_call)
                 batches = BatchLines(folder)
                 self.batches = self._open(batches, self.standing.batches.append)
                 known: set[str] = set()
@@ -132,10 +134,6 @@ class RunStore:
             folder.write({STOPPED: json.dumps(stopped.fields(), indent=2) + "\n"})
         else:
             folder.remove([STOPPED])
-
-    def begun_turns(self, done: Container[str]) -> dict[str, list[Turn]]:
-        """The turns of episodes that have begun and are not `done`, by sample id."""
-        return collect_turns(TurnLines(self._folder, self._validation), done)
 
     def _open(
         self,
@@ -177,7 +175,7 @@ def held_run(folder: Path, manifest: Manifest) -> Manifest | None:
     """Return the manifest in `folder`, which holds the run that `manifest` describes; None where it
     holds no run. Nothing is written.
 
-    Raises StoreError when it holds records or turns of another run, of a run that another version
+    Raises StoreError when it holds records or calls of another run, of a run that another version
     of phyblock began, or what is no run. A manifest without any is no run yet: one that failed at
     once leaves it behind, and nothing would be lost with it.
     """
@@ -185,7 +183,7 @@ def held_run(folder: Path, manifest: Manifest) -> Manifest | None:
     if not (folder / MANIFEST).exists():
         return None
     found = read_manifest(folder)
-    paid: tuple[Lines[Any], ...] = (RecordLines(folder), TurnLines(folder), BatchLines(folder))
+    paid: tuple[Lines[Any], ...] = (RecordLines(folder), CallLines(folder), BatchLines(folder))
     if all(next(iter(lines), None) is None for lines in paid):
         return None
     names = _changed_models(found, manifest)
@@ -330,7 +328,7 @@ def _line(line: Mapping[str, Any]) -> bytes:
 
 
 LOCK = ".lock"
-_OWN = (MANIFEST, RECORDS, TURNS, PROMPTS, BATCHES, "batches", LOCK, LIST)
+_OWN = (MANIFEST, RECORDS, CALLS, PROMPTS, BATCHES, "batches", LOCK, LIST)
 _BEGUN = re.compile(rf"{re.escape(LOCK)}|{re.escape(LIST)}|\.[0-9a-f]{{32}}\.part")
 """What a run that was killed before it had a manifest leaves behind."""
 
@@ -469,3 +467,62 @@ def _content(message: Message) -> PromptMessage:
         for part in message.parts
     )
     return PromptMessage(role=message.role, parts=tuple(parts))
+
+
+class CallJournal:
+    """The calls of a run, each on disk before it is sent, and with its reply before that is judged.
+
+    What an earlier command was answered and no record holds is kept in `replies` by its key.
+    """
+
+    def __init__(self, writer: RecordWriter, run: str, standing: Standing) -> None:
+        self._writer = writer
+        self._run = run
+        self._next = standing.calls
+        self._replies = standing.replies
+
+    def kept(self, key: str) -> Reply | None:
+        """Return the reply to a request that an earlier command was answered, or None."""
+        return self._replies.get(key)
+
+    async def sent(self, model: str, sample: str, key: str, most_usd: float | None) -> Call:
+        """Write a call that is about to be sent; StoreError where the disk refuses."""
+        number, self._next = self._next, self._next + 1
+        call = Call(
+            call=number, model=model, sample=sample, key=key, run=self._run, most_usd=most_usd
+        )
+        await self._writer.put(call)
+        return call
+
+    async def ended(self, call: Call, billed_usd: float | None, reply: Reply | None) -> None:
+        """Write what became of a call; StoreError where the disk refuses."""
+        stored = None if reply is None else reply.storable()
+        known = {"ended": True, "billed_usd": billed_usd, "reply": stored}
+        await self._writer.put(call.model_copy(update=known))
+
+
+class Journaled:
+    """A model that answers here and cannot be asked again: its answers are written as they come."""
+
+    needs_messages = True
+
+    def __init__(self, model: Model, config: ModelConfig, journal: CallJournal) -> None:
+        self.name = model.name
+        self._model = model
+        self._config = config
+        self._journal = journal
+
+    async def ask(self, request: Request) -> Reply | None:
+        """Return the answer of the model, or that which it gave to an earlier command."""
+        key = reply_key(self._config, request)
+        if (kept := self._journal.kept(key)) is not None:
+            return kept
+        reply = await self._model.ask(request)
+        if reply is not None:
+            call = await self._journal.sent(self.name, request.sample, key, 0.0)
+            await self._journal.ended(call, 0.0, reply)
+        return reply
+
+    async def aclose(self) -> None:
+        """Release what the model holds."""
+        await self._model.aclose()

@@ -193,11 +193,6 @@ class EpisodeRecord(Record):
         return tuple(turn.reply for turn in self.turns) or super().replies
 
     @property
-    def limit_usd(self) -> float:
-        """The use of a failed request; replies were counted where each was written, as a turn."""
-        return super().limit_usd if self.reply is None else 0.0
-
-    @property
     def steps(self) -> tuple[EpisodeTurn, ...]:
         """The turns that a step was taken with: one of each vote."""
         return tuple(turn for turn in self.turns if turn.outcome is not None)

@@ -163,8 +163,8 @@ def test_a_run_writes_through_no_link(suite: Workspace) -> None:
     put(suite.root / "theirs")
     words = ("run", suite.root / "suite.yaml", "--out", suite.out)
     call(*words, "--no-report")
-    (suite.out / "turns.jsonl").symlink_to(suite.root / "theirs")
-    with pytest.raises(StoreError, match=r"turns\.jsonl: is a link"):
+    (suite.out / "calls.jsonl").symlink_to(suite.root / "theirs")
+    with pytest.raises(StoreError, match=r"calls\.jsonl: is a link"):
         call(*words)
     assert (suite.root / "theirs").read_text() == "mine"
 

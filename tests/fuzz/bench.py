@@ -17,7 +17,7 @@ from tests.workspace import Raw, shared_folders
 __all__ = ["Bench", "Case", "Fifo", "Link"]
 
 _LONGEST_SHOWN = 1500
-_KEPT_FILES = ("records.jsonl", "turns.jsonl")
+_KEPT_FILES = ("records.jsonl", "calls.jsonl")
 
 
 @dataclass(frozen=True)

@@ -228,7 +228,7 @@ _OF_RUN = {
         ("run", "questions.yaml", "--out", "asked", "--no-report"),
     ),
 }  # fmt: skip
-_GROWING = ("records.jsonl", "turns.jsonl", "prompts.jsonl")
+_GROWING = ("records.jsonl", "calls.jsonl", "prompts.jsonl")
 _IN_OUT = ("report/ch1/thesis.tex", "figures/mine.svg", "tables/mine.csv", "notes.md")
 
 

@@ -85,17 +85,17 @@ def lost(ledger: Ledger, kept: Collection[tuple[str, str]]) -> Iterator[Broken]:
 
 
 def kept_in(folder: Path) -> set[tuple[str, str]]:
-    """What stands in a run's records, or among its turns, by model and signature of the reply.
+    """What stands in a run's records, or among its calls, by model and signature of the reply.
 
     A last line that a kill cut short does not count.
     """
     found = set()
-    for name in ("records.jsonl", "turns.jsonl"):
+    for name in ("records.jsonl", "calls.jsonl"):
         path = folder / name
         for line in path.read_bytes().split(b"\n")[:-1] if path.exists() else ():
             stored: dict[str, Any] = json.loads(line)
-            model = stored["sample"].split("/")[1]
-            if stored["reply"] is not None:
+            model = stored["model"]
+            if stored.get("reply") is not None:
                 found.add((model, stored["reply"]["reasoning"]))
     return found
 

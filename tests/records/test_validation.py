@@ -13,7 +13,7 @@ import pytest
 from phyblock.errors import StoreError
 from phyblock.records.files import Validation, known_records
 from phyblock.records.manifest import Manifest
-from phyblock.records.record import Turn
+from phyblock.records.record import Call
 from phyblock.results.load import load_run
 from phyblock.run.rescore import rescore
 from tests.records.damage import Raw, plan_record
@@ -67,15 +67,14 @@ def test_a_foreign_record_is_known_by_what_differs(record: Raw, field: str) -> N
     assert differs(Validation(facts(), {plan_record()["sample"]}), record) == field
 
 
-def test_a_turn_of_another_run_is_foreign() -> None:
-    reply = {"text": "", "usage": {"prompt_tokens": 1, "completion_tokens": 1}}
-    fields = {"sample": "s", "turn": 0, "reply": {**reply, "cost_usd": None, "cached": False}}
-    validation = Validation(facts(), {"s"})
-    assert validation.problem("turns.jsonl:1", Turn.model_validate(fields)) is None
-    for changes in ({"sample": "t"}, {"run": "0" * 16}):
-        problem = validation.problem("turns.jsonl:1", Turn.model_validate({**fields, **changes}))
-        assert problem is not None
-        assert problem.field in changes
+def test_a_call_of_another_run_is_foreign() -> None:
+    manifest = facts()
+    call = Call(call=0, model="m", sample="s", key="k", run=manifest.run)
+    assert Validation(manifest, {"t"}).problem("calls.jsonl:1", call) is None
+    other = call.model_copy(update={"run": "0" * 16})
+    problem = Validation(manifest, {"s"}).problem("calls.jsonl:1", other)
+    assert problem is not None
+    assert problem.field == "run"
 
 
 @pytest.fixture(scope="module")

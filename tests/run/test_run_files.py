@@ -17,20 +17,17 @@ from phyblock.config.models import ModelConfig
 from phyblock.config.suite import load_suite
 from phyblock.errors import StoreError
 from phyblock.models import Image, Message
-from phyblock.records.files import PromptLines, TurnLines, collect_turns
+from phyblock.records.files import CallLines, PromptLines
 from phyblock.records.manifest import Manifest
+from phyblock.records.record import Call
+from phyblock.records.reply import Reply
+from phyblock.run.events import Standing
 from phyblock.run.plan import make_plan
 from phyblock.run.store import AppendFile, PromptFile, RunStore, read_prompts
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
 
-REPLY = {
-    "text": "Move(1)",
-    "usage": {"prompt_tokens": 1, "completion_tokens": None},
-    "cost_usd": None,
-    "cached": False,
-}
 values = st.dictionaries(st.text(max_size=5), st.text(max_size=5) | st.integers(), max_size=4)
 
 
@@ -120,40 +117,38 @@ def test_a_run_is_on_disk_with_its_name_before_anything_is_asked(
     assert [path for path, _ in synced[2:]] == [folder] + [f"{folder}/records.jsonl"] * 2
 
 
-def turn_lines(folder: Path, *numbers: int) -> None:
-    lines = [{"sample": "s", "turn": n, "reply": {**REPLY, "text": f"Move({n})"}} for n in numbers]
-    text = "".join(json.dumps(line) + "\n" for line in lines)
-    (folder / "turns.jsonl").write_text(text, encoding="utf-8")
-
-
-def test_turns_are_read_in_their_order_and_a_later_line_counts(tmp_path: Path) -> None:
-    turn_lines(tmp_path, 0, 1, 0, 2)
-    assert [turn.reply.text for turn in collect_turns(TurnLines(tmp_path))["s"]] == [
-        "Move(0)",
-        "Move(1)",
-        "Move(2)",
-    ]
-
-
-def test_turns_of_samples_that_are_done_are_left_on_disk(tmp_path: Path) -> None:
-    turn_lines(tmp_path, 0, 2)
-    assert collect_turns(TurnLines(tmp_path), {"s"}) == {}
-
-
-def test_a_turn_that_is_missing_is_an_error_at_the_next(tmp_path: Path) -> None:
-    turn_lines(tmp_path, 0, 2)
-    with pytest.raises(StoreError, match="is turn 2 of a sample of which 1"):
-        collect_turns(TurnLines(tmp_path))
-
-
-def test_a_turn_that_a_kill_cut_short_is_not_there(tmp_path: Path) -> None:
-    turn_lines(tmp_path, 0, 1)
-    path = tmp_path / "turns.jsonl"
-    path.write_bytes(path.read_bytes()[:-9])
-    lines = TurnLines(tmp_path)
-    assert len(list(lines)) == 1
-    assert lines.is_cut
-    assert len(collect_turns(TurnLines(tmp_path))["s"]) == 1
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(["s/1", "s/2", ""]),
+            st.sampled_from(["a", "b"]),
+            st.integers(0, 8),
+            st.booleans(),
+            st.none() | st.integers(0, 8),
+        ),
+        max_size=12,
+    )
+)
+def test_a_limit_counts_every_call_once_and_one_without_an_end_in_full(
+    calls: list[tuple[str, str, int, bool, int | None]],
+) -> None:
+    standing, expected = Standing(), dict.fromkeys("ab", 0.0)
+    for number, (sample, model, most, is_ended, billed) in enumerate(calls):
+        line = Call(
+            call=number, model=model, sample=sample, key=f"k{number}", run="r", most_usd=most
+        )
+        standing.add_call(line)
+        if is_ended:
+            reply = Reply(text=f"{number}")
+            ended = {"ended": True, "billed_usd": billed, "reply": reply}
+            standing.add_call(line.model_copy(update=ended))
+            assert standing.replies[f"k{number}"] == reply
+        expected[model] += (billed or 0) if is_ended else most
+    unanswered = sum(not call[3] for call in calls)
+    assert standing.calls == len(calls)
+    assert len(standing.unanswered) == unanswered
+    assert standing.unanswered_text.startswith(f"{unanswered} call" if unanswered else "")
+    assert {model: standing.limit_usd.get(model, 0.0) for model in "ab"} == expected
 
 
 def test_a_prompt_is_kept_once_without_its_pictures(tmp_path: Path) -> None:
@@ -189,10 +184,9 @@ def test_every_record_names_a_prompt_that_is_there(tmp_path: Path, pictures_dir:
         fields = [message.fields() for message in messages]
         canonical = json.dumps(fields, sort_keys=True, separators=(",", ":"))
         assert hashlib.sha256(canonical.encode()).hexdigest() == digest
-    assert not (made.out / "turns.jsonl").exists()
 
 
-@pytest.mark.parametrize("name", ["turns.jsonl", "prompts.jsonl"])
+@pytest.mark.parametrize("name", ["calls.jsonl", "prompts.jsonl"])
 @pytest.mark.parametrize("stands_there", ["pipe", "device"])
 def test_what_is_no_file_is_not_waited_for(
     workspace: Workspace, name: str, stands_there: str
@@ -202,6 +196,6 @@ def test_what_is_no_file_is_not_waited_for(
         os.mkfifo(path)
     else:
         path.symlink_to("/dev/zero")
-    lines = {"turns": TurnLines, "prompts": PromptLines}[path.stem]
+    lines = {"calls": CallLines, "prompts": PromptLines}[path.stem]
     with pytest.raises(StoreError, match="is not a regular file"):
         list(lines(workspace.root))

@@ -167,7 +167,7 @@ def test_a_killed_run_goes_on_in_the_middle_of_episodes(
             assert process.returncode == -signal.SIGKILL
             while server.at_once:
                 time.sleep(0.02)
-            kept = on_disk(workspace, "turns.jsonl")
+            kept = [call for call in on_disk(workspace, "calls.jsonl") if call.get("reply")]
             finished = {record["sample"] for record in on_disk(workspace, "records.jsonl")}
             middle += len({turn["sample"] for turn in kept} - finished)
             answered = {turn["reply"]["reasoning"] for turn in kept}

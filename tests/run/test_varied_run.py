@@ -72,10 +72,11 @@ def test_every_way_is_asked_once_and_what_is_kept_is_not_asked_again(workspace: 
         check_scored_again(workspace)
         check_tables(workspace, whole)
 
-        # A kill that leaves some records, and no cache: what has one is not asked again.
+        # Some records are left, no calls and no cache: what has a record is not asked again.
         kept = lines.splitlines(keepends=True)[: WAYS * SCENES // 2]
         (workspace.out / "records.jsonl").write_text("".join(kept) + lines[:40])
         (workspace.cache / "replies.sqlite").unlink()
+        (workspace.out / "calls.jsonl").unlink()
         before, left = asked(server), {json.loads(line)["sample"] for line in kept}
         assert workspace.run("--no-report").code == 0
         again = asked(server)[len(before) :]
