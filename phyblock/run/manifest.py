@@ -43,34 +43,54 @@ def make_manifest(
     are no part of it. `variants` has the tracks of every condition.
     """
     data_version = read_version(dataset.root)
-    inputs = inputs_of(suite, models, dataset, data_version, variants, limit, extractor)
+    known: dict[str, object] = {"name": dataset.name, "sha256": dataset.sha256}
+    if data_version != UNNUMBERED:
+        known["version"] = data_version
+    decisive = [{"name": m.name, **_model(m)} for m in models]
+    inputs: dict[str, Any] = {
+        "format": FORMAT,
+        "suite": suite.identity(),
+        # Whoever is asked, the run is the same; but every person has a run alone.
+        "models": [model for model in decisive if str(model["name"]).startswith(HUMAN)],
+        "dataset": known,
+        "tracks": {track.name: track.identity() for track in variants[Variant()]},
+        "limit": limit,
+    }
+    if extractor is not None:
+        inputs["extractor"] = {**extractor.identity(), "prompt": extraction_prompt().version}
+    if suite.vary.factors:
+        inputs["variants"] = {
+            variant.key: {track.name: track.identity() for track in of_variant}
+            for variant, of_variant in variants.items()
+            if variant == variant.shown
+        }
+    identity = hex_digest(json.dumps(inputs, sort_keys=True, separators=(",", ":")))
     scenes = [task.scene for task in dataset.tasks]
+    kinds = [kind_of(name) for name in suite.tracks]
+    engine = {"engine": described_engine()} if kinds_with_physics(suite.model_dump()) else {}
     fields = {
-        "identity": identity_of(inputs),
+        "identity": identity,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         **inputs,
         "suite": suite.model_dump(mode="json"),
         "models": [
-            {**decisive, "published": m.published, "size_b": m.size_b, **_place(m)}
-            for decisive, m in zip(inputs["models"], models, strict=True)
+            {**one, "published": m.published, "size_b": m.size_b, **_place(m)}
+            for one, m in zip(decisive, models, strict=True)
         ],
         "dataset": {
-            **inputs["dataset"],
+            **known,
             "version": data_version,
             "format": suite.dataset.format,
             "root": str(dataset.root),
         },
-        **_of_tracks(suite),
+        **engine,
+        **{key: value for kind in kinds for key, value in kind.manifest(suite).items()},
         "items": {track.name: len(track.items) for track in variants[Variant()]},
         "scenes": len(scenes),
         "scenes_by_level": {
             level: sum(level in scene.levels for scene in scenes) for level in suite.levels
         },
-        "versions": {
-            "python": platform.python_version(),
-            **_versions(),
-            **code_versions(),
-        },
+        "versions": {"python": platform.python_version(), **_versions(), **code_versions()},
     }
     return Manifest.model_validate(fields)
 
@@ -92,65 +112,6 @@ def _versions() -> dict[str, str]:
         with contextlib.suppress(PackageNotFoundError):
             found[name] = version(name)
     return found
-
-
-def _of_tracks(suite: Suite) -> dict[str, Any]:
-    """Facts of single tracks beyond what all of them have."""
-    kinds = [kind_of(name) for name in suite.tracks]
-    told = {"engine": described_engine()} if kinds_with_physics(suite.model_dump()) else {}
-    return told | {key: value for kind in kinds for key, value in kind.manifest(suite).items()}
-
-
-Inputs = Mapping[str, Any]
-"""Data that decides the results, but for the version of the readers."""
-
-
-def inputs_of(
-    suite: Suite,
-    models: Sequence[PlannedModel],
-    dataset: Dataset,
-    data_version: int,
-    variants: Mapping[Variant, Sequence[AnyTrack]],
-    limit: int | None,
-    extractor: ModelConfig | None = None,
-) -> Inputs:
-    """Return what decides the results; `variants` has the tracks of every condition."""
-    inputs: dict[str, Any] = {
-        "format": FORMAT,
-        "suite": suite.identity(),
-        "models": [{"name": m.name, **_model(m)} for m in models],
-        "dataset": _dataset(dataset, data_version),
-        "tracks": {track.name: _track(track) for track in variants[Variant()]},
-        "limit": limit,
-    }
-    if extractor is not None:
-        version = extraction_prompt().version
-        inputs["extractor"] = {**extractor.identity(), "prompt": version}
-    if suite.vary.factors:
-        inputs["variants"] = {
-            variant.key: {track.name: _track(track) for track in of_variant}
-            for variant, of_variant in variants.items()
-            if variant == variant.shown
-        }
-    return inputs
-
-
-def identity_of(inputs: Inputs) -> str:
-    """Return the hex digest of the inputs, whoever is asked; every person has a run alone."""
-    people = [model for model in inputs["models"] if str(model["name"]).startswith(HUMAN)]
-    decisive = {**inputs, "models": people}
-    return hex_digest(json.dumps(decisive, sort_keys=True, separators=(",", ":")))
-
-
-def _track(track: AnyTrack) -> dict[str, Any]:
-    """Return what decides a track's requests."""
-    return track.identity()
-
-
-def _dataset(dataset: Dataset, data_version: int) -> dict[str, object]:
-    """Return the facts of the data that decide the results."""
-    known: dict[str, object] = {"name": dataset.name, "sha256": dataset.sha256}
-    return known if data_version == UNNUMBERED else {**known, "version": data_version}
 
 
 def _model(model: PlannedModel) -> dict[str, object]:

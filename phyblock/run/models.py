@@ -15,7 +15,6 @@ from phyblock.data.published_names import match_published
 from phyblock.errors import Problem, SpecError
 from phyblock.models import known_providers, server_address, takes_format
 from phyblock.records.files import RECORDS, RecordLines
-from phyblock.records.record import Record
 from phyblock.text import did_you_mean
 from phyblock.tracks.base import kind_of
 from phyblock.types import AnswerFormat, CandidateOrder
@@ -45,7 +44,9 @@ def plan_models(
         if unknown := [name for name in only if name not in folders]:
             raise SpecError(Problem("--models", message, "", one, allowed) for one in unknown)
         return tuple(
-            PlannedModel(name, _replay(name, folders[name]), match_published(name))
+            PlannedModel(
+                name, ModelConfig(name=name, replay=str(folders[name])), match_published(name)
+            )
             for name in dict.fromkeys(only) or folders
         )
     if only:
@@ -91,26 +92,25 @@ def plan_extractor(suite: Suite, known: Mapping[str, ModelConfig]) -> ModelConfi
     return config.model_copy(update={"batch": False})
 
 
-def recorded_order(folder: Path) -> CandidateOrder:
-    """The order in which candidates were shown to a recorded model.
+def recorded_as(folder: Path) -> tuple[CandidateOrder, AnswerFormat]:
+    """Return the order in which candidates were shown to a recorded model, and the form in which it
+    was asked to answer.
 
-    A run of our own says so in its records; raw replies name numbers of the file.
+    A run of our own says so in its records, a varied one in those of its reference; raw replies are
+    texts that name numbers of the file.
     """
-    shown = next((record.shown for record in _recorded(folder) if record.shown), None)
-    if shown is None or list(shown.order) == sorted(shown.order):
-        return "file"
-    return "shuffled"
-
-
-def recorded_format(folder: Path) -> AnswerFormat:
-    """The form in which a recorded model was asked to answer; raw replies are texts."""
-    return "json_schema" if any(record.asked for record in _recorded(folder)) else "text"
-
-
-def _recorded(folder: Path) -> Iterator[Record]:
-    """The records of a run that can be replayed: of a varied one those of its reference."""
+    order: CandidateOrder | None = None
+    form: AnswerFormat = "text"
     if (folder / RECORDS).is_file():
-        yield from (record for _, record in RecordLines(folder) if not record.variant)
+        for _, record in RecordLines(folder):
+            if record.variant:
+                continue
+            if order is None and record.shown:
+                is_sorted = list(record.shown.order) == sorted(record.shown.order)
+                order = "file" if is_sorted else "shuffled"
+            if record.asked:
+                form = "json_schema"
+    return order or "file", form
 
 
 def _planned(name: str, known: ModelConfig, suite: Suite) -> PlannedModel:
@@ -143,10 +143,6 @@ def _sends_format(config: ModelConfig, suite: Suite) -> bool:
         field = "extra_body.response_format"
         raise SpecError(Problem(f"model {config.name}", message, field, hint=hint))
     return True
-
-
-def _replay(name: str, folder: Path) -> ModelConfig:
-    return ModelConfig(name=name, replay=str(folder))
 
 
 def model_problems(

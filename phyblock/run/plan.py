@@ -20,8 +20,7 @@ from phyblock.run.models import (
     PlannedModel,
     plan_extractor,
     plan_models,
-    recorded_format,
-    recorded_order,
+    recorded_as,
     with_baselines,
 )
 from phyblock.stable import drawn_bytes
@@ -131,7 +130,9 @@ def make_plan(
     """
     dataset = open_dataset(suite.dataset.format, suite.files.dataset)
     models = tuple(people) or with_baselines(plan_models(suite, known, only), suite, known)
-    suite = _with_plain_names(suite, known)
+    if suite.models != RECORDED:
+        # Members in the place of their group: the run is the same by them.
+        suite = suite.model_copy(update={"models": with_members(suite.models, known)})
     limit = suite.limit if limit is None else limit
     asks = any(model.config.kind != "replay" for model in models)
     variants = _variants(Opening(suite, dataset, limit, asks))
@@ -142,18 +143,13 @@ def make_plan(
     if not any(track.items for track in tracks):
         raise SpecError(_nothing(suite, dataset, limit))
     if asks:
-        for of_variant in variants.values():
-            _check_prompts(of_variant)
+        # PromptError where a prompt cannot be rendered for the first item, before anything is.
+        for track in (track for of_variant in variants.values() for track in of_variant):
+            for item in track.items[:1]:
+                next(iter(track.outlines(item)), None)
     extractor = plan_extractor(suite, known)
     manifest = make_manifest(suite, models, selected, variants, limit, extractor)
     return RunPlan(suite, models, selected, variants, manifest, extractor=extractor)
-
-
-def _with_plain_names(suite: Suite, known: Mapping[str, ModelConfig]) -> Suite:
-    """The suite with the members of groups in their place, which a run stays the same by."""
-    if suite.models == RECORDED:
-        return suite
-    return suite.model_copy(update={"models": with_members(suite.models, known)})
 
 
 def _variants(opening: Opening) -> dict[Variant, tuple[AnyTrack, ...]]:
@@ -166,13 +162,6 @@ def _variants(opening: Opening) -> dict[Variant, tuple[AnyTrack, ...]]:
             opened[variant.shown] = open_tracks(replace(opening, suite=suite), names)
         opened[variant] = opened[variant.shown]
     return opened
-
-
-def _check_prompts(tracks: Sequence[AnyTrack]) -> None:
-    """Raise PromptError where a prompt cannot be said of the first item, before anything is."""
-    for track in tracks:
-        for item in track.items[:1]:
-            next(iter(track.outlines(item)), None)
 
 
 def _nothing(suite: Suite, dataset: Dataset, limit: int | None) -> Problem:
@@ -191,16 +180,18 @@ def _check_models(models: Sequence[PlannedModel], tracks: Sequence[AnyTrack], su
     for model in models:
         if model.config.kind == "replay" and suite.vary.factors:
             message = "is a recording, which was asked in one way"
-            found = ", ".join(suite.vary.factors)
-            problems.append(Problem(f"model {model.name}", message, "vary", found))
+            factors = ", ".join(suite.vary.factors)
+            problems.append(Problem(f"model {model.name}", message, "vary", factors))
             continue
         where, recorded = f"model {model.name}", model.config.recording
-        if recorded is not None and (found := recorded_order(recorded)) != order:
-            message = f"is a recording of candidates in the order {found}"
-            problems.append(Problem(where, message, "candidates.order", order, found))
-        if recorded is not None and (form := recorded_format(recorded)) != asked:
-            message = f"is a recording of answers that were asked for as {form}"
-            problems.append(Problem(where, message, "answer_format", asked, form))
+        if recorded is not None:
+            found, form = recorded_as(recorded)
+            if found != order:
+                message = f"is a recording of candidates in the order {found}"
+                problems.append(Problem(where, message, "candidates.order", order, found))
+            if form != asked:
+                message = f"is a recording of answers that were asked for as {form}"
+                problems.append(Problem(where, message, "answer_format", asked, form))
         for track in tracks:
             if model.config.kind == "replay" and isinstance(track, EpisodeTrack):
                 message = f"is a recording, which cannot answer in {track.name}"
@@ -227,18 +218,13 @@ def _alike(models: Sequence[PlannedModel]) -> list[Problem]:
     problems = []
     for earlier, later in combinations(models, 2):
         one, other = earlier.config, later.config
-        if one.identity() == other.identity() and _served_at(one) != _served_at(other):
+        if one.identity() == other.identity() and set(one.addresses) != set(other.addresses):
             message = f"is {earlier.name} at another address: they would share their replies"
             hint = "give one of them a revision, or run one alone"
             where = f"model {later.name}"
-            found = ", ".join(sorted(_served_at(other)))
+            found = ", ".join(sorted(set(other.addresses)))
             problems.append(Problem(where, message, "api_base", found, hint=hint))
     return problems
-
-
-def _served_at(config: ModelConfig) -> frozenset[str]:
-    """The addresses of a model."""
-    return frozenset(config.addresses)
 
 
 CHANGED = "is not the data set that the run was made on, or it was changed since"

@@ -39,11 +39,6 @@ def test_a_folder_of_any_bytes_is_kept_and_names_can_be_shown(tmp_path: Path) ->
     assert [manifest.dataset.name, manifest.models[0].name] == ["x?", "x?"]
 
 
-def test_an_unknown_field_may_hold_any_plain_data(tmp_path: Path) -> None:
-    (tmp_path / MANIFEST).write_text("identity: x\nmine: {a: [1, 2.5, on, ~, 'x: y']}\n")
-    assert read_manifest(tmp_path).fields()["mine"] == {"a": [1, 2.5, "on", None, "x: y"]}
-
-
 @pytest.mark.parametrize(
     "value",
     [10**6000, {object(): 1}, {(1, 2): 3}, b"x", "\ud800", {"a": {1, 2}}, "x" * 10**6],

@@ -13,8 +13,6 @@ from phyblock.results.compare import compare_runs
 from phyblock.results.load import load_run
 from phyblock.run.rescore import rescore
 from phyblock.sim.engine import ENGINES, described_engine, installed_engines
-from phyblock.types import Physics
-from tests.tracks.opened import track_of
 from tests.workspace import Raw, Workspace, candidates
 
 SMALL = ("--set", "images.size_px=128", "--set", "seeds=[0]", "--no-report")
@@ -82,15 +80,3 @@ def test_an_unknown_engine_is_refused_before_anything_is_made(workspace: Workspa
         f"    allowed: {', '.join(ENGINES)}"
     ]
     assert not workspace.out.exists()
-
-
-@pytest.mark.parametrize("physics", ["off", "settle", "strict"])
-def test_a_step_run_in_pybullet_is_told_as_it_always_was(
-    physics: Physics, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """So that runs from before there was a choice of engines go on."""
-    if physics != "off" and "pybullet" not in installed_engines():
-        pytest.skip("PyBullet is not installed")
-    monkeypatch.setenv("PHYBLOCK_PHYSICS", "pybullet")
-    track = track_of("step_planning", steps={"physics": physics})
-    assert track.identity() == {"prompt": None, "pictures": None}

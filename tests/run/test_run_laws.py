@@ -184,16 +184,6 @@ def test_a_second_process_is_refused_and_the_first_goes_on(workspace: Workspace)
         assert running.server.requests == 5
 
 
-def test_a_run_opens_as_a_frame_with_a_row_a_sample(finished: Workspace) -> None:
-    records = load_run(finished.out).records
-    stored = {record["sample"]: record for record in finished.records()}
-    assert len(records) == len(stored) == 45
-    assert set(records["sample"]) == set(stored)
-    for row in records.to_dict("records"):
-        assert row["text"] == stored[row["sample"]]["reply"]["text"]
-        assert row["outcome"] == stored[row["sample"]]["outcome"]
-
-
 def test_a_limit_keeps_some_of_every_level_and_is_a_run_of_its_own(copy: Workspace) -> None:
     copy.out = copy.root / "few"
     assert copy.run("--limit", "3", "--models", "oracle").code == 0
@@ -245,14 +235,6 @@ def test_a_model_that_is_asked_otherwise_makes_another_run(copy: Workspace) -> N
     done = copy.run("--models", "alpha")
     assert done.code == 2
     assert "found: different: models.alpha.params" in done.err
-
-
-def test_the_same_model_named_twice_is_run_once(copy: Workspace) -> None:
-    copy.out = copy.root / "twice"
-    done = copy.run("--models", "oracle,oracle")
-    assert done.code == 0
-    names = [record["sample"] for record in copy.records()]
-    assert len(names) == len(set(names)) == 15
 
 
 def test_a_folder_that_holds_no_record_is_free_for_the_mended_suite(workspace: Workspace) -> None:

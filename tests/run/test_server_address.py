@@ -76,11 +76,6 @@ def test_what_the_models_file_says_comes_first(monkeypatch: pytest.MonkeyPatch) 
     assert config.api_base == "http://127.0.0.1:10/v1"
 
 
-def test_an_empty_variable_names_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("OPENAI_BASE_URL", "")
-    assert config_of("openai/m").api_base is None
-
-
 def test_a_server_that_moved_is_asked_nothing_again(workspace: Workspace) -> None:
     with Running(OpenAIChat()) as first:
         workspace.write_models(first.url, "alpha")

@@ -57,24 +57,6 @@ def on_disk(workspace: Workspace, name: str) -> list[dict[str, Any]]:
     return []
 
 
-def test_baselines_give_table_3(workspace: Workspace) -> None:
-    prepare(workspace, "http://nowhere", models=["oracle", "random", "repeat"])
-    done = workspace.run()
-    assert (done.code, done.err) == (0, "")
-    table = workspace.tables()["table3.csv"].decode().splitlines()
-    leading = "completion,completion_lo,completion_hi,attempted_f1,attempted_f1_lo,attempted_f1_hi"
-    assert table[0].startswith(f"model,{leading},attempted_precision,")
-    oracle = [100.0, 39.3, 100.0, 100.0, 39.3, 100.0, 100.0, 100.0, 100.0, 100.0, 1.0]
-    assert [round(float(cell), 1) for cell in table[1].split(",")[1:]] == oracle
-    assert [line.split(",")[0] for line in table] == ["model", "oracle", "random", "repeat"]
-    endings = {r["model"]: set() for r in workspace.records()}  # type: ignore[var-annotated]
-    for record in workspace.records():
-        endings[record["model"]].add(record["ending"])
-    assert endings["oracle"] == {"completed"}
-    assert endings["repeat"] == {"max_repeats"}
-    assert "Step planning" in done.out
-
-
 def test_the_server_sees_goal_candidates_current_picture_and_history(workspace: Workspace) -> None:
     with Running(StepAgent()) as running:
         prepare(workspace, running.url)

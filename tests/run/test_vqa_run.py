@@ -15,7 +15,7 @@ import pytest
 from PIL import Image as PillowImage
 
 from phyblock.data import read_builtin, read_questions
-from phyblock.domain import LETTERS, SUBTASKS, Question
+from phyblock.domain import LETTERS, Question
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_png
 from tests.fork_server import Done
@@ -197,22 +197,6 @@ def test_wrong_pictures_are_those_of_another_scene_and_the_same_for_all_models(
     assert all(len(variants) == 1 for variants in sent.values())
 
 
-def test_table_2_of_the_baselines(workspace: Workspace) -> None:
-    made = questions(per_subtask=24)
-    write_questions(workspace.root / "questions", made)
-    workspace.write_suite(**{**vqa_suite(blind=True), "models": ["random", "majority", "oracle"]})
-    done = workspace.run()
-    assert (done.code, done.err) == (0, "")
-    rows = {row["model"]: row for row in table(workspace, "table2")}
-    assert {float(rows["oracle"][subtask]) for subtask in (*SUBTASKS, "overall")} == {100.0}
-    for subtask in SUBTASKS:
-        chance = 100 / 24 if subtask == "OR" else 25.0
-        three_errors = 3 * (chance * (100 - chance) / 24) ** 0.5
-        assert abs(float(rows["random"][subtask]) - chance) <= three_errors
-    letters = {row["model"]: row for row in table(workspace, "letters")}
-    assert all(letters["oracle"][f"right_{x}"] == letters["oracle"][f"given_{x}"] for x in "abcd")
-
-
 BAD = [
     ({"answer": "E"}, "answer"),
     ({"options": ["cube", "arch", "cube", "cuboid"]}, r"options\[2\]"),
@@ -230,22 +214,6 @@ def test_broken_questions_are_errors_with_file_and_line_all_at_once(workspace: W
     assert done.code == 2
     for line, ((_, field), error) in enumerate(zip(BAD, done.errors, strict=True), 2):
         assert re.search(rf"questions\.jsonl:{line}: {field}: ", error)
-
-
-def test_a_set_of_questions_that_is_not_there_is_said_so(workspace: Workspace) -> None:
-    (workspace.root / "questions").mkdir()
-    workspace.write_suite(**vqa_suite())
-    done = workspace.run("--dry-run")
-    assert done.code == 2
-    assert "holds no questions" in done.errors[0]
-
-
-def test_a_baseline_of_plans_has_no_rule_for_questions(workspace: Workspace) -> None:
-    write_questions(workspace.root / "questions")
-    workspace.write_suite(**{**vqa_suite(), "models": ["all-candidates"]})
-    done = workspace.run("--dry-run")
-    assert done.code == 2
-    assert "has no rule for vqa" in done.errors[0]
 
 
 def test_pictures_of_official_files_are_sent_byte_for_byte(workspace: Workspace) -> None:
