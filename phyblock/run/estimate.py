@@ -187,8 +187,8 @@ def estimate(
 
     Raises StoreError for the folder of another run.
     """
-    rows = [
-        Estimate(
+    rows = {
+        m.name: Estimate(
             m.name,
             m.config.kind,
             plan.samples_per_model,
@@ -197,45 +197,42 @@ def estimate(
             m.config.batch,
         )
         for m in plan.models
-    ]
-    found = held_run(folder, plan.manifest)
-    settled = set() if found is None else _settled(plan, folder, rows, again=retry_failed)
-    lines = () if found is None else tuple(line for _, line in BatchLines(folder))
-    waiting = {
-        model.name: waiting_keys(model.config, lines, folder)
-        for model in plan.models
-        if model.config.batch
     }
+    settled: dict[str, bool] = {}
+    waiting: dict[str, frozenset[str]] = {}
+    if held_run(folder, plan.manifest) is not None:
+        for _, record in run_records(folder, plan.manifest, plan.sample_ids()):
+            settled[record.sample] = record.is_answered if retry_failed else record.is_final
+            kind = _kind(record.track, record.way)
+            for reply in record.replies:
+                rows[record.model].add_reply(reply.usage.completion_tokens, kind)
+        lines = tuple(line for _, line in BatchLines(folder))
+        for model in plan.models:
+            if model.config.batch:
+                waiting[model.name] = waiting_keys(model.config, lines, folder)
+    alike: dict[Variant, list[Variant]] = {}
+    for variant in plan.variants:
+        alike.setdefault(variant.shown, []).append(variant)
     path = reply_cache_file()
     with ReplyCache(path) if use_cache and path.exists() else nullcontext() as cache:
-        for tracks, variants in _alike(plan):
-            for track in tracks:
+        for first, variants in alike.items():
+            for track in plan.variants[first]:
                 for item in track.items:
                     for seeds, outlines in _outlines(track, item, plan.suite.seeds):
-                        for model, row in zip(plan.models, rows, strict=True):
+                        for model in plan.models:
                             samples = [
-                                Sample(track, model.name, item, seed, variant)
+                                sample
                                 for seed in seeds
                                 for variant in variants
+                                if not settled.get(
+                                    (sample := Sample(track, model.name, item, seed, variant)).id
+                                )
                             ]
-                            _add(
-                                row,
-                                model,
-                                samples,
-                                outlines,
-                                settled,
-                                cache,
-                                waiting.get(model.name, frozenset()),
-                            )
-    return rows
-
-
-def _alike(plan: RunPlan) -> Iterator[tuple[Sequence[AnyTrack], Sequence[Variant]]]:
-    """The ways of asking that send the same, with their tracks."""
-    shown: dict[Variant, list[Variant]] = {}
-    for variant in plan.variants:
-        shown.setdefault(variant.shown, []).append(variant)
-    yield from ((plan.variants[first], alike) for first, alike in shown.items())
+                            row = rows[model.name]
+                            row.done += len(seeds) * len(variants) - len(samples)
+                            held = waiting.get(model.name, frozenset())
+                            _add(row, model, samples, outlines, cache, held)
+    return list(rows.values())
 
 
 def _outlines(
@@ -250,26 +247,11 @@ def _outlines(
             yield [seed], list(track.outlines(shown[seed]))
 
 
-def _settled(plan: RunPlan, folder: Path, rows: Sequence[Estimate], *, again: bool) -> set[str]:
-    """Return the samples that are not asked again, by their newest records; rows learn from
-    replies. `again` asks for those whose request was rejected.
-    """
-    by_model = {row.model: row for row in rows}
-    newest: dict[str, bool] = {}
-    for _, record in run_records(folder, plan.manifest, plan.sample_ids()):
-        newest[record.sample] = record.is_answered if again else record.is_final
-        kind = _kind(record.track, record.way)
-        for reply in record.replies:
-            by_model[record.model].add_reply(reply.usage.completion_tokens, kind)
-    return {sample for sample, is_settled in newest.items() if is_settled}
-
-
 def _add(
     row: Estimate,
     model: PlannedModel,
     samples: Sequence[Sample],
     outlines: Sequence[tuple[Request, bool]],
-    settled: set[str],
     cache: ReplyCache | None,
     waiting: frozenset[str],
 ) -> None:
@@ -281,9 +263,6 @@ def _add(
         expected = [(request, real, estimate_call(config, request)) for request, real in asked]
     for sample in samples:
         kind = _kind(sample.track.name, sample.variant)
-        if sample.id in settled:
-            row.done += 1
-            continue
         for request, is_real, tokens in expected:
             sent = sample.asking(replace(request, seed=sample.seed))
             kept = cache.get(reply_key(config, sent)) if is_real and cache is not None else None
