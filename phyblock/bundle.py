@@ -383,7 +383,7 @@ def _check_member(info: zipfile.ZipInfo) -> None:
     """Raise ValueError for a member that would harm or fill this machine."""
     mode, name = info.external_attr >> 16, info.filename
     is_dense = info.file_size > _MOST_PACKED * max(info.compress_size, 1)
-    if mode and not stat.S_ISREG(mode):
+    if stat.S_IFMT(mode) not in (0, stat.S_IFREG):
         raise ValueError(f"{name} is a link or the like")
     if info.flag_bits & 1 or info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         raise ValueError(f"{name} is packed in a way that is not taken")

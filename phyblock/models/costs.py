@@ -21,7 +21,7 @@ from typing import Any
 
 from phyblock.config.models import BatchRateSpec, ModelConfig, RateSpec, host_of
 from phyblock.errors import BudgetReachedError, ModelError, Problem, SpecError, UnavailableError
-from phyblock.models.keys import KEYLESS
+from phyblock.models.keys import KEYLESS, api_key_status
 from phyblock.models.request import Image, Request, wire_params
 from phyblock.records.reply import Reply, Usage
 from phyblock.types import ImageDetail
@@ -201,11 +201,11 @@ def require_prices(config: ModelConfig) -> Prices:
 
 def is_billed(config: ModelConfig) -> bool:
     """True if somebody may be billed for calls: not where the price is 0 from today on, nor by a
-    local server to which no price and no key was given.
+    local server where no price is known and no key would be sent.
     """
     prices = prices_of(config)
     if prices is None:
-        return config.provider not in KEYLESS or config.api_key_env is not None
+        return config.provider not in KEYLESS or api_key_status(config).is_set
     return not prices.is_free_from(today())
 
 

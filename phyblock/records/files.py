@@ -112,6 +112,10 @@ class Lines(Generic[LineT]):
                 while data := file.readline(_LONGEST_LINE_BYTES + 1):
                     number += 1
                     where = f"{self.path}:{number}"
+                    if b"\0" in data or data.endswith(b"\r\n"):
+                        what = "zero bytes" if b"\0" in data else "a line end of CR LF"
+                        message = f"is not a {self.noun}: it holds {what}"
+                        raise StoreError(Problem(where, message, hint=self.hint))
                     self.lacks_newline = not data.endswith(b"\n")
                     if self.lacks_newline and _is_cut(data):
                         self.is_cut = True

@@ -299,6 +299,7 @@ class Session:
         for error in (self._failure, *ended):
             if error is not None:
                 raise error
+        self._store.records.check()
 
     async def _end(self, workers: list[asyncio.Task[None]]) -> None:
         """Give up what is still under way, and wait until what was answered is on disk."""

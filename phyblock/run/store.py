@@ -290,11 +290,13 @@ class AppendFile:
         self._sync = sync
         self._writing = threading.Lock()
         self._file: FileIO | None = None
+        self._size_bytes = 0
 
     def append(self, lines: Iterable[Mapping[str, Any]]) -> None:
         """Write objects, a line each, and wait until they are on disk.
 
-        Raises StoreError when the disk refuses; what was written before stays whole.
+        Raises StoreError when the disk refuses, or when somebody else removed, replaced or changed
+        the file meanwhile; what was written before stays whole.
         """
         data = b"".join(_line(line) for line in lines)
         with self._writing:
@@ -304,6 +306,12 @@ class AppendFile:
         """Write the newline that the last line lacks."""
         with FileIO(self._path, "a") as file:
             file.write(b"\n")
+
+    def check(self) -> None:
+        """Raise StoreError unless the file that was written is the one at its path, and whole."""
+        with self._writing:
+            if self._file is not None:
+                self._check(self._file.fileno())
 
     def close(self) -> None:
         """Close the file, once what is being written is written."""
@@ -317,9 +325,24 @@ class AppendFile:
             if self._file is None:
                 # Unbuffered: a write that failed must not be tried again behind our back.
                 self._file = FileIO(self._path, "a")
+                self._size_bytes = os.fstat(self._file.fileno()).st_size
                 if self._sync:
                     sync_folder(self._path.parent)
+            self._check(self._file.fileno())
             append_whole(self._file.fileno(), data, sync=self._sync)
+            self._size_bytes += len(data)
+
+    def _check(self, number: int) -> None:
+        opened = os.fstat(number)
+        try:
+            there = os.stat(self._path)
+            is_same = os.path.samestat(opened, there)
+        except FileNotFoundError:
+            is_same = False
+        if not is_same or opened.st_size != self._size_bytes:
+            message = "was removed, replaced or changed while the run was writing it"
+            hint = f"restore it from a copy; replies that have arrived are in {CALLS}"
+            raise StoreError(Problem(str(self._path), message, hint=hint))
 
 
 def _line(line: Mapping[str, Any]) -> bytes:

@@ -138,3 +138,11 @@ def test_what_is_packed_is_unpacked_and_is_the_same_whatever_the_order(tmp_path:
     (tmp_path / "b.zip").write_bytes(SOUND)
     unpack(tmp_path / "b.zip", tmp_path)
     assert {name: (tmp_path / name).read_bytes() for name in MEMBERS} == CONTENTS
+
+
+def test_what_another_program_packed_is_unpacked(tmp_path: Path) -> None:
+    """Python's zipfile gives members no kind of file."""
+    held = {name: name.encode() * 9 for name in MEMBERS}
+    (tmp_path / "b.zip").write_bytes(archive(*held.items()))
+    unpack(tmp_path / "b.zip", tmp_path)
+    assert {name: (tmp_path / name).read_bytes() for name in MEMBERS} == held

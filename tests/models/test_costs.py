@@ -34,6 +34,7 @@ from phyblock.models import (
     build_model,
     ends_on,
     estimate,
+    is_billed,
     is_unlisted,
     most_usd,
     prices_of,
@@ -206,6 +207,15 @@ def test_the_longest_reply_is_what_was_asked_for_or_what_the_model_can() -> None
     assert most("openai/gpt-4o-2024-08-06", max_completion_tokens=70) == 70
     assert most("openai/gpt-4o-2024-08-06") == 16384
     assert most("x/y") == 32768
+
+
+def test_a_local_server_is_free_only_where_no_key_is_sent(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("HOSTED_VLLM_API_KEY", raising=False)
+    local = config("hosted_vllm/x", api_base="http://127.0.0.1:9/v1")
+    assert not is_billed(local)
+    monkeypatch.setenv("HOSTED_VLLM_API_KEY", "sk-not-a-real-key-1234")
+    assert is_billed(local)
+    assert is_billed(config("openai/nobodys"))
 
 
 def test_a_model_without_a_price_under_a_budget_is_an_error_at_the_start() -> None:

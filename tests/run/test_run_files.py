@@ -6,6 +6,8 @@ import errno
 import hashlib
 import json
 import os
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +26,7 @@ from phyblock.records.reply import Reply
 from phyblock.run.events import Standing
 from phyblock.run.plan import make_plan
 from phyblock.run.store import AppendFile, PromptFile, RunStore, read_prompts
-from tests.servers.chassis import Running
+from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
 
@@ -49,6 +51,58 @@ def test_a_full_disk_is_an_error_that_leaves_whole_lines() -> None:
     with pytest.raises(StoreError, match="No space left on device"):
         file.append([{"a": 1}])
     file.close()
+
+
+CHANGES: dict[str, Callable[[Path], object]] = {
+    "removed": Path.unlink,
+    "truncated": lambda path: path.write_bytes(b""),
+    "replaced": lambda path: (path.rename(f"{path}.old"), path.write_bytes(b'{"a":1}\n')),
+    "grown": lambda path: path.write_bytes(path.read_bytes() * 2),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_file_that_somebody_changes_meanwhile_is_not_written_on(
+    tmp_path: Path, change: str
+) -> None:
+    path = tmp_path / "records.jsonl"
+    file = AppendFile(path)
+    file.append([{"a": 1}])
+    file.check()
+    CHANGES[change](path)
+    left = path.read_bytes() if path.exists() else None
+    with pytest.raises(StoreError, match="was removed, replaced or changed"):
+        file.append([{"a": 2}])
+    with pytest.raises(StoreError, match="was removed, replaced or changed"):
+        file.check()
+    file.close()
+    assert (path.read_bytes() if path.exists() else None) == left
+
+
+def test_a_run_whose_records_are_taken_away_asks_no_more_and_says_so(workspace: Workspace) -> None:
+    with Running(OpenAIChat(Faults(latency_s=0.02))) as running:
+        server = running.server
+        workspace.write_models(running.url, "alpha", max_concurrency=2)
+        workspace.write_suite(models=["alpha"], seeds=list(range(20)))
+        with workspace.start("--yes") as process:
+            while process.poll() is None and server.requests < 10:
+                time.sleep(0.002)
+            (workspace.out / "records.jsonl").unlink()
+            _, errors = process.communicate()
+        assert process.returncode == 2
+        assert "records.jsonl: was removed, replaced or changed" in errors
+        assert server.requests < 100
+        asked = server.requests
+        assert workspace.run("--yes").code == 0
+        assert server.requests == 100 < asked + 100
+    assert len(workspace.records()) == 100
+
+
+@pytest.mark.parametrize("line", [b"\0" * 40, b"\0" * 40 + b"\n", b"{}\r\n"])
+def test_zero_bytes_and_foreign_line_ends_are_named(tmp_path: Path, line: bytes) -> None:
+    (tmp_path / "prompts.jsonl").write_bytes(line)
+    with pytest.raises(StoreError, match=r"prompts\.jsonl:1: is not a prompt: it holds"):
+        list(PromptLines(tmp_path))
 
 
 @pytest.mark.parametrize("call", ["fstat", "write", "fsync"])
