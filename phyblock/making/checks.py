@@ -16,7 +16,7 @@ from phyblock.domain.aov import AOVGraph, CycleError
 from phyblock.domain.blocks import KIT_PALETTE, orientation_class
 from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, CandidateSet, Kind, Scene
 from phyblock.errors import Problem
-from phyblock.making.poses import POSES, find_twins
+from phyblock.making.scenes.sketch import POSES, find_twins
 from phyblock.making.workers import Workers, open_workers
 from phyblock.sim.contact import (
     FIT_TOLERANCE_M,

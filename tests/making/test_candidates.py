@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from phyblock.data import read_builtin
 from phyblock.domain import KIT_PALETTE, MAX_CANDIDATES, Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.errors import DataError
-from phyblock.making.poses import POSES
 from phyblock.making.scenes.candidates import NEEDED, make_candidates
 from phyblock.making.scenes.production import Group, Request, draw, shares
+from phyblock.making.scenes.sketch import POSES
 from phyblock.scoring.counts import micro
 from phyblock.scoring.plan import Goal, match_plan
 from phyblock.tracks.goal_blind import goal_blind_plans

@@ -13,7 +13,7 @@ import pytest
 from phyblock.data import read_builtin, read_official
 from phyblock.domain import Block, CandidateSet, Scene
 from phyblock.domain.symmetry import Symmetry
-from phyblock.errors import DataError, Problem
+from phyblock.errors import DataError
 from phyblock.making.checks import (
     AUDITED,
     CHECKS,
@@ -21,7 +21,6 @@ from phyblock.making.checks import (
     LAWS,
     OURS,
     CheckName,
-    Finding,
     SceneFacts,
     audit_scene,
     audit_scenes,
@@ -32,17 +31,15 @@ from phyblock.making.checks import (
     findings_of,
     verify_scene,
 )
-from phyblock.making.poses import transformed
 from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.files import SUMS_FILE, check_sums, sums_text
-from phyblock.making.scenes.sketch import make_scene
+from phyblock.making.scenes.sketch import make_scene, transformed
 from phyblock.sim.contact import GROUND
 from phyblock.sim.dynamics import Trial
 from phyblock.sim.engine import Physics
 from tests.designs.acceptance import accept, form_problems, physics_problems
 from tests.designs.pad import Pad
 from tests.designs.scenes import designed_scene, designed_scenes
-from tests.sim.structures import counterweighted_beam, scene_of
 from tests.sim.test_support import FLOATING, OVERLAPPING
 
 BUILT_IN = Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400"
@@ -154,40 +151,6 @@ def test_accepting_verifying_and_auditing_say_the_same_words(scene: Scene) -> No
     assert audited <= refused
     with pytest.raises(DataError):
         accept(scene)
-
-
-def test_nothing_is_computed_before_it_is_asked_for() -> None:
-    facts = SceneFacts(lifted(-0.004))
-    names: tuple[CheckName, ...] = ("size", "overlap", "unstable", "unstable step", "hidden")
-    assert next(findings_of(facts, names)).check == "overlap"
-    assert not {"finished", "steps", "hidden"} & set(vars(facts))
-
-
-def test_dependencies_that_name_no_block_leave_layers_and_order_unjudged() -> None:
-    facts = SceneFacts(with_block(3, depend=(9,)))
-    assert list(findings_of(facts, ["size", "layer", "order"])) == []
-
-
-def test_a_finding_reads_as_a_problem_with_orders_as_a_list() -> None:
-    finding = Finding("s1", "order", "said", (2,), field="f", declared=(1, 3), derived=())
-    assert finding.problem == Problem("s1", "said", "f", "[1, 3]", "")
-
-
-def test_levels_limit_blocks_and_layers() -> None:
-    tower = Pad()
-    for _ in range(5):
-        tower.put("cube")
-    scene = make_scene("tower", (1, 2), tower.blocks)
-    found = [(problem.message, problem.found, problem.allowed) for problem in form_problems(scene)]
-    assert ("wrong size", "5", "1 to 4 at level 1") in found
-    assert ("too high", "5", "at most 3 at level 2") in found
-
-
-def test_a_beam_that_waits_for_its_counterweight_falls_midway_alone() -> None:
-    audit = audit_scene((scene_of(counterweighted_beam()), None), QUICK_FOREIGN)
-    steps = [finding for finding in audit.findings if finding.check == "unstable step"]
-    assert not audit.has("unstable")
-    assert [2 in step.blocks and "block 3" in step.message for step in steps] == [True]
 
 
 def test_the_same_findings_with_two_processes_and_in_the_csv() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections import Counter
 
 import numpy as np
@@ -12,16 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.data import read_builtin
-from phyblock.domain import BLOCK_TYPES, LETTERS, Block, BlockType, Color, QuestionPicture, Scene
+from phyblock.domain import LETTERS, Block, BlockType, Color, QuestionPicture, Scene
 from phyblock.domain.blocks import SHAPES, Euler
 from phyblock.domain.question import Mark
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, turned_form
-from phyblock.making.poses import POSES, transformed
-from phyblock.making.questions.affordance import is_on_face, sort_of, stays_at
+from phyblock.making.questions.affordance import is_on_face, stays_at
 from phyblock.making.questions.counterfactual import resting_on
 from phyblock.making.questions.counting import layers_of, sure_blocks
 from phyblock.making.questions.draft import UnfairError
-from phyblock.making.questions.pictured import four_alike
 from phyblock.making.questions.positions import LENGTHS, grid_cm
 from phyblock.making.questions.predictive import ranked_as_drawn
 from phyblock.making.questions.referring import (
@@ -30,22 +27,21 @@ from phyblock.making.questions.referring import (
     names,
     resolve,
     resolve_one,
-    shape_word,
 )
 from phyblock.making.questions.rotations import AXIS_TURNS, axis_turns, put_beside, tipped_over
 from phyblock.making.questions.selection import BALANCE, Texts, even_letters, keeping_odds
 from phyblock.making.questions.structures import (
     is_sure,
     lowered,
-    lowered_round,
     stays_round,
     with_annex,
 )
-from phyblock.making.questions.view import shows_solid
+from phyblock.making.questions.view import four_alike
 from phyblock.making.questions.viewpoint import ViewpointMaker, shifted
+from phyblock.making.scenes.sketch import POSES, transformed
 from phyblock.resources import bundled
-from phyblock.sim.contact import bounds_m, find_gaps, find_overlaps, support_graph
-from phyblock.sim.question_pictures import Top, least_difference, seen
+from phyblock.sim.contact import find_gaps, find_overlaps, support_graph
+from phyblock.sim.question_pictures import least_difference, seen
 from tests.sim.structures import block as solid
 from tests.sim.structures import tower
 
@@ -92,19 +88,6 @@ def test_a_name_fits_its_block_alone_and_speaks_of_what_it_may(
                 assert not any(word in name for word in SHAPE_WORDS)
 
 
-def test_the_shortest_names_come_first_and_a_doubtful_one_is_none() -> None:
-    red, blue = block(1, (0, 0, 0.025)), block(3, (0, 0.4, 0.025), color="blue")
-    arch = block(2, (0, 0.2, 0.025), kind="arch")
-    picture = shown(red, arch, blue)
-    assert names(arch, picture, ("color", "type", "layer")) == ("arch",)
-    assert names(blue, picture, ("color", "type")) == ("blue block",)
-    assert names(red, picture, ("color", "type")) == ("red cube",)
-    beside_prism = shown(red, block(2, (0, 0.2, 0.025), kind="cuboid1"))
-    assert not names(red, beside_prism, ("type",))
-    with pytest.raises(UnfairError, match="may be taken for another block"):
-        resolve_one("red cube", beside_prism)
-
-
 @pytest.mark.parametrize(
     ("text", "place", "azimuth", "orders"),
     [
@@ -124,17 +107,6 @@ def test_words_for_places_fit_one_block_or_none(
 ) -> None:
     other = block(2, place, (1,) if place[2] > 0.05 else (), color="blue")
     assert resolve(text, shown(block(1, (0, 0, 0.025)), other, azimuth=azimuth)) == orders
-
-
-@pytest.mark.parametrize("text", ["purple cube", "cube of red", "", "the the cube", "red"])
-def test_words_that_are_no_name_are_refused(text: str) -> None:
-    with pytest.raises(UnfairError, match="names no block"):
-        resolve(text, shown(block(1, (0, 0, 0.025))))
-
-
-def test_every_type_has_one_of_six_words() -> None:
-    assert len(SHAPE_WORDS) == 6
-    assert {shape_word(kind) for kind in BLOCK_TYPES} == set(SHAPE_WORDS)
 
 
 # Turns, lengths, layers
@@ -269,47 +241,12 @@ def test_a_place_where_the_block_stays_on_its_neighbors_is_none() -> None:
     assert stays_at(plain, PUT, at) is None
 
 
-def test_a_block_is_let_down_all_round_as_far_off_as_told() -> None:
-    put = lowered(PUT, PLANK, 0.0, 0.03)
-    for radius_m in (0.00125, 0.005):
-        around = list(lowered_round(put, PLANK, (radius_m,)))
-        steps = [bounds_m(one).mean(axis=0) - bounds_m(put).mean(axis=0) for one in around]
-        assert len({(round(float(x), 5), round(float(y), 5)) for x, y, _ in steps}) == 8
-        for x, y, z in steps:
-            assert math.hypot(x, y) == pytest.approx(radius_m, abs=2e-6)
-            assert z == pytest.approx(0.0, abs=2e-6)
-
-
 def test_a_verdict_that_turns_close_by_is_none() -> None:
     """A thin slab put over a gap of 5.2 cm bridges it, and drops in where it is 1 cm off."""
     posts = [solid(1, "cube", (-0.051, 0, 0.025)), solid(2, "cube", (0.051, 0, 0.025))]
     put = lowered(solid(3, "cuboid2", (0, 0, 0)), posts, 0.0, 0.0)
     assert stays_round(put, posts, (0.005,)) is True
     assert stays_round(put, posts, (0.03,)) is None
-
-
-@pytest.mark.parametrize(
-    ("shape", "azimuth_deg", "shows"),
-    [
-        *(("roof", 0.0, True), ("roof", 45.0, True), ("roof", 90.0, False)),
-        *(("slab", 0.0, False), ("slab", 45.0, True)),
-    ],
-)
-def test_a_block_shows_its_profile_and_more_than_one_face_or_not(
-    shape: str, azimuth_deg: float, shows: bool
-) -> None:
-    roof, slab = solid(1, "triangle", (0, 0, 0)), solid(1, "cuboid3", (0, 0, 0), (0, 90, 0))
-    assert shows_solid(roof if shape == "roof" else slab, (azimuth_deg, 30.0)) is shows
-
-
-def test_four_places_are_of_a_sort_by_three_ranks_of_the_right_one() -> None:
-    """Highest in the picture and apart from three on a low plank, not over its block's middle."""
-    post = [solid(n, "cube", (-0.3, 0, 0.025 + 0.05 * (n - 3))) for n in (3, 4, 5)]
-    plain = QuestionPicture("scene", (*PLANK, *post), VIEW)
-    right = Top((-0.31, 0.0, 0.15), 1.0, 0.01)
-    wrong = [Top((0.0, y, TOP_M), 1.0, abs(y)) for y in (0.0, 0.005, 0.05)]
-    assert sort_of(plain, [right, *wrong]) == "central 2, up 0, alone 3"
-    assert sort_of(plain, [*wrong, right]) == "central 0, up 3, alone 1"
 
 
 @settings(max_examples=5, deadline=None)

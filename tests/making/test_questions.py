@@ -8,7 +8,6 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from phyblock.data import QuestionSet, read_builtin, read_questions
@@ -19,23 +18,22 @@ from phyblock.domain.question import rotated
 from phyblock.errors import DataError, StoreError
 from phyblock.making.questions.audit import audit_questions, duplicates_of
 from phyblock.making.questions.counterfactual import OUTCOME_TEXTS
-from phyblock.making.questions.draft import WORDINGS
-from phyblock.making.questions.files import check_place, question_card, write_questions
-from phyblock.making.questions.pictured import LEAST_PIXELS
 from phyblock.making.questions.production import (
-    MAKERS,
     PER_SUBTASK,
     as_question,
+    check_place,
     make_questions,
     problem_of,
+    question_card,
     scene_drafts,
+    write_questions,
 )
-from phyblock.making.questions.view import ELEVATIONS_DEG
+from phyblock.making.questions.view import ELEVATIONS_DEG, LEAST_PIXELS
 from phyblock.making.workers import open_workers
 from phyblock.resources import bundled
 from phyblock.sim.contact import find_gaps
 from phyblock.sim.engine import other_engine
-from phyblock.sim.question_pictures import is_inside, least_difference, mark_pixel, seen
+from phyblock.sim.question_pictures import is_inside, least_difference, seen
 from phyblock.types import BACKGROUNDS
 from tests.vqa_set import questions as asked_questions
 from tests.vqa_set import write_questions as write_asked
@@ -126,11 +124,6 @@ def test_views_backgrounds_and_colors_are_drawn_for_each_question(static: list[Q
     assert [recolored[subtask] for subtask in ("SH", "CO", "SI", "NU")] == [COUNT] * 3 + [0]
 
 
-def test_no_question_stands_twice(static: list[Question]) -> None:
-    told = [(q.scene, q.text, frozenset(q.options)) for q in static]
-    assert len(set(told)) == len(told) == len({question.id for question in static})
-
-
 def test_what_depends_on_the_view_is_told_for_the_view() -> None:
     """Seen from the other side, in front is behind and left is right, or a named block hides."""
     stored = read_questions(FOLDER, DATA).tasks
@@ -145,17 +138,6 @@ def test_what_depends_on_the_view_is_told_for_the_view() -> None:
     hidden = sum("less than 40% of themselves" in problem for problem in problems)
     assert others + hidden == len(problems)
     assert others > len(problems) / 2
-
-
-def test_wordings_are_many_and_ask_for_heights_above_the_ground() -> None:
-    counts = Counter(name.split("-")[0].upper() for name in WORDINGS)
-    assert counts.keys() == set(MAKERS) == set(PER_SUBTASK)
-    assert all(counts[subtask] >= 12 for subtask in ("OC", "LC", "TC", "VP"))
-    for name, template in WORDINGS.items():
-        assert template[-1] in "?."
-        if any(word in template for word in ("high", "low")) and name.startswith("rp-"):
-            assert "ground" in template or "same height" in template or "Leave heights" in template
-            assert "picture" not in template or "Leave heights" in template
 
 
 def test_pictures_of_options_are_whole_and_told_apart(pictured: list[Question]) -> None:
@@ -231,11 +213,6 @@ def test_too_few_scenes_are_told_for_all_subtasks_at_once() -> None:
     assert len(told.value.problems) > 1
 
 
-@pytest.mark.slow
-def test_two_processes_give_the_same_bytes(pictured: list[Question]) -> None:
-    assert lines_of(dynamic(jobs=2)) == lines_of(pictured)
-
-
 # The built-in set
 
 
@@ -268,17 +245,6 @@ def test_the_built_in_set_is_whole_and_even(built_in: QuestionSet) -> None:
 def test_a_sample_of_the_answers_is_derived_again(built_in: QuestionSet) -> None:
     for task in built_in.tasks[7::50]:
         assert problem_of(task.question) is None, task.key
-
-
-def test_the_right_place_is_apart_from_the_others_as_often_as_any(built_in: QuestionSet) -> None:
-    ranks: Counter[int] = Counter()
-    for question in (t.question for t in built_in.tasks if t.question.subtask == "AD"):
-        shown = question.pictures[0]
-        places = np.array([mark_pixel(shown, mark.position_m) for mark in shown.marks])
-        apart = np.linalg.norm(places[:, None] - places, axis=2).sum(axis=1)
-        ranks[int((apart < apart[question.answer[0]]).sum())] += 1
-    assert ranks.keys() == set(range(len(LETTERS)))
-    assert max(ranks.values()) <= 17
 
 
 def test_a_place_that_is_not_marked_is_found_out(built_in: QuestionSet) -> None:

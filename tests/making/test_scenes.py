@@ -16,9 +16,8 @@ from phyblock.data import read_builtin
 from phyblock.domain import BLOCK_TYPES, KIT_PALETTE, Scene, orientation_class
 from phyblock.domain.symmetry import canonical_form
 from phyblock.errors import DataError, StoreError
-from phyblock.making.poses import POSES
 from phyblock.making.scenes.designs import BUILDINGS, COMPOSITIONS, CREATURES, beside
-from phyblock.making.scenes.files import SetWriter, card, open_writer, sums_text
+from phyblock.making.scenes.files import SetWriter, open_writer, sums_text
 from phyblock.making.scenes.production import (
     GROUP_LEVELS,
     Order,
@@ -28,16 +27,9 @@ from phyblock.making.scenes.production import (
     produce,
     shares,
 )
-from phyblock.making.scenes.sketch import PALETTES, Draft, make_scene
+from phyblock.making.scenes.sketch import PALETTES, POSES, Draft
 from phyblock.making.workers import open_workers
 from phyblock.sim.contact import bounds_m, find_gaps, find_overlaps, support_graph
-from phyblock.sim.engine import (
-    REFERENCE_ENGINE,
-    described_engine,
-    installed_engines,
-    other_engine,
-    physics_engine,
-)
 from phyblock.sim.pictures import hidden_blocks
 from tests.designs.acceptance import accept, form_problems
 from tests.designs.pad import Pad
@@ -69,17 +61,6 @@ def test_whatever_is_put_down_neither_overlaps_nor_floats(drawn) -> None:
 def test_poses_of_a_type_look_different(block_type) -> None:
     poses = POSES[block_type].values()
     assert len({orientation_class(block_type, euler) for euler in poses}) == len(poses)
-
-
-def test_a_scene_is_centered_and_its_graph_comes_from_contact() -> None:
-    sketch = Pad(origin=(20.0, -8.0))
-    sketch.pair("cube", 2)
-    sketch.put("cuboid3", pose="flat-y")
-    scene = make_scene("test", (1,), sketch.blocks)
-    assert [block.depend for block in scene.blocks] == [(), (), (1, 2)]
-    assert [block.layer for block in scene.blocks] == [1, 1, 2]
-    assert scene.blocks[2].position_m == (0.0, 0.0, 0.0625)
-    assert scene.parents == ("test",)
 
 
 def test_designs_declare_what_contact_says() -> None:
@@ -213,21 +194,6 @@ def scenes() -> list[Scene]:
     return made(SMALL)
 
 
-def test_a_card_names_another_engine_and_not_the_usual_one(
-    scenes: list[Scene], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    written = write(tmp_path / "set", scenes)
-    others = f", by {other_engine()}" if other_engine() else ""
-    assert bool(others) == (physics_engine().name != REFERENCE_ENGINE)
-    here = card("few", written, "make", "kit")
-    assert f"number of processes{others}.\n" in here
-    usual = here.replace(others, "")
-    if "mujoco" in installed_engines():
-        monkeypatch.setenv("PHYBLOCK_PHYSICS", "mujoco")
-        told = f"number of processes, by the physics engine {described_engine()}"
-        assert card("few", written, "make", "kit") == usual.replace("number of processes", told)
-
-
 @given(st.integers(1, 5000), st.sets(st.integers(1, 4), min_size=1))
 def test_shares_add_up(count: int, levels: set[int]) -> None:
     found = shares(count, sorted(levels))
@@ -291,19 +257,3 @@ def too_many_looks(scene: Scene) -> Scene:
     block = scene.blocks[0]
     blocks = tuple(replace(block, euler_deg=(0.0, 0.0, 3.0 * i)) for i in range(18))
     return replace(scene, blocks=tuple(replace(b, type="arch", color="red") for b in blocks))
-
-
-def test_rules_that_give_no_more_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("phyblock.making.scenes.production._PATIENCE", 3)
-    order = Order(0, "kit", (Share("1", 100_000, 0),))
-    with pytest.raises(DataError, match="new scenes of 100000"):
-        for _ in zip(range(400), produce(order, _Nothing()), strict=False):
-            pass
-
-
-class _Nothing:
-    """Workers whose rules never give a scene."""
-
-    def map(self, function, tasks):
-        del function
-        return (None for _ in tasks)

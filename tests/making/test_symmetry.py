@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from phyblock.domain import BLOCK_TYPES, SHAPES, Block
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, canonical_form
-from phyblock.making.poses import POSES, transformed
+from phyblock.making.scenes.sketch import POSES, transformed
 from phyblock.sim.contact import find_overlaps, support_graph
 from phyblock.sim.pictures import DrawnBlock
 from tests.designs.scenes import designed_scenes

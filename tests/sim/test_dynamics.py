@@ -15,7 +15,7 @@ import pytest
 from phyblock.data import read_builtin, read_official
 from phyblock.domain import Block, BlockType
 from phyblock.errors import SimulationError
-from phyblock.making.poses import POSES
+from phyblock.making.scenes.sketch import POSES
 from phyblock.sim.contact import drop_height_m
 from phyblock.sim.dynamics import (
     DEFAULT_TRIAL,

@@ -24,8 +24,8 @@ from phyblock.data import read_builtin, read_official, read_questions
 from phyblock.domain import BLOCK_TYPES, KIT_PALETTE, SHAPES, Candidate, CandidateSet, Color, Scene
 from phyblock.domain.question import Mark, QuestionPicture
 from phyblock.errors import DataError
-from phyblock.making.poses import POSES
 from phyblock.making.scenes.candidates import make_candidates
+from phyblock.making.scenes.sketch import POSES
 from phyblock.sim import ruled
 from phyblock.sim.backgrounds import PERIOD_M, TEXTURED, sample, surface_map
 from phyblock.sim.camera import VIEWS, Camera, Window, frame, view_axes

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from phyblock.data import AssemblyTask, read_builtin
 from phyblock.domain.symmetry import Symmetry, canonical_form
 from phyblock.errors import DataError, SpecError
-from phyblock.making.poses import transformed
+from phyblock.making.scenes.sketch import transformed
 from phyblock.models.request import Image
 from phyblock.records.reply import Reply, Usage
 from phyblock.tracks.items import (

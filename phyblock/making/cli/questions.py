@@ -31,8 +31,13 @@ from phyblock.making.cli.options import (
     tracked,
 )
 from phyblock.making.questions.audit import Probe, audit_questions
-from phyblock.making.questions.files import check_place, write_questions
-from phyblock.making.questions.production import PER_SUBTASK, make_questions, verify_questions
+from phyblock.making.questions.production import (
+    PER_SUBTASK,
+    check_place,
+    make_questions,
+    verify_questions,
+    write_questions,
+)
 from phyblock.making.scenes.files import check_sums
 from phyblock.making.workers import open_workers
 from phyblock.sim.pictures import PictureStyle

@@ -26,7 +26,6 @@ from phyblock.domain.blocks import (
 )
 from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.poses import POSES
 from phyblock.making.questions.draft import (
     Draft,
     Maker,
@@ -37,7 +36,6 @@ from phyblock.making.questions.draft import (
     shuffled,
     slots_of,
 )
-from phyblock.making.questions.pictured import WRONG, four_alike, picture_of
 from phyblock.making.questions.structures import (
     group_of,
     lowered,
@@ -48,12 +46,16 @@ from phyblock.making.questions.structures import (
     with_annex,
 )
 from phyblock.making.questions.view import (
+    WRONG,
     are_seen,
     drawn_view,
+    four_alike,
     orders_of,
+    picture_of,
     require_seen,
     shows_solid,
 )
+from phyblock.making.scenes.sketch import POSES
 from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.contact import bounds_m
 from phyblock.sim.dynamics import groups

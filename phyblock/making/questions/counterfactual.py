@@ -30,24 +30,22 @@ from phyblock.making.questions.draft import (
     shuffled,
     slots_of,
 )
-from phyblock.making.questions.pictured import (
+from phyblock.making.questions.structures import group_of, is_sure, with_annex
+from phyblock.making.questions.view import (
+    COUNTED,
     LEAST_PIXELS,
+    NAMED,
     TAKEN,
+    are_seen,
     are_told_apart,
+    center_m,
+    drawn_view,
     four_alike,
     marked_order,
     of_kind,
     option_pictures,
-    picture_of,
-)
-from phyblock.making.questions.structures import group_of, is_sure, with_annex
-from phyblock.making.questions.view import (
-    COUNTED,
-    NAMED,
-    are_seen,
-    center_m,
-    drawn_view,
     orders_of,
+    picture_of,
     require_seen,
     shares,
 )

@@ -28,18 +28,16 @@ from phyblock.making.questions.draft import (
     pick,
     slots_of,
 )
-from phyblock.making.questions.pictured import (
-    are_told_apart,
-    of_kind,
-    option_pictures,
-    same_blocks,
-)
 from phyblock.making.questions.view import (
     COUNTED,
     are_seen,
+    are_told_apart,
     drawn_view,
+    of_kind,
+    option_pictures,
     orders_of,
     require_seen,
+    same_blocks,
 )
 from phyblock.sim.question_pictures import seen
 

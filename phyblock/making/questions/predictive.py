@@ -27,19 +27,6 @@ from phyblock.making.questions.draft import (
     shuffled,
     slots_of,
 )
-from phyblock.making.questions.pictured import (
-    LEAST_PIXELS,
-    MOST_OFF,
-    TAKEN,
-    WRONG,
-    are_told_apart,
-    marked_order,
-    of_kind,
-    option_pictures,
-    picture_of,
-    ranks_among,
-    same_blocks,
-)
 from phyblock.making.questions.structures import (
     group_of,
     is_sure,
@@ -48,7 +35,22 @@ from phyblock.making.questions.structures import (
     verdict,
     with_annex,
 )
-from phyblock.making.questions.view import COUNTED, are_seen, drawn_view
+from phyblock.making.questions.view import (
+    COUNTED,
+    LEAST_PIXELS,
+    MOST_OFF,
+    TAKEN,
+    WRONG,
+    are_seen,
+    are_told_apart,
+    drawn_view,
+    marked_order,
+    of_kind,
+    option_pictures,
+    picture_of,
+    ranks_among,
+    same_blocks,
+)
 from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.camera import view_axes
 from phyblock.sim.contact import bounds_m, boxes_near, whole_bounds_m

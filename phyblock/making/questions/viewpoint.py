@@ -21,7 +21,6 @@ from phyblock.domain.blocks import COLORS
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import Symmetry, turned_form
-from phyblock.making.poses import transformed
 from phyblock.making.questions.draft import (
     Draft,
     Maker,
@@ -33,15 +32,18 @@ from phyblock.making.questions.draft import (
     shuffled,
     slots_of,
 )
-from phyblock.making.questions.pictured import (
+from phyblock.making.questions.structures import group_of
+from phyblock.making.questions.view import (
+    View,
     are_told_apart,
+    drawn_view,
     of_kind,
     option_pictures,
     picture_of,
+    recolored,
     same_blocks,
 )
-from phyblock.making.questions.structures import group_of
-from phyblock.making.questions.view import View, drawn_view, recolored
+from phyblock.making.scenes.sketch import transformed
 from phyblock.sim.balance import surely_stands
 from phyblock.sim.contact import drop_height_m, find_overlaps
 from phyblock.sim.question_pictures import least_difference, seen, shown_pixels

@@ -13,7 +13,7 @@ from collections import Counter
 from phyblock.domain.blocks import KIT_PALETTE, BlockType
 from phyblock.domain.scene import MAX_CANDIDATES, Candidate, CandidateSet, Kind, Look, Scene
 from phyblock.errors import DataError, Problem
-from phyblock.making.poses import POSES
+from phyblock.making.scenes.sketch import POSES
 from phyblock.stable import drawn_bytes
 
 NEEDED: dict[BlockType, dict[str, float]] = {

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from phyblock.domain.blocks import BlockType
 from phyblock.domain.scene import Block
 from phyblock.domain.symmetry import Symmetry
-from phyblock.making.poses import transformed
-from phyblock.making.scenes.sketch import UNIT_M, Draft, Theme
+from phyblock.making.scenes.sketch import UNIT_M, Draft, Theme, transformed
 from phyblock.sim.contact import whole_bounds_m
 
 OUT = ("ramp-y", "ramp+y")

@@ -19,9 +19,8 @@ from phyblock.domain.scene import Block, Kind, Scene
 from phyblock.domain.symmetry import SYMMETRIES, fingerprint
 from phyblock.errors import DataError, Problem
 from phyblock.making.checks import LEVEL_LIMITS, is_acceptable
-from phyblock.making.poses import transformed
 from phyblock.making.scenes.designs import BUILDINGS, COMPOSITIONS, CREATURES, beside
-from phyblock.making.scenes.sketch import PALETTES, Draft, Palette, Theme, make_scene
+from phyblock.making.scenes.sketch import PALETTES, Draft, Palette, Theme, make_scene, transformed
 from phyblock.making.workers import Workers
 from phyblock.sim.contact import find_gaps
 from phyblock.stable import drawn_bytes

@@ -1,12 +1,13 @@
 """A sketch pad for structures: put blocks down one after another, as a person builds.
 
-A block is let down from above at a place on the grid, and its height follows from what it lands
-on; so a design holds no heights, no overlap and no gap, and its order can be built by hand.
+A block is let down from above at a place on the grid, in a pose by its name, and its height follows
+from what it lands on; so a design holds no heights, no overlap and no gap.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import functools
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Literal, TypeVar
@@ -14,11 +15,47 @@ from typing import Literal, TypeVar
 import numpy as np
 
 from phyblock.domain.aov import AOVGraph
-from phyblock.domain.blocks import BLOCK_TYPES, COLORS, KIT_PALETTE, SHAPES, BlockType, Color
+from phyblock.domain.blocks import BLOCK_TYPES, COLORS, KIT_PALETTE, SHAPES, BlockType, Color, Euler
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.poses import POSES
+from phyblock.domain.symmetry import Symmetry, fingerprint, image_deg, image_m, pose_class
 from phyblock.sim.contact import GROUND, drop_height_m, support_graph, whole_bounds_m
 from phyblock.sim.geometry import corners_m
+
+POSES: Mapping[BlockType, Mapping[str, Euler]] = {
+    block_type: shape.poses for block_type, shape in SHAPES.items()
+}
+"""Euler angles [degrees] of each named pose; the first is the one a design means by default."""
+
+
+def transformed(blocks: Sequence[Block], symmetry: Symmetry) -> tuple[Block, ...]:
+    """The blocks turned or mirrored about the origin; their graph stays what it was."""
+    return tuple(
+        replace(
+            block,
+            position_m=image_m(block.position_m, symmetry),
+            euler_deg=_turned(block.type, block.euler_deg, symmetry),
+        )
+        for block in blocks
+    )
+
+
+def find_twins(scenes: Iterable[Scene]) -> dict[str, str]:
+    """Scenes, by id, that equal an earlier one but for turning, mirroring and shifting: its id."""
+    first: dict[bytes, str] = {}
+    earlier = {scene.id: first.setdefault(fingerprint(scene.blocks), scene.id) for scene in scenes}
+    return {name: twin for name, twin in earlier.items() if twin != name}
+
+
+@functools.cache
+def _turned(block_type: BlockType, euler_deg: Euler, symmetry: Symmetry) -> Euler:
+    """Angles of the image of a pose, as `POSES` names them where it does."""
+    angles = image_deg(euler_deg, symmetry)
+    wanted = pose_class(block_type, angles)
+    for known in POSES[block_type].values():
+        if pose_class(block_type, known) == wanted:
+            return known
+    return angles
+
 
 UNIT_M = 0.025
 """Grid unit [m]: half the side of a cube."""

@@ -74,12 +74,6 @@ def test_show_prints_the_facts(data: Path) -> None:
         scenes("show", data, "t9")
 
 
-def test_stats_count(data: Path) -> None:
-    told = scenes("stats", data)
-    assert "data: 6 scenes, 6 base scenes" in told
-    assert "100.0 %" in told
-
-
 def test_render_names_views_backgrounds_and_kinds(data: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     extras = ("--composite", "--exploded", "--filmstrip", "--gif", "--webp")
