@@ -84,7 +84,7 @@ def ask_through(
         servers = Servers([Server("http://gone:1", client)], policy, told.append)  # type: ignore[arg-type]
         overall = asyncio.Semaphore(width)
         limits = Limits(width, overall, rest_s=servers.rest_s, clock=time.clock)
-        more: dict[str, Any] = {"cache": None, "budget": None, "prices": None}
+        more: dict[str, Any] = {"cache": None, "budget": None, "prices": None, "journal": None}
         config = ModelConfig(name="m", id="openai/m", api_base="http://gone:1/v1")
         model = ChatModel(config, servers, limits, policy=policy, observer=lambda _: None, **more)
         queue = [make_request(f"{n:03}") for n in range(samples)]
