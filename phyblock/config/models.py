@@ -60,8 +60,11 @@ OWN_SERVER = "a server of one's own"
 LARGEST_REPLY_BYTES = 32 * 1024 * 1024
 """Default limit of a reply's body [bytes]: a hundred times what the longest thoughts take."""
 
-_SELF_HOSTED = ("hosted_vllm", "lm_studio", "llamafile")
-"""Providers that are nowhere unless `api_base`, or the variable PROVIDER_API_BASE, says where."""
+_SELF_HOSTED = (
+    "hosted_vllm", "lm_studio", "llamafile", "custom_openai", "xinference", "litellm_proxy",
+)  # fmt: skip
+"""Providers that are nowhere unless `api_base`, or the variable PROVIDER_API_BASE, says where:
+litellm sends their prompts to api.openai.com otherwise, but for llamafile's."""
 _RENAMES_PARAMETERS = re.compile(r"o\d|gpt-5")
 _OWNERS = (("gpt", "openai"), ("o1", "openai"), ("o3", "openai"), ("claude", "anthropic"),
            ("gemini", "gemini"), ("qwen-vl", "dashscope"))  # fmt: skip
