@@ -12,9 +12,8 @@ from threading import Thread
 
 import click
 from rich.console import Console
-from rich.progress import Progress
 
-from phyblock.cli.console import make_console, print_path, shown_path
+from phyblock.cli.console import make_console, print_path
 from phyblock.cli.options import NAME_OR_PATH, UserPath, limit_option, sets_option
 from phyblock.cli.results import show_tables
 from phyblock.config.suite import load_suite
@@ -23,19 +22,10 @@ from phyblock.files import read_text
 from phyblock.resources import bundled
 from phyblock.run.plan import RunPlan
 from phyblock.run.preflight import bundled_suites, find_suite, prompt_dirs
-from phyblock.run.runner import RunResult, Session
 from phyblock.run.store import held_run, run_folder
-from phyblock.text import counted
-from phyblock.web.answers import (
-    FileAnswers,
-    check_folder,
-    check_offline,
-    export_session,
-    read_answers,
-)
 from phyblock.web.report import files_of, report_files
 from phyblock.web.server import Server, default_consent
-from phyblock.web.session import Person, PersonModel, PlaySession, outcomes, plan_session
+from phyblock.web.session import Person, PlaySession, outcomes, plan_session
 
 _INTERRUPTED = 130
 _RUNS = Path("results")
@@ -71,12 +61,7 @@ _LARGEST_CONSENT_BYTES = 64 * 1024
     "--out", type=UserPath(), metavar="DIR", help="Folder. [default: results/SUITE-DIGEST]"
 )
 @click.option("--port", type=click.IntRange(0, 65535), default=0, help="[default: any free one]")
-@click.option("--no-report", is_flag=True, help="With --import: tables alone, no page.")
 @click.option("--no-browser", is_flag=True, help="Print the address and open nothing.")
-@click.option("--export", type=UserPath(), metavar="DIR", help="Write a page without a server.")
-@click.option(
-    "--import", "answers", type=UserPath(), metavar="FILE", help="Take answers of such a page."
-)
 def play(
     suite: str,
     name: str,
@@ -87,39 +72,23 @@ def play(
     beside: tuple[Path, ...],
     out: Path | None,
     port: int,
-    no_report: bool,
     no_browser: bool,
-    export: Path | None,
-    answers: Path | None,
 ) -> int:
     """Answer SUITE yourself, in a browser: what a model is sent, with a click for a word.
 
     Answers are records of the model human:NAME in a run folder. The same command again goes on
     where it stopped.
     """
-    if export is not None and answers is not None:
-        raise SpecError(Problem("--export", "cannot be given with --import"))
-    if consent is not None:
-        text = _consent(consent)
-    else:
-        text = default_consent(offline=export is not None or answers is not None)
+    text = default_consent() if consent is None else _consent(consent)
     person = Person(name, number, text)
     path = find_suite(suite)
     data, prompts = bundled("benchmarks", "data"), prompt_dirs(path)
     loaded = load_suite(path, sets, data_dir=data, prompt_dirs=prompts)
     plan = plan_session(loaded, person, limit)
-    console = make_console()
-    if export is not None or answers is not None:
-        check_offline(plan)
-    if export is not None:
-        check_folder(export, _RUNS)
-        return _export(console, plan, person, export)
     folder = out or plan.folder_in(_RUNS)
     if held_run(folder, plan.manifest) is not None:
         run_folder(folder).check(files_of(page=True))
-    if answers is not None:
-        return _import(console, plan, person, folder, answers, page=not no_report)
-    return _serve(console, plan, person, folder, beside, port, opens=not no_browser)
+    return _serve(make_console(), plan, person, folder, beside, port, opens=not no_browser)
 
 
 def _consent(path: Path) -> str:
@@ -133,52 +102,6 @@ def _consent(path: Path) -> str:
     if not text:
         raise SpecError(Problem(str(path), "is empty", "--consent"))
     return text
-
-
-def _export(console: Console, plan: RunPlan, person: Person, folder: Path) -> int:
-    try:
-        with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
-            drawing = progress.add_task("Drawing tasks", total=plan.samples_per_model)
-
-            def done(number: int) -> None:
-                progress.update(drawing, completed=number)
-
-            page = asyncio.run(export_session(plan, person, folder, done))
-    finally:
-        plan.close()
-    tasks = counted(plan.samples_per_model, "task")
-    console.print(f"{tasks} for {person.name}; its answers come into a run with:")
-    words, again = iter(sys.argv[1:]), ["phyblock"]
-    for word in words:
-        if word == "--export":
-            next(words)
-        elif not word.startswith("--export="):
-            again.append(word)
-    print_path(console, f"  {shlex.join([*again, '--import', 'FILE'])}")
-    print_path(console, page)
-    return 0
-
-
-def _import(
-    console: Console, plan: RunPlan, person: Person, folder: Path, file: Path, *, page: bool
-) -> int:
-    given = read_answers(file, plan, person)
-    answers = FileAnswers(given, plan, person.model)
-    present = {person.model: PersonModel(person.model, plan.suite, answers.ask)}
-
-    async def run() -> RunResult:
-        session = Session(plan, folder, lambda _: None, use_cache=False, present=present)
-        async with session as opened:
-            return await opened.run()
-
-    result = asyncio.run(run())
-    made = show_tables(folder, plan.suite.tables, page=page)
-    if known := len(given) - answers.taken:
-        text = f"{known:,} of {counted(len(given), 'answer')} of {shown_path(file)} were there"
-        console.print(f"{text} already: those in the run stay.")
-    console.print(f"{result.settled:,} of {counted(result.samples, 'answer')} are there.")
-    print_path(console, made)
-    return 1 if result.left else 0
 
 
 def _serve(

@@ -57,24 +57,18 @@ _STATE = re.compile(r"(?:after=(\d{1,9}))?")
 _PICTURE = re.compile(r"picture/(\d{1,9})/(\d{1,3})")
 
 
-def assets(source: str, name: str = "") -> dict[str, tuple[str, bytes]]:
-    """Return type and content of every file of the page by name; the page itself is called `name`.
-
-    `source` is the script that brings questions and takes answers: from a server, or without one.
-    """
+def assets() -> dict[str, tuple[str, bytes]]:
+    """Return type and content of every file of the page by name; the page itself has none."""
     found = {one: asset(one) for one in _SHARED}
-    found |= {"source.js": asset(source), name: asset("play.html")}
+    found |= {"source.js": asset("served.js"), "": asset("play.html")}
     return {
         one: (_KINDS[(one or "play.html").rpartition(".")[2]], data) for one, data in found.items()
     }
 
 
-def default_consent(*, offline: bool) -> str:
-    """Return the text that a person agrees to where a study brings none of its own.
-
-    It says where answers are kept: by the server, or `offline` in the browser.
-    """
-    return asset("consent-offline.txt" if offline else "consent.txt").decode()
+def default_consent() -> str:
+    """Return the text that a person agrees to where a study brings none of its own."""
+    return asset("consent.txt").decode()
 
 
 class Server:
@@ -90,7 +84,7 @@ class Server:
         self._session = session
         self._token, self._code = secrets.token_urlsafe(24), secrets.token_urlsafe(24)
         self._code_used = threading.Lock()
-        self._assets = assets("served.js")
+        self._assets = assets()
         self._files: Mapping[str, Path] = {}
         handler = type("Handler", (_Handler,), {"server_of": self})
         try:

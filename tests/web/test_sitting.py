@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -312,99 +311,10 @@ def stored_prompt(run: Path, record: Raw) -> list[object]:
     return [*texts, *(image["sha256"] for image in record["prompt"]["images"])]
 
 
-KEPT = "JSON.parse(localStorage.getItem(localStorage.key(0)))"
-"""What the page without a server has stored."""
-BOB = ("play", "suite.yaml", "--name", "bob", "--consent", "consent.txt")
-
-
-def test_a_folder_without_a_server_gives_its_answers_as_a_file(
-    browser: Browser, workspace: Workspace
-) -> None:
-    folder = workspace.root / "export"
-    done = workspace.phyblock(*BOB, "--export", folder)
-    assert done.code == 0, done.err
-    check_nothing_is_given_away(folder)
-    # A larger sitting of earlier leaves no picture.
-    left = folder / "pictures" / "0099-1.png"
-    left.write_bytes(b"png")
-    with (folder / ".generated").open("a") as listed:
-        listed.write("pictures/0099-1.png\n")
-    assert workspace.phyblock(*BOB, "--export", folder).code == 0
-    assert not left.exists()
-    visit = opened(browser, (folder / "index.html").as_uri())
-    page = visit.page
-    page.get_by_role("button", name="I agree").click()
-    for number in range(1, 11):
-        task(page, number)
-        if number == 3:
-            while (spent_s := page.evaluate(f"{KEPT}?.before") or 0.0) < 0.4:
-                page.wait_for_timeout(50)
-            page.reload()
-            page.get_by_text("8 tasks of 10 are left").wait_for()
-            page.get_by_role("button", name="I agree").click()
-            task(page, number)
-        is_order = page.get_by_role("button", name="Clear").count() and 3 < number < 8
-        page.keyboard.type("cdab" if is_order else "d" if 3 < number < 8 else "4")
-        if number > 7:
-            page.keyboard.type("-1\n.5\n2.5")
-        page.keyboard.press("Control+Enter")
-    with page.expect_download() as download:
-        page.get_by_role("button", name="Save the answers").click()
-    file = workspace.root / "answers.json"
-    download.value.save_as(file)
-    page.close()
-    assert not visit.complaints
-    assert visit.asked_elsewhere(folder.as_uri(), "blob:") == []
-    content = json.loads(file.read_text(encoding="utf-8"))
-    check_bad_files(workspace, content)
-    done = workspace.phyblock(*BOB, "--import", file, "--out", "bob", "--no-report")
-    assert done.code == 0, done.err
-    records = answered(workspace.root / "bob")
-    assert {record["model"] for record in records} == {"human:bob"}
-    assert content["answers"][2]["took_s"] > spent_s, "a reload sets the clock back"
-    assert [*map(said, records[:3])] == [plan(4)] * 3
-    assert {*map(said, records[3:7])} == {"Answer: D", "Answer: C, D, A, B"}
-    assert {*map(said, records[7:])} == {poses("4 at (-1, 0.5, 2.5) turned (0, 0, 0)")}
-    assert [record["reply"]["latency_s"] for record in records] == [
-        answer["took_s"] for answer in content["answers"]
-    ]
-    again = workspace.phyblock(*BOB, "--import", file, "--out", "bob", "--no-report")
-    assert "were there already: those in the run stay" in " ".join(again.out.split())
-    assert answered(workspace.root / "bob") == records
-    shutil.rmtree(folder)
-
-
-SHOWN = {
-    *("head", "format", "run", "model", "consent", "name", "text", "questions"),
-    *("number", "of", "turn", "messages", "role", "parts", "picture", "label", "width", "height"),
-    *("choices", "spots", "box", "least", "most", "repeats", "noun"),
-    *("fields", "unit", "decimals", "step", "leap", "start"),
-}
-
-
-def check_nothing_is_given_away(folder: Path) -> None:
-    """What is exported says what is shown, and neither names nor fields tell what is right."""
-    script = (folder / "questions.js").read_text(encoding="utf-8")
-    names: set[str] = set()
-
-    def fields(found: Raw) -> Raw:
-        names.update(found)
-        return found
-
-    json.loads(script.removeprefix("const SESSION = ").rstrip(";\n"), object_hook=fields)
-    assert names == SHOWN
-    files = [path.relative_to(folder).as_posix() for path in folder.rglob("*")]
-    assert not any(re.search(r"\bt[123]\b|-001", text) for text in (script, *files))
-
-
 @pytest.mark.parametrize(
     ("words", "error"),
     [
         (["--name", "Ada Lovelace"], "--name: is no name"),
-        (["--name", "x", "--set", "tracks=[step_planning]", "--export", "e"], "turn by turn"),
-        (["--name", "x", "--export", "e", "--import", "f"], "cannot be given with --import"),
-        (["--name", "x", "--export", "out"], "--export: is a folder of runs"),
-        (["--name", "x", "--import", "nowhere.json"], "nowhere.json: cannot be read"),
         (["--name", "x", "--beside", "nowhere"], "nowhere"),
         (["--name", "x", "--set", "vary.repeats=2"], "asks in several ways"),
     ],
@@ -424,21 +334,3 @@ def test_a_person_is_not_asked_by_run(workspace: Workspace) -> None:
     done = workspace.run("--models", "human:eve")
     assert done.code == 2
     assert "is a person, who answers in `phyblock play`" in done.err
-
-
-def check_bad_files(workspace: Workspace, content: dict[str, Any]) -> None:
-    """Files of another sitting, or that are broken, are refused as a whole."""
-    first, *_, last = content["answers"]
-    for change, error in (
-        ({"model": "human:eve"}, "model: is of another session"),
-        ({"answers": [{**first, "number": 11}]}, "answers[0].number: is no question"),
-        ({"answers": [first, first]}, "answers[1].number: is there twice"),
-        ({"answers": [{**first, "picks": [99]}]}, "question 1: holds picks outside"),
-        ({"answers": [{**last, "numbers": [[0.001] * 6]}]}, "x 0.001 with more than 2 decimals"),
-    ):
-        file = workspace.root / "bad.json"
-        file.write_text(json.dumps({**content, **change}), encoding="utf-8")
-        done = workspace.phyblock(*BOB, "--import", file, "--out", "bad", "--no-report")
-        assert done.code == 2, done.out
-        assert error in done.err
-        assert not (workspace.root / "bad").exists()

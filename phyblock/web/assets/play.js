@@ -72,14 +72,6 @@
       progress.textContent = "Done";
       main.replaceChildren(Results.page(results, () => post("finish")));
     },
-    saved({ session }) {
-      progress.textContent = "Done";
-      card(
-        el("h1", {}, "Thank you"),
-        el("p", {}, "All tasks are answered. Save your answers as a file, and give it to whoever asked you."),
-        primary("Save the answers", session.save),
-      );
-    },
   };
 
   async function submit(change, answer) {
@@ -117,7 +109,7 @@
         const state = await Session.next(shown.change);
         if (state.change === shown.change) continue;
         take(state);
-        if (["closed", "done", "saved"].includes(state.phase)) return;
+        if (["closed", "done"].includes(state.phase)) return;
       } catch {
         if (shown.phase !== "lost") take({ change: -1, phase: "lost" });
         await new Promise((go) => setTimeout(go, RETRY_MS));
