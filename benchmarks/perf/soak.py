@@ -33,6 +33,8 @@ FLOOR = "import json, sys\nfor line in open(sys.argv[1], 'rb'):\n    json.loads(
 RESUME = """
 import asyncio, sys
 from pathlib import Path
+from phyblock.config.models import load_models
+from phyblock.config.suite import load_suite
 from phyblock.resources import bundled
 from phyblock.run.plan import make_plan
 from phyblock.run.runner import Session
