@@ -163,6 +163,7 @@ _MOST_TURNED = 240
 _MOST_TRIED = 12
 _ROUNDS = 5
 _DIGITS = 6
+_PLACE_DIGITS = 3
 _TRACE_SLACK = 1e-4
 
 
@@ -172,6 +173,11 @@ class Motion:
 
     turn_rad: float = 0.0
     shift_cm: tuple[float, float] = (0.0, 0.0)
+
+    def place(self) -> tuple[float, ...]:
+        """Return numbers that tell motions apart, the same for turns by a full circle more."""
+        parts = (math.cos(self.turn_rad), math.sin(self.turn_rad), *self.shift_cm)
+        return tuple(round(part, _PLACE_DIGITS) + 0.0 for part in parts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,11 +226,12 @@ class Alignment:
     def likely_motions(self) -> list[tuple[int, Motion]]:
         """Motions, each with the number of tolerances its steps are within in any order.
 
-        Those with most come first, then those that bring steps nearest.
+        Those with most come first, then those that bring steps nearest. A goal that looks the same
+        after a turn has motions of equal rank, of which the order of steps may allow but one.
         """
         if not self.equal.any():
             return [(0, Motion())]
-        ranked: dict[tuple[float, float], Motion] = {}
+        ranked: dict[tuple[float, ...], Motion] = {}
         for turn, shift in zip(*self._likeliest(*self._hypotheses()), strict=True):
             motion = Motion(float(turn), (float(shift[0]), float(shift[1])))
             for _ in range(_ROUNDS):
@@ -232,7 +239,7 @@ class Alignment:
                 pairs = [(s, v) for s, v in enumerate(assigned(near)) if v is not None]
                 within = sum(int(near.within[pair]) for pair in pairs)
                 far = plain_sum(min(float(near.distance_cm[pair]), FARTHEST_CM) for pair in pairs)
-                rank = (float(within), -round(far, _DIGITS))
+                rank = (float(within), -round(far, _DIGITS), *motion.place())
                 if rank in ranked:
                     break
                 ranked[rank] = motion
@@ -241,7 +248,7 @@ class Alignment:
                     break
                 motion = self._fitted(close, near, motion)
         best = sorted(ranked.items(), key=lambda item: item[0], reverse=True)
-        return [(int(within), motion) for (within, _), motion in best]
+        return [(int(rank[0]), motion) for rank, motion in best]
 
     def _fitted(self, pairs: list[tuple[int, int]], near: Nearness, before: Motion) -> Motion:
         """The motion of weighted least squares over pairs, in the plane of the floor (Kabsch).
@@ -333,11 +340,12 @@ class Alignment:
         limits = np.array(TOLERANCES_CM)
 
         def ranked(distance: Floats) -> NDArray[np.int64]:
-            """Places of hypotheses, the best first."""
+            """Places of hypotheses, the best first; of equal ones the same, however numbered."""
             nearest = distance.min(axis=2)
             within = (nearest[..., None] <= limits + 10**-_DIGITS).sum(axis=(1, 2))
             far = np.round(np.minimum(nearest, FARTHEST_CM).sum(axis=1), _DIGITS)
-            return np.lexsort((far, -within))
+            turned = (np.cos(turns_rad), np.sin(turns_rad), *shifts_cm.T)
+            return np.lexsort((*np.round(turned, _PLACE_DIGITS), far, -within))
 
         p, q = self.steps.centers_cm, self.goal.centers_cm
         rise = (p[:, None, 2] - q[None, :, 2]) ** 2

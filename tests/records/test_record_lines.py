@@ -118,11 +118,6 @@ def test_text_that_no_output_could_hold_is_read_without_it(tmp_path: Path) -> No
     assert run.records["text"].tolist() == ["half ? of one"]
 
 
-def test_lines_that_end_as_on_other_systems_are_read(tmp_path: Path) -> None:
-    folder = folder_with(tmp_path, *(line + b"\r" for line in lines_before()[:1] * 2))
-    assert len(load_run(folder).records) == 1
-
-
 def test_a_sample_is_taken_from_its_last_line(tmp_path: Path) -> None:
     first, last = lines_before()[0], with_value("reply.text", "later")
     records = RecordLines(folder_with(tmp_path, first, last))

@@ -135,7 +135,8 @@ def test_a_run_without_records_is_empty(tmp_path: Path) -> None:
     ("line", "at", "field"),
     [
         ('{"sample": "x', ":14", ""),
-        ("\0\0\0", ":1", ""),
+        ("\0\0\0", "", ""),
+        ("{}\r", "", ""),
         ("[1, 2]", "", ""),
         ("{}", "", "track"),
         (json.dumps(record() | {"seed": "first"}), "", "seed"),

@@ -195,6 +195,22 @@ def test_symmetries_and_the_order_of_equal_blocks_in_the_file_change_nothing(
     assert [summary(score) for score in one] == [summary(score) for score in two]
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_a_goal_that_looks_the_same_after_half_a_turn_is_met_whichever_way(seed: int) -> None:
+    one, two = (
+        Block(n, "cube", "red", (0.0, y, 0.0), (0.0, 0.0, 0.0), depend, 1)
+        for n, y, depend in ((1, 0.0, ()), (2, 0.025, (1,)))
+    )
+    candidates = CandidateSet((Candidate("cube", "red", (0.0, 0.0, 0.0)),))
+    scene = Scene("s", (2,), (one, two), ("s",))
+    steps = noisy(laid(scene, candidates, [0, 1]), np.random.default_rng(seed), 0.012)
+    scores = [
+        PoseScorer(replace(scene, blocks=blocks), candidates, "B", pieces).score(steps)
+        for blocks in ((one, two), (two, one))
+    ]
+    assert [summary(score) for score in scores[0]] == [summary(score) for score in scores[1]]
+
+
 def _euler(matrix: np.ndarray) -> tuple[float, float, float]:
     w = math.sqrt(max(0.0, 1 + np.trace(matrix))) / 2
     if w > 1e-3:
