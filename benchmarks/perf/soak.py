@@ -5,8 +5,8 @@
 A run is made of recorded replies for the bundled scenes: the real command asks for them once, and
 its records are repeated under so many seeds that there are `--samples`. Then each in a process of
 its own: the floor, which reads the same lines as JSON and does nothing with them; resuming, which
-opens the run, reads its records and finds nothing left to ask; `phyblock report --print`; `phyblock
-report`. Prints wall and CPU seconds, their ratio to the floor's wall seconds, and the peak of
+opens the run, reads its records and finds nothing left to ask; `phyblock report --print`; and
+`phyblock report`, `site` and `bundle`. Prints wall and CPU seconds, their ratio to the floor's wall seconds, and the peak of
 resident memory.
 """
 
@@ -120,9 +120,14 @@ def main() -> None:
         show("the lines as JSON", floor, floor)
         resume = (sys.executable, "-c", RESUME, str(folder))
         show("resuming", run_measured(resume, os.environ), floor)
-        verbs = ("tables",) if given.no_report else ("tables", "report")
-        for verb in verbs:
-            show(f"phyblock {verb}", run_measured((*PHYBLOCK, verb, str(run)), os.environ), floor)
+        commands = [("report", str(run), "--print")]
+        if not given.no_report:
+            site = ("site", str(run), "--out", str(folder / "site"))
+            bundle = ("bundle", str(run), "--out", str(folder / "bundle.zip"))
+            commands += [("report", str(run)), site, bundle]
+        for words in commands:
+            named = "report --print" if "--print" in words else words[0]
+            show(f"phyblock {named}", run_measured((*PHYBLOCK, *words), os.environ), floor)
 
 
 if __name__ == "__main__":
