@@ -2,13 +2,15 @@
 
 A bundle is a ZIP archive of three members, the same bytes for the same run. It holds no prompts, no
 pictures, of paths of this machine the last part, no address of a server, and of a failed request
-its kind and status alone. Whoever sends one may mean harm: members are known by name, nothing is
-written under a name that the archive says, and no member is larger than its bound.
+its kind and status alone. It is written as a stream, without a copy under a name. Whoever sends one
+may mean harm: members are known by name, nothing is written under a name that the archive says, and
+no member is larger than its bound.
 """
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import io
 import re
 import shutil
@@ -17,40 +19,48 @@ import struct
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+from functools import partial
 from importlib.metadata import version
 from itertools import zip_longest
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import Annotated, Any
+from typing import IO, Annotated, Any
 
 from pydantic import Field, TypeAdapter, ValidationError
 
 from phyblock.errors import DataError, InputError, Problem, SpecError, StoreError, reason_of
-from phyblock.files import atomic_write, digest_of_file, open_regular, read_bytes, write_named
+from phyblock.files import digest_of_file, open_regular, read_bytes, write_named
 from phyblock.parsing.text import READER_VERSION
 from phyblock.records.files import RECORDS, read_records
 from phyblock.records.line import Line, decode, problems_of
 from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
-from phyblock.records.record import Record
+from phyblock.records.record import Record, SentPrompt
 from phyblock.records.reply import Reply
 from phyblock.resources import bundled
 from phyblock.results.design import read_design
-from phyblock.results.tables import write_tables
+from phyblock.run.judge import about_prompt
 from phyblock.run.plan import recorded_dataset
 from phyblock.run.rescore import judged_anew, recorded_suite, reopen_tracks
-from phyblock.run.store import manifest_text, record_lines, run_folder, write_run
+from phyblock.run.store import manifest_text, prompt_of, record_lines, run_folder
+from phyblock.stable import hex_digest
 from phyblock.text import some_of
+from phyblock.tracks import AnyTrack, EpisodeTrack, Item, kind_of
 from phyblock.tracks.base import kinds_with_physics
 
 BUNDLE_FILE = "bundle.zip"
 """Its name in the run's folder, unless another place is named."""
 ABOUT = "bundle.json"
-FELL = "what fell is taken from the records"
-"""In words, the part that is not scored again."""
 _MB = 1024 * 1024
-MEMBERS = {ABOUT: 4 * _MB, MANIFEST: 2 * _MB, RECORDS: 512 * _MB}
+MEMBERS = {MANIFEST: 2 * _MB, RECORDS: 512 * _MB, ABOUT: 4 * _MB}
 """Members in their order, with their largest sizes [bytes]."""
+_CHUNK_BYTES = _MB
+_SHOWN = ("prompt", "pictures", "examples")
+"""Parts of a track's identity that say what models were shown."""
+_EARLIEST = datetime(2025, 1, 1, tzinfo=UTC)
+_CLOCKS = timedelta(days=1)
+"""Times of records lie after the one, and in the future by no more than clocks differ."""
 _LARGEST_BYTES = 512 * _MB
 _MOST_PACKED, _FREE_BYTES = 100, 16 * _MB
 """A member above so many bytes may be so many times smaller than what it holds: records of rules,
@@ -80,25 +90,21 @@ class About(Line):
     """Version of the readers by which it scores replies."""
     files: dict[str, str]
     """Digests of the other members."""
-    tables: dict[str, str]
-    """Digests of the tables that the records make, by file name."""
 
 
 @dataclass(frozen=True)
 class Verified:
     """A bundle that was scored again: `folder` is its run, with the data of this machine, while it
-    is open; `records` and `tables` are how many came out as the same bytes, `expected` how many
-    samples a whole run has. Of the tracks in `physics`, by their titles, what fell is taken from
-    the records.
+    is open; `records` came out as the same bytes, `expected` is how many samples a whole run has.
+    `unverified` are sentences on what was taken as the bundle says it.
     """
 
     about: About
     manifest: Manifest
     folder: Path
     records: int
-    tables: int
     expected: int
-    physics: tuple[str, ...]
+    unverified: tuple[str, ...]
 
     @property
     def is_whole(self) -> bool:
@@ -106,65 +112,50 @@ class Verified:
         return self.records == self.expected
 
 
-@dataclass(frozen=True)
-class Bundled:
-    """A bundle that was written; `verified` is None where it could not be scored again here, and
-    `lacking` says why.
-    """
+def bundle_run(folder: Path, out: Path | None = None) -> Path:
+    """Write a bundle of the run in `folder`, the same bytes for the same run, and return its path.
 
-    path: Path
-    size_bytes: int
-    verified: Verified | None
-    lacking: str = ""
-
-
-def bundle_run(folder: Path, out: Path | None = None, data: Sequence[Path] = ()) -> Bundled:
-    """Write a bundle of the run in `folder`, the same bytes for the same run.
-
-    Before it is kept it is verified as `opened_bundle` does, where its data are at hand; `data` are
-    folders to look for them in, beside where the run found them. Raises StoreError for a folder
-    that is no run, a run whose scores do not come out again, or a file that cannot be written.
+    Raises StoreError for a folder that is no run, or a file that cannot be written.
     """
     manifest = read_manifest(folder)
-    held = (manifest.dataset, manifest.questions)
-    known = [Path(one.root) for one in held if one is not None and one.root]
-    with tempfile.TemporaryDirectory(prefix="phyblock-") as scratch:
-        made, draft = Path(scratch, "run"), Path(scratch, BUNDLE_FILE)
-        write_run(made, portable_manifest(manifest), map(portable, read_records(folder, manifest)))
-        about = About(
-            format=1,
-            run=manifest.identity,
-            phyblock=version("phyblock"),
-            readers=READER_VERSION,
-            files={name: digest_of_file(made / name) for name in (MANIFEST, RECORDS)},
-            tables=_tables(made),
-        )
-        files = {name: (made / name).read_bytes() for name in (MANIFEST, RECORDS)}
-        packed = pack({**files, ABOUT: about.as_json().encode()})
-        atomic_write(draft, packed)
-        verified, lacking = None, ""
-        try:
-            with opened_bundle(draft, [*data, *known], name=str(folder)) as verified:
-                pass
-        except DataError as error:
-            lacking = str(error.problems[0])
-    path = out or run_folder(folder).write({BUNDLE_FILE: packed})[0]
-    if out is not None:
+    text = manifest_text(portable_manifest(manifest)).encode()
+    digest = hashlib.sha256()
+
+    def records() -> Iterator[bytes]:
+        for line in record_lines(map(portable, read_records(folder, manifest))):
+            data = line.encode("utf-8", "replace")
+            digest.update(data)
+            yield data
+
+    def about() -> Iterator[bytes]:
+        digests = {MANIFEST: hex_digest(text), RECORDS: digest.hexdigest()}
+        run, made_by = manifest.identity, version("phyblock")
+        told = About(format=1, run=run, phyblock=made_by, readers=READER_VERSION, files=digests)
+        yield told.as_json().encode()
+
+    # A file without a name: a kill leaves nothing behind.
+    with tempfile.TemporaryFile() as file:
+        pack(file, {MANIFEST: [text], RECORDS: records(), ABOUT: about()})
+        file.seek(0)
+        packed = iter(partial(file.read, _CHUNK_BYTES), b"")
+        if out is None:
+            return run_folder(folder).write({BUNDLE_FILE: packed})[0]
         write_named(out, packed)
-    return Bundled(path, len(packed), verified, lacking)
+        return out
 
 
 @contextlib.contextmanager
-def opened_bundle(path: Path, data: Sequence[Path] = (), name: str = "") -> Iterator[Verified]:
-    """Unpack a bundle, score its replies again, and hold records and tables against what it says.
+def opened_bundle(path: Path, data: Sequence[Path] = ()) -> Iterator[Verified]:
+    """Unpack a bundle, score its replies and render its prompts again, and hold its records against
+    what comes out.
 
-    `data` are folders in which its data may be, beside the sets that come with phyblock; `name` is
-    what messages call it. Raises StoreError for what is no bundle, was changed, or scores otherwise
-    than it says, and DataError where its data are not at hand.
+    `data` are folders in which its data may be, beside the sets that come with phyblock. Raises
+    StoreError for what is no bundle, was changed, or comes out otherwise than it says, and
+    DataError where its data are not at hand.
     """
-    where = name or str(path)
+    where = str(path)
     with tempfile.TemporaryDirectory(prefix="phyblock-") as scratch:
-        folder, again = Path(scratch, "run"), Path(scratch, "again")
+        folder = Path(scratch, "run")
         folder.mkdir()
         with named(folder, where):
             unpack(path, folder)
@@ -172,25 +163,127 @@ def opened_bundle(path: Path, data: Sequence[Path] = (), name: str = "") -> Iter
             about = _read_about(path, folder, manifest)
             here = _localized(folder, manifest, data, where)
             (folder / MANIFEST).write_text(manifest_text(here), encoding="utf-8")
-            judged, records = judged_anew(folder)
-        lines = (line.encode() for line in record_lines(records))
-        with (folder / RECORDS).open("rb") as stored:
-            pairs = enumerate(zip_longest(stored, lines), 1)
-            wrong = [str(number) for number, (was, now) in pairs if was != now]
-        if wrong:
-            found = f"{len(wrong):,} records, at lines {some_of(wrong)} of {RECORDS}"
-            raise _otherwise(where, about, "records", found)
-        for field in ("items", "scenes", "scenes_by_level"):
-            if getattr(manifest, field) != getattr(judged, field):
-                raise _otherwise(where, about, field)
-        write_run(again, manifest, ())
-        shutil.copyfile(folder / RECORDS, again / RECORDS)
-        tables = _tables(again)
-        if names := sorted(dict(tables.items() ^ about.tables.items())):
-            raise _otherwise(where, about, "tables", some_of(names))
+            judged, again = judged_anew(folder)
+            prompts = AskedPrompts(folder, here, is_ours=about.phyblock == version("phyblock"))
+            wrong: dict[str, list[str]] = {"records": [], "prompts": [], "time": []}
+            count, seen = 0, set[str]()
+            with (folder / RECORDS).open("rb") as stored:
+                for count, (was, record) in enumerate(zip_longest(stored, again), 1):
+                    now = b"" if record is None else next(record_lines([record])).encode()
+                    if record is None or was != now or record.sample in seen:
+                        wrong["records"].append(str(count))
+                        continue
+                    seen.add(record.sample)
+                    if not prompts.made(record):
+                        wrong["prompts"].append(str(count))
+                    if not _is_time(record.time):
+                        wrong["time"].append(str(count))
+        for what, lines in wrong.items():
+            if lines:
+                found = f"{len(lines):,} records, at lines {some_of(lines)} of {RECORDS}"
+                raise _otherwise(where, about, what, found)
+        for name in ("items", "scenes", "scenes_by_level"):
+            if getattr(manifest, name) != getattr(judged, name):
+                raise _otherwise(where, about, name)
+        if prompts.differ or not _is_time(manifest.created):
+            raise _otherwise(where, about, ", ".join(prompts.differ) or "created")
         expected = read_design(manifest.fields(), where).all_samples
-        physics = tuple(kind.title for kind in kinds_with_physics(manifest.suite))
-        yield Verified(about, manifest, folder, len(records), len(tables), expected, physics)
+        physics = ", ".join(kind.title for kind in kinds_with_physics(manifest.suite))
+        fell = (f"{physics}: what fell, which is taken from the records.",) if physics else ()
+        unverified = (*prompts.unverified, *fell, *_NEVER_SHOWN)
+        yield Verified(about, manifest, folder, count, expected, unverified)
+
+
+_NEVER_SHOWN = (
+    "That the models gave these replies, when, how fast and at what cost: no bundle can show it.",
+)
+
+
+def _is_time(text: str) -> bool:
+    """True if a time can be that of a run; "" is none."""
+    try:
+        return not text or _EARLIEST < datetime.fromisoformat(text) < datetime.now(UTC) + _CLOCKS
+    except (TypeError, ValueError):
+        return False
+
+
+class AskedPrompts:
+    """The prompts of a run, rendered again from its data and the templates at hand.
+
+    `differ` names what the manifest says of prompts and pictures that is not so. What cannot be
+    told stands in `unverified`: templates of the run's author, the prompts of later turns, and the
+    bytes of pictures, whose recipes alone are held against the data.
+    """
+
+    def __init__(self, folder: Path, manifest: Manifest, *, is_ours: bool) -> None:
+        self.differ: list[str] = []
+        self._tracks: dict[tuple[str, str], AnyTrack] = {}
+        self._items: dict[tuple[str, str], Item] = {}
+        self._unknown: set[tuple[str, str]] = set()
+        self._known: dict[tuple[object, ...], tuple[object, ...]] = {}
+        told: dict[str, None] = {}
+        suite = recorded_suite(folder, manifest)
+        dataset = recorded_dataset(folder, manifest, suite.levels, None)
+        for variant in dict.fromkeys(one.shown for one in suite.vary.variants):
+            stored = manifest.variants.get(variant.key, manifest.tracks)
+            for name in suite.tracks:
+                title, was = kind_of(name).title, stored.get(name, {})
+                if was.get("prompt") is None:
+                    continue
+                one = suite.at(variant).model_copy(update={"tracks": (name,)})
+                try:
+                    (track,) = reopen_tracks(folder, manifest, one, dataset, with_prompts=True)
+                    now = track.identity()
+                except InputError as error:
+                    told[f"{title}: the prompts, since {error.problems[0]}"] = None
+                    self._unknown.add((variant.key, name))
+                    continue
+                track.close()
+                changed = [key for key in _SHOWN if was.get(key) != now.get(key)]
+                is_default = _name_of(was["prompt"]) == _name_of(now["prompt"])
+                if changed and not (is_default and is_ours):
+                    told[f"{title}: the prompts, of a template that is not at hand."] = None
+                    self._unknown.add((variant.key, name))
+                    continue
+                self.differ += [f"tracks.{name}.{key}" for key in changed]
+                if isinstance(track, EpisodeTrack):
+                    told[f"{title}: the prompts after the first of an episode."] = None
+                self._tracks[variant.key, name] = track
+                self._items |= {(name, item.key): item for item in track.items}
+        if self._tracks:
+            told["The bytes of pictures: their recipes are those of the data."] = None
+        self.unverified = tuple(told)
+
+    def made(self, record: Record) -> bool:
+        """True if the prompt of a record is what its item is asked by, as far as can be told."""
+        turns = record.asked_turns
+        prompt = turns[0].prompt if turns else record.prompt
+        at = (record.way.shown.key, record.track)
+        if prompt is None or at in self._unknown:
+            return True
+        track = self._tracks.get(at)
+        if track is None:
+            return False
+        item = self._items[record.track, record.item]
+        shown = track.shown(item, record.seed)
+        key = (*at, record.item, shown is item or record.seed)
+        if key not in self._known:
+            request, _ = next(iter(track.outlines(shown)))
+            self._known[key] = _sent(
+                about_prompt(request, track.prompt_name, prompt_of(request.messages).sha256)
+            )
+        return self._known[key] == _sent(prompt)
+
+
+def _name_of(prompt: object) -> object:
+    """The name of a prompt, of what a manifest says of it."""
+    return prompt.get("name") if isinstance(prompt, Mapping) else prompt
+
+
+def _sent(prompt: SentPrompt) -> tuple[object, ...]:
+    """All that is known of a prompt without its pictures' bytes."""
+    labels = tuple(image.label for image in prompt.images)
+    return prompt.template, prompt.version, prompt.messages, prompt.examples, labels
 
 
 def _otherwise(where: str, about: About, what: str, found: str = "") -> StoreError:
@@ -200,7 +293,7 @@ def _otherwise(where: str, about: About, what: str, found: str = "") -> StoreErr
             f"replies were read by readers {about.readers}, here are {READER_VERSION}: take the "
             f"phyblock that made it ({about.phyblock}), or score the run again"
         )
-    message = "does not verify: scored again, they come out otherwise"
+    message = "does not verify: made again, they come out otherwise"
     return StoreError(Problem(where, message, what, found, hint=hint))
 
 
@@ -219,11 +312,6 @@ def named(folder: Path, where: str) -> Iterator[None]:
             )
             for one in error.problems
         ) from error
-
-
-def _tables(folder: Path) -> dict[str, str]:
-    """Write the tables of a run into its folder; their digests by their file names."""
-    return {path.name: digest_of_file(path) for path in sorted(write_tables(folder).files)}
 
 
 def _read_about(path: Path, folder: Path, manifest: Manifest) -> About:
@@ -269,7 +357,7 @@ def _localized(folder: Path, manifest: Manifest, data: Sequence[Path], where: st
             try:
                 dataset = recorded_dataset(folder, here, levels, None)
                 if part == "questions":
-                    for track in reopen_tracks(folder, here, suite, dataset).values():
+                    for track in reopen_tracks(folder, here, suite, dataset):
                         track.close()
             except (DataError, SpecError):
                 continue
@@ -336,21 +424,24 @@ def portable(record: Record) -> Record:
     return record.model_copy(update=changed)
 
 
-def pack(contents: Mapping[str, bytes]) -> bytes:
-    """Return an archive of all `MEMBERS`; the bytes depend on the contents and zlib alone.
+def pack(file: IO[bytes], contents: Mapping[str, Iterable[bytes]]) -> None:
+    """Write an archive of all `MEMBERS`, whose bytes depend on the contents and zlib alone.
 
-    Raises StoreError for a member that is too large to be read again.
+    The pieces of a member are taken as they come. Raises StoreError for one that is too large to
+    be read again.
     """
-    file = io.BytesIO()
     with zipfile.ZipFile(file, "w", allowZip64=False) as archive:
         for name, most in MEMBERS.items():
-            if len(contents[name]) > most:
-                raise StoreError(Problem(name, f"is larger than {most // _MB:,} MB"))
             info = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
             info.compress_type, info.create_system = zipfile.ZIP_DEFLATED, 3
             info.external_attr = (stat.S_IFREG | 0o644) << 16
-            archive.writestr(info, contents[name], compresslevel=9)
-    return file.getvalue()
+            left = most
+            with archive.open(info, "w") as member:
+                for piece in contents[name]:
+                    left -= len(piece)
+                    if left < 0:
+                        raise StoreError(Problem(name, f"is larger than {most // _MB:,} MB"))
+                    member.write(piece)
 
 
 def unpack(path: Path, folder: Path) -> None:

@@ -307,7 +307,7 @@ def append_whole(number: int, data: bytes, *, sync: bool = False) -> None:
         raise
 
 
-def write_named(path: Path, data: bytes | str) -> None:
+def write_named(path: Path, data: bytes | str | Iterable[bytes]) -> None:
     """Write the very file that a person named, in place of what is there, and folders above it.
 
     A link is followed, as they made it. Raises StoreError where the disk refuses, and for what is
@@ -399,7 +399,7 @@ class OutFolder:
         for folder in _folders(names):
             make_folder(self.path / folder, _MOVE)
 
-    def write(self, files: Mapping[str, bytes | str]) -> tuple[Path, ...]:
+    def write(self, files: Mapping[str, bytes | str | Iterable[bytes]]) -> tuple[Path, ...]:
         """Write files by name, each whole or not at all; raises as `check`, or as the disk does."""
         self.claim(files)
         for name, data in files.items():

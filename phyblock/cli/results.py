@@ -25,7 +25,6 @@ from phyblock.errors import Problem, SpecError
 from phyblock.text import counted, one_line
 
 if TYPE_CHECKING:
-    from phyblock.bundle import Verified
     from phyblock.results.tables import Summary
 
 _MB = 1e6
@@ -317,57 +316,46 @@ def export(
 @click.command()
 @run_argument
 @click.option("--out", type=UserPath(), metavar="FILE", help="The file. [default: RUN/bundle.zip]")
-@data_folders_option
-def bundle(run: Path, out: Path | None, data: tuple[Path, ...]) -> None:
+def bundle(run: Path, out: Path | None) -> None:
     """Write the folder RUN as one file: manifest, records, digests.
 
     Leaves out keys, pictures, prompts, addresses of servers, and all but the last part of paths of
-    this machine. Keeps what models wrote, and what they were sent beside the prompt. Scores the
-    replies again first, where the data are at hand, and refuses a run whose scores do not come out
-    the same.
+    this machine. Keeps what models wrote, and what they were sent beside the prompt. `phyblock
+    verify` scores it again.
     """
     from phyblock.bundle import bundle_run
 
     console = make_console()
-    made = bundle_run(run, out, data)
-    if made.verified is None:
-        console.print(f"It was not verified here: {made.lacking}")
-    else:
-        _print_verified(console, made.verified)
-    console.print(f"{made.size_bytes / _MB:.1f} MB:")
-    print_path(console, made.path)
-
-
-def _print_verified(console: Console, verified: Verified) -> None:
-    samples = f"{verified.records:,} of {verified.expected:,} expected samples"
-    console.print(f"{samples}." if verified.is_whole else f"{samples}: the run is not whole.")
-    models = counted(len(verified.manifest.models), "model")
-    records, tables = counted(verified.records, "record"), counted(verified.tables, "table file")
-    console.print(f"{records} of {models}, scored again, and {tables} are the same bytes.")
+    path = bundle_run(run, out)
+    console.print(f"{path.stat().st_size / _MB:.1f} MB:")
+    print_path(console, path)
 
 
 @click.command()
 @click.argument("file", type=UserPath())
 @data_folders_option
 def verify(file: Path, data: tuple[Path, ...]) -> None:
-    """Score the replies in the bundle FILE again; say whether its records and tables come out as
-    the same bytes, and whether samples were left out. Exits with 2 where they do not come out.
+    """Score the replies in the bundle FILE again, and render its prompts; say whether its records
+    come out as the same bytes, what was not verified, and whether samples were left out. Exits with
+    2 where they do not come out.
 
     Calls no model. A bundle holds no data: sets that come with phyblock are found; name others
     with --data.
     """
-    from phyblock.bundle import FELL, opened_bundle
+    from phyblock.bundle import opened_bundle
 
     console = make_console()
     with opened_bundle(file, data) as verified:
         console.print(f"{shown_path(file)} verifies.")
-        _print_verified(console, verified)
+        samples = f"{verified.records:,} of {verified.expected:,} expected samples"
+        console.print(f"{samples}." if verified.is_whole else f"{samples}: the run is not whole.")
+        models = counted(len(verified.manifest.models), "model")
+        records = counted(verified.records, "record")
+        console.print(f"{records} of {models}, scored again, are the same bytes.")
         console.print(f"Run {verified.manifest.run}, made with phyblock {verified.about.phyblock}.")
-        if verified.physics:
-            tracks = ", ".join(verified.physics)
-            console.print(f"{tracks}: physics was not carried out, {FELL}.")
-        console.print("That the models gave these replies, no bundle can show.")
-        console.print("Nor can it what they cost, how long they took, and which model answered.")
+        console.print("Not verified:")
+        for sentence in verified.unverified:
+            console.print(f"* {sentence}")
 
 
 @click.command()

@@ -33,6 +33,8 @@ from phyblock.types import Matcher, PlanParser
 __all__ = ["judged_anew", "recorded_suite", "reopen_tracks", "rescore"]
 
 _RESTORE = "restore the file from a copy"
+_NO_DATA = ("prompt", "pictures", "examples", CARRYING, ENGINE)
+"""Parts of a track's identity that are not the data that it asks about."""
 
 
 def rescore(
@@ -93,8 +95,8 @@ def rescore(
     return target
 
 
-def judged_anew(folder: Path) -> tuple[Manifest, list[Record]]:
-    """Return manifest and records of a run, made again of its replies and its data.
+def judged_anew(folder: Path) -> tuple[Manifest, Iterator[Record]]:
+    """Return the manifest of a run and the record of each line, made of its replies and its data.
 
     What records say of their items is taken from the data, as is how much was to be asked. Physics
     is not carried out: what became of blocks that were let go is taken from the records. Nothing is
@@ -104,9 +106,6 @@ def judged_anew(folder: Path) -> tuple[Manifest, list[Record]]:
     suite = recorded_suite(folder, manifest)
     dataset = recorded_dataset(folder, manifest, suite.levels, None)
     tracks = _by_condition(folder, manifest, suite, dataset)
-    records = {
-        record.sample: again for record, again in _judged(folder, manifest, tracks, strict=True)
-    }
     scenes = [task.scene for task in asked_about(manifest, suite.levels, dataset).tasks]
     changes = {
         "items": {name: len(track.items) for name, track in tracks[""].items()},
@@ -115,7 +114,8 @@ def judged_anew(folder: Path) -> tuple[Manifest, list[Record]]:
             level: sum(level in scene.levels for scene in scenes) for level in suite.levels
         },
     }
-    return manifest.model_copy(update=changes), list(records.values())
+    records = (again for _, again in _judged(folder, manifest, tracks, strict=True))
+    return manifest.model_copy(update=changes), records
 
 
 def recorded_suite(
@@ -146,25 +146,25 @@ def recorded_suite(
 
 
 def reopen_tracks(
-    folder: Path, manifest: Manifest, suite: Suite, dataset: Dataset
-) -> dict[str, AnyTrack]:
+    folder: Path, manifest: Manifest, suite: Suite, dataset: Dataset, *, with_prompts: bool = False
+) -> tuple[AnyTrack, ...]:
     """Return the tracks of the run in `folder`, known to ask what was asked; nobody is.
 
-    `dataset` is the run's. Raises DataError for other data of a track than those that the run was
-    made on.
+    `dataset` is the run's. With prompts, those of the bundled templates. Raises DataError for other
+    data of a track than those that the run was made on.
     """
     path = folder / MANIFEST
     roots = {name: kind_of(name).data_root(manifest) for name in suite.tracks}
     folders = {name: Path(root) for name, root in roots.items() if root is not None}
     suite = suite.with_files(SuiteFiles(path, dataset.root, YamlSource(str(path)), folders))
-    opening = Opening(suite, dataset, manifest.limit, with_prompts=False)
-    tracks = {track.name: track for track in open_tracks(opening, suite.tracks)}
-    for name, track in tracks.items():
-        stored = manifest.tracks.get(name, {})
+    opening = Opening(suite, dataset, manifest.limit, with_prompts=with_prompts)
+    tracks = open_tracks(opening, suite.tracks)
+    for track in tracks:
+        stored = manifest.tracks.get(track.name, {})
         for key, value in track.identity().items():
-            # A track that asks nobody has no prompts and pictures; engines and readers ask nothing.
-            if key not in (CARRYING, ENGINE) and value not in (None, stored.get(key)):
-                root, field = folders.get(name, dataset.root), f"tracks.{name}.{key}"
+            # Prompts and pictures are no data; engines and readers ask nothing.
+            if key not in _NO_DATA and value not in (None, stored.get(key)):
+                root, field = folders.get(track.name, dataset.root), f"tracks.{track.name}.{key}"
                 was = str(stored.get(key))
                 raise DataError(Problem(str(root), CHANGED, field, str(value), was))
     return tracks
@@ -175,7 +175,12 @@ def _by_condition(
 ) -> dict[str, dict[str, AnyTrack]]:
     """The tracks of a run by the key of the condition in which they asked, and by name."""
     conditions = dict.fromkeys(variant.shown for variant in suite.vary.variants)
-    return {one.key: reopen_tracks(folder, manifest, suite.at(one), dataset) for one in conditions}
+    return {
+        one.key: {
+            track.name: track for track in reopen_tracks(folder, manifest, suite.at(one), dataset)
+        }
+        for one in conditions
+    }
 
 
 def _judged(

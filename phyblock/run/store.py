@@ -469,14 +469,19 @@ class PromptFile:
 
     def keep(self, messages: Sequence[Message]) -> str:
         """Write a prompt unless it is there; its digest. Raises StoreError as the file does."""
-        content = tuple(_content(message) for message in messages)
-        fields = [message.fields() for message in content]
-        canonical = json.dumps(fields, sort_keys=True, separators=(",", ":"))
-        digest = hex_digest(canonical)
-        if digest not in self._known:
-            self._known.add(digest)
-            self._file.append([Prompt(sha256=digest, messages=content).fields()])
-        return digest
+        prompt = prompt_of(messages)
+        if prompt.sha256 not in self._known:
+            self._known.add(prompt.sha256)
+            self._file.append([prompt.fields()])
+        return prompt.sha256
+
+
+def prompt_of(messages: Sequence[Message]) -> Prompt:
+    """Return messages as they are kept, with the labels of pictures in their place."""
+    content = tuple(_content(message) for message in messages)
+    fields = [message.fields() for message in content]
+    digest = hex_digest(json.dumps(fields, sort_keys=True, separators=(",", ":")))
+    return Prompt(sha256=digest, messages=content)
 
 
 def read_prompts(folder: Path) -> dict[str, tuple[PromptMessage, ...]]:

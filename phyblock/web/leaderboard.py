@@ -83,14 +83,20 @@ _REPLY = ("text", "reasoning", "finish", "cost_usd", "usage", "latency_s")
 
 @dataclass(frozen=True, eq=False)
 class SiteRun:
-    """A run that was opened: `where` is what the user calls it, `is_verified` that it came in a
-    bundle and was scored again; `sources` are what can be drawn of it.
+    """A run that was opened: `where` is what the user calls it, `sources` are what can be drawn of
+    it. `unverified` says what was taken as a bundle says it; None for a folder, which is not
+    scored again.
     """
 
     where: str
     run: Run
-    is_verified: bool
     sources: Sources
+    unverified: tuple[str, ...] | None = None
+
+    @property
+    def is_verified(self) -> bool:
+        """True if it came in a bundle and was scored again."""
+        return self.unverified is not None
 
     @property
     def date(self) -> str:
@@ -212,9 +218,10 @@ def open_runs(paths: Sequence[Path], data: Sequence[Path], kept: ExitStack) -> t
     opened: list[SiteRun] = []
     seen: dict[str, str] = {}
     for path in paths:
-        where = str(path)
+        where, unverified = str(path), None
         if path.is_file():
             verified = kept.enter_context(opened_bundle(path, data))
+            unverified = verified.unverified
             with named(verified.folder, where):
                 run = load_run(verified.folder, texts=False)
         else:
@@ -229,7 +236,7 @@ def open_runs(paths: Sequence[Path], data: Sequence[Path], kept: ExitStack) -> t
             if sources.lacking:
                 with suppress(DataError):
                     sources = open_sources(run, folder)
-        opened.append(SiteRun(where, run, path.is_file(), sources))
+        opened.append(SiteRun(where, run, sources, unverified))
     return tuple(opened)
 
 
@@ -499,6 +506,7 @@ def _run(one: SiteRun) -> dict[str, Any]:
         "id": manifest.identity[:12],
         "date": one.date,
         "verified": one.is_verified,
+        "unverified": one.unverified or (),
         "seeds": len(run.design.suite.seeds),
         "data": data.name if data else "",
         "version": data.version if data else None,

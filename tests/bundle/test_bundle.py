@@ -12,11 +12,14 @@ from typing import Any
 import pytest
 import yaml
 
-from phyblock.bundle import ABOUT, MEMBERS, bundle_run, opened_bundle, pack, unpack
+from phyblock.bundle import ABOUT, MEMBERS, bundle_run, opened_bundle, unpack
 from phyblock.errors import DataError, StoreError
 from phyblock.records.files import RECORDS
 from phyblock.records.manifest import MANIFEST
 from phyblock.stable import hex_digest
+from tests.bundle.test_bundle_archive import packed
+from tests.servers.chassis import Running
+from tests.servers.openai_chat import OpenAIChat
 from tests.vqa_set import questions, write_questions
 from tests.workspace import SCENES, Raw, Workspace
 
@@ -25,7 +28,7 @@ SUBTASKS = ["SH", "OR"]
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
-    """A baseline in three tracks, and the bundle of the run beside it."""
+    """A model and a baseline in three tracks, and the bundle of the run beside it."""
     workspace = Workspace(tmp_path_factory.mktemp("bundled"), pictures_dir)
     workspace.write_scenes(*SCENES[:3])
     write_questions(workspace.root / "questions", questions(per_subtask=2, subtasks=SUBTASKS))
@@ -34,13 +37,14 @@ def made(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Worksp
         vqa={"path": "./questions", "subtasks": SUBTASKS},
         steps={"physics": "off"},
         seeds=[0],
-        models=["random"],
+        models=["random", "alpha"],
     )
-    done = workspace.run()
+    with Running(OpenAIChat()) as running:
+        workspace.write_models(running.url, "alpha", price={"input": 0.0, "output": 0.0})
+        done = workspace.run()
     assert done.code == 0, done.err
     done = workspace.phyblock("bundle", "out")
     assert done.code == 0, done.err
-    assert "10 records of 1 model, scored again" in done.out
     return workspace
 
 
@@ -67,7 +71,7 @@ def forged(made: Workspace, folder: Path, change: Callable[[list[Raw], Raw], Non
     digests = {name: hex_digest(data) for name, data in files.items()}
     about = json.dumps({**json.loads(found[ABOUT]), "files": digests})
     path = folder.with_suffix(".zip")
-    path.write_bytes(pack({**files, ABOUT: about.encode()}))
+    path.write_bytes(packed({**files, ABOUT: about.encode()}))
     return path
 
 
@@ -77,8 +81,6 @@ def test_a_bundle_verifies_elsewhere_and_holds_nothing_of_this_machine(
     held = contents(made, tmp_path / "held")
     assert not any(str(made.root).encode() in data for data in held.values())
     assert b"messages" not in held[MANIFEST]
-    about = json.loads(held[ABOUT])
-    assert set(about["tables"]) == {path.name for path in (made.out / "tables").iterdir()}
     (tmp_path / "elsewhere").mkdir()
     elsewhere = Workspace(tmp_path / "elsewhere", tmp_path / "pictures")
     for folder in folders(made):
@@ -87,7 +89,7 @@ def test_a_bundle_verifies_elsewhere_and_holds_nothing_of_this_machine(
     known = ("--data", "data", "--data", "questions")
     done = elsewhere.phyblock("verify", "b.zip", *known)
     assert done.code == 0, done.err
-    assert "10 records of 1 model, scored again" in done.out
+    assert "20 records of 2 models, scored again" in done.out
     done = elsewhere.phyblock("verify", "b.zip", "--data", "data")
     assert done.code == 2
     assert "needs the questions questions, which a bundle does not hold" in done.err
@@ -109,25 +111,23 @@ def test_data_are_told_by_what_they_hold_whatever_their_names(
     write_questions(other, others)
     bundle = made.out / "bundle.zip"
     with opened_bundle(bundle, [both]) as found:
-        assert found.records == 10
+        assert found.records == 20
     with opened_bundle(bundle, [other, *folders(made)]) as found:
-        assert found.records == 10
+        assert found.records == 20
     needs = pytest.raises(DataError, match="needs the questions questions")
     with needs, opened_bundle(bundle, [other, made.root / "data"]):
         pytest.fail("it was taken")
 
 
-def test_a_run_without_its_data_is_bundled_to_the_same_bytes_and_said_to_be_unverified(
+def test_a_run_without_its_data_is_bundled_to_the_same_bytes(
     made: Workspace, tmp_path: Path
 ) -> None:
     moved = tmp_path / "moved"
     shutil.copytree(made.out, moved)
     text = (moved / MANIFEST).read_text(encoding="utf-8")
     (moved / MANIFEST).write_text(text.replace(str(made.root), "/gone"), encoding="utf-8")
-    found = bundle_run(moved, tmp_path / "b.zip")
-    assert found.verified is None
-    assert "needs the data set data" in found.lacking
-    assert found.path.read_bytes() == (made.out / "bundle.zip").read_bytes()
+    path = bundle_run(moved, tmp_path / "b.zip")
+    assert path.read_bytes() == (made.out / "bundle.zip").read_bytes()
 
 
 def of_track(records: list[Raw], track: str) -> Raw:
@@ -174,6 +174,42 @@ def _twice(records: list[Raw], _: Raw) -> None:
     records.append(records[0])
 
 
+def _asked(records: list[Raw], track: str) -> Raw:
+    return next(r for r in records if r["track"] == track and r["model"] == "alpha")
+
+
+def _prompt(records: list[Raw], _: Raw) -> None:
+    _asked(records, "full_planning")["prompt"]["messages"] = "0" * 64
+
+
+def _template(records: list[Raw], _: Raw) -> None:
+    _asked(records, "vqa")["prompt"]["version"] = "0" * 64
+
+
+def _first_turn(records: list[Raw], _: Raw) -> None:
+    _asked(records, "step_planning")["turns"][0]["prompt"]["messages"] = "0" * 64
+
+
+def _label(records: list[Raw], _: Raw) -> None:
+    _asked(records, "vqa")["prompt"]["images"][0]["label"] = "answer"
+
+
+def _pictures(_: list[Raw], manifest: Raw) -> None:
+    manifest["tracks"]["full_planning"]["pictures"] = "0" * 64
+
+
+def _no_prompt(_: list[Raw], manifest: Raw) -> None:
+    manifest["tracks"]["full_planning"]["prompt"] = None
+
+
+def _time(records: list[Raw], _: Raw) -> None:
+    records[0]["time"] = "9999-12-31T00:00:00+00:00"
+
+
+def _created(_: list[Raw], manifest: Raw) -> None:
+    manifest["created"] = "1999-12-31T00:00:00+00:00"
+
+
 def _asked_about_less(records: list[Raw], manifest: Raw) -> None:
     del records[1:]
     manifest["items"] = {"full_planning": 1, "vqa": 0, "step_planning": 0}
@@ -184,6 +220,7 @@ def _asked_about_less(records: list[Raw], manifest: Raw) -> None:
     "change",
     [
         *(_score, _answer, _subtask, _level, _parents, _turn, _plan, _twice),
+        *(_prompt, _template, _first_turn, _label, _pictures, _no_prompt, _time, _created),
         _asked_about_less,
     ],
 )
@@ -207,9 +244,9 @@ def test_samples_that_were_left_out_are_counted(made: Workspace, tmp_path: Path)
     known = ("--data", "data", "--data", "questions")
     done = made.phyblock("verify", "less.zip", *known)
     assert done.code == 0, done.err
-    assert "9 of 10 expected samples: the run is not whole" in done.out
+    assert "19 of 20 expected samples: the run is not whole" in done.out
     done = made.phyblock("verify", "out/bundle.zip", *known)
-    assert "10 of 10 expected samples." in done.out
+    assert "20 of 20 expected samples." in done.out
 
 
 def test_what_is_not_changed_is_made_here_to_the_byte(made: Workspace, tmp_path: Path) -> None:
@@ -217,10 +254,22 @@ def test_what_is_not_changed_is_made_here_to_the_byte(made: Workspace, tmp_path:
     path = forged(made, tmp_path / "forged", lambda *_: None)
     (tmp_path / "again").mkdir()
     unpack(path, tmp_path / "again")
-    now = {name: (tmp_path / "again" / name).read_bytes() for name in (RECORDS, ABOUT)}
     was = contents(made, tmp_path / "was")
-    assert now[RECORDS] == was[RECORDS]
-    assert json.loads(now[ABOUT])["tables"] == json.loads(was[ABOUT])["tables"]
+    assert (tmp_path / "again" / RECORDS).read_bytes() == was[RECORDS]
+    with opened_bundle(path, folders(made)) as found:
+        told = " ".join(found.unverified)
+    assert "Step planning: the prompts after the first of an episode." in told
+    assert "The bytes of pictures" in told
+
+
+def test_prompts_of_an_author_s_own_template_are_said_to_be_unverified(
+    made: Workspace, tmp_path: Path
+) -> None:
+    def own(_: list[Raw], manifest: Raw) -> None:
+        manifest["tracks"]["vqa"]["prompt"] = {"name": "mine", "version": "0" * 64}
+
+    with opened_bundle(forged(made, tmp_path / "forged", own), folders(made)) as found:
+        assert "VQA: the prompts, of a template that is not at hand." in found.unverified
 
 
 def _root(_: list[Raw], manifest: Raw) -> None:
@@ -273,7 +322,7 @@ def test_a_member_that_was_changed_is_named(
 ) -> None:
     held: dict[str, Any] = contents(made, tmp_path / "held")
     path = tmp_path / "b.zip"
-    path.write_bytes(pack(_changed_member(held, name, old, new)))
+    path.write_bytes(packed(_changed_member(held, name, old, new)))
     with pytest.raises(StoreError) as caught, opened_bundle(path, folders(made)):
         pytest.fail("it was taken")
     assert said in str(caught.value)

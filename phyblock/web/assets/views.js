@@ -121,7 +121,7 @@ const Views = (() => {
       el("p", {}, "Under a value stands its 95 % interval, from leaving out each base scene in turn."),
       state.wanted.includes("date") ? el("p", {}, `Asked on: ${Table.ASKED[0].toLowerCase()}${Table.ASKED.slice(1)}.`) : null,
       track.notes.map((note) => el("p", {}, note)),
-      el("p", {}, "“Scored again” are runs that came as a bundle, whose replies were scored again when this page was made and came out the same. Scoring cannot check what replies cost, how long they took, or which model gave them: these are taken from the records."),
+      el("p", {}, "“Scored again” are runs that came as a bundle, whose replies were scored again when this page was made and came out the same. A model's page lists what was not verified."),
       track.physics ? el("p", {}, `${track.title}: physics is not carried out again, what fell is taken from the records.`) : null);
   }
 
@@ -158,6 +158,7 @@ const Views = (() => {
       ["Parameters", row.size_b === null ? null : `${row.size_b} billion`],
       ...runs.flatMap((run) => [["Run", `${run.suite || "run"} ${run.id}, begun ${run.date || "on an unknown day"}`],
         ["Scored again", run.verified ? "yes, from a bundle" : "no: taken from a run folder"],
+        ["Not verified", run.unverified.join(" ") || null],
         ["Seeds", String(run.seeds)], ["Asked how", run.asked.join(", ") || null]]),
     ];
     await Store.openSamples();
