@@ -55,12 +55,7 @@ def find_data_set(name: str) -> Path:
     path = Path(name)
     if (path / SCENES_FILE).is_file() or (path / "data").is_dir():
         return path
-    if (folder := _file_or_bundled(path, SCENES_FILE)) is not None:
-        return folder
-    names = ", ".join(bundled_sets(SCENES_FILE))
-    allowed = f"a folder with {SCENES_FILE}, an official checkout, or a bundled set: {names}"
-    message = "holds no data set" if path.is_dir() else "there is no such data set"
-    raise DataError(Problem(name, message, allowed=allowed))
+    return _file_or_bundled(path, SCENES_FILE, "data set", ", an official checkout")
 
 
 def read_data_set(name: str) -> Dataset:
@@ -75,18 +70,16 @@ def find_questions(name: str) -> Path:
     Raises DataError that lists the bundled sets when there is no such folder.
     """
     path = Path(name)
-    if path.is_dir():
-        return path
-    if (folder := _file_or_bundled(path, QUESTIONS_FILE)) is not None:
-        return folder
-    names = ", ".join(bundled_sets(QUESTIONS_FILE))
-    allowed = f"a folder with {QUESTIONS_FILE}, or a bundled set: {names}"
-    raise DataError(Problem(name, "there are no such questions", allowed=allowed))
+    return path if path.is_dir() else _file_or_bundled(path, QUESTIONS_FILE, "set of questions")
 
 
-def _file_or_bundled(path: Path, file: str) -> Path | None:
-    """The folder of a data file that is named itself, or of a bundled set."""
+def _file_or_bundled(path: Path, file: str, noun: str, more: str = "") -> Path:
+    """Return the folder of a data file that is named itself, or of a bundled set."""
     if path.name == file and path.is_file():
         return path.parent
     inside = bundled("benchmarks", "data", *path.parts)
-    return inside if len(path.parts) == 1 and (inside / file).is_file() else None
+    if len(path.parts) == 1 and (inside / file).is_file():
+        return inside
+    message = f"holds no {noun}" if path.is_dir() else f"there is no such {noun}"
+    allowed = f"a folder with {file}{more}, or a bundled set: {', '.join(bundled_sets(file))}"
+    raise DataError(Problem(str(path), message, allowed=allowed))

@@ -105,9 +105,7 @@ def _digests(files: Mapping[str, Path]) -> dict[str, str]:
 
 def _digest(content: object) -> str:
     # `asdict` would copy all that is in a dataclass as well.
-    def plain(one: Any) -> dict[str, object]:
-        return {each.name: getattr(one, each.name) for each in fields(one)}
-
+    plain = lambda one: {each.name: getattr(one, each.name) for each in fields(one)}  # noqa: E731
     return hex_digest(json.dumps(content, sort_keys=True, default=plain))
 
 
@@ -128,12 +126,12 @@ def read_text(path: Path, allowed: str = "") -> str:
     try:
         return read_bytes(path, _LARGEST_BYTES).decode("utf-8")
     except OSError as error:
-        problem = Problem(str(path), f"cannot be read: {reason_of(error)}", allowed=allowed)
-        raise DataError(problem) from error
+        message = f"cannot be read: {reason_of(error)}"
     except UnicodeDecodeError as error:
-        raise DataError(Problem(str(path), f"is not UTF-8 text: {error.reason}")) from error
+        message = f"is not UTF-8 text: {error.reason}"
     except ValueError as error:
-        raise DataError(Problem(str(path), str(error), allowed=allowed)) from error
+        message = str(error)
+    raise DataError(Problem(str(path), message, allowed=allowed))
 
 
 def read_json(path: Path) -> Any:
@@ -149,25 +147,25 @@ def parse_json(text: str, path: Path, line: int | None = None) -> Any:
     characters. Numbers that are not finite pass: the field they stand in is checked.
     """
     where = str(path) if line is None else f"{path}:{line}"
-    if line is not None and len(text) > _LONGEST_LINE:
-        found = f"{len(text):,} characters"
-        problem = Problem(where, "is too long a line", "", found, f"{_LONGEST_LINE:,} at most")
-        raise DataError(problem)
+    field = found = allowed = ""
     try:
+        if line is not None and len(text) > _LONGEST_LINE:
+            found, allowed = f"{len(text):,} characters", f"{_LONGEST_LINE:,} at most"
+            raise ValueError("is too long a line")
         value = load_json(text, finite=False, unique=True)
         if _SURROGATE.search(text):
             json.dumps(value, ensure_ascii=False).encode()
+        return value
     except json.JSONDecodeError as error:
         where += f":{error.colno}" if line is not None else f":{error.lineno}:{error.colno}"
-        raise DataError(Problem(where, f"is not valid JSON: {error.msg}")) from error
+        message = f"is not valid JSON: {error.msg}"
     except RepeatedFieldError as error:
-        raise DataError(Problem(where, "stands twice in one object", error.field)) from error
-    except UnicodeEncodeError as error:
+        message, field = "stands twice in one object", error.field
+    except UnicodeEncodeError:
         message = "holds half of a character (a lone surrogate)"
-        raise DataError(Problem(where, message)) from error
     except ValueError as error:
-        raise DataError(Problem(where, str(error))) from error
-    return value
+        message = str(error)
+    raise DataError(Problem(where, message, field, found, allowed))
 
 
 def lines_of(text: str) -> list[str]:
@@ -176,44 +174,47 @@ def lines_of(text: str) -> list[str]:
     return text.removesuffix("\n").split("\n") if text else []
 
 
-def read_lines(
-    path: Path, text: str, noun: str, read: Callable[[Any, str], _T], name: Callable[[_T], str]
+def read_each(
+    entries: Iterable[tuple[str, Callable[[], _T]]], name: Callable[[_T], str]
 ) -> list[_T]:
-    """Return every line of a file's `text` as `read` makes it of its JSON value and its place.
+    """Return what is read at each place; DataError with all that cannot, and names used twice.
 
-    Raises DataError with everything that is wrong: what `read` raises, a name that stands twice, a
-    file of no `noun`.
+    Reading stops after a thousand faults.
     """
-    lines = lines_of(text)
-    first_line: dict[str, int] = {}
+    first_use: dict[str, str] = {}
     values: list[_T] = []
     problems: list[Problem] = []
-    for number, line in enumerate(lines, 1):
-        where = f"{path}:{number}"
+    for where, read in entries:
+        if len(problems) > _MOST_OF_ALL:
+            message = f"more than {_MOST_OF_ALL:,} faults; only the first were looked for"
+            raise DataError([Problem(where, message), *problems])
         try:
-            one = read(parse_json(line, path, number), where)
+            one = read()
         except DataError as error:
-            gather(problems, error.problems, path)
+            problems += error.problems
             continue
-        first = first_line.setdefault(name(one), number)
-        if first != number:
-            gather(problems, [used_already(where, f"by line {first}", name(one))], path)
+        first = first_use.setdefault(name(one), where)
+        if first != where:
+            problems.append(Problem(where, f"is used at {first} already", "id", repr(name(one))))
         values.append(one)
-    if not lines:
-        problems.append(Problem(str(path), f"holds no {noun}s", allowed=f"one {noun} a line"))
     if problems:
         raise DataError(problems)
     return values
 
 
-def used_already(where: str, first: str, name: str) -> Problem:
-    """Return the problem of an id whose `first` use was before: by a line, or at a place."""
-    return Problem(where, f"is used {first} already", "id", repr(name))
+def read_lines(
+    path: Path, text: str, noun: str, read: Callable[[Any, str], _T], name: Callable[[_T], str]
+) -> list[_T]:
+    """Return what `read` makes of the JSON value of every line of a file's `text` and its place.
 
+    Raises DataError with everything that is wrong: what `read` raises, a name that stands twice, a
+    file of no `noun`.
+    """
+    if not text:
+        raise DataError(Problem(str(path), f"holds no {noun}s", allowed=f"one {noun} a line"))
 
-def gather(problems: list[Problem], more: Iterable[Problem], where: object) -> None:
-    """Add problems to those of a whole data set; DataError when they become too many to go on."""
-    problems += more
-    if len(problems) > _MOST_OF_ALL:
-        note = f"has more than {_MOST_OF_ALL:,} faults; only the first were looked for"
-        raise DataError([Problem(str(where), note), *problems])
+    def entry(number: int, line: str) -> tuple[str, Callable[[], _T]]:
+        where = f"{path}:{number}"
+        return where, lambda: read(parse_json(line, path, number), where)
+
+    return read_each((entry(number, line) for number, line in enumerate(lines_of(text), 1)), name)

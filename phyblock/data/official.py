@@ -6,28 +6,16 @@
     outputs/<model>/NNN.json                            recorded raw replies (optional)
 
 No released file is labelled level 1; the paper's Level-1 columns score the level-2 scenes without
-order, so a level-2 scene is read as a scene of levels 1 and 2.
-
-Questions are files in the JSON form of the paper's appendix A.4, in a folder of their own:
-
-    SH.json, CO.json, ...       questions: one file a subtask, a JSON array of objects (or JSON
-                                Lines, .jsonl); the name is the subtask's code or its name
-    images/<scene_id>.png       the picture of a scene; without it the scene is drawn
-    images/<id>/img1.png ...    the pictures <img1> to <img4> of a question (.png or .jpg)
-
-An object holds `scene_id`, `question`, `options` (four texts, or `<img1>` to `<img4>`) and
-`answer`, and may hold `id` (else the file's name and the number in the file), `subtask` (which then
-counts, not the file's name) and `images`: paths by `scene`, `img1` to `img4`, from the folder.
-`answer` is a letter, the text of an option, or an index; for ordering four letters or four
-indices. Indices count from 0 in a file in which some answer is 0, from 1 where some answer is 4;
-where neither tells, they are refused.
+order, so a level-2 scene is read as a scene of levels 1 and 2. Question files in the JSON form of
+the paper's appendix A.4 lie in a folder of their own; docs/vqa.md describes them. Names of models
+are matched to the rows of the paper's Tables 1 and 2.
 """
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -38,12 +26,8 @@ from phyblock.data.base import (
     Dataset,
     QuestionSet,
     QuestionTask,
-    gather,
-    lines_of,
-    parse_json,
+    read_each,
     read_json,
-    read_text,
-    used_already,
 )
 from phyblock.data.questions import Options, scene_of
 from phyblock.data.scenes import (
@@ -81,15 +65,7 @@ _OUTPUTS = Path("outputs")
 # <IMG_CONTEXT> of InternVL, <|image_pad|> of Qwen, <image> of LLaVA
 _PICTURE_MARKS = re.compile(r"\A(?:\s*<\|?[A-Za-z_]{1,30}\|?>)+")
 _PARENTS = r"^[A-Za-z0-9][A-Za-z0-9.-]{0,99}(_[A-Za-z0-9][A-Za-z0-9.-]{0,99})*$"
-_MOST_QUESTIONS = 100_000
 _GOAL_VIEW = (45.0, 22.0)
-_PICTURE_FILE = "a PNG or JPEG file inside the folder"
-_NOT_LETTERS = re.compile(r"[^a-z]+")
-_SUBTASKS: Mapping[str, Subtask] = {
-    **{code.lower(): code for code in SUBTASKS},
-    **{_NOT_LETTERS.sub("", name): code for code, name in SUBTASK_NAMES.items()},
-    **{"colour": "CO", "prediction": "PD", "predict": "PD", "dependency": "RD"},
-}
 
 
 class _Goal(Line, extra="ignore"):
@@ -105,9 +81,7 @@ class _Goal(Line, extra="ignore"):
     lookat_pos: Position | None = None
     combined: (
         Annotated[
-            str,
-            Field(pattern=_PARENTS),
-            worded("is not allowed", "base scenes joined by '_'"),
+            str, Field(pattern=_PARENTS), worded("is not allowed", "base scenes joined by '_'")
         ]
         | None
     ) = None
@@ -142,38 +116,23 @@ class _CandidateFile(Line):
 
 
 def read_official(root: Path) -> Dataset:
-    """Return all scenes of a checkout; DataError with everything that is wrong in it."""
+    """Return all scenes of a checkout; DataError with all scenes in which something is wrong."""
     goals = sorted((root / _GOALS).glob("*.json"))
     if not goals:
         allowed = f"a checkout of the official PhyBlock repository, with {_GOALS.as_posix()}/*.json"
         raise DataError(Problem(str(root), "holds no official scenes", allowed=allowed))
-    tasks: list[AssemblyTask] = []
-    problems: list[Problem] = []
-    for path in goals:
-        candidates_path = root / _CANDIDATES / f"{path.stem}_16_cand_blocks.json"
-        scene, candidates = None, None
-        try:
-            scene = _read_goal(path)
-        except DataError as error:
-            gather(problems, error.problems, root)
-        try:
-            candidates = read_candidates(candidates_path)
-            if scene is not None:
-                picture = root / _PICTURES / f"{path.stem}.png"
-                composite = picture if picture.is_file() else None
-                tasks.append(task_of(scene, candidates, str(candidates_path), composite))
-        except DataError as error:
-            gather(problems, error.problems, root)
-    if problems:
-        raise DataError(problems)
+
+    def read(goal: Path) -> AssemblyTask:
+        name = goal.stem
+        if not is_name(name):
+            raise DataError(Problem(str(goal), "is not a name", "the file", name, NAME_ALLOWED))
+        path, picture = root / _CANDIDATES / f"{name}_16_cand_blocks.json", root / _PICTURES
+        scene = validated(_Goal, read_json(goal), str(goal)).scene(name)
+        own = picture / f"{name}.png"
+        return task_of(scene, read_candidates(path), str(path), own if own.is_file() else None)
+
+    tasks = read_each(((str(goal), partial(read, goal)) for goal in goals), lambda task: task.key)
     return Dataset("official", root, tuple(tasks))
-
-
-def _read_goal(path: Path) -> Scene:
-    if not is_name(path.stem):
-        problem = Problem(str(path), "is not a name", "the file's name", path.stem, NAME_ALLOWED)
-        raise DataError(problem)
-    return validated(_Goal, read_json(path), str(path)).scene(path.stem)
 
 
 def read_candidates(path: Path) -> CandidateSet:
@@ -221,106 +180,82 @@ def official_prompt(root: Path) -> str:
 
 class _Question(Line, extra="ignore"):
     id: Name
-    subtask: Any
     scene_id: str
     question: Text
     options: Options
     answer: Any
-    images: dict[str, Any] = Field(default_factory=dict)
 
 
 def read_official_questions(folder: Path, scenes: Dataset) -> QuestionSet:
     """Return all questions of a folder, about these scenes; DataError with all that is wrong."""
-    files = sorted(path for path in folder.glob("*") if path.suffix in (".json", ".jsonl"))
+    files = sorted(folder.glob("*.json"))
     if not files:
         allowed = "question files such as SH.json, one a subtask"
         raise DataError(Problem(str(folder), "holds no question files", allowed=allowed))
     known = {task.scene.id: task.scene for task in scenes.tasks}
-    tasks: list[QuestionTask] = []
-    problems: list[Problem] = []
-    first: dict[str, str] = {}
-    for path in files:
-        try:
-            entries = _entries(path)
-        except DataError as error:
-            gather(problems, error.problems, folder)
-            continue
-        base = _index_base([raw for _, raw in entries])
-        for number, (where, raw) in enumerate(entries, 1):
-            try:
-                task = _read_question(raw, where, path, number, known, base)
-            except DataError as error:
-                gather(problems, error.problems, folder)
-                continue
-            if (earlier := first.setdefault(task.key, where)) != where:
-                gather(problems, [used_already(where, f"at {earlier}", task.key)], folder)
-            tasks.append(task)
-    if problems:
-        raise DataError(problems)
-    return QuestionSet(folder.name, folder, tuple(tasks))
+    entries = [entry for path in files for entry in _entries(path, known)]
+    return QuestionSet(folder.name, folder, tuple(read_each(entries, lambda task: task.key)))
 
 
-def _entries(path: Path) -> list[tuple[str, Any]]:
-    """The questions of a file, each with its place: a line, or an index in an array."""
-    text = read_text(path)
-    if path.suffix == ".jsonl":
-        lines = enumerate(lines_of(text), 1)
-        return [(f"{path}:{number}", parse_json(line, path, number)) for number, line in lines]
-    whole = parse_json(text, path)
-    if not isinstance(whole, list):
+def _entries(path: Path, scenes: Mapping[str, Scene]) -> Iterator[tuple[str, Any]]:
+    """Yield the place of each question of a file, and the function that reads it."""
+    name = re.sub(r"[^a-z]+", "", path.stem.lower())
+    subtask = next((s for s in SUBTASKS if name in (s.lower(), SUBTASK_NAMES[s].replace(" ", ""))),
+                   None)  # fmt: skip
+    if subtask is None:
+        allowed = ", ".join(SUBTASKS)
+        raise DataError(Problem(str(path), "names no subtask", "the file", path.stem, allowed))
+    raws = read_json(path)
+    if not isinstance(raws, list):
         raise DataError(Problem(str(path), "is not an array", allowed="an array of questions"))
-    if len(whole) > _MOST_QUESTIONS:
-        allowed = f"{_MOST_QUESTIONS:,} questions at most"
-        raise DataError(Problem(str(path), "is too long an array", "", f"{len(whole):,}", allowed))
-    return [(f"{path}[{index}]", raw) for index, raw in enumerate(whole)]
-
-
-def _index_base(entries: list[Any]) -> int | None:
-    """The first index of a file, 0 or 1, or None where its answers do not tell."""
-    indices: set[int] = set()
-    for raw in entries:
-        answer = raw.get("answer") if isinstance(raw, dict) else None
-        answers = answer if isinstance(answer, list) else [answer]
-        indices.update(index for index in answers if type(index) is int)
-    if 0 in indices:
-        return 0
-    return 1 if len(LETTERS) in indices else None
+    answers = [raw.get("answer") for raw in raws if isinstance(raw, dict)]
+    flat = [part for one in answers for part in (one if isinstance(one, list) else [one])]
+    indices = {part for part in flat if type(part) is int}
+    # Indices count from 0 where some answer is 0, from 1 where some answer is 4.
+    base = 0 if 0 in indices else 1 if len(LETTERS) in indices else None
+    for number, raw in enumerate(raws):
+        where = f"{path}[{number}]"
+        if isinstance(raw, dict):
+            raw = {"id": f"{subtask.lower()}-{number + 1:03d}", **raw}
+        yield where, partial(_read_question, raw, where, subtask, path.parent, scenes, base)
 
 
 def _read_question(
-    raw: Any, where: str, path: Path, number: int, scenes: Mapping[str, Scene], base: int | None
+    raw: Any,
+    where: str,
+    subtask: Subtask,
+    folder: Path,
+    scenes: Mapping[str, Scene],
+    base: int | None,
 ) -> QuestionTask:
-    code = _subtask(path.stem)
-    if isinstance(raw, dict):
-        stem = code.lower() if code else re.sub(r"[^A-Za-z0-9._-]", "-", path.stem)
-        raw = {"id": f"{stem}-{number:03d}", "subtask": path.stem, **raw}
-        if type(raw.get("scene_id")) is int:
-            # Scene ids are texts of three digits in the official files.
-            raw["scene_id"] = f"{raw['scene_id']:03d}"
     line = validated(_Question, raw, where)
     scene = scene_of(line.scene_id, scenes, where)
-    subtask = _subtask(line.subtask)
-    if subtask is None:
-        allowed = f"in the entry or as the file's name: {', '.join(SUBTASKS)}"
-        raise DataError(Problem(where, "is not known", "subtask", shown(line.subtask), allowed))
+    wanted = {"scene": f"images/{scene.id}"}
+    for letter, option in zip(LETTERS, line.options, strict=True):
+        if is_picture_option(option):
+            wanted[letter] = f"images/{line.id}/{option.strip('<>')}"
+    files: dict[str, Path] = {}
+    for label, name in wanted.items():
+        paths = [folder / f"{name}{ending}" for ending in (".png", ".jpg", ".jpeg")]
+        path = next((path for path in paths if path.is_file()), None)
+        if path is not None:
+            files[label] = path
+        elif label != "scene":
+            refuse([Fault("the file is missing", str(paths[0]), "", ("options",))], where)
+    drawn = ("scene" not in files and subtask != "OR") * (
+        QuestionPicture("scene", scene.blocks, _GOAL_VIEW),
+    )
     answer = _answer(line, subtask, base, where)
-    files = _files(line, scene, path.parent, where)
-    is_drawn = "scene" not in files and subtask != "OR"
-    drawn = (QuestionPicture("scene", scene.blocks, _GOAL_VIEW),) if is_drawn else ()
     question = Question(line.id, subtask, scene, line.question, line.options, answer, drawn)
     return QuestionTask(question, files)
 
 
-def _subtask(named: object) -> Subtask | None:
-    return _SUBTASKS.get(_NOT_LETTERS.sub("", named.lower())) if isinstance(named, str) else None
-
-
 def _answer(line: _Question, subtask: Subtask, base: int | None, where: str) -> tuple[int, ...]:
-    """The indices from 0 of the right options."""
+    """Return the indices from 0 of the right options: letters, texts or indices in the file."""
     is_order = subtask == "OR"
     parts = line.answer if isinstance(line.answer, list) else [line.answer]
     if is_order and isinstance(line.answer, str):
-        parts = [letter for letter in line.answer.upper() if letter.isalnum()]
+        parts = [letter for letter in line.answer if letter.isalnum()]
     indices: list[int] = []
     for part in parts:
         text = part.strip() if isinstance(part, str) else ""
@@ -331,40 +266,67 @@ def _answer(line: _Question, subtask: Subtask, base: int | None, where: str) -> 
             indices.append(LETTERS.index(letter))
         elif text in line.options:
             indices.append(line.options.index(text))
-    wanted = len(LETTERS) if is_order else 1
-    if not len(set(indices)) == len(parts) == wanted:
+    if not len(set(indices)) == len(parts) == (len(LETTERS) if is_order else 1):
         allowed = "a permutation of the options" if is_order else "a letter, option or index"
         if base is None and any(type(part) is int for part in parts):
             allowed = "letters: the indices of this file do not tell whether they begin at 0"
-        found = shown(line.answer)
-        refuse([Fault("is none of the options", allowed, found, ("answer",))], where)
+        fault = Fault("is none of the options", allowed, shown(line.answer), ("answer",))
+        refuse([fault], where)
     return tuple(indices)
 
 
-def _files(line: _Question, scene: Scene, folder: Path, where: str) -> dict[str, Path]:
-    """The picture files by label; that of the scene may be missing, those of options may not."""
-    wanted = [("scene", "scene", f"images/{scene.id}")]
-    for letter, option in zip(LETTERS, line.options, strict=True):
-        if is_picture_option(option):
-            key = option.strip("<>")
-            wanted.append((letter, key, f"images/{line.id}/{key}"))
-    files: dict[str, Path] = {}
-    faults: list[Fault] = []
-    root = os.path.join(os.path.abspath(folder), "")
-    for label, key, usual in wanted:
-        endings = (".png", ".jpg", ".jpeg")
-        names = [str(line.images[key])] if key in line.images else [usual + e for e in endings]
-        paths = (folder / name for name in names)
-        # os.path says False of a name that no file can have, where pathlib raises.
-        inside = (path for path in paths if os.path.abspath(path).startswith(root))
-        path = next((path for path in inside if os.path.isfile(path)), None)
-        if path is not None:
-            files[label] = path
-        elif key in line.images:
-            at = ("images", key)
-            faults.append(Fault("no such file in the folder", _PICTURE_FILE, shown(names[0]), at))
-        elif label != "scene":
-            message = f"the picture <{key}> is missing"
-            faults.append(Fault(message, _PICTURE_FILE, shown(names[0]), ("images",)))
-    refuse(faults, where)
-    return files
+_SPELLINGS: dict[str, tuple[str, ...]] = {
+    "Claude-3.5 Haiku": (),
+    "Claude-3.5 Sonnet": (),
+    "Claude-3.7 Sonnet": ("claude-3-7",),
+    "Claude-3.7 Sonnet-Thinking": ("claude-3-7-thinking",),
+    "GPT-4o-mini": (),
+    "GPT-4o": (),
+    "GPT-o1": ("o1",),
+    "Gemini-1.5-flash-8b": (),
+    "Gemini-1.5-flash": (),
+    "Gemini-2.0-flash-lite": ("gemini-2.0-flash-lite-preview",),
+    "Gemini-2.0-flash": (),
+    "Gemini-2.0-flash-thinking-exp": ("gemini-2.0-flash-thinking",),
+    "Qwen-VL-Max": (),
+    "InternVL2.5-1B": (),
+    "InternVL2.5-8B": (),
+    "InternVL2.5-78B": (),
+    "Qwen2.5-VL-3B-Instruct": ("qwen2.5-vl-3b",),
+    "Qwen2.5-VL-7B-Instruct": ("qwen2.5-vl-7b",),
+    "LLaVa-OneVision-0.5B": tuple(
+        f"llava-onevision-qwen2-0.5b{end}" for end in ("", "-ov", "-ov-hf")
+    ),
+    "LLaVa-OneVision-7B": tuple(f"llava-onevision-qwen2-7b{end}" for end in ("", "-ov", "-ov-hf")),
+    "Random": (),
+    "GPT-4.1": (),
+    "GPT-o3": ("o3",),
+    "Qwen2.5-VL-72B-Instruct": ("qwen2.5-vl-72b",),
+}
+"""Rows of the paper's Table 1, then those that Table 2 has beside them; other spellings of each."""
+_TOKEN = re.compile(r"[a-z]+|[0-9]+|[^\W_]+")
+_MONTH, _DAY = "(?:0[1-9]|1[0-2])", "(?:0[1-9]|[12][0-9]|3[01])"
+_DATE = re.compile(rf"(?<![0-9])20[0-9]{{2}}[-_./ ]?{_MONTH}(?:[-_./ ]?{_DAY})?(?![0-9])")
+_SHORT_DATE = re.compile(rf"(?<=[-_./ @]){_MONTH}[-_./ ]?{_DAY}$")
+_RELEASE = re.compile(r"(?<=[-_./ @])(?:latest|00[0-9])$")
+
+
+def match_published(name: str) -> str | None:
+    """Return the row of Table 1 or 2 that a folder of recordings or a model name stands for.
+
+    Case, separators, release dates and folders before the last slash make no difference; else all
+    tokens (runs of letters and of digits) must be those of a known spelling. None where the name is
+    unknown or could mean more than one row: "claude-3-5" names two models, "gemini-2.0" four.
+    """
+    return _ROWS.get(_tokens(name))
+
+
+def _tokens(name: str) -> tuple[str, ...]:
+    bare = name.strip().rstrip("/").rpartition("/")[2].lower()
+    bare = _DATE.sub(" ", bare).rstrip("-_. @")
+    for pattern in (_RELEASE, _SHORT_DATE, _RELEASE):
+        bare = pattern.sub("", bare).rstrip("-_. @")
+    return tuple(_TOKEN.findall(bare))
+
+
+_ROWS = {_tokens(one): row for row, more in _SPELLINGS.items() for one in (row, *more)}

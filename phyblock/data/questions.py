@@ -46,6 +46,7 @@ _MOST_OPTIONS = 26
 _MOST_PICTURES = 2 + len(LETTERS)
 _FEW = 20
 """So many lines with faults are reported one by one."""
+_NO_SCENE = "names no scene of the data set"
 
 
 class StoredPose(Line, extra="ignore"):
@@ -307,7 +308,7 @@ def scene_of(name: str, scenes: Mapping[str, Scene], where: str) -> Scene:
     """Return the scene that a question names; DataError where the data set has none such."""
     if name not in scenes:
         allowed = f"one of the {len(scenes)} scenes of the data set"
-        refuse([_wrong("scene_id", "names no scene of the data set", allowed, name)], where)
+        refuse([_wrong("scene_id", _NO_SCENE, allowed, name)], where)
     return scenes[name]
 
 
@@ -317,25 +318,23 @@ def read_questions(folder: Path, scenes: Dataset) -> QuestionSet:
     Where most are about scenes of another data set, that is what is wrong.
     """
     known = {task.scene.id: task.scene for task in scenes.tasks}
-    is_about: list[bool] = []
 
     def read(raw: Any, where: str) -> QuestionTask:
-        is_about.append(isinstance(raw, dict) and str(raw.get("scene_id")) in known)
         line = validated(StoredQuestion, raw, where)
         scene = scene_of(line.scene_id, known, where)
         refuse(line.faults(scene), where)
         return QuestionTask(line.about(scene))
 
     path = folder / QUESTIONS_FILE
+    text = read_text(path, f"a folder with {QUESTIONS_FILE}, or a bundled set of questions")
     try:
-        text = read_text(path, f"a folder with {QUESTIONS_FILE}, or a bundled set of questions")
         tasks = read_lines(path, text, "question", read, lambda task: task.key)
     except DataError as error:
-        if len(is_about) < _FEW or 2 * sum(is_about) > len(is_about):
+        elsewhere = [one for one in error.problems if one.message == _NO_SCENE]
+        if len(elsewhere) < max(_FEW, len(error.problems) / 2):
             raise
         message = "asks about scenes of another data set"
-        found = f"the data set {scenes.name}"
+        found, allowed = f"the data set {scenes.name}", "questions about its scenes"
         hint = "make questions about it, or name the data set that they are about"
-        problem = Problem(str(path), message, "", found, "questions about its scenes", hint)
-        raise DataError(problem) from error
+        raise DataError(Problem(str(path), message, "", found, allowed, hint)) from error
     return QuestionSet(folder.name, folder, tuple(tasks))

@@ -42,19 +42,20 @@ Vector = tuple[float, float, float]
 
 # Bounds are far above any use, and near enough to zero for geometry to be exact. Numbers stay
 # integers or floats as they were given, so that a line is written as it was read.
+_Number = Annotated[int, Field(strict=True)] | Annotated[float, Field(strict=True)]
 _Meters = Annotated[
-    Annotated[int, Field(strict=True, ge=-100, le=100)]
-    | Annotated[float, Field(strict=True, ge=-100, le=100, allow_inf_nan=False)],
+    _Number,
+    Field(ge=-100, le=100),
     WithJsonSchema({"type": "number", "minimum": -100, "maximum": 100}),
 ]
 _Degrees = Annotated[
-    Annotated[int, Field(strict=True, ge=-36_000, le=36_000)]
-    | Annotated[float, Field(strict=True, ge=-36_000, le=36_000, allow_inf_nan=False)],
+    _Number,
+    Field(ge=-36_000, le=36_000),
     WithJsonSchema({"type": "number", "minimum": -36_000, "maximum": 36_000}),
 ]
 _Elevation = Annotated[
-    Annotated[int, Field(strict=True, ge=1, le=90)]
-    | Annotated[float, Field(strict=True, ge=1, le=90, allow_inf_nan=False)],
+    _Number,
+    Field(ge=1, le=90),
     WithJsonSchema({"type": "number", "minimum": 1, "maximum": 90}),
 ]
 

@@ -11,7 +11,7 @@ from phyblock.config.models import RECORDED, ModelConfig, resolve_models, with_m
 from phyblock.config.suite import Suite
 from phyblock.config.yaml import read_yaml
 from phyblock.data import recorded_models
-from phyblock.data.published_names import match_published
+from phyblock.data.official import match_published
 from phyblock.errors import Problem, SpecError
 from phyblock.models import known_providers, server_address, takes_format
 from phyblock.records.files import RECORDS, RecordLines

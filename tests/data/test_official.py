@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections import Counter
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 
 from phyblock.data import official_prompt, read_builtin, read_official, recorded_models
 from phyblock.errors import DataError, Problem
-from tests.data.broken import sound_scene, with_value, without, write_checkout, write_scenes
+from tests.data.broken import sound_scene, with_value, write_checkout, write_scenes
 
 SCENE = {**sound_scene(), "levels": [3], "parents": ["s1"]}
 
@@ -112,29 +113,23 @@ def test_a_broken_candidate_set_is_named_with_file_and_field(tmp_path: Path, nam
     assert message in problem.message
 
 
-def test_what_is_wrong_in_both_files_of_every_scene_is_said_at_once(tmp_path: Path) -> None:
-    write_checkout(tmp_path, SCENE, {**SCENE, "id": "s2"})
-    change(goal_path(tmp_path), "level", 9)
+def test_what_is_wrong_in_every_scene_is_said_at_once(tmp_path: Path) -> None:
+    write_checkout(tmp_path, SCENE, {**SCENE, "id": "s2"}, {**SCENE, "id": "s3"})
+    goals = goal_path(tmp_path).parent
     candidates_path(tmp_path).unlink()
-    (tmp_path / "data" / "SCENEs_400_Goal_Jsons" / "s2.json").write_text("{\n  oops")
-    (level, missing, syntax) = problems_of(tmp_path)
-    assert (level.where, level.field) == (str(goal_path(tmp_path)), "level")
+    (goals / "s2.json").write_text("{\n  oops")
+    (goals / "s3.json").rename(goals / os.fsdecode(b"\xff.json"))
+    (missing, syntax, name) = problems_of(tmp_path)
     assert missing.where == str(candidates_path(tmp_path))
     assert "No such file" in missing.message
     assert syntax.where.endswith("s2.json:2:3")
+    assert "not a name" in name.message
 
 
 def test_a_folder_without_scenes_is_no_checkout(tmp_path: Path) -> None:
     (problem,) = problems_of(tmp_path)
     assert problem.where == str(tmp_path)
     assert "checkout" in problem.allowed
-
-
-def test_a_missing_level_is_said_once(tmp_path: Path) -> None:
-    goal = goal_path(write_checkout(tmp_path, SCENE))
-    raw = json.loads(goal.read_text(encoding="utf-8"))
-    goal.write_text(json.dumps(without(raw, "level")), encoding="utf-8")
-    assert [(p.field, p.message) for p in problems_of(tmp_path)] == [("level", "is missing")]
 
 
 def record(root: Path, model: str, scene: str, raw: object) -> None:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import json
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
 
 from phyblock.data import Dataset, QuestionTask, read_builtin, read_questions
 from phyblock.domain import Block, Mark, QuestionPicture
 from phyblock.errors import DataError, Problem
 from tests.data.broken import sound_scene, with_value, without, write_scenes
+from tests.fuzz.strategies import QUESTIONS
+from tests.workspace import tower
 
 QUESTION: dict[str, Any] = {
     "id": "co-001",
@@ -97,13 +101,6 @@ def test_an_order_is_read_as_four_indices(tmp_path: Path, scenes: Dataset) -> No
     assert read_one(tmp_path / "q", scenes, question).question.answer == (1, 0, 3, 2)
 
 
-def test_the_digest_follows_the_content(tmp_path: Path, scenes: Dataset) -> None:
-    one = read_questions(write(tmp_path / "a", QUESTION), scenes)
-    same = read_questions(write(tmp_path / "b", QUESTION), scenes)
-    other = read_questions(write(tmp_path / "c", QUESTION | {"answer": "A"}), scenes)
-    assert one.sha256 == same.sha256 != other.sha256
-
-
 PICTURE_OPTIONS = ["<img1>", "<img2>", "<img3>", "<img4>"]
 BROKEN = {
     "a scene that is not there": ({"scene_id": "s9"}, "scene_id", '"s9"'),
@@ -143,6 +140,12 @@ BROKEN_PICTURES = {
     "a block added twice": ({"add": [sound_scene()["blocks"][0]]}, "pictures[0].add", "1"),
     "nothing to draw": ({"without": [1, 2]}, "pictures[0]", ""),
     "a misspelled field": ({"widthout": [1]}, "pictures[0].widthout", ""),
+    "a mark beyond": (
+        {"marks": [{"letter": "A", "position": [0, 0, 1e9]}]},
+        "pictures[0].marks[0].position",
+        "[0, 0, 1000000000.0]",
+    ),
+    "too many blocks": ({"add": [sound_scene()["blocks"][0]] * 100}, "pictures[0].add", "100"),
     "a mark of no letter": (
         {"marks": [{"letter": "E", "position": [0, 0, 0]}]},
         "pictures[0].marks[0].letter",
@@ -178,7 +181,7 @@ def test_what_is_wrong_in_a_picture_is_named(
 
 def test_a_number_that_is_used_twice_is_told(tmp_path: Path, scenes: Dataset) -> None:
     folder = write(tmp_path / "q", QUESTION, QUESTION | {"id": "co-002"}, QUESTION)
-    with pytest.raises(DataError, match=r"questions.jsonl:3: id: is used by line 1 already"):
+    with pytest.raises(DataError, match=r"questions.jsonl:3: id: is used at .*:1 already"):
         read_questions(folder, scenes)
 
 
@@ -260,3 +263,31 @@ def test_questions_about_another_data_set_are_said_once(tmp_path: Path, scenes: 
     with pytest.raises(DataError) as caught:
         read_questions(write(tmp_path / "few", QUESTION, *others[:5]), scenes)
     assert len(caught.value.problems) == 5
+
+
+def test_the_complaints_of_one_line_are_bounded(tmp_path: Path, scenes: Dataset) -> None:
+    question = copy.deepcopy(QUESTION)
+    question["pictures"][0]["without"] = [9] * 20
+    question.update({f"field{i}": [0] * 20 for i in range(5_000)})
+    with pytest.raises(DataError) as caught:
+        read_questions(write(tmp_path / "q", question), scenes)
+    assert len(caught.value.problems) == 100
+
+
+def test_a_whole_character_in_two_escapes_is_fine(tmp_path: Path, scenes: Dataset) -> None:
+    text = "How many \U0001f9f1?"
+    assert read_one(tmp_path / "q", scenes, QUESTION | {"question": text}).question.text == text
+
+
+@settings(deadline=None, max_examples=40)
+@given(QUESTIONS)
+def test_any_question_is_read_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, line: bytes
+) -> None:
+    folder = tmp_path_factory.getbasetemp()
+    scenes = read_builtin(write_scenes(folder, tower("t1", [1, 2], ("red", "blue"))))
+    (folder / "questions.jsonl").write_bytes(line)
+    with contextlib.suppress(DataError):
+        questions = read_questions(folder, scenes)
+        assert len(questions.sha256) == 64
+        assert all(task.question.text.encode() for task in questions.tasks)

@@ -17,7 +17,7 @@ from phyblock.errors import DataError
 from phyblock.records.line import Line, validated
 from phyblock.resources import bundled
 from tests.data.broken import Raw, sound_scene, with_value, without
-from tests.data.test_builtin_laws import as_json, tasks
+from tests.data.test_scenes import as_json, tasks
 from tests.documents import ROOT
 from tests.fuzz.strategies import sound_question
 

@@ -1,19 +1,37 @@
-"""The reader of the project's own format: what is sound reads back, what is broken is named."""
+"""The reader of scenes: what is sound reads back, what is broken is named in few words."""
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 from pathlib import Path
+from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from phyblock.data import read_builtin
-from phyblock.domain import Block, Candidate, Scene
+from phyblock.data import AssemblyTask, read_builtin
+from phyblock.data.official import read_candidates
+from phyblock.domain import (
+    BLOCK_TYPES,
+    COLORS,
+    MAX_CANDIDATES,
+    Block,
+    Candidate,
+    CandidateSet,
+    Scene,
+)
 from phyblock.errors import DataError, Problem
 from tests.data.broken import Raw, sound_scene, with_value, without, write_scenes
+from tests.fuzz.strategies import CANDIDATES, SCENES
 
 SCENE = sound_scene()
 CUBE, ARCH = SCENE["blocks"]
+LENGTHS = st.floats(-10, 10).map(lambda x: x + 0.0)
+ANGLES = st.sampled_from([0.0, 45.0, 90.0, 180.0, 270.0, -90.0, 12.5])
+NAMES = st.from_regex(r"\A[A-Za-z0-9][A-Za-z0-9._-]{0,20}\Z")
 
 
 def problems_of(folder: Path) -> tuple[Problem, ...]:
@@ -68,17 +86,12 @@ def test_orientation_is_read_as_euler(tmp_path: Path) -> None:
 
 
 def test_line_ends_of_any_kind_and_a_missing_last_one_are_read(tmp_path: Path) -> None:
-    lines = [json.dumps({**SCENE, "id": name}) for name in "ab"]
+    # Unicode's own line ends inside a string end no line.
+    scenes = [{**SCENE, "id": name, "note": "a\u2028b\x85c"} for name in "ab"]
+    lines = [json.dumps(scene, ensure_ascii=False) for scene in scenes]
     for text in ("\n".join(lines), "\r\n".join(lines) + "\r\n"):
         (tmp_path / "scenes.jsonl").write_bytes(text.encode())
         assert len(read_builtin(tmp_path).tasks) == 2
-
-
-def test_unicode_line_ends_inside_a_string_do_not_end_a_line(tmp_path: Path) -> None:
-    noted = {**SCENE, "note": "a\u2028b\x85c"}
-    text = json.dumps(noted, ensure_ascii=False)
-    (tmp_path / "scenes.jsonl").write_text(text, encoding="utf-8")
-    assert len(read_builtin(tmp_path).tasks) == 1
 
 
 BROKEN_VALUES: dict[str, tuple[str, object, str, str, str]] = {
@@ -86,36 +99,28 @@ BROKEN_VALUES: dict[str, tuple[str, object, str, str, str]] = {
     "id is no string": ("id", 3, "id", "not a name", "letters"),
     "id is empty": ("id", "", "id", "not a name", "letters"),
     "id is a path": ("id", "../s1", "id", "not a name", "letters"),
-    "id is a parent folder": ("id", "..", "id", "not a name", "letters"),
     "id has two lines": ("id", "a\nb", "id", "not a name", "letters"),
     "level 5": ("levels", [5], "levels", "not allowed", "one level 1 to 4, or [1, 2]"),
     "levels 1 and 3": ("levels", [1, 3], "levels", "not allowed", "[1, 2]"),
-    "level twice": ("levels", [2, 2], "levels", "not allowed", "[1, 2]"),
     "level is true": ("levels", [True], "levels", "not allowed", "[1, 2]"),
-    "levels is no list": ("levels", 2, "levels", "not allowed", "[1, 2]"),
     "no levels": ("levels", [], "levels", "not allowed", "[1, 2]"),
     "parents is a number": ("parents", [3], "parents[0]", "not a name", "letters"),
     "no parents": ("parents", [], "parents", "non-empty list", "at least one"),
     "no blocks": ("blocks", [], "blocks", "non-empty list", "at least one"),
     "block is no object": ("blocks.1", [1], "blocks[1]", "not an object", "an object"),
     "order 0": ("blocks.0.order", 0, "blocks[0].order", "allowed number", "at least 1"),
-    "order is null": ("blocks.0.order", None, "blocks[0].order", "allowed number", "at least 1"),
     "order is true": ("blocks.0.order", True, "blocks[0].order", "allowed number", "at least 1"),
     "order is a float": ("blocks.1.order", 2.0, "blocks[1].order", "number", "at least 1"),
     "order twice": ("blocks.1.order", 1, "blocks[1].order", "used twice", "unique"),
     "unknown type": ("blocks.1.type", "arc", "blocks[1].type", "not known", "arch, cube, cub"),
-    "type is a list": ("blocks.1.type", ["arch"], "blocks[1].type", "not known", "arch, cube"),
     "unknown color": ("blocks.0.color", "pink", "blocks[0].color", "not known", "red, yellow"),
     "layer 0": ("blocks.0.layer", 0, "blocks[0].layer", "allowed number", "at least 1"),
     "wrong layer": ("blocks.1.layer", 1, "blocks[1].layer", "is wrong", "2, the longest path"),
     "NaN": ("blocks.0.position", [0, 0, float("nan")], "blocks[0].position", "vector", "finite"),
     "infinity": ("blocks.0.position", [0, 0, 1e999], "blocks[0].position", "vector", "finite"),
-    "too large": ("blocks.0.position", [0, 0, 10**400], "blocks[0].position", "vector", "finite"),
-    "two coordinates": ("blocks.0.position", [0, 0], "blocks[0].position", "vector", "three"),
     "a word for a coordinate": ("blocks.0.position", [0, 0, "1"], "blocks[0].position", "v", "thr"),
     "true as an angle": ("blocks.1.euler", [0, 0, True], "blocks[1].euler", "vector", "three"),
     "dangling depend": ("blocks.1.depend", [7], "blocks[1].depend", "names no block", ": 1, 2"),
-    "negative depend": ("blocks.1.depend", [-1], "blocks[1].depend[0]", "number", "at least 0"),
     "no depend": ("blocks.1.depend", [], "blocks[1].depend", "non-empty list", "at least one"),
     "cycle": ("blocks.0.depend", [2], "blocks[0].depend", "part of a cycle", "without a cycle"),
     "self-dependent": ("blocks.1.depend", [2], "blocks[1].depend", "part of a cycle", "without"),
@@ -128,6 +133,11 @@ BROKEN_VALUES: dict[str, tuple[str, object, str, str, str]] = {
         "that differ in type, color or orientation",
     ),
     "unknown candidate": ("candidates.0.type", "cuboid", "candidates[0].type", "known", "cuboid1"),
+    "far": ("blocks.0.position", [101, 0, 0], "blocks[0].position", "vector", "-100 to 100 m"),
+    "turned": ("blocks.1.euler", [0, 0, 1e9], "blocks[1].euler", "vector", "-36000"),
+    "order beyond": ("blocks.0.order", 10_000, "blocks[0].order", "number", "at most 9999"),
+    "layer beyond": ("blocks.0.layer", 10**18, "blocks[0].layer", "number", "at most 9999"),
+    "depend beyond": ("blocks.1.depend", [10**18], "blocks[1].depend[0]", "number", "at most"),
     "unsolvable": ("candidates.2.color", "blue", "candidates", "hold nothing that block 2", "ever"),
 }
 
@@ -156,17 +166,6 @@ def test_a_missing_field_is_said_once(tmp_path: Path, path: str) -> None:
     assert (problem.field, problem.message) == (field, "is missing")
 
 
-def test_blocks_and_candidates_are_bounded(tmp_path: Path) -> None:
-    blocks = [{**CUBE, "order": order} for order in range(1, 24)]
-    (problem,) = problems_of(write_scenes(tmp_path, {**SCENE, "blocks": blocks}))
-    assert (problem.field, problem.found, problem.allowed) == ("blocks", "23", "at most 22")
-    candidates = [
-        {"type": "cuboid3", "color": "red", "euler": [0, 0, 10 * i]} for i in range(14)
-    ] + SCENE["candidates"]
-    (problem,) = problems_of(write_scenes(tmp_path, {**SCENE, "candidates": candidates}))
-    assert (problem.field, problem.found, problem.allowed) == ("candidates", "17", "at most 16")
-
-
 def test_everything_that_is_wrong_is_said_at_once(tmp_path: Path) -> None:
     first = with_value(with_value(SCENE, "levels", [9]), "blocks.0.depend", [2])
     first = with_value(first, "candidates.0.color", "pink")
@@ -180,7 +179,30 @@ def test_everything_that_is_wrong_is_said_at_once(tmp_path: Path) -> None:
         ("2", "blocks[1].layer"),
         ("4", "id"),
     ]
-    assert "line 3" in found[-1].message
+    assert "jsonl:3" in found[-1].message
+    (tmp_path / "scenes.jsonl").write_text("x\n" * 200_000)
+    assert len(problems_of(tmp_path)) == 1_002
+
+
+MANY = {
+    "blocks": ("blocks", [CUBE] * 23),
+    "endless blocks": ("blocks", [CUBE] * 2_000),
+    "candidates": ("candidates", SCENE["candidates"][:1] * 17),
+    "endless candidates": ("candidates", [1] * 20_000),
+    "levels": ("levels", [1] * 20_000),
+    "parents": ("parents", ["x/"] * 20_000),
+    "depend": ("blocks.0.depend", [1] * 20_000),
+}
+
+
+@pytest.mark.parametrize(("at", "value"), MANY.values(), ids=MANY)
+def test_a_list_that_is_too_long_is_refused_in_few_words(
+    tmp_path: Path, at: str, value: object
+) -> None:
+    found = problems_of(write_scenes(tmp_path, with_value(SCENE, at, value)))
+    assert len(found) <= 100
+    assert all(problem.allowed for problem in found)
+    assert {problem.field.partition("[")[0] for problem in found} == {at.partition(".")[0]}
 
 
 BROKEN_TEXTS: dict[str, tuple[bytes, str, str]] = {
@@ -197,7 +219,10 @@ BROKEN_TEXTS: dict[str, tuple[bytes, str, str]] = {
     "UTF-16": ("{}".encode("utf-16"), "", "not UTF-8"),
     "a field twice": (b'{"id": "s1", "id": "s2"}', ":1", "twice"),
     "too many digits": (b'{"id": ' + b"1" * 5000 + b"}", ":1", "of 5,000 digits"),
+    "too long": (b"[" * 3_000_000, ":1", "too long a line"),
     "nested without end": (b"[" * 200_000, ":1", "nested more than 64 levels"),
+    "nested but whole": (b"[" * 80 + b"]" * 80, ":1", "nested more than 64 levels"),
+    "half a character": (b'{"id": "\\ud800"}', ":1", "half of a character"),
 }
 
 
@@ -218,3 +243,100 @@ def test_a_missing_file_and_a_folder_in_its_place_are_named(tmp_path: Path) -> N
     (tmp_path / "scenes.jsonl").mkdir()
     (problem,) = problems_of(tmp_path)
     assert "cannot be read" in problem.message
+    (tmp_path / "scenes.jsonl").rmdir()
+    os.mkfifo(tmp_path / "scenes.jsonl")
+    (problem,) = problems_of(tmp_path)
+    assert problem.message == "is not a regular file"
+
+
+@st.composite
+def tasks(draw: st.DrawFn) -> AssemblyTask:
+    """Any valid scene, with the candidates it needs and some that it does not."""
+    n = draw(st.integers(1, 8))
+    blocks: list[Block] = []
+    orders = draw(st.lists(st.integers(1, 99), min_size=n, max_size=n, unique=True))
+    for order in orders:
+        carriers = (
+            draw(st.lists(st.sampled_from(blocks), unique=True, max_size=3)) if blocks else []
+        )
+        blocks.append(
+            Block(
+                order,
+                draw(st.sampled_from(BLOCK_TYPES)),
+                draw(st.sampled_from(COLORS)),
+                draw(st.tuples(LENGTHS, LENGTHS, LENGTHS)),
+                draw(st.tuples(ANGLES, ANGLES, ANGLES)),
+                tuple(block.order for block in carriers),
+                1 + max((block.layer for block in carriers), default=0),
+            )
+        )
+    extra = st.builds(
+        Candidate,
+        st.sampled_from(BLOCK_TYPES),
+        st.sampled_from(COLORS),
+        st.tuples(ANGLES, ANGLES, ANGLES),
+    )
+    wanted = [Candidate(b.type, b.color, b.euler_deg) for b in blocks]
+    distinct = {c.look: c for c in wanted + draw(st.lists(extra, max_size=8))}
+    candidates = CandidateSet(tuple(draw(st.permutations(list(distinct.values())))))
+    levels = draw(st.sampled_from([(1,), (2,), (3,), (4,), (1, 2)]))
+    parents = tuple(draw(st.lists(NAMES, min_size=1, max_size=2)))
+    file_order = tuple(draw(st.permutations(blocks)))
+    return AssemblyTask(Scene(draw(NAMES), levels, file_order, parents), candidates)
+
+
+def as_json(task: AssemblyTask) -> dict[str, Any]:
+    scene = task.scene
+    return {
+        "id": scene.id,
+        "levels": scene.levels,
+        "parents": scene.parents,
+        "blocks": [
+            {
+                "order": block.order,
+                "type": block.type,
+                "color": block.color,
+                "layer": block.layer,
+                "depend": block.depend or [0],
+                "position": block.position_m,
+                "euler": block.euler_deg,
+            }
+            for block in scene.blocks
+        ],
+        "candidates": [
+            {"type": c.type, "color": c.color, "euler": c.euler_deg, "required": 1}
+            for c in task.candidates.candidates
+        ],
+    }
+
+
+@settings(deadline=None)
+@given(written=st.lists(tasks(), min_size=1, max_size=3, unique_by=lambda task: task.scene.id))
+def test_any_valid_scene_reads_back_equal(
+    tmp_path_factory: pytest.TempPathFactory, written: list[AssemblyTask]
+) -> None:
+    read = read_builtin(write_scenes(tmp_path_factory.getbasetemp(), *map(as_json, written)))
+    assert read.tasks == tuple(sorted(written, key=lambda task: task.scene.id))
+
+
+@settings(deadline=None, max_examples=40)
+@given(SCENES)
+def test_any_scene_is_read_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, line: bytes
+) -> None:
+    folder = tmp_path_factory.getbasetemp()
+    (folder / "scenes.jsonl").write_bytes(line)
+    with contextlib.suppress(DataError):
+        for task in read_builtin(folder).tasks:
+            assert max(map(abs, (x for b in task.scene.blocks for x in b.position_m))) <= 100
+
+
+@settings(deadline=None, max_examples=40)
+@given(CANDIDATES)
+def test_any_candidate_set_is_read_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, data: bytes
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "c.json"
+    path.write_bytes(data)
+    with contextlib.suppress(DataError):
+        assert 1 <= len(read_candidates(path)) <= MAX_CANDIDATES
