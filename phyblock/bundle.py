@@ -39,7 +39,7 @@ from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
 from phyblock.records.record import Record, SentPrompt
 from phyblock.records.reply import Reply
 from phyblock.resources import bundled
-from phyblock.results.design import read_design
+from phyblock.results.load import design_of
 from phyblock.run.judge import about_prompt
 from phyblock.run.plan import recorded_dataset
 from phyblock.run.rescore import judged_anew, recorded_suite, reopen_tracks
@@ -187,7 +187,7 @@ def opened_bundle(path: Path, data: Sequence[Path] = ()) -> Iterator[Verified]:
                 raise _otherwise(where, about, name)
         if prompts.differ or not _is_time(manifest.created):
             raise _otherwise(where, about, ", ".join(prompts.differ) or "created")
-        expected = read_design(manifest.fields(), where).all_samples
+        expected = design_of(manifest, where).all_samples
         physics = ", ".join(kind.title for kind in kinds_with_physics(manifest.suite))
         fell = (f"{physics}: what fell, which is taken from the records.",) if physics else ()
         unverified = (*prompts.unverified, *fell, *_NEVER_SHOWN)
@@ -342,7 +342,6 @@ def _localized(folder: Path, manifest: Manifest, data: Sequence[Path], where: st
     The first of the folders `data`, or of the sets that come with phyblock, that holds what was
     asked is taken. Raises DataError that names what is missing, StoreError for no plan.
     """
-    levels = read_design(manifest.fields(), where).suite.levels
     suite = recorded_suite(folder, manifest)
     for part in ("dataset", "questions"):
         held = getattr(manifest, part)
@@ -355,7 +354,7 @@ def _localized(folder: Path, manifest: Manifest, data: Sequence[Path], where: st
             moved = held.model_copy(update={"root": str(path)})
             here = manifest.model_copy(update={part: moved})
             try:
-                dataset = recorded_dataset(folder, here, levels, None)
+                dataset = recorded_dataset(folder, here, suite.levels, None)
                 if part == "questions":
                     for track in reopen_tracks(folder, here, suite, dataset):
                         track.close()

@@ -1,8 +1,7 @@
 """The tracks that there are, and the baselines that they bring: the one place that names them.
 
 Layers below the tracks ask here for the words that tracks add (sections of a suite, names of
-baselines and tables) without importing them: a track's package is loaded when it is first asked
-for.
+baselines) without importing them: a track's package is loaded when it is first asked for.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ if TYPE_CHECKING:
     from phyblock.tracks.base import AnyTrack
 
 __all__ = [
-    "PUBLISHED_TABLE",
     "add_baseline",
     "add_measure",
     "added_measures",
@@ -25,7 +23,6 @@ __all__ = [
     "known_tracks",
     "register_track",
     "remove_measure",
-    "table_names",
     "track_baselines",
     "unregister_track",
 ]
@@ -38,7 +35,6 @@ _MODULES = (
 )
 """Modules that hold a `TRACK`, in the order in which tracks are listed."""
 
-PUBLISHED_TABLE = "published"
 """The comparison with the paper, which a suite has only if it asks for it."""
 
 
@@ -59,16 +55,16 @@ def known_track(name: str) -> type[AnyTrack]:
 
 
 def register_track(kind: type[AnyTrack]) -> None:
-    """Add a track. Raises ValueError for a name, section or table that is taken."""
+    """Add a track. Raises ValueError for a name or section that is taken."""
     taken = {name for other in known_tracks().values() for name in _names_of(other)}
-    if clash := sorted(_names_of(kind) & (taken | {PUBLISHED_TABLE})):
-        raise ValueError(f"a track, section or table has this name: {', '.join(clash)}")
+    if clash := sorted(_names_of(kind) & taken):
+        raise ValueError(f"a track or section has this name: {', '.join(clash)}")
     _registered[kind.name] = kind
 
 
 def _names_of(kind: type[AnyTrack]) -> set[str]:
     """Names that a suite says for a track."""
-    return {kind.name, *kind.tables} | ({kind.section[0]} if kind.section is not None else set())
+    return {kind.name} | ({kind.section[0]} if kind.section is not None else set())
 
 
 def unregister_track(name: str) -> None:
@@ -103,12 +99,6 @@ def add_baseline(track: str, name: str, rule: Callable[..., str]) -> None:
 def track_baselines(kind: type[AnyTrack]) -> Mapping[str, Callable[..., str]]:
     """Return the rules of a track by name, the built-in ones first."""
     return {**kind.baselines, **_baselines.get(kind.name, {})}
-
-
-def table_names() -> tuple[str, ...]:
-    """Tables that a suite can ask for: those of its tracks, then the comparison with the paper."""
-    own = (name for kind in known_tracks().values() for name in kind.tables)
-    return (*dict.fromkeys(own), PUBLISHED_TABLE)
 
 
 def baseline_names() -> tuple[str, ...]:

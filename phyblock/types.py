@@ -10,14 +10,17 @@ from typing import Literal, get_args
 __all__ = [
     "BACKGROUNDS",
     "BATCH_PROVIDERS",
+    "FAILURES",
     "GATINGS",
     "LEVEL1_CRITERIA",
     "MATCHERS",
+    "OUTCOMES",
     "PLAN_PARSERS",
     "QUOTE_HINT",
     "REFUSED_ENDS",
     "SETTINGS",
     "STEP_ENDS",
+    "WITHOUT_REPLY",
     "AnswerFormat",
     "AskedAs",
     "Background",
@@ -111,6 +114,12 @@ Role = Literal["system", "user", "assistant"]
 Finish = Literal["stop", "length", "refusal", "unknown"]
 """Why a reply ended: by itself, at the token limit, by a content filter, or not said."""
 Outcome = Literal["ok", "parse_failure", "refusal", "truncated", "api_error", "missing"]
+OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
+"""Every outcome, in the order of columns."""
+FAILURES: tuple[Outcome, ...] = tuple(outcome for outcome in OUTCOMES if outcome != "ok")
+"""Every outcome but `ok`."""
+WITHOUT_REPLY: tuple[Outcome, ...] = ("api_error", "missing")
+"""Outcomes of samples that the model said nothing about; a refusal is an answer."""
 """What became of a sample."""
 TransportName = Literal["auto", "litellm", "direct"]
 BATCH_PROVIDERS = ("openai", "hosted_vllm", "anthropic", "gemini")

@@ -134,7 +134,7 @@ def _serve(
             console.print("To go on, give the same command again:")
             print_path(console, f"  {shlex.join(['phyblock', *sys.argv[1:]])}")
             return _INTERRUPTED
-        made = show_tables(folder, plan.suite.tables, page=True)
+        made = show_tables(folder, page=True)
         server.show_files(report_files(folder))
         session.finish(outcomes(folder, person.model, beside))
         print_path(console, made)

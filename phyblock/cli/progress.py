@@ -18,7 +18,6 @@ from rich.table import Table
 from rich.text import Text
 
 from phyblock.models import ModelEvent
-from phyblock.results.design import FAILURES
 from phyblock.run.events import (
     ModelStopped,
     RunEvent,
@@ -30,6 +29,7 @@ from phyblock.run.events import (
 )
 from phyblock.scoring.counts import Counts
 from phyblock.text import counted, one_line
+from phyblock.types import FAILURES
 
 _LINE_EVERY_S = 10.0
 _NOTICES = 6

@@ -92,18 +92,17 @@ def _print_tables(folder: Path, names: Sequence[str], form: str, *, is_paper: bo
 
 def show_tables(
     folder: Path,
-    tables: Sequence[str] | None = None,
     data: Path | None = None,
     *,
     page: bool = True,
 ) -> Path:
-    """Write these tables, those of the suite by default, and the page of a run folder.
+    """Write the tables and the page of a run folder.
 
     Prints the summary; returns the page, or the folder of tables where no page is wanted.
     """
     from phyblock.results.tables import summary_of, write_tables
 
-    written = write_tables(folder, tables)
+    written = write_tables(folder)
     _print_summary(make_console(), summary_of(written.run))
     if not page:
         return written.folder

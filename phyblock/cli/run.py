@@ -127,7 +127,7 @@ def run(
     be_quiet()
     session = Session(plan, folder, view, use_cache=not no_cache, retry_failed=retry_failed)
     result = asyncio.run(_run(session, view))
-    made = show_tables(folder, plan.suite.tables, page=not no_report)
+    made = show_tables(folder, page=not no_report)
     code = _conclude(console, folder, result, view)
     print_path(console, made)
     return code

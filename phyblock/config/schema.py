@@ -8,7 +8,7 @@ from typing import Any
 
 from phyblock.config.models import RECORDED, ModelConfig
 from phyblock.config.suite import suite_model
-from phyblock.registry import baseline_names, known_tracks, table_names
+from phyblock.registry import baseline_names, known_tracks
 
 _NAME = r"^[A-Za-z0-9][A-Za-z0-9._:+-]{0,79}$"
 
@@ -19,7 +19,6 @@ def suite_schema() -> dict[str, Any]:
     properties, kinds = schema["properties"], known_tracks()
     properties["tracks"]["items"]["enum"] = list(kinds)
     properties["tracks"]["description"] = " ".join(f"{k.name}: {k.asks}." for k in kinds.values())
-    properties["tables"]["items"]["enum"] = list(table_names())
     names = [{"enum": list(baseline_names())}, {"type": "string", "pattern": _NAME}]
     listed = next(branch for branch in properties["models"]["oneOf"] if "items" in branch)
     listed["items"] = {"anyOf": names}

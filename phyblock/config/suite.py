@@ -59,11 +59,9 @@ from phyblock.config.yaml import (
 )
 from phyblock.errors import Problem, SpecError
 from phyblock.registry import (
-    PUBLISHED_TABLE,
     baseline_names,
     known_track,
     known_tracks,
-    table_names,
 )
 from phyblock.text import did_you_mean
 from phyblock.types import (
@@ -427,11 +425,6 @@ class Suite(Section):
     """Bounds of a run; they change how fast results come, not what they are."""
     vary: VarySpec = VarySpec()
     """Ways of asking that are crossed, to tell how much each of them moves a model."""
-    tables: Unique[Annotated[str, _one_of(table_names)]] = Field(
-        default_factory=lambda: tuple(n for n in table_names() if n != PUBLISHED_TABLE)
-    )
-    """Tables to write, as far as they belong to a track of the suite; published compares with the
-    paper's numbers."""
 
     _files: SuiteFiles | None = PrivateAttr(default=None)
 
@@ -503,7 +496,7 @@ class Suite(Section):
     def identity(self) -> dict[str, Any]:
         """Return what determines the results, as JSON-able data, whatever the order of lists.
 
-        Leaves out name, description, limits and tables, sections of tracks that are not run,
+        Leaves out name, description and limits, sections of tracks that are not run,
         models, baselines, seeds, limit and paths (of data and templates): a run stores which models
         were run, about which items, and the hashes of what stands at the paths, which say more and
         survive a move.
@@ -518,7 +511,6 @@ class Suite(Section):
             "models",
             "baselines",
             "seeds",
-            "tables",
         }
         spec = self.model_dump(mode="json", exclude={*unsaid, *idle})
         for name in ("levels", "settings", "tracks"):
@@ -536,7 +528,7 @@ class Suite(Section):
 
         The first field is the one to fix; the error points at the first that is written.
         """
-        official, published = self.dataset.format == "official", PUBLISHED_TABLE in self.tables
+        official = self.dataset.format == "official"
         recorded, as_json = self.models == RECORDED, self.answer_format == "json_schema"
         shuffled = self.candidates.order == "shuffled"
         set_official = "set dataset.format to official and dataset.path to a checkout"
@@ -576,20 +568,6 @@ class Suite(Section):
             message = "recorded replies name candidates by the numbers of the file"
             hint = "use candidates.order: file, or list the models"
             yield "candidates.order models", message, hint
-        leave_out = "or leave published out of tables"
-        if published and not official:
-            message = "published numbers compare with the official data set only"
-            yield "tables dataset.format", message, f"{set_official}, {leave_out}"
-        if published and "paper" not in self.scoring.matchers:
-            message = "the published numbers were made by the paper matcher"
-            yield "scoring.matchers tables", message, f"add paper to scoring.matchers, {leave_out}"
-        if published and 1 in self.levels and self.scoring.level1 != "membership":
-            message = "the published Level-1 columns are the membership criterion"
-            hint = f"use scoring.level1: membership, {leave_out}"
-            yield "scoring.level1 tables levels", message, hint
-        if published and "A" not in self.settings:
-            message = "the published numbers are those of setting A"
-            yield "settings tables", message, f"add A to settings, {leave_out}"
 
     def _vary_faults(self, factor: str) -> Iterator[dict[str, Any]]:
         """Give what is wrong with a factor: its tracks must know it, other fields allow it."""

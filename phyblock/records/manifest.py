@@ -8,8 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, ValidationError
+from pydantic import AfterValidator, Field, ValidationError, field_validator
 
+from phyblock.config.suite import Suite, suite_model
 from phyblock.config.yaml import parse_yaml
 from phyblock.errors import Problem, SpecError, StoreError
 from phyblock.files import read_text
@@ -123,6 +124,14 @@ class Manifest(Line):
     versions: dict[str, str] = Field(default_factory=dict)
     """Versions of Python, of libraries, and of the readers that read the replies."""
 
+    @field_validator("models")
+    @classmethod
+    def _differ(cls, models: tuple[ManifestModel, ...]) -> tuple[ManifestModel, ...]:
+        names = [model.name for model in models]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise ValueError(f"models of different names, not {', '.join(twice)} twice")
+        return models
+
     @property
     def run(self) -> str:
         """The digest by which its records show that they are its own."""
@@ -154,6 +163,15 @@ def read_manifest(folder: Path) -> Manifest:
         raise StoreError(problems_of(error, where, Manifest, is_not, _HINT)) from error
     except ValueError as error:
         raise StoreError(Problem(where, str(error), hint=_HINT)) from error
+
+
+def suite_of(manifest: Manifest, where: str) -> Suite:
+    """Return the suite of a run; StoreError naming `where` and every field that is wrong."""
+    try:
+        return suite_model().model_validate(manifest.suite)
+    except ValidationError as error:
+        problems = problems_of(error, where, Manifest, "is not the suite of a run", _HINT)
+        raise StoreError(replace(one, field=f"suite.{one.field}") for one in problems) from error
 
 
 @functools.lru_cache(maxsize=2)

@@ -15,7 +15,6 @@ import pandas as pd
 from phyblock.errors import Problem, SpecError
 from phyblock.files import OutFolder
 from phyblock.records.manifest import ManifestDataset, ManifestQuestions
-from phyblock.results.design import Design
 from phyblock.results.estimates import (
     counted_samples,
     headline_columns,
@@ -26,7 +25,7 @@ from phyblock.results.estimates import (
     track_measures,
     value_of_cells,
 )
-from phyblock.results.load import Run, checked_models
+from phyblock.results.load import Design, Run, checked_models
 from phyblock.results.text import (
     NO_VALUE,
     Column,

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from phyblock.errors import Problem, StoreError
 from phyblock.records.files import RECORDS
 from phyblock.registry import added_measures
-from phyblock.results.design import Design
-from phyblock.results.load import Run
+from phyblock.results.load import Design, Run
 from phyblock.scoring.counts import Floats
 from phyblock.scoring.statistics import Clusters, in_range, jackknife
 from phyblock.tracks.base import kind_of

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,26 +11,35 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from phyblock.config.suite import Suite
 from phyblock.errors import Problem, SpecError
 from phyblock.records.files import record_types, run_records
-from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
+from phyblock.records.manifest import MANIFEST, Manifest, ManifestModel, read_manifest, suite_of
 from phyblock.records.record import Record, Score
 from phyblock.results.text import level_name
 from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES
 from phyblock.tracks.measures import CELL, Cell
+from phyblock.types import WITHOUT_REPLY, Outcome
 
 if TYPE_CHECKING:
     from phyblock.results.compare import Comparison
 
-from phyblock.results.design import (
-    OVERALL,
-    WITHOUT_REPLY,
-    Design,
-    SectionT,
-    read_design,
-    read_section,
-)
+HEADINGS: dict[Outcome, str] = {
+    "ok": "OK",
+    "parse_failure": "Unparsed",
+    "refusal": "Refusal",
+    "truncated": "Truncated",
+    "api_error": "API error",
+    "missing": "Missing",
+}
+"""What heads the column of each outcome."""
 
+NOT_RUN = "Not run"
+"""What heads numbers of samples that there are not."""
+
+
+OVERALL = "overall"
+"""Name of the row that pools the scenes of all levels."""
 BLOCK_COLUMNS = {name: f"blocks_{name}" for name in BLOCK_OUTCOMES}
 """Columns of scores that say what became of the goal's blocks."""
 MATCHED = ("tp", "fp", "fn")
@@ -242,6 +251,89 @@ def _rule(parse: Any) -> str | None:
     return None if rule is None else str(rule)
 
 
+@dataclass(frozen=True)
+class Design:
+    """The plan of a run as its `run.yaml` states it: the rows and columns of every table.
+
+    `items` counts what each track asks about. The first matcher and the first setting of the suite
+    are the headline.
+    """
+
+    suite: Suite
+    models: tuple[ManifestModel, ...]
+    items: Mapping[str, int]
+    scenes: int
+
+    @property
+    def model_names(self) -> tuple[str, ...]:
+        """Names of the models in the order of the suite."""
+        return tuple(model.name for model in self.models)
+
+    @property
+    def published(self) -> dict[str, str]:
+        """Names in the paper of the models that it knows; Table 1 need not have a row of it."""
+        return {model.name: model.published for model in self.models if model.published}
+
+    @property
+    def of_suite(self) -> str:
+        """The suite as captions of tables end in it, `, suite NAME`; "" where it has no name."""
+        return f", suite {self.suite.name}" if self.suite.name else ""
+
+    def after_suite(self, text: str, mark: str = ", ") -> str:
+        """A text as figures say it, behind the suite and a mark where the suite has a name."""
+        return f"Suite {self.suite.name}{mark}{text}" if self.suite.name else text
+
+    def samples(self, track: str) -> int:
+        """Samples that a complete run holds of one model in a track."""
+        return self.items.get(track, 0) * self.repeats
+
+    @property
+    def all_samples(self) -> int:
+        """Samples that a complete run holds."""
+        return len(self.models) * sum(self.samples(track) for track in self.suite.tracks)
+
+    @property
+    def repeats(self) -> int:
+        """Number of samples of an item and model: with every seed, in every way."""
+        return len(self.suite.seeds) * self.suite.vary.n_variants
+
+    @property
+    def levels(self) -> tuple[str, ...]:
+        """Level names in ascending order, then `overall`."""
+        return (*(str(level) for level in sorted(self.suite.levels)), OVERALL)
+
+    @property
+    def matcher(self) -> str:
+        """The headline matcher."""
+        return self.suite.scoring.matchers[0]
+
+    @property
+    def setting(self) -> str:
+        """The headline setting."""
+        return self.suite.settings[0]
+
+    @property
+    def outcomes_left_out(self) -> frozenset[str]:
+        """Outcomes whose samples enter no score under the policy on missing replies."""
+        return frozenset(WITHOUT_REPLY) if self.suite.scoring.missing == "skip" else frozenset()
+
+    def criterion(self, level: str) -> str:
+        """The criterion that scores a level.
+
+        Level 1 has its own. `overall` counts every scene once by `aov`, or by the Level-1
+        criterion where no other level was run.
+        """
+        only_level1 = set(self.suite.levels) == {1}
+        if level == "1" or (level == OVERALL and only_level1):
+            return self.suite.scoring.level1
+        return "aov"
+
+
+def design_of(manifest: Manifest, where: str = MANIFEST) -> Design:
+    """Return the design of a run; StoreError naming `where` and every field that is wrong."""
+    return Design(suite_of(manifest, where), manifest.models, manifest.items, manifest.scenes)
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
     """A run folder, read: `manifest` is its `run.yaml`, `design` the plan in it.
@@ -261,13 +353,6 @@ class Run:
     scores: pd.DataFrame = field(repr=False)
     is_cut: bool = False
     made: dict[str, pd.DataFrame] = field(default_factory=dict, repr=False, init=False)
-
-    def section(self, key: str, model: type[SectionT]) -> SectionT:
-        """Return a section of the run's suite, with the defaults of what it does not say.
-
-        Fields that only another version knows are left out; StoreError for a value that is wrong.
-        """
-        return read_section(self.manifest.suite, key, model, str(self.path / MANIFEST))
 
     @property
     def estimates(self) -> pd.DataFrame:
@@ -424,7 +509,7 @@ def load_run(path: str | Path, *, texts: bool = True) -> Run:
     """
     folder = Path(path)
     manifest = read_manifest(folder)
-    design = read_design(manifest.fields(), str(folder / MANIFEST))
+    design = design_of(manifest, str(folder / MANIFEST))
     lines = run_records(folder, manifest)
     records, scores = frames_of((record for _, record in lines), design, texts=texts)
     return Run(folder, manifest, design, records, scores, lines.is_cut)
@@ -453,7 +538,7 @@ def of_models(run: Run, models: Sequence[str]) -> Run:
     kept = tuple(model for model in run.design.models if model.name in chosen)
     return replace(
         run,
-        design=run.design.model_copy(update={"models": kept}),
+        design=replace(run.design, models=kept),
         records=run.records[run.records["model"].isin(chosen)],
         scores=run.scores[run.scores["model"].isin(chosen)],
     )

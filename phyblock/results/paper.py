@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from phyblock.results.design import OVERALL
 from phyblock.results.estimates import headline_rows, pooled_in, track_estimates
-from phyblock.results.load import Run
+from phyblock.results.load import OVERALL, Run
 from phyblock.results.text import Column, TextTable, number
 from phyblock.tracks.base import kind_of
 from phyblock.tracks.measures import CELL
@@ -120,6 +119,17 @@ def published_frame(run: Run, table: int) -> pd.DataFrame:
     return found[
         ["model", "published_name", CELL, "metric", "published", "ours", "difference", "n"]
     ]
+
+
+def is_as_published(run: Run) -> bool:
+    """True if a run counts official scenes as the paper's Table 1 does."""
+    suite = run.design.suite
+    return (
+        suite.dataset.format == "official"
+        and "paper" in suite.scoring.matchers
+        and (1 not in suite.levels or suite.scoring.level1 == "membership")
+        and _SETTING in suite.settings
+    )
 
 
 def _ours(run: Run, table: int) -> pd.DataFrame:

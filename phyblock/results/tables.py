@@ -15,8 +15,7 @@ import pandas as pd
 import yaml
 from pydantic import BaseModel, ConfigDict
 
-from phyblock.registry import PUBLISHED_TABLE, added_measures
-from phyblock.results.design import HEADINGS, NOT_RUN, OUTCOMES
+from phyblock.registry import added_measures
 from phyblock.results.estimates import (
     all_estimates,
     headline_columns,
@@ -28,7 +27,7 @@ from phyblock.results.estimates import (
     track_estimates,
     track_measures,
 )
-from phyblock.results.load import TOKENS, Run, load_run
+from phyblock.results.load import HEADINGS, NOT_RUN, TOKENS, Run, load_run
 from phyblock.results.text import (
     NO_VALUE,
     Column,
@@ -46,10 +45,12 @@ from phyblock.run.store import run_folder
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of, kinds
 from phyblock.tracks.measures import CELL, Measure
+from phyblock.types import OUTCOMES
 
 TABLES = "tables"
 """The folder of tables in the folder of a run."""
 _FORMS = ("csv", "md", "tex")
+_PUBLISHED = "published"
 
 
 class _Strict(BaseModel):
@@ -434,15 +435,14 @@ class TablesWritten:
         return {name: table.view for name, table in self.tables.items()}
 
 
-def write_tables(path: str | Path, tables: Sequence[str] | None = None) -> TablesWritten:
+def write_tables(path: str | Path) -> TablesWritten:
     """Rebuild `tables/` of a run folder from its records; each file appears whole or not at all.
 
-    `tables` names those of tracks to write; None is what the suite in `run.yaml` asks for. Raises
-    StoreError for a broken run (see `load_run`) or a folder that cannot be written, and, before
-    anything is, naming every file in the way that we never wrote.
+    Raises StoreError for a broken run (see `load_run`) or a folder that cannot be written, and,
+    before anything is, naming every file in the way that we never wrote.
     """
     run = load_run(path, texts=False)
-    made = make_tables(run, run.design.suite.tables if tables is None else tables)
+    made = make_tables(run)
     texts: dict[str, str | bytes] = {f"{TABLES}/estimates.csv": to_csv(all_estimates(run), "%.6f")}
     for name, table in made.items():
         texts[f"{TABLES}/{name}.csv"] = to_csv(table.frame, "%.6f")
@@ -460,41 +460,43 @@ def table_files() -> tuple[str, ...]:
     """Return every file of tables that a run folder may hold, by its name in it."""
     own = [name for track in kinds() for name in layouts_of(track) or (track,)]
     own += [f"{track}_measures" for track in kinds()]
-    names = (*own, PUBLISHED_TABLE, "sensitivity", "coverage", "cost")
+    names = (*own, _PUBLISHED, "sensitivity", "coverage", "cost")
     return (f"{TABLES}/estimates.csv", *(f"{TABLES}/{n}.{form}" for form in _FORMS for n in names))
 
 
 def table_names(run: Run) -> tuple[str, ...]:
     """Return the names of the tables that a run may have."""
     own = [name for track in run.design.suite.tracks for name in _layouts(run, track)]
-    return (*own, PUBLISHED_TABLE, "sensitivity", "coverage", "cost")
+    return (*own, _PUBLISHED, "sensitivity", "coverage", "cost")
 
 
-def make_tables(run: Run, names: Sequence[str]) -> dict[str, Table]:
-    """Make those of `names`, and unasked what has to be seen.
+def make_tables(run: Run, names: Sequence[str] | None = None) -> dict[str, Table]:
+    """Make the tables of these names that the run has values for; of None, those that it writes.
 
-    That is the table of a track without a layout, measures that were added from outside, what the
-    way of asking changes, coverage that is not complete, and cost.
+    A run writes the tables of its tracks, what the way of asking changes, coverage that is not
+    complete, cost, and the paper's numbers where it counts as the paper does.
     """
-    from phyblock.results.paper import beside_paper
+    from phyblock.results.paper import beside_paper, is_as_published
     from phyblock.results.sensitivity import sensitivity_frame, sensitivity_view
 
     made: dict[str, Table] = {}
+    wanted = set(table_names(run) if names is None else names)
     for track in run.design.suite.tracks:
         for name, layout in _layouts(run, track).items():
-            if name in names or name in (track, f"{track}_measures"):
+            if name in wanted:
                 table = filled(run, track, layout)
                 made |= {name: table} if table.view.rows else {}
-    if PUBLISHED_TABLE in names and (beside := beside_paper(run, 1)) is not None:
-        made[PUBLISHED_TABLE] = beside
-    moved = sensitivity_frame(run)
-    if len(moved):
+    counts_as_paper = names is not None or is_as_published(run)
+    if _PUBLISHED in wanted and counts_as_paper and (beside := beside_paper(run, 1)) is not None:
+        made[_PUBLISHED] = beside
+    if "sensitivity" in wanted and len(moved := sensitivity_frame(run)):
         made["sensitivity"] = Table(moved, sensitivity_view(moved, run))
     coverage = coverage_frame(run)
-    if "coverage" in names or run.is_cut or not is_complete(coverage):
+    if "coverage" in wanted and not (names is None and is_complete(coverage) and not run.is_cut):
         made["coverage"] = Table(coverage, coverage_view(coverage, run))
-    cost = cost_frame(run)
-    made["cost"] = Table(cost, cost_view(cost, run))
+    if "cost" in wanted:
+        cost = cost_frame(run)
+        made["cost"] = Table(cost, cost_view(cost, run))
     return made
 
 

@@ -39,7 +39,7 @@ def make_manifest(
     """Return the manifest of a run.
 
     `identity` digests what decides the results, so that only the same run goes on in a folder.
-    Limits, prices, labels, tables, paths, and where and in which order models are named and served
+    Limits, prices, labels, paths, and where and in which order models are named and served
     are no part of it. `variants` has the tracks of every condition.
     """
     data_version = read_version(dataset.root)

@@ -10,15 +10,13 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
-from phyblock.config.suite import Suite, SuiteFiles, suite_model
+from phyblock.config.suite import Suite, SuiteFiles
 from phyblock.config.yaml import YamlSource
 from phyblock.data import Dataset
 from phyblock.errors import DataError, Problem, SpecError, StoreError
 from phyblock.parsing.plan import reader_version
 from phyblock.records.files import run_records
-from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
+from phyblock.records.manifest import MANIFEST, Manifest, read_manifest, suite_of
 from phyblock.records.record import Record
 from phyblock.records.reply import StoredError
 from phyblock.run.judge import about_item, judged, judged_apart, read_extraction
@@ -129,12 +127,7 @@ def recorded_suite(
     Raises StoreError for a suite that is none, SpecError for a parser that cannot read what was
     asked for.
     """
-    try:
-        suite = suite_model().model_validate(manifest.suite)
-    except ValidationError as error:
-        hint = "run.yaml is written by `phyblock run` and is never edited"
-        problem = Problem(str(folder / MANIFEST), "is missing or wrong", "suite", hint=hint)
-        raise StoreError(problem) from error
+    suite = suite_of(manifest, str(folder / MANIFEST))
     if parser == "official" and suite.answer_format == "json_schema":
         message = "asked for JSON, which the official expression does not read"
         raise SpecError(Problem(str(folder), message, "--parser", parser, "steps"))

@@ -63,7 +63,6 @@ _NOT_IDENTITY = (
     "suite.models",
     "suite.baselines",
     "suite.seeds",
-    "suite.tables",
     "suite.dataset",
     "dataset.root",
 )

@@ -131,8 +131,6 @@ class Track(ABC, Generic[ItemT]):
     """The module that holds its `REPORT`, for tracks that do not override `report`."""
     counted: ClassVar[tuple[SampleCounts, ...]] = ()
     """What its measures count of every sample as it is judged."""
-    tables: ClassVar[tuple[str, ...]] = ()
-    """Names of tables that a suite can ask for, in the order in which they are listed."""
     varies: ClassVar[tuple[str, ...]] = ("repeats",)
     """Factors of a suite's section `vary` that change what it asks."""
     no_examples: ClassVar[str] = "it declares none"

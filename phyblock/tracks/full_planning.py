@@ -320,7 +320,6 @@ class FullPlanning(SceneTrack, SingleTrack[AssemblyTask]):
     by_hand = staticmethod(pick_plan)
     record = PlanRecord
     counted = (POSE_COUNTS,)
-    tables = ("table1", "errors", "losses")
     varies = ("prompt", "background", "view", "candidate_order", "layout", "examples", "repeats")
     no_examples = ""
 

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from phyblock.data import AssemblyTask, Dataset
     from phyblock.models import Image
     from phyblock.records.record import Record
-    from phyblock.results.design import Design
-    from phyblock.results.load import Run
+    from phyblock.results.load import Design, Run
     from phyblock.results.text import TextTable
     from phyblock.scoring.counts import Metric
     from phyblock.sim.film import FilmStep

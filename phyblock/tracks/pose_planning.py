@@ -812,7 +812,6 @@ class PosePlanning(SceneTrack, SingleTrack[AssemblyTask]):
     by_hand = staticmethod(pick_poses)
     record = PoseRecord
     counted = (RIGHT, FITS, CARRIED, ERRORS, *PLANS.values())
-    tables = ("table_c", "pose_errors")
     varies = ("prompt", "background", "candidate_order", "repeats")
     no_examples = "one would need the floor and the sheet of blocks of a scene of its own"
     drawn_here = "the floor is ruled in pictures that are drawn here"

@@ -46,8 +46,7 @@ from phyblock.tracks.pose_planning import (
 from phyblock.types import REFUSED_ENDS, Setting, StepEnd
 
 if TYPE_CHECKING:
-    from phyblock.results.design import Design
-    from phyblock.results.load import Run
+    from phyblock.results.load import Design, Run
 
 NAME = "pose_planning"
 

@@ -393,7 +393,6 @@ class Vqa(SingleTrack[AskedQuestion]):
     baselines = CHOICE_RULES
     by_hand = staticmethod(pick_answer)
     record = ChoiceRecord
-    tables = ("table2", "letters")
     varies = ("prompt", "background", "examples", "repeats")
     no_examples = ""
 

@@ -415,7 +415,6 @@ class StepPlanning(SceneTrack, EpisodeTrack[AssemblyTask]):
     by_hand = staticmethod(pick_step)
     record = EpisodeRecord
     counted = (POSE_COUNTS,)
-    tables = ("table3", "endings", "moves")
     varies = ("prompt", "background", "view", "candidate_order", "layout", "repeats")
     no_examples = "one would be an episode of several turns, each with a picture of its own"
     drawn_here = "step planning draws every state, so the goal must be drawn as well"

@@ -145,7 +145,7 @@ _COLUMNS = (
 
 
 def _notes(run: Run) -> Sequence[str]:
-    steps = run.section("steps", StepsSpec)
+    steps = run.design.suite.section(StepsSpec)
     engine = f" in {run.manifest.engine}" if ENGINE in run.manifest.tracks.get(NAME, {}) else ""
     return (
         f"Percent. Scored in setting {run.design.setting}; the simulator goes by setting "

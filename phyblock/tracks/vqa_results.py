@@ -109,7 +109,7 @@ def _questions(run: Run) -> pd.DataFrame:
     asked = answers.groupby(keys, sort=True).agg({"correct": "sum", "replied": "any"}).reset_index()
     replied = asked.groupby(["model", CELL])["replied"].transform("any").astype(bool)
     asked = asked[replied]
-    correct = (asked["correct"] == run.section(NAME, VqaSpec).rotations).astype("int64")
+    correct = (asked["correct"] == run.design.suite.section(VqaSpec).rotations).astype("int64")
     about: dict[str, Any] = {
         **dict.fromkeys(SCORED_BY, ""),
         "item": asked["question"],
@@ -129,7 +129,7 @@ def guessing(run: Run, cell: str) -> float:
     """Return the expected accuracy of uniform guesses in a cell that was asked."""
     subtask = next((name for name in SUBTASKS if name == cell), None)
     if subtask is not None:
-        return chance(subtask) ** run.section(NAME, VqaSpec).rotations
+        return chance(subtask) ** run.design.suite.section(VqaSpec).rotations
     (names,) = (other.of for other in _run_cells(run) if other.name == cell)
     return plain_sum(guessing(run, name) for name in names) / len(names)
 
@@ -167,7 +167,7 @@ _COLUMNS = (
 def _notes(run: Run) -> Sequence[str]:
     circular = (
         " A question counts as right only if every rotation of its options was answered right."
-        if run.section(NAME, VqaSpec).circular
+        if run.design.suite.section(VqaSpec).circular
         else ""
     )
     return (
@@ -177,7 +177,7 @@ def _notes(run: Run) -> Sequence[str]:
 
 
 def _showing(run: Run) -> tuple[str, ...]:
-    shown = run.section(NAME, VqaSpec)
+    shown = run.design.suite.section(VqaSpec)
     circular = ("circular",) if shown.circular else ()
     letters = ("options on one sheet",) if shown.options_as == "letters" else ()
     return (*circular, *run.controls(NAME), *letters)
@@ -189,7 +189,7 @@ def _question_digest(run: Run) -> str | None:
 
 
 def _check_alike(run: Run, first: Run, _: Sequence[str], __: Measure) -> None:
-    circular = [one.section(NAME, VqaSpec).circular for one in (run, first)]
+    circular = [one.design.suite.section(VqaSpec).circular for one in (run, first)]
     if circular[0] != circular[1]:
         found, allowed = (str(one).lower() for one in circular)
         message = f"counts right answers in another way than {first.path}"
@@ -202,7 +202,7 @@ def _check_alike(run: Run, first: Run, _: Sequence[str], __: Measure) -> None:
 
 def question_items(run: Run, dataset: Dataset) -> PageItems:
     """Return the questions of a run; DataError where they are not what it was made on."""
-    recorded, shown = run.manifest.questions, run.section(NAME, VqaSpec)
+    recorded, shown = run.manifest.questions, run.design.suite.section(VqaSpec)
     if recorded is None:
         raise DataError(Problem(str(run.path / MANIFEST), "names no questions", "questions"))
     questions = open_questions(recorded.format, Path(recorded.root), dataset)

@@ -9,7 +9,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,6 @@ from typing import Any
 from pydantic import BaseModel
 
 from phyblock.bundle import named, opened_bundle, portable_manifest
-from phyblock.config.suite import ImagesSpec
 from phyblock.errors import DataError, Problem, SpecError, StoreError
 from phyblock.files import LIST, OutFolder, digest_of_file, writing
 from phyblock.records.files import RECORDS
@@ -294,9 +293,9 @@ def _facts(run: Run, shared: Sequence[str]) -> Iterator[tuple[str, Any]]:
                 yield f"tracks.{track}.{key}", value
         held: list[tuple[str, BaseModel, frozenset[str]]] = []
         if identity.get("pictures") is not None:
-            held.append(("images", run.section("images", ImagesSpec), frozenset({"size_px"})))
+            held.append(("images", run.design.suite.images, frozenset({"size_px"})))
         if (section := kind_of(track).section) is not None:
-            held.append((section[0], run.section(*section[:2]), _CONTROLS))
+            held.append((section[0], run.design.suite.section(section[1]), _CONTROLS))
         for name, values, without in held:
             for key in type(values).model_fields.keys() - without:
                 yield f"{name}.{key}", str(getattr(values, key))
@@ -357,7 +356,7 @@ def values_of(run: Run, track: str) -> TrackValues:
     values: dict[str, Mapping[tuple[str, str], Value]] = {}
     for setting in design.suite.settings if shown["setting"].astype(bool).any() else ("",):
         suite = design.suite.model_copy(update={"settings": (setting,)} if setting else {})
-        in_setting = design.model_copy(update={"suite": suite})
+        in_setting = replace(design, suite=suite)
         values[setting] = headline_of(run, track, in_setting)
     return TrackValues(values, samples, _facts_of(run, track, samples, what.measure.best))
 

@@ -29,8 +29,7 @@ from phyblock.models import Image
 from phyblock.records.files import PromptLines, RecordLines, run_records
 from phyblock.records.record import Record, Score, SentPrompt
 from phyblock.resources import cache_dir
-from phyblock.results.design import Design
-from phyblock.results.load import Run
+from phyblock.results.load import Design, Run
 from phyblock.run.plan import recorded_dataset
 from phyblock.stable import hex_digest
 from phyblock.tracks.base import kind_of, kinds
@@ -412,7 +411,7 @@ def _cached(
 
 def _images_of(run: Run) -> Iterable[ImagesSpec]:
     """What a run's suite says of pictures, in every condition that has other ones."""
-    vary, images = run.design.suite.vary, run.section("images", ImagesSpec)
+    vary, images = run.design.suite.vary, run.design.suite.images
     found = {images: None}
     for variant in vary.variants:
         paths = ((FACTORS[factor] or (), factor, level) for factor, level in variant.levels)

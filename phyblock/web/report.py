@@ -18,7 +18,6 @@ from phyblock.files import OutFolder, digest_of_file, writing
 from phyblock.records.files import PROMPTS, RECORDS, STOPPED, read_stopped
 from phyblock.records.manifest import MANIFEST
 from phyblock.results.compare import compare_models
-from phyblock.results.design import WITHOUT_REPLY
 from phyblock.results.estimates import (
     Value,
     headline_columns,
@@ -34,6 +33,7 @@ from phyblock.results.text import NO_VALUE, captioned, number, spread
 from phyblock.run.store import run_folder
 from phyblock.tracks.base import kind_of
 from phyblock.tracks.pictures import kit
+from phyblock.types import WITHOUT_REPLY
 from phyblock.web.pack import (
     Pack,
     SampleIndex,

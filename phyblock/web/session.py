@@ -33,8 +33,7 @@ from phyblock.models import HaltedError, Image, Reply, Request, Usage
 from phyblock.records.files import read_records
 from phyblock.records.record import Record
 from phyblock.results.compare import check_alike, comparable
-from phyblock.results.design import Design
-from phyblock.results.load import load_run
+from phyblock.results.load import Design, load_run
 from phyblock.run.events import RunEvent, RunStarted, SampleDone
 from phyblock.run.models import PlannedModel
 from phyblock.run.plan import RunPlan, make_plan

@@ -95,7 +95,9 @@ def test_no_cell_of_any_csv_is_a_formula(tmp_path: Path) -> None:
         record(FORMULA, scene, scores=[score(1, 1, 1)], text="-2+3+cmd|' /C calc'!A0")
         for scene in LEVELS
     ]
-    folder = write_run(tmp_path / "run", records, manifest(models=[FORMULA], seeds=[0]))
+    facts = manifest(models=[FORMULA], seeds=[0])
+    facts["suite"]["models"] = ["alpha"]
+    folder = write_run(tmp_path / "run", records, facts)
     written = write_tables(folder)
     exported = export_run(load_run(folder), "csv")
     checked = 0

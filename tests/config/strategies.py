@@ -58,7 +58,6 @@ FIELDS: dict[str, st.SearchStrategy[Any]] = {
     "prompt": st.just("default"),
     "parser": st.sampled_from(["steps", "official"]),
     "answer_format": st.sampled_from(["text", "json_schema"]),
-    "tables": st.lists(st.sampled_from(["errors", "table1", "errors"]), unique=True),
     **{name: st.fixed_dictionaries({}, optional=fields) for name, fields in SECTIONS.items()},
 }
 REQUIRED: dict[str, st.SearchStrategy[Any]] = {

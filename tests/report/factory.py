@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from phyblock.records.files import known_records
 from phyblock.records.manifest import Manifest
-from phyblock.results.design import OUTCOMES, read_design
-from phyblock.results.load import Run, frames_of
+from phyblock.results.load import Run, design_of, frames_of
 from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES
+from phyblock.types import OUTCOMES
 
 laws = settings(max_examples=12, deadline=None)
 """Tables take some 50 ms each, so that few examples must do."""
@@ -39,6 +39,7 @@ def manifest(
         "identity": "0" * 64,
         "suite": {
             "name": "test",
+            "models": [name for name, _ in named],
             "levels": list(levels),
             "settings": list(settings),
             "seeds": list(seeds),
@@ -124,8 +125,9 @@ def record(
 
 def run_of(records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Run:
     read = (known_records().validate_python(one) for one in records)
-    design = read_design(facts)
-    return Run(Path("run"), Manifest.model_validate(dict(facts)), design, *frames_of(read, design))
+    told = Manifest.model_validate(dict(facts))
+    design = design_of(told)
+    return Run(Path("run"), told, design, *frames_of(read, design))
 
 
 def write_run(folder: Path, records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Path:

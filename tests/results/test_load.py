@@ -173,23 +173,26 @@ def test_a_broken_manifest_is_said_so(tmp_path: Path, text: str) -> None:
 
 def test_all_that_a_manifest_lacks_is_said_at_once(tmp_path: Path) -> None:
     facts = manifest()
-    del facts["scenes"], facts["suite"]["seeds"]
+    del facts["suite"]["name"]
     facts["suite"]["scoring"]["missing"] = "ignore"
     with pytest.raises(StoreError) as caught:
         load_run(write_run(tmp_path / "run", [], facts))
     assert {problem.field for problem in caught.value.problems} == {
-        "scenes",
-        "suite.seeds",
+        "suite.name",
         "suite.scoring.missing",
     }
 
 
 def test_models_of_one_name_are_refused(tmp_path: Path) -> None:
-    facts = manifest(models=["alpha", "beta", "alpha"])
+    facts = manifest(models=["alpha", "beta"])
+    facts["models"] *= 2
     with pytest.raises(StoreError) as caught:
         load_run(write_run(tmp_path / "run", [record()], facts))
     (problem,) = caught.value.problems
-    assert (problem.field, problem.message) == ("models", "names models twice: alpha")
+    assert (problem.field, problem.allowed) == (
+        "models",
+        "models of different names, not alpha, beta twice",
+    )
 
 
 def test_reading_runs_needs_no_simulator_and_no_network() -> None:

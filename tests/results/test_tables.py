@@ -19,7 +19,6 @@ from phyblock.errors import StoreError
 from phyblock.files import LIST
 from phyblock.records.files import known_records
 from phyblock.results.compare import compare_models, write_comparison
-from phyblock.results.design import OUTCOMES
 from phyblock.results.estimates import all_estimates, track_measures
 from phyblock.results.figures import Look, write_paper_figures
 from phyblock.results.load import Run, load_run
@@ -34,6 +33,7 @@ from phyblock.results.tables import (
 from phyblock.results.text import NO_VALUE, number, to_latex, to_markdown
 from phyblock.run.events import Summary
 from phyblock.tracks.base import kinds
+from phyblock.types import OUTCOMES
 from tests.report.factory import laws, manifest, record, record_lists, run_of, score, write_run
 from tests.results.test_estimates import complete, episode, episodes, questions
 
@@ -131,9 +131,8 @@ def test_how_questions_were_shown_is_in_the_captions(shown: dict[str, Any], word
 
 
 def test_layouts_name_what_tracks_declare() -> None:
-    for track, kind in kinds().items():
+    for track in kinds():
         layouts = layouts_of(track)
-        assert set(kind.tables) == set(layouts)
         measures = {measure.name for measure in track_measures(track)}
         for layout in layouts.values():
             named = {name for column in layout.columns for name in column.measures}
@@ -181,7 +180,7 @@ def test_an_unknown_cost_is_never_shown_as_zero() -> None:
         record("dear", cost_usd=1234.5),
         record("cached", cost_usd=0.25, cached=True, attempts=0),
     ]
-    view = make_tables(run_of(records, facts), [])["cost"].view
+    view = make_tables(run_of(records, facts), ["cost"])["cost"].view
     places = [n for n, column in enumerate(view.columns) if column.group == "Cost (USD)"]
     assert {row[0]: tuple(row[n] for n in places) for row in view.rows} == {
         "unknown": (NO_VALUE, NO_VALUE),
@@ -216,8 +215,9 @@ def records_of(model: str) -> Records:
     ]
 
 
-def test_a_run_writes_estimates_tables_that_are_asked_for_and_cost(tmp_path: Path) -> None:
-    facts = manifest(models=[("alpha", "GPT-4o")])
+def test_a_run_writes_estimates_the_tables_of_its_tracks_and_cost(tmp_path: Path) -> None:
+    facts = manifest(models=[("alpha", "GPT-4o")], level1="membership")
+    facts["suite"]["dataset"] = {"format": "official", "path": "there"}
     written = write_tables(write_run(tmp_path / "run", records_of("alpha"), facts))
     names = {"table1", "errors", "losses", "published", "coverage", "cost"}
     assert set(written.tables) == names
@@ -226,7 +226,7 @@ def test_a_run_writes_estimates_tables_that_are_asked_for_and_cost(tmp_path: Pat
         *(f"{name}.{form}" for name in names for form in ("csv", "md", "tex")),
     }
     assert {f"tables/{file.name}" for file in written.files} <= set(table_files())
-    assert set(write_tables(written.run.path, ["errors"]).tables) == {"errors", "coverage", "cost"}
+    assert set(make_tables(written.run, ["errors"])) == {"errors"}
 
 
 def test_coverage_is_written_where_it_is_not_complete(tmp_path: Path) -> None:

@@ -18,10 +18,10 @@ from hypothesis import strategies as st
 
 from phyblock.errors import DataError, SpecError, StoreError
 from phyblock.records.files import known_records
+from phyblock.records.manifest import Manifest
 from phyblock.records.record import Record
-from phyblock.results.design import read_design
 from phyblock.results.estimates import headline_of
-from phyblock.results.load import load_run
+from phyblock.results.load import design_of, load_run
 from phyblock.results.tables import write_tables
 from phyblock.web import leaderboard
 from phyblock.web.leaderboard import (
@@ -95,7 +95,7 @@ def test_the_newest_record_of_every_sample_is_there_once(
         {**one, "outcome": "missing", "reply": None} for one in records if random.random() < 0.5
     ]
     write_run(folder, [*stale, *records], facts)
-    design = read_design(facts)
+    design = design_of(Manifest.model_validate(facts))
     index, pack = SampleIndex(design), Pack(folder, "records", "build")
     prompts = Pack(folder, "prompts", "build")
     pack_samples(folder, read_places(folder, design), index, pack, prompts, {})
@@ -125,7 +125,7 @@ def test_the_newest_record_of_every_sample_is_there_once(
 def test_every_text_of_the_page_is_escaped_and_only_our_script_may_run(tmp_path: Path) -> None:
     hostile = "<script>alert(1)</script><img src=x onerror=alert(2)>\"'&"
     facts = manifest(models=[hostile])
-    facts["suite"] |= {"name": hostile, "description": hostile}
+    facts["suite"] |= {"models": ["alpha"], "description": hostile}
     folder = write_run(tmp_path / "run", [record(hostile, scores=[score(1, 0, 1)])], facts)
     page = Report(folder).page
     assert not (folder / "figures").exists()
