@@ -188,7 +188,7 @@ def test_a_sample_is_solved_where_it_has_the_best_value_that_there_is(
     has_best = not math.isnan(best)
     flipped = compare_models(run).flipped
     assert set(flipped["right"]) == ({"oracle"} if has_best else set())
-    sites = [SiteRun("run", run, False, Sources())]
+    sites = [SiteRun("run", run, Sources())]
     board = board_of(sites, entries_of(sites), all_values(sites))
     assert json.loads(json.dumps(board, allow_nan=False))["tracks"][0]["best"] == (
         best if has_best else None

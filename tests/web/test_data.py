@@ -252,7 +252,7 @@ def planned(
     facts = manifest(models=right, seeds=[seed], items={"full_planning": len(SCENES)})
     for model in facts["models"]:
         model["kind"] = "baseline" if model["name"] in rules else "litellm"
-    return SiteRun("run", run_of(records, facts), False, Sources())
+    return SiteRun("run", run_of(records, facts), Sources())
 
 
 def test_only_whole_models_have_ranks_the_same_on_the_site_and_in_the_report() -> None:
@@ -276,7 +276,7 @@ def test_only_whole_models_have_ranks_the_same_on_the_site_and_in_the_report() -
 
 
 def site_run(where: str, **facts: Any) -> SiteRun:
-    return SiteRun(where, run_of([], manifest(**facts)), False, Sources())
+    return SiteRun(where, run_of([], manifest(**facts)), Sources())
 
 
 def in_track(track: str, **more: Any) -> dict[str, Any]:
