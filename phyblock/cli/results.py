@@ -291,11 +291,9 @@ def export(
     from phyblock.data import read_data_set
     from phyblock.results.export import export_run
     from phyblock.results.load import load_run
-    from phyblock.tracks import kinds
+    from phyblock.results.questions_export import EXPORT_FILES, export_questions
 
-    brought = [kind.report().export for kind in kinds().values()]
-    writers = {word: one for one in brought if one is not None for word in one.formats}
-    forms = _RUN_FORMS if questions is None else tuple(writers)
+    forms = _RUN_FORMS if questions is None else tuple(EXPORT_FILES)
     if form not in forms:
         raise click.BadParameter(f"{form!r} is not one of {', '.join(forms)}.", param_hint="--to")
     if (run is None) == (questions is None):
@@ -306,8 +304,8 @@ def export(
         assert questions is not None
         if out is None:
             raise click.UsageError("--questions needs --out: the folder to write.")
-        items = questions or writers[form].items
-        files = writers[form].write(form, out, items, read_data_set(data), limit, size_px)
+        questions = questions or "phyblock-vqa"
+        files = export_questions(form, out, questions, read_data_set(data), limit, size_px)
     for file in files:
         print_path(make_console(), file)
 

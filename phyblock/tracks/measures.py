@@ -230,12 +230,11 @@ class KeptPictures(Protocol):
 class PageItems:
     """The data of a report's page on items that are more than their scene.
 
-    `shown` gives what a record asked about, as it was shown, None where that is not known. `entry`
-    is what the page takes of it, `pictures` finds those that were sent in a folder of kept ones.
+    `shown` gives what a record asked about, as it was shown, with its `question`; None where that
+    is not known. `pictures` finds those that were sent in a folder of kept ones.
     """
 
     shown: Callable[[Record], Any | None]
-    entry: Callable[[Any], Mapping[str, Any]]
     pictures: Callable[[Path, PictureStyle], KeptPictures]
 
 
@@ -251,24 +250,6 @@ class EpisodeView:
     table: Callable[[Any], TextTable]
     frames: Callable[[Any, AssemblyTask], Iterable[FilmStep]]
     state_keys: Callable[[Any, AssemblyTask, PictureStyle], Iterable[str]] = lambda *_: ()
-
-
-@dataclass(frozen=True)
-class ItemExport:
-    """The form in which `phyblock export --questions` writes items with their pictures for other
-    tools.
-
-    `formats` are the words for `--to`; `items` names the bundled set that is written unless
-    another is named. `write` takes a format, the folder to write, the set by its name or folder,
-    the scenes that it is about, how many items to write at most (None: all) and the edge of a
-    picture [pixels]; it returns what it wrote. It raises DataError for a set or picture that cannot
-    be read, SpecError for a package that is not installed, StoreError for a folder that cannot be
-    written.
-    """
-
-    formats: tuple[str, ...]
-    items: str
-    write: Callable[[str, Path, str, Dataset, int | None, int], tuple[Path, ...]]
 
 
 WHOLE = Cell("overall", "Overall")
@@ -301,8 +282,8 @@ class TrackReport:
     `part_names` say what `Record.part` stands for. `items` opens, for the page of a run, what was
     asked about where that is more than scenes; it raises DataError where that is not what the run
     was made on.
-    `episodes` shows records that are episodes, `export` writes what is asked about. `listings` are
-    the scores that the page of a run lists samples by, the one that the headline leads with first.
+    `episodes` shows records that are episodes. `listings` are the scores that the page of a run
+    lists samples by, the one that the headline leads with first.
     `showing` says, in words that end every caption, what is unusual about how items were shown.
     """
 
@@ -320,6 +301,5 @@ class TrackReport:
     part_names: Mapping[str, str] = field(default_factory=dict)
     items: Callable[[Run, Dataset], PageItems] | None = None
     episodes: EpisodeView | None = None
-    export: ItemExport | None = None
     listings: Callable[[Design], tuple[Listing, ...]] = by_settings
     showing: Callable[[Run], tuple[str, ...]] = lambda _: ()

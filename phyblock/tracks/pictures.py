@@ -15,7 +15,6 @@ from typing import Any, TypeVar
 
 from phyblock.config.suite import ImagesSpec
 from phyblock.data import AssemblyTask
-from phyblock.domain import BLOCK_TYPES, Block, CandidateSet, Scene
 from phyblock.errors import DataError, Problem, SimulationError
 from phyblock.files import (
     LARGEST_PICTURE_BYTES,
@@ -28,9 +27,7 @@ from phyblock.files import (
 )
 from phyblock.models.request import Image
 from phyblock.resources import cache_dir
-from phyblock.sim.geometry import solid_mesh
 from phyblock.sim.pictures import (
-    COLOR_RGB,
     PictureStyle,
     candidates_key,
     candidates_png,
@@ -326,60 +323,3 @@ def _half(composite: Path, *, is_goal: bool) -> bytes:
         side = width // 2 - width // 256
         left = 0 if is_goal else width - side
         return to_png(picture.crop((left, 0, left + side, height)))
-
-
-_DECIMALS = 6
-
-
-def kit() -> dict[str, Any]:
-    """Shapes (vertices [m] and triangles in the body frame) and colors of all blocks."""
-    meshes = {name: solid_mesh(name) for name in BLOCK_TYPES}
-    return {
-        "shapes": {
-            name: {
-                "vertices": [rounded(corner) for corner in mesh.vertices_m.tolist()],
-                "triangles": mesh.triangles.tolist(),
-            }
-            for name, mesh in meshes.items()
-        },
-        "colors": COLOR_RGB,
-    }
-
-
-def scene_entry(scene: Scene, candidates: CandidateSet) -> dict[str, Any]:
-    """A scene with its candidates.
-
-    `depend` holds positions of blocks in the list, from 0; `candidate` is the number of the
-    candidate that stands for the block in setting A, null where there is none.
-    """
-    needs = scene.graph.depends_on
-    return {
-        "blocks": [
-            {
-                **block_entry(block),
-                "order": block.order,
-                "depend": sorted(needs[vertex]),
-                "candidate": candidates.index_of(block.look),
-            }
-            for vertex, block in enumerate(scene.blocks)
-        ],
-        "candidates": [
-            {"type": one.type, "color": one.color, "euler": rounded(one.euler_deg)}
-            for one in candidates.candidates
-        ],
-    }
-
-
-def block_entry(block: Block) -> dict[str, Any]:
-    """A block: its kind and pose."""
-    return {
-        "type": block.type,
-        "color": block.color,
-        "position": rounded(block.position_m),
-        "euler": rounded(block.euler_deg),
-    }
-
-
-def rounded(values: Iterable[float]) -> list[float]:
-    """Numbers with as many decimals as a drawing needs."""
-    return [round(float(value), _DECIMALS) for value in values]

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
-import base64
-import contextlib
-import csv
 import functools
 import json
 from collections import Counter
-from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -32,7 +28,6 @@ from phyblock.data import (
     Dataset,
     QuestionSet,
     QuestionTask,
-    find_questions,
     read_official_questions,
     read_questions,
     read_version,
@@ -40,14 +35,14 @@ from phyblock.data import (
 from phyblock.domain import LETTERS, SUBTASKS, Question, Scene, Subtask, is_picture_option
 from phyblock.domain.question import rotated, rotated_label
 from phyblock.errors import DataError, Problem, SpecError
-from phyblock.files import OutFolder, read_picture, writing
+from phyblock.files import read_picture
 from phyblock.models.request import Image
 from phyblock.parsing.answer import ParsedAnswer, choice_form, parse_answer
 from phyblock.parsing.structured import AnswerForm
 from phyblock.records.line import Line, Whole
 from phyblock.records.manifest import Manifest
 from phyblock.records.record import Record
-from phyblock.resources import bundled, bundled_sets, needs
+from phyblock.resources import bundled, bundled_sets
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import (
     LETTERED_VERSION,
@@ -60,7 +55,6 @@ from phyblock.stable import hex_digest
 from phyblock.tracks.base import Opening, SingleTrack
 from phyblock.tracks.baselines import Choice, Guesses, Picking, Spot
 from phyblock.tracks.items import Elsewhere, examples_of, spread, stratified
-from phyblock.tracks.measures import ItemExport
 from phyblock.tracks.pictures import Drawing, Pictures, Workshop, picture_style
 from phyblock.tracks.prompts import form_facts
 from phyblock.types import Background, DataFormat
@@ -94,10 +88,6 @@ class VqaSpec(PictureControls):
     def rotations(self) -> int:
         """The number of times that each question is asked with one seed."""
         return len(LETTERS) if self.circular else 1
-
-
-_QUESTION = ("id", "subtask", "category", "rotation")
-_ANSWER = ("right", "given", "correct")
 
 
 class ChoiceParse(Line):
@@ -160,18 +150,6 @@ class ChoiceRecord(Record):
         "right": "object",
         "given": "object",
     }
-
-    def row(self) -> Mapping[str, Any]:
-        """The question, the letters that are right and those given."""
-        answer = self.answer
-        return {
-            "question": self.question.id,
-            "subtask": self.question.subtask,
-            "rotation": self.question.rotation,
-            "right": answer and answer.right,
-            "given": answer and answer.given,
-        }
-
     exported: ClassVar[Mapping[str, str]] = {
         "question_id": "string",
         "question_subtask": "string",
@@ -182,13 +160,18 @@ class ChoiceRecord(Record):
         "answer_correct": "boolean",
     }
 
+    def row(self) -> Mapping[str, Any]:
+        """The question, the letters that are right and those given."""
+        about = {name: getattr(self.question, name) for name in ("subtask", "rotation")}
+        letters = {name: getattr(self.answer, name, None) for name in ("right", "given")}
+        return {"question": self.question.id, **about, **letters}
+
     def export_row(self) -> Mapping[str, Any]:
         """The question, the right answer, and the one that was given."""
-        question = {name: getattr(self.question, name) for name in _QUESTION}
-        answer = {name: getattr(self.answer, name, None) for name in _ANSWER}
+        parts = {name: name.partition("_") for name in self.exported}
         return {
-            **{f"question_{name}": value for name, value in question.items()},
-            **{f"answer_{name}": value for name, value in answer.items()},
+            name: getattr(getattr(self, part), field, None)
+            for name, (part, _, field) in parts.items()
         }
 
     @property
@@ -254,10 +237,7 @@ def pick_answer(subject: ChoiceSubject) -> Picking:
         for letter, option in zip(LETTERS, options, strict=False)
     )
     noun = "place" if is_ordering else "option"
-
-    def write(picks: Sequence[Any]) -> str:
-        return choice_text([pick.place for pick in picks])
-
+    write = lambda picks: choice_text([pick.place for pick in picks])  # noqa: E731
     return Picking(choices, least=picked, most=picked, repeats=False, noun=noun, write=write)
 
 
@@ -327,23 +307,23 @@ class QuestionPictures(Pictures):
 
     def draw(self, item: AskedQuestion) -> tuple[Drawing, ...]:
         """Return the pictures of a question; DataError for a picture that is not there."""
-        drawings = [self._drawing(item, label) for label in item.labels]
-        options = [drawing for drawing in drawings if drawing.label in LETTERS]
+        drawings = {label: self._drawing(item, label) for label in item.labels}
+        options = [drawing for label, drawing in drawings.items() if label in LETTERS]
         if not options or self._options_as == "images":
-            return tuple(drawings)
+            return tuple(drawings.values())
         cell_px = min(self._style.size_px, _MOST_CELL_PX)
         letters = "".join(drawing.label for drawing in options)
         parts = " ".join(drawing.key for drawing in options)
         key = hex_digest(f"sheet {LETTERED_VERSION} {cell_px} {letters} {parts}")
         make = partial(_sheet, tuple(drawing.make for drawing in options), letters, cell_px)
         sheet = Drawing(SHEET, key, make, sheet_size_px(len(options), cell_px))
-        return (*(drawing for drawing in drawings if drawing.label not in LETTERS), sheet)
+        return (*(one for label, one in drawings.items() if label not in LETTERS), sheet)
 
     def _drawing(self, item: AskedQuestion, label: str) -> Drawing:
         if label in item.files:
             path = item.files[label]
-            key = hex_digest(read_picture(path))
-            return Drawing(label, key, partial(read_picture, path), is_file=True)
+            make = partial(read_picture, path)
+            return Drawing(label, hex_digest(make()), make, is_file=True)
         recipe = next(one for one in item.question.pictures if one.label == label)
         recipe = replace(recipe, background=self._background or recipe.background)
         key, make = question_key(recipe, self._style), partial(question_png, recipe, self._style)
@@ -421,9 +401,9 @@ class Vqa(SingleTrack[AskedQuestion]):
             self._elsewhere.check(tasks, "question", "vqa.wrong_image")
         super().__init__(opening)
         if self.shop is not None:
-            pool = map(AskedQuestion, known.tasks)
-            asked = [AskedQuestion(task) for task in tasks]
-            self.examples = examples_of(suite, pool, asked, "question", _subtask)
+            pool, asked = map(AskedQuestion, known.tasks), [*map(AskedQuestion, tasks)]
+            sort_of = lambda item: item.task.question.subtask  # noqa: E731
+            self.examples = examples_of(suite, pool, asked, "question", sort_of)
 
     @classmethod
     def data_folder(cls, suite: Suite) -> tuple[str, tuple[str, ...], bool] | None:
@@ -446,22 +426,15 @@ class Vqa(SingleTrack[AskedQuestion]):
     def open_pictures(self, shop: Workshop) -> Pictures:
         """Return the pictures of questions as a suite wants them."""
         images = self.suite.images
-        style = picture_style(images)
-        return QuestionPictures(shop, style, self.spec.options_as, images.background)
+        return QuestionPictures(
+            shop, picture_style(images), self.spec.options_as, images.background
+        )
 
     def about(self, item: AskedQuestion) -> dict[str, Any]:
         """Return the question and how it is shown."""
-        return {
-            "question": {
-                "id": item.question.id,
-                "subtask": item.question.subtask,
-                "category": item.question.category,
-                "rotation": item.rotation,
-                "options_as": self.spec.options_as,
-                "blind": self.spec.blind,
-                "wrong_image": self.spec.wrong_image,
-            }
-        }
+        asked = {name: getattr(item.question, name) for name in ("id", "subtask", "category")}
+        shown = {name: getattr(self.spec, name) for name in ("options_as", "blind", "wrong_image")}
+        return {"question": {**asked, "rotation": item.rotation, **shown}}
 
     def identity(self) -> dict[str, Any]:
         """Return digests of all questions, of those asked, the prompt and the pictures."""
@@ -493,14 +466,13 @@ class Vqa(SingleTrack[AskedQuestion]):
     def facts(self, item: AskedQuestion, pictures: Sequence[Image]) -> dict[str, object]:
         """Return the variables of templates; nothing in it gives the answer away."""
         question = item.question
-        letters = LETTERS[: len(question.options)]
         return {
             "question": question.text,
             "options": [
                 {"letter": letter, "text": option, "is_picture": is_picture_option(option)}
-                for letter, option in zip(letters, question.options, strict=True)
+                for letter, option in zip(LETTERS, question.options, strict=False)
             ],
-            "letters": list(letters),
+            "letters": list(LETTERS[: len(question.options)]),
             "is_ordering": question.subtask == "OR",
             "pictures": [picture.label for picture in pictures],
             "is_blind": self.spec.blind,
@@ -526,11 +498,6 @@ class Vqa(SingleTrack[AskedQuestion]):
         if text is not None:
             parsed = parse_answer(text, question.options, question.subtask == "OR")
         return ChoiceJudgement(parsed, question.answer_letters)
-
-
-def _subtask(item: AskedQuestion) -> str:
-    """Return what a question and its worked examples share."""
-    return item.task.question.subtask
 
 
 def _sort_of(task: QuestionTask) -> tuple[object, ...]:
@@ -581,129 +548,4 @@ def select_questions(
     return tuple(task for task in tasks if task.key in kept)
 
 
-MCQ_FILE, ORDERING_FILE = "PhyBlock_MCQ.tsv", "PhyBlock_Ordering.tsv"
-EXPORT_FILES = {
-    "vlmevalkit": (MCQ_FILE, ORDERING_FILE),
-    "hf": ("dataset/", "questions.parquet", "README.md"),
-}
-"""The files of each format of export."""
-_COLUMNS = ("index", "question", *LETTERS, "answer", "category", "l2-category", "scene")
-_AT_ONCE = 4
-_CARD = """---
-configs:
-- config_name: default
-  data_files: questions.parquet
----
-# Questions about block structures
-
-One row a question: `question`, four `options`, `answer` (a letter; four for ordering), and
-`images` in the order sent with their `labels` (`scene`, `block`, or the letter of an option).
-"""
-
-
-def export_questions(
-    tasks: Sequence[QuestionTask], pictures: Pictures, form: str, folder: Path
-) -> tuple[Path, ...]:
-    """Write questions and their pictures into `folder` in a form of `EXPORT_FILES`; the files.
-
-    `vlmevalkit`: two TSV files, of one right letter and of ordering; put into `$LMUData`, the first
-    is a multiple-choice set of VLMEvalKit by its file name. `hf`: a folder for `load_from_disk`,
-    and a Parquet file with pictures inside for `load_dataset`. Raises StoreError where the folder
-    cannot be written or a file is in the way that we never wrote, SpecError where a package is
-    missing, DataError for a picture that cannot be had.
-    """
-    out = OutFolder(folder)
-    out.check(EXPORT_FILES[form])
-    with writing(folder), out.making() as made:
-        if form == "hf":
-            needs("datasets", "hf", "hf")
-            asyncio.run(_write_hugging_face(tasks, pictures, made))
-        else:
-            asyncio.run(_write_tsv(tasks, pictures, made))
-    return tuple(folder / name for name in EXPORT_FILES[form] if name != "README.md")
-
-
-async def _write_tsv(tasks: Sequence[QuestionTask], pictures: Pictures, folder: Path) -> None:
-    """Write pictures as base64; those of several are lists, with names in `image_path`."""
-    with contextlib.ExitStack() as stack:
-        opened = partial(Path.open, mode="w", newline="", encoding="utf-8")
-        files = [stack.enter_context(opened(folder / n)) for n in (MCQ_FILE, ORDERING_FILE)]
-        writers = [csv.writer(file, delimiter="\t", lineterminator="\n") for file in files]
-        for writer in writers:
-            writer.writerow((*_COLUMNS, "image", "image_path"))
-        async for question, images in _drawn(tasks, pictures):
-            labels = [image.label for image in images]
-            coded = [base64.b64encode(image.data).decode() for image in images]
-            names = [f"{question.id}-{label}.png" for label in labels]
-            # A picture is named by where it stands among those that are sent.
-            options = [
-                f"Picture {labels.index(LETTERS[at]) + 1}" if is_picture_option(option) else option
-                for at, option in enumerate(question.options)
-            ]
-            about = (question.subtask, question.category, question.scene.id)
-            sent = (repr(coded), repr(names)) if len(images) > 1 else (coded[0], names[0])
-            row = (question.id, question.text, *options, question.answer_letters, *about, *sent)
-            writers[len(question.answer) > 1].writerow(row)
-
-
-async def _write_hugging_face(
-    tasks: Sequence[QuestionTask], pictures: Pictures, folder: Path
-) -> None:
-    from datasets import Dataset, Features, Value, utils  # type: ignore[import-untyped]
-    from datasets import Image as HfImage
-
-    rows = [
-        {
-            "id": question.id,
-            "subtask": question.subtask,
-            "category": question.category,
-            "scene": question.scene.id,
-            "wording": question.wording,
-            "question": question.text,
-            "answer": question.answer_letters,
-            "evidence": json.dumps(question.evidence, sort_keys=True),
-            "options": list(question.options),
-            "levels": list(question.scene.levels),
-            "labels": [image.label for image in images],
-            "images": [{"bytes": image.data, "path": f"{image.label}.png"} for image in images],
-        }
-        async for question, images in _drawn(tasks, pictures)
-    ]
-    texts = ("id", "subtask", "category", "scene", "wording", "question", "answer", "evidence")
-    lists = {"options": Value("string"), "levels": Value("int64"), "labels": Value("string")}
-    features = {name: Value("string") for name in texts} | {n: [v] for n, v in lists.items()}
-    utils.disable_progress_bars()
-    dataset = Dataset.from_list(rows, features=Features({**features, "images": [HfImage()]}))
-    dataset.save_to_disk(folder / "dataset")
-    dataset.to_parquet(folder / "questions.parquet")
-    (folder / "README.md").write_text(_CARD, encoding="utf-8")
-
-
-async def _drawn(
-    tasks: Sequence[QuestionTask], pictures: Pictures
-) -> AsyncIterator[tuple[Question, tuple[Image, ...]]]:
-    """Yield questions with their pictures in the order in which models get them."""
-    for start in range(0, len(tasks), _AT_ONCE):
-        some = tasks[start : start + _AT_ONCE]
-        drawn = await asyncio.gather(*(pictures.of(AskedQuestion(task)) for task in some))
-        for task, images in zip(some, drawn, strict=True):
-            yield task.question, images
-
-
-def _write(
-    form: str, out: Path, questions: str, scenes: Dataset, limit: int | None, size_px: int
-) -> tuple[Path, ...]:
-    """Write as `ItemExport` says; a `limit` is shared over subtasks."""
-    asked = open_questions("builtin", find_questions(questions), scenes)
-    tasks = select_questions(asked.tasks, SUBTASKS, (1, 2, 3, 4), None, limit)
-    shop = Workshop()
-    try:
-        pictures = QuestionPictures(shop, PictureStyle(size_px=size_px), "images")
-        return export_questions(tasks, pictures, form, out)
-    finally:
-        shop.close()
-
-
-QUESTION_EXPORT = ItemExport(tuple(EXPORT_FILES), BUILTIN_QUESTIONS, _write)
-"""What `phyblock export --questions` writes."""
 TRACK = Vqa

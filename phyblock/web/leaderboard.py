@@ -35,7 +35,6 @@ from phyblock.results.estimates import (
 from phyblock.results.load import Run, load_run
 from phyblock.results.tables import cost_frame, coverage_frame
 from phyblock.tracks.base import CARRYING, kind_of
-from phyblock.tracks.pictures import kit
 from phyblock.web.pack import (
     IN_INDEX,
     Columns,
@@ -44,8 +43,10 @@ from phyblock.web.pack import (
     Sources,
     build_of,
     fill,
+    kit,
     open_sources,
     pack_scenes,
+    question_entry,
     read_places,
     records_at,
     write_script,
@@ -550,7 +551,7 @@ def _write_samples(
                     scene=scenes.of(record.scene),
                     levels=list(record.levels),
                     part=record.part,
-                    question=packs["questions"].add(dict(known.entry(shown)))
+                    question=packs["questions"].add(question_entry(shown.question))
                     if known and shown
                     else -1,
                 )

@@ -23,6 +23,7 @@ import jinja2
 
 from phyblock.config.suite import FACTORS, ImagesSpec, with_values
 from phyblock.data import AssemblyTask
+from phyblock.domain import BLOCK_TYPES, Block, CandidateSet, Question, Scene
 from phyblock.errors import DataError
 from phyblock.files import atomic_write
 from phyblock.models import Image
@@ -31,6 +32,8 @@ from phyblock.records.record import Record, Score, SentPrompt
 from phyblock.resources import cache_dir
 from phyblock.results.load import Design, Run
 from phyblock.run.plan import recorded_dataset
+from phyblock.sim.geometry import solid_mesh
+from phyblock.sim.pictures import COLOR_RGB
 from phyblock.stable import hex_digest
 from phyblock.tracks.base import kind_of, kinds
 from phyblock.tracks.items import in_order
@@ -40,13 +43,14 @@ from phyblock.tracks.pictures import (
     ScenePictures,
     Workshop,
     picture_style,
-    scene_entry,
 )
 
 _LAYOUT = 6
 """Version of the scripts."""
 _CHUNK_CHARACTERS = 400_000
 _DIGITS = 24
+_DECIMALS = 6
+"""Decimals of numbers that pages draw by."""
 _ONLY_IN_TABLES = ("errors", "blocks", *Score.FURTHER)
 IN_INDEX = frozenset(
     {
@@ -294,6 +298,69 @@ def pack_scenes(scenes: Iterable[str], sources: Sequence[Sources], pack: Pack) -
         is_drawn |= task is not None
         pack.add(task and scene_entry(task.scene, task.candidates))
     return is_drawn
+
+
+def kit() -> dict[str, Any]:
+    """Return shapes (vertices [m] and triangles in the body frame) and colors of all blocks."""
+    shapes = {}
+    for name in BLOCK_TYPES:
+        mesh = solid_mesh(name)
+        corners = [_rounded(corner) for corner in mesh.vertices_m.tolist()]
+        shapes[name] = {"vertices": corners, "triangles": mesh.triangles.tolist()}
+    return {"shapes": shapes, "colors": COLOR_RGB}
+
+
+def scene_entry(scene: Scene, candidates: CandidateSet) -> dict[str, Any]:
+    """Return a scene with its candidates, as pages take it.
+
+    `depend` holds positions of blocks in the list, from 0; `candidate` is the number of the
+    candidate that stands for the block in setting A, null where there is none.
+    """
+    blocks = []
+    for vertex, block in enumerate(scene.blocks):
+        depend, number = sorted(scene.graph.depends_on[vertex]), candidates.index_of(block.look)
+        more = {"order": block.order, "depend": depend, "candidate": number}
+        blocks.append({**_block_entry(block), **more})
+    offered = [
+        {"type": one.type, "color": one.color, "euler": _rounded(one.euler_deg)}
+        for one in candidates.candidates
+    ]
+    return {"blocks": blocks, "candidates": offered}
+
+
+def question_entry(question: Question) -> dict[str, Any]:
+    """Return a question with the recipes of its pictures, as pages take it."""
+    pictures = [
+        {
+            "label": picture.label,
+            "view": list(picture.view_deg),
+            "blocks": [_block_entry(block) for block in picture.blocks],
+            "framed": [_block_entry(block) for block in picture.framed],
+            "marks": [
+                {"letter": mark.letter, "position": _rounded(mark.position_m)}
+                for mark in picture.marks
+            ],
+        }
+        for picture in question.pictures
+    ]
+    return {
+        "id": question.id,
+        "subtask": question.subtask,
+        "text": question.text,
+        "options": list(question.options),
+        "answer": question.answer_letters,
+        "pictures": pictures,
+        "evidence": dict(question.evidence),
+    }
+
+
+def _block_entry(block: Block) -> dict[str, Any]:
+    pose = {"position": _rounded(block.position_m), "euler": _rounded(block.euler_deg)}
+    return {"type": block.type, "color": block.color, **pose}
+
+
+def _rounded(values: Iterable[float]) -> list[float]:
+    return [round(float(value), _DECIMALS) for value in values]
 
 
 def items_shown(

@@ -32,7 +32,6 @@ from phyblock.results.tables import TablesWritten, coverage_frame, table_files
 from phyblock.results.text import NO_VALUE, captioned, number, spread
 from phyblock.run.store import run_folder
 from phyblock.tracks.base import kind_of
-from phyblock.tracks.pictures import kit
 from phyblock.types import WITHOUT_REPLY
 from phyblock.web.pack import (
     Pack,
@@ -43,9 +42,11 @@ from phyblock.web.pack import (
     has_pictures,
     items_shown,
     keep_pictures,
+    kit,
     open_sources,
     pack_samples,
     pack_scenes,
+    question_entry,
     read_places,
     write_script,
 )
@@ -348,7 +349,7 @@ def _write_data(run: Run, sources: Sources, out: OutFolder, new: Path, build: st
     pack_samples(run.path, places, index, packs["records"], packs["prompts"], pictures)
     pack_scenes(index.scenes if sources.tasks else (), [sources], packs["scenes"])
     questions = {
-        item: packs["questions"].add(dict(sources.items[item.track].entry(shown)))
+        item: packs["questions"].add(question_entry(shown.question))
         for item, shown in asked.items()
     }
     for pack in packs.values():
