@@ -10,15 +10,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from phyblock.lazy import lazy_names
-
 if TYPE_CHECKING:
-    from phyblock.api.pictures import Picture, render
-    from phyblock.api.running import run_suite
-    from phyblock.api.scores import PlanScore, score
-    from phyblock.api.suites import SceneTask, Suite, load_suite
+    from phyblock.api import (
+        Picture,
+        PlanScore,
+        Run,
+        SceneTask,
+        Suite,
+        load_run,
+        load_suite,
+        render,
+        run_suite,
+        score,
+    )
     from phyblock.errors import PhyblockError
-    from phyblock.results.load import Run, load_run
 
     __version__: str
 
@@ -37,21 +42,6 @@ __all__ = [
     "score",
 ]
 
-_HOMES = {
-    "PhyblockError": "phyblock.errors",
-    "Picture": "phyblock.api.pictures",
-    "PlanScore": "phyblock.api.scores",
-    "Run": "phyblock.results.load",
-    "SceneTask": "phyblock.api.suites",
-    "Suite": "phyblock.api.suites",
-    "load_run": "phyblock.results.load",
-    "load_suite": "phyblock.api.suites",
-    "render": "phyblock.api.pictures",
-    "run_suite": "phyblock.api.running",
-    "score": "phyblock.api.scores",
-}
-_public = lazy_names(__name__, _HOMES)
-
 
 def __getattr__(name: str) -> object:
     # What these need takes up to a second to import: only those who ask for it pay.
@@ -59,7 +49,15 @@ def __getattr__(name: str) -> object:
         from importlib.metadata import version
 
         return version("phyblock")
-    return _public(name)
+    if name == "PhyblockError":
+        from phyblock.errors import PhyblockError
+
+        return PhyblockError
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from phyblock import api
+
+    return getattr(api, name)
 
 
 def __dir__() -> list[str]:

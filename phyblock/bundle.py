@@ -36,8 +36,7 @@ from phyblock.parsing.text import READER_VERSION
 from phyblock.records.files import RECORDS, read_records
 from phyblock.records.line import Line, decode, problems_of
 from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
-from phyblock.records.record import Record, SentPrompt
-from phyblock.records.reply import Reply
+from phyblock.records.record import Record, Reply, SentPrompt
 from phyblock.resources import bundled
 from phyblock.results.load import design_of
 from phyblock.run.judge import about_prompt

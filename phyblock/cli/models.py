@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import io
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import date, timedelta
 from importlib.metadata import version
 
 import click
+from PIL import Image as PillowImage
 from rich.console import Console
 
 from phyblock.cli.console import make_console, may_spend, print_rows, shown_path
@@ -23,7 +25,13 @@ from phyblock.config.models import (
 from phyblock.config.suite import Suite
 from phyblock.errors import ModelError, Problem, SpecError
 from phyblock.models import (
+    Image,
+    Message,
+    Reply,
+    Request,
+    RetryPolicy,
     api_key_status,
+    build_model,
     ends_on,
     is_billed,
     is_unlisted,
@@ -32,8 +40,7 @@ from phyblock.models import (
 )
 from phyblock.models.litellm_client import be_quiet
 from phyblock.registry import baseline_names
-from phyblock.run.models import to_config
-from phyblock.run.preflight import check_model, find_models_file
+from phyblock.run.plan import find_models_file, to_config
 from phyblock.text import counted, did_you_mean
 
 _SOON_DAYS = 180
@@ -152,7 +159,7 @@ def check(known: Mapping[str, ModelConfig], name: str, yes: bool) -> int:
     for address in addresses:
         server = f"{name} at {host_of(address)}" if address and len(addresses) > 1 else name
         try:
-            reply = asyncio.run(check_model(config.at(address)))
+            reply = asyncio.run(_ask_tiny(config.at(address)))
         except ModelError as error:
             console.print(f"{server} does not answer: {error}", style="red")
             code = 1
@@ -168,3 +175,29 @@ def check(known: Mapping[str, ModelConfig], name: str, yes: bool) -> int:
         answer = repr(reply.text.strip()[:80])
         console.print(f"{server} answers: {answer} in {reply.latency_s:.1f} s, {tokens}, {cost}")
     return code
+
+
+_SIDE_PX = 64
+_QUESTION = "What color is this picture? Answer with one word."
+
+
+async def _ask_tiny(config: ModelConfig) -> Reply:
+    """Show the model a small red square and ask for its color; one attempt, nothing cached.
+
+    Raises the ModelError that the call met, SpecError or DataError when the model cannot be built.
+    """
+    buffer = io.BytesIO()
+    PillowImage.new("RGB", (_SIDE_PX, _SIDE_PX), (216, 49, 49)).save(buffer, "PNG")
+    picture = Image(buffer.getvalue(), "check", _SIDE_PX, _SIDE_PX)
+    messages = (Message("user", (picture, _QUESTION)),)
+    request = Request("check", 0, messages, {}, "", None)
+    model = build_model(
+        config.model_copy(update={"seed": "never", "batch": False}),
+        cache=None,
+        policy=RetryPolicy(attempts=1, retry_for_s=0.0),
+    )
+    try:
+        reply = await model.ask(request)
+    finally:
+        await model.aclose()
+    return reply or Reply(text="")

@@ -20,8 +20,7 @@ from phyblock.config.suite import load_suite
 from phyblock.errors import Problem, SpecError, reason_of
 from phyblock.files import read_text
 from phyblock.resources import bundled
-from phyblock.run.plan import RunPlan
-from phyblock.run.preflight import bundled_suites, find_suite, prompt_dirs
+from phyblock.run.plan import RunPlan, bundled_suites, find_suite, prompt_dirs
 from phyblock.run.store import held_run, run_folder
 from phyblock.web.report import files_of, report_files
 from phyblock.web.server import Server, default_consent

@@ -36,12 +36,13 @@ from phyblock.models.litellm_client import be_quiet
 from phyblock.resources import bundled
 from phyblock.results.text import NO_VALUE, Column, TextTable
 from phyblock.run.estimate import Estimate, estimate
-from phyblock.run.plan import RunPlan, make_plan
-from phyblock.run.preflight import (
+from phyblock.run.plan import (
+    RunPlan,
     asking_remarks,
     bundled_suites,
     find_models_file,
     find_suite,
+    make_plan,
     moved_remarks,
     prompt_dirs,
 )

@@ -18,13 +18,13 @@ from phyblock.data import SCENES_FILE, read_builtin, read_official
 from phyblock.errors import InputError, Problem, SpecError
 from phyblock.files import check_free, read_bytes, writing
 from phyblock.resources import bundled, reply_cache_file
-from phyblock.run.models import model_problems
-from phyblock.run.plan import make_plan
-from phyblock.run.preflight import (
+from phyblock.run.plan import (
     asking_remarks,
     bundled_suites,
     find_models_file,
     find_suite,
+    make_plan,
+    model_problems,
     prompt_dirs,
 )
 from phyblock.text import counted

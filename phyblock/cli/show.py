@@ -15,8 +15,7 @@ from phyblock.text import counted
 
 if TYPE_CHECKING:
     from phyblock.data import AssemblyTask
-    from phyblock.records.record import Record
-    from phyblock.records.reply import Reply
+    from phyblock.records.record import Record, Reply
 
 _NAMED = 5
 """Samples that a message names when it is unclear which one is meant."""

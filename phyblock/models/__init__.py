@@ -32,7 +32,7 @@ from phyblock.models.request import (
     Model,
     Request,
 )
-from phyblock.records.reply import Reply, Usage
+from phyblock.records.record import Reply, Usage
 
 __all__ = [
     "AskLaterError",

@@ -38,8 +38,7 @@ from phyblock.models.costs import (
 from phyblock.models.model import EventKind, ModelEvent, Observer, RetryPolicy, format_refused
 from phyblock.models.request import AskLaterError, Request
 from phyblock.records.files import BATCHES
-from phyblock.records.record import BatchEvent, BatchLine
-from phyblock.records.reply import Reply
+from phyblock.records.record import BatchEvent, BatchLine, Reply
 
 T = TypeVar("T")
 

@@ -20,7 +20,7 @@ from pathlib import Path
 from phyblock.config.models import ModelConfig
 from phyblock.errors import Problem, StoreError, reason_of
 from phyblock.models.request import Image, Message, Request, wire_params
-from phyblock.records.reply import Reply
+from phyblock.records.record import Reply
 from phyblock.stable import hex_digest
 
 SCHEMA = 1

@@ -34,7 +34,7 @@ from phyblock.files import load_json
 from phyblock.models.keys import api_key, hidden, secrets_of
 from phyblock.models.replay import read_chat_completion
 from phyblock.models.request import Request, json_body, wire_params
-from phyblock.records.reply import Reply
+from phyblock.records.record import Reply
 from phyblock.text import well_formed
 
 if TYPE_CHECKING:

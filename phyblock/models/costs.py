@@ -23,7 +23,7 @@ from phyblock.config.models import BatchRateSpec, ModelConfig, RateSpec, host_of
 from phyblock.errors import BudgetReachedError, ModelError, Problem, SpecError, UnavailableError
 from phyblock.models.keys import KEYLESS, api_key_status
 from phyblock.models.request import Image, Request, wire_params
-from phyblock.records.reply import Reply, Usage
+from phyblock.records.record import Reply, Usage
 from phyblock.types import ImageDetail
 
 _MAP_FILE = "model_prices_and_context_window_backup.json"

@@ -36,7 +36,7 @@ from phyblock.models.costs import map_entry, mapped_providers
 from phyblock.models.keys import KEYLESS, api_key
 from phyblock.models.replay import read_raw_reply
 from phyblock.models.request import Request, wire_messages, wire_params
-from phyblock.records.reply import Reply, Usage
+from phyblock.records.record import Reply, Usage
 
 if TYPE_CHECKING:
     import types

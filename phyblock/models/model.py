@@ -36,8 +36,7 @@ from phyblock.models.costs import (
 from phyblock.models.limits import Clock, Limits
 from phyblock.models.request import Journal, Request, wire_params
 from phyblock.models.servers import Server, Servers
-from phyblock.records.record import Call
-from phyblock.records.reply import Reply
+from phyblock.records.record import Call, Reply
 
 _FORMAT_HINT = (
     "if the provider takes no JSON schema, set response_format: never for this model in the models "

@@ -18,8 +18,7 @@ from phyblock.errors import DataError, Problem, RefusedError, SampleError, SpecE
 from phyblock.files import load_json, read_text
 from phyblock.models.request import Request
 from phyblock.records.files import RECORDS, RecordLines
-from phyblock.records.record import Record
-from phyblock.records.reply import Reply, Usage
+from phyblock.records.record import Record, Reply, Usage
 from phyblock.registry import baseline_names, baseline_rules
 from phyblock.stable import drawn_bytes
 from phyblock.text import well_formed

@@ -17,8 +17,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import DataError, PhyblockError, Problem
-from phyblock.records.record import Call
-from phyblock.records.reply import Reply
+from phyblock.records.record import Call, Reply
 from phyblock.stable import hex_digest
 from phyblock.types import ImageDetail, Role
 

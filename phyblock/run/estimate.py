@@ -27,8 +27,7 @@ from phyblock.models import (
 from phyblock.models import estimate as estimate_call
 from phyblock.records.files import BatchLines, run_records
 from phyblock.resources import reply_cache_file
-from phyblock.run.models import PlannedModel
-from phyblock.run.plan import RunPlan, Sample
+from phyblock.run.plan import PlannedModel, RunPlan, Sample
 from phyblock.run.store import held_run
 from phyblock.tracks import AnyTrack, Item
 

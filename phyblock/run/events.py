@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from phyblock.models import ModelEvent
-from phyblock.records.record import BatchLine, Call, Record
-from phyblock.records.reply import Reply
+from phyblock.records.record import BatchLine, Call, Record, Reply
 from phyblock.scoring.counts import Counts
 from phyblock.text import counted
 

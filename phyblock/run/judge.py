@@ -22,8 +22,15 @@ from phyblock.errors import (
 )
 from phyblock.models import AskLaterError, HaltedError, Image, Message, Model, Request
 from phyblock.records.files import known_records
-from phyblock.records.record import Extraction, Record, SentImage, SentPrompt
-from phyblock.records.reply import Reply, StoredError, Usage
+from phyblock.records.record import (
+    Extraction,
+    Record,
+    Reply,
+    SentImage,
+    SentPrompt,
+    StoredError,
+    Usage,
+)
 from phyblock.resources import bundled
 from phyblock.stable import plain_sum
 from phyblock.tracks import Episode, Item, Judgement, SingleTrack

@@ -1,4 +1,4 @@
-"""`run.yaml`: what a run is, written before anything is asked."""
+"""`run.yaml`: what a run is, written before anything is asked; and what makes two runs of it."""
 
 from __future__ import annotations
 
@@ -6,26 +6,35 @@ import contextlib
 import hashlib
 import json
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from phyblock.config.models import HUMAN, ModelConfig
 from phyblock.config.suite import Suite, Variant
 from phyblock.data import UNNUMBERED, Dataset, read_version
 from phyblock.parsing.text import READER_VERSION
-from phyblock.records.manifest import FORMAT, Manifest
+from phyblock.records.manifest import FORMAT, Manifest, ManifestModel
 from phyblock.run.judge import extraction_prompt
-from phyblock.run.models import PlannedModel
-from phyblock.sim.engine import ENGINES, described_engine
+from phyblock.sim.engine import ENGINES, PHYSICS_VARIABLE, REFERENCE_ENGINE, described_engine
 from phyblock.stable import hex_digest
 from phyblock.tracks import AnyTrack, kind_of
-from phyblock.tracks.base import kinds_with_physics
+from phyblock.tracks.base import CARRYING, ENGINE, kinds_with_physics
+
+if TYPE_CHECKING:
+    from phyblock.run.plan import PlannedModel
 
 _ENGINES = (engine.distribution for engine in ENGINES.values())
 _LIBRARIES = ("litellm", *_ENGINES, "numpy", "pillow", "jinja2")
 """Of the physics engines, one or both may be there."""
+_LABELS = ("published", "served_at", "size_b")
+_NOT_IDENTITY = {
+    *(f"suite.{name}" for name in ("name", "description", "limit", "limits", "models")),
+    *(f"suite.{name}" for name in ("baselines", "seeds", "dataset")),
+    "dataset.root",
+}
+"""Parts of a manifest that may change while the run stays the same, or that others repeat."""
 
 
 def make_manifest(
@@ -123,3 +132,69 @@ def _model(model: PlannedModel) -> dict[str, object]:
     for path in sorted((*folder.glob("*.json"), *folder.glob("records.jsonl"))):
         digest.update(f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
     return {**model.config.identity(), "recording": digest.hexdigest()}
+
+
+def differences(found: Manifest, wanted: Manifest) -> list[str]:
+    """Return dotted names of what makes two manifests two runs; none where they are of one."""
+    asked = {model.name: _decisive(model) for model in (*found.models, *found.others)}
+    models = [
+        f"models.{model.name}.{key}"
+        for model in wanted.models
+        for was, now in [(asked.get(model.name, {}), _decisive(model))]
+        for key in sorted(now.keys() | was.keys())
+        if was and now.get(key) != was.get(key)
+    ]
+    if found.identity == wanted.identity:
+        return models
+    old, new = dict(_parts(found)), dict(_parts(wanted))
+    gone = (name for name in old.keys() - new.keys() if name.partition(".")[0] in wanted.tracks)
+    names = [
+        name
+        for name in (*new, *sorted(gone))
+        # What an older version did not know of a suite, it did not do otherwise.
+        if name not in _NOT_IDENTITY
+        and (name in old or not name.startswith("suite."))
+        and old.get(name) != new.get(name)
+    ]
+    if {"suite.levels", "limit"} & set(names):
+        # Other scenes of the same data have other digests, too.
+        names = [name for name in names if not name.endswith("sha256")]
+    return [*names, *models] or ["how phyblock asks, draws or reads"]
+
+
+def reasons(found: Manifest, wanted: Manifest) -> Iterator[str]:
+    """Yield the differences of manifests that a user wrote in the same words."""
+    made, now = (one.dataset.version if one.dataset else 1 for one in (found, wanted))
+    if made != now:
+        yield f"its data are version {made}, these version {now}"
+    tracks = [name for name in wanted.tracks if name in found.tracks]
+    differs = {
+        key: any(found.tracks[name].get(key) != wanted.tracks[name].get(key) for name in tracks)
+        for key in (ENGINE, CARRYING)
+    }
+    if differs[ENGINE]:
+        was, is_now = (one.engine or REFERENCE_ENGINE for one in (found, wanted))
+        yield f"its blocks are let go in {was}, here in {is_now} ({PHYSICS_VARIABLE} chooses)"
+    if differs[CARRYING]:
+        yield (
+            "this version carries plans out and measures what stands otherwise than the one "
+            "that made it, which phyblock score leaves as it was"
+        )
+
+
+def _decisive(model: ManifestModel) -> dict[str, Any]:
+    """Return what decides a model's replies."""
+    return {key: value for key, value in model.fields().items() if key not in _LABELS}
+
+
+def _parts(manifest: Manifest) -> Iterator[tuple[str, Any]]:
+    """Yield dotted names and values of what a run is made of, without digests of pictures."""
+    fields = manifest.fields()
+    yield "limit", manifest.limit
+    for part, about in (
+        *((one, fields.get(one)) for one in ("suite", "dataset")),
+        *manifest.tracks.items(),
+    ):
+        yield from (
+            (f"{part}.{key}", one) for key, one in (about or {}).items() if key != "pictures"
+        )

@@ -17,8 +17,7 @@ from phyblock.errors import DataError, Problem, SpecError, StoreError
 from phyblock.parsing.plan import reader_version
 from phyblock.records.files import run_records
 from phyblock.records.manifest import MANIFEST, Manifest, read_manifest, suite_of
-from phyblock.records.record import Record
-from phyblock.records.reply import StoredError
+from phyblock.records.record import Record, StoredError
 from phyblock.run.judge import about_item, judged, judged_apart, read_extraction
 from phyblock.run.manifest import code_versions
 from phyblock.run.plan import CHANGED, asked_about, recorded_dataset

@@ -43,8 +43,7 @@ from phyblock.models import (
     under_way,
 )
 from phyblock.records.files import BATCHES
-from phyblock.records.record import Record, SentPrompt
-from phyblock.records.reply import Reply
+from phyblock.records.record import Record, Reply, SentPrompt
 from phyblock.resources import reply_cache_file
 from phyblock.run.events import (
     ModelStopped,
@@ -56,8 +55,7 @@ from phyblock.run.events import (
     Watcher,
 )
 from phyblock.run.judge import Extractor, about_prompt, begun, judged, judged_apart, pooled
-from phyblock.run.models import PlannedModel, provider_problem
-from phyblock.run.plan import RunPlan, Sample
+from phyblock.run.plan import PlannedModel, RunPlan, Sample, provider_problem
 from phyblock.run.store import CallJournal, Journaled, RecordWriter, RunStore
 from phyblock.tracks import AnyTrack, EpisodeTrack
 from phyblock.types import AskedAs

@@ -42,31 +42,15 @@ from phyblock.records.files import (
     run_records,
 )
 from phyblock.records.line import Line, encodable
-from phyblock.records.manifest import MANIFEST, Manifest, ManifestModel, read_manifest
-from phyblock.records.record import Call, PictureMark, Prompt, PromptMessage, Record, Stopped
-from phyblock.records.reply import Reply
+from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
+from phyblock.records.record import Call, PictureMark, Prompt, PromptMessage, Record, Reply, Stopped
 from phyblock.run.events import Standing
-from phyblock.run.manifest import code_versions
-from phyblock.sim.engine import PHYSICS_VARIABLE, REFERENCE_ENGINE
+from phyblock.run.manifest import code_versions, differences, reasons
 from phyblock.stable import hex_digest
-from phyblock.tracks.base import CARRYING, ENGINE
 
-_LABELS = ("published", "served_at", "size_b")
 LineT = TypeVar("LineT", bound=Line)
 
 _HINT = "choose another folder with --out"
-_NOT_IDENTITY = (
-    "suite.name",
-    "suite.description",
-    "suite.limit",
-    "suite.limits",
-    "suite.models",
-    "suite.baselines",
-    "suite.seeds",
-    "suite.dataset",
-    "dataset.root",
-)
-"""Parts of a manifest that may change while the run stays the same, or that others repeat."""
 
 
 class RunStore:
@@ -185,93 +169,21 @@ def held_run(folder: Path, manifest: Manifest) -> Manifest | None:
     paid: tuple[Lines[Any], ...] = (RecordLines(folder), CallLines(folder), BatchLines(folder))
     if all(next(iter(lines), None) is None for lines in paid):
         return None
-    names = _changed_models(found, manifest)
-    if found.identity == manifest.identity and not names:
-        _check_versions(folder, found, manifest)
-        return found
-    if found.identity != manifest.identity:
-        names = [*_changed(found, manifest), *names]
-    changed = f"different: {', '.join(names) or 'how phyblock asks, draws or reads'}"
-    hint = "; ".join((*_reasons(found, manifest), _HINT))
-    raise StoreError(Problem(str(folder), "holds another run", found=changed, hint=hint))
-
-
-def _check_versions(folder: Path, found: Manifest, wanted: Manifest) -> None:
-    """Raise StoreError where the code that judged a run's replies is not the one here."""
-    differ = [name for name in code_versions() if found.versions.get(name) != wanted.versions[name]]
-    if differ:
+    if differ := differences(found, manifest):
+        changed = f"different: {', '.join(differ)}"
+        hint = "; ".join((*reasons(found, manifest), _HINT))
+        raise StoreError(Problem(str(folder), "holds another run", found=changed, hint=hint))
+    if differ := [
+        name for name in code_versions() if found.versions.get(name) != manifest.versions[name]
+    ]:
         made, here = (
             ", ".join(f"{name} {one.versions.get(name, 'unknown')}" for name in differ)
-            for one in (found, wanted)
+            for one in (found, manifest)
         )
         message = "was judged by another version of phyblock"
         hint = f"phyblock score {folder} first: it judges the replies again and asks nobody"
         raise StoreError(Problem(str(folder), message, found=made, allowed=here, hint=hint))
-
-
-def _reasons(found: Manifest, wanted: Manifest) -> Iterator[str]:
-    """Return the differences of manifests that a user wrote in the same words."""
-    made, now = (one.dataset.version if one.dataset else 1 for one in (found, wanted))
-    if made != now:
-        yield f"its data are version {made}, these version {now}"
-    engines = [
-        {track: about.get(ENGINE) for track, about in one.tracks.items()} for one in (found, wanted)
-    ]
-    if engines[0] != engines[1] and engines[0].keys() == engines[1].keys():
-        was, is_now = (one.engine or REFERENCE_ENGINE for one in (found, wanted))
-        yield f"its blocks are let go in {was}, here in {is_now} ({PHYSICS_VARIABLE} chooses)"
-    for track, about in wanted.tracks.items():
-        if track in found.tracks and found.tracks[track].get(CARRYING) != about.get(CARRYING):
-            yield (
-                "this version carries plans out and measures what stands otherwise than the one "
-                "that made it, which phyblock score leaves as it was"
-            )
-
-
-def _changed(found: Manifest, wanted: Manifest) -> list[str]:
-    """Dotted names of the parts in which two manifests differ and that make them two runs."""
-    old, new = dict(_parts(found)), dict(_parts(wanted))
-    tracks = {name for name in old if name.partition(".")[0] in wanted.tracks}
-    names = [
-        name
-        for name in (*new, *sorted(tracks - new.keys()))
-        # What an older version did not know of a suite, it did not do otherwise.
-        if name not in _NOT_IDENTITY
-        and (name in old or not name.startswith("suite."))
-        and old.get(name) != new.get(name)
-    ]
-    # Other scenes of the same data have other digests, too.
-    chosen = {"suite.levels", "limit"} & set(names)
-    return [name for name in names if not (chosen and name.endswith("sha256"))]
-
-
-def _parts(manifest: Manifest) -> Iterator[tuple[str, Any]]:
-    """Dotted names and values of what a run is made of, digests of pictures left out."""
-    fields = manifest.fields()
-    for part in ("suite", "dataset", "limit"):
-        value = fields.get(part)
-        if isinstance(value, dict):
-            yield from ((f"{part}.{key}", below) for key, below in value.items())
-        else:
-            yield part, value
-    for track, about in manifest.tracks.items():
-        yield from ((f"{track}.{k}", below) for k, below in about.items() if k != "pictures")
-
-
-def _changed_models(found: Manifest, wanted: Manifest) -> list[str]:
-    """Dotted names of what decides the replies of models and was another when they were asked."""
-    asked = _decisive((*found.models, *found.others))
-    return [
-        f"models.{name}.{key}"
-        for name, model in _decisive(wanted.models).items()
-        for key in sorted(model.keys() | asked.get(name, {}).keys())
-        if name in asked and model.get(key) != asked[name].get(key)
-    ]
-
-
-def _decisive(models: Iterable[ManifestModel]) -> dict[str, dict[str, Any]]:
-    """Return what decides the models' replies, by their names."""
-    return {m.name: {k: v for k, v in m.fields().items() if k not in _LABELS} for m in models}
+    return found
 
 
 _HINT_APPENDING = "free some space and give the same command again: it goes on from here"

@@ -25,8 +25,7 @@ from phyblock.errors import Problem, SpecError
 from phyblock.models.request import Image, Message, Request
 from phyblock.parsing.structured import AnswerForm
 from phyblock.records.manifest import Manifest
-from phyblock.records.record import Record
-from phyblock.records.reply import Reply
+from phyblock.records.record import Record, Reply
 from phyblock.registry import added_measures, known_track, known_tracks
 from phyblock.sim.engine import REFERENCE_ENGINE, physics_engine
 from phyblock.stable import hex_digest

@@ -18,8 +18,7 @@ from phyblock.models.request import Image, Message, Request
 from phyblock.parsing.move import MoveProblem, ParsedMove, move_form, parse_move
 from phyblock.parsing.structured import AnswerForm
 from phyblock.records.line import Line, Whole
-from phyblock.records.record import AskedTurn, Course, Record
-from phyblock.records.reply import Reply
+from phyblock.records.record import AskedTurn, Course, Record, Reply
 from phyblock.resources import bundled
 from phyblock.scoring.plan import ERROR_TYPES
 from phyblock.scoring.steps import Assembly, MoveOutcome, attempted_counts, placed_counts

@@ -35,8 +35,7 @@ from phyblock.records.record import Record
 from phyblock.results.compare import check_alike, comparable
 from phyblock.results.load import Design, load_run
 from phyblock.run.events import RunEvent, RunStarted, SampleDone
-from phyblock.run.models import PlannedModel
-from phyblock.run.plan import RunPlan, make_plan
+from phyblock.run.plan import PlannedModel, RunPlan, make_plan
 from phyblock.run.runner import RunResult, Session
 from phyblock.stable import drawn_bytes, hex_digest
 from phyblock.text import one_line

@@ -14,7 +14,7 @@ from phyblock.config.suite import Suite
 from phyblock.models import ends_on
 from phyblock.models.costs import map_entry
 from phyblock.models.keys import KEYLESS
-from phyblock.run.models import to_config
+from phyblock.run.plan import to_config
 from tests.models.factory import make_model, make_request, reply_of
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Running

@@ -19,7 +19,7 @@ from phyblock.models.request import json_body, wire_messages
 from phyblock.parsing.answer import choice_form
 from phyblock.parsing.move import move_form
 from phyblock.parsing.plan import parse_plan, plan_form
-from phyblock.run.models import to_config
+from phyblock.run.plan import to_config
 from phyblock.types import ImageDetail
 from tests.models.factory import JPEG, PNG, ask, make_model, make_request, picture, reply_of
 from tests.models.routes import KEY_VARIABLE, ROUTES

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from phyblock.errors import StoreError
 from phyblock.records import files
 from phyblock.records.files import RecordLines, known_records, newest_starts
-from phyblock.records.reply import Reply, Usage
+from phyblock.records.record import Reply, Usage
 from phyblock.results.load import load_run
 from tests.records.damage import DAMAGED, lines_before, plan_record, with_value
 from tests.report.factory import manifest

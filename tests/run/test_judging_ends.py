@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from phyblock.api.running import run_suite
+from phyblock.api import run_suite
 from phyblock.cli.main import phyblock
 from phyblock.errors import SimulationError
 from phyblock.run.rescore import rescore

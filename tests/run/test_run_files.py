@@ -21,8 +21,7 @@ from phyblock.errors import StoreError
 from phyblock.models import Image, Message
 from phyblock.records.files import CallLines, PromptLines
 from phyblock.records.manifest import Manifest
-from phyblock.records.record import Call
-from phyblock.records.reply import Reply
+from phyblock.records.record import Call, Reply
 from phyblock.run.events import Standing
 from phyblock.run.plan import make_plan
 from phyblock.run.store import AppendFile, PromptFile, RunStore, read_prompts

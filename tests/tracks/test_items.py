@@ -17,7 +17,7 @@ from phyblock.domain.symmetry import Symmetry, canonical_form
 from phyblock.errors import DataError, SpecError
 from phyblock.making.scenes.sketch import transformed
 from phyblock.models.request import Image
-from phyblock.records.reply import Reply, Usage
+from phyblock.records.record import Reply, Usage
 from phyblock.tracks.items import (
     Examples,
     Presentation,

@@ -20,7 +20,7 @@ from phyblock.domain import Block, Candidate, CandidateSet, Scene
 from phyblock.errors import PromptError
 from phyblock.models.request import Image, Message, Request
 from phyblock.parsing.move import MOVE_PROBLEMS
-from phyblock.records.reply import Reply, Usage
+from phyblock.records.record import Reply, Usage
 from phyblock.scoring.steps import MOVE_OUTCOMES
 from phyblock.tracks.pictures import Workshop
 from phyblock.tracks.step_planning import (
