@@ -158,7 +158,7 @@ def decode(adapter: TypeAdapter[Any], line: bytes) -> Any:
 def problems_of(
     error: ValidationError,
     where: str,
-    kind: type[Line] = Line,
+    kind: type[BaseModel] = Line,
     is_not: str = "",
     hint: str = "",
     skip: int = 0,
@@ -237,7 +237,7 @@ def parts(hint: Any) -> list[type[Line]]:
     return [part for argument in get_args(hint) for part in parts(argument)]
 
 
-def _model_at(kind: type[Line], place: Iterable[str | int]) -> type[Line]:
+def _model_at(kind: type[BaseModel], place: Iterable[str | int]) -> type[BaseModel]:
     """The model of the part of a line that holds this place."""
     for name in place:
         if name in kind.model_fields:

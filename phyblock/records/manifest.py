@@ -170,7 +170,7 @@ def suite_of(manifest: Manifest, where: str) -> Suite:
     try:
         return suite_model().model_validate(manifest.suite)
     except ValidationError as error:
-        problems = problems_of(error, where, Manifest, "is not the suite of a run", _HINT)
+        problems = problems_of(error, where, suite_model(), "is not the suite of a run", _HINT)
         raise StoreError(replace(one, field=f"suite.{one.field}") for one in problems) from error
 
 

@@ -82,8 +82,11 @@ _RECORD_TYPES: dict[str, str] = {
     "rule": "object",
     "time": "object",
     "counts": "object",
+    "start": "int64",
 }
-"""Columns that records of all tracks have; each track adds its own."""
+"""Columns that records of all tracks have; each track adds its own. `start` is where the record
+begins in `records.jsonl` [bytes].
+"""
 
 _SCORE_TYPES: dict[str, str] = {
     "sample": "object",
@@ -96,8 +99,8 @@ _SCORE_TYPES: dict[str, str] = {
     "criterion": "object",
     "matcher": "object",
     "setting": "object",
-    **dict.fromkeys(MATCHED, "int64"),
-    **dict.fromkeys((*ERROR_TYPES, *BLOCK_COLUMNS.values(), *Score.FURTHER), "Int64"),
+    **dict.fromkeys(MATCHED, "int32"),
+    **dict.fromkeys((*ERROR_TYPES, *BLOCK_COLUMNS.values(), *Score.FURTHER), "Int32"),
 }
 
 _OF_SAMPLE = ("sample", "track", "model", "scene", "seed", "variant", "outcome")
@@ -107,7 +110,7 @@ TOKENS = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
 """Columns that count tokens."""
 _COUNTS = (*MATCHED, *ERROR_TYPES, *BLOCK_COLUMNS.values(), *Score.FURTHER)
 _LABELS = ("criterion", "matcher", "setting")
-_UNKNOWN = -(2**62)
+_UNKNOWN = -(2**31)
 """Stands for a count that there is not."""
 
 
@@ -123,14 +126,14 @@ class Columns:
         self._records: dict[str, list[Any]] = {name: [] for name in self._types}
         self._first, self._n_scores = array("q"), array("q")
         self._labels: dict[str, list[str]] = {name: [] for name in _LABELS}
-        self._counts = {name: array("q") for name in _COUNTS}
+        self._counts = {name: array("i") for name in _COUNTS}
         self._shared: dict[Any, Any] = {}
 
-    def add(self, record: Record) -> None:
-        """Take in a record; it replaces an earlier one of its sample."""
+    def add(self, record: Record, start: int = 0) -> None:
+        """Take in a record, which begins at `start` [bytes]; it replaces an earlier one."""
         row = self._rows.setdefault(record.sample, len(self._rows))
         # A slice beyond the end appends.
-        values = self._flat(record)
+        values = self._flat(record) | {"start": start}
         for name, column in self._records.items():
             column[row : row + 1] = (values.get(name),)
         self._first[row : row + 1] = array("q", (len(self._counts["tp"]),))
@@ -181,19 +184,16 @@ class Columns:
         return pd.DataFrame(columns, copy=False)
 
     def _add_score(self, score: Score) -> None:
-        for name, label in zip(
-            _LABELS, (score.criterion, score.matcher or "", score.setting), strict=True
-        ):
-            self._labels[name].append(self._share(label))
+        labels = (score.criterion, score.matcher or "", score.setting)
+        for column, label in zip(self._labels.values(), labels, strict=True):
+            column.append(self._share(label))
         errors, blocks = score.errors or {}, score.blocks or {}
-        counts = (
-            *(getattr(score, name) for name in MATCHED),
-            *(errors.get(name) for name in ERROR_TYPES),
-            *(blocks.get(name) for name in BLOCK_OUTCOMES),
-            *(getattr(score, name) for name in Score.FURTHER),
-        )
-        for name, count in zip(_COUNTS, counts, strict=True):
-            self._counts[name].append(_UNKNOWN if count is None else count)
+        counts = [score.tp, score.fp, score.fn]
+        counts += [errors.get(name, _UNKNOWN) for name in ERROR_TYPES]
+        counts += [blocks.get(name, _UNKNOWN) for name in BLOCK_OUTCOMES]
+        counts.append(_UNKNOWN if score.kept is None else score.kept)
+        for of_name, count in zip(self._counts.values(), counts, strict=True):
+            of_name.append(count)
 
     def _share(self, value: Any) -> Any:
         """The one object that stands for all that equal it."""
@@ -241,8 +241,8 @@ def _objects(values: Iterable[Any]) -> np.ndarray[Any, Any]:
 
 
 def _counts(column: array[int], rows: np.ndarray[Any, np.dtype[np.intp]], kind: str) -> Any:
-    values = np.frombuffer(column, dtype=np.int64)[rows] if column else np.zeros(0, np.int64)
-    return pd.arrays.IntegerArray(values, values == _UNKNOWN) if kind == "Int64" else values
+    values = np.frombuffer(column, dtype=np.int32)[rows] if column else np.zeros(0, np.int32)
+    return pd.arrays.IntegerArray(values, values == _UNKNOWN) if kind == "Int32" else values
 
 
 def _rule(parse: Any) -> str | None:
@@ -511,17 +511,20 @@ def load_run(path: str | Path, *, texts: bool = True) -> Run:
     manifest = read_manifest(folder)
     design = design_of(manifest, str(folder / MANIFEST))
     lines = run_records(folder, manifest)
-    records, scores = frames_of((record for _, record in lines), design, texts=texts)
-    return Run(folder, manifest, design, records, scores, lines.is_cut)
+    records = ((record, lines.start_bytes) for _, record in lines)
+    return Run(folder, manifest, design, *frames_of(records, design, texts=texts), lines.is_cut)
 
 
 def frames_of(
-    records: Iterable[Record], design: Design, *, texts: bool = True
+    records: Iterable[tuple[Record, int]], design: Design, *, texts: bool = True
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Return `Run.records` and `Run.scores`; a later record of a sample replaces an earlier one."""
+    """Return `Run.records` and `Run.scores` of records and where they begin [bytes].
+
+    A later record of a sample replaces an earlier one.
+    """
     columns = Columns(texts=texts)
-    for record in records:
-        columns.add(record)
+    for record, start in records:
+        columns.add(record, start)
     order = {name: place for place, name in enumerate(design.model_names)}
     return columns.frames(lambda model: order.get(model, len(order)))
 

@@ -46,8 +46,8 @@ from phyblock.web.pack import (
     kit,
     open_sources,
     pack_scenes,
+    places_of,
     question_entry,
-    read_places,
     records_at,
     write_script,
 )
@@ -538,7 +538,7 @@ def _write_samples(
     for number, one in enumerate(runs):
         # Model by model: what one model says packs best together.
         order = Numbers(one.run.design.model_names)
-        places = [p for p in read_places(one.run.path, one.run.design) if p.track in one.tracks]
+        places = [p for p in places_of(one.run) if p.track in one.tracks]
         places.sort(key=lambda place: order.of(place.model))
         for record in records_at(one.run.path, places):
             track, item = record.track, record.item

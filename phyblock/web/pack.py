@@ -27,7 +27,7 @@ from phyblock.domain import BLOCK_TYPES, Block, CandidateSet, Question, Scene
 from phyblock.errors import DataError
 from phyblock.files import atomic_write
 from phyblock.models import Image
-from phyblock.records.files import PromptLines, RecordLines, run_records
+from phyblock.records.files import PromptLines, RecordLines
 from phyblock.records.record import Record, Score, SentPrompt
 from phyblock.resources import cache_dir
 from phyblock.results.load import Design, Run
@@ -130,24 +130,18 @@ class Item(NamedTuple):
     key: str
 
 
-def read_places(folder: Path, design: Design) -> list[Place]:
-    """Return every sample once: by track, item, then model in the suite's order, and seed.
-
-    Raises StoreError for a line that is no record.
-    """
-    lines = run_records(folder)
-    newest: dict[str, Place] = {}
-    for _, record in lines:
-        start = lines.start_bytes
-        newest[record.sample] = Place(record.track, record.item, record.model, record.seed, start)
-    tracks = {name: n for n, name in enumerate(design.suite.tracks)}
-    models = {name: n for n, name in enumerate(design.model_names)}
+def places_of(run: Run) -> list[Place]:
+    """Return every sample once: by track, item, then model in the suite's order, and seed."""
+    names = ("track", "item", "model", "seed", "start")
+    places = map(Place, *(run.records[name].tolist() for name in names))
+    tracks = {name: n for n, name in enumerate(run.design.suite.tracks)}
+    models = {name: n for n, name in enumerate(run.design.model_names)}
 
     def order(place: Place) -> tuple[int, str, int, str, int]:
         track, model = tracks.get(place.track, len(tracks)), models.get(place.model, len(models))
         return track, place.key, model, place.model, place.seed
 
-    return sorted(newest.values(), key=order)
+    return sorted(places, key=order)
 
 
 def records_at(folder: Path, places: Iterable[Place]) -> Iterable[Record]:

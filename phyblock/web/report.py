@@ -46,8 +46,8 @@ from phyblock.web.pack import (
     open_sources,
     pack_samples,
     pack_scenes,
+    places_of,
     question_entry,
-    read_places,
     write_script,
 )
 
@@ -338,7 +338,7 @@ def report_files(folder: Path) -> dict[str, Path]:
 def _write_data(run: Run, sources: Sources, out: OutFolder, new: Path, build: str) -> None:
     """Write the scripts and the pictures."""
     packs = {kind: Pack(new, kind, build) for kind in ("records", "scenes", "questions", "prompts")}
-    places, tracks = read_places(run.path, run.design), run.design.suite.tracks
+    places, tracks = places_of(run), run.design.suite.tracks
     asked = items_shown(run.path, places, sources.items)
     pictures: dict[str, str] = {}
     if has_pictures(run, places):

@@ -142,7 +142,7 @@ DATA: tuple[Bad, ...] = (
     Bad("lost", second_scene("candidates", [tower("t", [1], ("red",))["candidates"][0]]),
         ("jsonl:2: candidates", "block 2")),
     Bad("json", scenes_text(lambda lines: [*lines[:3], "{", *lines[4:]]), ("scenes.jsonl:4:",)),
-    Bad("twice", scenes_text(lambda lines: [*lines, lines[0]]), ("scenes.jsonl:6: id", "line 1")),
+    Bad("twice", scenes_text(lambda lines: [*lines, lines[0]]), ("scenes.jsonl:6: id", "scenes.jsonl:1 already")),
     Bad("none", scenes_text(lambda _: []), ("scenes.jsonl", "holds no scenes")),
     Bad("no-png", checkout(None), ("official", "images.source", "found: 000", "render")),
     Bad("bad-png", checkout(b"no picture"), ("000.png", "is no picture")),

@@ -124,7 +124,7 @@ def record(
 
 
 def run_of(records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Run:
-    read = (known_records().validate_python(one) for one in records)
+    read = ((known_records().validate_python(one), 0) for one in records)
     told = Manifest.model_validate(dict(facts))
     design = design_of(told)
     return Run(Path("run"), told, design, *frames_of(read, design))

@@ -32,7 +32,7 @@ from phyblock.web.leaderboard import (
     entries_of,
     write_site,
 )
-from phyblock.web.pack import Pack, SampleIndex, Sources, pack_samples, read_places
+from phyblock.web.pack import Pack, SampleIndex, Sources, pack_samples, places_of
 from phyblock.web.report import headlines, rank_texts, write_report
 from tests.report.factory import laws, manifest, record, record_lists, run_of, score, write_run
 from tests.workspace import Workspace
@@ -98,7 +98,7 @@ def test_the_newest_record_of_every_sample_is_there_once(
     design = design_of(Manifest.model_validate(facts))
     index, pack = SampleIndex(design), Pack(folder, "records", "build")
     prompts = Pack(folder, "prompts", "build")
-    pack_samples(folder, read_places(folder, design), index, pack, prompts, {})
+    pack_samples(folder, places_of(load_run(folder)), index, pack, prompts, {})
     columns = index.columns({})
     entries = entries_in(folder, pack, "records")
     by_name = {one["sample"]: one for one in records}
