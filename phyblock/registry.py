@@ -13,20 +13,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from phyblock.tracks.base import AnyTrack
 
-__all__ = [
-    "add_baseline",
-    "add_measure",
-    "added_measures",
-    "baseline_names",
-    "baseline_rules",
-    "known_track",
-    "known_tracks",
-    "register_track",
-    "remove_measure",
-    "track_baselines",
-    "unregister_track",
-]
-
 _MODULES = (
     "phyblock.tracks.full_planning",
     "phyblock.tracks.step_planning",

@@ -7,48 +7,6 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
-__all__ = [
-    "BACKGROUNDS",
-    "BATCH_PROVIDERS",
-    "FAILURES",
-    "GATINGS",
-    "LEVEL1_CRITERIA",
-    "MATCHERS",
-    "OUTCOMES",
-    "PLAN_PARSERS",
-    "QUOTE_HINT",
-    "REFUSED_ENDS",
-    "SETTINGS",
-    "STEP_ENDS",
-    "WITHOUT_REPLY",
-    "AnswerFormat",
-    "AskedAs",
-    "Background",
-    "CandidateOrder",
-    "CandidateScale",
-    "Criterion",
-    "DataFormat",
-    "Finish",
-    "Gating",
-    "ImageDetail",
-    "Level1Criterion",
-    "Matcher",
-    "MissingPolicy",
-    "Outcome",
-    "Physics",
-    "PictureLayout",
-    "PictureName",
-    "PictureSource",
-    "PlanParser",
-    "PoseRotation",
-    "Role",
-    "SendMode",
-    "Setting",
-    "StepEnd",
-    "TransportName",
-    "View",
-]
-
 Setting = Literal["A", "B"]
 """What blocks are compared by: A with orientation, B without."""
 SETTINGS: tuple[Setting, ...] = get_args(Setting)

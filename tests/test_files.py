@@ -48,12 +48,6 @@ def test_what_is_written_is_read(
     assert list(folder.iterdir()) == [path]
 
 
-def test_the_file_may_be_read_by_whom_other_files_may(tmp_path: Path) -> None:
-    atomic_write(tmp_path / "ours", "text")
-    (tmp_path / "other").write_text("text")
-    assert (tmp_path / "ours").stat().st_mode == (tmp_path / "other").stat().st_mode
-
-
 def test_what_cannot_be_replaced_stays_and_nothing_is_left_beside_it(tmp_path: Path) -> None:
     (tmp_path / "folder" / "inside").mkdir(parents=True)
     with pytest.raises(OSError, match="folder"):
@@ -92,11 +86,6 @@ def test_what_the_disk_refuses_is_one_of_our_errors(tmp_path: Path) -> None:
             path.write_text("text")
     with pytest.raises(StoreError, match="no words"), writing(tmp_path):
         raise OSError("no words")
-
-
-def test_halves_of_characters_are_no_failure(tmp_path: Path) -> None:
-    atomic_write(tmp_path / "file", "a\ud83db")
-    assert (tmp_path / "file").read_text() == "a?b"
 
 
 def test_a_named_file_is_written_through_the_link_that_a_person_made(tmp_path: Path) -> None:
@@ -149,10 +138,6 @@ def test_json_of_ordinary_size_is_read_as_json_reads_it(value: object) -> None:
 def test_json_beyond_the_bounds_is_a_value_error(text: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         load_json(text)
-
-
-def test_nesting_is_allowed_down_to_the_limit() -> None:
-    assert load_json("[" * 64 + "]" * 64)
 
 
 def test_a_file_is_read_up_to_the_limit(tmp_path: Path) -> None:
@@ -343,19 +328,6 @@ def test_a_list_that_is_a_link_is_not_written_through(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="it is a link"):
         OutFolder(tmp_path / "out").write({"a": "ours"})
     assert theirs.read_text() == "theirs"
-
-
-def test_files_and_folders_in_the_way_are_named(tmp_path: Path) -> None:
-    (tmp_path / "tables").write_text("theirs")
-    (tmp_path / "a.csv").mkdir()
-    with pytest.raises(StoreError) as caught:
-        OutFolder(tmp_path).check(["tables/b.csv", "a.csv"])
-    told = {problem.where: problem.message for problem in caught.value.problems}
-    assert told == {
-        str(tmp_path / "tables"): "cannot be written in: it is no folder",
-        str(tmp_path / "a.csv"): "cannot be written: it is no file",
-    }
-    assert not (tmp_path / LIST).exists()
 
 
 def test_a_closed_folder_is_not_said_to_be_in_the_way(

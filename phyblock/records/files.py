@@ -89,20 +89,23 @@ class Lines(Generic[LineT]):
     file: ClassVar[str]
     noun: ClassVar[str]
     hint: ClassVar[str]
+    kind: ClassVar[type[Line]]
     skip: ClassVar[int] = 0
     """Parts of a place in a line that name the model by which it was read."""
 
-    def __init__(
-        self, folder: Path, adapter: TypeAdapter[LineT], validation: Validation | None = None
-    ) -> None:
+    def __init__(self, folder: Path, validation: Validation | None = None) -> None:
         """Without a `validation` lines of any run are taken."""
         self.path = folder / self.file
         self.is_cut = False
         self.lacks_newline = False
         self.start_bytes = 0
         self.whole_bytes = 0
-        self._adapter = adapter
+        self._adapter: TypeAdapter[LineT] = self.adapter()
         self._validation = validation
+
+    def adapter(self) -> TypeAdapter[Any]:
+        """Return what reads a line."""
+        return TypeAdapter(self.kind)
 
     def __iter__(self) -> Iterator[tuple[str, LineT]]:
         self.whole_bytes = 0
@@ -185,47 +188,42 @@ class RecordLines(Lines[Record]):
     hint = "restore the file from a copy, or remove this line: its sample is then run again"
     skip = 1
 
-    def __init__(self, folder: Path, validation: Validation | None = None) -> None:
-        super().__init__(folder, known_records(), validation)
+    def adapter(self) -> TypeAdapter[Any]:
+        """Return what reads a record by the model of its track."""
+        return known_records()
 
 
 class CallLines(Lines[Call]):
     """The calls of a run folder, each when it was sent and when it had ended."""
 
     file = CALLS
+    kind = Call
     noun = "call"
     hint = (
         "restore the file from a copy, or remove this line: its cost is then not counted, and a "
         "reply that no record holds is asked for again"
     )
 
-    def __init__(self, folder: Path, validation: Validation | None = None) -> None:
-        super().__init__(folder, TypeAdapter(Call), validation)
-
 
 class PromptLines(Lines[Prompt]):
     """The prompts of a run folder."""
 
     file = PROMPTS
+    kind = Prompt
     noun = "prompt"
     hint = "remove this line: reports then show the sample without its prompt"
-
-    def __init__(self, folder: Path) -> None:
-        super().__init__(folder, TypeAdapter(Prompt))
 
 
 class BatchLines(Lines[BatchLine]):
     """The history of the batches of a run."""
 
     file = BATCHES
+    kind = BatchLine
     noun = "line about a batch"
     hint = (
         "restore the file from a copy, or remove all lines of the same batch: its questions are "
         "then asked again"
     )
-
-    def __init__(self, folder: Path) -> None:
-        super().__init__(folder, TypeAdapter(BatchLine))
 
 
 def record_types() -> tuple[type[Record], ...]:

@@ -8,7 +8,6 @@ from typing import Any
 
 import jsonschema
 import pytest
-from hypothesis import given
 
 from phyblock.data import Dataset, QuestionSet, read_builtin, read_questions
 from phyblock.data.questions import StoredQuestion
@@ -16,8 +15,7 @@ from phyblock.data.scenes import StoredScene
 from phyblock.errors import DataError
 from phyblock.records.line import Line, validated
 from phyblock.resources import bundled
-from tests.data.broken import Raw, sound_scene, with_value, without
-from tests.data.test_scenes import as_json, tasks
+from tests.data.broken import Raw, sound_scene, with_value
 from tests.documents import ROOT
 from tests.fuzz.strategies import sound_question
 
@@ -55,11 +53,6 @@ def test_the_shipped_questions_are_written_byte_for_byte(
     assert written == lines_of(QUESTIONS)
 
 
-@given(tasks().map(as_json))
-def test_a_line_is_written_as_it_was_read(raw: Raw) -> None:
-    assert validated(StoredScene, raw, "here").as_json() == json.dumps(raw)
-
-
 @pytest.mark.parametrize(
     ("kind", "raw"), [(StoredScene, sound_scene()), (StoredQuestion, sound_question())]
 )
@@ -70,21 +63,6 @@ def test_a_line_may_say_its_version_and_none_is_from_the_future(kind: type[Line]
         validated(kind, {**raw, "format": 2}, "here")
     (problem,) = caught.value.problems
     assert (problem.field, problem.found, problem.allowed) == ("format", "2", "1")
-
-
-def test_everything_that_is_wrong_with_a_question_is_said_at_once() -> None:
-    broken = without(sound_question(), "question") | {"answer": 1, "colour": 1}
-    broken = with_value(broken, "pictures.0.marks.0.position", [0, 0])
-    with pytest.raises(DataError) as caught:
-        validated(StoredQuestion, broken, "here")
-    assert {(p.field, p.message) for p in caught.value.problems} == {
-        ("question", "is missing"),
-        ("answer", "is no text"),
-        ("colour", "is not known"),
-        ("pictures[0].marks[0].position", "is not a vector in range"),
-    }
-    (unknown,) = (p for p in caught.value.problems if p.field == "colour")
-    assert unknown.allowed.startswith("id, subtask, category, scene_id")
 
 
 def schema(name: str) -> jsonschema.Draft202012Validator:

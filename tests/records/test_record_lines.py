@@ -112,12 +112,6 @@ def test_what_is_no_file_is_refused(tmp_path: Path, make: Callable[[Path], None]
         list(RecordLines(tmp_path))
 
 
-def test_text_that_no_output_could_hold_is_read_without_it(tmp_path: Path) -> None:
-    line = with_value("reply.text", "half \ud83d of one")
-    run = load_run(folder_with(tmp_path, line))
-    assert run.records["text"].tolist() == ["half ? of one"]
-
-
 def test_a_sample_is_taken_from_its_last_line(tmp_path: Path) -> None:
     first, last = lines_before()[0], with_value("reply.text", "later")
     records = RecordLines(folder_with(tmp_path, first, last))

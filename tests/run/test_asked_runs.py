@@ -121,20 +121,3 @@ def test_all_tracks_ask_and_read_by_the_schema(
     replayed = workspace.root / "replayed"
     assert call("run", "suite.yaml", "--out", replayed, "--no-report", "--limit", 2) == 0
     assert {rule for r in workspace.records(replayed) for rule in rules(r)} == {RULE}
-
-
-def test_what_is_asked_of_whom_is_said_before(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(workspace.root)
-    (workspace.root / "mine.j2").write_text("{% block user %}Build.{% endblock %}")
-    known = {"alpha": "openai/gpt-4o-2024-08-06", "beta": "dashscope/qwen-vl-max"}
-    workspace.write_yaml("models.yaml", known)
-    workspace.write_suite(models=[*known, "random"], prompt="mine.j2", **FORMAT)
-    assert call("validate", "suite.yaml") == 0
-    said = " ".join(capsys.readouterr().out.split())
-    assert "prompt of full_planning: " in said
-    entry = {"id": known["alpha"], "extra_body": {"response_format": {"type": "json_object"}}}
-    workspace.write_yaml("models.yaml", {**known, "alpha": entry})
-    with pytest.raises(InputError, match="says its own response_format"):
-        call("validate", "suite.yaml")

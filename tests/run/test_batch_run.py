@@ -84,23 +84,6 @@ def test_steps_refuse_batches_and_say_why(workspace: Workspace) -> None:
         assert "is asked in batches, and step_planning plays episodes of several turns" in done.err
 
 
-@pytest.mark.parametrize(
-    ("entry", "words"),
-    [
-        ({"id": "mistral/m"}, "does not speak the batches of mistral"),
-        ({"id": "openai/m", "api_base": ["http://a:1/v1", "http://b:1/v1"]}, "a list of servers"),
-    ],
-)
-def test_models_that_have_no_batches_are_refused_where_they_stand(
-    workspace: Workspace, entry: dict[str, Any], words: str
-) -> None:
-    workspace.write_yaml("models.yaml", {"alpha": {**entry, "batch": True}})
-    done = workspace.phyblock("validate", "models.yaml")
-    assert done.code == 2
-    assert words in done.err
-    assert "models.yaml:" in done.err
-
-
 def test_a_run_that_waits_is_stopped_and_goes_on_by_the_same_command(workspace: Workspace) -> None:
     """Between both commands the provider is asked nothing, and the estimate asks for no money."""
     with Running(OpenAIBatches(batch=BatchFaults(looks=10**6))) as running:

@@ -130,19 +130,6 @@ def test_a_dry_run_is_near_the_bill_of_every_provider(workspace: Workspace) -> N
         assert [one.tokens for one in lengths] == [CALLS // 2 * COMPLETION] * 2
 
 
-def test_the_length_of_replies_is_learned_from_those_that_are_there() -> None:
-    row = Estimate("m", "litellm", 100, Prices.flat(0.0, 10.0), today())
-    for _ in range(10):
-        row.add_call(CallEstimate(100, 500, 4096), "a")
-    assert (row.lengths["a"].mean, row.completion_tokens) == (None, 5000)
-    assert row.reply_usd == pytest.approx(0.05)
-    for tokens in range(20):
-        row.add_reply(tokens, "a")
-    row.add_reply(None, "a")
-    assert (row.lengths["a"].mean, row.completion_tokens) == (9.5, 95)
-    assert row.reply_usd == pytest.approx(95 * 10 / 1e6)
-
-
 @given(
     st.lists(
         st.tuples(st.sampled_from("ab"), st.integers(1, 500), st.integers(1, 500)), min_size=1

@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from phyblock.data import UNNUMBERED, VERSION_FILE, read_version
+from phyblock.data import VERSION_FILE, read_version
 from phyblock.errors import DataError, SpecError
 from phyblock.records.manifest import read_manifest
 from phyblock.results.compare import check_alike, compare_runs
@@ -16,16 +14,6 @@ from phyblock.results.estimates import main_measure
 from phyblock.results.load import load_run
 from tests.report.factory import manifest, run_of
 from tests.workspace import Workspace
-
-
-@given(st.integers(1, 999_999), st.sampled_from(["", "\n", " \n"]))
-def test_a_version_is_read_back(
-    tmp_path_factory: pytest.TempPathFactory, version: int, end: str
-) -> None:
-    folder = tmp_path_factory.mktemp("set")
-    assert read_version(folder) == UNNUMBERED
-    (folder / VERSION_FILE).write_text(f"{version}{end}", encoding="utf-8")
-    assert read_version(folder) == version
 
 
 @pytest.mark.parametrize("text", ["", "0", "two", "-1", "1.5", "1" * 7, "²"])

@@ -158,18 +158,3 @@ def test_a_sample_whose_every_attempt_failed_is_asked_again_by_the_next_run(
         assert running.server.requests == 20
     assert coverage(workspace)["alpha"]["api_error"] == "0"
     assert "All 10 samples are done" in again.out
-
-
-def test_refused_seeds_are_said_in_the_tables(workspace: Workspace) -> None:
-    with Running(OpenAIChat(Faults(mode="seed"))) as running:
-        workspace.write_models(running.url, "alpha")
-        workspace.write_suite(models=["alpha", "random"], seeds=[0, 1, 2])
-        done = workspace.run()
-    assert done.code == 0
-    note = "alpha: seed unsupported, seeds are independent repeats."
-    tables = workspace.tables()
-    assert note in tables["table1.md"].decode()
-    assert note in tables["table1.tex"].decode()
-    records = [record for record in workspace.records() if record["model"] == "alpha"]
-    assert {record["reply"]["seed_sent"] for record in records} == {False}
-    assert len(records) == running.server.ended["ok"] == 15

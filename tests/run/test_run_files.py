@@ -18,13 +18,12 @@ from hypothesis import strategies as st
 from phyblock.config.models import ModelConfig
 from phyblock.config.suite import load_suite
 from phyblock.errors import StoreError
-from phyblock.models import Image, Message
-from phyblock.records.files import CallLines, PromptLines
+from phyblock.records.files import PromptLines
 from phyblock.records.manifest import Manifest
 from phyblock.records.record import Call, Reply
 from phyblock.run.events import Standing
 from phyblock.run.plan import make_plan
-from phyblock.run.store import AppendFile, PromptFile, RunStore, read_prompts
+from phyblock.run.store import AppendFile, RunStore, read_prompts
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
@@ -43,13 +42,6 @@ def test_what_is_appended_is_what_is_read(
     file.close()
     lines = path.read_bytes().splitlines() if path.exists() else []
     assert [json.loads(line) for line in lines] == [line for batch in batches for line in batch]
-
-
-def test_a_full_disk_is_an_error_that_leaves_whole_lines() -> None:
-    file = AppendFile(Path("/dev/full"))
-    with pytest.raises(StoreError, match="No space left on device"):
-        file.append([{"a": 1}])
-    file.close()
 
 
 CHANGES: dict[str, Callable[[Path], object]] = {
@@ -204,25 +196,6 @@ def test_a_limit_counts_every_call_once_and_one_without_an_end_in_full(
     assert {model: standing.limit_usd.get(model, 0.0) for model in "ab"} == expected
 
 
-def test_a_prompt_is_kept_once_without_its_pictures(tmp_path: Path) -> None:
-    picture = Image(b"\x89PNG secret", "goal", 8, 8)
-    messages = (Message("system", ("Be brief.",)), Message("user", (picture, "Which?")))
-    path = tmp_path / "prompts.jsonl"
-    for _ in range(2):
-        known = {line.sha256 for _, line in PromptLines(tmp_path)}
-        file = AppendFile(path)
-        prompts = PromptFile(file, known)
-        digests = {prompts.keep(messages) for _ in range(3)}
-        file.close()
-    (digest,) = digests
-    assert len(path.read_text(encoding="utf-8").splitlines()) == 1
-    assert "secret" not in path.read_text(encoding="utf-8")
-    assert [message.fields() for message in read_prompts(tmp_path)[digest]] == [
-        {"role": "system", "parts": ("Be brief.",)},
-        {"role": "user", "parts": ({"image": "goal"}, "Which?")},
-    ]
-
-
 def test_every_record_names_a_prompt_that_is_there(tmp_path: Path, pictures_dir: Path) -> None:
     made = Workspace(tmp_path, pictures_dir)
     made.write_scenes()
@@ -237,18 +210,3 @@ def test_every_record_names_a_prompt_that_is_there(tmp_path: Path, pictures_dir:
         fields = [message.fields() for message in messages]
         canonical = json.dumps(fields, sort_keys=True, separators=(",", ":"))
         assert hashlib.sha256(canonical.encode()).hexdigest() == digest
-
-
-@pytest.mark.parametrize("name", ["calls.jsonl", "prompts.jsonl"])
-@pytest.mark.parametrize("stands_there", ["pipe", "device"])
-def test_what_is_no_file_is_not_waited_for(
-    workspace: Workspace, name: str, stands_there: str
-) -> None:
-    path = workspace.root / name
-    if stands_there == "pipe":
-        os.mkfifo(path)
-    else:
-        path.symlink_to("/dev/zero")
-    lines = {"calls": CallLines, "prompts": PromptLines}[path.stem]
-    with pytest.raises(StoreError, match="is not a regular file"):
-        list(lines(workspace.root))

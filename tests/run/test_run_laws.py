@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import random
-import re
 import shutil
 import time
 from pathlib import Path
@@ -77,25 +76,6 @@ def test_scoring_again_by_the_same_rules_changes_nothing(copy: Workspace) -> Non
     before = copy.files()
     done = copy.phyblock("score", "out", fresh=True)
     assert (done.code, done.err) == (0, "")
-    assert lasting(copy.files()) == lasting(before)
-
-
-def test_a_run_of_other_readers_is_scored_before_it_goes_on(copy: Workspace) -> None:
-    before = copy.files()
-    manifest = copy.out / "run.yaml"
-    text = re.sub(r"readers: '\d+'", "readers: '1'", manifest.read_text(encoding="utf-8"))
-    manifest.write_text(text, encoding="utf-8")
-    refused = copy.run()
-    assert refused.code == 2
-    assert "phyblock score" in refused.err
-    path = copy.out / "records.jsonl"
-    lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
-    for line in lines:
-        if line["reply"] is not None:
-            line.update(outcome="parse_failure", scores=[])
-    path.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
-    assert copy.phyblock("score", "out").code == 0
-    assert copy.run().code == 0
     assert lasting(copy.files()) == lasting(before)
 
 
@@ -287,21 +267,3 @@ def test_baselines_need_no_replies_kept_and_nothing_is_drawn_for_them(
     # What the pictures would be is a part of what the run is all the same.
     facts = yaml.safe_load((workspace.out / "run.yaml").read_text())
     assert len(facts["tracks"][track]["pictures"]) == 64
-
-
-def test_a_run_of_baselines_that_has_prompts_goes_on(workspace: Workspace) -> None:
-    """Earlier versions made prompts and pictures for baselines."""
-    workspace.write_suite(models=["oracle"])
-    assert workspace.run().code == 0
-    first, *lines = (workspace.out / "records.jsonl").read_text().splitlines()
-    version = yaml.safe_load((workspace.out / "run.yaml").read_text())["tracks"]["full_planning"]
-    image = {"label": "composite", "sha256": "0" * 64, "width_px": 256, "height_px": 128}
-    about = {"template": "default", "version": version["prompt"]["version"], "messages": "0" * 64}
-    older = {**json.loads(first), "prompt": {**about, "images": [image]}}
-    kept = [json.dumps(older), *lines[:2]]
-    (workspace.out / "records.jsonl").write_text("".join(f"{line}\n" for line in kept))
-    done = workspace.run()
-    assert (done.code, done.err) == (0, "")
-    records = workspace.records()
-    assert records[0] == older
-    assert len(records) == 5

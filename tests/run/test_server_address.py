@@ -69,13 +69,6 @@ def test_calls_go_to_the_address_and_keys_say_that_there_is_one(
     assert len(keys) == 2
 
 
-def test_what_the_models_file_says_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("OPENAI_BASE_URL", "http://127.0.0.1:9/v1")
-    spec = ModelConfig(id="openai/m", api_base="http://127.0.0.1:10/v1")
-    config = to_config("m", spec, Suite(name="s", models=("m",)))
-    assert config.api_base == "http://127.0.0.1:10/v1"
-
-
 def test_a_server_that_moved_is_asked_nothing_again(workspace: Workspace) -> None:
     with Running(OpenAIChat()) as first:
         workspace.write_models(first.url, "alpha")

@@ -115,16 +115,6 @@ def test_faults_change_nothing(workspace: Workspace) -> None:
     assert found[0] == found[1]
 
 
-def test_samples_of_a_step_are_asked_apart(workspace: Workspace) -> None:
-    with Running(StepAgent()) as running:
-        prepare(workspace, running.url, steps={"samples": 3, "physics": "off"})
-        assert workspace.run(*FEW).code == 0
-        seeds = {one.seed for one in running.server.seen}
-    assert seeds == {0, 1, 2}
-    for record in workspace.records():
-        assert len(record["turns"]) == 3 * len(record["outcomes"])
-
-
 @pytest.mark.parametrize(
     ("kills", "seeds", "physics"),
     [(2, 2, "off"), pytest.param(12, 16, "settle", marks=pytest.mark.slow)],
@@ -167,15 +157,6 @@ def test_a_killed_run_goes_on_in_the_middle_of_episodes(
         assert workspace.run("--no-cache").code == 0
         quiet = by_sample(workspace.records())
     assert killed == quiet
-
-
-def test_a_model_that_refuses_leaves_episodes_without_steps(workspace: Workspace) -> None:
-    with Running(StepAgent(Faults(mode="policy"))) as running:
-        prepare(workspace, running.url)
-        workspace.run(*FEW)
-    for record in workspace.records():
-        assert (record["outcome"], record["ending"]) == ("refusal", "unanswered")
-        assert record["turns"] == []
 
 
 @pytest.mark.parametrize(("mode", "outcome"), [("length", "truncated"), ("filtered", "refusal")])

@@ -161,61 +161,6 @@ def test_circular_and_blind_a_question_counts_once_and_only_if_all_rotations_are
     ).replace("}", "")
 
 
-def test_one_letter_for_every_rotation_is_never_right_in_a_circular_run(
-    workspace: Workspace,
-) -> None:
-    server = Answering(lambda _: "B")
-    run_with(workspace, server, circular=True, blind=True, subtasks=["VP", "AD"], per_subtask=2)
-    for measure, value in (("accuracy", 0.0), ("each_rotation", 0.25)):
-        cells = accuracies(workspace, measure)
-        assert [float(cells[subtask]["value"]) for subtask in ("VP", "AD")] == [value] * 2
-
-
-@pytest.mark.slow
-def test_wrong_pictures_are_those_of_another_scene_and_the_same_for_all_models(
-    workspace: Workspace,
-) -> None:
-    wrong = Answering(a_cube)
-    two = ("alpha", "beta")
-    done = run_with(
-        workspace, wrong, models=two, wrong_image=True, subtasks=["SH", "VP"], per_subtask=2
-    )
-    assert done.code == 0
-    assert "[pictures of another scene]" in " ".join(done.out.split())
-    drawn = pictures_of(workspace)
-    by_text = {question.text: (question, labels) for question, labels in drawn.values()}
-    sent: dict[str, set[tuple[str, ...]]] = {}
-    for seen in wrong.seen:
-        text = str(seen.parts[-1])
-        question, labels = next(v for k, v in by_text.items() if f"Question: {k}\n" in text)
-        digests = tuple(digest for _, digest in shown(seen))
-        sent.setdefault(question.id, set()).add(digests)
-        assert not set(digests) & set(labels.values())
-        others = [set(o.values()) for q, o in drawn.values() if q.subtask == question.subtask]
-        assert set(digests) in others
-    assert len(sent) == 4
-    assert all(len(variants) == 1 for variants in sent.values())
-
-
-BAD = [
-    ({"answer": "E"}, "answer"),
-    ({"options": ["cube", "arch", "cube", "cuboid"]}, r"options\[2\]"),
-    ({"scene_id": "t9"}, "scene_id"),
-    ({"options": ["<img1>", "<img2>", "<img3>", "<img4>"]}, "pictures"),
-]
-
-
-def test_broken_questions_are_errors_with_file_and_line_all_at_once(workspace: Workspace) -> None:
-    first, *made = questions(subtasks=["SH"], per_subtask=1 + len(BAD))
-    broken = [{**one, **change} for one, (change, _) in zip(made, BAD, strict=True)]
-    write_questions(workspace.root / "questions", [first, *broken])
-    workspace.write_suite(**vqa_suite())
-    done = workspace.run("--dry-run")
-    assert done.code == 2
-    for line, ((_, field), error) in enumerate(zip(BAD, done.errors, strict=True), 2):
-        assert re.search(rf"questions\.jsonl:{line}: {field}: ", error)
-
-
 def test_pictures_of_official_files_are_sent_byte_for_byte(workspace: Workspace) -> None:
     folder = workspace.root / "questions"
     folder.mkdir()
