@@ -1,9 +1,12 @@
+"""Text of others steers neither a terminal nor a spreadsheet."""
+
 from __future__ import annotations
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from phyblock.errors import ModelError
 from phyblock.text import counted, csv_cell, one_line
 
 STARTS = tuple("=+-@\t\r\n")
@@ -46,3 +49,8 @@ def test_one_line_is_one_line_that_can_be_written(text: str) -> None:
 def test_one_thing_is_no_plural(number: int, said: str) -> None:
     assert counted(number, "reply", "replies") == said
     assert counted(number, "scene") == said.replace("replies", "scenes").replace("reply", "scene")
+
+
+@given(st.text())
+def test_what_a_server_says_steers_no_terminal(message: str) -> None:
+    assert str(ModelError(message)).isprintable()

@@ -31,7 +31,7 @@ from phyblock.cli.progress import ProgressView
 from phyblock.cli.results import show_tables
 from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
-from phyblock.models import Price, is_billed
+from phyblock.models import is_billed
 from phyblock.models.litellm_client import be_quiet
 from phyblock.resources import bundled
 from phyblock.results.text import NO_VALUE, Column, TextTable
@@ -261,10 +261,6 @@ def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) ->
         sources = [f"{source} ({', '.join(names)})" for source, names in by_source.items()]
         console.print(f"Prices of {left[0].day}: {'; '.join(sources)}.")
     for row in rows:
-        coming = row.next_tariff if row.calls else None
-        if coming is not None and row.tariff is not None:
-            now, then = (_a_million(tariff.at(0)) for tariff in (row.tariff, coming))
-            console.print(f"From {coming.since} on {row.model} costs {then} in place of {now}.")
         if row.waiting:
             console.print(f"{counted(row.waiting, 'call')} of {row.model} are in batches already.")
     if batched := [row.model for row in left if row.batch]:
@@ -290,10 +286,6 @@ def _sum_text(rows: Sequence[Estimate]) -> str:
     if unknown := len(rows) - len(known):
         costs.append(f"unknown cost of {counted(unknown, 'model')} (give a price in models.yaml)")
     return f"{counted(sum(row.calls for row in rows), 'call')}, {' and '.join(costs)}."
-
-
-def _a_million(price: Price) -> str:
-    return f"${price.input_usd:g} in and ${price.output_usd:g} out per million tokens"
 
 
 def _lengths_text(rows: Sequence[Estimate]) -> str:

@@ -137,10 +137,6 @@ class Prices:
         begun = (t for t in reversed(self.tariffs) if t.since is None or t.since <= day)
         return next(begun, None)
 
-    def next_after(self, day: date) -> Tariff | None:
-        """Return the tariff that follows that of a day."""
-        return next((t for t in self.tariffs if t.since is not None and t.since > day), None)
-
     def at(self, day: date, prompt_tokens: int = 0, *, batched: bool = False) -> Price | None:
         """Return the price of a call; None where it is not known."""
         tariff = self.on(day)

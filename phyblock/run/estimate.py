@@ -6,7 +6,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
-from datetime import date, timedelta
+from datetime import date
 from pathlib import Path
 
 from phyblock.config.suite import Variant
@@ -33,7 +33,6 @@ from phyblock.tracks import AnyTrack, Item
 
 _ENOUGH_REPLIES = 20
 """Replies whose mean length stands for those to come."""
-_SOON = timedelta(days=14)
 
 
 @dataclass
@@ -141,13 +140,6 @@ class Estimate:
     def tariff(self) -> Tariff | None:
         """The prices of the day, with where they are said."""
         return None if self.prices is None else self.prices.on(self.day)
-
-    @property
-    def next_tariff(self) -> Tariff | None:
-        """Prices that follow on them within days."""
-        coming = None if self.prices is None else self.prices.next_after(self.day)
-        is_soon = coming is not None and coming.since is not None and coming.since - self.day
-        return coming if is_soon and is_soon <= _SOON else None
 
     @property
     def prompt_usd(self) -> float | None:

@@ -24,6 +24,7 @@ from tests.vqa_set import questions, write_questions
 from tests.workspace import SCENES, Raw, Workspace
 
 SUBTASKS = ["SH", "OR"]
+Change = Callable[[list[Raw], Raw], None]
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +59,7 @@ def contents(made: Workspace, folder: Path) -> dict[str, bytes]:
     return {name: (folder / name).read_bytes() for name in MEMBERS}
 
 
-def forged(made: Workspace, folder: Path, change: Callable[[list[Raw], Raw], None]) -> Path:
+def forged(made: Workspace, folder: Path, change: Change) -> Path:
     """A bundle whose author changed records or manifest and made the digests of them anew."""
     found = contents(made, folder)
     records = [json.loads(line) for line in found[RECORDS].splitlines()]
@@ -130,8 +131,21 @@ def test_a_run_without_its_data_is_bundled_to_the_same_bytes(
     assert path.read_bytes() == (made.out / "bundle.zip").read_bytes()
 
 
-def of_track(records: list[Raw], track: str) -> Raw:
-    return next(r for r in records if r["track"] == track and r["model"] == "random")
+def put(place: str, value: object, track: str = "", model: str = "random") -> Change:
+    """A change of one value: in the first record of a track and model, or in the manifest."""
+
+    def change(records: list[Raw], manifest: Raw) -> None:
+        node: Any = of_track(records, track, model) if track else manifest
+        *above, last = (int(part) if part.isdigit() else part for part in place.split("."))
+        for part in above:
+            node = node[part]
+        node[last] = value
+
+    return change
+
+
+def of_track(records: list[Raw], track: str, model: str = "random") -> Raw:
+    return next(r for r in records if r["track"] == track and r["model"] == model)
 
 
 def _score(records: list[Raw], _: Raw) -> None:
@@ -144,70 +158,9 @@ def _answer(records: list[Raw], _: Raw) -> None:
     wrong["answer"] = {**wrong["answer"], "given": wrong["answer"]["right"], "correct": True}
 
 
-def _subtask(records: list[Raw], _: Raw) -> None:
-    of_track(records, "vqa")["question"]["subtask"] = "CO"
-
-
-def _level(records: list[Raw], _: Raw) -> None:
-    of_track(records, "full_planning")["levels"] = [4]
-
-
-def _parents(records: list[Raw], _: Raw) -> None:
-    of_track(records, "full_planning")["parents"] = ["t1", "t2"]
-
-
 def _turn(records: list[Raw], _: Raw) -> None:
-    record = next(
-        r
-        for r in records
-        if r["track"] == "step_planning" and any(t["outcome"] != "placed" for t in r["turns"])
-    )
-    turn = next(t for t in record["turns"] if t["outcome"] != "placed")
-    turn.update(outcome="placed", placed=0)
-
-
-def _plan(records: list[Raw], _: Raw) -> None:
-    of_track(records, "full_planning")["parse"]["plan"] = [1]
-
-
-def _twice(records: list[Raw], _: Raw) -> None:
-    records.append(records[0])
-
-
-def _asked(records: list[Raw], track: str) -> Raw:
-    return next(r for r in records if r["track"] == track and r["model"] == "alpha")
-
-
-def _prompt(records: list[Raw], _: Raw) -> None:
-    _asked(records, "full_planning")["prompt"]["messages"] = "0" * 64
-
-
-def _template(records: list[Raw], _: Raw) -> None:
-    _asked(records, "vqa")["prompt"]["version"] = "0" * 64
-
-
-def _first_turn(records: list[Raw], _: Raw) -> None:
-    _asked(records, "step_planning")["turns"][0]["prompt"]["messages"] = "0" * 64
-
-
-def _label(records: list[Raw], _: Raw) -> None:
-    _asked(records, "vqa")["prompt"]["images"][0]["label"] = "answer"
-
-
-def _pictures(_: list[Raw], manifest: Raw) -> None:
-    manifest["tracks"]["full_planning"]["pictures"] = "0" * 64
-
-
-def _no_prompt(_: list[Raw], manifest: Raw) -> None:
-    manifest["tracks"]["full_planning"]["prompt"] = None
-
-
-def _time(records: list[Raw], _: Raw) -> None:
-    records[0]["time"] = "9999-12-31T00:00:00+00:00"
-
-
-def _created(_: list[Raw], manifest: Raw) -> None:
-    manifest["created"] = "1999-12-31T00:00:00+00:00"
+    turns = (turn for r in records if r["track"] == "step_planning" for turn in r["turns"])
+    next(t for t in turns if t["outcome"] != "placed").update(outcome="placed", placed=0)
 
 
 def _asked_about_less(records: list[Raw], manifest: Raw) -> None:
@@ -216,18 +169,33 @@ def _asked_about_less(records: list[Raw], manifest: Raw) -> None:
     manifest["scenes"] = 1
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        *(_score, _answer, _subtask, _level, _parents, _turn, _plan, _twice),
-        *(_prompt, _template, _first_turn, _label, _pictures, _no_prompt, _time, _created),
-        _asked_about_less,
-    ],
-)
+ZEROS = "0" * 64
+FORGED: dict[str, Change] = {
+    "score": _score,
+    "answer": _answer,
+    "turn": _turn,
+    "twice": lambda records, _: records.append(records[0]),
+    "less": _asked_about_less,
+    "subtask": put("question.subtask", "CO", "vqa"),
+    "level": put("levels", [4], "full_planning"),
+    "parents": put("parents", ["t1", "t2"], "full_planning"),
+    "plan": put("parse.plan", [1], "full_planning"),
+    "prompt": put("prompt.messages", ZEROS, "full_planning", "alpha"),
+    "template": put("prompt.version", ZEROS, "vqa", "alpha"),
+    "first turn": put("turns.0.prompt.messages", ZEROS, "step_planning", "alpha"),
+    "label": put("prompt.images.0.label", "answer", "vqa", "alpha"),
+    "time": put("time", "9999-12-31T00:00:00+00:00", "full_planning"),
+    "pictures": put("tracks.full_planning.pictures", ZEROS),
+    "no prompt": put("tracks.full_planning.prompt", None),
+    "created": put("created", "1999-12-31T00:00:00+00:00"),
+}
+
+
+@pytest.mark.parametrize("name", FORGED)
 def test_what_does_not_follow_from_the_replies_is_refused(
-    made: Workspace, tmp_path: Path, change: Callable[[list[Raw], Raw], None]
+    made: Workspace, tmp_path: Path, name: str
 ) -> None:
-    path = forged(made, tmp_path / "forged", change)
+    path = forged(made, tmp_path / "forged", FORGED[name])
     with pytest.raises(StoreError) as caught, opened_bundle(path, folders(made)):
         pytest.fail("it was taken")
     assert str(path) in str(caught.value)
@@ -265,26 +233,18 @@ def test_what_is_not_changed_is_made_here_to_the_byte(made: Workspace, tmp_path:
 def test_prompts_of_an_author_s_own_template_are_said_to_be_unverified(
     made: Workspace, tmp_path: Path
 ) -> None:
-    def own(_: list[Raw], manifest: Raw) -> None:
-        manifest["tracks"]["vqa"]["prompt"] = {"name": "mine", "version": "0" * 64}
-
+    own = put("tracks.vqa.prompt", {"name": "mine", "version": ZEROS})
     with opened_bundle(forged(made, tmp_path / "forged", own), folders(made)) as found:
         assert "VQA: the prompts, of a template that is not at hand." in found.unverified
 
 
-def _root(_: list[Raw], manifest: Raw) -> None:
-    manifest["dataset"]["root"] = "/proc"
-    manifest["dataset"]["name"] = "../../.."
-
-
 def test_data_are_never_looked_for_where_a_bundle_says(made: Workspace, tmp_path: Path) -> None:
-    path = forged(made, tmp_path / "forged", _root)
+    def change(_: list[Raw], manifest: Raw) -> None:
+        manifest["dataset"] |= {"root": "/proc", "name": "../../.."}
+
+    path = forged(made, tmp_path / "forged", change)
     with pytest.raises(DataError, match="which a bundle does not hold"), opened_bundle(path):
         pytest.fail("it was taken")
-
-
-def _levels(_: list[Raw], manifest: Raw) -> None:
-    manifest["suite"]["levels"][0] = [1]
 
 
 def _models(records: list[Raw], manifest: Raw) -> None:
@@ -292,9 +252,11 @@ def _models(records: list[Raw], manifest: Raw) -> None:
     records.clear()
 
 
-@pytest.mark.parametrize(("change", "field"), [(_levels, "suite.levels"), (_models, "models")])
+@pytest.mark.parametrize(
+    ("change", "field"), [(put("suite.levels.0", [1]), "suite.levels"), (_models, "models")]
+)
 def test_a_manifest_that_names_no_plan_is_refused(
-    made: Workspace, tmp_path: Path, change: Callable[[list[Raw], Raw], None], field: str
+    made: Workspace, tmp_path: Path, change: Change, field: str
 ) -> None:
     path = forged(made, tmp_path / "forged", change)
     with pytest.raises(StoreError, match=re.escape(field)), opened_bundle(path, folders(made)):

@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+import jsonschema
 import pytest
 import yaml
 from hypothesis import given
@@ -18,6 +19,7 @@ from phyblock.records import files
 from phyblock.records.files import RecordLines, known_records, newest_starts
 from phyblock.records.record import Reply, Usage
 from phyblock.results.load import load_run
+from tests.documents import ROOT, make_documents
 from tests.records.damage import DAMAGED, lines_before, plan_record, with_value
 from tests.report.factory import manifest
 
@@ -136,3 +138,27 @@ def test_whatever_was_paid_for_is_stored_and_read(
     assert kept.text == text.encode("utf-8", "replace").decode()
     assert kept.usage.completion_tokens in (said, None)
     assert kept.cost_usd in (cost, None)
+
+
+def test_tables_and_schemas_are_current() -> None:
+    for path, text in make_documents().items():
+        assert (ROOT / path).read_text(encoding="utf-8") == text, "run python -m tests.documents"
+
+
+@pytest.fixture(scope="module")
+def schema() -> jsonschema.Draft202012Validator:
+    text = (ROOT / "benchmarks" / "schemas" / "record.schema.json").read_text(encoding="utf-8")
+    jsonschema.Draft202012Validator.check_schema(json.loads(text))
+    return jsonschema.Draft202012Validator(json.loads(text))
+
+
+def test_the_schema_takes_records_of_every_track(schema: jsonschema.Draft202012Validator) -> None:
+    for line in lines_before():
+        schema.validate(json.loads(line))
+
+
+@pytest.mark.parametrize("name", ["huge-number", "number-for-text", "word", "score", "track"])
+def test_the_schema_refuses_what_the_models_refuse(
+    schema: jsonschema.Draft202012Validator, name: str
+) -> None:
+    assert not schema.is_valid(json.loads(DAMAGED[name][0]))
