@@ -19,6 +19,7 @@ import pytest
 
 from tests.fuzz.ledger import Ledger, LedgerAgent, LedgerChat, kept_in
 from tests.fuzz.sizes import KILLS, SEED
+from tests.run.test_kill import CALL_USD, PRICE, counted_usd
 from tests.servers.chassis import FAULTS, Faults, Running
 from tests.vqa_set import questions, vqa_suite, write_questions
 from tests.workspace import SCENES, Workspace
@@ -51,7 +52,7 @@ def run_until_killed(
 ) -> tuple[int, int]:
     """A run that is killed; of several servers some die and come back before: deaths of both."""
     deaths = 0
-    with workspace.start() as process:
+    with workspace.start("--yes") as process:
         for _ in range(1 if len(servers) == 1 else 4):
             target = len(ledger.entries) + draw.randrange(1, _ASKED_PER_EVENT)
             give_up_s = time.monotonic() + _LONGEST_WAIT_S
@@ -106,12 +107,16 @@ def test_kills(
         bases = [f"{server.url}/v1" for server in servers]
         for _ in range(rounds):
             # The order of the addresses may change.
-            workspace.write_models("", "alpha", api_base=draw.sample(bases, count))
+            order = draw.sample(bases, count)
+            workspace.write_models("", "alpha", api_base=order, price=PRICE, max_tokens=1000)
             deaths, killed = run_until_killed(workspace, servers, ledger, draw)
             tally.update({"deaths of servers": deaths, "kills": killed})
             missing = ledger.answered() - on_disk(workspace)
             assert len(missing) <= AT_ONCE * (deaths + killed), "more is lost than was under way"
             under_way.update(missing)
+            known_usd, _ = counted_usd(workspace)
+            billed_usd = CALL_USD * sum(entry.comes_to == "reply" for entry in ledger.entries)
+            assert known_usd >= billed_usd - 1e-9, "less is known than was billed"
         for server in servers:
             server.come_back()
         done = workspace.run("--yes")
