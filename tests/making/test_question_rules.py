@@ -16,18 +16,18 @@ from phyblock.domain.blocks import SHAPES, Euler
 from phyblock.domain.question import Mark
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, turned_form
 from phyblock.making.questions.affordance import is_on_face, stays_at
+from phyblock.making.questions.base import UnfairError, four_alike
 from phyblock.making.questions.counterfactual import resting_on
 from phyblock.making.questions.counting import layers_of, sure_blocks
-from phyblock.making.questions.draft import UnfairError
-from phyblock.making.questions.positions import LENGTHS, grid_cm
-from phyblock.making.questions.predictive import ranked_as_drawn
-from phyblock.making.questions.referring import (
+from phyblock.making.questions.names import (
     SHAPE_WORDS,
     Feature,
     names,
     resolve,
     resolve_one,
 )
+from phyblock.making.questions.positions import LENGTHS, grid_cm
+from phyblock.making.questions.predictive import ranked_as_drawn
 from phyblock.making.questions.rotations import AXIS_TURNS, axis_turns, put_beside, tipped_over
 from phyblock.making.questions.selection import BALANCE, Texts, even_letters, keeping_odds
 from phyblock.making.questions.structures import (
@@ -36,7 +36,6 @@ from phyblock.making.questions.structures import (
     stays_round,
     with_annex,
 )
-from phyblock.making.questions.view import four_alike
 from phyblock.making.questions.viewpoint import ViewpointMaker, shifted
 from phyblock.making.scenes.sketch import POSES, transformed
 from phyblock.resources import bundled

@@ -8,6 +8,7 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from phyblock.data import QuestionSet, read_builtin, read_questions
@@ -17,6 +18,7 @@ from phyblock.domain.blocks import COLORS
 from phyblock.domain.question import rotated
 from phyblock.errors import DataError, StoreError
 from phyblock.making.questions.audit import audit_questions, duplicates_of
+from phyblock.making.questions.base import ELEVATIONS_DEG, LEAST_PIXELS
 from phyblock.making.questions.counterfactual import OUTCOME_TEXTS
 from phyblock.making.questions.production import (
     PER_SUBTASK,
@@ -28,12 +30,11 @@ from phyblock.making.questions.production import (
     scene_drafts,
     write_questions,
 )
-from phyblock.making.questions.view import ELEVATIONS_DEG, LEAST_PIXELS
 from phyblock.making.workers import open_workers
 from phyblock.resources import bundled
 from phyblock.sim.contact import find_gaps
 from phyblock.sim.engine import other_engine
-from phyblock.sim.question_pictures import is_inside, least_difference, seen
+from phyblock.sim.question_pictures import is_inside, least_difference, mark_pixel, seen
 from phyblock.types import BACKGROUNDS
 from tests.vqa_set import questions as asked_questions
 from tests.vqa_set import write_questions as write_asked
@@ -245,6 +246,17 @@ def test_the_built_in_set_is_whole_and_even(built_in: QuestionSet) -> None:
 def test_a_sample_of_the_answers_is_derived_again(built_in: QuestionSet) -> None:
     for task in built_in.tasks[7::50]:
         assert problem_of(task.question) is None, task.key
+
+
+def test_the_right_place_is_apart_from_the_others_as_often_as_any(built_in: QuestionSet) -> None:
+    ranks: Counter[int] = Counter()
+    for question in (t.question for t in built_in.tasks if t.question.subtask == "AD"):
+        shown = question.pictures[0]
+        places = np.array([mark_pixel(shown, mark.position_m) for mark in shown.marks])
+        apart = np.linalg.norm(places[:, None] - places, axis=2).sum(axis=1)
+        ranks[int((apart < apart[question.answer[0]]).sum())] += 1
+    assert ranks.keys() == set(range(len(LETTERS)))
+    assert max(ranks.values()) <= 17
 
 
 def test_a_place_that_is_not_marked_is_found_out(built_in: QuestionSet) -> None:

@@ -26,13 +26,21 @@ from phyblock.domain.blocks import (
 )
 from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.draft import (
+from phyblock.making.questions.base import (
+    WRONG,
     Draft,
     Maker,
     UnfairError,
+    are_seen,
     draft,
+    drawn_view,
+    four_alike,
     only_index,
+    orders_of,
     pick,
+    picture_of,
+    require_seen,
+    shows_solid,
     shuffled,
     slots_of,
 )
@@ -44,16 +52,6 @@ from phyblock.making.questions.structures import (
     surely_stays,
     verdict,
     with_annex,
-)
-from phyblock.making.questions.view import (
-    WRONG,
-    are_seen,
-    drawn_view,
-    four_alike,
-    orders_of,
-    picture_of,
-    require_seen,
-    shows_solid,
 )
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim.balance import is_balanced, surely_stands
@@ -113,7 +111,7 @@ class AffordanceMaker(Maker):
                     shown, slots = [plain, alone], {"size": _size(block)}
                     facts: dict[str, Any] = {"block": block.type, "euler": list(block.euler_deg)}
                     sort = sort_of(plain, places)
-                    made = draft(scene, rng, "ad-place", marks, shown, sort, slots, **facts)
+                    made = draft(scene, rng, "ad-place", marks, shown, slots, value=sort, **facts)
                     yield replace(made, looks=tuple(looks_of(plain, top) for top in places))
                     return
 

@@ -19,48 +19,42 @@ import numpy as np
 from phyblock.domain.blocks import Color
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.draft import (
-    Draft,
-    Maker,
-    UnfairError,
-    draft,
-    only_index,
-    pick,
-    right_first,
-    shuffled,
-    slots_of,
-)
-from phyblock.making.questions.structures import group_of, is_sure, with_annex
-from phyblock.making.questions.view import (
+from phyblock.making.questions.base import (
     COUNTED,
     LEAST_PIXELS,
     NAMED,
     TAKEN,
+    WORDS,
+    Draft,
+    Maker,
+    UnfairError,
     are_seen,
     are_told_apart,
     center_m,
+    draft,
     drawn_view,
     four_alike,
     marked_order,
     of_kind,
+    only_index,
     option_pictures,
     orders_of,
+    pick,
     picture_of,
     require_seen,
+    right_first,
     shares,
+    shuffled,
+    slots_of,
 )
+from phyblock.making.questions.structures import group_of, is_sure, with_annex
 from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.contact import support_graph
 from phyblock.sim.outcomes import Outcome, after_removal
 from phyblock.sim.pictures import Shot
 from phyblock.sim.question_pictures import block_mark, seen
 
-OUTCOME_TEXTS = (
-    "No other block moves or falls.",
-    "Exactly one other block moves or falls.",
-    "Exactly two other blocks move or fall.",
-    "Three or more other blocks move or fall.",
-)
+OUTCOME_TEXTS: tuple[str, ...] = tuple(WORDS["outcomes_of_removal"])
 """Outcomes of a removal, by the number of other blocks that do not stay; all are offered."""
 _ALL_SEEN = 0.12
 _STRUCTURES_TRIED = 6
@@ -173,12 +167,12 @@ def _drafts_of(
     if is_colored:
         colored, slots, value = colored_options(plain, case.order, outcome.moved, rng)
         if colored:
-            yield draft(scene, rng, "cf-color", colored, shown, value, slots, **facts)
+            yield draft(scene, rng, "cf-color", colored, shown, slots, value=value, **facts)
         return
     number = min(len(outcome.moved), len(OUTCOME_TEXTS) - 1)
     right = OUTCOME_TEXTS[number]
     options = [right, *shuffled(rng, right_first(right, OUTCOME_TEXTS)[1:])]
-    yield draft(scene, rng, "cf-count", options, shown, str(number), {}, **facts)
+    yield draft(scene, rng, "cf-count", options, shown, {}, **facts)
 
 
 Lot = frozenset[int]

@@ -5,59 +5,45 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from phyblock.domain.blocks import BLOCK_TYPES, COLORS
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.draft import (
-    Draft,
-    UnfairError,
-    draft,
-    index_of,
-    pick,
-    shuffled,
-    stem_of,
-)
-from phyblock.making.questions.referring import SHAPE_WORDS, plain_names, resolve_one, shape_word
-from phyblock.making.questions.view import (
+from phyblock.making.questions.base import (
     COUNTED,
     NAMED,
+    Draft,
+    Slots,
     StaticMaker,
+    UnfairError,
     View,
     are_seen,
+    draft,
     goal_picture,
+    index_of,
     orders_of,
+    pick,
     recolored,
     require_seen,
     require_shapes_seen,
     seen_blocks,
     shares,
+    shuffled,
+    stem_of,
+    window,
 )
+from phyblock.making.questions.names import SHAPE_WORDS, plain_names, resolve_one, shape_word
 from phyblock.sim.contact import GROUND, bounds_m, support_graph
 
-Slots = Mapping[str, str]
 _TYPES_OF = {
     f"{word}es" if word == "arch" else f"{word}s": types for word, types in SHAPE_WORDS.items()
 }
 """The types that each plural names."""
 _MOST = 13
-_MOST_BLOCKS = 22
 _WEDGED_M = 0.005
-
-
-def window(rng: np.random.Generator, values: Sequence[int], right: int) -> tuple[int, ...] | None:
-    """Four neighbors among the allowed values that hold the right one, in a place drawn evenly.
-
-    The right one stands first. None where it is not allowed, or the place drawn does not exist.
-    """
-    if right not in values:
-        return None
-    start = values.index(right) - int(rng.integers(4))
-    if start < 0 or start + 4 > len(values):
-        return None
-    return (right, *(value for value in values[start : start + 4] if value != right))
 
 
 class NumberMaker(StaticMaker):
@@ -80,13 +66,10 @@ class NumberMaker(StaticMaker):
         except UnfairError:
             pass  # Colors can be counted where shapes cannot.
         for what, kind in shuffled(rng, kinds):
-            counted = _fitting(what, scene.blocks)
-            values = window(rng, range(1, _MOST), len(counted))
-            if values is not None:
-                options, slots, orders = list(map(str, values)), {"what": what}, orders_of(counted)
-                yield draft(
-                    scene, rng, "nu", options, [picture], options[0], slots, kind, counted=orders
-                )
+            counted = orders_of(_fitting(what, scene.blocks))
+            if options := window(rng, range(1, _MOST), len(counted)):
+                slots = {"what": what}
+                yield draft(scene, rng, "nu", options, [picture], slots, kind=kind, counted=counted)
 
     def answer(self, question: Question, picture: QuestionPicture, slots: Slots) -> tuple[int, ...]:
         """Count the blocks that fit the words."""
@@ -104,66 +87,6 @@ def _fitting(what: str, blocks: Sequence[Block]) -> list[Block]:
         raise UnfairError(f"{what!r} cannot be counted")
     types = _TYPES_OF.get(noun, BLOCK_TYPES)
     return [block for block in blocks if color in ("", block.color) and block.type in types]
-
-
-@dataclass(frozen=True)
-class Tally:
-    """One way of counting.
-
-    `count` says how many there are, and raises UnfairError where that cannot be told from the
-    picture; `values` are those offered; `slots` are those that a text about a picture can have.
-    `is_recolored` where the kit's colors would tell too much, or too few blocks have names.
-    """
-
-    count: Callable[[QuestionPicture, Slots], int]
-    values: Sequence[int]
-    slots: Callable[[QuestionPicture], Sequence[Slots]] = lambda _: ({},)
-    is_recolored: bool = False
-
-
-class TallyMaker(StaticMaker):
-    """OC, LC or TC: the ways of counting whose stems begin with the subtask."""
-
-    views_a_scene = 2
-    drafts_a_view = 6
-
-    def __init__(self, subtask: Subtask) -> None:
-        self.subtask = subtask
-        self._stems = tuple(stem for stem in TALLIES if stem.startswith(f"{subtask.lower()}-"))
-
-    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-        """One way of counting after another, as far as the picture allows it."""
-        colored = recolored(scene, rng)
-        for stem in shuffled(rng, self._stems):
-            tally = TALLIES[stem]
-            shown = colored if tally.is_recolored else scene
-            picture = goal_picture(shown, view)
-            possible = tally.slots(picture)
-            if not possible:
-                continue
-            slots = pick(rng, possible)
-            try:
-                right = tally.count(picture, slots)
-            except UnfairError:
-                continue
-            values = window(rng, tally.values, right)
-            if values is None:
-                continue
-            options, kind = list(map(str, values)), stem
-            evidence: dict[str, object] = {"count": right}
-            if stem == "oc-hidden":
-                in_sight = orders_of(seen_blocks(picture, COUNTED))
-                hidden = set(orders_of(shown.blocks)) - set(in_sight)
-                evidence["inferred"] = sorted(hidden)
-                kind = f"{stem}-{len(hidden)}"
-            yield draft(shown, rng, stem, options, [picture], options[0], slots, kind, **evidence)
-
-    def answer(self, question: Question, picture: QuestionPicture, slots: Slots) -> tuple[int, ...]:
-        """Count again."""
-        stem = stem_of(question.wording)
-        if stem not in self._stems:
-            raise UnfairError(f"the wording {question.wording!r} counts nothing")
-        return index_of(question, str(TALLIES[stem].count(picture, slots)))
 
 
 def layers_of(blocks: Sequence[Block]) -> Mapping[int, int]:
@@ -200,8 +123,8 @@ def sure_blocks(picture: QuestionPicture) -> int:
 
     Every block shows at least `COUNTED` of itself, but one at the most that shows less. That
     one is sure to be there, whatever it is, where a block that shows `NAMED` of itself rests on it
-    alone: without it, that block would float. One is enough, for one is there. UnfairError where
-    more are hidden, or nothing tells of it.
+    alone: without it, that block would float. UnfairError where more are hidden, or nothing tells
+    of it.
     """
     seen = shares(picture)
     hidden = [order for order, share in seen.items() if share < COUNTED]
@@ -239,55 +162,70 @@ def _types(blocks: Sequence[Block]) -> Counter[str]:
     return Counter(block.type for block in blocks)
 
 
-def _in_layers(picture: QuestionPicture, fits: Callable[[int], bool]) -> int:
-    return sum(map(fits, layers_of(_all(picture)).values()))
-
-
 def _layer_of_block(picture: QuestionPicture, slots: Slots) -> int:
-    block = resolve_one(slots["block"], picture)
-    layers = layers_of(picture.blocks)
+    block, layers = resolve_one(slots["block"], picture), layers_of(picture.blocks)
     require_seen(picture, [block.order], NAMED)
     under = [o for o in orders_of(picture.blocks) if layers[o] < layers[block.order]]
     require_seen(picture, under, COUNTED)
     return layers[block.order]
 
 
-def _colors(picture: QuestionPicture) -> Sequence[Slots]:
-    return [{"color": color} for color in sorted({b.color for b in picture.blocks})]
+def _colors(picture: QuestionPicture) -> list[str]:
+    return sorted({block.color for block in picture.blocks})
 
 
-def _color_pairs(picture: QuestionPicture) -> Sequence[Slots]:
-    colors = sorted({block.color for block in picture.blocks})
-    return [{"color": a, "other": b} for a in colors for b in colors if a != b]
+def _layer_numbers(picture: QuestionPicture) -> list[Slots]:
+    return [{"layer": str(n + 1)} for n in range(max(block.layer for block in picture.blocks))]
 
 
-def _layer_numbers(picture: QuestionPicture) -> Sequence[Slots]:
-    highest = max(block.layer for block in picture.blocks)
-    return [{"layer": str(number)} for number in range(1, highest + 1)]
+@dataclass(frozen=True)
+class Tally:
+    """One way of counting.
 
+    `count` says how many there are, and raises UnfairError where that cannot be told from the
+    picture; `values` are those offered; `slots` are those that a text about a picture can have.
+    `is_recolored` where the kit's colors would tell too much, or too few blocks have names.
+    """
 
-def _named(picture: QuestionPicture) -> Sequence[Slots]:
-    return [{"block": name} for name in plain_names(picture).values()]
+    count: Callable[[QuestionPicture, Slots], int]
+    values: Sequence[int]
+    slots: Callable[[QuestionPicture], Sequence[Slots]] = lambda _: ({},)
+    is_recolored: bool = False
 
 
 TALLIES: Mapping[str, Tally] = {
-    "oc-all": Tally(lambda p, _: len(_all(p)), range(2, _MOST_BLOCKS + 3)),
-    "oc-hidden": Tally(lambda p, _: sure_blocks(p), range(2, _MOST_BLOCKS + 3)),
+    "oc-all": Tally(lambda p, _: len(_all(p)), range(2, 25)),
+    "oc-hidden": Tally(lambda p, _: sure_blocks(p), range(2, 25)),
     "oc-ground": Tally(lambda p, _: len(_on_ground(_all(p))), range(1, 13)),
     "oc-raised": Tally(lambda p, _: len(_all(p)) - len(_on_ground(p.blocks)), range(1, 17)),
     "oc-other": Tally(
-        lambda p, s: len(p.blocks) - _of_colors(p, s["color"]), range(1, 19), _colors, True
+        lambda p, s: len(p.blocks) - _of_colors(p, s["color"]),
+        range(1, 19),
+        lambda p: [{"color": color} for color in _colors(p)],
+        is_recolored=True,
     ),
     "oc-pair": Tally(
-        lambda p, s: _of_colors(p, s["color"], s["other"]), range(1, 15), _color_pairs, True
+        lambda p, s: _of_colors(p, s["color"], s["other"]),
+        range(1, 15),
+        lambda p: [{"color": a, "other": b} for a in _colors(p) for b in _colors(p) if a != b],
+        is_recolored=True,
     ),
     "lc-all": Tally(lambda p, _: max(layers_of(_all(p)).values()), range(1, 9)),
-    "lc-block": Tally(_layer_of_block, range(1, 9), _named, True),
+    "lc-block": Tally(
+        _layer_of_block,
+        range(1, 9),
+        lambda p: [{"block": name} for name in plain_names(p).values()],
+        is_recolored=True,
+    ),
     "lc-in": Tally(
-        lambda p, s: _in_layers(p, lambda n: n == int(s["layer"])), range(1, 12), _layer_numbers
+        lambda p, s: sum(n == int(s["layer"]) for n in layers_of(_all(p)).values()),
+        range(1, 12),
+        _layer_numbers,
     ),
     "lc-above": Tally(
-        lambda p, s: _in_layers(p, lambda n: n > int(s["layer"])), range(1, 12), _layer_numbers
+        lambda p, s: sum(n > int(s["layer"]) for n in layers_of(_all(p)).values()),
+        range(1, 12),
+        _layer_numbers,
     ),
     "tc-all": Tally(lambda p, _: len(_types(_shaped(p))), range(1, len(BLOCK_TYPES) + 1)),
     "tc-shapes": Tally(
@@ -300,3 +238,47 @@ TALLIES: Mapping[str, Tally] = {
     ),
 }
 """By stem of the wordings."""
+
+
+class TallyMaker(StaticMaker):
+    """OC, LC or TC: the ways of counting whose stems begin with the subtask."""
+
+    views_a_scene = 2
+    drafts_a_view = 6
+
+    def __init__(self, subtask: Subtask) -> None:
+        self.subtask = subtask
+        self._stems = tuple(stem for stem in TALLIES if stem.startswith(f"{subtask.lower()}-"))
+
+    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+        """One way of counting after another, as far as the picture allows it."""
+        colored = recolored(scene, rng)
+        for stem in shuffled(rng, self._stems):
+            tally = TALLIES[stem]
+            shown = colored if tally.is_recolored else scene
+            picture = goal_picture(shown, view)
+            possible = tally.slots(picture)
+            if not possible:
+                continue
+            slots = pick(rng, possible)
+            try:
+                right = tally.count(picture, slots)
+            except UnfairError:
+                continue
+            options = window(rng, tally.values, right)
+            if not options:
+                continue
+            kind = stem
+            facts: dict[str, Any] = {"count": right}
+            if stem == "oc-hidden":
+                in_sight = orders_of(seen_blocks(picture, COUNTED))
+                hidden = sorted(set(orders_of(shown.blocks)) - set(in_sight))
+                kind, facts["inferred"] = f"{stem}-{len(hidden)}", hidden
+            yield draft(shown, rng, stem, options, [picture], slots, kind=kind, **facts)
+
+    def answer(self, question: Question, picture: QuestionPicture, slots: Slots) -> tuple[int, ...]:
+        """Count again."""
+        stem = stem_of(question.wording)
+        if stem not in self._stems:
+            raise UnfairError(f"the wording {question.wording!r} counts nothing")
+        return index_of(question, str(TALLIES[stem].count(picture, slots)))

@@ -20,24 +20,22 @@ from numpy.typing import NDArray
 from phyblock.domain.blocks import Color
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Scene
-from phyblock.making.questions.draft import (
+from phyblock.making.questions.base import (
+    COUNTED,
     Draft,
     Maker,
     UnfairError,
-    draft,
-    pick,
-    slots_of,
-)
-from phyblock.making.questions.view import (
-    COUNTED,
     are_seen,
     are_told_apart,
+    draft,
     drawn_view,
     of_kind,
     option_pictures,
     orders_of,
+    pick,
     require_seen,
     same_blocks,
+    slots_of,
 )
 from phyblock.sim.question_pictures import seen
 
@@ -102,7 +100,7 @@ def _draft_from(scene: Scene, plain: QuestionPicture, rng: np.random.Generator) 
         if are_told_apart(options):
             slots: dict[str, str] = {"color": pair[0], "other": pair[1]}
             facts: dict[str, Any] = {"stages": [sorted(stage) for stage in stages]}
-            yield draft(scene, rng, kind, options, [], kind, slots, **facts)
+            yield draft(scene, rng, kind, options, [], slots, value=kind, **facts)
             return
 
 

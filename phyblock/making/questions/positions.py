@@ -10,55 +10,44 @@ import itertools
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from phyblock.domain.blocks import SHAPES
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.draft import (
-    Draft,
-    UnfairError,
-    draft,
-    index_of,
-    only_index,
-    pick,
-    right_first,
-    shuffled,
-    stem_of,
-)
-from phyblock.making.questions.referring import plain_names, resolve_one
-from phyblock.making.questions.view import (
+from phyblock.making.questions.base import (
     NAMED,
+    WORDS,
+    Draft,
+    Floats,
+    Slots,
     StaticMaker,
+    UnfairError,
     View,
     center_m,
+    draft,
     goal_picture,
+    index_of,
     length_axis,
+    only_index,
     orders_of,
     outermost,
+    pick,
     picture_axes,
     recolored,
     require_seen,
+    right_first,
     seen_blocks,
+    shuffled,
+    stem_of,
 )
+from phyblock.making.questions.names import plain_names, resolve_one
 from phyblock.sim.contact import GROUND, bounds_m, support_graph
 
-Names = Mapping[int, str]
-_CORNERS: tuple[str, ...] = (
-    "in front and to the left",
-    "in front and to the right",
-    "behind and to the left",
-    "behind and to the right",
-)
-_UPRIGHT: tuple[str, ...] = (
-    "above it",
-    "below it",
-    "to its left, at the same height",
-    "to its right, at the same height",
-)
-_CLEAR_M = 0.03
-_ABOVE_M = 0.015
-_LEVEL_M = 0.005
+# RP
+
+_CORNERS: Sequence[str] = WORDS["sides_of_floor"]
+_UPRIGHT: Sequence[str] = WORDS["places_upright"]
+_CLEAR_M, _ABOVE_M, _LEVEL_M = 0.03, 0.015, 0.005
 _SIDES = ("farthest left", "farthest right")
 _RANKED = ("highest", "lowest", "front", "back")
 """Told by wordings of their own, because they are not about the picture but about the ground."""
@@ -79,13 +68,29 @@ class PositionMaker(StaticMaker):
             shown = recolored(scene, rng)
             picture = goal_picture(shown, view)
             named = plain_names(picture)
+            blocks = [block for block in shown.blocks if block.order in named]
             for _ in range(6):
-                yield from _of_four(shown, picture, named, rng)
-            yield from _of_pairs(shown, picture, named, rng)
+                chosen = shuffled(rng, blocks)[:5]
+                if len(chosen) == 5:
+                    yield from _of_four(shown, picture, named, chosen, rng)
+            for one, other in shuffled(rng, list(itertools.permutations(blocks, 2)))[:2]:
+                offset = [round(float(x), 6) for x in _offset_m(one, other, view)]
+                slots = {"block": named[one.order], "other": named[other.order]}
+                for kind, rule, words in (
+                    ("corner", _corner, _CORNERS),
+                    ("upright", _upright, _UPRIGHT),
+                ):
+                    try:
+                        options = right_first(rule(one, other, view), words)
+                    except UnfairError:
+                        continue
+                    yield draft(
+                        *(shown, rng, f"rp-{kind}", options, [picture], slots),
+                        kind=kind,
+                        offset_m=offset,
+                    )
 
-    def answer(
-        self, question: Question, picture: QuestionPicture, slots: Mapping[str, str]
-    ) -> tuple[int, ...]:
+    def answer(self, question: Question, picture: QuestionPicture, slots: Slots) -> tuple[int, ...]:
         """By the places of the blocks that the text or the options name."""
         if "block" in slots:
             one, other = (resolve_one(slots[name], picture) for name in ("block", "other"))
@@ -101,45 +106,32 @@ class PositionMaker(StaticMaker):
         return (named.index(_extreme(kind, named, picture)),)
 
 
-def _of_pairs(
-    scene: Scene, picture: QuestionPicture, named: Names, rng: np.random.Generator
-) -> Iterator[Draft]:
-    blocks = [block for block in scene.blocks if block.order in named]
-    pairs = shuffled(rng, list(itertools.permutations(blocks, 2)))[:2]
-    for one, other in pairs:
-        slots = {"block": named[one.order], "other": named[other.order]}
-        for kind, words, rule in (("corner", _CORNERS, _corner), ("upright", _UPRIGHT, _upright)):
-            try:
-                right = rule(one, other, picture.view_deg)
-            except UnfairError:
-                continue
-            stem, options = f"rp-{kind}", right_first(right, words)
-            offset = [round(float(x), 6) for x in _offset_m(one, other, picture.view_deg)]
-            yield draft(scene, rng, stem, options, [picture], right, slots, kind, offset_m=offset)
-
-
 def _of_four(
-    scene: Scene, picture: QuestionPicture, named: Names, rng: np.random.Generator
+    scene: Scene,
+    picture: QuestionPicture,
+    named: Mapping[int, str],
+    chosen: Sequence[Block],
+    rng: np.random.Generator,
 ) -> Iterator[Draft]:
-    blocks = [block for block in scene.blocks if block.order in named]
-    chosen = shuffled(rng, blocks)[:5]
-    if len(chosen) < 5:
-        return
-    anchor, four = chosen[0], chosen[1:]
+    """The outermost of the last four blocks, or the one nearest to the first."""
+    anchor, *four = chosen
     kind = pick(rng, (*_SIDES, *_RANKED, "nearest"))
-    is_near, is_side = kind == "nearest", kind in _SIDES
+    stem, slots = f"rp-{kind}", {}
     try:
-        right = _nearest(anchor, four) if is_near else _extreme(kind, four, picture)
+        if kind == "nearest":
+            right, slots = _nearest(anchor, four), {"other": named[anchor.order]}
+        else:
+            right = _extreme(kind, four, picture)
     except UnfairError:
         return
+    if kind in _SIDES:
+        stem, slots = "rp-extreme", {"extreme": kind}
     ranked = right_first(right, four)
     options = [f"the {named[block.order]}" for block in ranked]
-    slots = {"other": named[anchor.order]} if is_near else {"extreme": kind} if is_side else {}
-    stem, orders = "rp-extreme" if is_side else f"rp-{kind}", orders_of(ranked)
-    yield draft(scene, rng, stem, options, [picture], right.type, slots, kind, ranked=orders)
+    yield draft(scene, rng, stem, options, [picture], slots, kind=kind, ranked=orders_of(ranked))
 
 
-def _offset_m(block: Block, other: Block, view: View) -> NDArray[np.float64]:
+def _offset_m(block: Block, other: Block, view: View) -> Floats:
     """From `other` to `block`: to the right of the picture, away from the viewer, up [m], (3,)."""
     right, away = picture_axes(view)
     step = center_m(block) - center_m(other)
@@ -151,8 +143,7 @@ def _corner(one: Block, other: Block, view: View) -> str:
     across, away, _ = _offset_m(one, other, view)
     if min(abs(across), abs(away)) < _CLEAR_M:
         raise UnfairError("is neither clearly to a side nor clearly in front or behind")
-    depth = "behind" if away > 0 else "in front"
-    return f"{depth} and to the {'right' if across > 0 else 'left'}"
+    return _CORNERS[int(2 * (away > 0) + (across > 0))]
 
 
 def _upright(one: Block, other: Block, view: View) -> str:
@@ -160,10 +151,10 @@ def _upright(one: Block, other: Block, view: View) -> str:
     across, away, _ = _offset_m(one, other, view)
     low, high = bounds_m(one)[:, 2] - bounds_m(other)[::-1, 2]
     if max(abs(across), abs(away)) < _ABOVE_M and (low > -_LEVEL_M or high < _LEVEL_M):
-        return "above it" if low > -_LEVEL_M else "below it"
+        return _UPRIGHT[int(low <= -_LEVEL_M)]
     bottoms = abs(bounds_m(one)[0, 2] - bounds_m(other)[0, 2])
     if abs(across) > _CLEAR_M and bottoms < _LEVEL_M:
-        return f"to its {'right' if across > 0 else 'left'}, at the same height"
+        return _UPRIGHT[int(2 + (across > 0))]
     raise UnfairError("is neither over, under nor beside it")
 
 
@@ -178,23 +169,42 @@ def _nearest(anchor: Block, blocks: Sequence[Block]) -> Block:
 
 def _extreme(extreme: str, blocks: Sequence[Block], picture: QuestionPicture) -> Block:
     """The one of `blocks` that is clearly farthest to a side, to the front, or reaches highest."""
-    if extreme in _RANKED:
-        away = picture_axes(picture.view_deg)[1]
-        upright = extreme in ("highest", "lowest")
-        sign = -1.0 if extreme in ("highest", "back") else 1.0
-        reach = {
-            b.order: sign * (_top_m(b) if upright else float(center_m(b) @ away)) for b in blocks
-        }
-        ranked = sorted(blocks, key=lambda block: reach[block.order])
-        if reach[ranked[1].order] - reach[ranked[0].order] < _GAP_M:
-            raise UnfairError(f"two blocks are about as {extreme}")
-        return ranked[0]
-    if extreme not in _SIDES:
+    if extreme in _SIDES:
+        order = outermost(orders_of(blocks), picture, to_left=extreme == _SIDES[0])
+        if order is None:
+            raise UnfairError(f"two blocks are about the {extreme}")
+        return next(block for block in blocks if block.order == order)
+    if extreme not in _RANKED:
         raise UnfairError(f"{extreme!r} is no place")
-    order = outermost(orders_of(blocks), picture, to_left=extreme == "farthest left")
-    if order is None:
-        raise UnfairError(f"two blocks are about the {extreme}")
-    return next(block for block in blocks if block.order == order)
+    away = picture_axes(picture.view_deg)[1]
+    upright = extreme in ("highest", "lowest")
+    sign = -1.0 if extreme in ("highest", "back") else 1.0
+    reach = {b.order: sign * (_top_m(b) if upright else float(center_m(b) @ away)) for b in blocks}
+    ranked = sorted(blocks, key=lambda block: reach[block.order])
+    if reach[ranked[1].order] - reach[ranked[0].order] < _GAP_M:
+        raise UnfairError(f"two blocks are about as {extreme}")
+    return ranked[0]
+
+
+# AP
+
+Values = tuple[float, ...]
+"""A length, or how far along and across [cm]."""
+_SIDE_M = 0.001
+_EXACT_CM = 0.1
+_SCALES: Mapping[str, str] = WORDS["scales"]
+_STEP_CM, _LONGEST_CM, _PLACE_STEP_CM = 2.5, 50.0, 5.0
+_APART = (1.2, 2.0)
+"""Values that are options together: each at least and at most so many times the one before."""
+_KINDS: Mapping[str, str] = {
+    **{"top": "height", "bottom": "height"},
+    **{kind: kind for kind in ("rise", "apart", "gap", "place")},
+}
+"""Wordings, and the sorts of questions whose shares are even: heights are one of five."""
+PAIRED = ("apart", "rise", "gap", "place")
+"""Kinds that are asked of two blocks."""
+_FEW_A_SCENE = ("gap", "place")
+"""Kinds of which hardly any scene has four values that could be offered together."""
 
 
 def _top_m(block: Block) -> float:
@@ -202,16 +212,12 @@ def _top_m(block: Block) -> float:
     return float(bounds_m(block)[1, 2])
 
 
-_SIDE_M = 0.001
-_EXACT_CM = 0.1
-
-
 def grid_cm(length_m: float) -> float:
     """The length in centimeters where it is a multiple of 2.5 cm; else UnfairError."""
-    steps = round(length_m * 100 / 2.5)
-    if abs(length_m * 100 - 2.5 * steps) > _EXACT_CM:
+    steps = round(length_m * 100 / _STEP_CM)
+    if abs(length_m * 100 - _STEP_CM * steps) > _EXACT_CM:
         raise UnfairError(f"{length_m * 100:.1f} cm is no multiple of 2.5 cm")
-    return 2.5 * steps
+    return _STEP_CM * steps
 
 
 def _apart(one: Block, other: Block, blocks: Sequence[Block]) -> float:
@@ -267,31 +273,6 @@ def _require_joined(one: Block, other: Block, blocks: Sequence[Block]) -> None:
         raise UnfairError("the blocks are parts of structures that stand apart")
 
 
-Values = tuple[float, ...]
-"""A length, or how far along and across [cm]."""
-_SCALES: Mapping[str, str] = {
-    "cube": "the edges of a cube are 5 cm long",
-    "cylinder": "a cylinder is 10 cm long and 5 cm thick",
-    "arch": "an arch is 10 cm long, 5 cm wide and 5 cm high",
-}
-_STEP_CM, _LONGEST_CM, _PLACE_STEP_CM = 2.5, 50.0, 5.0
-_APART = (1.2, 2.0)
-"""Values that are options together: each at least and at most so many times the one before."""
-_KINDS: Mapping[str, str] = {
-    "top": "height",
-    "bottom": "height",
-    "rise": "rise",
-    "apart": "apart",
-    "gap": "gap",
-    "place": "place",
-}
-"""Wordings, and the sorts of questions whose shares are even: heights are one of five."""
-PAIRED = ("apart", "rise", "gap", "place")
-"""Kinds that are asked of two blocks."""
-_FEW_A_SCENE = ("gap", "place")
-"""Kinds of which hardly any scene has four values that could be offered together."""
-
-
 class DistanceMaker(StaticMaker):
     """AP: heights, distances and places in centimeters, on the blocks' grid.
 
@@ -312,9 +293,7 @@ class DistanceMaker(StaticMaker):
             if scales:
                 yield from _distances(shown, picture, pick(rng, scales), rng)
 
-    def answer(
-        self, question: Question, picture: QuestionPicture, slots: Mapping[str, str]
-    ) -> tuple[int, ...]:
+    def answer(self, question: Question, picture: QuestionPicture, slots: Slots) -> tuple[int, ...]:
         """By the places of the blocks that the text names."""
         named = [resolve_one(slots[name], picture) for name in ("block", "other") if name in slots]
         require_seen(picture, orders_of(named), NAMED)
@@ -355,9 +334,10 @@ def _distances(
         slots = {"block": named[one.order], "scale": scale}
         if rule in PAIRED:
             slots["other"] = named[other.order]
-        stem, options, kind = f"ap-{rule}", list(map(_text_of, values)), _KINDS[rule]
-        right = options[0]
-        yield draft(scene, rng, stem, options, [picture], right, slots, kind, right=right)
+        right, *_ = options = list(map(_text_of, values))
+        yield draft(
+            *(scene, rng, f"ap-{rule}", options, [picture], slots), kind=_KINDS[rule], right=right
+        )
 
 
 def _values_cm(rule: str, one: Block, other: Block, picture: QuestionPicture) -> Values:
@@ -379,7 +359,7 @@ def _four_values(
     four, as of `_FEW_A_SCENE`, one that is true stands beside others, and chance drops most of
     these (`keeping_odds`).
     """
-    fours: Sequence[Sequence[Values]] = _squares(found) if rule == "place" else _ladders()
+    fours = _squares(found) if rule == "place" else _ladders()
     whole = [four for four in fours if set(four) <= set(found)]
     if whole:
         four = pick(rng, whole)
@@ -404,13 +384,9 @@ def _ladders() -> Sequence[Sequence[Values]]:
 
 def _squares(found: Collection[Values]) -> Sequence[Sequence[Values]]:
     """Places 5 cm from one another along and across, four at a time, one of them among `found`."""
-    step = _PLACE_STEP_CM
-    corners = {(a - x, b - y) for a, b in found for x in (0, step) for y in (0, step)}
-    return [
-        [(a + x, b + y) for x in (0, step) for y in (0, step)]
-        for a, b in sorted(corners)
-        if min(a, b) >= 0
-    ]
+    steps = (0, _PLACE_STEP_CM)
+    corners = sorted({(a - x, b - y) for a, b in found for x in steps for y in steps})
+    return [[(a + x, b + y) for x in steps for y in steps] for a, b in corners if min(a, b) >= 0]
 
 
 def _text_of(values_cm: Values) -> str:
@@ -419,6 +395,8 @@ def _text_of(values_cm: Values) -> str:
     along, across = values_cm
     return f"{along:g} cm along and {across:g} cm across"
 
+
+# RD
 
 Below = Mapping[int, frozenset[int]]
 """The orders that each block rests on, by its order."""
@@ -439,7 +417,6 @@ class DependencyMaker(StaticMaker):
     def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """One block to ask about and four to choose from, drawn again and again."""
         below = support_graph(scene.blocks)
-        types = {block.order: block.type for block in scene.blocks}
         for _ in range(12):
             shown = recolored(scene, rng)
             picture = goal_picture(shown, view)
@@ -455,20 +432,18 @@ class DependencyMaker(StaticMaker):
                     chosen = [pick(rng, right), *wrong]
                     options, slots = [f"the {named[o]}" for o in chosen], {"block": named[anchor]}
                     contacts = {str(o): sorted(below[o]) for o in (anchor, *chosen)}
-                    stem, value = f"rd-{rule}", types[chosen[0]]
                     yield draft(
-                        *(shown, rng, stem, options, [picture], value, slots, rule),
+                        *(shown, rng, f"rd-{rule}", options, [picture], slots),
+                        kind=rule,
                         rests_on=contacts,
                     )
 
-    def answer(
-        self, question: Question, picture: QuestionPicture, slots: Mapping[str, str]
-    ) -> tuple[int, ...]:
+    def answer(self, question: Question, picture: QuestionPicture, slots: Slots) -> tuple[int, ...]:
         """By the contacts of the blocks that the text and the options name."""
         anchor = resolve_one(slots["block"], picture)
         named = [resolve_one(option, picture) for option in question.options]
         require_seen(picture, orders_of([anchor, *named]), NAMED)
-        rule = question.wording.split("-")[1] if question.wording else ""
+        rule = stem_of(question.wording).removeprefix("rd-")
         if rule not in _RELATIONS or anchor in named:
             raise UnfairError("asks about no dependency, or a block about itself")
         below = support_graph(picture.blocks)

@@ -17,13 +17,28 @@ from numpy.typing import NDArray
 
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.draft import (
+from phyblock.making.questions.base import (
+    COUNTED,
+    LEAST_PIXELS,
+    MOST_OFF,
+    TAKEN,
+    WORDS,
+    WRONG,
     Draft,
     Maker,
     UnfairError,
+    are_seen,
+    are_told_apart,
     draft,
+    drawn_view,
+    marked_order,
+    of_kind,
     only_index,
+    option_pictures,
     pick,
+    picture_of,
+    ranks_among,
+    same_blocks,
     shuffled,
     slots_of,
 )
@@ -34,22 +49,6 @@ from phyblock.making.questions.structures import (
     stays_round,
     verdict,
     with_annex,
-)
-from phyblock.making.questions.view import (
-    COUNTED,
-    LEAST_PIXELS,
-    MOST_OFF,
-    TAKEN,
-    WRONG,
-    are_seen,
-    are_told_apart,
-    drawn_view,
-    marked_order,
-    of_kind,
-    option_pictures,
-    picture_of,
-    ranks_among,
-    same_blocks,
 )
 from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.camera import view_axes
@@ -129,7 +128,9 @@ def next_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
                     "placed": [one.order for one in stage],
                     "next": block.order,
                 }
-                yield draft(scene, rng, "pd-next", options, [shown], f"area {rank}", {}, **facts)
+                yield draft(
+                    scene, rng, "pd-next", options, [shown], {}, value=f"area {rank}", **facts
+                )
                 return
 
 
@@ -203,7 +204,7 @@ _PUSHES_TRIED = 9
 _OPTIONS = 4
 _FRONTS_DEG = (0.0, 90.0, 180.0, 270.0)
 _ELEVATIONS_DEG_PUSHES = (20, 32)
-_DIRECTIONS = {"to the right": 1, "to the left": -1}
+_DIRECTIONS: Mapping[str, int] = WORDS["directions"]
 _LEAST_SHOWN_PUSHES = 60
 _TOUCH_M = 0.002
 _ALONG_M = 0.01
@@ -232,7 +233,7 @@ def push_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
             shown = [replace(plain, marks=(mark,))]
             value = "falls" if len(outcome.moved) > 1 else "slides"
             slots = {"direction": direction}
-            yield draft(scene, rng, "pd-push", options, shown, value, slots, **facts)
+            yield draft(scene, rng, "pd-push", options, shown, slots, value=value, **facts)
             return
 
 

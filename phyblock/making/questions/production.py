@@ -27,9 +27,9 @@ from phyblock.domain.scene import Block, Scene
 from phyblock.errors import DataError, PhyblockError, Problem, StoreError
 from phyblock.files import atomic_write, check_free, writing
 from phyblock.making.questions.affordance import AffordanceMaker
+from phyblock.making.questions.base import Draft, Maker, UnfairError, pick, shuffled
 from phyblock.making.questions.counterfactual import CounterfactualMaker
 from phyblock.making.questions.counting import NumberMaker, TallyMaker
-from phyblock.making.questions.draft import Draft, Maker, UnfairError, pick, shuffled
 from phyblock.making.questions.ordering import OrderingMaker
 from phyblock.making.questions.positions import DependencyMaker, DistanceMaker, PositionMaker
 from phyblock.making.questions.predictive import PredictiveMaker

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,31 +20,32 @@ from phyblock.domain.blocks import (
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import angles_deg
-from phyblock.making.questions.draft import (
-    Draft,
-    UnfairError,
-    draft,
-    only_index,
-    pick,
-    right_first,
-    shuffled,
-    stem_of,
-)
-from phyblock.making.questions.referring import resolve_one, shape_word
-from phyblock.making.questions.view import (
+from phyblock.making.questions.base import (
     NAMED,
     STUDIED,
+    WORDS,
+    Draft,
+    Floats,
+    Slots,
     StaticMaker,
+    UnfairError,
     View,
     are_seen,
     center_m,
+    draft,
     goal_picture,
     length_axis,
+    only_index,
     orders_of,
+    pick,
     require_seen,
+    right_first,
     seen_blocks,
+    shuffled,
+    stem_of,
     with_own_colors,
 )
+from phyblock.making.questions.names import resolve_one, shape_word
 from phyblock.sim.contact import (
     FIT_TOLERANCE_M,
     bounds_m,
@@ -57,14 +58,30 @@ from phyblock.sim.contact import (
 from phyblock.sim.outcomes import holds
 
 _STEP_DEG = 15
-AXIS_TURNS: tuple[str, ...] = (
-    "no turn at all",
-    "a quarter turn about an upright axis",
-    "a quarter turn about a level axis along its length",
-    "a quarter turn about a level axis across its length",
-)
+AXIS_TURNS: tuple[str, ...] = tuple(WORDS["turns_about_axes"])
 """Turns of a block that lies along the ground; the side does not matter."""
 _SAME = 1e-4
+_CLEAR_M, _STEP_M, _NEAR_M = 0.02, 0.01, 0.002
+_PAIRS, _LOOSE = 6, 4
+_PLACES = 6
+"""So many are tried for a loose block; with one, turns that are hard to see would be rare."""
+
+
+def _about(axis: int, angle_deg: float) -> Floats:
+    """Rotation matrix (3, 3) about an axis of the world."""
+    cosine, sine = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
+    one, two = (axis + 1) % 3, (axis + 2) % 3
+    matrix = np.eye(3)
+    matrix[one, one] = matrix[two, two] = cosine
+    matrix[two, one], matrix[one, two] = sine, -sine
+    return matrix
+
+
+@functools.lru_cache(maxsize=4096)
+def _is_alike(block_type: BlockType, one_deg: Euler, other_deg: Euler) -> bool:
+    """True if no one can tell two orientations of a type apart."""
+    one, other = (orientation_class(block_type, deg) for deg in (one_deg, other_deg))
+    return bool(np.abs(np.array(one) - np.array(other)).max() < _SAME)
 
 
 def axis_turns(block: Block, other: Block) -> tuple[str, ...]:
@@ -75,8 +92,9 @@ def axis_turns(block: Block, other: Block) -> tuple[str, ...]:
     """
     if block.type != other.type or not SHAPES[block.type].is_long:
         return ()
-    along = length_axis(other)
-    return _turns(block.type, block.euler_deg, other.euler_deg, along)
+    images = _images(other.euler_deg, length_axis(other))
+    fitting = (name for name, deg in images if _is_alike(block.type, block.euler_deg, deg))
+    return tuple(dict.fromkeys(fitting))
 
 
 def tipped_over(block: Block) -> tuple[Block, ...]:
@@ -86,35 +104,13 @@ def tipped_over(block: Block) -> tuple[Block, ...]:
 
 
 @functools.lru_cache(maxsize=4096)
-def _turns(
-    block_type: BlockType, euler_deg: Euler, other_deg: Euler, along: int
-) -> tuple[str, ...]:
-    wanted = np.array(orientation_class(block_type, euler_deg))
-    found = []
-    for name, image_deg in _images(other_deg, along):
-        image = np.array(orientation_class(block_type, image_deg))
-        if np.abs(wanted - image).max() < _SAME and name not in found:
-            found.append(name)
-    return tuple(found)
-
-
-def _images(euler_deg: Euler, along: int) -> list[tuple[str, Euler]]:
+def _images(euler_deg: Euler, along: int) -> Sequence[tuple[str, Euler]]:
     """Each turn, to either side, with the orientation that it gives."""
     rotation = euler_deg_to_matrix(euler_deg)
     images = [(AXIS_TURNS[0], euler_deg)]
     for name, axis in zip(AXIS_TURNS[1:], (2, along, 1 - along), strict=True):
         images += [(name, angles_deg(_about(axis, side) @ rotation)) for side in (90.0, -90.0)]
     return images
-
-
-def _about(axis: int, angle_deg: float) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """Rotation matrix (3, 3) about an axis of the world."""
-    cosine, sine = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
-    one, two = (axis + 1) % 3, (axis + 2) % 3
-    matrix = np.eye(3)
-    matrix[one, one] = matrix[two, two] = cosine
-    matrix[two, one], matrix[one, two] = sine, -sine
-    return matrix
 
 
 def vertical_turns_deg(block: Block, other: Block) -> tuple[int, ...]:
@@ -126,20 +122,13 @@ def vertical_turns_deg(block: Block, other: Block) -> tuple[int, ...]:
     """
     if block.type != other.type:
         return ()
-    return _vertical(block.type, block.euler_deg, other.euler_deg)
-
-
-@functools.lru_cache(maxsize=4096)
-def _vertical(block_type: BlockType, euler_deg: Euler, other_deg: Euler) -> tuple[int, ...]:
-    wanted = np.array(orientation_class(block_type, euler_deg))
-    roll, pitch, yaw = other_deg
+    roll, pitch, yaw = other.euler_deg
     turns = sorted(range(-180 + _STEP_DEG, 181, _STEP_DEG), key=lambda turn: (abs(turn), -turn))
-    distinct = []
-    for turn in turns:
-        turned = orientation_class(block_type, (roll, pitch, _yaw_deg(yaw, turn)))
-        if np.abs(wanted - np.array(turned)).max() < _SAME:
-            distinct.append(turn)
-    return tuple(distinct)
+    return tuple(
+        turn
+        for turn in turns
+        if _is_alike(block.type, block.euler_deg, (roll, pitch, _yaw_deg(yaw, turn)))
+    )
 
 
 def turned_about_vertical(block: Block, angle_deg: float) -> Block:
@@ -155,10 +144,6 @@ def turned_about_vertical(block: Block, angle_deg: float) -> Block:
 
 def _yaw_deg(yaw_deg: float, turn_deg: float) -> float:
     return round((yaw_deg + turn_deg) % 360, 6)
-
-
-_CLEAR_M = 0.02
-_STEP_M = 0.01
 
 
 def put_beside(block: Block, blocks: Sequence[Block], rng: np.random.Generator) -> Block:
@@ -178,8 +163,7 @@ def put_beside(block: Block, blocks: Sequence[Block], rng: np.random.Generator) 
         step = np.array([*(place_m - box.mean(axis=0)[:2]), -box[0, 2]])
         x, y, z = (round(float(part), 4) for part in np.array(loose.position_m) + step)
         placed = replace(loose, position_m=(x, y, z))
-        near = (boxes_near(bounds_m(placed), bounds_m(other), _CLEAR_M) for other in blocks)
-        if not any(near):
+        if not any(boxes_near(bounds_m(placed), bounds_m(other), _CLEAR_M) for other in blocks):
             return placed
         distance += _STEP_M
 
@@ -197,42 +181,27 @@ class _Rule:
     phrases: Callable[[Block, Block], Sequence[str]]
 
 
-def _angle(turn_deg: int) -> str:
-    return f"{abs(turn_deg)} degrees"
+def _vertical(stem: str, own: tuple[int, ...], turns: Sequence[int], is_signed: bool) -> _Rule:
+    """The rule for blocks that the turns `own` about the vertical map to themselves."""
+
+    def text(turn: int) -> str:
+        side = "" if turn in (0, 180) else " counterclockwise" if turn > 0 else " clockwise"
+        return f"{abs(turn)} degrees{side if is_signed else ''}"
+
+    def phrases(block: Block, other: Block) -> Sequence[str]:
+        if vertical_turns_deg(block, block) != own:
+            return ()
+        return [text(turn) for turn in vertical_turns_deg(block, other)]
+
+    return _Rule(stem, "vertical", tuple(map(text, turns)), phrases)
 
 
-def _turn(turn_deg: int) -> str:
-    if turn_deg in (0, 180):
-        return _angle(turn_deg)
-    return f"{_angle(turn_deg)} {'counterclockwise' if turn_deg > 0 else 'clockwise'}"
-
-
-def _vertical_phrases(
-    block: Block, other: Block, own: tuple[int, ...], text_of: Callable[[int], str]
-) -> Sequence[str]:
-    """The turns between two blocks that the turns `own` about the vertical map to themselves."""
-    if vertical_turns_deg(block, block) != own:
-        return ()
-    return [text_of(turn) for turn in vertical_turns_deg(block, other)]
-
-
-_ANGLE = _Rule(
-    *("angle", "vertical", tuple(map(_angle, (0, 30, 60, 90)))),
-    lambda block, other: _vertical_phrases(block, other, (0, 180), _angle),
+_ON_THE_SPOT = (
+    _vertical("rr-angle", (0, 180), (0, 30, 60, 90), is_signed=False),
+    _vertical("rr-turn", (0,), (0, 90, -90, 180), is_signed=True),
 )
-"""Of a block that a half turn about the vertical maps to itself."""
-_TURN = _Rule(
-    *("turn", "vertical", tuple(map(_turn, (0, 90, -90, 180)))),
-    lambda block, other: _vertical_phrases(block, other, (0,), _turn),
-)
-"""Of one without such a symmetry."""
-_AXIS = _Rule("axis", "axis", AXIS_TURNS, axis_turns)
+_AXIS = _Rule("rr-axis", "axis", AXIS_TURNS, axis_turns)
 """Of one with a length, which may roll over or stand on end as well."""
-_PAIRS = 6
-_LOOSE = 4
-_PLACES = 6
-"""So many are tried for a loose block; with one, turns that are hard to see would be rare."""
-_NEAR_M = 0.002
 
 
 class RotationMaker(StaticMaker):
@@ -257,17 +226,15 @@ class RotationMaker(StaticMaker):
             if one.type == other.type and one.order not in carrying
         ]
         for pair in shuffled(rng, pairs)[:_PAIRS]:
-            for rule in (_ANGLE, _TURN):
-                yield from _on_the_spot(view, scene, pair, rule, rng)
+            for rule in _ON_THE_SPOT:
+                yield from _turned_on_the_spot(view, scene, pair, rule, rng)
 
-    def answer(
-        self, question: Question, picture: QuestionPicture, slots: Mapping[str, str]
-    ) -> tuple[int, ...]:
+    def answer(self, question: Question, picture: QuestionPicture, slots: Slots) -> tuple[int, ...]:
         """By the orientations in the picture, up to the symmetry of the type."""
         pair = [resolve_one(slots[name], picture) for name in ("block", "other")]
         require_seen(picture, orders_of(pair), STUDIED)
         stem = stem_of(question.wording)
-        rule = next((r for r in (_ANGLE, _TURN, _AXIS) if stem == f"rr-{r.stem}"), None)
+        rule = next((rule for rule in (*_ON_THE_SPOT, _AXIS) if rule.stem == stem), None)
         true = rule.phrases(*pair) if rule else ()
         if not true:
             raise UnfairError("are not of one type, or not turned as the wording asks")
@@ -301,14 +268,14 @@ def _about_some_axis(
             return
 
 
-def _on_the_spot(
+def _turned_on_the_spot(
     view: View, scene: Scene, pair: tuple[Block, Block], rule: _Rule, rng: np.random.Generator
 ) -> Iterator[Draft]:
     """The first of two is turned about the vertical so that a phrase drawn is true."""
     phrase = pick(rng, rule.options)
     colored = with_own_colors(scene, orders_of(pair), rng)
     mine, its = (next(b for b in colored.blocks if b.order == x.order) for x in pair)
-    for turn in shuffled(rng, range(0, 360, 15)):
+    for turn in shuffled(rng, range(0, 360, _STEP_DEG)):
         moved = turned_about_vertical(mine, turn) if turn else mine
         if phrase in rule.phrases(moved, its)[:1]:
             blocks = tuple(moved if b.order == mine.order else b for b in colored.blocks)
@@ -334,8 +301,7 @@ def _drafted(
     except UnfairError:
         return
     slots, options = {"block": one, "other": other}, right_first(phrase, rule.options)
-    stem, kind = f"rr-{rule.stem}", rule.kind
-    yield draft(scene, rng, stem, options, [picture], phrase, slots, kind, turned=phrase)
+    yield draft(scene, rng, rule.stem, options, [picture], slots, kind=rule.kind, turned=phrase)
 
 
 def _fits(picture: QuestionPicture, moved: Block, before: Block) -> bool:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain.question import LETTERS
-from phyblock.making.questions.draft import Draft
+from phyblock.making.questions.base import Draft
 from phyblock.tracks.baselines import text_features
 
 _LOOKED_AT = 100

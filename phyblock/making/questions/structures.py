@@ -17,7 +17,7 @@ import numpy as np
 
 from phyblock.domain.blocks import COLORS, SHAPES, BlockType, Euler
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.draft import pick, shuffled
+from phyblock.making.questions.base import pick, shuffled
 from phyblock.sim.balance import MARGIN_M, is_balanced, surely_falls, surely_stands
 from phyblock.sim.contact import bounds_m, drop_height_m, find_gaps, find_overlaps
 from phyblock.sim.dynamics import groups

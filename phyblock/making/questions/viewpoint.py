@@ -21,28 +21,27 @@ from phyblock.domain.blocks import COLORS
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import Symmetry, turned_form
-from phyblock.making.questions.draft import (
+from phyblock.making.questions.base import (
+    WORDS,
     Draft,
     Maker,
     UnfairError,
+    View,
+    are_told_apart,
     draft,
+    drawn_view,
+    of_kind,
     only_index,
+    option_pictures,
     pick,
+    picture_of,
+    recolored,
     right_first,
+    same_blocks,
     shuffled,
     slots_of,
 )
 from phyblock.making.questions.structures import group_of
-from phyblock.making.questions.view import (
-    View,
-    are_told_apart,
-    drawn_view,
-    of_kind,
-    option_pictures,
-    picture_of,
-    recolored,
-    same_blocks,
-)
 from phyblock.making.scenes.sketch import transformed
 from phyblock.sim.balance import surely_stands
 from phyblock.sim.contact import drop_height_m, find_overlaps
@@ -51,7 +50,7 @@ from phyblock.sim.question_pictures import least_difference, seen, shown_pixels
 _FRONTS_DEG = (0.0, 90.0, 180.0, 270.0)
 """Straight on: a mirror image of a slanted view can be a true view of the same side."""
 _FRONT_ELEVATION_DEG = 22.0
-_SIDES: dict[str, float] = {"its right side": 90.0, "its left side": -90.0, "behind": 180.0}
+_SIDES: dict[str, float] = WORDS["sides_seen"]
 _LEAST_TURN_DEG = 60
 _FAMILIES_TRIED = 8
 _LEAST_SHOWN = 100
@@ -133,7 +132,7 @@ def _match(
             dealt = [options[i] for i in right_first(right, range(len(family)))]
             pictures, slots = [shown[right]], {"side_words": side} if side else {}
             value = side or changes
-            yield draft(scene, rng, stem, dealt, pictures, value, slots, changes=changes)
+            yield draft(scene, rng, stem, dealt, pictures, slots, value=value, changes=changes)
             return
 
 
@@ -206,7 +205,7 @@ def _side(scene: Scene, rng: np.random.Generator, front: View, side: str) -> Ite
             # The mirror image is shown: what it looks like from a side is the other side mirrored.
             shown, options = base.mirrored().seen_from(front), options[::-1]
         slots = {"side_words": side}
-        yield draft(scene, rng, "vp-side", options, [shown], side, slots, changes="mirror")
+        yield draft(scene, rng, "vp-side", options, [shown], slots, value=side, changes="mirror")
 
 
 def _differ_at_a_glance(options: Sequence[QuestionPicture]) -> bool:

@@ -9,16 +9,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from phyblock.domain.blocks import COLORS, SHAPES, BlockType, Color
+from phyblock.domain.blocks import COLORS, SHAPES, BlockType
 from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block
-from phyblock.making.questions.draft import UnfairError, pick
-from phyblock.making.questions.view import NAMED, outermost, seen_blocks, shows_profile
+from phyblock.making.questions.base import (
+    NAMED,
+    UnfairError,
+    outermost,
+    pick,
+    seen_blocks,
+    shows_profile,
+)
 from phyblock.sim.contact import bounds_m
 
 Feature = Literal["color", "type", "size", "layer", "side", "support"]
@@ -33,15 +38,10 @@ SHAPE_WORDS: dict[str, tuple[BlockType, ...]] = {
 _SIZED: dict[str, tuple[BlockType, ...]] = {
     shape.exact: (one,) for one, shape in SHAPES.items() if shape.exact
 }
-_NOUNS: dict[str, tuple[BlockType, ...]] = {
-    **SHAPE_WORDS,
-    **_SIZED,
-    "block": tuple(block_type for types in SHAPE_WORDS.values() for block_type in types),
-}
+_NOUNS = {**SHAPE_WORDS, **_SIZED, "block": sum(SHAPE_WORDS.values(), ())}
 _SIDES = ("leftmost", "rightmost", "topmost")
 _TOP_GAP_M = 0.02
 _NAMES_DRAWN_FROM = 3
-_PLAIN: tuple[Feature, ...] = ("color", "type")
 _SIMPLE = rf"(?:(?:{'|'.join(COLORS)}) )?(?:{'|'.join(_NOUNS)})"
 _PATTERN = re.compile(
     rf"(?:(?P<side>{'|'.join(_SIDES)}) )?(?:(?P<color>{'|'.join(COLORS)}) )?"
@@ -50,11 +50,10 @@ _PATTERN = re.compile(
 )
 
 
-@dataclass(frozen=True)
-class _Expression:
+class _Words(NamedTuple):
     noun: str
-    color: Color | None = None
-    layer: int | None = None
+    color: str | None = None
+    layer: str | None = None
     side: str | None = None
     support: str | None = None
 
@@ -62,11 +61,15 @@ class _Expression:
     def text(self) -> str:
         """Without an article."""
         words = [word for word in (self.side, self.color, self.noun) if word]
-        if self.layer is not None:
-            words.append(f"in layer {self.layer}")
-        if self.support is not None:
-            words.append(f"resting on the {self.support}")
+        words += [f"in layer {self.layer}"] if self.layer else []
+        words += [f"resting on the {self.support}"] if self.support else []
         return " ".join(words)
+
+    def says_more_than(self, shorter: _Words) -> bool:
+        """True if these say what others do, and perhaps more."""
+        fits = set(_NOUNS[self.noun]) <= set(_NOUNS[shorter.noun])
+        pairs = zip(shorter[1:], self[1:], strict=True)
+        return fits and all(short is None or short == long for short, long in pairs)
 
 
 def shape_word(block_type: BlockType) -> str:
@@ -85,19 +88,38 @@ def resolve(text: str, picture: QuestionPicture, loosely: bool = False) -> tuple
     match = _PATTERN.fullmatch(text.removeprefix("the "))
     if match is None:
         raise UnfairError(f"{text!r} names no block")
-    words = match.groupdict()
+    words = _Words(**match.groupdict())
     fitting = [block for block in picture.blocks if _fits(block, words, loosely, picture)]
-    if words["layer"] is not None:
+    if words.layer is not None:
         layers = [block.layer for block in fitting]
         if len(set(layers)) < len(layers):
             return ()
-        fitting = [block for block in fitting if block.layer == int(words["layer"])]
-    if words["support"] is not None:
-        below = resolve(words["support"], picture, loosely)
+        fitting = [block for block in fitting if block.layer == int(words.layer)]
+    if words.support is not None:
+        below = resolve(words.support, picture, loosely)
         fitting = [b for b in fitting if len(below) == 1 and set(b.depend) == set(below)]
-    if words["side"] is not None:
-        fitting = _outermost(fitting, picture, words["side"])
+    if words.side == "topmost":
+        top_m = {b.order: float(bounds_m(b)[1, 2]) for b in fitting}
+        ranked = sorted(fitting, key=lambda b: -top_m[b.order])
+        highest = [b for b in ranked if top_m[ranked[0].order] - top_m[b.order] < _TOP_GAP_M]
+        fitting = highest if len(highest) == 1 else []
+    elif words.side is not None and fitting:
+        orders = [block.order for block in fitting]
+        order = outermost(orders, picture, to_left=words.side == "leftmost")
+        fitting = [block for block in fitting if block.order == order]
     return tuple(block.order for block in fitting)
+
+
+def _fits(block: Block, words: _Words, loosely: bool, picture: QuestionPicture) -> bool:
+    if words.color not in (None, block.color):
+        return False
+    types = set(_NOUNS[words.noun])
+    if loosely and words.noun != "block" and not shows_profile(block, picture.view_deg):
+        # Seen from this side, it may be taken for anything but what it is.
+        return block.type not in types
+    if loosely:
+        types = types.union(*(SHAPES[one].mistaken_for for one in types))
+    return block.type in types
 
 
 def resolve_one(text: str, picture: QuestionPicture) -> Block:
@@ -112,13 +134,13 @@ def resolve_one(text: str, picture: QuestionPicture) -> Block:
 
 def names(block: Block, picture: QuestionPicture, features: Sequence[Feature]) -> tuple[str, ...]:
     """Expressions that fit this block alone and speak of these features only, shortest first."""
-    shortest: list[_Expression] = []
-    for expression in _expressions(block, picture, features):
-        is_longer = any(_is_part(shorter, expression) for shorter in shortest)
-        readings = (resolve(expression.text, picture, loosely) for loosely in (False, True))
+    shortest: list[_Words] = []
+    for words in _expressions(block, picture, features):
+        is_longer = any(words.says_more_than(shorter) for shorter in shortest)
+        readings = (resolve(words.text, picture, loosely) for loosely in (False, True))
         if not is_longer and all(reading == (block.order,) for reading in readings):
-            shortest.append(expression)
-    return tuple(expression.text for expression in shortest)
+            shortest.append(words)
+    return tuple(words.text for words in shortest)
 
 
 def drawn_name(
@@ -129,72 +151,33 @@ def drawn_name(
     return pick(rng, expressions[:_NAMES_DRAWN_FROM]) if expressions else None
 
 
-def plain_names(picture: QuestionPicture) -> dict[int, str]:
+def plain_names(picture: QuestionPicture) -> Mapping[int, str]:
     """The shortest name by color and type of each block that shows enough, by order."""
-    found = ((b.order, names(b, picture, _PLAIN)) for b in seen_blocks(picture, NAMED))
+    found = ((b.order, names(b, picture, ("color", "type"))) for b in seen_blocks(picture, NAMED))
     return {order: expressions[0] for order, expressions in found if expressions}
 
 
 def _expressions(
     block: Block, picture: QuestionPicture, features: Sequence[Feature]
-) -> Iterator[_Expression]:
+) -> Iterator[_Words]:
     """All that is true of a block, the simple before the long."""
-    colors: list[Color | None] = [block.color, None] if "color" in features else [None]
+    colors = [block.color, None] if "color" in features else [None]
     nouns = ["block"]
     if "type" in features:
         nouns.append(shape_word(block.type))
     if "size" in features:
         nouns += [noun for noun, types in _SIZED.items() if block.type in types]
-    simple = [_Expression(noun, color) for noun in nouns for color in colors]
+    simple = [_Words(noun, color) for noun in nouns for color in colors]
     yield from sorted(simple, key=lambda one: len(one.text.split()))
     for one in simple:
         if "side" in features:
             for side in _SIDES:
-                yield _Expression(one.noun, one.color, side=side)
+                yield one._replace(side=side)
         if "layer" in features:
-            yield _Expression(one.noun, one.color, layer=block.layer)
+            yield one._replace(layer=str(block.layer))
     below = [other for other in picture.blocks if other.order in block.depend]
     if "support" in features and len(below) == 1:
         plain = [f for f in features if f in ("color", "type")]
         for name in names(below[0], picture, plain):
             for one in simple:
-                yield _Expression(one.noun, one.color, support=name)
-
-
-def _is_part(shorter: _Expression, longer: _Expression) -> bool:
-    """True if the longer says the same and more."""
-    pairs = (
-        (shorter.color, longer.color),
-        (shorter.layer, longer.layer),
-        (shorter.side, longer.side),
-        (shorter.support, longer.support),
-    )
-    fits = set(_NOUNS[longer.noun]) <= set(_NOUNS[shorter.noun])
-    return fits and all(short is None or short == long for short, long in pairs)
-
-
-def _fits(
-    block: Block, words: Mapping[str, str | None], loosely: bool, picture: QuestionPicture
-) -> bool:
-    types = set(_NOUNS[words["noun"] or "block"])
-    if loosely and words["noun"] != "block" and not shows_profile(block, picture.view_deg):
-        # Seen from this side, it may be taken for anything but what it is.
-        return block.type not in types and words["color"] in (None, block.color)
-    if loosely:
-        types = types.union(*(SHAPES[one].mistaken_for for one in types))
-    return block.type in types and words["color"] in (None, block.color)
-
-
-def _outermost(fitting: list[Block], picture: QuestionPicture, side: str) -> list[Block]:
-    """The one that is clearly outermost, or none."""
-    if not fitting:
-        return []
-    if side == "topmost":
-        reach = {b.order: float(bounds_m(b)[1, 2]) for b in fitting}
-        ranked = sorted(fitting, key=lambda b: -reach[b.order])
-        is_clear = len(ranked) < 2 or (
-            reach[ranked[0].order] - reach[ranked[1].order] >= _TOP_GAP_M
-        )
-        return ranked[:1] if is_clear else []
-    order = outermost([b.order for b in fitting], picture, to_left=side == "leftmost")
-    return [block for block in fitting if block.order == order]
+                yield one._replace(support=name)
