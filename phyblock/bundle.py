@@ -31,7 +31,7 @@ from typing import IO, Annotated, Any
 from pydantic import Field, TypeAdapter, ValidationError
 
 from phyblock.errors import DataError, InputError, Problem, SpecError, StoreError, reason_of
-from phyblock.files import digest_of_file, open_regular, read_bytes, write_named
+from phyblock.files import OutFolder, digest_of_file, open_regular, read_bytes, write_named
 from phyblock.parsing.text import READER_VERSION
 from phyblock.records.files import RECORDS, read_records
 from phyblock.records.line import Line, decode, problems_of
@@ -42,7 +42,7 @@ from phyblock.results.load import design_of
 from phyblock.run.judge import about_prompt
 from phyblock.run.plan import recorded_dataset
 from phyblock.run.rescore import judged_anew, recorded_suite, reopen_tracks
-from phyblock.run.store import manifest_text, prompt_of, record_lines, run_folder
+from phyblock.run.store import manifest_text, prompt_of, record_lines
 from phyblock.stable import hex_digest
 from phyblock.text import some_of
 from phyblock.tracks import AnyTrack, EpisodeTrack, Item, kind_of
@@ -138,7 +138,7 @@ def bundle_run(folder: Path, out: Path | None = None) -> Path:
         file.seek(0)
         packed = iter(partial(file.read, _CHUNK_BYTES), b"")
         if out is None:
-            return run_folder(folder).write({BUNDLE_FILE: packed})[0]
+            return OutFolder(folder).write({BUNDLE_FILE: packed})[0]
         write_named(out, packed)
         return out
 

@@ -18,10 +18,10 @@ from phyblock.cli.options import NAME_OR_PATH, UserPath, limit_option, sets_opti
 from phyblock.cli.results import show_tables
 from phyblock.config.suite import load_suite
 from phyblock.errors import Problem, SpecError, reason_of
-from phyblock.files import read_text
+from phyblock.files import OutFolder, read_text
 from phyblock.resources import bundled
 from phyblock.run.plan import RunPlan, bundled_suites, find_suite, prompt_dirs
-from phyblock.run.store import held_run, run_folder
+from phyblock.run.store import held_run
 from phyblock.web.report import files_of, report_files
 from phyblock.web.server import Server, default_consent
 from phyblock.web.session import Person, PlaySession, outcomes, plan_session
@@ -86,7 +86,7 @@ def play(
     plan = plan_session(loaded, person, limit)
     folder = out or plan.folder_in(_RUNS)
     if held_run(folder, plan.manifest) is not None:
-        run_folder(folder).check(files_of(page=True))
+        OutFolder(folder).check(files_of(page=True))
     return _serve(make_console(), plan, person, folder, beside, port, opens=not no_browser)
 
 

@@ -31,6 +31,7 @@ from phyblock.cli.progress import ProgressView
 from phyblock.cli.results import show_tables
 from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
+from phyblock.files import OutFolder
 from phyblock.models import is_billed
 from phyblock.models.litellm_client import be_quiet
 from phyblock.resources import bundled
@@ -48,7 +49,7 @@ from phyblock.run.plan import (
 )
 from phyblock.run.rescore import rescore
 from phyblock.run.runner import Cause, RunResult, Session, check_ready
-from phyblock.run.store import held_run, run_folder
+from phyblock.run.store import held_run
 from phyblock.text import counted, one_line, plain_lines
 from phyblock.tracks import kind_of
 from phyblock.types import MATCHERS, PLAN_PARSERS, Matcher, PlanParser
@@ -79,7 +80,7 @@ _LINE_EVERY_S = 2.0
 @click.option(
     "--retry-failed", is_flag=True, help="Ask again for samples whose request was rejected."
 )
-@click.option("--no-report", is_flag=True, help="Write only tables: no figures, no page.")
+@click.option("--no-report", is_flag=True, help="Write only tables, no page.")
 @yes_option
 def run(
     suite: str,
@@ -112,7 +113,7 @@ def run(
     if found is not None:
         from phyblock.web.report import files_of
 
-        run_folder(folder).check(() if dry_run else files_of(page=not no_report))
+        OutFolder(folder).check(() if dry_run else files_of(page=not no_report))
     asks = {"use_cache": not no_cache, "retry_failed": retry_failed}
     if dry_run:
         print_estimate(console, plan, estimate(plan, folder, **asks))

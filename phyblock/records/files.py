@@ -21,7 +21,7 @@ from phyblock.errors import Problem, StoreError, reason_of
 from phyblock.files import NotRegularError, open_regular, read_bytes
 from phyblock.records.line import Line, decode, problems_of
 from phyblock.records.manifest import Manifest, read_manifest
-from phyblock.records.record import BatchLine, Call, Prompt, Record, Stopped
+from phyblock.records.record import BatchLine, Call, Prompt, PromptMessage, Record, Stopped
 from phyblock.registry import known_tracks
 
 RECORDS = "records.jsonl"
@@ -295,3 +295,8 @@ def read_stopped(folder: Path) -> Stopped:
     except (OSError, ValueError) as error:
         message, hint = f"cannot be read: {reason_of(error)}", "remove it: it is made again"
         raise StoreError(Problem(str(path), message, hint=hint)) from error
+
+
+def read_prompts(folder: Path) -> dict[str, tuple[PromptMessage, ...]]:
+    """Return the messages of every prompt of a run folder, by digest."""
+    return {line.sha256: line.messages for _, line in PromptLines(folder)}

@@ -10,13 +10,12 @@ from typing import Any
 import pandas as pd
 
 from phyblock.files import OutFolder, writing
-from phyblock.records.files import read_records, record_types
+from phyblock.records.files import read_prompts, read_records, record_types
 from phyblock.records.record import PictureMark, PromptMessage, Record
 from phyblock.resources import needs
 from phyblock.results.estimates import numbers_of, stored_counts
 from phyblock.results.load import Run
 from phyblock.results.text import to_csv as csv_text
-from phyblock.run.store import read_prompts, run_folder
 
 _SAMPLE = ("sample", "track", "model", "scene", "seed")
 _REPLY = ("finish", "cost_usd", "latency_s", "provider_model", "attempts", "cached")
@@ -198,7 +197,7 @@ def export_run(run: Run, form: str, folder: Path | None = None) -> tuple[Path, .
     Raises StoreError where the folder cannot be written or a file is in the way that we never
     wrote, SpecError where a package is missing.
     """
-    out = OutFolder(folder) if folder else run_folder(run.path)
+    out = OutFolder(folder or run.path)
     below = "" if folder else f"export/{form}/"
     target = out.path / below
     with writing(target), out.making(below) as made:

@@ -1,4 +1,4 @@
-r"""Figures of a run, for its report and for papers: forest, levels, shares, cost, sensitivity."""
+r"""Figures of a run for papers: forest, levels, shares, cost, sensitivity."""
 
 from __future__ import annotations
 
@@ -30,9 +30,8 @@ from phyblock.results.load import Run
 from phyblock.results.sensitivity import ITEMS, factor_name, sensitivity_frame, sizes_text
 from phyblock.results.tables import cost_frame, filled, layouts_of
 from phyblock.results.text import between, escape, level_name, number
-from phyblock.run.store import run_folder
 from phyblock.text import counted
-from phyblock.tracks.base import kind_of, kinds
+from phyblock.tracks.base import kind_of
 from phyblock.tracks.measures import in_unit
 
 if TYPE_CHECKING:
@@ -465,7 +464,6 @@ def sensitivity(run: Run, *, track: str) -> Figure | None:
 
 PAPER = "paper"
 """The folder in a run's folder where figures for papers are, unless another is named."""
-_FOLDER = "figures"
 _STACKED = {"full_planning": ("errors", "losses"), "step_planning": ("moves",),
             "pose_planning": ("pose_errors",)}  # fmt: skip
 """Tables whose shares are drawn, by track."""
@@ -492,41 +490,19 @@ def figure_titles(run: Run) -> dict[str, str]:
     return {name: title for name, (title, _) in _makers(run.design.suite.tracks).items()}
 
 
-def figure_files() -> tuple[str, ...]:
-    """Return every file of figures of a report, by its name in a run folder."""
-    return tuple(f"{_FOLDER}/{name}.svg" for name in _makers(tuple(kinds())))
-
-
-def write_figures(run: Run) -> tuple[Path, ...]:
-    """Draw the figures of the report into `figures/` of the run's folder as SVG, but for forests.
-
-    Figures that the run has no numbers for are left out. The same records give the same bytes.
-    Raises StoreError for a folder that cannot be written, and, before anything is drawn, naming
-    every file in the way that we never wrote.
-    """
-    folder = run_folder(run.path)
-    makers = _makers(run.design.suite.tracks)
-    folder.check(f"{_FOLDER}/{name}.svg" for name in makers)
-    files: list[Path] = []
-    with styled(Look()):
-        for name, (_, draw) in makers.items():
-            figure = None if name.startswith("forest-") else draw(run)
-            if figure is not None:
-                files += folder.write({f"{_FOLDER}/{name}.svg": svg_bytes(figure)})
-    return tuple(files)
-
-
 def write_paper_figures(
     run: Run, names: Sequence[str], look: Look, out: Path | None = None
 ) -> tuple[Path, ...]:
     """Draw figures for a paper into `out`, else into `paper/` of the run's folder.
 
     Each is NAME.pdf, NAME.svg and NAME.png, its caption NAME.txt, and NAME.tex a float that
-    includes it. All figures where no names are given; as `write_figures` else.
+    includes it. All figures where no names are given; those without numbers are left out. The
+    same records give the same bytes. Raises StoreError for a folder that cannot be written, and,
+    before anything is drawn, naming every file in the way that we never wrote.
     """
     makers = _makers(run.design.suite.tracks)
     wanted = list(names) or list(makers)
-    folder = run_folder(run.path) if out is None else OutFolder(out)
+    folder = OutFolder(out or run.path)
     below = f"{PAPER}/" if out is None else ""
     endings = ("pdf", "svg", "png", "txt", "tex")
     folder.check(f"{below}{name}.{ending}" for name in wanted for ending in endings)

@@ -15,6 +15,7 @@ import pandas as pd
 import yaml
 from pydantic import BaseModel, ConfigDict
 
+from phyblock.files import OutFolder
 from phyblock.registry import added_measures
 from phyblock.results.estimates import (
     all_estimates,
@@ -41,7 +42,6 @@ from phyblock.results.text import (
     track_column,
     track_text,
 )
-from phyblock.run.store import run_folder
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of, kinds
 from phyblock.tracks.measures import CELL, Measure
@@ -448,7 +448,7 @@ def write_tables(path: str | Path) -> TablesWritten:
         texts[f"{TABLES}/{name}.csv"] = to_csv(table.frame, "%.6f")
         texts[f"{TABLES}/{name}.md"] = to_markdown(table.view)
         texts[f"{TABLES}/{name}.tex"] = to_latex(table.view, f"phyblock-{name}")
-    folder = run_folder(run.path)
+    folder = OutFolder(run.path)
     written = folder.write(texts)
     # Coverage that was not complete before may be so now.
     known = set(table_files()) - set(texts)

@@ -14,6 +14,7 @@ from phyblock.config.suite import Suite, SuiteFiles
 from phyblock.config.yaml import YamlSource
 from phyblock.data import Dataset
 from phyblock.errors import DataError, Problem, SpecError, StoreError
+from phyblock.files import OutFolder
 from phyblock.parsing.plan import reader_version
 from phyblock.records.files import run_records
 from phyblock.records.manifest import MANIFEST, Manifest, read_manifest, suite_of
@@ -21,7 +22,7 @@ from phyblock.records.record import Record, StoredError
 from phyblock.run.judge import about_item, judged, judged_apart, read_extraction
 from phyblock.run.manifest import code_versions
 from phyblock.run.plan import CHANGED, asked_about, recorded_dataset
-from phyblock.run.store import check_place, locked, run_folder, write_run
+from phyblock.run.store import check_place, locked, write_run
 from phyblock.text import counted
 from phyblock.tracks import AnyTrack, EpisodeTrack, Item, kind_of, open_tracks
 from phyblock.tracks.base import CARRYING, ENGINE, Opening
@@ -65,7 +66,7 @@ def rescore(
         changes["identity"] = f"{manifest.identity} scored by {by}"
         changes["suite"] = suite.model_dump(mode="json")
         if out is None:
-            run_folder(folder).check([f"{target.relative_to(folder)}/"])
+            OutFolder(folder).check([f"{target.relative_to(folder)}/"])
         check_place(target)
         if (target / MANIFEST).exists() and read_manifest(target).identity != changes["identity"]:
             hint = "choose another folder with --out"

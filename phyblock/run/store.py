@@ -74,7 +74,7 @@ class RunStore:
         try:
             with writing(folder, _HINT):
                 check_place(folder)
-                run_folder(folder).claim([])
+                OutFolder(folder).claim([])
                 self._lock.enter_context(locked(folder))
                 self._claim(manifest)
                 records = run_records(folder, manifest, samples, whole=True)
@@ -112,7 +112,7 @@ class RunStore:
         earlier = read_stopped(self._folder).models
         kept = {name: why for name, why in earlier.items() if name not in asked}
         stopped = Stopped(models={**kept, **models}, run=run)
-        folder = run_folder(self._folder)
+        folder = OutFolder(self._folder)
         if stopped.models or stopped.run:
             folder.write({STOPPED: json.dumps(stopped.fields(), indent=2) + "\n"})
         else:
@@ -267,11 +267,6 @@ _BEGUN = re.compile(rf"{re.escape(LOCK)}|{re.escape(LIST)}|\.[0-9a-f]{{32}}\.par
 """What a run that was killed before it had a manifest leaves behind."""
 
 
-def run_folder(path: Path) -> OutFolder:
-    """A run's folder, to write into what can be made again from its records."""
-    return OutFolder(path)
-
-
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
     """Hold the lock of a run folder, which one process writes; StoreError where another does."""
@@ -315,7 +310,7 @@ def write_run(folder: Path, manifest: Manifest, records: Iterable[Record]) -> No
     files: dict[str, str | Iterator[bytes]] = {RECORDS: lines, MANIFEST: manifest_text(manifest)}
     # Where a run is replaced, a kill between the two leaves one that has to be scored again.
     names = (RECORDS, MANIFEST) if (folder / MANIFEST).exists() else (MANIFEST, RECORDS)
-    run_folder(folder).claim([])
+    OutFolder(folder).claim([])
     for name in names:
         with writing(folder / name):
             atomic_write(folder / name, files[name], sync=True)
@@ -393,11 +388,6 @@ def prompt_of(messages: Sequence[Message]) -> Prompt:
     fields = [message.fields() for message in content]
     digest = hex_digest(json.dumps(fields, sort_keys=True, separators=(",", ":")))
     return Prompt(sha256=digest, messages=content)
-
-
-def read_prompts(folder: Path) -> dict[str, tuple[PromptMessage, ...]]:
-    """The messages of every prompt of a run folder, by digest."""
-    return {line.sha256: line.messages for _, line in PromptLines(folder)}
 
 
 def _content(message: Message) -> PromptMessage:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
@@ -26,11 +26,9 @@ from phyblock.results.estimates import (
     main_column,
     main_measure,
 )
-from phyblock.results.figures import figure_files, figure_titles, write_figures
 from phyblock.results.load import Run
 from phyblock.results.tables import TablesWritten, coverage_frame, table_files
 from phyblock.results.text import NO_VALUE, captioned, number, spread
-from phyblock.run.store import run_folder
 from phyblock.tracks.base import kind_of
 from phyblock.types import WITHOUT_REPLY
 from phyblock.web.pack import (
@@ -287,9 +285,8 @@ def _short(message: str) -> str:
     return text if len(text) <= _MOST_CHARACTERS else f"{text[:_MOST_CHARACTERS].rstrip()} …"
 
 
-def write_report(written: TablesWritten, data: Path | None = None, *, figures: bool = True) -> Path:
-    """Write figures, `report.html` and `report/` of a run whose tables were written; return the
-    page.
+def write_report(written: TablesWritten, data: Path | None = None) -> Path:
+    """Write `report.html` and `report/` of a run whose tables were written; return the page.
 
     The page draws goals, candidates and assemblies from the scenes: `data` is where the data set is
     now, if it has moved; where it cannot be read, the page says so and shows the rest. Pictures
@@ -299,17 +296,16 @@ def write_report(written: TablesWritten, data: Path | None = None, *, figures: b
     """
     run = written.run
     sources = open_sources(run, data)
-    out = run_folder(run.path)
+    out = OutFolder(run.path)
     out.check(page_files())
     with out.alone(), writing(run.path / REPORT_FILE):
-        drawn = write_figures(run) if figures else ()
         paths = [run.path / name for name in (MANIFEST, RECORDS, PROMPTS, STOPPED)]
         build = build_of(sources.lacking, [digest_of_file(p) for p in paths if p.exists()])
         own = f"{_FOLDER}/{build}/"
         out.claim([REPORT_FILE])
         with out.making(own) as new:
             _write_data(run, sources, out, new, build)
-            page = _page(written, drawn, build)
+            page = _page(written, build)
         (path,) = out.write({REPORT_FILE: page})
         # A page of an earlier build that is still open says that it was written again.
         lasting = (own, _PICTURES)
@@ -318,8 +314,8 @@ def write_report(written: TablesWritten, data: Path | None = None, *, figures: b
 
 
 def files_of(*, page: bool) -> tuple[str, ...]:
-    """Return what a run folder may get: tables, and with `page` figures and the page as well."""
-    return table_files() + (figure_files() + page_files() if page else ())
+    """Return what a run folder may get: tables, and with `page` the page as well."""
+    return table_files() + (page_files() if page else ())
 
 
 def page_files() -> tuple[str, ...]:
@@ -329,9 +325,8 @@ def page_files() -> tuple[str, ...]:
 
 def report_files(folder: Path) -> dict[str, Path]:
     """Return the report's page and what it loads, by their names below the run folder."""
-    found = [folder / REPORT_FILE]
-    for place in (_FOLDER, "figures"):
-        found += (path for path in sorted((folder / place).rglob("*")) if path.is_file())
+    below = sorted((folder / _FOLDER).rglob("*"))
+    found = [folder / REPORT_FILE, *(path for path in below if path.is_file())]
     return {path.relative_to(folder).as_posix(): path for path in found if not path.is_symlink()}
 
 
@@ -373,9 +368,9 @@ def _write_data(run: Run, sources: Sources, out: OutFolder, new: Path, build: st
     write_script(new, "index", build, content)
 
 
-def _page(written: TablesWritten, figures: Sequence[Path], build: str) -> str:
+def _page(written: TablesWritten, build: str) -> str:
     """Return the HTML of the report; every text is escaped, and only our own scripts may run."""
-    run, titles = written.run, figure_titles(written.run)
+    run = written.run
     manifest, design, table = run.manifest, run.design, coverage_frame(run)
     answered = int(table["recorded"].sum() - table[list(WITHOUT_REPLY)].sum().sum())
     expected = int(table["expected"].sum())
@@ -402,11 +397,6 @@ def _page(written: TablesWritten, figures: Sequence[Path], build: str) -> str:
         cautions=cautions(run),
         models=frozenset(design.model_names),
         headlines=headlines(run),
-        figures=[
-            (f"{path.parent.name}/{path.name}", titles.get(path.stem, path.stem))
-            for path in figures
-            if path.suffix == ".svg"
-        ],
         tables=[
             (view, [(name, len([*columns])) for name, columns in spans(view.columns)])
             for name, view in written.views.items()

@@ -10,7 +10,7 @@ import pytest
 from phyblock.bundle import model_name, portable, portable_manifest
 from phyblock.records.files import known_records
 from phyblock.records.manifest import Manifest
-from tests.report.factory import manifest, record
+from tests.web.factory import manifest, record
 
 SERVERS = ["http://10.0.0.5:8000/v1", "http://gpu-7.lab:9000/v1"]
 AT_HOME = "/srv/models/Qwen2-VL"

@@ -20,7 +20,7 @@ from phyblock.results.load import load_run
 from phyblock.results.tables import summary_of, write_tables
 from phyblock.results.text import Column, TextTable, to_csv, to_latex, to_markdown
 from phyblock.run.events import RunStarted
-from tests.report.factory import LEVELS, manifest, record, score, write_run
+from tests.web.factory import LEVELS, manifest, record, score, write_run
 
 NAME = ":b: [red]x[/red]\n=2 \x1b[31m\u202e|&\r"
 SHOWN = ":b: [red]x[/red] =2  [31m |&"

@@ -17,7 +17,7 @@ from phyblock.errors import StoreError
 from phyblock.files import LIST
 from phyblock.results.tables import write_tables
 from phyblock.web.report import write_report
-from tests.report.factory import LEVELS, manifest, record, score, write_run
+from tests.web.factory import LEVELS, manifest, record, score, write_run
 from tests.workspace import COMMAND, Workspace
 
 Prepare = Callable[[Path], None]
@@ -121,7 +121,6 @@ IN_THE_WAY: dict[str, tuple[Prepare, str]] = {
     "linked-report": (lambda run: link(run / "report"), "report: .*it is a link"),
     "linked-tables": (lambda run: link(run / "tables"), "tables: .*it is a link"),
     "page": (lambda run: put(run / "report.html"), r"report\.html: .*phyblock did not make"),
-    "figure": (lambda run: put(run / "figures" / "errors.svg"), "errors.svg: .*did not make"),
     "table": (lambda run: put(run / "tables" / "table1.md"), "table1.md: .*did not make"),
 }
 
@@ -152,7 +151,6 @@ def test_a_run_goes_on_only_where_its_report_can_be_written(suite: Workspace) ->
                 call(*words)
             for path in (suite.out / "report", suite.out / "report.html"):
                 path.unlink(missing_ok=True)
-            (suite.out / "figures" / "errors.svg").unlink(missing_ok=True)
     left = files(suite.root)
     assert {path: left[path] for path in before} == before
     call(*words, "--no-report")
@@ -172,12 +170,12 @@ def test_a_run_writes_through_no_link(suite: Workspace) -> None:
 def test_scripts_that_we_did_not_write_stay_whatever_their_names(finished: Path) -> None:
     theirs = finished / "report" / "0123456789ab" / "index.js"
     put(theirs)
-    write_report(write_tables(finished), figures=False)
+    write_report(write_tables(finished))
     (first,) = set((finished / "report").iterdir()) - {theirs.parent}
     put(first / "records-7.js")
     with (finished / "records.jsonl").open("a") as file:
         file.write((finished / "records.jsonl").read_text().splitlines()[0] + "\n")
-    write_report(write_tables(finished), figures=False)
+    write_report(write_tables(finished))
     (second,) = set((finished / "report").iterdir()) - {theirs.parent, first}
     assert theirs.read_text() == "mine"
     assert [path.name for path in first.iterdir()] == ["records-7.js"]
@@ -189,20 +187,20 @@ def test_a_link_in_the_place_of_a_build_is_not_followed(finished: Path, tmp_path
     put(tmp_path / "theirs" / "index.js")
     (finished / "report").mkdir()
     (finished / "report" / "0123456789ab").symlink_to(tmp_path / "theirs")
-    page = write_report(write_tables(finished), figures=False)
+    page = write_report(write_tables(finished))
     assert (finished / "report" / "0123456789ab").is_symlink()
     (build,) = (path for path in (finished / "report").iterdir() if not path.is_symlink())
     build.rename(tmp_path / "build")
     (finished / "report" / build.name).symlink_to(tmp_path / "theirs")
     with pytest.raises(StoreError, match="it is a link"):
-        write_report(write_tables(finished), figures=False)
+        write_report(write_tables(finished))
     assert files(tmp_path / "theirs") == {"index.js": b"mine"}
     assert page.is_file()
 
 
 def test_reports_that_are_written_at_once_all_come_to_their_end(finished: Path) -> None:
     def write(_: int) -> Path:
-        return write_report(write_tables(finished), figures=False)
+        return write_report(write_tables(finished))
 
     with ThreadPoolExecutor(4) as pool:
         pages = list(pool.map(write, range(5)))

@@ -15,8 +15,8 @@ from tests.workspace import COMMAND, Workspace
 
 
 def in_terminal(workspace: Workspace, answer: str, *args: str) -> tuple[int, str]:
-    """Run with a terminal of 120 columns, and type `answer` first; exit code and screen. No figures
-    and no page, which take seconds.
+    """Run with a terminal of 120 columns, and type `answer` first; exit code and screen. No page,
+    which takes seconds.
     """
     master, slave = pty.openpty()
     with subprocess.Popen(

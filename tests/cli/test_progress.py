@@ -20,7 +20,7 @@ from phyblock.run.events import (
     RunStarted,
     SampleDone,
 )
-from tests.report.factory import record
+from tests.web.factory import record
 
 
 def retry(status: int | None = 429, wait_s: float = 1.0, model: str = "alpha") -> ModelEvent:

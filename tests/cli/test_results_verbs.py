@@ -9,7 +9,7 @@ from click.testing import CliRunner, Result
 
 from phyblock.cli.main import phyblock
 from phyblock.errors import SpecError, StoreError
-from tests.report.factory import LEVELS, manifest, record, score, write_run
+from tests.web.factory import LEVELS, manifest, record, score, write_run
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from phyblock.records.record import Reply, Usage
 from phyblock.results.load import load_run
 from tests.documents import ROOT, make_documents
 from tests.records.damage import DAMAGED, lines_before, plan_record, with_value
-from tests.report.factory import manifest
+from tests.web.factory import manifest
 
 numbers = st.none() | st.integers(-(10**40), 10**40)
 amounts = st.none() | st.floats()

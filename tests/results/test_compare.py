@@ -22,7 +22,7 @@ from phyblock.results.compare import (
     write_comparison,
 )
 from phyblock.results.load import Run
-from tests.report.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
+from tests.web.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
 
 Records = list[dict[str, Any]]
 

@@ -18,7 +18,7 @@ from phyblock.results.estimates import all_estimates, blind_baselines, headline_
 from phyblock.results.load import Run
 from phyblock.scoring.counts import Counts, micro
 from phyblock.scoring.plan import ERROR_TYPES
-from tests.report.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
+from tests.web.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
 
 Records = list[dict[str, Any]]
 

@@ -11,7 +11,7 @@ import pytest
 from phyblock.errors import SpecError, StoreError
 from phyblock.results.export import FORMATS, export_frame, export_run
 from phyblock.results.load import load_run
-from tests.report.factory import LEVELS, manifest, record, score, write_run
+from tests.web.factory import LEVELS, manifest, record, score, write_run
 
 HF = "the package datasets is not installed"
 

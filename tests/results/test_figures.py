@@ -12,16 +12,14 @@ from phyblock.results.figures import (
     COLUMN_IN,
     Look,
     cost,
-    figure_files,
     figure_titles,
     forest,
     levels,
     shares,
-    write_figures,
     write_paper_figures,
 )
 from phyblock.results.load import Run, load_run, of_models
-from tests.report.factory import LEVELS, manifest, record, run_of, score, write_run
+from tests.web.factory import LEVELS, manifest, record, run_of, score, write_run
 
 TRACK = "full_planning"
 MODELS = ("alpha", "beta", "gamma")
@@ -80,7 +78,7 @@ def test_a_run_without_an_answer_draws_nothing_and_does_not_fail(tmp_path: Path)
         record(model, scene, 0, [], outcome="api_error") for model in MODELS for scene in LEVELS
     ]
     write_run(tmp_path, failed, manifest(models=MODELS, seeds=[0]))
-    assert write_figures(load_run(tmp_path)) == ()
+    assert write_paper_figures(load_run(tmp_path), (), Look()) == ()
 
 
 def test_a_forest_has_a_row_a_pair_or_of_two_models_a_row_a_part(run: Run) -> None:
@@ -94,12 +92,11 @@ def test_a_forest_has_a_row_a_pair_or_of_two_models_a_row_a_part(run: Run) -> No
 def test_files_are_the_same_each_time_and_known_beforehand(tmp_path: Path) -> None:
     folder = write_run(tmp_path / "run", records(), manifest(models=MODELS, seeds=[0]))
     run = load_run(folder)
-    first = {file: file.read_bytes() for file in write_figures(run)}
+    first = {file: file.read_bytes() for file in write_paper_figures(run, (), Look())}
     assert {file.stem for file in first} == {
-        *("levels-full-planning", "errors", "losses", "cost-full-planning"),
+        *("levels-full-planning", "errors", "losses", "cost-full-planning", "forest-full-planning"),
     }
-    assert {file: file.read_bytes() for file in write_figures(run)} == first
-    assert {f"figures/{file.name}" for file in first} <= set(figure_files())
+    assert {file: file.read_bytes() for file in write_paper_figures(run, (), Look())} == first
     assert {file.stem for file in first} <= set(figure_titles(run))
 
 
@@ -122,8 +119,8 @@ def test_a_paper_gets_each_figure_in_three_formats_with_a_caption(tmp_path: Path
 
 def test_nothing_of_the_user_is_written_over(tmp_path: Path) -> None:
     folder = write_run(tmp_path / "run", records(), manifest(models=MODELS, seeds=[0]))
-    (folder / "figures").mkdir()
-    (folder / "figures" / "errors.svg").write_text("mine")
+    (folder / "paper").mkdir()
+    (folder / "paper" / "errors.svg").write_text("mine")
     with pytest.raises(StoreError, match=r"errors\.svg"):
-        write_figures(load_run(folder))
-    assert (folder / "figures" / "errors.svg").read_text("utf-8") == "mine"
+        write_paper_figures(load_run(folder), ["errors"], Look())
+    assert (folder / "paper" / "errors.svg").read_text("utf-8") == "mine"

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from phyblock.errors import StoreError
 from phyblock.results.load import load_run
 from phyblock.sim.engine import ENGINES
-from tests.report.factory import (
+from tests.web.factory import (
     laws,
     manifest,
     record,

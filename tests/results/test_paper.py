@@ -9,8 +9,8 @@ import pytest
 
 from phyblock.data.official import match_published
 from phyblock.results.paper import PAPER_TABLES, beside_paper, published_frame, published_table
-from tests.report.factory import manifest, record, run_of, score
 from tests.results.test_estimates import answered, episode
+from tests.web.factory import manifest, record, run_of, score
 
 LEVELS = ["1", "2", "3", "4", "overall"]
 

@@ -14,7 +14,7 @@ from phyblock.results.figures import sensitivity
 from phyblock.results.load import Run
 from phyblock.results.sensitivity import sensitivity_frame, sensitivity_view
 from phyblock.results.text import number
-from tests.report.factory import manifest, record, run_of, score
+from tests.web.factory import manifest, record, run_of, score
 
 VARY = {"background": ["lawn", "white"], "view": ["oblique", "front", "top"]}
 SEEDS = (0, 1)

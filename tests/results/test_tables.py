@@ -34,8 +34,8 @@ from phyblock.results.text import NO_VALUE, number, to_latex, to_markdown
 from phyblock.run.events import Summary
 from phyblock.tracks.base import kinds
 from phyblock.types import OUTCOMES
-from tests.report.factory import laws, manifest, record, record_lists, run_of, score, write_run
 from tests.results.test_estimates import complete, episode, episodes, questions
+from tests.web.factory import laws, manifest, record, record_lists, run_of, score, write_run
 
 Records = list[dict[str, Any]]
 

@@ -12,7 +12,7 @@ from phyblock.records.manifest import read_manifest
 from phyblock.results.compare import check_alike, compare_runs
 from phyblock.results.estimates import main_measure
 from phyblock.results.load import load_run
-from tests.report.factory import manifest, run_of
+from tests.web.factory import manifest, run_of
 from tests.workspace import Workspace
 
 

@@ -25,8 +25,8 @@ from phyblock.tracks import kind_of
 from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.measures import Measure, SampleCounts
 from phyblock.web.report import write_report
-from tests.report.factory import manifest, record, write_run
 from tests.vqa_set import write_questions
+from tests.web.factory import manifest, record, write_run
 from tests.workspace import Workspace
 
 

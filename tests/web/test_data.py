@@ -34,7 +34,7 @@ from phyblock.web.leaderboard import (
 )
 from phyblock.web.pack import Pack, SampleIndex, Sources, pack_samples, places_of
 from phyblock.web.report import headlines, rank_texts, write_report
-from tests.report.factory import laws, manifest, record, record_lists, run_of, score, write_run
+from tests.web.factory import laws, manifest, record, record_lists, run_of, score, write_run
 from tests.workspace import Workspace
 
 JSON = st.recursive(
@@ -62,7 +62,7 @@ class Report:
     """What a page reads out of a folder of scripts."""
 
     def __init__(self, run: Path, data: Path | None = None) -> None:
-        path = write_report(write_tables(run), data, figures=False)
+        path = write_report(write_tables(run), data)
         self.page = path.read_text(encoding="utf-8")
         self.folder = run / self.page.partition('data-folder="')[2].partition('"')[0]
         self.index = unpacked(self.folder / "index.js")
@@ -128,7 +128,6 @@ def test_every_text_of_the_page_is_escaped_and_only_our_script_may_run(tmp_path:
     facts["suite"] |= {"models": ["alpha"], "description": hostile}
     folder = write_run(tmp_path / "run", [record(hostile, scores=[score(1, 0, 1)])], facts)
     page = Report(folder).page
-    assert not (folder / "figures").exists()
     assert "<script>alert" not in page
     assert "<img src=x" not in page
     assert page.count("<script>") == 1

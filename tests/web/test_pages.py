@@ -16,8 +16,8 @@ from phyblock.results.tables import write_tables
 from phyblock.scoring.plan import ERROR_TYPES
 from phyblock.web.report import write_report
 from tests.browser import expect
-from tests.report.factory import manifest, write_run
 from tests.web.conftest import HOSTILE, MARKUP, NAME, ReportVisit, SiteVisit
+from tests.web.factory import manifest, write_run
 from tests.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -107,9 +107,6 @@ def test_results_stand_in_the_page_before_anything_is_loaded(visit: ReportVisit)
     assert page.inner_text("h1") == "trial"
     assert {"Full planning", "VQA"} <= set(page.locator(".headline h2").all_inner_texts())
     assert not any("/report/" in url for url in visit.requests)
-    for picture in page.locator(".figures img").all():
-        picture.scroll_into_view_if_needed()
-        picture.evaluate("image => image.decode()")
     page.get_by_text("Coverage, suite trial").click()
     assert page.get_by_text("Expected").first.is_visible()
     page.get_by_role("button", name="Level 3").first.click()
@@ -281,7 +278,7 @@ def test_what_a_model_saw_is_shown_pixel_for_pixel_or_said_not_to_be_kept(
     shutil.copytree(troubled.out, tmp_path / "run")
     shutil.rmtree(tmp_path / "run" / "report")
     monkeypatch.setenv("PHYBLOCK_CACHE", str(tmp_path / "cache"))
-    other = visiting(write_report(write_tables(tmp_path / "run"), figures=False))
+    other = visiting(write_report(write_tables(tmp_path / "run")))
     other.show(sent["full_planning"]["sample"], tab="saw")
     notice = other.page.locator("#panel-saw .notice")
     expect(notice).to_contain_text("is not kept beside this page")
@@ -299,7 +296,7 @@ def test_a_run_in_trouble_says_so_first(
     page.locator(".headline a", has_text="locked").first.click()
     expect(page.locator("#list-status")).to_contain_text("no sample of locked here: 0 of 2")
     folder = write_run(tmp_path / "run", [], manifest())
-    empty = visiting(write_report(write_tables(folder), figures=False))
+    empty = visiting(write_report(write_tables(folder)))
     empty.open("matrix")
     expect(empty.page.locator("#matrix-none")).to_contain_text("This run is not finished: 0 of ")
 
@@ -312,7 +309,7 @@ def test_a_report_without_data_or_scripts_shows_what_it_has(
     facts = yaml.safe_load((folder / "run.yaml").read_text())
     facts["dataset"]["root"] = "gone"
     (folder / "run.yaml").write_text(yaml.safe_dump(facts))
-    visit = visiting(write_report(write_tables(folder), figures=False))
+    visit = visiting(write_report(write_tables(folder)))
     page = visit.show("full_planning/oracle/t5/s0")
     assert "Nothing can be drawn without the data set" in page.inner_text("#detail")
     assert page.locator(".strip button.right").count() == 4
