@@ -8,10 +8,9 @@ records know the numbers in the file. Worked examples are other items with right
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import islice
 from typing import Any, Generic, Protocol, TypeVar
 
 from phyblock.config.suite import Suite
@@ -96,6 +95,10 @@ def _spread_out(size: int) -> list[int]:
     return list(dict.fromkeys(part * size // 2**digits for part in parts))
 
 
+def _bases(item: Item) -> set[str]:
+    return {item.scene.id, *item.scene.parents}
+
+
 class Elsewhere(Generic[ItemT]):
     """Finds, for an item, another of its sort about a scene that shares no base scene with its own.
 
@@ -111,25 +114,22 @@ class Elsewhere(Generic[ItemT]):
 
     def of(self, item: ItemT, seed: int) -> ItemT:
         """Return the one whose picture is shown, which depends on item and seed alone."""
-        others = self._others(item)
+        others = self.others(item)
         digest = drawn_bytes("wrong image", seed, item.key)
         return others[int.from_bytes(digest, "big") % len(others)]
 
     def check(self, items: Sequence[ItemT], noun: str, field: str) -> None:
         """Raise SpecError for the first item that has no other; `field` is that of the suite."""
-        lacking = next((item for item in items if not self._others(item)), None)
+        lacking = next((item for item in items if not self.others(item)), None)
         if lacking is not None:
             message = f"has no {noun} of the same kind about another scene to take pictures from"
             raise SpecError(Problem(f"{noun} {lacking.key}", message, field))
 
-    def _others(self, item: ItemT) -> list[ItemT]:
+    def others(self, item: ItemT) -> list[ItemT]:
+        """Return all that can stand in for an item, in the order of the pool."""
         if item.key not in self._others_of:
-            own = set(item.scene.parents or (item.scene.id,))
-            self._others_of[item.key] = [
-                one
-                for one in self._alike.get(self._sort_of(item), ())
-                if own.isdisjoint(one.scene.parents or (one.scene.id,))
-            ]
+            alike, own = self._alike.get(self._sort_of(item), ()), _bases(item)
+            self._others_of[item.key] = [one for one in alike if own.isdisjoint(_bases(one))]
         return self._others_of[item.key]
 
 
@@ -241,55 +241,50 @@ def presentation_fields(task: AssemblyTask) -> dict[str, Any]:
     return {"shown": {"order": list(task.order), "goal": goal}}
 
 
-@dataclass
 class Examples(Generic[ItemT]):
     """Chooses `n` worked examples for an item out of a pool.
 
     They are tried in one order for all items, so that requests begin alike: those about the scenes
     `named` first, then as `seed` draws; no two are about one scene. None is of another sort than
     the item, shares a base scene with it, or has its goal, be it turned, mirrored or shifted.
-    Sorted by digests, the order is the same on every machine.
     """
 
-    pool: Iterable[ItemT]
-    n: int
-    named: Sequence[str] = ()
-    seed: int = 0
-    sort_of: Callable[[ItemT], Hashable] = lambda _: None
-    _alike: dict[Hashable, list[ItemT]] = field(default_factory=dict, init=False)
-    _goals: dict[str, bytes] = field(default_factory=dict, init=False)
+    def __init__(
+        self,
+        pool: Iterable[ItemT],
+        n: int,
+        named: Sequence[str] = (),
+        seed: int = 0,
+        sort_of: Callable[[ItemT], Hashable] = lambda _: None,
+    ) -> None:
+        def place(one: ItemT) -> tuple[int, bytes]:
+            # Sorted by digests, the order is the same on every machine.
+            at = named.index(one.scene.id) if one.scene.id in named else len(named)
+            return at, drawn_bytes("example", seed, one.key)
 
-    def __post_init__(self) -> None:
-        """Put the pool in order."""
-        for one in sorted(self.pool, key=self._place) if self.n else ():
-            self._alike.setdefault(self.sort_of(one), []).append(one)
+        self._n = n
+        self._pool = Elsewhere(sorted(pool, key=place) if n else (), sort_of)
+        self._goals: dict[str, bytes] = {}
 
     def of(self, item: ItemT) -> tuple[ItemT, ...]:
         """Return the examples of an item, fewer than `n` where there are no more."""
-        return tuple(islice(self._others(item), self.n))
+        found: dict[str, ItemT] = {}
+        for one in self._pool.others(item) if self._n else ():
+            if len(found) == self._n:
+                break
+            if one.scene.id not in found and self._goal(one) != self._goal(item):
+                found[one.scene.id] = one
+        return tuple(found.values())
 
     def used(self, items: Iterable[ItemT]) -> tuple[ItemT, ...]:
         """Return all that are examples of any of the items, by key."""
         by_key = {one.key: one for item in items for one in self.of(item)}
         return tuple(by_key[key] for key in sorted(by_key))
 
-    def _others(self, item: ItemT) -> Iterator[ItemT]:
-        bases, scenes = {item.scene.id, *item.scene.parents}, set[str]()
-        for one in self._alike.get(self.sort_of(item), ()):
-            if one.scene.id in scenes or not bases.isdisjoint((one.scene.id, *one.scene.parents)):
-                continue
-            if self._goal(one) != self._goal(item):
-                scenes.add(one.scene.id)
-                yield one
-
     def _goal(self, item: ItemT) -> bytes:
         if item.key not in self._goals:
             self._goals[item.key] = fingerprint(item.scene.blocks)
         return self._goals[item.key]
-
-    def _place(self, one: ItemT) -> tuple[int, bytes]:
-        place = self.named.index(one.scene.id) if one.scene.id in self.named else len(self.named)
-        return place, drawn_bytes("example", self.seed, one.key)
 
 
 def examples_of(
@@ -307,22 +302,21 @@ def examples_of(
     wanted = suite.examples
     n, named = (wanted, ()) if isinstance(wanted, int) else (len(wanted), wanted)
     kept = list(pool) if n else []
-    known = {one.scene.id for one in kept}
+    known = sorted({one.scene.id for one in kept})
     problems = []
     for at, name in enumerate(named):
         if name not in known:
             where, message = suite.where("examples", at), "is no scene that an example can be about"
-            allowed = f"scenes, such as {min(known)}" if known else "no scene of these data"
-            hint = did_you_mean(name, sorted(known))
+            allowed = f"scenes, such as {known[0]}" if known else "no scene of these data"
+            hint = did_you_mean(name, known)
             problems.append(Problem(where, message, f"examples[{at}]", name, allowed, hint))
     if problems:
         raise SpecError(problems)
     examples = Examples(kept, n, named, min(suite.seeds), sort_of)
     for item in items if n else ():
         if (offered := len(examples.of(item))) < n:
-            message = f"{noun} {item.key} has fewer others to be shown as examples"
+            where, message = suite.where("examples"), "has fewer others to be shown as examples"
             allowed = "others of its kind that share neither base scene nor goal with it"
-            raise SpecError(
-                Problem(suite.where("examples"), message, "examples", str(offered), allowed)
-            )
+            message = f"{noun} {item.key} {message}"
+            raise SpecError(Problem(where, message, "examples", str(offered), allowed))
     return examples

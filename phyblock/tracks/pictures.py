@@ -47,6 +47,7 @@ _Result = TypeVar("_Result")
 _WORKERS = 4
 _KEPT = 256
 """Pictures that stay in memory: more than are under way at once."""
+_PNG_START, _PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
 
 
 @dataclass(frozen=True)
@@ -109,10 +110,11 @@ class Workshop:
         key = drawing.key
         if key not in self._making:
             self._making[key] = asyncio.create_task(self._draw(drawing))
-            self._making[key].add_done_callback(_take_note)
+            # Where all who waited were cancelled, nobody asks for the failure: asyncio prints it.
+            self._making[key].add_done_callback(lambda done: done.cancelled() or done.exception())
         # Shielded: others may wait for the same picture when one waiter is cancelled.
         data = await asyncio.shield(self._making[key])
-        return self._remembered(drawing, to_image(data, drawing.label))
+        return self._remembered(drawing, data)
 
     def kept(self, drawing: Drawing) -> Image | None:
         """Return a picture at hand; None where it is not there, not whole, or no picture.
@@ -124,14 +126,13 @@ class Workshop:
             self._recent.move_to_end(name)
             return self._recent[name]
         if drawing.is_file:
-            return self._remembered(drawing, to_image(drawing.make(), drawing.label))
-        data = _whole_png(self._path(drawing.key))
-        try:
-            found = None if data is None else to_image(data, drawing.label)
-        except DataError:
-            # It is drawn again.
-            return None
-        return None if found is None else self._remembered(drawing, found)
+            return self._remembered(drawing, drawing.make())
+        # One that is not whole, or no picture, is drawn again.
+        with contextlib.suppress(OSError, ValueError, DataError):
+            data = read_bytes(self._path(drawing.key), LARGEST_PICTURE_BYTES)
+            if data.startswith(_PNG_START) and data.endswith(_PNG_END):
+                return self._remembered(drawing, data)
+        return None
 
     def close(self) -> None:
         """Stop the worker processes."""
@@ -139,7 +140,8 @@ class Workshop:
             self._pool.shutdown(wait=True, cancel_futures=True)
             self._pool = None
 
-    def _remembered(self, drawing: Drawing, image: Image) -> Image:
+    def _remembered(self, drawing: Drawing, data: bytes) -> Image:
+        image = Image(data, drawing.label, *picture_size(data, f"picture {drawing.label}"))
         self._recent[drawing.key, drawing.label] = image
         if len(self._recent) > _KEPT:
             self._recent.popitem(last=False)
@@ -159,27 +161,6 @@ class Workshop:
 
     def _path(self, key: str) -> Path:
         return self._folder / key[:2] / f"{key}.png"
-
-
-def _take_note(drawn: asyncio.Task[bytes]) -> None:
-    # Where all who waited were cancelled, nobody asks for the failure, and asyncio would print it.
-    if not drawn.cancelled():
-        drawn.exception()
-
-
-def to_image(data: bytes, label: str) -> Image:
-    """Return an encoded picture as it is sent; DataError for what is none."""
-    return Image(data, label, *picture_size(data, f"picture {label}"))
-
-
-def _whole_png(path: Path) -> bytes | None:
-    """Return the bytes of a picture in the cache; None when it is not there, or not whole."""
-    try:
-        data = read_bytes(path, LARGEST_PICTURE_BYTES)
-    except (OSError, ValueError):
-        return None
-    is_whole = data.startswith(b"\x89PNG\r\n\x1a\n") and data.endswith(b"IEND\xaeB`\x82")
-    return data if is_whole else None
 
 
 class Pictures(ABC):
@@ -283,18 +264,18 @@ class ScenePictures(Pictures):
     def _files(self, task: AssemblyTask) -> tuple[Drawing, ...]:
         """Return the data set's own composite, or what is cut out of it."""
         shown, own = goal_of(task), _composite(task)
-        grid = partial(_half, own, is_goal=False)
-        if shown is None:
-            makes: dict[str, Callable[[], bytes]] = {"candidates": grid}
-        elif self._images.layout == "composite":
-            is_whole = not isinstance(task, ShownTask)
-            join = partial(_joined, partial(_half, _composite(shown), is_goal=True), grid)
-            makes = {"composite": partial(read_picture, own) if is_whole else join}
-        else:
-            apart = {"goal": partial(_half, _composite(shown), is_goal=True), "candidates": grid}
-            makes = {label: apart[label] for label in self._images.order}
+        grid: Callable[[], bytes] = partial(_half, own, is_goal=False)
+        makes = {"candidates": grid}
+        if shown is not None:
+            goal = partial(_half, _composite(shown), is_goal=True)
+            makes = {"goal": goal, "candidates": grid}
+            if self._images.layout == "composite":
+                is_whole = not isinstance(task, ShownTask)
+                whole = partial(read_picture, own) if is_whole else partial(_joined, goal, grid)
+                makes = {"composite": whole}
+        labels = self._images.order if len(makes) == 2 else makes
         name = getattr(task, "shown_as", task.key)
-        return tuple(Drawing(label, name, make, is_file=True) for label, make in makes.items())
+        return tuple(Drawing(label, name, makes[label], is_file=True) for label in labels)
 
 
 def goal_of(task: AssemblyTask) -> AssemblyTask | None:

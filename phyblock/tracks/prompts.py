@@ -183,7 +183,10 @@ class TemplatePrompt:
                 known = "names that are there: " + ", ".join(sorted(facts))
                 if any(f"'{fact}' is undefined" in why for fact in facts):
                     hint = "macros of another file see it by {% import ... with context %}"
-            where, message = self._place_of(error), f"cannot be rendered: {why}"
+            files = {str(source.path) for source in self._sources.values()}
+            frames = traceback.extract_tb(error.__traceback__)
+            places = [f"{one.filename}:{one.lineno}" for one in frames if one.filename in files]
+            where, message = [f"{self._path}:1", *places][-1], f"cannot be rendered: {why}"
             problem = Problem(where, message, f"block {block}", "", known, hint)
             raise PromptError(problem) from error
 
@@ -219,13 +222,6 @@ class TemplatePrompt:
         context = self._template.new_context({**facts, **above.vars})
         return "".join(self._template.blocks[block](context))
 
-    def _place_of(self, error: Exception) -> str:
-        """Return the file and line at which rendering failed."""
-        files = {str(source.path) for source in self._sources.values()}
-        frames = traceback.extract_tb(error.__traceback__)
-        places = [f"{one.filename}:{one.lineno}" for one in frames if one.filename in files]
-        return places[-1] if places else f"{self._path}:1"
-
 
 Prompt = OfficialPrompt | TemplatePrompt
 """What turns pictures and facts about a sample into chat messages."""
@@ -256,25 +252,23 @@ def _named(node: Any, folders: Sequence[Path], where: str) -> list[tuple[str, Pa
     if isinstance(node, nodes.Extends):
         hint = "use {% include %} or {% import %}"
         raise PromptError(Problem(where, "a prompt cannot extend another", hint=hint))
-    named = list(jinja2.meta.find_referenced_templates(nodes.Template([node])))
-    names = [name for name in named if name]
-    if not names or len(names) < len(named):
+    names = list(jinja2.meta.find_referenced_templates(nodes.Template([node])))
+    if not names or not all(names):
         message = "includes a file that is not named in quotes: what is sent would not be known"
         raise PromptError(Problem(where, message))
     found = []
-    for name in names:
+    for name in filter(None, names):
         inside = PurePosixPath(name)
         path = next((folder / inside for folder in folders if (folder / inside).is_file()), None)
         parts = inside.parts if path is None else (*inside.parts, path.resolve().name)
-        is_outside = inside.is_absolute() or "\\" in name
-        is_hidden = any(part.startswith(".") for part in parts)
-        if is_outside or is_hidden or (path is not None and not parts[-1].endswith(".j2")):
+        is_open = not (inside.is_absolute() or "\\" in name or any(p[0] == "." for p in parts))
+        if not is_open or (path is not None and not parts[-1].endswith(".j2")):
             allowed = "a file that ends in .j2, beside the template or below it, no part of whose "
             allowed += "path begins with a dot"
             raise PromptError(Problem(where, "includes what is no template", "", name, allowed))
         if path is not None:
             found.append((name, path))
     if not found and not getattr(node, "ignore_missing", False):
-        allowed = f"a file in {' or '.join(map(str, folders))}"
-        raise PromptError(Problem(where, "no such file", "", ", ".join(names), allowed))
+        allowed, missing = f"a file in {' or '.join(map(str, folders))}", ", ".join(map(str, names))
+        raise PromptError(Problem(where, "no such file", "", missing, allowed))
     return found
