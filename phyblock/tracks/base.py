@@ -72,9 +72,8 @@ class Judgement(Protocol):
 class Episode(Judgement, Protocol):
     """One sample of several turns, as a state machine that replies alone drive.
 
-    The same replies lead to the same requests, so that a killed run goes on in the middle of an
-    episode by taking the replies it has. `fields` holds `turns` too, a mapping for each reply
-    taken, as things stand.
+    The same replies lead to the same requests, so that a killed run goes on in the middle of it.
+    `fields` holds `turns` too, a mapping for each reply taken.
     """
 
     async def request(self) -> Request | None:
@@ -213,9 +212,7 @@ class Track(ABC, Generic[ItemT]):
         return None
 
     def identity(self) -> dict[str, Any]:
-        """Return what decides its results, JSON-able: name and version of the prompt, a digest of
-        all that decides the pictures, and the worked examples where there are any.
-        """
+        """Return what decides its results as JSON: the prompt, a digest of pictures, examples."""
         if self.prompt is None or self.pictures is None:
             return {"prompt": None, "pictures": None}
         examples = self.examples.used(self.items)
@@ -236,9 +233,7 @@ class Track(ABC, Generic[ItemT]):
         """
 
     async def work_out(self, work: Callable[[], Any]) -> Any:
-        """Return what `work`, a `partial` of a function of a module, gives in another process, or
-        in a thread where no pictures are drawn.
-        """
+        """Return what `work`, a `partial`, gives in another process; without a shop in a thread."""
         if self.shop is None:
             return await asyncio.to_thread(work)
         return await self.shop.work_out(work)
@@ -283,7 +278,7 @@ class SingleTrack(Track[ItemT]):
         """Return the request of one sample; without messages for models that need none."""
         if not with_messages or self.pictures is None:
             return Request(item.key, seed, (), params, "", self.subject_of(item))
-        drawn = [self.drawn(one) for one in self.examples.of(item)] + [self.drawn(item, seed)]
+        drawn = self._drawn_with_examples(item, seed)
         images = [() if one is None else await self.pictures.of(one) for one in drawn]
         return self._request(item, seed, params, images)
 
@@ -292,10 +287,15 @@ class SingleTrack(Track[ItemT]):
         if self.pictures is None:
             yield Request(item.key, 0, (), {}, "", self.subject_of(item)), True
             return
-        drawn = [self.drawn(one) for one in self.examples.of(item)] + [self.drawn(item, 0)]
-        found = [((), True) if one is None else self.pictures.outline(one) for one in drawn]
+        found = [
+            ((), True) if one is None else self.pictures.outline(one)
+            for one in self._drawn_with_examples(item, 0)
+        ]
         request = self._request(item, 0, {}, [images for images, _ in found])
         yield request, all(are_real for _, are_real in found)
+
+    def _drawn_with_examples(self, item: ItemT, seed: int) -> list[object | None]:
+        return [*map(self.drawn, self.examples.of(item)), self.drawn(item, seed)]
 
     def _request(
         self,
@@ -309,25 +309,19 @@ class SingleTrack(Track[ItemT]):
         examples, turns = self.examples.of(item), list[Message]()
         for one, pictures in zip(examples, images, strict=False):
             *_, asked = self.prompt.messages(pictures, self.facts(one, pictures))
+            name = f"example {one.key}: "
             parts = tuple(
-                replace(part, label=f"example {one.key}: {part.label}")
-                if isinstance(part, Image)
-                else part
+                replace(part, label=name + part.label) if isinstance(part, Image) else part
                 for part in asked.parts
             )
             turns += [Message("user", parts), Message("assistant", (self.right_answer(one),))]
         *first, question = self.prompt.messages(images[-1], self.facts(item, images[-1]))
-        form = self.form(item)
-        return Request(
-            item.key,
-            seed,
-            (*first, *turns, question),
-            params,
-            self.prompt.version,
-            self.subject_of(item),
-            None if form is None else form.response_format,
-            examples=tuple(one.key for one in examples),
-        )
+        messages, version = (*first, *turns, question), self.prompt.version
+        asks = self.form(item)
+        form = None if asks is None else asks.response_format
+        keys = tuple(one.key for one in examples)
+        subject = self.subject_of(item)
+        return Request(item.key, seed, messages, params, version, subject, form, examples=keys)
 
 
 class EpisodeTrack(Track[ItemT]):
@@ -359,15 +353,15 @@ class SceneTrack(Track[AssemblyTask]):
         """Select scenes evenly over levels. Raises SpecError where another goal is to be shown and
         a scene has none.
         """
-        suite, pool = opening.suite, opening.dataset.tasks
-        self.pool = pool
-        self.items = select_tasks(pool, suite.levels, opening.limit)
-        controls = None if self.section is None else suite.section(self.section[1])
+        suite, self.pool = opening.suite, opening.dataset.tasks
+        self.items = select_tasks(self.pool, suite.levels, opening.limit)
         is_blind, elsewhere = False, None
-        if self.section is not None and isinstance(controls, PictureControls):
-            is_blind = controls.blind
-            if controls.wrong_image:
-                elsewhere = other_goals(pool)
+        if self.section is not None:
+            controls = suite.section(self.section[1])
+            if isinstance(controls, PictureControls):
+                is_blind = controls.blind
+                elsewhere = other_goals(self.pool) if controls.wrong_image else None
+            if elsewhere is not None:
                 elsewhere.check(self.items, "scene", f"{self.section[0]}.wrong_image")
         self.presentation = Presentation(suite.candidates.order, is_blind, elsewhere, suite.seeds)
         super().__init__(opening)
@@ -407,8 +401,6 @@ class SceneTrack(Track[AssemblyTask]):
 
 AnyTrack = SingleTrack[Any] | EpisodeTrack[Any]
 """A track of either kind."""
-
-
 kinds, kind_of = known_tracks, known_track
 """All tracks by name, and the one of a name."""
 
@@ -422,9 +414,8 @@ def kinds_with_physics(suite: Mapping[str, Any]) -> tuple[type[AnyTrack], ...]:
 def count_sample(track: str, item: Any, judged: Any) -> Mapping[str, tuple[float, ...]]:
     """Return the counts of one sample that the measures of a track need, by name of the counts.
 
-    `judged` is the judgement of the reply, or the episode once it has ended. Where a measure does
-    not count a sample, its counts are empty: they are absent where a record was written before the
-    measure was there, and `phyblock score` fills them in.
+    `judged` is the judgement of the reply, or the episode once it has ended. Counts are empty where
+    a measure does not count a sample.
     """
     added: list[SampleCounts] = [measure.counted for measure in added_measures(track)]
     return {
@@ -441,14 +432,13 @@ def open_tracks(opening: Opening, names: Sequence[str]) -> tuple[AnyTrack, ...]:
     """
     suite = opening.suite
     for name in names:
-        kind = kind_of(name)
+        kind, field = kind_of(name), "answer_format"
         if suite.answer_format == "json_schema" and kind.json_template is None:
-            where, message = suite.where("answer_format"), "cannot be asked for as JSON"
-            hint = "use answer_format: text"
-            raise SpecError(Problem(where, message, "answer_format", f"track {name}", hint=hint))
+            message, hint = f"{name} cannot be asked for as JSON", "use answer_format: text"
+            raise SpecError(Problem(suite.where(field), message, field, "json_schema", hint=hint))
         if suite.examples and kind.no_examples:
-            where, message = suite.where("examples"), f"cannot be shown in {name}"
-            message = f"{message}: {kind.no_examples}"
+            message = f"cannot be shown in {name}: {kind.no_examples}"
+            where = suite.where("examples")
             raise SpecError(Problem(where, message, "examples", hint="leave them out"))
     return tuple(kind_of(name)(opening) for name in names)
 

@@ -13,8 +13,8 @@ from hypothesis import given, settings
 
 from phyblock.data import Dataset, QuestionTask, read_builtin, read_questions
 from phyblock.domain import Block, Mark, QuestionPicture
-from phyblock.errors import DataError, Problem
-from tests.data.broken import sound_scene, with_value, without, write_scenes
+from phyblock.errors import DataError
+from tests.data.broken import sound_scene, without, write_scenes
 from tests.fuzz.strategies import QUESTIONS
 from tests.workspace import tower
 
@@ -60,15 +60,6 @@ def test_a_sound_question_is_read(tmp_path: Path, scenes: Dataset) -> None:
     assert not task.files
 
 
-def test_a_background_is_that_of_all_pictures(tmp_path: Path, scenes: Dataset) -> None:
-    recipes = [{"label": label, "view": [45, 22]} for label in ("scene", "block")]
-    asked = QUESTION | {"background": "lawn", "pictures": recipes}
-    task = read_one(tmp_path / "q", scenes, asked)
-    assert [picture.background for picture in task.question.pictures] == ["lawn", "lawn"]
-    plain = read_one(tmp_path / "p", scenes, QUESTION | {"background": None})
-    assert plain.question.pictures[0].background is None
-
-
 def test_a_picture_is_the_scene_but_for_what_its_recipe_says(
     tmp_path: Path, scenes: Dataset
 ) -> None:
@@ -83,8 +74,10 @@ def test_a_picture_is_the_scene_but_for_what_its_recipe_says(
         "marks": [{"letter": "A", "position": [0, 0, 0.1]}],
         "framed": True,
     }
-    task = read_one(tmp_path / "q", scenes, QUESTION | {"pictures": [recipe]})
+    asked = QUESTION | {"pictures": [recipe], "background": "lawn"}
+    task = read_one(tmp_path / "q", scenes, asked)
     (picture,) = task.question.pictures
+    assert picture.background == "lawn"
     assert picture.blocks == (
         Block(2, "cuboid2", "green", (0, 0, 0.1), (0, 0, 45), (1,), 2),
         Block(9, "cube", "red", (0.2, 0, 0.025), (0, 0, 0), (), 1),
@@ -189,37 +182,6 @@ def test_a_number_that_is_used_twice_is_told(tmp_path: Path, scenes: Dataset) ->
 def test_a_missing_field_is_told(tmp_path: Path, scenes: Dataset, field: str) -> None:
     with pytest.raises(DataError, match=rf"questions.jsonl:1: {field}: is missing"):
         read_questions(write(tmp_path / "q", without(QUESTION, field)), scenes)
-
-
-WHOLE = QUESTION | {
-    "pictures": [
-        {
-            "label": "scene",
-            "view": [45, 22],
-            "without": [1],
-            "poses": {},
-            "swap": {},
-            "add": [sound_scene()["blocks"][0] | {"order": 9}],
-            "marks": [{"letter": "A", "position": [0, 0, 0]}],
-            "framed": True,
-        }
-    ]
-}
-
-
-@pytest.mark.parametrize("value", [None, 3, "text", [], {}, [[]], [{}], {"1": 3}, {"1": []}])
-@pytest.mark.parametrize("field", [*WHOLE, *(f"pictures.0.{f}" for f in WHOLE["pictures"][0])])
-def test_values_of_any_kind_are_read_or_refused(
-    tmp_path: Path, scenes: Dataset, field: str, value: object
-) -> None:
-    folder = write(tmp_path / "q", with_value(WHOLE, field, value))
-    problems: tuple[Problem, ...] = ()
-    try:
-        (task,) = read_questions(folder, scenes).tasks
-        assert task.question.answer == (1,)
-    except DataError as error:
-        problems = error.problems
-    assert all(one.where.startswith(str(folder)) for one in problems)
 
 
 def test_an_empty_file_and_no_file_are_told(tmp_path: Path, scenes: Dataset) -> None:
