@@ -231,21 +231,15 @@ class StoredQuestion(Line, extra="forbid"):
     @classmethod
     def of(cls, question: Question, original: Scene) -> Self:
         """Return a question as it is written; `original` is the scene as stored."""
-        colors = {
-            str(block.order): block.color
-            for block, before in zip(question.scene.blocks, original.blocks, strict=True)
-            if block.color != before.color
-        }
+        pairs = zip(question.scene.blocks, original.blocks, strict=True)
+        colors = {str(new.order): new.color for new, old in pairs if new.color != old.color}
         background = question.pictures[0].background if question.pictures else None
         optional: dict[str, Any] = {"colors": colors, "background": background}
+        same = ("id", "subtask", "category", "wording", "options")
         return cls(
-            id=question.id,
-            subtask=question.subtask,
-            category=question.category,
+            **{name: getattr(question, name) for name in same},
             scene_id=question.scene.id,
-            wording=question.wording,
             question=question.text,
-            options=question.options,
             answer=question.answer_letters,
             **{name: value for name, value in optional.items() if value},
             pictures=tuple(StoredPicture.of(p, question.scene) for p in question.pictures),
@@ -275,11 +269,10 @@ class StoredQuestion(Line, extra="forbid"):
         """Yield what is wrong with it as a question about a scene."""
         if self.category not in (None, category_of(self.subtask)):
             yield _wrong("category", "is not known", category_of(self.subtask), self.category)
-        if self.subtask == "OR" and sorted(self.answer) != list(LETTERS):
-            allowed = "all of A, B, C, D in the right order"
+        is_order = self.subtask == "OR"
+        allowed = "all of A, B, C, D in the right order" if is_order else "A, B, C or D"
+        if "".join(sorted(self.answer)) not in ([LETTERS] if is_order else [*LETTERS]):
             yield _wrong("answer", "is none of the options", allowed, self.answer)
-        if self.subtask != "OR" and self.answer not in tuple(LETTERS):
-            yield _wrong("answer", "is none of the options", "A, B, C or D", self.answer)
         yield from _unknown_orders(self.colors, scene, "colors")
         for i, picture in enumerate(self.pictures):
             for each in picture.faults(scene):

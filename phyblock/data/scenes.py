@@ -171,16 +171,13 @@ class StoredCandidate(Line, extra="ignore"):
         return Candidate(self.type, self.color, triple(self.euler))
 
 
-def _order_faults(blocks: Sequence[StoredBlock]) -> Iterator[Fault]:
+def _block_faults(blocks: Sequence[StoredBlock]) -> Iterator[Fault]:
+    """Yield orders that are used twice, else dependencies that name no block, else a cycle."""
     orders = [block.order for block in blocks]
-    for i, order in enumerate(orders):
-        if order in orders[:i]:
-            yield Fault("is used twice", "unique orders", str(order), (i, "order"))
-
-
-def _dependency_faults(blocks: Sequence[StoredBlock]) -> list[Fault]:
-    """Dependencies that name no block or run in a circle, in a list whose orders are unique."""
-    orders = [block.order for block in blocks]
+    twice = [i for i, order in enumerate(orders) if order in orders[:i]]
+    yield from (
+        Fault("is used twice", "unique orders", str(orders[i]), (i, "order")) for i in twice
+    )
     known = "0 (the ground) or an order of the scene: " + ", ".join(map(str, sorted(orders)))
     unknown = [
         Fault("names no block", known, str(order), (i, "depend"))
@@ -188,15 +185,14 @@ def _dependency_faults(blocks: Sequence[StoredBlock]) -> list[Fault]:
         for order in block.depend
         if order and order not in orders
     ]
-    if unknown:
-        return unknown
-    try:
-        _graph(blocks)
-    except CycleError as error:
-        cycle = " -> ".join(str(orders[v]) for v in (*error.vertices, error.vertices[0]))
-        at = (error.vertices[0], "depend")
-        return [Fault("is part of a cycle", "dependencies without a cycle", cycle, at)]
-    return []
+    yield from () if twice else unknown
+    if not twice and not unknown:
+        try:
+            _graph(blocks)
+        except CycleError as error:
+            cycle = " -> ".join(str(orders[v]) for v in (*error.vertices, error.vertices[0]))
+            at = (error.vertices[0], "depend")
+            yield Fault("is part of a cycle", "dependencies without a cycle", cycle, at)
 
 
 def _layer_faults(blocks: Sequence[StoredBlock]) -> Iterator[Fault]:
@@ -223,16 +219,10 @@ def look_faults(candidates: Sequence[StoredCandidate]) -> Iterator[Fault]:
             yield Fault(message, allowed, found, (i,))
 
 
-def _level_faults(levels: Sequence[int]) -> Iterator[Fault]:
-    if list(levels) not in _LEVELS:
-        yield Fault(*_NO_LEVELS)
-
-
 SceneBlocks = Annotated[
     tuple[StoredBlock, ...],
     Field(min_length=1, max_length=MAX_BLOCKS),
-    checked(_order_faults),
-    checked(_dependency_faults),
+    checked(_block_faults),
 ]
 """Blocks with unique orders whose dependencies are a graph without cycles."""
 CandidateList = Annotated[
@@ -244,7 +234,7 @@ CandidateList = Annotated[
 Levels = Annotated[
     tuple[StrictInt, ...],
     worded(*_NO_LEVELS),
-    checked(_level_faults),
+    checked(lambda levels: () if list(levels) in _LEVELS else [Fault(*_NO_LEVELS)]),
     WithJsonSchema({"enum": list(_LEVELS)}),
 ]
 """The levels that a scene counts in."""
@@ -271,10 +261,6 @@ class StoredScene(Line, extra="ignore"):
     @classmethod
     def of(cls, scene: Scene, candidates: CandidateSet) -> Self:
         """Return a scene as it is written: lengths to a micrometer."""
-        blocks = []
-        for block in scene.blocks:
-            x, y, z = (round(length, 6) + 0.0 for length in block.position_m)
-            blocks.append(StoredBlock.of(block, (x, y, z)))
         looks = {block.look for block in scene.blocks}
         offered = [
             StoredCandidate(
@@ -282,13 +268,12 @@ class StoredScene(Line, extra="ignore"):
             )
             for c in candidates.candidates
         ]
-        return cls(
-            id=scene.id,
-            levels=scene.levels,
-            parents=scene.parents,
-            blocks=tuple(blocks),
-            candidates=tuple(offered),
-        )
+        blocks = []
+        for block in scene.blocks:
+            x, y, z = (round(length, 6) + 0.0 for length in block.position_m)
+            blocks.append(StoredBlock.of(block, (x, y, z)))
+        about: dict[str, Any] = {"id": scene.id, "levels": scene.levels, "parents": scene.parents}
+        return cls(**about, blocks=tuple(blocks), candidates=tuple(offered))
 
     def scene(self) -> Scene:
         """Return the goal structure."""
@@ -306,19 +291,14 @@ def task_of(
 ) -> AssemblyTask:
     """Return a scene with its candidates; DataError where no candidate can stand for a block."""
     missing = candidates.missing(scene)
-    refuse(
-        (
-            Fault(
-                f"hold nothing that block {block.order} of scene {scene.id} needs",
-                "every type, color and orientation that the scene uses",
-                shown([block.type, block.color, block.euler_deg]),
-                ("candidates",),
-            )
-            for block in scene.blocks
-            if block.order in missing
-        ),
-        where,
-    )
+    allowed = "every type, color and orientation that the scene uses"
+    faults = []
+    for block in scene.blocks:
+        if block.order in missing:
+            message = f"hold nothing that block {block.order} of scene {scene.id} needs"
+            found = shown([block.type, block.color, block.euler_deg])
+            faults.append(Fault(message, allowed, found, ("candidates",)))
+    refuse(faults, where)
     return AssemblyTask(scene, candidates, composite)
 
 
