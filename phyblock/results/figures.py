@@ -11,6 +11,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -79,9 +80,16 @@ ROW_PT, PANEL_PT = 7.5, 8.5
 _TITLE_PT, _SUBTITLE_PT, _LEGEND_PT, _AXIS_PT = 10.5, 7.5, 7.5, 8.0
 _LINES_IN = {_TITLE_PT: 0.19, _SUBTITLE_PT: 0.14}
 _MARGIN_IN = 0.08
+_CHARACTER_IN = 0.0083
+"""Width of a character of text of 1 pt, as wide letters have it."""
 _LEGEND_ROW_IN, _LEGEND_HANDLE_IN = 0.17, 0.5
 _ROW_IN = 0.19
-_DPI, _PRINT_DPI = 200, 300
+_FORMATS: dict[str, tuple[int, dict[str, Any]]] = {
+    "pdf": (300, {"Creator": "phyblock", "CreationDate": None, "ModDate": None}),
+    "svg": (72, {"Creator": "phyblock", "Date": None}),
+    "png": (200, {"Software": "phyblock"}),
+}
+"""Dots per inch and metadata: without a date, the same numbers give the same bytes."""
 _SALT = "phyblock"
 _RC: dict[str, Any] = {
     "font.size": 8,
@@ -157,7 +165,7 @@ def headed(figure: Figure, title: str, subtitle: str) -> None:
     lines = [
         (line, size, weight)
         for text, size, weight in ((title, _TITLE_PT, "bold"), (subtitle, _SUBTITLE_PT, "normal"))
-        for line in wrapped(text, width - 2 * _MARGIN_IN, size, weight)
+        for line in wrap(text, int((width - 2 * _MARGIN_IN) / (_CHARACTER_IN * size)))
     ]
     above = 0.17 + sum(_LINES_IN[size] for _, size, _ in lines)
     height = figure.get_figheight() + above
@@ -173,31 +181,10 @@ def headed(figure: Figure, title: str, subtitle: str) -> None:
         top += _LINES_IN[size] + (0.02 if size == _TITLE_PT else 0)
 
 
-def text_width_in(text: str, size_pt: float, weight: str = "normal") -> float:
-    """Return the width of a line of text in the chosen font [inches]."""
-    from matplotlib.font_manager import FontProperties
-    from matplotlib.textpath import text_to_path
-
-    font = FontProperties(size=size_pt, weight=weight)
-    width, _, _ = text_to_path.get_text_width_height_descent(text, font, False)
-    return float(width) / 72
-
-
-def wrapped(text: str, width_in: float, size_pt: float, weight: str = "normal") -> list[str]:
-    """A text in lines that are no wider than `width_in` [inches], unless a word alone is."""
-    lines: list[str] = []
-    for word in text.split():
-        longer = f"{lines[-1]} {word}" if lines else word
-        if lines and text_width_in(longer, size_pt, weight) <= width_in:
-            lines[-1] = longer
-        else:
-            lines.append(word)
-    return lines
-
-
 def legend_below(figure: Figure, handles: Sequence[Artist], labels: Sequence[str]) -> None:
     """A legend under all axes, in as many columns as fit; it makes the figure that much higher."""
-    widest = max(text_width_in(label, _LEGEND_PT) for label in labels) + _LEGEND_HANDLE_IN
+    longest = max(map(len, labels))
+    widest = _CHARACTER_IN * _LEGEND_PT * longest + _LEGEND_HANDLE_IN
     columns = max(1, min(len(labels), int(figure.get_figwidth() / widest)))
     rows = -(-len(labels) // columns)
     columns = -(-len(labels) // rows)
@@ -504,7 +491,7 @@ def write_paper_figures(
     wanted = list(names) or list(makers)
     folder = OutFolder(out or run.path)
     below = f"{PAPER}/" if out is None else ""
-    endings = ("pdf", "svg", "png", "txt", "tex")
+    endings = (*_FORMATS, "txt", "tex")
     folder.check(f"{below}{name}.{ending}" for name in wanted for ending in endings)
     files: list[Path] = []
     with styled(look):
@@ -513,8 +500,10 @@ def write_paper_figures(
             if figure is None:
                 continue
             made: dict[str, bytes | str] = {}
-            for ending, draw in (("pdf", pdf_bytes), ("svg", svg_bytes), ("png", png_bytes)):
-                made[f"{below}{name}.{ending}"] = draw(figure)
+            for ending, (dpi, metadata) in _FORMATS.items():
+                drawn = io.BytesIO()
+                figure.savefig(drawn, format=ending, dpi=dpi, metadata=metadata)
+                made[f"{below}{name}.{ending}"] = drawn.getvalue()
                 # Laid out once: the next format takes what the first has found.
                 figure.set_layout_engine("none")
             captions = _captions(run, name, figure)
@@ -544,31 +533,3 @@ def _captions(run: Run, name: str, figure: Figure) -> Mapping[str, str]:
         rf"\end{{figure{star}}}",
     )
     return {"txt": text + "\n", "tex": "\n".join(lines) + "\n"}
-
-
-def svg_bytes(figure: Figure) -> bytes:
-    """The figure as SVG whose text is text, the same bytes for the same numbers."""
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-
-    file = io.BytesIO()
-    # `savefig` would draw twice, the first time for the layout alone, which drawing makes as well.
-    canvas = FigureCanvasSVG(figure)
-    canvas.print_svg(  # type: ignore[no-untyped-call]
-        file, metadata={"Date": None, "Creator": "phyblock"}
-    )
-    return file.getvalue()
-
-
-def pdf_bytes(figure: Figure) -> bytes:
-    """The figure as PDF with its fonts (TrueType) inside, the same bytes for the same numbers."""
-    file = io.BytesIO()
-    dates = {"CreationDate": None, "ModDate": None}
-    figure.savefig(file, format="pdf", dpi=_PRINT_DPI, metadata={"Creator": "phyblock", **dates})
-    return file.getvalue()
-
-
-def png_bytes(figure: Figure) -> bytes:
-    """The figure as PNG at 200 dots per inch."""
-    file = io.BytesIO()
-    figure.savefig(file, format="png", dpi=_DPI, metadata={"Software": "phyblock"})
-    return file.getvalue()

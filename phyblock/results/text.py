@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
 NO_VALUE = "–"  # noqa: RUF001
 """What stands in a cell that has no value; it is not a zero."""
-SPREAD = " ± "
-"""What stands between a mean and its standard deviation."""
 
 
 @dataclass(frozen=True)
@@ -54,12 +52,7 @@ class TextTable:
 
     def without(self, names: Collection[str]) -> TextTable:
         """The table but for the columns of these names."""
-        return self.with_columns(
-            [place for place, column in enumerate(self.columns) if column.name not in names]
-        )
-
-    def with_columns(self, kept: Sequence[int]) -> TextTable:
-        """The columns with these numbers, from 0."""
+        kept = [place for place, column in enumerate(self.columns) if column.name not in names]
         return replace(
             self,
             columns=tuple(self.columns[place] for place in kept),
@@ -78,7 +71,7 @@ def number(value: float, digits: int = 1, *, signed: bool = False) -> str:
 
 def spread(mean: float, sd: float) -> str:
     """`47.1 ± 1.2`; the mean alone where there is no standard deviation."""
-    return number(mean) if math.isnan(sd) else f"{number(mean)}{SPREAD}{number(sd)}"
+    return number(mean) if math.isnan(sd) else f"{number(mean)} ± {number(sd)}"
 
 
 def between(lo: float, hi: float, *, signed: bool = False) -> str:
@@ -88,12 +81,9 @@ def between(lo: float, hi: float, *, signed: bool = False) -> str:
     return f"[{number(lo, signed=signed)}, {number(hi, signed=signed)}]"
 
 
-def with_interval(row: Mapping[Hashable, Any], name: str = "") -> tuple[str, str]:
-    """A value and its interval, out of the columns `value`, `lo` and `hi`, or of those of a name:
-    `<name>`, `<name>_lo` and `<name>_hi`.
-    """
-    value, lo, hi = (name, f"{name}_lo", f"{name}_hi") if name else ("value", "lo", "hi")
-    return number(row[value]), between(row[lo], row[hi])
+def with_interval(row: Mapping[Hashable, Any], name: str) -> tuple[str, str]:
+    """A value and its interval, out of the columns `<name>`, `<name>_lo` and `<name>_hi`."""
+    return number(row[name]), between(row[f"{name}_lo"], row[f"{name}_hi"])
 
 
 def captioned(caption: str, words: Sequence[str]) -> str:
@@ -137,30 +127,21 @@ def to_markdown(table: TextTable) -> str:
 
     Group headings join the column names, because Markdown has one heading row.
     """
-    head = tuple(_heading(column) for column in table.columns)
+    head = tuple(f"{column.group} {column.name}".strip() for column in table.columns)
     grid = [tuple(_escape(cell) for cell in row) for row in (head, *table.rows)]
     widths = [max(3, *(len(row[place]) for row in grid)) for place in range(len(head))]
-    rule = "|".join(
-        f" {'-' * width} " if column.is_text else f" {'-' * (width - 1)}: "
+    rule = (
+        "-" * width if column.is_text else "-" * (width - 1) + ":"
         for column, width in zip(table.columns, widths, strict=True)
     )
-    lines = [_line(row, table.columns, widths) for row in grid]
-    lines.insert(1, f"|{rule}|")
+    lines = []
+    for row in (grid[0], tuple(rule), *grid[1:]):
+        shapes = zip(row, table.columns, widths, strict=True)
+        cells = (cell.ljust(w) if column.is_text else cell.rjust(w) for cell, column, w in shapes)
+        lines.append(f"| {' | '.join(cells)} |")
     notes = [f"- {_escape(note)}" for note in table.notes]
     parts = [f"**{_escape(table.caption)}**", "\n".join(lines), "\n".join(notes)]
     return "\n\n".join(part for part in parts if part) + "\n"
-
-
-def _heading(column: Column) -> str:
-    return f"{column.group} {column.name}".strip()
-
-
-def _line(row: tuple[str, ...], columns: tuple[Column, ...], widths: list[int]) -> str:
-    cells = (
-        cell.ljust(width) if column.is_text else cell.rjust(width)
-        for cell, column, width in zip(row, columns, widths, strict=True)
-    )
-    return f"| {' | '.join(cells)} |"
 
 
 def _escape(text: str) -> str:
@@ -188,74 +169,44 @@ _ESCAPES_LATEX = str.maketrans(
     }
 )
 _LIGATURE = re.compile("-(?=-)")
-_PAGE_LINES = 40
-_HEAD = "% Needs \\usepackage{booktabs} and \\usepackage{graphicx}.\n"
+_FLOAT = r"""% Needs \usepackage{{booktabs}} and \usepackage{{graphicx}}.
+\begin{{table*}}[t]
+\centering\small
+\setlength{{\tabcolsep}}{{4pt}}
+\caption{{{caption}}}
+\label{{tab:{label}}}
+\resizebox{{!}}{{\ifdim\height>.8\textheight.8\textheight\else\height\fi}}{{%
+\resizebox{{\ifdim\width>\linewidth\linewidth\else\width\fi}}{{!}}{{%
+\begin{{tabular}}{{@{{}}{alignment}@{{}}}}
+\toprule
+{rows}
+\bottomrule
+\end{{tabular}}}}}}
+{notes}\end{{table*}}
+"""
 
 
 def to_latex(table: TextTable, label: str) -> str:
-    r"""`table*` floats that compile by `\input`, made narrower only where they are too wide.
+    r"""A `table*` float that compiles by `\input`, made smaller only where it is too large.
 
-    A table too long for a page goes on in further floats of the same number. `label` follows
-    `tab:`. Needs booktabs and graphicx, and says so in its first line.
+    `label` follows `tab:`. Needs booktabs and graphicx, and says so in its first line.
     """
-    rows = [_row(row, table.columns) for row in table.rows]
-    notes = "".join(rf"\par {escape(note)}" + "\n" for note in table.notes)
-    pages = _pages(table.rows, rows) or [range(0)]
-    floats = []
-    for place, page in enumerate(pages):
-        caption = escape(table.caption) + (" (continued)" if place else "")
-        last = place == len(pages) - 1
-        floats.append(
-            "\\begin{table*}[t]\n\\centering\\small\n\\setlength{\\tabcolsep}{4pt}\n"
-            + ("\\addtocounter{table}{-1}\n" if place else "")
-            + f"\\caption{{{caption}}}\n"
-            + ("" if place else f"\\label{{tab:{label}}}\n")
-            + "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}{%\n"
-            + _tabular(
-                table.columns, _spaced([rows[n] for n in page], [table.rows[n] for n in page])
-            )
-            + "}\n"
-            + (f"\\par\\smallskip\\raggedright\\footnotesize\n{notes}" if last and notes else "")
-            + "\\end{table*}\n"
-        )
-    return _HEAD + "\n".join(floats)
-
-
-def _tabular(columns: tuple[Column, ...], rows: list[str]) -> str:
-    alignment = "".join("l" if column.is_text else "r" for column in columns)
-    return "\n".join(
-        [
-            rf"\begin{{tabular}}{{@{{}}{alignment}@{{}}}}",
-            r"\toprule",
-            *_headings(columns),
-            r"\midrule",
-            *rows,
-            r"\bottomrule",
-            r"\end{tabular}",
-        ]
-    )
-
-
-def _pages(cells: tuple[tuple[str, ...], ...], rows: list[str]) -> list[range]:
-    """Stretches of rows that fit a page and begin where the first column says something."""
-    starts = [n for n, row in enumerate(cells) if row[0]] or [0] * bool(rows)
-    pages: list[range] = []
-    for start, end in itertools.pairwise([*starts, len(rows)]):
-        first = pages[-1].start if pages else 0
-        if pages and "\n".join(rows[first:end]).count("\n") < _PAGE_LINES:
-            pages[-1] = range(first, end)
-        else:
-            pages.append(range(start, end))
-    return pages
-
-
-def _spaced(lines: list[str], rows: list[tuple[str, ...]]) -> list[str]:
-    """Lines with space between blocks, where a block takes more than one line."""
-    blocks = any("\n" in line or not row[0] for line, row in zip(lines, rows, strict=True))
-    return [
-        ("\\addlinespace\n" if blocks and place and rows[place][0] else "") + line
-        for place, line in enumerate(lines)
+    names = [
+        escape(column.name)
+        if column.is_text
+        else rf"\multicolumn{{1}}{{c}}{{{escape(column.name)}}}"
+        for column in table.columns
     ]
+    rows = [*_group_rows(table.columns), _latex_row(names), r"\midrule"]
+    rows += [_latex_row(map(escape, row)) for row in table.rows]
+    notes = "".join(rf"\par {escape(note)}" + "\n" for note in table.notes)
+    return _FLOAT.format(
+        caption=escape(table.caption),
+        label=label,
+        alignment="".join("l" if column.is_text else "r" for column in table.columns),
+        rows="\n".join(rows),
+        notes=f"\\par\\smallskip\\raggedright\\footnotesize\n{notes}" if notes else "",
+    )
 
 
 def escape(text: str) -> str:
@@ -263,49 +214,19 @@ def escape(text: str) -> str:
     return _LIGATURE.sub("-{}", text.translate(_ESCAPES_LATEX))
 
 
-def _headings(columns: tuple[Column, ...]) -> list[str]:
-    names = _line_latex(_heading_latex(column) for column in columns)
-    if not any(column.group for column in columns):
-        return [names]
-    groups, rules, start = [], [], 1
+def _group_rows(columns: tuple[Column, ...]) -> list[str]:
+    """The headings of groups, and rules under them; [] where there are none."""
+    cells, rules, start = [], "", 1
     for group, members in itertools.groupby(columns, key=lambda column: column.group):
         width = len(list(members))
         if group:
-            groups.append(rf"\multicolumn{{{width}}}{{c}}{{{_stacked(group)}}}")
-            rules.append(rf"\cmidrule(lr){{{start}-{start + width - 1}}}")
+            cells.append(rf"\multicolumn{{{width}}}{{c}}{{{escape(group)}}}")
+            rules += rf"\cmidrule(lr){{{start}-{start + width - 1}}}"
         else:
-            groups += [""] * width
+            cells += [""] * width
         start += width
-    return [_line_latex(groups), "".join(rules), names]
+    return [_latex_row(cells), rules] if rules else []
 
 
-def _stacked(group: str) -> str:
-    """A heading of several words on two lines, so that it does not spread its columns."""
-    words = group.split(" ")
-    halves = [(" ".join(words[:n]), " ".join(words[n:])) for n in range(1, len(words))]
-    if not halves:
-        return escape(group)
-    upper, lower = min(halves, key=lambda half: max(map(len, half)))
-    return rf"\shortstack{{{escape(upper)}\\{escape(lower)}}}"
-
-
-def _heading_latex(column: Column) -> str:
-    name = escape(column.name)
-    return name if column.is_text else rf"\multicolumn{{1}}{{c}}{{{name}}}"
-
-
-def _row(cells: tuple[str, ...], columns: tuple[Column, ...]) -> str:
-    """A row; standard deviations stand under their means, which keeps wide tables legible."""
-    pairs = [
-        (cell, "") if column.is_text else cell.partition(SPREAD)[::2]
-        for cell, column in zip(cells, columns, strict=True)
-    ]
-    upper = _line_latex(escape(mean) for mean, _ in pairs)
-    if not any(sd for _, sd in pairs):
-        return upper
-    lower = _line_latex(rf"{{\scriptsize$\pm${escape(sd)}}}" if sd else "" for _, sd in pairs)
-    return f"{upper}[-2pt]\n{lower}"
-
-
-def _line_latex(cells: Iterable[str]) -> str:
+def _latex_row(cells: Iterable[str]) -> str:
     return " & ".join(cells) + r" \\"
