@@ -1,17 +1,32 @@
-"""The reader of the official layout, on checkouts written here and on the real one."""
+"""The official layout: its scenes, its recordings, question files, and the names of its models."""
 
 from __future__ import annotations
 
 import json
 import os
 from collections import Counter
+from datetime import date
 from pathlib import Path
+from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
 
-from phyblock.data import official_prompt, read_builtin, read_official, recorded_models
+from phyblock.data import (
+    Dataset,
+    official_prompt,
+    read_builtin,
+    read_official,
+    read_official_questions,
+    recorded_models,
+)
+from phyblock.data.official import match_published
 from phyblock.errors import DataError, Problem
-from tests.data.broken import sound_scene, with_value, write_checkout, write_scenes
+from phyblock.results.paper import published_table
+from tests.data.broken import Raw, sound_scene, with_value, write_checkout, write_scenes
+from tests.workspace import Workspace
 
 SCENE = {**sound_scene(), "levels": [3], "parents": ["s1"]}
 
@@ -164,3 +179,209 @@ def test_the_official_scenes(official_checkout: Path) -> None:
 
 def test_the_official_prompt_asks_for_the_form_that_is_parsed(official_checkout: Path) -> None:
     assert "Move block with index" in official_prompt(official_checkout)
+
+
+COLOR: Raw = {
+    "scene_id": "t1",
+    "question": "What is the color of the block on top?",
+    "options": ["red", "blue", "green", "yellow"],
+    "answer": "B",
+}
+NEXT: Raw = {
+    "scene_id": "t2",
+    "question": "What comes next?",
+    "options": ["<img1>", "<img2>", "<img3>", "<img4>"],
+    "answer": "<img3>",
+}
+
+
+@pytest.fixture(scope="module")
+def scenes(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    root = tmp_path_factory.mktemp("official")
+    return read_builtin(Workspace(root, root / "pictures").write_scenes())
+
+
+def write(folder: Path, name: str, content: Any) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    text = content if isinstance(content, str) else json.dumps(content, indent=2)
+    (folder / name).write_text(text, encoding="utf-8")
+    return folder
+
+
+def draw(folder: Path, *names: str) -> None:
+    for name in names:
+        path = folder / "images" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        Image.new("RGB", (8, 8), "red").save(path)
+
+
+def problems(folder: Path, scenes: Dataset) -> list[str]:
+    with pytest.raises(DataError) as caught:
+        read_official_questions(folder, scenes)
+    return [str(problem) for problem in caught.value.problems]
+
+
+def test_texts_pictures_and_orders_are_read(tmp_path: Path, scenes: Dataset) -> None:
+    write(tmp_path, "color.json", [COLOR, {**COLOR, "id": "mine", "answer": "blue"}])
+    write(tmp_path, "PD.json", [NEXT])
+    write(tmp_path, "Ordering.json", [{**NEXT, "answer": "CABD"}])
+    draw(tmp_path, *(f"pd-001/img{i}.png" for i in range(1, 5)), "t1.png")
+    draw(tmp_path, *(f"or-001/img{i}.jpg" for i in range(1, 5)))
+    found = {task.key: task for task in read_official_questions(tmp_path, scenes).tasks}
+    assert {name: task.question.subtask for name, task in found.items()} == {
+        "pd-001": "PD", "or-001": "OR", "co-001": "CO", "mine": "CO"
+    }  # fmt: skip
+    assert found["co-001"].question.answer_letters == "B" == found["mine"].question.answer_letters
+    assert found["co-001"].files == {"scene": tmp_path / "images" / "t1.png"}
+    assert found["co-001"].question.pictures == ()
+    assert found["pd-001"].question.answer_letters == "C"
+    assert list(found["pd-001"].files) == list("ABCD")
+    assert [p.label for p in found["pd-001"].question.pictures] == ["scene"]
+    assert found["or-001"].question.answer == (2, 0, 1, 3)
+    assert found["or-001"].question.pictures == ()
+
+
+@pytest.mark.parametrize(
+    ("answers", "letters"),
+    [
+        ([0, 1, 2, 3], "ABCD"),
+        ([4, 1, 1, 2], "DAAB"),
+        (["a", "(B)", "C.", "yellow"], "ABCD"),
+    ],
+)
+def test_letters_texts_and_indices_are_answers(
+    tmp_path: Path, scenes: Dataset, answers: list[object], letters: str
+) -> None:
+    write(tmp_path, "CO.json", [{**COLOR, "answer": answer} for answer in answers])
+    found = read_official_questions(tmp_path, scenes).tasks
+    assert "".join(task.question.answer_letters for task in found) == letters
+
+
+FAULTS = [
+    ({"answer": "E"}, "answer: is none of the options"),
+    ({"answer": "purple"}, "answer: is none of the options"),
+    ({"answer": 2}, "answer: is none of the options"),
+    ({"options": ["red", "blue", "Red", "green"]}, r"options[2]: is the same as option A"),
+    ({"options": ["red", "blue"]}, "options: are not four"),
+    ({"scene_id": "t9"}, "scene_id: names no scene of the data set"),
+    ({"question": " "}, "question: is no text"),
+    ({"options": NEXT["options"]}, "options: the file is missing"),
+    ({"id": "co-001"}, "id: is used at"),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), FAULTS)
+def test_each_fault_is_one_error_with_file_and_place(
+    tmp_path: Path, scenes: Dataset, change: Raw, message: str
+) -> None:
+    write(tmp_path, "CO.json", [COLOR, {**COLOR, **change}])
+    (problem,) = problems(tmp_path, scenes)
+    assert problem.startswith(f"{tmp_path / 'CO.json'}[1]: {message}")
+
+
+def test_indices_that_do_not_tell_where_they_begin_are_refused(
+    tmp_path: Path, scenes: Dataset
+) -> None:
+    write(tmp_path, "CO.json", [{**COLOR, "answer": n} for n in (1, 2)])
+    found = problems(tmp_path, scenes)
+    assert len(found) == 2
+    assert all("whether they begin at 0" in problem for problem in found)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("CO.json", "{", "is not valid JSON"),
+        ("CO.json", '{"scene_id": 1}', "is not an array"),
+        ("CO.json", "[3]", "is not an object"),
+        ("nonsense.json", [COLOR], "names no subtask"),
+        ("CO.jsonl", "{}", "holds no question files"),
+        ("CO.json", [1] * 50_000, "more than 1,000 faults"),
+    ],
+)
+def test_files_that_are_no_questions_are_said(
+    tmp_path: Path, scenes: Dataset, name: str, content: object, message: str
+) -> None:
+    write(tmp_path, name, content)
+    assert any(message in problem for problem in problems(tmp_path, scenes))
+
+
+SPELLINGS = {
+    "claude-3-5-haiku-20241022": "Claude-3.5 Haiku",
+    "anthropic/claude-3-5-haiku@20241022": "Claude-3.5 Haiku",
+    "claude-3-5-sonnet-latest": "Claude-3.5 Sonnet",
+    "claude-3-7": "Claude-3.7 Sonnet",
+    "claude-3-7-sonnet-20250219-thinking": "Claude-3.7 Sonnet-Thinking",
+    "gpt4o": "GPT-4o",
+    "openai/gpt-4o-2024-08-06": "GPT-4o",
+    "gpt-4o-mini-2024-07-18": "GPT-4o-mini",
+    "o1-2024-12-17": "GPT-o1",
+    "o3": "GPT-o3",
+    "gemini-1.5-flash-002": "Gemini-1.5-flash",
+    "gemini-1.5-flash-8b-001": "Gemini-1.5-flash-8b",
+    "gemini-2.0-flash-lite-preview-02-05": "Gemini-2.0-flash-lite",
+    "gemini-2.0-flash-thinking-exp-1219": "Gemini-2.0-flash-thinking-exp",
+    "qwen-vl-max-2025-01-25": "Qwen-VL-Max",
+    "OpenGVLab/InternVL2_5-78B": "InternVL2.5-78B",
+    "Qwen2_5-VL-3B": "Qwen2.5-VL-3B-Instruct",
+    "llava-onevision-qwen2-7b-ov": "LLaVa-OneVision-7B",
+    "lmms-lab/llava-onevision-qwen2-0.5b-ov": "LLaVa-OneVision-0.5B",
+    "random": "Random",
+}
+OTHERS = [
+    *("", "/", "日本", "claude-3-5", "claude-3-5-thinking", "claude-4-sonnet", "gpt-4", "o1-mini"),
+    *("gpt-4o-audio-preview", "chatgpt-4o-latest", "gemini-2.0", "gemini-2.0-flash-exp"),
+    *("gemini-1.5-pro", "gemini-2.5-flash-lite", "gemini-2.0-flash-8b", "qwen2-vl-max"),
+    *("Qwen2.5-7B-Instruct", "Qwen2.5-VL-7B-Instruct-AWQ", "InternVL2-8B", "InternVL2_5-78B-MPO"),
+    *("llava-onevision-qwen2-7b-ov-chat", "llava-onevision-qwen2-72b-ov", "random-4"),
+]
+ROWS = [*dict.fromkeys([*published_table(1)["model"], *published_table(2)["model"]])]
+
+
+@pytest.mark.parametrize(("name", "published"), [*SPELLINGS.items(), *zip(ROWS, ROWS, strict=True)])
+def test_known_spellings(name: str, published: str) -> None:
+    assert match_published(name) == published
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_other_models_are_not_taken_for_published_ones(name: str) -> None:
+    assert match_published(name) is None
+
+
+names = st.sampled_from([*ROWS, *SPELLINGS])
+dates = st.dates(date(2020, 1, 1), date(2030, 12, 31))
+
+
+@given(
+    st.sampled_from(ROWS),
+    dates,
+    st.sampled_from(["%Y-%m-%d", "%Y%m%d", "%Y_%m_%d", "%m-%d", "%m%d"]),
+)
+def test_a_release_date_changes_nothing(name: str, day: date, form: str) -> None:
+    assert match_published(f"{name}-{day:{form}}") == name
+
+
+@given(names, st.data())
+def test_case_and_separators_change_nothing(name: str, data: st.DataObject) -> None:
+    bare = name.rpartition("/")[2]
+    other = "".join(
+        data.draw(st.sampled_from("-_. ")) if char in "-_. " else data.draw(_cases(char))
+        for char in bare
+    )
+    assert match_published(other) == match_published(name)
+
+
+def _cases(char: str) -> st.SearchStrategy[str]:
+    return st.sampled_from([char.lower(), char.upper()])
+
+
+@given(names, st.from_regex(r"[a-z]{2,9}", fullmatch=True))
+def test_an_unknown_word_makes_it_another_model(name: str, word: str) -> None:
+    known = {"mini", "thinking", "lite", "latest", "preview", "exp", "instruct", "ov", "hf"}
+    if word not in known:
+        assert match_published(f"{name}-{word}") is None
+
+
+@given(st.text(max_size=40))
+def test_any_text_is_a_published_name_or_unknown(name: str) -> None:
+    assert match_published(name) in {None, *ROWS}

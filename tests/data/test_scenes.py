@@ -6,7 +6,6 @@ import contextlib
 import json
 import os
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -14,6 +13,7 @@ from hypothesis import strategies as st
 
 from phyblock.data import AssemblyTask, read_builtin
 from phyblock.data.official import read_candidates
+from phyblock.data.scenes import StoredScene
 from phyblock.domain import (
     BLOCK_TYPES,
     COLORS,
@@ -29,7 +29,7 @@ from tests.fuzz.strategies import CANDIDATES, SCENES
 
 SCENE = sound_scene()
 CUBE, ARCH = SCENE["blocks"]
-LENGTHS = st.floats(-10, 10).map(lambda x: x + 0.0)
+LENGTHS = st.floats(-10, 10).map(lambda x: round(x, 6) + 0.0)
 ANGLES = st.sampled_from([0.0, 45.0, 90.0, 180.0, 270.0, -90.0, 12.5])
 NAMES = st.from_regex(r"\A[A-Za-z0-9][A-Za-z0-9._-]{0,20}\Z")
 
@@ -285,37 +285,15 @@ def tasks(draw: st.DrawFn) -> AssemblyTask:
     return AssemblyTask(Scene(draw(NAMES), levels, file_order, parents), candidates)
 
 
-def as_json(task: AssemblyTask) -> dict[str, Any]:
-    scene = task.scene
-    return {
-        "id": scene.id,
-        "levels": scene.levels,
-        "parents": scene.parents,
-        "blocks": [
-            {
-                "order": block.order,
-                "type": block.type,
-                "color": block.color,
-                "layer": block.layer,
-                "depend": block.depend or [0],
-                "position": block.position_m,
-                "euler": block.euler_deg,
-            }
-            for block in scene.blocks
-        ],
-        "candidates": [
-            {"type": c.type, "color": c.color, "euler": c.euler_deg, "required": 1}
-            for c in task.candidates.candidates
-        ],
-    }
-
-
 @settings(deadline=None)
 @given(written=st.lists(tasks(), min_size=1, max_size=3, unique_by=lambda task: task.scene.id))
 def test_any_valid_scene_reads_back_equal(
     tmp_path_factory: pytest.TempPathFactory, written: list[AssemblyTask]
 ) -> None:
-    read = read_builtin(write_scenes(tmp_path_factory.getbasetemp(), *map(as_json, written)))
+    folder = tmp_path_factory.getbasetemp()
+    lines = [StoredScene.of(task.scene, task.candidates).as_json() for task in written]
+    (folder / "scenes.jsonl").write_text("\n".join(lines), encoding="utf-8")
+    read = read_builtin(folder)
     assert read.tasks == tuple(sorted(written, key=lambda task: task.scene.id))
 
 
