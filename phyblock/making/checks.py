@@ -136,7 +136,7 @@ OURS_IN_HASTE = Tolerances(rest=FINISHED_REST)
 
 # The last step of a foreign scene is left to the trial of the finished structure: what falls there
 # shall be told once. 2 mm cannot be seen in a picture.
-FOREIGN = Tolerances(fit_m=0.002, last_step=False)
+FOREIGN = Tolerances(fit_m=0.002, last_step=False, rest=FINISHED_REST)
 """For scenes made elsewhere, whose positions are written by hand in rounded millimeters."""
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import shlex
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import cast
 
@@ -50,7 +50,7 @@ from phyblock.making.scenes.production import Order, produce, shares
 from phyblock.making.scenes.sketch import PALETTES, Palette
 from phyblock.making.workers import open_workers
 from phyblock.sim.camera import VIEWS
-from phyblock.sim.film import animation, exploded_png, filmstrip_png, marked_png
+from phyblock.sim.film import assembly_gif
 from phyblock.sim.pictures import (
     PictureStyle,
     candidates_png,
@@ -59,7 +59,7 @@ from phyblock.sim.pictures import (
     visible_shares,
 )
 from phyblock.text import counted
-from phyblock.types import BACKGROUNDS, Background
+from phyblock.types import BACKGROUNDS
 
 
 @click.group("scenes")
@@ -257,21 +257,14 @@ def verify(data: str, jobs: int, ray_address: str | None, limit: int | None) -> 
         raise click.exceptions.Exit(1)
 
 
+_WORST = 15
+"""The worst scenes of an audit that are shown."""
 _DEPENDING: tuple[CheckName, ...] = ("undeclared dependency", "dependency without contact")
 
 
 @scenes.command("audit")
 @click.argument("data", metavar="PATH", type=NAME_OR_PATH)
 @click.option("--csv", "table", type=UserPath(), metavar="FILE", help="All findings as CSV.")
-@click.option("--pictures", type=UserPath(), metavar="DIR", help="Draw the worst scenes here.")
-@click.option(
-    "--worst",
-    type=click.IntRange(0),
-    default=15,
-    show_default=True,
-    metavar="N",
-    help="Number of the worst scenes that are shown and drawn.",
-)
 @jobs_option
 @click.option(
     "--tolerance",
@@ -280,9 +273,7 @@ _DEPENDING: tuple[CheckName, ...] = ("undeclared dependency", "dependency withou
     show_default=True,
     help="Overlaps and gaps up to this pass [mm].",
 )
-def audit(
-    data: str, table: Path | None, pictures: Path | None, worst: int, jobs: int, tolerance: float
-) -> None:
+def audit(data: str, table: Path | None, jobs: int, tolerance: float) -> None:
     """Audit the data set PATH: a folder with scenes.jsonl, an official checkout, or a bundled set.
 
     Changes nothing in PATH. Shows the worst scenes and totals: overlaps, gaps, declared
@@ -291,29 +282,19 @@ def audit(
     """
     if table is not None and table.is_dir():
         check_free([table], "name another place")
-    for folder in (None if table is None else table.parent, pictures):
-        if folder is not None:
-            make_folder(folder)
+    if table is not None:
+        make_folder(table.parent)
     tasks = [(task.scene, task.candidates) for task in read_data_set(data).tasks]
     running = audit_scenes(tasks, replace(FOREIGN, fit_m=tolerance / 1000), min(jobs, len(tasks)))
     audits = list(tracked(running, len(tasks), "Auditing"))
     twins = find_duplicates(scene for scene, _ in tasks)
     guilty = sorted((one for one in audits if one.findings), key=lambda one: one.badness)
-    worst_scenes = guilty[::-1][:worst]
-    _print_worst(worst_scenes)
+    _print_worst(guilty[::-1][:_WORST])
     _print_totals(audits, twins)
     console = make_console()
     if table is not None:
         write_named(table, findings_csv(audits, twins))
         console.print(f"all findings in {shown_path(table)}", markup=False)
-    if pictures is not None:
-        out = OutFolder(pictures)
-        out.check(f"{audit.scene.id}.png" for audit in worst_scenes)
-        for audit in worst_scenes:
-            blamed = {order for finding in audit.findings for order in finding.blocks}
-            out.write({f"{audit.scene.id}.png": marked_png(audit.scene, blamed, PictureStyle())})
-        told = f"{counted(len(worst_scenes), 'picture')} in {shown_path(pictures)}"
-        console.print(told, markup=False)
 
 
 def _print_worst(worst: Sequence[SceneAudit]) -> None:
@@ -413,16 +394,6 @@ def _angles(euler_deg: tuple[float, float, float]) -> str:
     return " ".join(f"{angle:g}" for angle in euler_deg)
 
 
-_Drawing = tuple[str, Callable[[], bytes]]
-"""A file's name, and how its bytes are made."""
-
-
-def _finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
-    if value is not None and math.isnan(value):
-        raise click.BadParameter("nan is no angle", ctx, param)
-    return value
-
-
 @scenes.command("render")
 @click.argument("data", metavar="PATH", type=NAME_OR_PATH)
 @click.argument("scenes", metavar="[SCENE]...", nargs=-1)
@@ -441,20 +412,6 @@ def _finite(ctx: click.Context, param: click.Parameter, value: float | None) -> 
     help="Where the scene is seen from.",
 )
 @click.option(
-    "--azimuth",
-    type=click.FloatRange(-360, 360),
-    callback=_finite,
-    metavar="DEG",
-    help="0 looks from +x, 90 from +y.",
-)
-@click.option(
-    "--elevation",
-    type=click.FloatRange(1, 90),
-    callback=_finite,
-    metavar="DEG",
-    help="90 looks straight down.",
-)
-@click.option(
     "--background",
     type=click.Choice([*BACKGROUNDS, "all"]),
     default="checkerboard",
@@ -469,35 +426,36 @@ def _finite(ctx: click.Context, param: click.Parameter, value: float | None) -> 
     help="Edge of a picture [pixels].",
 )
 @click.option("--composite", is_flag=True, help="Goal and candidates side by side, too.")
-@click.option("--exploded", is_flag=True, help="The structure pulled apart, too.")
-@click.option("--filmstrip", is_flag=True, help="All steps in one picture, too.")
 @click.option("--gif", is_flag=True, help="The assembly as an animated GIF, too.")
-@click.option("--webp", is_flag=True, help="The assembly as an animated WebP, too.")
 def render(
     data: str,
     scenes: tuple[str, ...],
     out: Path,
     view: str,
-    azimuth: float | None,
-    elevation: float | None,
     background: str,
     size: int,
-    **extras: bool,
+    composite: bool,
+    gif: bool,
 ) -> None:
     """Draw the scenes SCENE... of the data set PATH, or all of them.
 
     Files are named SCENE-VIEW-BACKGROUND-WHAT; it writes over those that it wrote before.
     """
     read = read_data_set(data)
-    tasks = find_scenes(read, scenes) if scenes else read.tasks
-    styles = _styles(view, azimuth, elevation, background, size)
-    wanted = [name for name, is_wanted in extras.items() if is_wanted]
-    drawings = {
-        f"{task.scene.id}-{name}{what}": make
-        for task in tasks
-        for name, style in styles.items()
-        for what, make in _drawings(task, style, wanted)
-    }
+    drawings: dict[str, Callable[[], bytes]] = {}
+    for task in find_scenes(read, scenes) if scenes else read.tasks:
+        scene = task.scene
+        for seen, (azimuth, elevation) in VIEWS.items():
+            for floor in BACKGROUNDS:
+                if view not in (seen, "all") or background not in (floor, "all"):
+                    continue
+                style = PictureStyle(size, floor, azimuth, elevation)
+                stem, goal = f"{scene.id}-{seen}-{floor}", partial(goal_png, scene, style)
+                drawings[f"{stem}.png"] = goal
+                if composite:
+                    drawings[f"{stem}-composite.png"] = partial(_composite, task, style)
+                if gif:
+                    drawings[f"{stem}.gif"] = partial(assembly_gif, scene, style)
     folder = OutFolder(out)
     folder.check(drawings)
     for name, make in drawings.items():
@@ -505,36 +463,5 @@ def render(
     make_console().print(f"{counted(len(drawings), 'file')} in {shown_path(out)}")
 
 
-def _styles(
-    view: str, azimuth: float | None, elevation: float | None, background: str, size: int
-) -> dict[str, PictureStyle]:
-    """Every style asked for, by its part of the file names."""
-    styles = {}
-    floors: tuple[Background, ...] = tuple(b for b in BACKGROUNDS if background in (b, "all"))
-    for named, (around, above) in VIEWS.items():
-        if view not in (named, "all"):
-            continue
-        name: str = named
-        if azimuth is not None or elevation is not None:
-            around = around if azimuth is None else azimuth
-            above = above if elevation is None else elevation
-            name = f"{around:g}-{above:g}"
-        for floor in floors:
-            styles[f"{name}-{floor}"] = PictureStyle(size, floor, around, above)
-    return styles
-
-
-def _drawings(task: AssemblyTask, style: PictureStyle, extras: list[str]) -> Iterator[_Drawing]:
-    scene, candidates = task.scene, task.candidates
-    yield ".png", lambda: goal_png(scene, style)
-    makers: dict[str, _Drawing] = {
-        "composite": (
-            "-composite.png",
-            lambda: composite_png(goal_png(scene, style), candidates_png(candidates, style)),
-        ),
-        "exploded": ("-exploded.png", lambda: exploded_png(scene, style)),
-        "filmstrip": ("-filmstrip.png", lambda: filmstrip_png(scene, style)),
-        "gif": (".gif", lambda: animation(scene, style, "gif")),
-        "webp": (".webp", lambda: animation(scene, style, "webp")),
-    }
-    yield from (makers[name] for name in extras)
+def _composite(task: AssemblyTask, style: PictureStyle) -> bytes:
+    return composite_png(goal_png(task.scene, style), candidates_png(task.candidates, style))
