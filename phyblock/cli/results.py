@@ -289,9 +289,8 @@ def export(
     hf: a Hugging Face dataset. csv, parquet: a row a sample. vlmevalkit: a TSV file of questions.
     """
     from phyblock.data import read_data_set
-    from phyblock.results.export import export_run
+    from phyblock.results.export import EXPORT_FILES, export_questions, export_run
     from phyblock.results.load import load_run
-    from phyblock.results.questions_export import EXPORT_FILES, export_questions
 
     forms = _RUN_FORMS if questions is None else tuple(EXPORT_FILES)
     if form not in forms:
