@@ -17,7 +17,7 @@ from phyblock.domain import LETTERS, SUBTASKS, Question, Subtask
 from phyblock.domain.blocks import COLORS
 from phyblock.domain.question import rotated
 from phyblock.errors import DataError, StoreError
-from phyblock.making.questions.audit import audit_questions, duplicates_of
+from phyblock.making.questions.audit import SubtaskAudit, audit_questions, duplicates_of
 from phyblock.making.questions.base import ELEVATIONS_DEG, LEAST_PIXELS
 from phyblock.making.questions.counterfactual import OUTCOME_TEXTS
 from phyblock.making.questions.production import (
@@ -246,6 +246,10 @@ def test_the_built_in_set_is_whole_and_even(built_in: QuestionSet) -> None:
 def test_a_sample_of_the_answers_is_derived_again(built_in: QuestionSet) -> None:
     for task in built_in.tasks[7::50]:
         assert problem_of(task.question) is None, task.key
+    question = next(t.question for t in built_in.tasks if t.question.subtask == "AD")
+    scene, block = question.pictures
+    bare = replace(question, pictures=(replace(scene, marks=scene.marks[1:]), block))
+    assert problem_of(bare) == "no place A is marked on a block"
 
 
 def test_the_right_place_is_apart_from_the_others_as_often_as_any(built_in: QuestionSet) -> None:
@@ -257,13 +261,6 @@ def test_the_right_place_is_apart_from_the_others_as_often_as_any(built_in: Ques
         ranks[int((apart < apart[question.answer[0]]).sum())] += 1
     assert ranks.keys() == set(range(len(LETTERS)))
     assert max(ranks.values()) <= 17
-
-
-def test_a_place_that_is_not_marked_is_found_out(built_in: QuestionSet) -> None:
-    question = next(t.question for t in built_in.tasks if t.question.subtask == "AD")
-    scene, block = question.pictures
-    bare = replace(question, pictures=(replace(scene, marks=scene.marks[1:]), block))
-    assert problem_of(bare) == "no place A is marked on a block"
 
 
 @pytest.mark.slow
@@ -321,52 +318,51 @@ def of(asked: list[Question], subtask: str) -> list[Question]:
     return [question for question in asked if question.subtask == subtask]
 
 
+def audit_of(
+    questions: list[Question], with_texts: bool = False, with_pictures: bool = False
+) -> SubtaskAudit:
+    (audit,) = audit_questions(questions, with_texts=with_texts, with_pictures=with_pictures)
+    return audit
+
+
 def test_letters_are_counted_and_balance_is_judged(asked: list[Question]) -> None:
-    even = [replace(q, answer=(n % 4,)) for n, q in enumerate(of(asked, "SH"))]
-    (audit,) = audit_questions(even, with_texts=False, with_pictures=False)
-    assert audit.letters == dict.fromkeys(LETTERS, 2)
-    assert audit.is_balanced
-    (skewed,) = audit_questions(
-        [replace(q, answer=(0,)) for q in even], with_texts=False, with_pictures=False
-    )
-    assert skewed.letters == {"A": 8, "B": 0, "C": 0, "D": 0}
-    assert not skewed.is_balanced
+    even = audit_of([replace(q, answer=(n % 4,)) for n, q in enumerate(of(asked, "SH"))])
+    skewed = audit_of([replace(q, answer=(0,)) for q in of(asked, "SH")])
+    assert (even.letters, even.is_balanced) == (dict.fromkeys(LETTERS, 2), True)
+    assert (skewed.letters["A"], skewed.is_balanced) == (8, False)
 
 
 def test_a_repeat_is_found_in_any_order_of_its_options(asked: list[Question]) -> None:
     for subtask in ("SH", "VP", "AD"):
         first = of(asked, subtask)[0]
-        again = replace(rotated(first, 1), id="again")
-        found = duplicates_of([first, again])
+        found = duplicates_of([first, replace(rotated(first, 1), id="again")])
         assert found == ({} if subtask == "AD" else {"again": first.id})
     assert duplicates_of(asked) == {}
 
 
-def test_a_text_that_gives_the_answer_away_is_a_finding(asked: list[Question]) -> None:
-    given = [
+def test_a_text_or_a_picture_that_gives_the_answer_away_is_a_finding(
+    asked: list[Question],
+) -> None:
+    """The cube is always right; the right one of four equal pictures lacks a block."""
+    cubes = [
         replace(q, id=f"sh-{n}", answer=(q.options.index("cube"),))
         for n, q in enumerate(5 * of(asked, "SH"))
     ]
-    (audit,) = audit_questions(given, with_pictures=False)
-    assert audit.text is not None
-    assert audit.text.accuracy == 1
-    assert any("text probe" in finding for finding in audit.findings())
-
-
-def test_a_picture_that_gives_the_answer_away_is_a_finding(asked: list[Question]) -> None:
-    """The right one of four equal pictures lacks a block in every question."""
-    given = []
-    for number in range(40):
-        first = of(asked, "VP")[number % 8]
-        scene, *options = first.pictures
-        less = replace(options[0], blocks=options[0].blocks[:-1])
+    lacking = []
+    for number, first in enumerate(5 * of(asked, "VP")):
+        scene, option, *_ = first.pictures
+        less = replace(option, blocks=option.blocks[:-1])
         shown = [
-            replace(less if i == number % 4 else options[0], label=letter)
+            replace(less if i == number % 4 else option, label=letter)
             for i, letter in enumerate(LETTERS)
         ]
-        pictures = (scene, *shown)
-        given.append(replace(first, id=f"vp-{number}", pictures=pictures, answer=(number % 4,)))
-    (audit,) = audit_questions(given, with_texts=False)
-    assert audit.pictures is not None
-    assert (audit.pictures.n, audit.pictures.accuracy) == (40, 1)
-    assert any("pictures probe" in finding for finding in audit.findings())
+        lacking.append(
+            replace(first, id=f"vp-{number}", pictures=(scene, *shown), answer=(number % 4,))
+        )
+    texts, pictures = audit_of(cubes, with_texts=True), audit_of(lacking, with_pictures=True)
+    assert texts.text is not None
+    assert texts.text.accuracy == 1
+    assert any("text probe" in finding for finding in texts.findings())
+    assert pictures.pictures is not None
+    assert (pictures.pictures.n, pictures.pictures.accuracy) == (40, 1)
+    assert any("pictures probe" in finding for finding in pictures.findings())

@@ -11,7 +11,6 @@ import functools
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -73,20 +72,16 @@ Place = tuple[float, float, float]
 RINGS_M = (0.00125, 0.0025, 0.005)
 """The verdict on a place holds all round it, this far off [m]."""
 _ANNEXED = 0.6
-_STRUCTURES_TRIED = 4
-_VIEWS_TRIED = 3
-_BLOCKS_TRIED = 3
-_STEP_PX = 5
+_STRUCTURES_TRIED, _VIEWS_TRIED, _BLOCKS_TRIED, _FOURS_TRIED = 4, 3, 3, 4
+_STEP_PX, _APART_PX = 5, 18.0
 _FLAT_RISE = 0.99
 _OFF_CENTER_M = 0.001
 _ALL_SEEN = 0.12
 _PLACES_TRIED, _GIVEN_UP = 90, 24
 _MOST_STAYING, _MOST_FALLING, _MOST_HINDERED = 10, 10, 12
 _OFF_CENTER, _ROW = 0, 4
-"""Places of two of the measures of `looks_of`."""
+"""Places of two of the measures of `_looks_of`."""
 _SAME_HEIGHT_M, _CLEARLY_HIGHER_M = 0.001, 0.01
-_APART_PX = 18.0
-_FOURS_TRIED = 4
 
 
 class AffordanceMaker(Maker):
@@ -104,15 +99,17 @@ class AffordanceMaker(Maker):
             tops = visible_tops(plain, seen(plain), _STEP_PX, _FLAT_RISE)
             for _ in range(_BLOCKS_TRIED):
                 block = _drawn_block(plain, rng)
-                places = alike_places(plain, block, shuffled(rng, tops), rng)
+                places = _alike_places(plain, block, shuffled(rng, tops), rng)
                 if places:
                     alone = QuestionPicture(BLOCK_LABEL, (block,), plain.view_deg)
                     marks = [Mark("A", top.position_m) for top in places]
-                    shown, slots = [plain, alone], {"size": _size(block)}
-                    facts: dict[str, Any] = {"block": block.type, "euler": list(block.euler_deg)}
-                    sort = sort_of(plain, places)
-                    made = draft(scene, rng, "ad-place", marks, shown, slots, value=sort, **facts)
-                    yield replace(made, looks=tuple(looks_of(plain, top) for top in places))
+                    made = draft(
+                        *(scene, rng, "ad-place", marks, [plain, alone], {"size": _size(block)}),
+                        value=_sort_of(plain, places),
+                        block=block.type,
+                        euler=list(block.euler_deg),
+                    )
+                    yield replace(made, looks=tuple(_looks_of(plain, top) for top in places))
                     return
 
     def rederive(self, question: Question) -> tuple[int, ...]:
@@ -145,12 +142,10 @@ def _pictured(scene: Scene, rng: np.random.Generator) -> QuestionPicture | None:
     """
     blocks = (with_annex(scene, rng) if rng.random() < _ANNEXED else None) or scene.blocks
     views = [drawn_view(rng) for _ in range(_VIEWS_TRIED)]
-    if all(map(surely_stands, groups(blocks))):
-        for view in views:
-            plain = QuestionPicture("scene", blocks, view)
-            if are_seen(plain, orders_of(blocks), _ALL_SEEN):
-                return plain
-    return None
+    if not all(map(surely_stands, groups(blocks))):
+        return None
+    pictures = (QuestionPicture("scene", blocks, view) for view in views)
+    return next((one for one in pictures if are_seen(one, orders_of(blocks), _ALL_SEEN)), None)
 
 
 def _drawn_block(plain: QuestionPicture, rng: np.random.Generator) -> Block:
@@ -186,7 +181,7 @@ def _size(block: Block) -> str:
     return f"{max(level):g} cm by {min(level):g} cm, and {high:g} cm in height"
 
 
-def alike_places(
+def _alike_places(
     plain: QuestionPicture, block: Block, tops: Sequence[Top], rng: np.random.Generator
 ) -> list[Top]:
     """The right place and three wrong ones, apart in the picture; none where there are too few."""
@@ -198,7 +193,7 @@ def alike_places(
     inside = np.array([is_inside(replace(plain, marks=(mark,))) for mark in marks])
     apart = np.array([[is_apart(plain, a, [b], _APART_PX) for b in marks] for a in marks])
     apart &= inside & inside[:, None]
-    measures = np.array([looks_of(plain, top) for top in together])
+    measures = np.array([_looks_of(plain, top) for top in together])
     pixels = np.array([mark_pixel(plain, mark.position_m) for mark in marks], dtype=np.float64)
     unlike = np.linalg.norm(pixels[:, None] - pixels, axis=2)
     is_sure: dict[int, bool] = {}
@@ -223,7 +218,7 @@ def _by_statics(
     What takes longer to find out is only asked where there may be enough of both.
     """
     sorts: dict[tuple[bool, bool], list[tuple[Top, Block]]] = {
-        (on, stays): [] for on in (True, False) for stays in (True, False)
+        sort: [] for sort in itertools.product((True, False), repeat=2)
     }
     marks: list[Mark] = []
     for number, top in enumerate(tops[:_PLACES_TRIED]):
@@ -231,7 +226,7 @@ def _by_statics(
         if number == _GIVEN_UP and not sorts[True, True]:
             break
         put = lowered(block, plain.blocks, *top.position_m[:2])
-        is_on = _is_on_face(plain, put, top.position_m)
+        is_on = is_on_face(plain, put, top.position_m)
         if is_on is not None and is_apart(plain, mark, marks, _APART_PX / 2):
             marks.append(mark)
             stays = is_balanced(group_of((*plain.blocks, put), put.order))
@@ -248,7 +243,7 @@ def _by_statics(
     return (sure(True, True, _MOST_STAYING) if len(wrong) >= WRONG else []), wrong
 
 
-def looks_of(plain: QuestionPicture, top: Top) -> tuple[float, ...]:
+def _looks_of(plain: QuestionPicture, top: Top) -> tuple[float, ...]:
     """Measures of a place: its distance from the middle of its block, room, height, distance out.
 
     In the world and in the picture, with how much of its block shows.
@@ -272,13 +267,13 @@ def looks_of(plain: QuestionPicture, top: Top) -> tuple[float, ...]:
     )
 
 
-def sort_of(plain: QuestionPicture, places: Sequence[Top]) -> str:
+def _sort_of(plain: QuestionPicture, places: Sequence[Top]) -> str:
     """By how many of the wrong places the right one, which is first, is outdone in three ways.
 
     How many are nearer to the middle of their block, how many higher up in the picture, and how
     many nearer to the others: by these the right one of any four would stand out.
     """
-    looks = np.array([looks_of(plain, top) for top in places])
+    looks = np.array([_looks_of(plain, top) for top in places])
     pixels = np.array([mark_pixel(plain, top.position_m) for top in places], dtype=np.float64)
     far = np.linalg.norm(pixels[:, None] - pixels, axis=2).sum(axis=1)
     measured = (("central", looks[:, _OFF_CENTER]), ("up", looks[:, _ROW]), ("alone", far))
@@ -293,7 +288,7 @@ def stays_at(plain: QuestionPicture, block: Block, at: Place) -> bool | None:
     """
     put = lowered(block, plain.blocks, *at[:2])
     around = lowered_round(put, plain.blocks, RINGS_M[-1:])
-    is_on = _is_on_face(plain, put, at)
+    is_on = is_on_face(plain, put, at)
     if is_on is None or any(_is_as_high(one, at) is not is_on for one in around):
         return None
     stays = stays_round(put, plain.blocks, RINGS_M)
@@ -302,14 +297,10 @@ def stays_at(plain: QuestionPicture, block: Block, at: Place) -> bool | None:
     return stays
 
 
-def is_on_face(plain: QuestionPicture, block: Block, at: Place) -> bool | None:
-    """True if the block let down at a place comes down on the marked face, as it would without the
-    other blocks; False if it meets a neighbor clearly before; None where neither is so.
+def is_on_face(plain: QuestionPicture, put: Block, at: Place) -> bool | None:
+    """True if a block let down at a place came down on the marked face, as it would without the
+    other blocks; False if it met a neighbor clearly before; None where neither is so.
     """
-    return _is_on_face(plain, lowered(block, plain.blocks, *at[:2]), at)
-
-
-def _is_on_face(plain: QuestionPicture, put: Block, at: Place) -> bool | None:
     is_as_high = _is_as_high(put, at)
     if not is_as_high:
         return is_as_high

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -27,6 +27,7 @@ from phyblock.making.questions.base import (
     WORDS,
     Draft,
     Maker,
+    Slots,
     UnfairError,
     are_seen,
     are_told_apart,
@@ -54,12 +55,12 @@ from phyblock.sim.outcomes import Outcome, after_removal
 from phyblock.sim.pictures import Shot
 from phyblock.sim.question_pictures import block_mark, seen
 
+Lot = frozenset[int]
+"""Orders of blocks that move."""
 OUTCOME_TEXTS: tuple[str, ...] = tuple(WORDS["outcomes_of_removal"])
 """Outcomes of a removal, by the number of other blocks that do not stay; all are offered."""
 _ALL_SEEN = 0.12
-_STRUCTURES_TRIED = 6
-_VIEWS_TRIED = 3
-_REMOVALS_TRIED = 6
+_STRUCTURES_TRIED, _VIEWS_TRIED, _REMOVALS_TRIED = 6, 3, 6
 _Sort = tuple[bool, bool]
 _SORTS: tuple[_Sort, ...] = ((False, False), (False, True), (True, False), (True, True))
 """True where what rests on the block goes with it, and where what rests on nothing else does."""
@@ -67,6 +68,18 @@ _SHARES = (0.35, 0.25, 0.25, 0.15)
 """Shares of removals of each sort that are looked for: each rule is right in four cases of ten."""
 _STAYS_ASKED = 0.25
 _COLORED = 0.5
+_MOST_POOL, _MOST_TOGETHER = 40, 3
+_AREA, _ROW = 0, 2
+"""Places of two of the measures of `_looks`."""
+_COLORS: tuple[tuple[Color, Color, Color], ...] = (
+    ("red", "yellow", "blue"),
+    ("orange", "blue", "green"),
+    ("yellow", "blue", "red"),
+    ("blue", "orange", "green"),
+    ("green", "orange", "blue"),
+    ("red", "blue", "yellow"),
+)
+"""The colors of what moves, of what stays, and of the block that is taken away."""
 
 
 class _Case(NamedTuple):
@@ -78,18 +91,14 @@ class _Case(NamedTuple):
 
     blocks: tuple[Block, ...]
     order: int
-    resting: frozenset[int]
-    only: frozenset[int]
+    resting: Lot
+    only: Lot
     falls: bool
 
     @property
     def sort(self) -> _Sort:
         """True or False for each rule: all that rests on the block goes with it; or on it alone."""
         return (bool(self.resting) is self.falls, bool(self.only) is self.falls)
-
-    def is_as_expected(self, moved: Collection[int]) -> bool:
-        """True if both rules hold, or fail, as they were thought to."""
-        return self.sort == (set(moved) == self.resting, set(moved) == self.only)
 
 
 class CounterfactualMaker(Maker):
@@ -111,16 +120,19 @@ class CounterfactualMaker(Maker):
         slots = slots_of(question)
         kind, shown = of_kind(question), picture_of(question, "scene")
         order = marked_order(shown, TAKEN)
-        outcome = sure_removal(shown.blocks, order)
+        outcome = _sure_removal(shown.blocks, order)
         if outcome is None:
             raise UnfairError(f"it is not sure what follows without block {order}")
         require_seen(shown, (order,), NAMED)
         if kind == "cf-count":
-            right = OUTCOME_TEXTS[min(len(outcome.moved), len(OUTCOME_TEXTS) - 1)]
+            right = _outcome_text(outcome)
             return only_index([option == right for option in question.options])
-        options = option_pictures(question)
-        told = [colored_orders(option, shown, order, slots) for option in options]
+        told = [_colored_orders(one, shown, order, slots) for one in option_pictures(question)]
         return only_index([one == set(outcome.moved) for one in told])
+
+
+def _outcome_text(outcome: Outcome) -> str:
+    return OUTCOME_TEXTS[min(len(outcome.moved), len(OUTCOME_TEXTS) - 1)]
 
 
 def _cases(
@@ -151,12 +163,15 @@ def _drafts_of(
             break
     else:
         return
-    outcome = sure_removal(case.blocks, case.order)
-    if outcome is None or not case.is_as_expected(outcome.moved):
+    outcome = _sure_removal(case.blocks, case.order)
+    if outcome is None:
+        return
+    moved = frozenset(outcome.moved)
+    if case.sort != (moved == case.resting, moved == case.only):
         return
     # That none moves is found more often than it is asked.
-    is_rare = not outcome.moved and rng.random() > _STAYS_ASKED
-    if is_rare or not are_seen(plain, outcome.moved, COUNTED):
+    is_rare = not moved and rng.random() > _STAYS_ASKED
+    if is_rare or not are_seen(plain, moved, COUNTED):
         return
     facts: dict[str, Any] = {
         "removed": case.order,
@@ -165,44 +180,24 @@ def _drafts_of(
     }
     shown = [replace(plain, marks=(mark,))]
     if is_colored:
-        colored, slots, value = colored_options(plain, case.order, outcome.moved, rng)
-        if colored:
-            yield draft(scene, rng, "cf-color", colored, shown, slots, value=value, **facts)
+        options, slots, value = _colored_options(plain, case.order, moved, rng)
+        if options:
+            yield draft(scene, rng, "cf-color", options, shown, slots, value=value, **facts)
         return
-    number = min(len(outcome.moved), len(OUTCOME_TEXTS) - 1)
-    right = OUTCOME_TEXTS[number]
-    options = [right, *shuffled(rng, right_first(right, OUTCOME_TEXTS)[1:])]
-    yield draft(scene, rng, "cf-count", options, shown, {}, **facts)
+    right, *others = right_first(_outcome_text(outcome), OUTCOME_TEXTS)
+    texts = [right, *shuffled(rng, others)]
+    yield draft(scene, rng, "cf-count", texts, shown, {}, **facts)
 
 
-Lot = frozenset[int]
-"""Orders of blocks that move."""
-
-_MOST_POOL = 40
-_MOST_TOGETHER = 3
-_AREA, _ROW = 0, 2
-"""Places of two of the measures of `_looks`."""
-_COLORS: tuple[tuple[Color, Color, Color], ...] = (
-    ("red", "yellow", "blue"),
-    ("orange", "blue", "green"),
-    ("yellow", "blue", "red"),
-    ("blue", "orange", "green"),
-    ("green", "orange", "blue"),
-    ("red", "blue", "yellow"),
-)
-"""The colors of what moves, of what stays, and of the block that is taken away."""
-
-
-def colored_options(
-    plain: QuestionPicture, taken: int, moved: Collection[int], rng: np.random.Generator
-) -> tuple[list[QuestionPicture], dict[str, str], str]:
+def _colored_options(
+    plain: QuestionPicture, taken: int, moved: Lot, rng: np.random.Generator
+) -> tuple[list[QuestionPicture], Slots, str]:
     """Four pictures, the right one first, and the slots of the text; none where they are too few.
 
-    The last tells if the right one has more colored than most, and lower.
-
-    `plain` has no marks; `moved` are the orders of the blocks that move when `taken` is gone.
+    The last tells if the right one has more colored than most, and lower. `plain` has no marks;
+    `moved` are the orders of the blocks that move when `taken` is gone.
     """
-    lots = [frozenset(moved), *_other_lots(plain, taken, frozenset(moved), rng)]
+    lots = [moved, *_other_lots(plain, taken, moved, rng)]
     shot = seen(plain)
     counts = np.bincount(shot.block[shot.block >= 0], minlength=len(plain.blocks))
     pixels = dict(zip(orders_of(plain.blocks), counts, strict=True))
@@ -210,19 +205,26 @@ def colored_options(
     measures = np.array([_looks(plain, shot, taken, lot) for lot in lots])
     four = four_alike(measures, unlike >= LEAST_PIXELS, rng, unlike=unlike)
     colors = pick(rng, _COLORS)
-    options = [_colored(plain, taken, lots[place], colors) for place in four.chosen]
-    slots: dict[str, str] = dict(zip(("color", "other", "taken"), colors, strict=True))
+
+    def colored(lot: Lot) -> QuestionPicture:
+        color = {b.order: colors[b.order not in lot] for b in plain.blocks} | {taken: colors[2]}
+        return replace(plain, blocks=tuple(replace(b, color=color[b.order]) for b in plain.blocks))
+
+    options = [colored(lots[place]) for place in four.chosen]
     if not options or not are_told_apart(options):
         return [], {}, ""
+    slots = dict(zip(("color", "other", "taken"), colors, strict=True))
     return options, slots, four.halves(_AREA, _ROW)
 
 
-def colored_orders(
-    picture: QuestionPicture, shown: QuestionPicture, taken: int, slots: Mapping[str, str]
+def _colored_orders(
+    picture: QuestionPicture, shown: QuestionPicture, taken: int, slots: Slots
 ) -> Lot:
     """Orders of the blocks that a picture says move; UnfairError when it says something else."""
-    start = {block.order: replace(block, color="red") for block in shown.blocks}
-    same = {block.order: replace(block, color="red") for block in picture.blocks}
+    start, same = (
+        {block.order: replace(block, color="red") for block in one.blocks}
+        for one in (shown, picture)
+    )
     color_of = {block.order: block.color for block in picture.blocks}
     rest = {color for order, color in color_of.items() if order != taken}
     if start != same or color_of.get(taken) != slots["taken"]:
@@ -261,8 +263,6 @@ def _looks(plain: QuestionPicture, shot: Shot, taken: int, lot: Lot) -> tuple[fl
     middle = center_m(block_of[taken])
     far_m = [float(np.linalg.norm(center_m(block_of[o]) - middle)) for o in about]
     low = min(float(center_m(block_of[o])[2]) for o in about)
-    resting = resting_on(plain.blocks, taken)
-    only = resting_on(plain.blocks, taken, only=True)
     area = len(rows) if lot else 0
     return (
         20 * area / max(int((shot.block >= 0).sum()), 1),
@@ -274,28 +274,19 @@ def _looks(plain: QuestionPicture, shot: Shot, taken: int, lot: Lot) -> tuple[fl
         10 * low,
         10 * min(far_m),
         10 * float(np.mean(far_m)),
-        float(len(lot ^ resting)),
-        float(len(lot ^ only)),
+        float(len(lot ^ resting_on(plain.blocks, taken))),
+        float(len(lot ^ resting_on(plain.blocks, taken, only=True))),
     )
 
 
-def _colored(
-    plain: QuestionPicture, taken: int, moved: Lot, colors: Sequence[Color]
-) -> QuestionPicture:
-    def of(block: Block) -> Color:
-        return colors[2] if block.order == taken else colors[block.order not in moved]
-
-    return replace(plain, blocks=tuple(replace(b, color=of(b)) for b in plain.blocks))
-
-
-def resting_on(blocks: Sequence[Block], order: int, *, only: bool = False) -> frozenset[int]:
+def resting_on(blocks: Sequence[Block], order: int, *, only: bool = False) -> Lot:
     """Orders of the blocks that rest on one, directly or not; not its own.
 
     With `only` they rest on nothing but it and others that do. The naive rule says that these, or
     those, fall when it is taken away, and nothing else.
     """
     below = _below(tuple(blocks))
-    found: frozenset[int] = frozenset({order})
+    found: Lot = frozenset({order})
     for _ in blocks:
         found |= {
             one for one, under in below.items() if under & found and (not only or under <= found)
@@ -304,12 +295,12 @@ def resting_on(blocks: Sequence[Block], order: int, *, only: bool = False) -> fr
 
 
 @functools.lru_cache(maxsize=64)
-def _below(blocks: tuple[Block, ...]) -> Mapping[int, frozenset[int]]:
+def _below(blocks: tuple[Block, ...]) -> Mapping[int, Lot]:
     """The support graph, which is asked again for every block of a structure."""
     return support_graph(blocks)
 
 
-def sure_removal(blocks: Sequence[Block], order: int) -> Outcome | None:
+def _sure_removal(blocks: Sequence[Block], order: int) -> Outcome | None:
     """The sure outcome of a removal; None where settings or statics leave a doubt."""
     group = group_of(blocks, order)
     if not surely_stands(group):

@@ -1,7 +1,8 @@
-"""PD, next steps: one more block on an unfinished structure, of which only one lot stays.
+"""PD: what holds next, and what a push leads to, by statics and simulation.
 
-All four pictures add the same block, let down where it first touches: here its weight is borne,
-there it is not. Right and wrong places are drawn alike, all over the structure.
+Next steps: all four pictures add the same block to an unfinished structure, let down where it
+first touches; right and wrong places are drawn alike, all over the structure. Pushes: a block is
+pushed to the right or left as seen, and other pictures show what follows other pushes close by.
 """
 
 from __future__ import annotations
@@ -9,8 +10,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +24,7 @@ from phyblock.making.questions.base import (
     WORDS,
     WRONG,
     Draft,
+    Floats,
     Maker,
     UnfairError,
     are_seen,
@@ -74,28 +74,68 @@ from phyblock.sim.question_pictures import (
     seen,
     shown_pixels,
 )
-from phyblock.stable import plain_sum
 
-_LEVEL_M, _DOWN_M = 0.004, 0.008
+_PUSHED = 0.55
+"""Share of drafts for which a push is sought, which fewer scenes allow than a next step."""
+
+
+class PredictiveMaker(Maker):
+    """Kinds: `pd-next` (the next step) and `pd-push` (the settled scene after a push)."""
+
+    subtask: Subtask = "PD"
+    scenes_tried = 340
+
+    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+        """A push or a next step, as drawn, where one is fair."""
+        yield from (_push_drafts if rng.random() < _PUSHED else _next_drafts)(scene, rng)
+
+    def rederive(self, question: Question) -> tuple[int, ...]:
+        """By statics and simulation."""
+        slots = slots_of(question)
+        shown, options = picture_of(question, "scene"), option_pictures(question)
+        if of_kind(question) == "pd-next":
+            return only_index([_can_follow(shown, one) for one in options])
+        push = _meant_push(shown, marked_order(shown, TAKEN), slots["direction"])
+        outcome = _sure_push(shown.blocks, push)
+        if outcome is None:
+            raise UnfairError("it is not sure what follows the push")
+        expected = _story(shown.blocks, replace(shown, blocks=outcome.settled), push)
+        return only_index([_story(shown.blocks, one, push) == expected for one in options])
+
+
 _ROOM_M = 0.06
-_MOST_POOL = 11
-_HELD_OFF = 0.5
-AREA = 0
-"""Place of the measure how much is colored."""
-_STAGES_TRIED = 3
+
+
+def _with_room(blocks: Sequence[Block], above_m: float = 0.0) -> tuple[Block, ...]:
+    """The blocks to frame a picture on for floor all round them, and some air above [m]."""
+    low, high = whole_bounds_m(blocks)
+    first = max(block.order for block in blocks) + 1
+    z = round(float(high[2]) + above_m, 4) if above_m else 0.0125
+    sides = itertools.product(*((low[i] - _ROOM_M, high[i] + _ROOM_M) for i in (0, 1)))
+    places = ((round(float(x), 4), round(float(y), 4), z) for x, y in sides)
+    corners = (
+        Block(first + i, "cuboid1", "red", place, (0.0, 0.0, 0.0), (), 1)
+        for i, place in enumerate(places)
+    )
+    return (*blocks, *corners)
+
+
+# Next steps
+
+RINGS_M = (0.0025, 0.005, 0.01)
+"""The verdict on a next step holds all round it, this far off [m]."""
+_STAGES_TRIED, _PLACES_TRIED, _RIGHTS_TRIED = 3, 60, 6
 _ANNEXED = 0.5
 _MOST_LEFT = 6
-_PLACES_TRIED = 60
 _STEP_M, _MOST_STEPS = 0.0125, 6
-_LEAST_HEIGHT_M = 0.02
+_LEAST_HEIGHT_M, _ABOVE_M = 0.02, 0.03
 _LEAST_SHOWN = 250
 _ELEVATIONS_DEG = (34, 48)
 """High enough to tell what lies behind from what lies above."""
-RINGS_M = (0.0025, 0.005, 0.01)
-"""The verdict on a next step holds all round it, this far off [m]."""
-_ABOVE_M = 0.03
-_ENOUGH, _MOST_OF_A_SORT = 4, 8
-_RIGHTS_TRIED = 6
+_ENOUGH, _MOST_OF_A_SORT, _MOST_POOL = 4, 8, 11
+_HELD_OFF = 0.5
+_AREA = 0
+"""Place of the measure how much is colored."""
 _AREA_RANKS = (0.1, 0.2, 0.3, 0.4)
 """Shares of each rank of the right picture by colored area that are looked for.
 
@@ -104,7 +144,7 @@ what is found is evened out when questions are chosen.
 """
 
 
-def next_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+def _next_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
     """At most one draft: a stage of building, a block to come, one place where it stays."""
     for _ in range(_STAGES_TRIED):
         stage, block = _stage(scene, rng)
@@ -112,29 +152,28 @@ def next_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
             return
         low, high = _ELEVATIONS_DEG
         view = (drawn_view(rng)[0], float(rng.integers(low, high + 1)))
-        shown = QuestionPicture("scene", stage, view, framed=with_room(stage, _ABOVE_M))
+        shown = QuestionPicture("scene", stage, view, framed=_with_room(stage, _ABOVE_M))
         staying, falling = _places(shown, block, rng)
         if len(falling) < _ENOUGH:
             continue
         rank = int(rng.choice(len(_AREA_RANKS), p=_AREA_RANKS))
         for right in staying[:_RIGHTS_TRIED]:
-            wrong = alike_wrong(shown, right, falling, rng, {AREA: rank})
-            if not all(are_seen(one, (block.order,), COUNTED) for one in (right, *wrong)):
-                continue
+            wrong = _alike_wrong(shown, right, falling, rng, {_AREA: rank})
             options = [right, *wrong]
-            is_sure_of = (_stays(stage, one.blocks[-1]) is (one is right) for one in options)
-            if wrong and all(is_sure_of):
-                facts: dict[str, Any] = {
-                    "placed": [one.order for one in stage],
-                    "next": block.order,
-                }
+            if not all(are_seen(one, (block.order,), COUNTED) for one in options):
+                continue
+            if wrong and all(_stays(stage, o.blocks[-1]) is (o is right) for o in options):
+                placed = [one.order for one in stage]
                 yield draft(
-                    scene, rng, "pd-next", options, [shown], {}, value=f"area {rank}", **facts
+                    *(scene, rng, "pd-next", options, [shown], {}),
+                    value=f"area {rank}",
+                    placed=placed,
+                    next=block.order,
                 )
                 return
 
 
-def can_follow(shown: QuestionPicture, option: QuestionPicture) -> bool:
+def _can_follow(shown: QuestionPicture, option: QuestionPicture) -> bool:
     """True if one block was added so that all stays; UnfairError when that is not sure."""
     placed = {block.order for block in shown.blocks}
     added = [block for block in option.blocks if block.order not in placed]
@@ -145,6 +184,12 @@ def can_follow(shown: QuestionPicture, option: QuestionPicture) -> bool:
     if stays is None:
         raise UnfairError(f"it is not sure whether all stays in picture {option.label}")
     return stays
+
+
+def _stays(stage: Sequence[Block], put: Block) -> bool | None:
+    """True if a block put down stays, by simulation too, and likewise up to 1 cm off; or None."""
+    stays = stays_round(put, stage, RINGS_M)
+    return stays if verdict((*stage, put), put.order) is stays else None
 
 
 def _stage(scene: Scene, rng: np.random.Generator) -> tuple[tuple[Block, ...], Block]:
@@ -193,239 +238,16 @@ def _places(
     return shuffled(rng, found[True]), found[False]
 
 
-def _stays(stage: Sequence[Block], put: Block) -> bool | None:
-    """True if a block put down stays, by simulation too, and likewise up to 1 cm off; or None."""
-    stays = stays_round(put, stage, RINGS_M)
-    return stays if verdict((*stage, put), put.order) is stays else None
-
-
-_BLOCKS_TRIED = 3
-_PUSHES_TRIED = 9
-_OPTIONS = 4
-_FRONTS_DEG = (0.0, 90.0, 180.0, 270.0)
-_ELEVATIONS_DEG_PUSHES = (20, 32)
-_DIRECTIONS: Mapping[str, int] = WORDS["directions"]
-_LEAST_SHOWN_PUSHES = 60
-_TOUCH_M = 0.002
-_ALONG_M = 0.01
-_REACH_M = 0.12
-
-
-def push_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-    """A block pushed to the right or left as seen, and what follows other pushes close by."""
-    plain = _shown_whole(scene, rng)
-    if plain is None:
-        return
-    shot = seen(plain)
-    for block in shuffled(rng, scene.blocks)[:_BLOCKS_TRIED]:
-        told = _told_apart(plain, _pushes(plain, block.order, rng))
-        if len(told) < _OPTIONS:
-            continue
-        (order, direction), right = told.pop(int(rng.integers(_OPTIONS)))
-        mark = block_mark(plain, shot, order, TAKEN)
-        outcome = sure_push(scene.blocks, meant_push(plain, order, direction)) if mark else None
-        if mark is None or outcome is None:
-            continue
-        right = replace(right, blocks=outcome.settled)
-        if are_told_apart([right, *(picture for _, picture in told)]):
-            facts: dict[str, Any] = {"pushed": order, "moved": list(outcome.moved)}
-            options = [right, *(picture for _, picture in told)]
-            shown = [replace(plain, marks=(mark,))]
-            value = "falls" if len(outcome.moved) > 1 else "slides"
-            slots = {"direction": direction}
-            yield draft(scene, rng, "pd-push", options, shown, slots, value=value, **facts)
-            return
-
-
-def _shown_whole(scene: Scene, rng: np.random.Generator) -> QuestionPicture | None:
-    """A picture from the front, back or a side in which every block shows; None where none does."""
-    low, high = _ELEVATIONS_DEG_PUSHES
-    for front_deg in shuffled(rng, _FRONTS_DEG):
-        view = (front_deg, float(rng.integers(low, high + 1)))
-        plain = QuestionPicture("scene", scene.blocks, view, framed=with_room(scene.blocks))
-        if min(shown_pixels(plain, seen(plain)).values()) >= _LEAST_SHOWN_PUSHES:
-            return plain
-    return None
-
-
-def meant_push(picture: QuestionPicture, order: int, direction: str) -> Push:
-    """The push that is meant by a direction in a picture."""
-    right = view_axes(*picture.view_deg)[0] * _DIRECTIONS[direction]
-    x, y = (round(float(part), 6) + 0.0 for part in right[:2])
-    return Push(order, (x, y))
-
-
-def sure_push(blocks: Sequence[Block], push: Push) -> Outcome | None:
-    """The sure outcome of a push; None where settings, or statics if none came down, doubt it."""
-    outcome = after(blocks, push)
-    if not outcome.is_clear or push.order not in outcome.moved:
-        return None
-    height = {block.order: block.position_m[2] for block in blocks}
-    if any(height[b.order] - b.position_m[2] > _TOUCH_M for b in outcome.settled):
-        return outcome
-    return outcome if is_sure(group_of(outcome.settled, push.order), ()) else None
-
-
-def what_happened(
-    blocks: Sequence[Block], picture: QuestionPicture, push: Push
-) -> tuple[tuple[int, ...], tuple[int, ...], frozenset[int], frozenset[int]]:
-    """The story of a picture, in words that two settled scenes can be compared by.
-
-    Who is gone, who moved, who came down, and who went the way of the push. UnfairError as
-    `story_of`.
-    """
-    story = story_of(blocks, picture)
-    start = {block.order: block.position_m for block in blocks}
-    along = {
-        b.order: plain_sum(
-            (end - begin) * way
-            for begin, end, way in zip(start[b.order], b.position_m, push.direction, strict=False)
-        )
-        for b in picture.blocks
-    }
-    return (*story, frozenset(order for order, way_m in along.items() if way_m > _ALONG_M))
-
-
-def _pushes(plain: QuestionPicture, order: int, rng: np.random.Generator) -> list[tuple[int, str]]:
-    """Pushes of a block and of those that it touches, to either side, in an order drawn."""
-    boxes = {block.order: bounds_m(block) for block in plain.blocks}
-    touching = [one for one, box in boxes.items() if boxes_near(box, boxes[order], _TOUCH_M)]
-    return shuffled(rng, list(itertools.product(touching, _DIRECTIONS)))[:_PUSHES_TRIED]
-
-
-def _told_apart(
-    plain: QuestionPicture, pushes: Sequence[tuple[int, str]]
-) -> list[tuple[tuple[int, str], QuestionPicture]]:
-    """The first four pushes of which each leads to a picture that tells a story of its own.
-
-    Settings are compared for the one that is asked about alone; one will do to look for others.
-    Blocks that stand far away are left alone.
-    """
-    found: list[tuple[tuple[int, str], QuestionPicture]] = []
-    stories: set[object] = set()
-    near = next(
-        group
-        for group in groups(plain.blocks, _REACH_M)
-        if any(block.order == pushes[0][0] for block in group)
-    )
-    axis = meant_push(plain, pushes[0][0], next(iter(_DIRECTIONS)))
-    for number, (order, direction) in enumerate(pushes):
-        if len(found) + len(pushes) - number < _OPTIONS:
-            break
-        outcome = after(near, meant_push(plain, order, direction), OUTCOME_SETTINGS[:1])
-        if not outcome.is_clear or order not in outcome.moved:
-            continue
-        settled = {block.order: block for block in outcome.settled}
-        blocks = tuple(settled.get(block.order, block) for block in plain.blocks)
-        picture = replace(plain, blocks=blocks)
-        try:
-            story = what_happened(plain.blocks, picture, axis)
-        except UnfairError:
-            continue
-        pictures = [plain, *(one for _, one in found), picture]
-        if story not in stories and are_told_apart(pictures):
-            stories.add(story)
-            found.append(((order, direction), picture))
-        if len(found) == _OPTIONS:
-            break
-    return found
-
-
-_PUSHED = 0.55
-"""Share of drafts for which a push is sought, which fewer scenes allow than a next step."""
-
-
-class PredictiveMaker(Maker):
-    """Kinds: `pd-next` (the next step) and `pd-push` (the settled scene after a push)."""
-
-    subtask: Subtask = "PD"
-    scenes_tried = 340
-
-    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-        """A push or a next step, as drawn, where one is fair."""
-        make = push_drafts if rng.random() < _PUSHED else next_drafts
-        yield from make(scene, rng)
-
-    def rederive(self, question: Question) -> tuple[int, ...]:
-        """By statics and simulation."""
-        slots = slots_of(question)
-        shown, options = picture_of(question, "scene"), option_pictures(question)
-        if of_kind(question) == "pd-next":
-            return only_index([can_follow(shown, one) for one in options])
-        before = shown.blocks
-        push = meant_push(shown, marked_order(shown, TAKEN), slots["direction"])
-        outcome = sure_push(before, push)
-        if outcome is None:
-            raise UnfairError("it is not sure what follows the push")
-        expected = what_happened(before, replace(shown, blocks=outcome.settled), push)
-        return only_index([what_happened(before, one, push) == expected for one in options])
-
-
-def with_room(blocks: Sequence[Block], above_m: float = 0.0) -> tuple[Block, ...]:
-    """The blocks to frame a picture on for floor all round them, and some air above [m]."""
-    low, high = whole_bounds_m(blocks)
-    first = max(block.order for block in blocks) + 1
-    height_m = round(float(high[2]) + above_m, 4) if above_m else 0.0125
-    corners = [
-        Block(first + i, "cuboid1", "red", (x, y, height_m), (0.0, 0.0, 0.0), (), 1)
-        for i, (x, y) in enumerate(
-            (round(float(x), 4), round(float(y), 4))
-            for x in (low[0] - _ROOM_M, high[0] + _ROOM_M)
-            for y in (low[1] - _ROOM_M, high[1] + _ROOM_M)
-        )
-    ]
-    return (*blocks, *corners)
-
-
-def moved_between(
-    scene: Scene, picture: QuestionPicture
-) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Orders of the scene's blocks that a picture lacks, and of those that it shows elsewhere.
-
-    UnfairError when it shows others, or a block neither at its place nor clearly elsewhere.
-    """
-    goal = {block.order: block for block in scene.blocks}
-    moved = []
-    for block in picture.blocks:
-        before = goal.get(block.order)
-        if before is None or before.kind != block.kind:
-            raise UnfairError(f"picture {picture.label} shows a block that the scene has not")
-        start, end = Pose.goal(before), Pose.goal(block)
-        distance_m, angle_deg = end.distance_m(start), end.angle_deg(start)
-        if distance_m > MOVED_M or angle_deg > MOVED_DEG:
-            moved.append(block.order)
-        elif distance_m > STILL_M or angle_deg > STILL_DEG:
-            raise UnfairError(f"picture {picture.label} shows block {block.order} hardly moved")
-    gone = set(goal) - {block.order for block in picture.blocks}
-    return tuple(sorted(gone)), tuple(sorted(moved))
-
-
-def story_of(
-    blocks: Sequence[Block], picture: QuestionPicture
-) -> tuple[tuple[int, ...], tuple[int, ...], frozenset[int]]:
-    """Orders of those gone, moved, and come down, by which two pictures can be compared.
-
-    UnfairError as `moved_between`, and where it is hard to tell whether a block came down.
-    """
-    gone, moved = moved_between(Scene("", (1,), tuple(blocks), ()), picture)
-    before = {block.order: block.position_m[2] for block in blocks}
-    after = {block.order: block.position_m[2] for block in picture.blocks}
-    down_m = {order: before[order] - after[order] for order in moved}
-    if any(_LEVEL_M < abs(height) < _DOWN_M for height in down_m.values()):
-        raise UnfairError(f"picture {picture.label} shows a block hardly lower than before")
-    return gone, moved, frozenset(order for order, height in down_m.items() if height >= _DOWN_M)
-
-
-def alike_wrong(
+def _alike_wrong(
     first: QuestionPicture,
     right: QuestionPicture,
     pool: Sequence[QuestionPicture],
     rng: np.random.Generator,
-    held: Mapping[int, int] = MappingProxyType({}),
+    held: Mapping[int, int],
 ) -> list[QuestionPicture]:
     """Three of the pool, told apart from one another and the rest, or none.
 
-    `held` gives ranks that hold exactly, by measure: `AREA`.
+    `held` gives ranks that hold exactly, by measure.
     """
     whole = [one for one in (right, *pool) if is_inside(one)][: 1 + _MOST_POOL]
     if not whole or whole[0] is not right:
@@ -439,16 +261,13 @@ def alike_wrong(
         apart[i, j] = apart[j, i] = is_worth_it and differing_pixels(one, other) >= LEAST_PIXELS
         if (i, j) == (0, 1) and not apart[i, j]:
             return []
-    measures = np.array([looks(start, shot) for shot in shots])
+    measures = np.array([_looks(start, shot) for shot in shots])
     chosen = ranked_as_drawn(measures, apart[1:, 1:], rng, held)
     return [whole[i] for i in chosen]
 
 
 def ranked_as_drawn(
-    measures: NDArray[np.float64],
-    apart: NDArray[np.bool_],
-    rng: np.random.Generator,
-    held: Mapping[int, int] = MappingProxyType({}),
+    measures: Floats, apart: NDArray[np.bool_], rng: np.random.Generator, held: Mapping[int, int]
 ) -> tuple[int, ...]:
     """Three rows after the first, all apart, among which the first has about the ranks drawn.
 
@@ -468,7 +287,7 @@ def ranked_as_drawn(
     return best[1]
 
 
-def looks(first: Shot, shot: Shot) -> tuple[float, ...]:
+def _looks(first: Shot, shot: Shot) -> tuple[float, ...]:
     """Eight measures of a picture, most of them shares of its side or of what is colored.
 
     What is colored: how much, its middle across and down, its width and its top. What changed
@@ -489,3 +308,138 @@ def looks(first: Shot, shot: Shot) -> tuple[float, ...]:
         2 * float(changed_columns.mean()) / side,
         2 * float(changed_rows.mean()) / side,
     )
+
+
+# Pushes
+
+_BLOCKS_TRIED, _PUSHES_TRIED = 3, 9
+_OPTIONS = 4
+_FRONTS_DEG = (0.0, 90.0, 180.0, 270.0)
+_ELEVATIONS_DEG_PUSHES = (20, 32)
+_DIRECTIONS: Mapping[str, int] = WORDS["directions"]
+_LEAST_SHOWN_PUSHES = 60
+_TOUCH_M, _ALONG_M, _REACH_M = 0.002, 0.01, 0.12
+_LEVEL_M, _DOWN_M = 0.004, 0.008
+_Pushed = tuple[int, str]
+"""The block that is pushed, and the direction."""
+
+
+def _push_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+    """At most one draft: a block pushed, of which a picture from the front, back or a side shows
+    every other as well.
+    """
+    low, high = _ELEVATIONS_DEG_PUSHES
+    for front_deg in shuffled(rng, _FRONTS_DEG):
+        view = (front_deg, float(rng.integers(low, high + 1)))
+        plain = QuestionPicture("scene", scene.blocks, view, framed=_with_room(scene.blocks))
+        shot = seen(plain)
+        if min(shown_pixels(plain, shot).values()) >= _LEAST_SHOWN_PUSHES:
+            break
+    else:
+        return
+    for block in shuffled(rng, scene.blocks)[:_BLOCKS_TRIED]:
+        told = _told_apart(plain, _pushes(plain, block.order, rng))
+        if len(told) < _OPTIONS:
+            continue
+        (order, direction), right = told.pop(int(rng.integers(_OPTIONS)))
+        mark = block_mark(plain, shot, order, TAKEN)
+        outcome = _sure_push(scene.blocks, _meant_push(plain, order, direction)) if mark else None
+        if mark is None or outcome is None:
+            continue
+        options = [replace(right, blocks=outcome.settled), *(picture for _, picture in told)]
+        if are_told_apart(options):
+            shown, slots = [replace(plain, marks=(mark,))], {"direction": direction}
+            yield draft(
+                *(scene, rng, "pd-push", options, shown, slots),
+                value="falls" if len(outcome.moved) > 1 else "slides",
+                pushed=order,
+                moved=list(outcome.moved),
+            )
+            return
+
+
+def _meant_push(picture: QuestionPicture, order: int, direction: str) -> Push:
+    """The push that is meant by a direction in a picture."""
+    right = view_axes(*picture.view_deg)[0] * _DIRECTIONS[direction]
+    x, y = (round(float(part), 6) + 0.0 for part in right[:2])
+    return Push(order, (x, y))
+
+
+def _sure_push(blocks: Sequence[Block], push: Push) -> Outcome | None:
+    """The sure outcome of a push; None where settings, or statics if none came down, doubt it."""
+    outcome = after(blocks, push)
+    if not outcome.is_clear or push.order not in outcome.moved:
+        return None
+    height = {block.order: block.position_m[2] for block in blocks}
+    if any(height[b.order] - b.position_m[2] > _TOUCH_M for b in outcome.settled):
+        return outcome
+    return outcome if is_sure(group_of(outcome.settled, push.order), ()) else None
+
+
+def _story(blocks: Sequence[Block], picture: QuestionPicture, push: Push) -> tuple[object, ...]:
+    """Orders of blocks gone, moved, come down, and gone the way of the push, to compare scenes by.
+
+    UnfairError when the picture shows other blocks, or it is hard to tell of one whether it moved
+    or came down.
+    """
+    goal, label = {block.order: block for block in blocks}, picture.label
+    moved, down, along = [], [], []
+    for block in picture.blocks:
+        before = goal.get(block.order)
+        if before is None or before.kind != block.kind:
+            raise UnfairError(f"picture {label} shows a block that the scene has not")
+        start, end = Pose.goal(before), Pose.goal(block)
+        distance_m, angle_deg = end.distance_m(start), end.angle_deg(start)
+        x, y, z = (b - a for a, b in zip(before.position_m, block.position_m, strict=True))
+        if distance_m > MOVED_M or angle_deg > MOVED_DEG:
+            moved.append(block.order)
+            if _LEVEL_M < abs(z) < _DOWN_M:
+                raise UnfairError(f"picture {label} shows a block hardly lower than before")
+            down += [block.order] if -z >= _DOWN_M else []
+        elif distance_m > STILL_M or angle_deg > STILL_DEG:
+            raise UnfairError(f"picture {label} shows block {block.order} hardly moved")
+        along += [block.order] if x * push.direction[0] + y * push.direction[1] > _ALONG_M else []
+    gone = set(goal) - {block.order for block in picture.blocks}
+    return tuple(map(frozenset, (gone, moved, down, along)))
+
+
+def _pushes(plain: QuestionPicture, order: int, rng: np.random.Generator) -> list[_Pushed]:
+    """Pushes of a block and of those that it touches, to either side, in an order drawn."""
+    boxes = {block.order: bounds_m(block) for block in plain.blocks}
+    touching = [one for one, box in boxes.items() if boxes_near(box, boxes[order], _TOUCH_M)]
+    return shuffled(rng, list(itertools.product(touching, _DIRECTIONS)))[:_PUSHES_TRIED]
+
+
+def _told_apart(
+    plain: QuestionPicture, pushes: Sequence[_Pushed]
+) -> list[tuple[_Pushed, QuestionPicture]]:
+    """The first four pushes of which each leads to a picture that tells a story of its own.
+
+    Settings are compared for the one that is asked about alone; one will do to look for others.
+    Blocks that stand far away are left alone.
+    """
+    found: list[tuple[_Pushed, QuestionPicture]] = []
+    stories: set[object] = set()
+    first = pushes[0][0]
+    reached = groups(plain.blocks, _REACH_M)
+    near = next(group for group in reached if any(block.order == first for block in group))
+    axis = _meant_push(plain, first, next(iter(_DIRECTIONS)))
+    for number, (order, direction) in enumerate(pushes):
+        if len(found) + len(pushes) - number < _OPTIONS:
+            break
+        outcome = after(near, _meant_push(plain, order, direction), OUTCOME_SETTINGS[:1])
+        if not outcome.is_clear or order not in outcome.moved:
+            continue
+        settled = {block.order: block for block in outcome.settled}
+        blocks = tuple(settled.get(block.order, block) for block in plain.blocks)
+        picture = replace(plain, blocks=blocks)
+        try:
+            story = _story(plain.blocks, picture, axis)
+        except UnfairError:
+            continue
+        if story not in stories and are_told_apart([plain, *(one for _, one in found), picture]):
+            stories.add(story)
+            found.append(((order, direction), picture))
+        if len(found) == _OPTIONS:
+            break
+    return found

@@ -159,22 +159,17 @@ def as_question(
     """A draft with its options dealt: `places` says of each, in their order, where it goes."""
     options: list[str] = [""] * len(places)
     pictures = list(draft.pictures)
-    marks: list[Mark] = []
-    shown: list[QuestionPicture] = []
-    for option, place in zip(draft.options, places, strict=True):
+    for place, option in sorted(zip(places, draft.options, strict=True), key=lambda one: one[0]):
         letter = LETTERS[place]
         if isinstance(option, QuestionPicture):
             options[place] = f"<img{place + 1}>"
-            shown.append(replace(option, label=letter))
+            pictures.append(replace(option, label=letter))
         elif isinstance(option, Mark):
             options[place] = f"place {letter}"
-            marks.append(replace(option, letter=letter))
+            marks = (*pictures[0].marks, replace(option, letter=letter))
+            pictures[0] = replace(pictures[0], marks=marks)
         else:
             options[place] = option
-    if marks:
-        lettered = sorted(marks, key=lambda mark: mark.letter)
-        pictures[0] = replace(pictures[0], marks=(*pictures[0].marks, *lettered))
-    pictures += sorted(shown, key=lambda picture: picture.label)
     return Question(
         id=name,
         subtask=subtask,
@@ -182,31 +177,31 @@ def as_question(
         text=draft.text,
         options=tuple(options),
         answer=tuple(places) if subtask == "OR" else (places[0],),
-        pictures=tuple(replace(tidy_picture(one), background=background) for one in pictures),
+        pictures=tuple(replace(_tidy(one), background=background) for one in pictures),
         wording=draft.wording,
         evidence=dict(draft.evidence),
     )
 
 
-def tidy_picture(picture: QuestionPicture) -> QuestionPicture:
+def _tidy(picture: QuestionPicture) -> QuestionPicture:
     """The picture with its numbers as the file holds them, and orders that rise."""
-    azimuth, elevation = (round(float(angle), _DIGITS) + 0.0 for angle in picture.view_deg)
+
+    def rounded(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+        x, y, z = (round(float(number), _DIGITS) + 0.0 for number in vector)
+        return (x, y, z)
+
+    def tidy(block: Block) -> Block:
+        place, angles = rounded(block.position_m), rounded(block.euler_deg)
+        return replace(block, position_m=place, euler_deg=angles)
+
+    azimuth, elevation, _ = rounded((*picture.view_deg, 0.0))
     return replace(
         picture,
-        blocks=tuple(sorted(map(_tidy_block, picture.blocks), key=lambda block: block.order)),
-        marks=tuple(replace(mark, position_m=_round(mark.position_m)) for mark in picture.marks),
-        framed=tuple(map(_tidy_block, picture.framed)),
+        blocks=tuple(sorted(map(tidy, picture.blocks), key=lambda block: block.order)),
+        marks=tuple(replace(mark, position_m=rounded(mark.position_m)) for mark in picture.marks),
+        framed=tuple(map(tidy, picture.framed)),
         view_deg=(azimuth, elevation),
     )
-
-
-def _tidy_block(block: Block) -> Block:
-    return replace(block, position_m=_round(block.position_m), euler_deg=_round(block.euler_deg))
-
-
-def _round(vector: tuple[float, float, float]) -> tuple[float, float, float]:
-    x, y, z = (round(float(number), _DIGITS) + 0.0 for number in vector)
-    return (x, y, z)
 
 
 def problem_of(question: Question) -> str | None:

@@ -11,7 +11,7 @@ Scenes are recolored, as many are their own mirror image.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -73,6 +73,14 @@ class _Structure:
     def mirrored(self) -> _Structure:
         """Its mirror image, which shows the mirrored picture from the mirrored view."""
         return _Structure(transformed(self.blocks, Symmetry(0, True)), not self.is_mirrored)
+
+    def changed(self, change: Mapping[int, Block]) -> _Structure:
+        """With other blocks in the place of some, by order; mirrored where there are none."""
+        if not change:
+            return self.mirrored()
+        if self.is_mirrored:
+            return self.mirrored().changed(change).mirrored()
+        return _Structure(tuple(change.get(block.order, block) for block in self.blocks))
 
     def seen_from(self, view: View) -> QuestionPicture:
         """The picture from a view; of a mirrored structure from the mirrored view."""
@@ -142,59 +150,43 @@ def _family(
     """A structure with each of two changes made or not; none where two of them are the same."""
     base = _Structure(scene.blocks)
     names = shuffled(rng, ("mirror", "swap", "swap", "shift"))[:2]
-    changed = [base]
-    touched: list[int] = []
+    family, touched = [base], []
     for name in names:
-        made = _changed(base, name, rng, views)
-        if made is None:
+        change = _change(base, name, rng, views)
+        if change is None:
             return (), ""
-        touched += [] if made.is_mirrored else _differing(base, made)
-        changed += [_like(base, made, one) for one in changed]
-    forms = {turned_form(one.blocks) for one in changed}
-    if len(forms) < len(changed) or len(set(touched)) < len(touched):
+        touched += list(change)
+        family += [one.changed(change) for one in family]
+    forms = {turned_form(one.blocks) for one in family}
+    if len(forms) < len(family) or len(set(touched)) < len(touched):
         return (), ""
-    return tuple(changed), "+".join(sorted(names))
+    return tuple(family), "+".join(sorted(names))
 
 
-def _differing(base: _Structure, changed: _Structure) -> list[int]:
-    """Orders of the blocks that a change alters."""
-    pairs = zip(base.blocks, changed.blocks, strict=True)
-    return [before.order for before, after in pairs if before != after]
-
-
-def _changed(
+def _change(
     base: _Structure, name: str, rng: np.random.Generator, views: Sequence[View]
-) -> _Structure | None:
+) -> Mapping[int, Block] | None:
+    """The blocks that a change puts in the place of others, none for mirroring; or None."""
     if name == "mirror":
-        return base.mirrored()
+        return {}
     if name == "shift":
         blocks = shifted(base.blocks, rng)
-        return None if blocks is None else _Structure(blocks)
+        pairs = zip(base.blocks, blocks or (), strict=False)
+        return {b.order: b for a, b in pairs if a != b} if blocks else None
     counts = [_pixels(base, view) for view in views]
     shown = [b for b in base.blocks if min(one[b.order] for one in counts) >= _LEAST_SHOWN]
-    pairs = [(a, b) for a, b in itertools.combinations(shown, 2) if a.color != b.color]
-    if not pairs:
+    unlike = [(a, b) for a, b in itertools.combinations(shown, 2) if a.color != b.color]
+    if not unlike:
         return None
-    one, other = pick(rng, pairs)
-    colors = {one.order: other.color, other.order: one.color}
-    return _Structure(tuple(replace(b, color=colors.get(b.order, b.color)) for b in base.blocks))
-
-
-def _like(base: _Structure, changed: _Structure, other: _Structure) -> _Structure:
-    """Another structure with the same change as from `base`."""
-    if changed.is_mirrored:
-        return other.mirrored()
-    if other.is_mirrored:
-        return _like(base, changed, other.mirrored()).mirrored()
-    altered = _differing(base, changed)
-    new = {block.order: block for block in changed.blocks if block.order in altered}
-    return _Structure(tuple(new.get(block.order, block) for block in other.blocks))
+    a, b = pick(rng, unlike)
+    return {a.order: replace(a, color=b.color), b.order: replace(b, color=a.color)}
 
 
 def _side(scene: Scene, rng: np.random.Generator, front: View, side: str) -> Iterator[Draft]:
     """Left and right of a structure and of its mirror image; either may be the one shown."""
     base = _Structure(scene.blocks)
-    views = [_from_side(front, name) for name in (side, _opposite(side))]
+    opposite = next(name for name in _SIDES if name not in (side, "behind"))
+    views = [_from_side(front, name) for name in (side, opposite)]
     options = [one.seen_from(view) for one in (base, base.mirrored()) for view in views]
     shown = base.seen_from(front)
     pixels = _pixels(base, front).values()
@@ -213,10 +205,6 @@ def _differ_at_a_glance(options: Sequence[QuestionPicture]) -> bool:
     shots = [seen(option) for option in options]
     area = max(int((shot.block >= 0).sum()) for shot in shots)
     return least_difference(shots) >= _LEAST_SHARE * area
-
-
-def _opposite(side: str) -> str:
-    return next(name for name in _SIDES if name not in (side, "behind"))
 
 
 def _hits(family: Sequence[_Structure], first: View, second: View) -> float:
