@@ -218,7 +218,7 @@ def _by_statics(
     What takes longer to find out is only asked where there may be enough of both.
     """
     sorts: dict[tuple[bool, bool], list[tuple[Top, Block]]] = {
-        sort: [] for sort in itertools.product((True, False), repeat=2)
+        (on, stays): [] for on in (True, False) for stays in (True, False)
     }
     marks: list[Mark] = []
     for number, top in enumerate(tops[:_PLACES_TRIED]):

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain.question import LETTERS, SUBTASKS, Question, QuestionPicture, Subtask
-from phyblock.domain.scene import Block
 from phyblock.making.questions.selection import BALANCE
 from phyblock.sim.pictures import COLOR_RGB, Shot
 from phyblock.sim.question_pictures import changed_pixels, seen
@@ -107,14 +106,19 @@ def audit_questions(
             continue
         chances = [1 / math.factorial(4) if subtask == "OR" else 1 / len(q.options) for q in mine]
         letters = Counter(q.answer_letters[0] for q in mine)
+        probes = ("majority", *(["text-only"] if with_texts else []))
+        right = {
+            name: Probe(sum(guesses.guess(name, q) == q.answer for q in mine), len(mine))
+            for name in probes
+        }
         yield SubtaskAudit(
             subtask=subtask,
             n=len(mine),
             base_scenes=len({base for q in mine for base in q.scene.parents or (q.scene.id,)}),
             letters={letter: letters[letter] for letter in LETTERS},
             chance=math.fsum(chances) / len(chances),
-            majority=_guessed("majority", mine, guesses),
-            text=_guessed("text-only", mine, guesses) if with_texts else None,
+            majority=right["majority"],
+            text=right.get("text-only"),
             pictures=picture_probe(mine, folds) if with_pictures else None,
             repeats=tuple(q.id for q in mine if q.id in repeated),
         )
@@ -163,11 +167,6 @@ def picture_probe(questions: Sequence[Question], folds: Folds) -> Probe | None:
     return Probe(right, n) if n else None
 
 
-def _guessed(probe: str, questions: Sequence[Question], guesses: Guesses) -> Probe:
-    right = sum(guesses.guess(probe, question) == question.answer for question in questions)
-    return Probe(right, len(questions))
-
-
 def _worth(question: Question) -> Floats:
     """1 for the right option and 0 for others; in an order, the first is worth most."""
     worth = np.zeros(len(question.options))
@@ -204,15 +203,11 @@ def _measures(shot: Shot) -> list[float]:
     """Colored area, its center, its extent, brightness and edges of a picture [pixels]."""
     mask = shot.block >= 0
     lines = [np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0)]
+    extents = [float(np.ptp(line)) if len(line) else 0.0 for line in lines]
     gray = np.where(mask, shot.rgb.mean(axis=2), 255.0)
     edges = sum(int((np.abs(np.diff(gray, axis=axis)) > _EDGE_STEP).sum()) for axis in (0, 1))
-    return [
-        float(mask.sum()),
-        *_center(mask),
-        *(float(np.ptp(line)) if len(line) else 0.0 for line in lines),
-        float(shot.rgb[mask].mean()) if mask.any() else 0.0,
-        float(edges),
-    ]
+    brightness = float(shot.rgb[mask].mean()) if mask.any() else 0.0
+    return [float(mask.sum()), *_center(mask), *extents, brightness, float(edges)]
 
 
 def _center(mask: NDArray[np.bool_]) -> tuple[float, float]:
@@ -235,21 +230,18 @@ def _color_shares(shot: Shot) -> Floats:
 
 def _content(question: Question) -> str:
     """Everything that a reader of the question sees, its options in no order, as JSON."""
-    pictures = {picture.label: _recipe(picture) for picture in question.pictures}
-    shown = [json.dumps(part) for label, part in pictures.items() if label not in LETTERS]
-    options = [
-        json.dumps(pictures[letter]) if letter in pictures else option
-        for letter, option in zip(LETTERS, question.options, strict=False)
-    ]
-    return json.dumps([question.subtask, question.text, shown, sorted(options)])
 
-
-def _recipe(picture: QuestionPicture) -> list[object]:
     def rounded(numbers: Sequence[float]) -> tuple[float, ...]:
         return tuple(round(number, 6) + 0.0 for number in numbers)
 
-    def drawn(block: Block) -> tuple[object, ...]:
-        return block.type, block.color, rounded(block.position_m), rounded(block.euler_deg)
+    def recipe(picture: QuestionPicture) -> str:
+        blocks = sorted(
+            (b.type, b.color, rounded(b.position_m), rounded(b.euler_deg)) for b in picture.blocks
+        )
+        marks = sorted((rounded(mark.position_m), mark.letter) for mark in picture.marks)
+        return json.dumps([picture.view_deg, blocks, marks])
 
-    marks = sorted((rounded(mark.position_m), mark.letter) for mark in picture.marks)
-    return [picture.view_deg, sorted(map(drawn, picture.blocks)), marks]
+    pictures = {picture.label: recipe(picture) for picture in question.pictures}
+    shown = [recipe for label, recipe in pictures.items() if label not in LETTERS]
+    options = [pictures.get(a, b) for a, b in zip(LETTERS, question.options, strict=False)]
+    return json.dumps([question.subtask, question.text, shown, sorted(options)])

@@ -15,7 +15,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from phyblock.domain.blocks import Color
 from phyblock.domain.question import Question, QuestionPicture, Subtask
@@ -147,26 +146,16 @@ def _stage_in(scene: Scene, option: QuestionPicture, slots: Mapping[str, str]) -
 
 
 def _is_sorted_by_eye(plain: QuestionPicture, stages: Stages) -> bool:
-    """True if size or height of what is highlighted, either way round, gives the order."""
-    shown = seen(plain).block
-    columns = zip(*(_looks(plain, shown, stage) for stage in stages), strict=True)
-    return any(list(one) in (sorted(one), sorted(one)[::-1]) for one in columns)
+    """True if size or height of what is highlighted, either way round, gives the order.
 
-
-def _looks(
-    plain: QuestionPicture, shown: NDArray[np.int64], stage: frozenset[int]
-) -> tuple[float, ...]:
-    """Numbers of blocks and pixels, and heights in the world and in the picture, of a stage."""
-    blocks = [(i, b.position_m[2]) for i, b in enumerate(plain.blocks) if b.order in stage]
-    rows = np.nonzero(np.isin(shown, [i for i, _ in blocks]))[0]
-    heights = [height for _, height in blocks]
-    return (
-        float(len(stage)),
-        float(len(rows)),
-        float(np.mean(heights)),
-        max(heights),
-        min(heights),
-        float(rows.mean()),
-        float(rows.min()),
-        float(rows.max()),
-    )
+    By numbers of blocks and pixels, and by heights in the world and in the picture.
+    """
+    shown, looks = seen(plain).block, []
+    for stage in stages:
+        blocks = [(i, b.position_m[2]) for i, b in enumerate(plain.blocks) if b.order in stage]
+        rows = np.nonzero(np.isin(shown, [i for i, _ in blocks]))[0]
+        heights = [height for _, height in blocks]
+        levels = (float(np.mean(heights)), max(heights), min(heights))
+        looks.append((len(stage), len(rows), *levels, rows.mean(), rows.min(), rows.max()))
+    columns = map(list, zip(*looks, strict=True))
+    return any(column in (sorted(column), sorted(column)[::-1]) for column in columns)

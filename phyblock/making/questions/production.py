@@ -227,8 +227,8 @@ def verify_questions(
     """Each question with its fault, if any, scene by scene, so that pictures are shared."""
     by_scene = sorted(questions, key=lambda question: question.scene.id)
     batches = [by_scene[i : i + _BATCH] for i in range(0, len(by_scene), _BATCH)]
-    answers = chain.from_iterable(workers.map(_problems, batches))
-    yield from zip(by_scene, answers, strict=True)
+    problems = chain.from_iterable(workers.map(_problems, batches))
+    yield from zip(by_scene, problems, strict=True)
 
 
 def _problems(questions: Sequence[Question]) -> list[str | None]:

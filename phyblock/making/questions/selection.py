@@ -34,21 +34,32 @@ _WEIGHTS = {"kind": 6.0, "wording": 2.0, "options": 0.2, "value": 4.0, "scene": 
 def select(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[Draft]:
     """At most `count` drafts of the pool, no two the same question about the same scene."""
     left = _kept(_spread(pool, count, rng), count, rng)
-    tally = _Tally(left)
-    taken: list[Draft] = []
-    keys: set[Hashable] = set()
+    members: dict[Hashable, set[Hashable]] = defaultdict(set)
+    for one in left:
+        for group, member, _ in _even(one):
+            members[group].add(member)
+    counts: Counter[tuple[Hashable, Hashable]] = Counter()
+
+    def cost(one: Draft) -> float:
+        """The unevenness that a further draft adds to those taken; the lower the better."""
+        cost = 0.0
+        for group, member, weight in _even(one):
+            others = [counts[group, other] for other in members[group]]
+            cost += weight * (counts[group, member] - sum(others) / len(others))
+        return cost
+
+    taken: dict[Hashable, Draft] = {}
     while left and len(taken) < count:
         size = min(_LOOKED_AT, len(left))
         drawn = rng.choice(len(left), size=size, replace=False).tolist()
-        best = min(drawn, key=lambda i: tally.cost(left[i]))
+        best = min(drawn, key=lambda i: cost(left[i]))
         chosen = left[best]
         left[best] = left[-1]
         left.pop()
-        if (key := _identity(chosen)) not in keys:
-            keys.add(key)
-            taken.append(chosen)
-            tally.add(chosen)
-    return taken
+        if _identity(chosen) not in taken:
+            taken[_identity(chosen)] = chosen
+            counts.update((group, member) for group, member, _ in _even(chosen))
+    return list(taken.values())
 
 
 def _spread(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[Draft]:
@@ -70,30 +81,6 @@ def _kept(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[D
     rank = rng.random(len(pool)) / np.maximum(odds, 1e-9)
     least = float(np.sort(rank)[: _SPARE * count][-1]) if len(pool) else 0.0
     return [one for one, place in zip(pool, rank, strict=True) if place <= max(1.0, least)]
-
-
-class _Tally:
-    """Counts of what was taken, and the unevenness that a further draft would add."""
-
-    def __init__(self, pool: Sequence[Draft]) -> None:
-        self._members: dict[Hashable, set[Hashable]] = defaultdict(set)
-        self._counts: Counter[tuple[Hashable, Hashable]] = Counter()
-        for one in pool:
-            for group, member, _ in _even(one):
-                self._members[group].add(member)
-
-    def cost(self, one: Draft) -> float:
-        """The lower the better."""
-        cost = 0.0
-        for group, member, weight in _even(one):
-            counts = [self._counts[group, other] for other in self._members[group]]
-            cost += weight * (self._counts[group, member] - sum(counts) / len(counts))
-        return cost
-
-    def add(self, one: Draft) -> None:
-        """Count a draft as taken."""
-        for group, member, _ in _even(one):
-            self._counts[group, member] += 1
 
 
 def _even(draft: Draft) -> Iterator[tuple[Hashable, Hashable, float]]:

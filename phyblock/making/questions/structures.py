@@ -52,9 +52,10 @@ class _Weight(NamedTuple):
     half_height_m: float
 
 
+_CUBE = _Weight("cube", (0.0, 0.0, 0.0), 0.025, 0.025)
 _WEIGHTS = (
-    _Weight("cube", (0.0, 0.0, 0.0), 0.025, 0.025),
-    _Weight("cube", (0.0, 0.0, 0.0), 0.025, 0.025),
+    _CUBE,
+    _CUBE,
     _Weight("cuboid1", (0.0, 0.0, 0.0), 0.025, 0.0125),
     _Weight("cuboid2", (0.0, 90.0, 0.0), 0.0125, 0.05),
     _Weight("cuboid2", (0.0, 0.0, 90.0), 0.025, 0.0125),
@@ -88,14 +89,14 @@ def with_annex(scene: Scene, rng: np.random.Generator) -> tuple[Block, ...] | No
 def _free_tops(blocks: Sequence[Block]) -> list[Block]:
     """Blocks with a flat top, square to the axes, that carries nothing."""
     carrying = {order for block in blocks for order in block.depend}
-    return [block for block in blocks if block.order not in carrying and _has_top(block)]
 
+    def has_top(block: Block) -> bool:
+        corners = corners_m(block.type, block.position_m, block.euler_deg)
+        top = corners[corners[:, 2] > corners[:, 2].max() - _FLAT_M, :2]
+        is_square = all(abs(angle % 90.0) < 1e-6 for angle in block.euler_deg)
+        return is_square and bool(np.ptp(top, axis=0).min() >= _LEAST_TOP_M)
 
-def _has_top(block: Block) -> bool:
-    corners = corners_m(block.type, block.position_m, block.euler_deg)
-    top = corners[corners[:, 2] > corners[:, 2].max() - _FLAT_M, :2]
-    is_square = all(abs(angle % 90.0) < 1e-6 for angle in block.euler_deg)
-    return is_square and bool(np.ptp(top, axis=0).min() >= _LEAST_TOP_M)
+    return [block for block in blocks if block.order not in carrying and has_top(block)]
 
 
 class _Plan(NamedTuple):
@@ -140,21 +141,21 @@ def _drawn(scene: Scene, top: Block, rng: np.random.Generator) -> list[Block]:
 
 
 def _planned(half_m: float, rng: np.random.Generator) -> _Plan | None:
-    """A plan whose balance hangs on something, for a top of that half width along the plank."""
+    """A plan whose balance hangs on something, for a top of that half width along the plank.
+
+    Plank and weights bear themselves; the plank reaches as far as a column that props its end, or
+    would tip without one of the weights.
+    """
     is_propped = rng.random() < _PROPPED
     for _ in range(_PLANS_TRIED):
         plank, length_m = pick(rng, _PLANKS)
         most = round((length_m / 2 + half_m - _CUBE_M / 2) / _UNIT_M)
         off_m = _UNIT_M * int(rng.integers(-most, most + 1))
-        weights = _weights(length_m, rng)
-        plan = _Plan(plank, length_m, off_m, weights, is_propped)
+        plan = _Plan(plank, length_m, off_m, _weights(length_m, rng), is_propped)
         is_far = abs(off_m) + length_m / 2 - _CUBE_M > half_m
-        others = [plan._replace(weights=[w for w in weights if w is not one]) for one in weights]
-        if _leans_m(plan) > half_m - MARGIN_M:
-            continue
-        if is_propped and is_far:
-            return plan
-        if not is_propped and any(_leans_m(one) > half_m + MARGIN_M for one in others):
+        left = [[w for w in plan.weights if w is not one] for one in plan.weights]
+        hangs = any(_leans_m(plan._replace(weights=some)) > half_m + MARGIN_M for some in left)
+        if _leans_m(plan) <= half_m - MARGIN_M and (is_far if is_propped else hangs):
             return plan
     return None
 
