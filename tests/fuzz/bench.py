@@ -39,7 +39,7 @@ Content = bytes | Fifo | Link
 class Case:
     """A command line and what stands in the folder where it is given.
 
-    `may_write` are the paths that the command is to write in, beside the cache; `lasting` those of
+    `may_write` are the paths that the command is to write in, beside cache and scratch folder; `lasting` those of
     the user's files that stand there and must not change.
     """
 
@@ -88,6 +88,7 @@ class Bench:
         )
 
     def _broken(self, case: Case, folder: Path) -> list[Broken]:
+        (folder / "tmp").mkdir()
         for name, content in case.files.items():
             _put(folder / name, content)
         before, lines = take_tree(folder), _whole_lines(folder)
@@ -96,7 +97,7 @@ class Bench:
         return self._judge(case, folder, ended, before) + _lost(lines, _whole_lines(folder))
 
     def _judge(self, case: Case, folder: Path, ended: Ended, before: Tree) -> list[Broken]:
-        places = (*case.may_write, "cache", *map(str, shared_folders(self._pictures)))
+        places = (*case.may_write, "cache", "tmp", *map(str, shared_folders(self._pictures)))
         after = take_tree(folder)
         return broken_laws(ended, folder, before, after, places, case.lasting)
 
@@ -105,7 +106,7 @@ class Bench:
         return {
             "PATH": os.environ["PATH"],
             "HOME": str(folder),
-            "TMPDIR": str(folder),
+            "TMPDIR": str(folder / "tmp"),
             "PHYBLOCK_CACHE": str(folder / "cache"),
             "LITELLM_LOCAL_MODEL_COST_MAP": "True",
             **case.env,
