@@ -5,27 +5,25 @@ from __future__ import annotations
 import asyncio
 import itertools
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.config.models import ModelConfig
 from phyblock.data import QuestionSet, QuestionTask, read_builtin, read_questions
 from phyblock.domain import LETTERS, SUBTASKS, Question, Scene, Subtask
 from phyblock.domain.question import rotated
-from phyblock.errors import SpecError
-from phyblock.models.replay import BaselineModel
 from phyblock.models.request import Image, Request
-from phyblock.parsing.answer import parse_answer
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.tracks import questions
 from phyblock.tracks.pictures import Workshop
 from phyblock.tracks.questions import (
+    CHOICE_RULES,
     AskedQuestion,
     ChoiceSubject,
     QuestionPictures,
@@ -190,32 +188,13 @@ def test_a_reply_that_cannot_be_read_is_wrong(question_set: QuestionSet) -> None
         assert bad.fields()["answer"] == {"right": right, "given": None, "correct": False}
 
 
-def answer(
-    name: str, subtask: Subtask, key: str, guesses: Mapping[str, tuple[int, ...]] | None = None
-) -> str:
-    right = (2, 0, 3, 1) if subtask == "OR" else (2,)
-    question = Question("q", subtask, Scene("s", (1,), (), ()), "?", OPTIONS, right)
-    model = BaselineModel(ModelConfig(name=name))
-    subject = ChoiceSubject(question, (guesses or {}).__getitem__)
-    reply = asyncio.run(model.ask(Request(key, 0, (), {}, "", subject)))
-    letters = parse_answer(reply.text, OPTIONS, subtask == "OR").letters
-    assert letters is not None
-    return letters
-
-
-def test_baselines_answer_by_chance_rightly_or_as_they_guess() -> None:
-    found = Counter(answer("random", "SH", f"q{n}") for n in range(400))
-    assert set(found) == set(LETTERS)
-    assert all(70 <= count <= 130 for count in found.values())
-    orders = {answer("random", "OR", f"q{n}") for n in range(300)}
-    assert len(orders) == 24
-    assert {"".join(sorted(order)) for order in orders} == {LETTERS}
-    assert (answer("oracle", "SH", "q"), answer("oracle", "OR", "q")) == ("C", "CADB")
-    for name in ("majority", "text-only"):
-        assert answer(name, "SH", "q", {name: (1,)}) == "B"
-        assert answer(name, "OR", "q", {name: (3, 2, 1, 0)}) == "DCBA"
-    with pytest.raises(SpecError, match="has no rule"):
-        answer("all-candidates", "SH", "q")
+def test_random_answers_are_spread_over_all_that_can_be_given(question_set: QuestionSet) -> None:
+    rng, found = np.random.default_rng(0), {}
+    for item in opened(question_set, None).items:
+        subject = ChoiceSubject(item.question, lambda _: (0,))
+        found[item.question.subtask] = {CHOICE_RULES["random"](subject, rng) for _ in range(300)}
+    sizes = {len(texts) for name, texts in found.items() if name != "OR"}
+    assert (sizes, len(found["OR"])) == ({4}, 24)
 
 
 def task_of(number: int, subtask: Subtask) -> QuestionTask:
