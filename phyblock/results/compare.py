@@ -60,17 +60,9 @@ def check_alike(run: Run, first: Run, cells: Sequence[str], track: str, measure:
     The track says what must agree in how the two were asked and scored; scenes of a name must be
     the same.
     """
-    _check_version(run, first)
-    _check_variants(run, first)
-    check = kind_of(track).report().check_alike
-    if check is not None:
-        check(run, first, cells, measure)
-    _check_scenes(run, first)
-
-
-def _check_version(run: Run, first: Run) -> None:
-    """Scenes and questions of two versions of a set may share a name and nothing else."""
+    where = str(run.path)
     for field in ("dataset", "questions"):
+        # Scenes and questions of two versions of a set may share a name and nothing else.
         found, wanted = (getattr(one.manifest, field) for one in (run, first))
         if found is None or wanted is None or _name(found) != _name(wanted):
             continue
@@ -78,32 +70,28 @@ def _check_version(run: Run, first: Run) -> None:
             message = f"is of another version of {_name(found)} than {first.path}"
             versions = str(found.version), str(wanted.version)
             hint = "run the suite again on the newer version"
-            raise SpecError(Problem(str(run.path), message, f"{field}.version", *versions, hint))
-
-
-def _check_variants(run: Run, first: Run) -> None:
-    """Raise SpecError for runs that vary other factors: their values mean other things."""
-    found, wanted = (one.design.suite.vary for one in (run, first))
-    if found != wanted:
+            raise SpecError(Problem(where, message, f"{field}.version", *versions, hint))
+    vary, allowed = (one.design.suite.vary for one in (run, first))
+    if vary != allowed:
+        # Values of other factors mean other things.
         message = f"asks in other ways than {first.path}"
-        said, allowed = (", ".join(vary.factors) or "nothing" for vary in (found, wanted))
+        factors = [", ".join(one.factors) or "nothing" for one in (vary, allowed)]
         hint = "compare runs that vary the same, in the same order"
-        raise SpecError(Problem(str(run.path), message, "vary", said, allowed, hint))
-
-
-def _name(data: ManifestDataset | ManifestQuestions) -> str:
-    return data.name if isinstance(data, ManifestDataset) else Path(data.root).name
-
-
-def _check_scenes(run: Run, first: Run) -> None:
+        raise SpecError(Problem(where, message, "vary", *factors, hint))
+    if (check := kind_of(track).report().check_alike) is not None:
+        check(run, first, cells, measure)
     blocks = [
         one.records.drop_duplicates("scene").set_index("scene")["n_blocks"] for one in (first, run)
     ]
     both = pd.concat(blocks, axis=1, join="inner", keys=["first", "other"])
     if len(differ := both[both["first"] != both["other"]]):
         message = f"is of other data than {first.path}"
-        found = f"other blocks in {counted(len(differ), 'scene')}, the first {differ.index[0]}"
-        raise SpecError(Problem(str(run.path), message, "scenes", found))
+        blocks_of = f"other blocks in {counted(len(differ), 'scene')}, the first {differ.index[0]}"
+        raise SpecError(Problem(where, message, "scenes", blocks_of))
+
+
+def _name(data: ManifestDataset | ManifestQuestions) -> str:
+    return data.name if isinstance(data, ManifestDataset) else Path(data.root).name
 
 
 _KEYS = ["scene", "item", "seed", "variant"]
@@ -212,11 +200,6 @@ class Comparable:
         return lambda sums: np.asarray(sums.reshape(*sums.shape[:-1], *shape))
 
 
-def comparable_tracks() -> tuple[str, ...]:
-    """Tracks that have a measure, in the order in which one is chosen for runs of several."""
-    return tuple(kinds())
-
-
 def comparable(run: Run, track: str, measure: str = "") -> Comparable:
     """A measure of a track of a run, the main one where none is named.
 
@@ -231,7 +214,12 @@ def comparable(run: Run, track: str, measure: str = "") -> Comparable:
     cells = report.cells(run)
     shown = report.headline(run) if report.headline is not None else ()
     criteria = [s.criterion for s in shown if s.measure == chosen.name and s.criterion]
-    parts = [Part(cell.name, cell.name) for cell in cells if not _is_single(cell, cells)]
+    # A part of a mean that is pooled itself is too small to be compared alone.
+    parts = [
+        Part(cell.name, cell.name)
+        for cell in cells
+        if cell.of or not any(cell.name in other.of for other in cells)
+    ]
     if criteria:
         parts = [
             Part(criterion, part.cell, criterion)
@@ -242,11 +230,6 @@ def comparable(run: Run, track: str, measure: str = "") -> Comparable:
     notes = report.notes(run) if is_headline else ()
     how = " ".join((f"{chosen.heading}: {chosen.meaning}.", *notes, "Samples that both have."))
     return Comparable(track, chosen, cells, tuple(parts), how)
-
-
-def _is_single(cell: Cell, cells: tuple[Cell, ...]) -> bool:
-    """True if a cell is a part of a mean and pooled itself: too small to be compared alone."""
-    return not cell.of and any(cell.name in other.of for other in cells)
 
 
 _LEVEL = 1 - CONFIDENCE
@@ -396,9 +379,7 @@ def compare_runs(
 
 def _shared_track(runs: Sequence[Run], wanted: str) -> str:
     """The track that is compared: `wanted`, else the first one that all runs have."""
-    shared = [
-        name for name in comparable_tracks() if all(name in run.design.suite.tracks for run in runs)
-    ]
+    shared = [name for name in kinds() if all(name in run.design.suite.tracks for run in runs)]
     if not shared or (wanted and wanted not in shared):
         where, allowed = ", ".join(str(run.path) for run in runs), ", ".join(shared) or "none"
         raise SpecError(Problem(where, "has no such track to compare", "track", wanted, allowed))
@@ -554,9 +535,6 @@ def _flipped(a: str, b: str, one: _Paired | None, what: Comparable, part: Part) 
     return rows.sort_values(["right", "scene", "item", "seed", "variant"])
 
 
-_LEAST_P = 0.001
-
-
 def compare_view(found: Comparison) -> TextTable:
     """A row a pair and part; the part is left out where there is but one."""
     table = found.table
@@ -580,7 +558,7 @@ def compare_view(found: Comparison) -> TextTable:
         rows.append(
             (
                 *(pair if pair != previous else ("", "")),
-                *([] if one_part else [_part_name(row["part"])]),
+                *([] if one_part else [level_name(row["part"].replace("_", " "))]),
                 number(row["value_a"]),
                 number(row["value_b"]),
                 number(row["difference"], signed=True),
@@ -595,10 +573,6 @@ def compare_view(found: Comparison) -> TextTable:
     return TextTable(
         "Models compared on the same samples", tuple(columns), tuple(rows), _notes(found)
     )
-
-
-def _part_name(part: str) -> str:
-    return level_name(part.replace("_", " "))
 
 
 def _notes(found: Comparison) -> tuple[str, ...]:
@@ -627,7 +601,11 @@ def _notes(found: Comparison) -> tuple[str, ...]:
 def ranks_view(found: Comparison) -> TextTable:
     """The rank that each model may have, out of `Comparison.ranks`, the best first."""
     rows = [
-        (row["model"], number(row["value"]), _range(row["best"], row["worst"]))
+        (
+            row["model"],
+            number(row["value"]),
+            " to ".join(str(n) for n in sorted({row["best"], row["worst"]})),
+        )
         for row in found.ranks.to_dict("records")
     ]
     return TextTable(
@@ -638,15 +616,11 @@ def ranks_view(found: Comparison) -> TextTable:
     )
 
 
-def _range(best: int, worst: int) -> str:
-    return str(best) if best == worst else f"{best} to {worst}"
-
-
 def p_text(p: float) -> str:
     """A p value with three decimals; `< 0.001` where it is less."""
     if pd.isna(p):
         return NO_VALUE
-    return f"< {_LEAST_P}" if p < _LEAST_P else f"{p:.3f}"
+    return "< 0.001" if p < 0.001 else f"{p:.3f}"
 
 
 def flipped_lines(found: Comparison) -> tuple[str, ...]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from phyblock.config.suite import REPEAT, Variant, VarySpec
-from phyblock.results.compare import Comparable, Part, comparable
+from phyblock.results.compare import Comparable, comparable
 from phyblock.results.estimates import base_scenes, parents_of
 from phyblock.results.load import Run
 from phyblock.results.text import (
@@ -31,103 +31,9 @@ from phyblock.scoring.statistics import (
 )
 from phyblock.tracks.base import kind_of
 
-
-@dataclass(frozen=True, eq=False)
-class Blocks:
-    """The variants in which one factor has all its levels while all else stays.
-
-    `places` has shape (levels, blocks, repeats) and holds numbers of variants.
-    """
-
-    factor: str
-    levels: tuple[str, ...]
-    places: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class ItemsAsked:
-    """The items that a model has in every way of asking with every seed, in order.
-
-    `counts` has shape (items, seeds, variants, counts); `clusters` are the items' base scenes.
-    """
-
-    counts: Floats
-    clusters: Clusters
-
-
-@dataclass(frozen=True, eq=False)
-class Varied:
-    """The samples of a track, measured by its main measure as a whole.
-
-    `asked` has the items of each model that has any; models need not have the same.
-    """
-
-    track: str
-    what: Comparable
-    part: Part
-    vary: VarySpec
-    asked: dict[str, ItemsAsked]
-
-    def scores(self, model: str, blocks: Blocks) -> Floats:
-        """Scores of single samples: (items, levels, blocks with each seed, repeats)."""
-        each = np.nan_to_num(self.what.each(self.part)(self.asked[model].counts))
-        found = np.moveaxis(each[:, :, blocks.places], 1, 3)
-        return found.reshape(*found.shape[:2], -1, found.shape[-1])
-
-    def blocks(self, factor: str) -> Blocks:
-        """Return the places of all levels of a factor."""
-        return blocks_of(self.vary, factor)
-
-
-def blocks_of(vary: VarySpec, factor: str) -> Blocks:
-    """Return the places of all levels of a factor."""
-    levels, repeats = vary.names(factor), vary.names(REPEAT) or ("1",)
-    places: dict[Variant, dict[tuple[str, str], int]] = {}
-    for place, variant in enumerate(vary.variants):
-        here = dict(variant.levels)
-        level = here.pop(factor, levels[0])
-        again = level if factor == REPEAT else here.pop(REPEAT, "1")
-        places.setdefault(Variant(tuple(here.items())), {})[level, again] = place
-    # Of repeats each level is one: all others stand beside it as blocks.
-    pairs = [[(n, again) for again in ((n,) if factor == REPEAT else repeats)] for n in levels]
-    every = {pair for row in pairs for pair in row}
-    whole = [found for found in places.values() if every <= set(found)]
-    numbers = [[[found[pair] for pair in row] for found in whole] for row in pairs]
-    return Blocks(factor, levels, np.array(numbers, dtype=np.intp))
-
-
-def varied(run: Run, track: str) -> Varied | None:
-    """The samples of a track of a run; None where it varies nothing or no item was asked whole."""
-    vary = run.design.suite.vary
-    if not vary.factors:
-        return None
-    what = comparable(run, track)
-    part = what.parts[-1]
-    samples = what.samples(run, part, run.design)
-    ways = [(seed, one.key) for seed in run.design.suite.seeds for one in vary.variants]
-    shape = (len(run.design.suite.seeds), vary.n_variants, -1)
-    parents = parents_of(run)
-    asked = {}
-    for model in run.design.model_names:
-        names = _whole_items(samples[model], len(ways)) if model in samples else ()
-        if names:
-            wanted = pd.MultiIndex.from_tuples([(*name, *way) for name in names for way in ways])
-            counts = what.counts_of(samples[model].loc[wanted], part)
-            counts = counts.reshape(len(names), *shape)
-            clusters = Clusters.of(base_scenes(parents, [scene for scene, _ in names]))
-            asked[model] = ItemsAsked(counts, clusters)
-    return Varied(track, what, part, vary, asked) if asked else None
-
-
-def _whole_items(samples: pd.DataFrame, ways: int) -> tuple[tuple[str, str], ...]:
-    """Scene and name of the items of a model that were asked in so many ways: in all of them."""
-    sizes = samples.groupby(level=["scene", "item"]).size()
-    return tuple(sorted((str(scene), str(item)) for scene, item in sizes.index[sizes == ways]))
-
-
 ITEMS = "items"
 """The row of what differs from item to item, to hold factors against."""
-_COMPONENTS = (
+_COLUMNS = (
     *("track", "model", "factor", "levels"),
     *(f"{name}{end}" for name in ("shift", "single") for end in ("", "_lo", "_hi")),
     *("n_items", "n_clusters"),
@@ -143,43 +49,78 @@ def sensitivity_frame(run: Run) -> pd.DataFrame:
     `n_clusters` base scenes of the `n_items` items that the model has in every way of asking.
     See `phyblock.scoring.statistics`. Empty where the run varies nothing.
     """
-    rows = []
-    of_tracks = [varied(run, track) for track in run.design.suite.tracks]
-    for found in filter(None, of_tracks):
-        for model, items in found.asked.items():
-            size = {"n_items": len(items.counts), "n_clusters": items.clusters.size}
-            for factor in (*found.vary.factors, ITEMS):
-                levels, *parts = _components(found, model, factor)
-                row: dict[str, Any] = {"track": found.track, "model": model, "factor": factor}
-                row["levels"] = levels
+    rows: list[dict[str, Any]] = []
+    vary = run.design.suite.vary
+    for track in run.design.suite.tracks if vary.factors else ():
+        what = comparable(run, track)
+        for model, scores, clusters in _scores(run, what):
+            for factor in (*vary.factors, ITEMS):
+                levels = len(scores) if factor == ITEMS else len(vary.names(factor))
+                row = {"track": track, "model": model, "factor": factor, "levels": levels}
+                parts = _components(vary, factor, scores, clusters)
                 for name, part in zip(("shift", "single"), parts, strict=True):
-                    scale = found.what.measure.scale
-                    row |= {name: scale * part.sd}
-                    high = np.minimum(scale * part.hi, found.what.measure.most_apart)
-                    row |= {f"{name}_lo": scale * part.lo, f"{name}_hi": high}
-                rows.append(row | size)
-    return pd.DataFrame(rows, columns=list(_COMPONENTS))
+                    scale = what.measure.scale
+                    row |= {name: scale * part.sd, f"{name}_lo": scale * part.lo}
+                    row[f"{name}_hi"] = np.minimum(scale * part.hi, what.measure.most_apart)
+                rows.append(row | {"n_items": len(scores), "n_clusters": clusters.size})
+    return pd.DataFrame(rows, columns=list(_COLUMNS))
 
 
-def _components(found: Varied, model: str, factor: str) -> tuple[int, Component, Component]:
-    """Levels of a factor, its shift, and what it does to single items."""
-    clusters = found.asked[model].clusters
+def _scores(run: Run, what: Comparable) -> Iterator[tuple[str, Floats, Clusters]]:
+    """Yield each model with its scores by the main measure, (items, seeds, variants), and the base
+    scenes of these items: those that it has in every way of asking. Models may have different ones.
+    """
+    suite, part, parents = run.design.suite, what.parts[-1], parents_of(run)
+    samples = what.samples(run, part, run.design)
+    ways = [(seed, one.key) for seed in suite.seeds for one in suite.vary.variants]
+    for model in (name for name in run.design.model_names if name in samples):
+        mine = samples[model]
+        sizes = mine.groupby(level=["scene", "item"]).size()
+        names = sorted((str(scene), str(item)) for scene, item in sizes.index[sizes == len(ways)])
+        if names:
+            wanted = pd.MultiIndex.from_tuples([(*name, *way) for name in names for way in ways])
+            counts = what.counts_of(mine.loc[wanted], part)
+            counts = counts.reshape(len(names), len(suite.seeds), suite.vary.n_variants, -1)
+            clusters = Clusters.of(base_scenes(parents, [scene for scene, _ in names]))
+            yield model, np.nan_to_num(what.each(part)(counts)), clusters
+
+
+def _components(
+    vary: VarySpec, factor: str, scores: Floats, clusters: Clusters
+) -> tuple[Component, Component]:
+    """The shift of a factor, and what it does to single items."""
     if factor == ITEMS:
-        scores = np.nan_to_num(found.what.each(found.part)(found.asked[model].counts))
-        return len(scores), NO_COMPONENT, spread_of_items(scores, clusters)
-    blocks = found.blocks(factor)
-    scores = found.scores(model, blocks)
+        return NO_COMPONENT, spread_of_items(scores, clusters)
+    # (items, levels, blocks with each seed, repeats)
+    of_levels = np.moveaxis(scores[:, :, _places(vary, factor)], 1, 3)
+    of_levels = of_levels.reshape(*of_levels.shape[:2], -1, of_levels.shape[-1])
     if factor == REPEAT:
-        ways = np.moveaxis(scores[..., 0], 1, 2)
-        return len(blocks.levels), NO_COMPONENT, within(ways, clusters)
+        return NO_COMPONENT, within(np.moveaxis(of_levels[..., 0], 1, 2), clusters)
     # Repeats tell noise apart where nothing else was varied.
-    cells = scores.mean(axis=3) if scores.shape[2] > 1 else scores[:, :, 0]
-    return len(blocks.levels), shift(cells, clusters), interaction(cells, clusters)
+    cells = of_levels.mean(axis=3) if of_levels.shape[2] > 1 else of_levels[:, :, 0]
+    return shift(cells, clusters), interaction(cells, clusters)
+
+
+def _places(vary: VarySpec, factor: str) -> np.ndarray:
+    """Numbers of the variants in which a factor has all its levels while all else stays, of shape
+    (levels, blocks, repeats).
+    """
+    levels, repeats = vary.names(factor), vary.names(REPEAT) or ("1",)
+    places: dict[Variant, dict[tuple[str, str], int]] = {}
+    for place, variant in enumerate(vary.variants):
+        here = dict(variant.levels)
+        level = here.pop(factor, levels[0])
+        again = level if factor == REPEAT else here.pop(REPEAT, "1")
+        places.setdefault(Variant(tuple(here.items())), {})[level, again] = place
+    # Of repeats each level is one: all others stand beside it as blocks.
+    pairs = [[(n, again) for again in ((n,) if factor == REPEAT else repeats)] for n in levels]
+    every = {pair for row in pairs for pair in row}
+    whole = [found for found in places.values() if every <= set(found)]
+    numbers = [[[found[pair] for pair in row] for found in whole] for row in pairs]
+    return np.array(numbers, dtype=np.intp)
 
 
 _NAMES = {REPEAT: "asked again", ITEMS: "between items"}
-_MODEL = Column("Model", is_text=True)
-FACTOR = Column("Factor", is_text=True)
 
 
 def factor_name(factor: str) -> str:
@@ -217,7 +158,12 @@ def sensitivity_view(table: pd.DataFrame, run: Run) -> TextTable:
         notes.append("One factor alone without repeats cannot be told from noise in single items.")
     return TextTable(
         f"What the way of asking changes{run.design.of_suite}",
-        (_MODEL, *track_column(run.design.suite.tracks), FACTOR, *pairs),
+        (
+            Column("Model", is_text=True),
+            *track_column(run.design.suite.tracks),
+            Column("Factor", is_text=True),
+            *pairs,
+        ),
         tuple(rows),
         tuple(notes),
     )
@@ -227,10 +173,6 @@ def sizes_text(table: pd.DataFrame) -> str:
     """Return how many items, of how many base scenes, are behind rows of `sensitivity_frame`: from
     the model that has fewest to the one that has most.
     """
-    items, scenes = (_from_to(table[name]) for name in ("n_items", "n_clusters"))
+    ends = [(int(table[name].min()), int(table[name].max())) for name in ("n_items", "n_clusters")]
+    items, scenes = (f"{a}" if a == b else f"{a} to {b}" for a, b in ends)
     return f"{items} items of {scenes} base scenes"
-
-
-def _from_to(sizes: pd.Series[int]) -> str:
-    least, most = int(sizes.min()), int(sizes.max())
-    return f"{most}" if least == most else f"{least} to {most}"

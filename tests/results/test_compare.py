@@ -10,16 +10,10 @@ from hypothesis import given
 
 from phyblock.errors import SpecError
 from phyblock.results.compare import (
-    Side,
-    comparable,
-    compare,
     compare_models,
     compare_runs,
-    compare_view,
     flipped_lines,
-    p_text,
     ranks_view,
-    write_comparison,
 )
 from phyblock.results.load import Run
 from tests.web.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
@@ -142,22 +136,6 @@ def test_a_gap_is_found_among_many_models_and_ranks_say_what_is_sure() -> None:
     assert (found.table["detectable"] < found.table["detectable_holm"]).all()
 
 
-def test_a_clear_difference_is_told_and_corrected_for_the_number_of_pairs() -> None:
-    scenes = [f"{n:03}" for n in range(40)]
-    three = {"alpha": 4, "beta": 2, "gamma": 2}
-    records = [
-        one
-        for model, tp in three.items()
-        for place, scene in enumerate(scenes)
-        for one in plans(model, {scene: max(0, tp - place % 2)})
-    ]
-    table = compare_models(one_seed(*records, models=list(three))).table.set_index(["a", "b"])
-    assert table.loc[("alpha", "beta"), "verdict"] == "alpha is better"
-    assert table.loc[("beta", "gamma"), "verdict"] == "cannot tell"
-    p = table.loc[("alpha", "beta"), "p"]
-    assert table.loc[("alpha", "beta"), "p_holm"] == pytest.approx(3 * p)
-
-
 def test_two_runs_are_compared_by_the_models_they_share_or_by_two_named() -> None:
     first = one_seed(*plans("alpha", {"000": 4, "001": 2}), models=["alpha"])
     second = run_of(
@@ -216,30 +194,3 @@ def test_the_first_runs_policy_on_missing_replies_holds_for_both() -> None:
         other = of("count" if missing == "skip" else "skip", "001")
         row = compare_runs(of(missing, "000"), other).table.set_index("part").loc["overall"]
         assert (row["n_samples"], row["difference"]) == (samples, 0)
-
-
-def test_levels_are_rows_of_one_pair_alone() -> None:
-    run = one_seed(*plans("alpha", {"000": 4, "001": 1}), *plans("beta", {"000": 4, "001": 2}))
-    sides = [Side(name, name, run) for name in ("alpha", "beta")]
-    what = comparable(run, "full_planning")
-    parts = [part for part in what.parts if part.name in ("2", "overall")]
-    one = compare_view(compare([(sides[0], sides[1])], parts, what))
-    assert [row[:3] for row in one.rows] == [("alpha", "beta", "Level 2"), ("", "", "Overall")]
-    assert "Part" not in [
-        column.name
-        for column in compare_view(compare([(sides[0], sides[1])], parts[-1:], what)).columns
-    ]
-
-
-def test_a_comparison_is_written_and_p_values_are_readable(tmp_path: Path) -> None:
-    run = one_seed(*plans("alpha", {"000": 4, "001": 1}), *plans("beta", {"000": 4, "001": 2}))
-    files = write_comparison(compare_models(run), tmp_path / "out")
-    assert [file.name for file in files] == [
-        "comparison.csv",
-        "comparison.md",
-        "comparison.tex",
-        "flipped.csv",
-        "ranks.csv",
-    ]
-    assert len(pd.read_csv(files[0])) == 5
-    assert (p_text(0.0004), p_text(0.05), p_text(float("nan"))) == ("< 0.001", "0.050", "\u2013")

@@ -17,7 +17,6 @@ from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
 from phyblock.results.estimates import all_estimates, blind_baselines, headline_floors
 from phyblock.results.load import Run
 from phyblock.scoring.counts import Counts, micro
-from phyblock.scoring.plan import ERROR_TYPES
 from tests.web.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
 
 Records = list[dict[str, Any]]
@@ -107,51 +106,6 @@ def test_shares_of_wrong_steps_and_of_blocks_add_up_to_one(records: Records) -> 
         shares = frame[frame["measure"].str.startswith(prefix) & (frame["measure"] != left_out)]
         sums = shares.dropna(subset=["value"]).groupby(ways)["value"].sum()
         assert np.allclose(sums, 1)
-
-
-def test_wrong_steps_by_hand() -> None:
-    records = [
-        record(scene="000", scores=[score(1, 4, 0, errors=(1, 0, 2, 1))]),
-        record(scene="002", scores=[score(1, 4, 0, errors=(0, 4, 0, 0))]),
-        record(scene="003", outcome="missing", scores=[score(0, 0, 4)]),
-    ]
-    run = run_of(records, manifest())
-    shares = [value(run, f"wrong_{name}", "2") for name in ERROR_TYPES]
-    assert shares == [0.25, 0, 0.5, 0.25]
-    row = of(run, "wrong_overflow")
-    assert (row["value"], row["n"]) == (0.5, 2)
-    assert 0 <= row["lo"] < 0.5 < row["hi"] <= 1
-    assert of(run, "wrong_overflow", "1") is None
-
-
-@pytest.mark.parametrize(("missing", "n", "recall"), [("skip", 1, 0.75), ("count", 3, 3 / 16)])
-def test_missing_replies_are_left_out_or_count_as_empty_plans(
-    missing: str, n: int, recall: float
-) -> None:
-    records = [
-        record(scene="001", scores=[score(3, 1, 1)]),
-        record(scene="002", scores=[score(0, 0, 4)], outcome="missing"),
-        record(scene="003", scores=[score(0, 0, 8)], outcome="api_error"),
-    ]
-    run = run_of(records, manifest(missing=missing))
-    row = of(run, "recall")
-    assert (row["n"], row["value"]) == (n, recall)
-    assert value(run, "precision") == 0.75
-
-
-def test_what_is_undefined_or_was_never_answered_has_no_value_and_is_not_zero() -> None:
-    records = [record(scene="001", scores=[score(0, 0, 4)])]
-    records += [
-        record("beta", scene, scores=[score(0, 0, 4)], outcome="api_error")
-        for scene in ("001", "002")
-    ]
-    run = run_of(records, manifest(missing="count"))
-    assert math.isnan(value(run, "precision", "2"))
-    assert (value(run, "recall", "2"), value(run, "f1", "2")) == (0, 0)
-    assert of(run, "f1", "3") is None
-    silent = of(run, "recall", model="beta")
-    assert silent["n"] == 2
-    assert math.isnan(silent["value"])
 
 
 def test_level_1_has_its_own_criterion_and_overall_counts_every_scene_once() -> None:
@@ -254,17 +208,6 @@ def test_circular_needs_every_rotation_of_a_seed() -> None:
     assert headline_floors(run, "vqa")["Overall"].name == "chance"
     lacking = questions(records[1:], seeds=(0, 1), circular=True)
     assert value(lacking, "accuracy", "SH") == 0.25
-
-
-def test_letters_are_those_of_questions_with_one_answer() -> None:
-    records = [
-        answered("SH", 0, "A"), answered("SH", 1, "B"), answered("CO", 0, None),
-        answered("OR", 0, "ABCD", right="ABCD"),
-    ]  # fmt: skip
-    run = questions(records)
-    assert (value(run, "right_a"), of(run, "right_a")["n"]) == (1, 3)
-    assert value(run, "given_a") == value(run, "given_b") == pytest.approx(1 / 3)
-    assert value(run, "given_c") == 0
 
 
 def episode(

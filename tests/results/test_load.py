@@ -82,19 +82,6 @@ def test_columns_and_types_do_not_depend_on_the_records(records: list[dict[str, 
     assert some.scores.dtypes.to_dict() == none.scores.dtypes.to_dict()
 
 
-def test_a_later_record_of_a_sample_replaces_the_earlier() -> None:
-    frames = run_of(
-        [
-            record(outcome="api_error", scores=[score(0, 0, 4)]),
-            record("beta"),
-            record(scores=[score(4, 0, 0)]),
-        ],
-        manifest(),
-    )
-    assert frames.records["outcome"].tolist() == ["ok", "ok"]
-    assert frames.scores["tp"].tolist() == [4]
-
-
 @laws
 @given(st.data())
 def test_a_cut_last_line_is_passed_over_and_counted(
@@ -117,10 +104,6 @@ def test_a_whole_last_line_without_its_end_is_read(tmp_path: Path) -> None:
     run = load_run(folder)
     assert run.records["model"].tolist() == ["alpha", "beta"]
     assert not run.is_cut
-
-
-def test_a_whole_file_has_no_cut_line(tmp_path: Path) -> None:
-    assert not load_run(write_run(tmp_path / "run", [record()], manifest())).is_cut
 
 
 def test_a_run_without_records_is_empty(tmp_path: Path) -> None:

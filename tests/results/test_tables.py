@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import shutil
 import subprocess
@@ -15,7 +14,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.cli.progress import Tally
-from phyblock.errors import StoreError
 from phyblock.files import LIST
 from phyblock.records.files import known_records
 from phyblock.results.compare import compare_models, write_comparison
@@ -77,24 +75,6 @@ def test_tables_of_episodes_and_questions_show_estimates() -> None:
     )
     assert shown_numbers(ran, "step_planning") > 20
     assert shown_numbers(questions(complete({"SH": 3, "OR": 1})), "vqa") > 20
-
-
-def test_table_1_is_the_headline_in_percent() -> None:
-    facts = manifest(seeds=[0], models=["beta", "alpha"])
-    scores = [score(1, 3, 1), score(4, 0, 0, matcher="paper"), score(4, 0, 0, setting="B")]
-    run = run_of([record(scene="001", scores=scores)], facts)
-    table = make_tables(run, ["table1"])["table1"]
-    rows = table.frame.set_index("model")
-    assert rows.index.tolist() == ["beta", "alpha"]
-    assert rows.loc["alpha", "overall_precision"] == 25
-    assert rows.loc["alpha", "level2_recall"] == 50
-    assert rows.loc["alpha", "overall_f1"] == pytest.approx(100 / 3)
-    assert rows.loc["beta"].isna().all()
-    assert set(table.view.rows[0][1:]) == {NO_VALUE}
-    notes = "\n".join(table.view.notes)
-    assert "Setting A, matcher optimal, Level 1 by selection" in notes
-    assert "Not complete, of 5 samples: beta 0, alpha 1." in notes
-    assert "only its Random row is as that header says" in notes
 
 
 def test_what_was_not_answered_and_seeds_that_were_refused_stand_under_tables() -> None:
@@ -238,14 +218,6 @@ def test_coverage_is_written_where_it_is_not_complete(tmp_path: Path) -> None:
     assert "coverage" in write_tables(folder).tables
 
 
-def test_csv_files_hold_numbers_and_empty_cells(tmp_path: Path) -> None:
-    written = write_tables(write_run(tmp_path / "run", records_of("alpha"), manifest()))
-    with (written.folder / "table1.csv").open(newline="") as file:
-        table1 = {row["model"]: row for row in csv.DictReader(file)}
-    assert table1["alpha"]["level2_precision"] == "50.000000"
-    assert table1["beta"]["overall_f1"] == ""
-
-
 @settings(laws, max_examples=3)
 @given(record_lists())
 def test_writing_again_changes_nothing(
@@ -255,14 +227,6 @@ def test_writing_again_changes_nothing(
     first = {file: file.read_bytes() for file in write_tables(folder).files}
     assert {file: file.read_bytes() for file in write_tables(folder).files} == first
     assert {file.name for file in folder.iterdir()} == {"run.yaml", "records.jsonl", "tables", LIST}
-
-
-def test_a_folder_that_cannot_be_written_is_said_so_and_leaves_no_rest(tmp_path: Path) -> None:
-    folder = write_run(tmp_path / "run", [], manifest())
-    (folder / "tables" / "table1.csv" / "in-the-way").mkdir(parents=True)
-    with pytest.raises(StoreError, match="cannot be written"):
-        write_tables(folder)
-    assert [file.name for file in (folder / "tables").iterdir()] == ["table1.csv"]
 
 
 def test_the_summary_ranks_models_and_says_who_is_above_the_blind_baseline() -> None:
