@@ -176,19 +176,6 @@ def test_scenes_are_drawn_from_where_they_are_and_from_no_other_data(
     assert "or it was changed since" in Report(out).index["no_scenes"]
 
 
-def test_prompts_and_pictures_as_sent_are_there(troubled: Workspace) -> None:
-    (index,) = (troubled.out / "report").glob("*/index.js")
-    records, prompts = (unpacked(index.parent / f"{kind}-0.js") for kind in ("records", "prompts"))
-    sent = [one["prompt"] for one in records]
-    images = []
-    for prompt in filter(None, sent):
-        assert "user" in [message["role"] for message in prompts[prompt["n"]]]
-        images += [image["file"] for image in prompt["images"]]
-    assert images
-    for file in filter(None, images):
-        assert (troubled.out / file).read_bytes().startswith(b"\x89PNG")
-
-
 def test_headlines_say_what_tables_say(made: Workspace) -> None:
     run = load_run(made.out, texts=False)
     for table in headlines(run):
