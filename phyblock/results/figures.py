@@ -7,7 +7,6 @@ import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -73,8 +72,6 @@ class Look:
     titled: bool = True
 
 
-_PAGE = Look()
-_LOOK: ContextVar[Look] = ContextVar("_LOOK", default=_PAGE)
 ROW_PT, PANEL_PT = 7.5, 8.5
 """Sizes of the names of rows and of panels."""
 _TITLE_PT, _SUBTITLE_PT, _LEGEND_PT, _AXIS_PT = 10.5, 7.5, 7.5, 8.0
@@ -136,31 +133,27 @@ def styled(look: Look) -> Iterator[None]:
 
     family, font = _FAMILIES[look.font]
     chosen = {**_RC, "font.family": [family], f"font.{family}": [font]}
-    token = _LOOK.set(look)
-    try:
-        with mpl.rc_context():
-            mpl.rcdefaults()
-            mpl.rcParams.update(chosen)  # type: ignore[arg-type]
-            yield
-    finally:
-        _LOOK.reset(token)
+    chosen["figure.figsize"] = (look.width_in, look.width_in)
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(chosen)  # type: ignore[arg-type]
+        yield
 
 
 def new_figure(height_in: float) -> Figure:
     """Return an empty figure of the chosen width; no window, no global state."""
+    import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(_LOOK.get().width_in, height_in), layout="constrained")
+    return Figure(figsize=(mpl.rcParams["figure.figsize"][0], height_in), layout="constrained")
 
 
-def headed(figure: Figure, title: str, subtitle: str) -> None:
-    """Put a title and, smaller below it, what was measured, above all axes at the left.
+def add_title(figure: Figure) -> None:
+    """Put the two lines of the label above all axes at the left, the second smaller.
 
-    They make the figure higher; without titles, they stand in the caption alone.
+    They make the figure higher; without them, they stand in the caption alone.
     """
-    figure.set_label(f"{title}\n{subtitle}")
-    if not _LOOK.get().titled:
-        return
+    title, _, subtitle = str(figure.get_label()).partition("\n")
     width = figure.get_figwidth()
     lines = [
         (line, size, weight)
@@ -219,8 +212,10 @@ def _ranked(run: Run, track: str) -> dict[str, Value]:
     return dict(sorted(values.items(), key=lambda item: (sign * item[1].value, item[0])))
 
 
-def _subtitle(run: Run, text: str) -> str:
-    return run.design.after_suite(text, "; ")
+def _describe(run: Run, figure: Figure, title: str, how: str) -> None:
+    """Label a figure with a title, and the suite and what was measured."""
+    suite = f"Suite {run.design.suite.name}; " if run.design.suite.name else ""
+    figure.set_label(f"{title}\n{suite}{how}")
 
 
 _MOST_MODELS = 6
@@ -287,7 +282,7 @@ def forest(run: Run, *, track: str) -> Figure | None:
         f"{counted(int(most['n_clusters']), 'base scene')}; filled: p < 0.05 after Holm's "
         f"correction for {counted(len(found.table), 'test')}"
     )
-    headed(figure, head, _subtitle(run, how))
+    _describe(run, figure, head, how)
     return figure
 
 
@@ -325,7 +320,7 @@ def levels(run: Run, *, track: str) -> Figure | None:
     legend_below(figure, handles[::-1], labels[::-1])
     more = f"; the other {len(models) - _NAMED} pale" if len(models) > _NAMED else ""
     title = f"{kind_of(track).title}: {measure.heading} by part"
-    headed(figure, title, _subtitle(run, f"the best of all first{more}"))
+    _describe(run, figure, title, f"the best of all first{more}")
     return figure
 
 
@@ -372,7 +367,7 @@ def shares(run: Run, *, track: str, table: str) -> Figure | None:
     bare_axes([ax])
     legend_below(figure, *ax.get_legend_handles_labels())
     title = layout.caption.removesuffix(" (%)")
-    headed(figure, title, _subtitle(run, f"{kind_of(track).title}, all parts together"))
+    _describe(run, figure, title, f"{kind_of(track).title}, all parts together")
     return figure
 
 
@@ -408,7 +403,7 @@ def cost(run: Run, *, track: str) -> Figure | None:
         if lacking
         else "lines: 95 % intervals"
     )
-    headed(figure, f"{kind_of(track).title}: {measure.heading} by cost", _subtitle(run, how))
+    _describe(run, figure, f"{kind_of(track).title}: {measure.heading} by cost", how)
     return figure
 
 
@@ -445,7 +440,7 @@ def sensitivity(run: Run, *, track: str) -> Figure | None:
     legend_below(figure, *axes[0].get_legend_handles_labels())
     what = f"Standard deviation of {main_measure(run, track).heading_in_unit}"
     how = f"{what}; lines: 95 % intervals, {sizes_text(table)}"
-    headed(figure, f"{kind_of(track).title}: what the way of asking changes", how)
+    _describe(run, figure, f"{kind_of(track).title}: what the way of asking changes", how)
     return figure
 
 
@@ -499,6 +494,8 @@ def write_paper_figures(
             figure = makers[name][1](run)
             if figure is None:
                 continue
+            if look.titled:
+                add_title(figure)
             made: dict[str, bytes | str] = {}
             for ending, (dpi, metadata) in _FORMATS.items():
                 drawn = io.BytesIO()

@@ -279,10 +279,6 @@ class Design:
         """The suite as captions of tables end in it, `, suite NAME`; "" where it has no name."""
         return f", suite {self.suite.name}" if self.suite.name else ""
 
-    def after_suite(self, text: str, mark: str = ", ") -> str:
-        """A text as figures say it, behind the suite and a mark where the suite has a name."""
-        return f"Suite {self.suite.name}{mark}{text}" if self.suite.name else text
-
     def samples(self, track: str) -> int:
         """Samples that a complete run holds of one model in a track."""
         return self.items.get(track, 0) * self.repeats
