@@ -71,13 +71,13 @@ def check_alike(run: Run, first: Run, cells: Sequence[str], track: str, measure:
             versions = str(found.version), str(wanted.version)
             hint = "run the suite again on the newer version"
             raise SpecError(Problem(where, message, f"{field}.version", *versions, hint))
-    vary, allowed = (one.design.suite.vary for one in (run, first))
-    if vary != allowed:
+    vary, wanted_vary = (one.design.suite.vary for one in (run, first))
+    if vary != wanted_vary:
         # Values of other factors mean other things.
         message = f"asks in other ways than {first.path}"
-        factors = [", ".join(one.factors) or "nothing" for one in (vary, allowed)]
+        said, allowed = (", ".join(one.factors) or "nothing" for one in (vary, wanted_vary))
         hint = "compare runs that vary the same, in the same order"
-        raise SpecError(Problem(where, message, "vary", *factors, hint))
+        raise SpecError(Problem(where, message, "vary", said, allowed, hint))
     if (check := kind_of(track).report().check_alike) is not None:
         check(run, first, cells, measure)
     blocks = [
