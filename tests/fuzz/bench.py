@@ -39,8 +39,8 @@ Content = bytes | Fifo | Link
 class Case:
     """A command line and what stands in the folder where it is given.
 
-    `may_write` are the paths that the command is to write in, beside cache and scratch folder; `lasting` those of
-    the user's files that stand there and must not change.
+    `may_write` are the paths that the command is to write in, beside cache and scratch folder;
+    `lasting` those of the user's files that stand there and must not change.
     """
 
     args: tuple[str, ...]
