@@ -76,8 +76,10 @@ _DETAILS: Mapping[str, tuple[str, ...]] = {
     "anthropic": (),
 }
 """Values of `image_detail` by provider; of all others nothing is known."""
-_OWN_BODY = ("model", "messages", "n", "stream", "max_tokens", "max_completion_tokens")
-"""Fields of a request's body that phyblock writes: others in their place would cost unforeseen."""
+_OWN_BODY = (
+    "model", "messages", "n", "best_of", "stream", "max_tokens", "max_completion_tokens",
+)  # fmt: skip
+"""Fields of a request's body that phyblock writes, or that multiply what is billed."""
 
 
 def address_fault(url: str) -> tuple[str, str] | None:
@@ -313,8 +315,8 @@ class ModelConfig(Section):
     extra_body: Annotated[dict[str, JsonValue], AfterValidator(_check_body)] = Field(
         default_factory=dict
     )
-    """Further fields of the request body, sent as they are; not model, messages, n, stream,
-    max_tokens, max_completion_tokens."""
+    """Further fields of the request body, sent as they are; not model, messages, n, best_of,
+    stream, max_tokens, max_completion_tokens."""
     prices: Annotated[
         tuple[PriceSpec, ...], AfterValidator(_check_days), BeforeValidator(_one_or_list)
     ] = Field(default=(), alias="price", json_schema_extra=_say_one_or_list)

@@ -327,42 +327,38 @@ def _unknown_key(
     root: type[BaseModel], path: FieldPath, source: YamlSource, whole: FieldPath
 ) -> Problem:
     name = str(path[-1])
-    section = _section(root, path[:-1])
-    known = [field.alias or key for key, field in section.model_fields.items() if not field.exclude]
+    known = _fields(_section(root, path[:-1]))
     hint = did_you_mean(name, known)
+    homes = [home for home, section in _sections(root).items() if name in _fields(section)]
     if name.lower() in _SECRET_KEYS and "api_key_env" in known:
         hint = _KEY_HINT
-    elif elsewhere := [home for home in _homes(root) if home[-1] == name]:
-        hint = f"it belongs at {'.'.join(elsewhere[0])}"
+    elif homes:
+        hint = f"it belongs at {'.'.join((*homes[0], name))}"
     where = source.where(whole, key=True)
     return Problem(where, "is not a known key", dotted(whole), "", ", ".join(known), hint)
 
 
-def _section(root: type[BaseModel], path: FieldPath) -> type[BaseModel]:
-    """Return the model that describes what stands at `path`."""
-    section = root
-    for part in path:
-        section = _inner(section, str(part)) or section
-    return section
-
-
-def _homes(root: type[BaseModel], above: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
-    """Give the paths of all fields."""
+def _sections(
+    root: type[BaseModel], above: tuple[str, ...] = ()
+) -> dict[tuple[str, ...], type[BaseModel]]:
+    """Return the models that describe a document, by the path of the fields that hold them."""
+    sections = {above: root}
     for name, field in root.model_fields.items():
-        home = (*above, field.alias or name)
-        yield home
-        if (inner := _inner(root, name)) is not None:
-            yield from _homes(inner, home)
+        parts: list[Any] = [field.annotation]
+        for part in parts:
+            parts.extend(get_args(part))
+            if isinstance(part, type) and issubclass(part, BaseModel):
+                sections |= _sections(part, (*above, field.alias or name))
+                break
+    return sections
 
 
-def _inner(section: type[BaseModel], name: str) -> type[BaseModel] | None:
-    """Return the model behind a field, if it holds one."""
-    fields = {field.alias or key: field for key, field in section.model_fields.items()}
-    field = fields.get(name) or section.model_fields.get(name)
-    stack: list[Any] = [] if field is None else [field.annotation]
-    while stack:
-        annotation = stack.pop()
-        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-            return annotation
-        stack.extend(get_args(annotation))
-    return None
+def _section(root: type[BaseModel], path: FieldPath) -> type[BaseModel]:
+    """Return the model that describes what stands at `path`, or the nearest around it."""
+    sections = _sections(root)
+    names = tuple(part for part in path if isinstance(part, str))
+    return next(sections[names[:n]] for n in range(len(names), -1, -1) if names[:n] in sections)
+
+
+def _fields(section: type[BaseModel]) -> list[str]:
+    return [field.alias or key for key, field in section.model_fields.items() if not field.exclude]

@@ -210,23 +210,6 @@ def test_reports_that_are_written_at_once_all_come_to_their_end(finished: Path) 
     assert f"report/{build.name}" in pages[0].read_text(encoding="utf-8")
 
 
-@pytest.mark.slow
-def test_four_processes_may_write_one_report(finished: Path, suite: Workspace) -> None:
-    started = [
-        subprocess.Popen(
-            [*COMMAND, "report", str(finished)],
-            cwd=suite.root,
-            env=suite.env,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        for _ in range(4)
-    ]
-    ends = [(process.communicate()[1], process.returncode) for process in started]
-    assert ends == [("", 0)] * 4
-
-
 def test_scores_go_to_no_folder_of_another(suite: Workspace) -> None:
     call("run", suite.root / "suite.yaml", "--out", suite.out, "--no-report")
     put(suite.root / "theirs" / "notes.txt")

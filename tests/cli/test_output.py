@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import pty
-import re
 import subprocess
 
 import pytest
@@ -58,19 +57,6 @@ def test_a_pipe_gets_whole_tables_without_escapes(suite: Workspace) -> None:
     assert done.out.splitlines()[-1] == "out/tables"
 
 
-def test_output_in_ascii_is_no_failure(suite: Workspace) -> None:
-    done = suite.run("--set", "seeds=[0,1]", env={"PYTHONIOENCODING": "ascii"}, fresh=True)
-    assert (done.code, done.err) == (0, "")
-    assert "oracle" in done.out
-
-
-def test_a_suite_may_do_without_tables(suite: Workspace) -> None:
-    done = suite.run("--set", "tables=[]")
-    assert (done.code, done.err) == (0, "")
-    always = [f"cost.{form}" for form in ("csv", "md", "tex")]
-    assert list(suite.tables()) == sorted([*always, "estimates.csv"])
-
-
 def test_a_terminal_shows_the_panel_and_then_the_tables(suite: Workspace) -> None:
     class Bracketing(OpenAIChat):
         """What it says looks like markup."""
@@ -104,19 +90,6 @@ def test_a_person_is_asked_before_money_is_spent(
     assert "Go on?" in screen
     assert ("Nothing was asked." in screen) == (calls == 0)
     assert suite.out.exists() == (code == 0)
-
-
-def test_samples_that_are_asked_again_are_counted_once(suite: Workspace) -> None:
-    with Running(OpenAIChat(Faults(mode="500"))) as running:
-        suite.write_models(running.url, "alpha", price={"input": 0.0, "output": 0.0})
-        once = ["--set", "limits.max_attempts=1", "--set", "limits.retry_for_s=0"]
-        limits = [*once, "--models", "alpha,oracle"]
-        assert suite.run(*limits).code == 1
-        running.server.faults = Faults(latency_s=0.5)
-        code, screen = in_terminal(suite, "", *limits)
-    assert code == 0
-    shown = {int(number) for number in re.findall(r"(\d+) of 10 samples ", screen)}
-    assert max(shown) == 10
 
 
 def test_tables_may_be_read_by_whoever_may_read_the_records(suite: Workspace) -> None:
@@ -204,17 +177,3 @@ def test_the_folder_of_a_run_is_found_again_without_naming_it(suite: Workspace) 
     before = suite.files()
     assert suite.phyblock("run", "suite.yaml").out == first.out
     assert suite.files() == before
-
-
-def test_the_name_of_a_model_that_is_stopped_stays_on_the_screen(suite: Workspace) -> None:
-    with Running(OpenAIChat(Faults(mode="401"))) as running:
-        suite.write_models(running.url, "alpha", price={"input": 0.0, "output": 0.0})
-        code, screen = in_terminal(suite, "", "--models", "alpha,oracle")
-    assert code == 1
-    # On a line of its own, maybe the first: colors may stand in it, and nothing that moves the
-    # cursor or clears.
-    colors = r"(\x1b\[[0-9;]*m)*"
-    reason = rf"HTTP 401: Incorrect API key provided api_error{colors}\r\n"
-    for words in ("alpha stopped: ", f"alpha was stopped:{colors} {colors}"):
-        assert re.search(rf"(\n|\x1b\[2K|^\x1b\[\?25l){colors}{words}{reason}", screen), words
-    assert "5 of 5 samples" in screen
