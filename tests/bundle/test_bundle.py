@@ -5,6 +5,9 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import signal
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -142,6 +145,26 @@ def put(place: str, value: object, track: str = "", model: str = "random") -> Ch
         node[last] = value
 
     return change
+
+
+def test_a_bundle_that_is_killed_leaves_nothing_behind(made: Workspace, tmp_path: Path) -> None:
+    """Killed once all is packed, before it is put in its place."""
+    code = (
+        "import os, signal, sys, phyblock.bundle as bundle\n"
+        "from pathlib import Path\n"
+        "pack = bundle.pack\n"
+        "def packed(*args):\n"
+        "    pack(*args)\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+        "bundle.pack = packed\n"
+        "bundle.bundle_run(Path(sys.argv[1]), Path(sys.argv[2]))\n"
+    )
+    for name in ("scratch", "out"):
+        (tmp_path / name).mkdir()
+    env = made.env | {"TMPDIR": str(tmp_path / "scratch")}
+    command = [sys.executable, "-c", code, str(made.out), str(tmp_path / "out" / "b.zip")]
+    assert subprocess.run(command, env=env, check=False).returncode == -signal.SIGKILL
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
 def of_track(records: list[Raw], track: str, model: str = "random") -> Raw:
