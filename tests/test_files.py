@@ -231,21 +231,6 @@ def test_a_bad_picture_is_refused(data: bytes, told: str, tmp_path: Path) -> Non
     assert problem.allowed
 
 
-def test_no_program_is_started_for_a_picture(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    told = tmp_path / "started"
-    script = tmp_path / "gs"
-    script.write_text(f"#!/bin/sh\ntouch {told}\n")
-    script.chmod(0o755)
-    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
-    path = tmp_path / "000.png"
-    path.write_bytes(EPS)
-    with pytest.raises(DataError, match="is no picture"):
-        read_picture(path)
-    assert not told.exists()
-
-
 def test_what_is_no_file_or_too_large(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(DataError, match="is not a regular file"):

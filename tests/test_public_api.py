@@ -132,22 +132,3 @@ def test_nothing_is_spent_unasked_and_a_loop_may_run(
 
     run = asyncio.run(in_a_notebook())
     assert set(run.records["outcome"]) == {"ok"}
-
-
-def test_a_program_without_a_guard_is_not_run_again_by_its_workers(
-    workspace: Workspace,
-) -> None:
-    workspace.write_scenes()
-    workspace.write_suite(tracks=["step_planning"], models=["oracle"], limit=1)
-    program = workspace.root / "program.py"
-    program.write_text(
-        "import phyblock\n"
-        "print('begins')\n"
-        "run = phyblock.run_suite('suite.yaml', out='out')\n"
-        "print(list(run.records['outcome']))\n"
-    )
-    words = [sys.executable, str(program)]
-    done = subprocess.run(
-        words, cwd=workspace.root, env=workspace.env, capture_output=True, text=True, timeout=300
-    )
-    assert done.stdout.splitlines() == ["begins", "['ok']"], done.stderr

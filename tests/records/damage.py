@@ -51,6 +51,7 @@ DAMAGED: dict[str, tuple[bytes, str, str]] = {
     "deep": (with_text('"latency_s":0.0', '"latency_s":' + "[" * 9999 + "]" * 9999), "", "deep"),
     "text-for-number": (with_value("seed", "0"), "seed", "wrong type"),
     "number-for-text": (with_value("reply.text", 5), "reply.text", "is no text"),
+    "no-cost": (with_value("reply.billed_usd", -5), "reply.billed_usd", "out of range"),
     "word": (with_value("outcome", "fine"), "outcome", "allowed: ok, "),
     "finish": (with_value("reply.finish", "never"), "reply.finish", "allowed: stop, "),
     "truth": (with_value("n_blocks", True), "n_blocks", "wrong type"),

@@ -110,8 +110,6 @@ def test_an_unread_reply_is_copied_kept_and_counted_and_asked_about_once(
 
 
 def test_an_extraction_model_that_fails_loses_no_reply(talking: Workspace) -> None:
-    server = Talking()
-
     class Failing(Talking):
         def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
             body = super().reply(seen, ending)

@@ -15,11 +15,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.config.models import ModelConfig
 from phyblock.config.suite import load_suite
 from phyblock.errors import StoreError
 from phyblock.records.files import PromptLines
-from phyblock.records.manifest import Manifest
 from phyblock.records.record import Call, Reply
 from phyblock.run.events import Standing
 from phyblock.run.plan import make_plan
@@ -115,27 +113,6 @@ def test_a_disk_that_fails_at_any_call_leaves_what_was_written(
     file.append([{"a": 3}])
     file.close()
     assert (tmp_path / "lines.jsonl").read_text() == '{"a":1}\n{"a":3}\n'
-
-
-GROUPED: dict[str, ModelConfig] = {
-    "b": ModelConfig(id="x/b", groups=("all",), image_detail="low"),
-    "a": ModelConfig(id="x/a", groups=("all",)),
-}
-
-
-def test_a_run_of_a_group_is_the_run_of_its_models(workspace: Workspace) -> None:
-    def manifest(models: list[str], *only: str) -> Manifest:
-        workspace.write_suite(models=models)
-        loaded = load_suite(workspace.root / "suite.yaml", data_dir=workspace.root)
-        return make_plan(loaded, GROUPED, only=only).manifest
-
-    plain = manifest(["oracle", "b", "a"])
-    for grouped in (manifest(["oracle", "group:all"]), manifest(["oracle"], "oracle", "group:all")):
-        assert grouped.identity == plain.identity
-        assert [model.name for model in grouped.models] == ["oracle", "b", "a"]
-    assert manifest(["oracle", "group:all"]).suite["models"] == ["oracle", "b", "a"]
-    told = [model.model_extra or {} for model in plain.models]
-    assert [extra.get("image_detail") for extra in told] == [None, "low", None]
 
 
 def test_a_run_is_on_disk_with_its_name_before_anything_is_asked(

@@ -88,22 +88,6 @@ def test_the_server_sees_goal_candidates_current_picture_and_history(workspace: 
         assert len(set(current.values())) == len(current)
 
 
-def test_history_as_turns_is_a_conversation(workspace: Workspace) -> None:
-    with Running(StepAgent()) as running:
-        steps = {"history": "turns", "memory": 2, "physics": "off", "feedback": "error_type"}
-        prepare(workspace, running.url, steps=steps)
-        assert workspace.run(*FEW).code == 0
-        longest = max(running.server.seen, key=lambda one: len(one.raw["messages"]))
-    roles = [message["role"] for message in longest.raw["messages"]]
-    assert roles == ["system", "user", "assistant", "user", "assistant", "user"]
-    kinds = [
-        [part["type"] for part in message["content"]]
-        for message in longest.raw["messages"]
-        if message["role"] == "user"
-    ]
-    assert kinds == [["image_url"] * 3 + ["text"], ["image_url", "text"], ["image_url", "text"]]
-
-
 def test_faults_change_nothing(workspace: Workspace) -> None:
     found = []
     for faults in (Faults(), ISSUE_MIX):
