@@ -294,12 +294,12 @@ def _lengths_text(rows: Sequence[Estimate]) -> str:
     measured, is_usual = [], False
     for row in rows:
         for kind, lengths in row.lengths.items():
-            if lengths.has_calls and lengths.mean is not None:
+            if lengths.coming and lengths.mean is not None:
                 asked = f" in {kind}" if len(row.lengths) > 1 else ""
                 mean = f"{lengths.mean:,.0f} tokens (the mean of {lengths.replies:,})"
                 measured.append(f"of {row.model}{asked} {mean}")
             else:
-                is_usual |= lengths.has_calls
+                is_usual |= bool(lengths.coming)
     return f"replies {', '.join((*measured, *['of usual length'] * is_usual))}"
 
 

@@ -40,47 +40,26 @@ class ReplyLengths:
     """Tokens of replies to questions of one kind: `replies` that are there already and tell them,
     `tokens` in all, and those to come.
 
-    `_coming` counts calls by the length of a usual reply, the longest possible, and dollars a
-    token.
+    `coming` counts calls by the length of a usual reply, the longest possible, and dollars a token.
     """
 
     replies: int = 0
     tokens: int = 0
-    _coming: Counter[tuple[int, int, float]] = field(default_factory=Counter)
-
-    def add_call(self, expected: CallEstimate, usd_a_token: float) -> None:
-        """Count a reply to come."""
-        self._coming[expected.completion_tokens, expected.most_completion_tokens, usd_a_token] += 1
-
-    def add_reply(self, tokens: int) -> None:
-        """Learn from a reply that is there."""
-        self.replies += 1
-        self.tokens += tokens
+    coming: Counter[tuple[int, int, float]] = field(default_factory=Counter)
 
     @property
     def mean(self) -> float | None:
         """Tokens of a reply, where enough are there to tell; else a usual length is taken."""
         return self.tokens / self.replies if self.replies >= _ENOUGH_REPLIES else None
 
-    @property
-    def has_calls(self) -> bool:
-        """True if replies are to come."""
-        return bool(self._coming)
-
-    @property
-    def coming_tokens(self) -> float:
-        """Tokens of the replies to come, none longer than it can be."""
-        return sum(length * calls for length, _, calls in self._lengths())
-
-    @property
-    def coming_usd(self) -> float:
-        """Dollars of these tokens."""
-        return sum(length * usd * calls for length, usd, calls in self._lengths())
-
-    def _lengths(self) -> Iterator[tuple[float, float, int]]:
-        mean = self.mean
-        for (usual, most, usd), calls in self._coming.items():
-            yield (usual if mean is None else min(mean, most)), usd, calls
+    def expected(self) -> tuple[float, float]:
+        """Return tokens and dollars of the replies to come, none longer than it can be."""
+        mean, all_tokens, all_usd = self.mean, 0.0, 0.0
+        for (usual, most, usd), calls in self.coming.items():
+            length = usual if mean is None else min(mean, most)
+            all_tokens += length * calls
+            all_usd += length * usd * calls
+        return all_tokens, all_usd
 
 
 @dataclass
@@ -115,26 +94,24 @@ class Estimate:
         """Count one call that is left to make, of a kind of question."""
         self.calls += 1
         self.prompt_tokens += expected.prompt_tokens
-        price = (
-            None
-            if self.prices is None
-            else self.prices.at(self.day, expected.prompt_tokens, batched=self.batch)
-        )
-        self.lengths[kind].add_call(expected, 0.0 if price is None else price.output_cost(1))
-        if self.prices is None or price is None:
-            return
-        self._prompt_usd += price.input_cost(expected.prompt_tokens)
-        self._most_usd += most_usd(self.prices, expected, self.day, batched=self.batch)
+        usual, most, reply_usd = expected.completion_tokens, expected.most_completion_tokens, 0.0
+        price = self.prices and self.prices.at(self.day, expected.prompt_tokens, batched=self.batch)
+        if self.prices is not None and price is not None:
+            reply_usd = price.output_cost(1)
+            self._prompt_usd += price.input_cost(expected.prompt_tokens)
+            self._most_usd += most_usd(self.prices, expected, self.day, batched=self.batch)
+        self.lengths[kind].coming[usual, most, reply_usd] += 1
 
     def add_reply(self, completion_tokens: int | None, kind: str) -> None:
         """Learn from a reply that is there, to a kind of question."""
         if completion_tokens is not None:
-            self.lengths[kind].add_reply(completion_tokens)
+            self.lengths[kind].replies += 1
+            self.lengths[kind].tokens += completion_tokens
 
     @property
     def completion_tokens(self) -> int:
         """Tokens of the replies to come."""
-        return round(sum(lengths.coming_tokens for lengths in self.lengths.values()))
+        return round(sum(lengths.expected()[0] for lengths in self.lengths.values()))
 
     @property
     def tariff(self) -> Tariff | None:
@@ -149,7 +126,7 @@ class Estimate:
     @property
     def reply_usd(self) -> float | None:
         """Dollars of the replies alone."""
-        usd = sum(lengths.coming_usd for lengths in self.lengths.values())
+        usd = sum(lengths.expected()[1] for lengths in self.lengths.values())
         return None if self.tariff is None else usd
 
     @property

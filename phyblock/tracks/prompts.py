@@ -137,12 +137,6 @@ class TemplatePrompt:
                     return part.lineno + before.count("\n")
         return None
 
-    @property
-    def says_form(self) -> bool:
-        """True if it uses a name that tells the JSON that is asked for."""
-        find = jinja2.meta.find_undeclared_variables
-        return any(not find(one.tree).isdisjoint(FORM_FACTS) for one in self._sources.values())
-
     def require(self, block: str, more: str) -> None:
         """Raise PromptError where the template lacks a block; `more` is told of what is allowed."""
         if block not in self._template.blocks:

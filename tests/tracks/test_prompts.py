@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from phyblock.data import official_prompt, recorded_models
 from phyblock.errors import PromptError
 from phyblock.models.request import Image, Message
-from phyblock.tracks import TemplatePrompt, kinds
+from phyblock.tracks import TemplatePrompt
 from phyblock.tracks.prompts import OfficialPrompt
 from tests.fuzz.strategies import TEMPLATES
 
@@ -170,11 +170,3 @@ def test_the_official_prompt_is_the_recorded_text_to_the_letter(official_checkou
     # Marks of the two pictures stand before the text, the goal's first.
     assert {raw["instruction"] for raw in recorded} == {"<IMG_CONTEXT>" * 2 + text}
     assert all("cand" not in raw["image"][0] and "cand" in raw["image"][1] for raw in recorded)
-
-
-def test_only_prompts_for_json_say_the_form() -> None:
-    for kind in kinds().values():
-        assert kind.template is not None
-        assert kind.json_template is not None
-        assert not TemplatePrompt(kind.template, "text").says_form
-        assert TemplatePrompt(kind.json_template, "json").says_form
