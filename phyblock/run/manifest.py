@@ -6,7 +6,7 @@ import contextlib
 import hashlib
 import json
 import platform
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
@@ -74,7 +74,6 @@ def make_manifest(
             if variant == variant.shown
         }
     identity = hex_digest(json.dumps(inputs, sort_keys=True, separators=(",", ":")))
-    scenes = [task.scene for task in dataset.tasks]
     kinds = [kind_of(name) for name in suite.tracks]
     engine = {"engine": described_engine()} if kinds_with_physics(suite.model_dump()) else {}
     fields = {
@@ -94,14 +93,20 @@ def make_manifest(
         },
         **engine,
         **{key: value for kind in kinds for key, value in kind.manifest(suite).items()},
-        "items": {track.name: len(track.items) for track in variants[Variant()]},
-        "scenes": len(scenes),
-        "scenes_by_level": {
-            level: sum(level in scene.levels for scene in scenes) for level in suite.levels
-        },
+        **asked_counts(suite, dataset, variants[Variant()]),
         "versions": {"python": platform.python_version(), **_versions(), **code_versions()},
     }
     return Manifest.model_validate(fields)
+
+
+def asked_counts(suite: Suite, dataset: Dataset, tracks: Iterable[AnyTrack]) -> dict[str, Any]:
+    """Return how many items and scenes a run asks about, of what is selected of its data."""
+    levels = [task.scene.levels for task in dataset.tasks]
+    return {
+        "items": {track.name: len(track.items) for track in tracks},
+        "scenes": len(levels),
+        "scenes_by_level": {level: sum(level in own for own in levels) for level in suite.levels},
+    }
 
 
 def code_versions() -> dict[str, str]:

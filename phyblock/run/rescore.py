@@ -20,7 +20,7 @@ from phyblock.records.files import run_records
 from phyblock.records.manifest import MANIFEST, Manifest, read_manifest, suite_of
 from phyblock.records.record import Record, StoredError
 from phyblock.run.judge import about_item, judged, judged_apart, read_extraction
-from phyblock.run.manifest import code_versions
+from phyblock.run.manifest import asked_counts, code_versions
 from phyblock.run.plan import CHANGED, asked_about, recorded_dataset
 from phyblock.run.store import check_place, locked, write_run
 from phyblock.text import counted
@@ -104,14 +104,8 @@ def judged_anew(folder: Path) -> tuple[Manifest, Iterator[Record]]:
     suite = recorded_suite(folder, manifest)
     dataset = recorded_dataset(folder, manifest, suite.levels, None)
     tracks = _by_condition(folder, manifest, suite, dataset)
-    scenes = [task.scene for task in asked_about(manifest, suite.levels, dataset).tasks]
-    changes = {
-        "items": {name: len(track.items) for name, track in tracks[""].items()},
-        "scenes": len(scenes),
-        "scenes_by_level": {
-            level: sum(level in scene.levels for scene in scenes) for level in suite.levels
-        },
-    }
+    asked = asked_about(manifest, suite.levels, dataset)
+    changes = asked_counts(suite, asked, tracks[""].values())
     records = (again for _, again in _judged(folder, manifest, tracks, strict=True))
     return manifest.model_copy(update=changes), records
 
@@ -254,19 +248,13 @@ async def _judged_again(
 
 def _led_on(was: Any, now: Mapping[str, Any]) -> bool:
     """True if a stored turn came to what it comes to now, by whichever rule it was read."""
-    fields = was.fields()
-    return all(
-        _is_same({**fields[name], "rule": None}, {**value, "rule": None})
-        if isinstance(value, Mapping) and isinstance(fields.get(name), Mapping)
-        else _is_same(fields.get(name), value)
-        for name, value in now.items()
-    )
+    stored = was.fields()
+    return all(_plain(stored.get(name)) == _plain(value) for name, value in now.items())
 
 
-def _is_same(was: object, now: object) -> bool:
-    """True if two values say the same; a missing part is null."""
-    if isinstance(was, Mapping) and isinstance(now, Mapping):
-        return all(_is_same(was.get(name), now.get(name)) for name in was.keys() | now.keys())
-    if isinstance(was, (list, tuple)) and isinstance(now, (list, tuple)):
-        return len(was) == len(now) and all(map(_is_same, was, now))
-    return was == now
+def _plain(value: object) -> object:
+    """A value as JSON holds it, without what is null and the rule by which it was read."""
+    if isinstance(value, Mapping):
+        held = {name: below for name, below in value.items() if below is not None}
+        return {name: _plain(below) for name, below in held.items() if name != "rule"}
+    return [_plain(below) for below in value] if isinstance(value, list | tuple) else value
