@@ -180,7 +180,7 @@ def _interrupts(stop: Callable[[], None], hear: Callable[[], None]) -> Iterator[
 
 
 def _is_agreed(console: Console, plan: RunPlan, folder: Path, **asks: bool) -> bool:
-    billed = {model.name for model in plan.models if is_billed(model.config)}
+    billed = {model.name for model in plan.models if is_billed(model)}
     if not billed:
         return True
     rows = estimate(plan, folder, **asks)

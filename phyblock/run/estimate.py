@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from datetime import date
 from pathlib import Path
 
+from phyblock.config.models import ModelConfig
 from phyblock.config.suite import Variant
 from phyblock.errors import Problem, SpecError
 from phyblock.models import Estimate as CallEstimate
@@ -27,7 +28,7 @@ from phyblock.models import (
 from phyblock.models import estimate as estimate_call
 from phyblock.records.files import BatchLines, run_records
 from phyblock.resources import reply_cache_file
-from phyblock.run.plan import PlannedModel, RunPlan, Sample
+from phyblock.run.plan import RunPlan, Sample
 from phyblock.run.store import held_run
 from phyblock.tracks import AnyTrack, Item
 
@@ -95,7 +96,9 @@ class Estimate:
         self.calls += 1
         self.prompt_tokens += expected.prompt_tokens
         usual, most, reply_usd = expected.completion_tokens, expected.most_completion_tokens, 0.0
-        price = self.prices and self.prices.at(self.day, expected.prompt_tokens, batched=self.batch)
+        price = None
+        if self.prices is not None:
+            price = self.prices.at(self.day, expected.prompt_tokens, batched=self.batch)
         if self.prices is not None and price is not None:
             reply_usd = price.output_cost(1)
             self._prompt_usd += price.input_cost(expected.prompt_tokens)
@@ -158,11 +161,11 @@ def estimate(
     rows = {
         m.name: Estimate(
             m.name,
-            m.config.kind,
+            m.kind,
             plan.samples_per_model,
-            prices_of(m.config),
+            prices_of(m),
             today(),
-            m.config.batch,
+            m.batch,
         )
         for m in plan.models
     }
@@ -176,8 +179,8 @@ def estimate(
                 rows[record.model].add_reply(reply.usage.completion_tokens, kind)
         lines = tuple(line for _, line in BatchLines(folder))
         for model in plan.models:
-            if model.config.batch:
-                waiting[model.name] = waiting_keys(model.config, lines, folder)
+            if model.batch:
+                waiting[model.name] = waiting_keys(model, lines, folder)
     alike: dict[Variant, list[Variant]] = {}
     for variant in plan.variants:
         alike.setdefault(variant.shown, []).append(variant)
@@ -217,14 +220,13 @@ def _outlines(
 
 def _add(
     row: Estimate,
-    model: PlannedModel,
+    config: ModelConfig,
     samples: Sequence[Sample],
     outlines: Sequence[tuple[Request, bool]],
     cache: ReplyCache | None,
     waiting: frozenset[str],
 ) -> None:
     """Count one item of one model, with seeds that show it alike."""
-    config = model.config
     expected = []
     if config.kind == "litellm":
         asked = [(replace(outline, params=config.params), real) for outline, real in outlines]
@@ -272,4 +274,4 @@ def spending_refused(
 
 def _billed(plan: RunPlan) -> set[str]:
     """The models whose calls somebody may be billed for."""
-    return {model.name for model in plan.models if is_billed(model.config)}
+    return {model.name for model in plan.models if is_billed(model)}

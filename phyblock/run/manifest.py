@@ -9,7 +9,7 @@ import platform
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from phyblock.config.models import HUMAN, ModelConfig
 from phyblock.config.suite import Suite, Variant
@@ -21,9 +21,6 @@ from phyblock.sim.engine import ENGINES, PHYSICS_VARIABLE, REFERENCE_ENGINE, des
 from phyblock.stable import hex_digest
 from phyblock.tracks import AnyTrack, kind_of
 from phyblock.tracks.base import CARRYING, ENGINE, kinds_with_physics
-
-if TYPE_CHECKING:
-    from phyblock.run.plan import PlannedModel
 
 _ENGINES = (engine.distribution for engine in ENGINES.values())
 _LIBRARIES = ("litellm", *_ENGINES, "numpy", "pillow", "jinja2")
@@ -39,7 +36,7 @@ _NOT_IDENTITY = {
 
 def make_manifest(
     suite: Suite,
-    models: Sequence[PlannedModel],
+    models: Sequence[ModelConfig],
     dataset: Dataset,
     variants: Mapping[Variant, Sequence[AnyTrack]],
     limit: int | None,
@@ -114,9 +111,9 @@ def code_versions() -> dict[str, str]:
     return {"phyblock": version("phyblock"), "readers": str(READER_VERSION)}
 
 
-def _place(model: PlannedModel) -> dict[str, object]:
+def _place(model: ModelConfig) -> dict[str, object]:
     """Address of a model's server, which decides nothing."""
-    addresses = model.config.addresses
+    addresses = model.addresses
     return {"served_at": addresses} if addresses else {}
 
 
@@ -128,15 +125,15 @@ def _versions() -> dict[str, str]:
     return found
 
 
-def _model(model: PlannedModel) -> dict[str, object]:
+def _model(model: ModelConfig) -> dict[str, object]:
     """Return what decides a model's replies; a recording by what is in it, not by where it is."""
-    folder = model.config.recording
+    folder = model.recording
     if folder is None:
-        return model.config.identity()
+        return model.identity()
     digest = hashlib.sha256()
     for path in sorted((*folder.glob("*.json"), *folder.glob("records.jsonl"))):
         digest.update(f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
-    return {**model.config.identity(), "recording": digest.hexdigest()}
+    return {**model.identity(), "recording": digest.hexdigest()}
 
 
 def differences(found: Manifest, wanted: Manifest) -> list[str]:

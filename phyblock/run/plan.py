@@ -32,16 +32,6 @@ _SEEDS = 2**31
 
 
 @dataclass(frozen=True)
-class PlannedModel:
-    """A model of a run: how to call it, its row in the paper's tables, its size if known."""
-
-    name: str
-    config: ModelConfig
-    published: str | None = None
-    size_b: float | None = None
-
-
-@dataclass(frozen=True)
 class Sample:
     """One item of a track, asked of one model with one seed; `track` asks as the variant does."""
 
@@ -80,7 +70,7 @@ class RunPlan:
     """
 
     suite: Suite
-    models: tuple[PlannedModel, ...]
+    models: tuple[ModelConfig, ...]
     dataset: Dataset
     variants: Mapping[Variant, tuple[AnyTrack, ...]]
     manifest: Manifest
@@ -129,7 +119,7 @@ def make_plan(
     *,
     only: Sequence[str] = (),
     limit: int | None = None,
-    people: Sequence[PlannedModel] = (),
+    people: Sequence[ModelConfig] = (),
 ) -> RunPlan:
     """Resolve a suite against the known models.
 
@@ -144,7 +134,7 @@ def make_plan(
         # Members in the place of their group: the run is the same by them.
         suite = suite.model_copy(update={"models": with_members(suite.models, known)})
     limit = suite.limit if limit is None else limit
-    asks = any(model.config.kind != "replay" for model in models)
+    asks = any(model.kind != "replay" for model in models)
     variants = _variants(Opening(suite, dataset, limit, asks))
     tracks = variants[Variant()]
     _check_models(models, tracks, suite)
@@ -181,19 +171,19 @@ def _nothing(suite: Suite, dataset: Dataset, limit: int | None) -> Problem:
     return Problem(str(suite.files.path), "the suite has no samples", "", found, allowed)
 
 
-def _check_models(models: Sequence[PlannedModel], tracks: Sequence[AnyTrack], suite: Suite) -> None:
+def _check_models(models: Sequence[ModelConfig], tracks: Sequence[AnyTrack], suite: Suite) -> None:
     """Every model can answer what every track asks, means the numbers that are shown, and is not
     taken for another; a recording was asked in the form in which it is read.
     """
     problems = _alike(models)
     order, asked = suite.candidates.order, suite.answer_format
     for model in models:
-        if model.config.kind == "replay" and suite.vary.factors:
+        if model.kind == "replay" and suite.vary.factors:
             message = "is a recording, which was asked in one way"
             factors = ", ".join(suite.vary.factors)
             problems.append(Problem(f"model {model.name}", message, "vary", factors))
             continue
-        where, recorded = f"model {model.name}", model.config.recording
+        where, recorded = f"model {model.name}", model.recording
         if recorded is not None:
             found, form = recorded_as(recorded)
             if found != order:
@@ -203,19 +193,19 @@ def _check_models(models: Sequence[PlannedModel], tracks: Sequence[AnyTrack], su
                 message = f"is a recording of answers that were asked for as {form}"
                 problems.append(Problem(where, message, "answer_format", asked, form))
         for track in tracks:
-            if model.config.kind == "replay" and isinstance(track, EpisodeTrack):
+            if model.kind == "replay" and isinstance(track, EpisodeTrack):
                 message = f"is a recording, which cannot answer in {track.name}"
                 problems.append(Problem(where, message, "tracks", track.name))
-            if model.config.batch and isinstance(track, EpisodeTrack):
+            if model.batch and isinstance(track, EpisodeTrack):
                 message = f"is asked in batches, and {track.name} plays episodes of several turns"
                 hint = "each turn waits for the one before: take batch: true out, or the track"
                 problems.append(Problem(where, message, "batch", track.name, hint=hint))
-            if model.config.kind == "human" and kind_of(track.name).by_hand is None:
+            if model.kind == "human" and kind_of(track.name).by_hand is None:
                 message = f"is a person, who cannot answer in {track.name}"
                 hint = f"leave {track.name} out of tracks"
                 problems.append(Problem(where, message, "tracks", track.name, hint=hint))
             able = track_baselines(kind_of(track.name))
-            if model.config.kind != "baseline" or model.name in able:
+            if model.kind != "baseline" or model.name in able:
                 continue
             message = f"has no rule for {track.name}"
             problems.append(Problem(where, message, "models", allowed=", ".join(able)))
@@ -223,16 +213,16 @@ def _check_models(models: Sequence[PlannedModel], tracks: Sequence[AnyTrack], su
         raise SpecError(problems)
 
 
-def _alike(models: Sequence[PlannedModel]) -> list[Problem]:
+def _alike(models: Sequence[ModelConfig]) -> list[Problem]:
     """Models that replies could not be told apart by, though they are asked at other addresses."""
     problems = []
     for earlier, later in combinations(models, 2):
-        one, other = earlier.config, later.config
-        if one.identity() == other.identity() and set(one.addresses) != set(other.addresses):
+        is_other_place = set(earlier.addresses) != set(later.addresses)
+        if earlier.identity() == later.identity() and is_other_place:
             message = f"is {earlier.name} at another address: they would share their replies"
             hint = "give one of them a revision, or run one alone"
             where = f"model {later.name}"
-            found = ", ".join(sorted(set(other.addresses)))
+            found = ", ".join(sorted(set(later.addresses)))
             problems.append(Problem(where, message, "api_base", found, hint=hint))
     return problems
 
@@ -281,7 +271,7 @@ def asked_about(manifest: Manifest, levels: Sequence[int], dataset: Dataset) -> 
 
 def plan_models(
     suite: Suite, known: Mapping[str, ModelConfig], only: Sequence[str]
-) -> tuple[PlannedModel, ...]:
+) -> tuple[ModelConfig, ...]:
     """The suite's models in its order, or those that `only` names, in its order.
 
     `only` may name any known model or group, in the suite or not; of recordings, any that is there.
@@ -293,9 +283,7 @@ def plan_models(
         if unknown := [name for name in only if name not in folders]:
             raise SpecError(Problem("--models", message, "", one, allowed) for one in unknown)
         return tuple(
-            PlannedModel(
-                name, ModelConfig(name=name, replay=str(folders[name])), match_published(name)
-            )
+            ModelConfig(name=name, replay=str(folders[name]), published=match_published(name))
             for name in dict.fromkeys(only) or folders
         )
     if only:
@@ -306,14 +294,14 @@ def plan_models(
 
 
 def with_baselines(
-    models: Sequence[PlannedModel], suite: Suite, known: Mapping[str, ModelConfig]
-) -> tuple[PlannedModel, ...]:
+    models: Sequence[ModelConfig], suite: Suite, known: Mapping[str, ModelConfig]
+) -> tuple[ModelConfig, ...]:
     """Return models with the suite's `baselines` beside them.
 
     They are scored in every run of plans in which a model or a recording is asked, where all tracks
     know them: what rules reach that never see the goal is what a score has to be held against.
     """
-    asks = any(model.config.kind in ("litellm", "replay") for model in models)
+    asks = any(model.kind in ("litellm", "replay") for model in models)
     if not asks or "full_planning" not in suite.tracks:
         return tuple(models)
     named = {model.name for model in models}
@@ -362,10 +350,10 @@ def recorded_as(folder: Path) -> tuple[CandidateOrder, AnswerFormat]:
     return order or "file", form
 
 
-def _planned(name: str, known: ModelConfig, suite: Suite) -> PlannedModel:
+def _planned(name: str, known: ModelConfig, suite: Suite) -> ModelConfig:
     config = to_config(name, known, suite)
     published = config.published or match_published(name)
-    return PlannedModel(name, config, published, config.size_b)
+    return config.model_copy(update={"name": name, "published": published})
 
 
 def to_config(name: str, known: ModelConfig, suite: Suite) -> ModelConfig:
@@ -491,7 +479,7 @@ def _near(suite: Path | None) -> list[Path]:
 def asking_remarks(suite: Suite, plan: RunPlan) -> list[str]:
     """Return which prompts of one's own are sent, and who copies replies that cannot be read."""
     own = []
-    if any(model.config.kind == "litellm" for model in plan.models):
+    if any(model.kind == "litellm" for model in plan.models):
         for variant in dict.fromkeys(variant.shown for variant in plan.variants):
             asked = suite.at(variant)
             for track, path in asked.files.templates.items():
@@ -510,9 +498,9 @@ def moved_remarks(begun: Manifest, plan: RunPlan) -> list[str]:
     before = {model.name: model.served_at for model in begun.models}
     return [
         f"{model.name} was asked at {', '.join(before[model.name])} and is now at "
-        f"{', '.join(model.config.addresses)}: taken to be the same weights (other ones need "
+        f"{', '.join(model.addresses)}: taken to be the same weights (other ones need "
         "another revision in the models file)"
         for model in plan.models
-        if before.get(model.name) and model.config.addresses
-        if set(before[model.name]).isdisjoint(model.config.addresses)
+        if before.get(model.name) and model.addresses
+        if set(before[model.name]).isdisjoint(model.addresses)
     ]

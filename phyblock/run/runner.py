@@ -55,7 +55,7 @@ from phyblock.run.events import (
     Watcher,
 )
 from phyblock.run.judge import Extractor, about_prompt, begun, judged, judged_apart, pooled
-from phyblock.run.plan import PlannedModel, RunPlan, Sample, provider_problem
+from phyblock.run.plan import RunPlan, Sample, provider_problem
 from phyblock.run.store import CallJournal, Journaled, RecordWriter, RunStore
 from phyblock.tracks import AnyTrack, EpisodeTrack
 from phyblock.types import AskedAs
@@ -104,7 +104,7 @@ class RunResult:
 def check_ready(plan: RunPlan) -> None:
     """Raise SpecError naming every model whose key or address is not set."""
     problems: list[Problem] = []
-    for config in (*(model.config for model in plan.models), *filter(None, [plan.extractor])):
+    for config in (*plan.models, *filter(None, [plan.extractor])):
         where, status = f"model {config.name}", api_key_status(config)
         if status.fault:
             problems.append(Problem(where, status.fault, "", config.id))
@@ -195,7 +195,7 @@ class Session:
         if problems := [
             Problem(f"model {model.name}", message, "batch", waiting[model.name], hint=hint)
             for model in plan.models
-            if model.name in waiting and not model.config.batch
+            if model.name in waiting and not model.batch
         ]:
             raise SpecError(problems)
 
@@ -203,7 +203,7 @@ class Session:
             self._watch(RunNotice(text))
 
         cache: ReplyCache | None = None
-        asks = any(model.config.kind == "litellm" for model in plan.models)
+        asks = any(model.kind == "litellm" for model in plan.models)
         if self._use_cache and (asks or plan.extractor):
             cache = ReplyCache(reply_cache_file(), tell)
             stack.callback(cache.close)
@@ -227,12 +227,12 @@ class Session:
             ),
         )
         for planned in plan.models:
-            config, present = planned.config, self._models.get(planned.name)
-            if present is not None:
-                self._models[planned.name] = Journaled(present, config, journal)
-            else:
-                model = build(config, batches=batches if config.batch else None)
-                self._models[planned.name] = model
+            present = self._models.get(planned.name)
+            self._models[planned.name] = (
+                build(planned, batches=batches if planned.batch else None)
+                if present is None
+                else Journaled(present, planned, journal)
+            )
             stack.push_async_callback(self._models[planned.name].aclose)
         if plan.extractor is not None:
             extracting = build(plan.extractor)
@@ -285,7 +285,7 @@ class Session:
             if isinstance(model, GatheringModel):
                 workers.append(asyncio.create_task(self._in_rounds(planned, model, queue)))
             else:
-                count = min(planned.config.max_concurrency, len(queue))
+                count = min(planned.max_concurrency, len(queue))
                 workers += [asyncio.create_task(self._work(planned, queue)) for _ in range(count)]
         try:
             # One worker's error must not end the others: they wait for what is paid for.
@@ -311,7 +311,7 @@ class Session:
         await self._records.drain()
 
     async def _work(
-        self, planned: PlannedModel, queue: deque[Sample], later: deque[Sample] | None = None
+        self, planned: ModelConfig, queue: deque[Sample], later: deque[Sample] | None = None
     ) -> None:
         """Ask until the queue is empty; what its model wants to be asked later goes to `later`, or
         without one behind the others.
@@ -319,15 +319,15 @@ class Session:
         while queue and self._goes_on(planned):
             sample = queue.popleft()
             try:
-                await self._guarded(planned, self._one(sample, planned.config))
+                await self._guarded(planned, self._one(sample, planned))
             except AskLaterError:
                 (queue if later is None else later).append(sample)
 
     async def _in_rounds(
-        self, planned: PlannedModel, model: GatheringModel, queue: deque[Sample]
+        self, planned: ModelConfig, model: GatheringModel, queue: deque[Sample]
     ) -> None:
         """Ask a model that sends many requests together."""
-        width = planned.config.max_concurrency
+        width = planned.max_concurrency
         while queue and self._goes_on(planned):
             taken: deque[Sample] = deque()
             later: deque[Sample] = deque()
@@ -339,7 +339,7 @@ class Session:
 
     async def _gather(
         self,
-        planned: PlannedModel,
+        planned: ModelConfig,
         model: GatheringModel,
         queue: deque[Sample],
         taken: deque[Sample],
@@ -354,14 +354,14 @@ class Session:
             nonlocal is_full
             while queue and not is_full and self._goes_on(planned):
                 sample = queue.popleft()
-                request = await self._request(sample.shown(), planned.config, with_messages=True)
+                request = await self._request(sample.shown(), planned, with_messages=True)
                 with self._cancellation.scope():
                     known = sample.id in self._store.standing.samples
                     is_taken = await model.gather(request, anew=known)
                 is_full = is_full or not is_taken
                 (taken if is_taken else left).append(sample)
 
-        width = min(planned.config.max_concurrency, len(queue))
+        width = min(planned.max_concurrency, len(queue))
         await asyncio.gather(*(self._guarded(planned, gather()) for _ in range(width)))
         queue.extendleft(reversed(left))
         if not self._goes_on(planned):
@@ -372,11 +372,11 @@ class Session:
             await model.begin()
             raise BudgetReachedError("what is left may cost more than is left of max_cost_usd")
 
-    def _goes_on(self, planned: PlannedModel) -> bool:
+    def _goes_on(self, planned: ModelConfig) -> bool:
         is_stopped = self.stopping or planned.name in self.result.stopped
         return not (is_stopped or self._is_over)
 
-    async def _guarded(self, planned: PlannedModel, work: Coroutine[Any, Any, None]) -> None:
+    async def _guarded(self, planned: ModelConfig, work: Coroutine[Any, Any, None]) -> None:
         """Do a part of the work on a model; what keeps it from going on stops it, or the run."""
         try:
             await work

@@ -35,7 +35,7 @@ from phyblock.records.record import Record
 from phyblock.results.compare import check_alike, comparable
 from phyblock.results.load import Design, load_run
 from phyblock.run.events import RunEvent, RunStarted, SampleDone
-from phyblock.run.plan import PlannedModel, RunPlan, make_plan
+from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.runner import RunResult, Session
 from phyblock.stable import drawn_bytes, hex_digest
 from phyblock.text import one_line
@@ -102,13 +102,12 @@ class Person:
         """Digest of the text that is agreed to."""
         return hex_digest(self.consent)
 
-    def planned(self) -> PlannedModel:
+    def planned(self) -> ModelConfig:
         """Return the person in a plan; number and text make runs that are not the same."""
         params: dict[str, JsonValue] = {"consent": self.consent_sha256}
         if self.number is not None:
             params["number"] = self.number
-        config = ModelConfig(name=self.model, extra_body=params, max_concurrency=1)
-        return PlannedModel(self.model, config)
+        return ModelConfig(name=self.model, extra_body=params, max_concurrency=1)
 
 
 def plan_session(suite: Suite, person: Person, limit: int | None) -> RunPlan:
