@@ -17,8 +17,7 @@ from phyblock.domain.question import Mark
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, turned_form
 from phyblock.making.questions.affordance import is_on_face, stays_at
 from phyblock.making.questions.base import UnfairError, four_alike
-from phyblock.making.questions.counterfactual import resting_on
-from phyblock.making.questions.counting import layers_of, sure_blocks
+from phyblock.making.questions.dynamics import ranked_as_drawn, resting_on
 from phyblock.making.questions.names import (
     SHAPE_WORDS,
     Feature,
@@ -26,9 +25,15 @@ from phyblock.making.questions.names import (
     resolve,
     resolve_one,
 )
-from phyblock.making.questions.positions import LENGTHS, grid_cm
-from phyblock.making.questions.predictive import ranked_as_drawn
-from phyblock.making.questions.rotations import AXIS_TURNS, axis_turns, put_beside, tipped_over
+from phyblock.making.questions.properties import layers_of, sure_blocks
+from phyblock.making.questions.relations import (
+    AXIS_TURNS,
+    LENGTHS,
+    axis_turns,
+    grid_cm,
+    put_beside,
+    tipped_over,
+)
 from phyblock.making.questions.selection import BALANCE, Texts, even_letters, keeping_odds
 from phyblock.making.questions.structures import (
     is_sure,
@@ -36,7 +41,7 @@ from phyblock.making.questions.structures import (
     stays_round,
     with_annex,
 )
-from phyblock.making.questions.viewpoint import ViewpointMaker, shifted
+from phyblock.making.questions.views import ViewpointMaker, shifted
 from phyblock.making.scenes.sketch import POSES, transformed
 from phyblock.resources import bundled
 from phyblock.sim.contact import find_gaps, find_overlaps, support_graph

@@ -19,7 +19,7 @@ from phyblock.domain.question import rotated
 from phyblock.errors import DataError, StoreError
 from phyblock.making.questions.audit import SubtaskAudit, audit_questions, duplicates_of
 from phyblock.making.questions.base import ELEVATIONS_DEG, LEAST_PIXELS
-from phyblock.making.questions.counterfactual import OUTCOME_TEXTS
+from phyblock.making.questions.dynamics import OUTCOME_TEXTS
 from phyblock.making.questions.production import (
     PER_SUBTASK,
     as_question,

@@ -28,15 +28,16 @@ from phyblock.errors import DataError, PhyblockError, Problem, StoreError
 from phyblock.files import atomic_write, check_free, writing
 from phyblock.making.questions.affordance import AffordanceMaker
 from phyblock.making.questions.base import Draft, Maker, UnfairError, pick, shuffled
-from phyblock.making.questions.counterfactual import CounterfactualMaker
-from phyblock.making.questions.counting import NumberMaker, TallyMaker
-from phyblock.making.questions.ordering import OrderingMaker
-from phyblock.making.questions.positions import DependencyMaker, DistanceMaker, PositionMaker
-from phyblock.making.questions.predictive import PredictiveMaker
-from phyblock.making.questions.properties import PropertyMaker, SizeMaker
-from phyblock.making.questions.rotations import RotationMaker
+from phyblock.making.questions.dynamics import CounterfactualMaker, PredictiveMaker
+from phyblock.making.questions.properties import NumberMaker, PropertyMaker, SizeMaker, TallyMaker
+from phyblock.making.questions.relations import (
+    DependencyMaker,
+    DistanceMaker,
+    PositionMaker,
+    RotationMaker,
+)
 from phyblock.making.questions.selection import even_letters, select
-from phyblock.making.questions.viewpoint import ViewpointMaker
+from phyblock.making.questions.views import OrderingMaker, ViewpointMaker
 from phyblock.making.workers import Workers
 from phyblock.sim.engine import other_engine
 from phyblock.stable import hex_digest
