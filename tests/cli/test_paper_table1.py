@@ -95,18 +95,6 @@ def test_counts_are_the_expected_ones_scene_by_scene(
     assert {key: found.get(key) for key in wanted} == wanted
 
 
-def test_models_that_take_the_place_of_their_recordings_are_named(
-    workspace: Workspace, official_checkout: Path
-) -> None:
-    workspace.write_models("http://127.0.0.1:9", "gpt-4o", "other")
-    words = ("run", "paper-table1", "--set", f"dataset.path={official_checkout}", "--limit", "2")
-    told = workspace.phyblock(*words, "--set", "models=[gpt-4o,other]", "--dry-run")
-    assert told.code == 0, told.err
-    assert "gpt-4o: called anew, though " in told.out
-    assert "other:" not in told.out
-    assert "called anew" not in workspace.phyblock(*words, "--dry-run").out
-
-
 def test_a_recording_is_never_asked_anything(reproduced: tuple[Workspace, Done]) -> None:
     workspace, _ = reproduced
     replies = [record["reply"] for record in workspace.records() if record["reply"]]

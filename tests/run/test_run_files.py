@@ -17,11 +17,11 @@ from hypothesis import strategies as st
 
 from phyblock.config.suite import load_suite
 from phyblock.errors import StoreError
-from phyblock.records.files import PromptLines
+from phyblock.records.files import PromptLines, read_prompts
 from phyblock.records.record import Call, Reply
 from phyblock.run.events import Standing
 from phyblock.run.plan import make_plan
-from phyblock.run.store import AppendFile, RunStore, read_prompts
+from phyblock.run.store import AppendFile, RunStore
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
