@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import signal
 import sys
 from functools import partial
 from pathlib import Path
@@ -98,3 +100,24 @@ def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
     again = workspace.records(rescore(workspace.out, None, None, workspace.root / "again"))
     assert {record["outcome"] for record in again} == {"ok"}
     assert all(record["pose"]["completed"] and record["error"] is None for record in again)
+
+
+def test_a_reply_that_is_being_judged_at_a_second_interrupt_is_recorded(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(workspace.root)
+    monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
+    monkeypatch.setattr(sys, "argv", ["phyblock"])
+    workspace.write_suite(tracks=["pose_planning"], models=["oracle"], pose={"views": ["oblique"]})
+
+    async def slow(track: PosePlanning, item: Any, text: str | None, _: Any) -> Any:
+        for _ in range(2):
+            os.kill(os.getpid(), signal.SIGINT)
+            await asyncio.sleep(0.1)
+        return track.judge(item, text)
+
+    monkeypatch.setattr(PosePlanning, "judge_apart", slow)
+    run = ["run", "suite.yaml", "--out", "out", "--no-report", "--limit", "1"]
+    phyblock.main(run, standalone_mode=False)
+    assert "(interrupted)" in capsys.readouterr().out
+    assert [record["outcome"] for record in workspace.records()] == ["ok"]
