@@ -108,3 +108,13 @@ def test_nothing_that_is_built_is_tracked() -> None:
     assert folders <= known
     assert not [file for file in files if re.search(r"\.min\.|\.map$", file.name)]
     assert [file for file in files if file.parts[0] == "results"] == [Path("results/README.md")]
+
+
+def test_tests_that_are_named_are_there() -> None:
+    texts = [ROOT / "SECURITY.md", ROOT / "CONTRIBUTING.md", ROOT / ".ci" / "pythons"]
+    texts += (ROOT / "docs").rglob("*.md")
+    named = {
+        name for text in texts for name in re.findall(r"tests/[\w/]+\.py", text.read_text("utf-8"))
+    }
+    assert named
+    assert not [name for name in sorted(named) if not (ROOT / name).is_file()]
