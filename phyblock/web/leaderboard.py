@@ -50,6 +50,7 @@ from phyblock.web.pack import (
     question_entry,
     records_at,
     write_script,
+    write_three,
 )
 from phyblock.web.report import shortfalls
 
@@ -184,6 +185,7 @@ def write_site(
                 samples = _write_samples(new, build, runs, entries, values)
                 write_script(new, "board", build, {**board, "title": title})
                 write_script(new, "samples", build, {**samples, "kit": kit()})
+                write_three(new)
                 size = sum(path.stat().st_size for path in new.iterdir())
             facts = {"title": title, "folder": f"{_DATA}{build}", "build": build}
             page = fill("site.html.j2", _SCRIPTS, _STYLES, **facts)

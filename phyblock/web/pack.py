@@ -11,6 +11,7 @@ import base64
 import hashlib
 import json
 import os
+import re
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -96,6 +97,34 @@ class Pack:
 def write_script(folder: Path, name: str, build: str, data: Mapping[str, object]) -> None:
     """Write one object as the script `<name>.js`; raises OSError where the disk refuses."""
     _write(folder, name, build, _to_json(data))
+
+
+def write_three(folder: Path) -> None:
+    """Write three.js as the script `three.js`, which names it `THREE`.
+
+    Its published build is of two modules, which a page that was opened from disk may not load; what
+    they import and export becomes what functions take and return. Raises OSError where the disk
+    refuses.
+    """
+
+    def exported(match: re.Match[str]) -> str:
+        pairs = (name.rpartition(" as ") for name in match[1].split(","))
+        return ",".join(f"{shown}:{own or shown}" for own, _, shown in pairs)
+
+    core, module = (asset(f"three/three.{name}.min.js").decode() for name in ("core", "module"))
+    core = re.sub(r"export\{([^}]*)\};?\s*$", lambda match: f"return{{{exported(match)}}}", core)
+    source = r'from"\./three\.core\.min\.js";?'
+    module = re.sub(rf"export\{{[^}}]*\}}{source}", "", module)
+    module = re.sub(
+        rf"import\{{([^}}]*)\}}{source}",
+        lambda match: f"const{{{match[1].replace(' as ', ':')}}}=core;",
+        module,
+    )
+    module = re.sub(
+        r"export\{([^}]*)\};?\s*$", lambda match: f"return{{...core,{exported(match)}}}", module
+    )
+    script = f"window.THREE=(core=>{{{module}}})((()=>{{{core}}})());\n"
+    (folder / "three.js").write_text(script, encoding="utf-8")
 
 
 def _to_json(data: object) -> str:

@@ -47,6 +47,7 @@ from phyblock.web.pack import (
     places_of,
     question_entry,
     write_script,
+    write_three,
 )
 
 _SCRIPTS = (
@@ -366,6 +367,7 @@ def _write_data(run: Run, sources: Sources, out: OutFolder, new: Path, build: st
         "shortfalls": {track: shortfalls(run, track) for track in tracks},
     }
     write_script(new, "index", build, content)
+    write_three(new)
 
 
 def _page(written: TablesWritten, build: str) -> str:

@@ -188,6 +188,8 @@ def test_a_sample_is_drawn_played_and_turned(visit: ReportVisit) -> None:
     page.clock.install()
     visit.show("full_planning/oracle/t5/s0")
     assert page.locator(".cells li").count() == 16
+    expect(page.locator("canvas.goal")).to_have_attribute("data-drawn", "4")
+    expect(page.locator(".cells canvas").first).to_have_attribute("data-drawn", "1")
     for canvas, least in (("canvas.goal", 1000), (".cells canvas", 100), ("canvas.stage", 1000)):
         assert painted(page, canvas) > least
     assert "F1 100.0" in page.inner_text(".facts")
@@ -207,22 +209,69 @@ def test_a_sample_is_drawn_played_and_turned(visit: ReportVisit) -> None:
     page.clock.run_for(10_000)
     expect(where).to_have_text("End")
     picture = "canvas => canvas.toDataURL()"
-    before = page.eval_on_selector("canvas.stage", picture)
+    views = ("canvas.stage", "canvas.goal")
+    before = [page.eval_on_selector(view, picture) for view in views]
     box = page.locator("canvas.stage").bounding_box()
     assert box is not None
     page.mouse.move(box["x"] + 100, box["y"] + 100)
     page.mouse.down()
     page.mouse.move(box["x"] + 160, box["y"] + 80)
     page.mouse.up()
-    assert page.eval_on_selector("canvas.stage", picture) != before
-    page.locator("canvas.stage").dblclick()
-    assert page.eval_on_selector("canvas.stage", picture) == before
+    turned = [page.eval_on_selector(view, picture) for view in views]
+    page.locator("canvas.goal").focus()
+    page.keyboard.press("ArrowLeft")
+    by_key = [page.eval_on_selector(view, picture) for view in views]
+    for one, other in ((before, turned), (turned, by_key)):
+        assert all(a != b for a, b in zip(one, other, strict=True))
+    page.get_by_role("button", name="Turn back to the first view").click()
+    assert [page.eval_on_selector(view, picture) for view in views] == before
+
+
+def test_a_stage_opens_at_the_first_wrong_step_and_moves_but_for_those_who_want_it_still(
+    visit: ReportVisit,
+) -> None:
+    page = visit.show("full_planning/oracle/t5/s1", tab="did")
+    where = page.locator(".controls output")
+    assert where.inner_text() == "Step 1 of 2"
+    assert page.locator(".wrong-step").count() == 1
+    at_first = "() => document.querySelector('canvas.stage').toDataURL()"
+    expect(page.locator("canvas.stage")).to_have_attribute("data-drawn", "0")
+    tried = page.evaluate(at_first)
+    page.locator("#numbers").uncheck()
+    assert page.evaluate(at_first) != tried
+    # What is drawn while a block drops is another picture than the one it ends in.
+    drawn = """async (still) => {
+        const seen = new Set(), canvas = document.querySelector("canvas.stage");
+        Detail.player.seek(2);
+        for (let i = 0; i < 40; i++) {
+            await new Promise(requestAnimationFrame);
+            seen.add(canvas.toDataURL());
+        }
+        return seen.size;
+    }"""
+    assert page.evaluate(drawn) > 1
+    page.emulate_media(reduced_motion="reduce")
+    page.evaluate("() => Detail.player.seek(1)")
+    assert page.evaluate(drawn) == 1
+
+
+def test_without_webgl_a_picture_says_so(visit: ReportVisit) -> None:
+    visit.page.add_init_script(
+        """HTMLCanvasElement.prototype.getContext = new Proxy(
+            HTMLCanvasElement.prototype.getContext,
+            { apply: (get, canvas, [kind, ...more]) =>
+                kind.startsWith("webgl") ? null : get.call(canvas, kind, ...more) })"""
+    )
+    page = visit.show("full_planning/oracle/t5/s0", tab="did")
+    expect(page.locator("canvas.goal")).to_have_attribute("data-drawn", "no")
+    assert 0 < painted(page, "canvas.goal") < 10_000
+    assert page.inner_text(".said").startswith("End")
 
 
 def test_a_wrong_step_says_why_with_the_sentence(visit: ReportVisit) -> None:
     page = visit.show("full_planning/oracle/t5/s1", step="1", numbers="off")
     why = page.locator(".why")
-    expect(why).to_contain_text("Glowing: what was tried, in the place of block 1")
+    expect(why).to_contain_text("Glowing: what was tried, on the floor, the first open place.")
     expect(page.locator(".said").first).to_contain_text("The goal has no green cylinder.")
     assert why.locator(".quote").inner_text() == "1. Move block with index 9."
     page.locator("#scrub").fill("2")
@@ -243,6 +292,7 @@ def test_questions_and_episodes_are_shown(visit: ReportVisit) -> None:
     assert visit.count() == "4 samples"
     visit.show("vqa/oracle/sh-000/s0")
     assert page.locator(".options .mark").all_inner_texts() == ["✓ right", "✓ given"]
+    expect(page.locator(".pictures canvas")).to_have_attribute("data-drawn", re.compile("[0-9]"))
     assert painted(page, ".pictures canvas") > 1000
     page.locator("summary", has_text="Evidence").click()
     assert "{" not in page.locator("dl.evidence").first.inner_text()

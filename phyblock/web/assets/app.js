@@ -206,7 +206,7 @@
       panels = [...detail.querySelectorAll(".panel[hidden]")];
       opened.forEach((part) => part.setAttribute("open", ""));
       panels.forEach((panel) => panel.removeAttribute("hidden"));
-      Detail.drawn();
+      Detail.drawn(true);
       // Frames that were never in sight were never drawn.
       detail.querySelectorAll(".strip button").forEach((frame) => frame.draw?.());
     });
@@ -235,7 +235,7 @@
   let waiting = 0;
   addEventListener("resize", () => {
     cancelAnimationFrame(waiting);
-    waiting = requestAnimationFrame(Detail.drawn);
+    waiting = requestAnimationFrame(() => Detail.drawn());
   });
   go();
 })();

@@ -94,12 +94,11 @@ const Detail = (() => {
     const runs = loaded.map(({ record, setting }) => Runs.of(scene, record, setting, headline(record.scores, setting)));
     const longest = Math.max(...runs.map(({ steps }) => steps.length));
     const noun = loaded[0].record.turns ? "Turn" : "Step";
-    player = new Stage.Player(longest + 1);
-    const panels = loaded.map((sample, i) => (runs[i].steps.length ? Stage.panel(runs[i], player, noun) : null));
+    player = new Stage.Player(longest + 1, Stage.wrongSteps(runs));
+    const panels = loaded.map((sample, i) => (runs[i].steps.length ? Stage.panel(runs[i], player, noun, scene) : null));
     const stages = panels.map((panel, i) => [
       several ? heading(loaded[i]) : null, verdict(loaded[i]), panel ? panel.said : nothing(loaded[i]),
       panel ? Why.note(loaded[i], scene, runs[i].steps, player) : null]);
-    if (scene) panels.forEach((panel, i) => panel && Overlay.over(panel.pictures, scene, runs[i], player));
     const wide = Math.max(...runs.map(({ titles }) => titles.length)) > 1 ? " wide" : "";
     const built = panels.flatMap((panel, i) => [
       runs[i].titles.map((title, k) => el("figure", { class: "built" },
@@ -166,7 +165,7 @@ const Detail = (() => {
       ? (as.goal ? `; shown was the goal of ${as.goal}` : "; no goal was shown") : "";
     return el("figure", {}, el("figcaption", {}, "Goal ", el("span", { class: "muted" },
       `${Words.count(scene.blocks.length, "block")}, level${levels.length > 1 ? "s" : ""} ${levels.join(" and ")}${other}`)),
-    Stage.picture("Goal", scene.blocks, { grid: true, marks: Overlay.marks(scene) }));
+    Stage.picture("Goal", scene.blocks, { grid: true, badges: Overlay.badges(scene) }, "goal", player));
   }
 
   function candidates(scene) {
@@ -186,8 +185,8 @@ const Detail = (() => {
   }
 
   /** Draw everything in sight again, after a change of size or colors too. */
-  function drawn() {
-    Stage.draw(place);
+  function drawn(isPrinted = false) {
+    Stage.draw(place, isPrinted);
     player?.tell();
   }
 

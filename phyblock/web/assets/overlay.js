@@ -1,54 +1,20 @@
-/* On the drawing of a stage: the block that a wrong step tried, glowing where it would go, and
-   the numbers of candidates on blocks, which tell them apart without their colors. */
+/* On the drawing of a stage: the block that a wrong step tried, where it would go, and the numbers of
+   candidates on blocks, which tell them apart without their colors. */
 "use strict";
 
 const Overlay = (() => {
-  const GLOW_CSS_PX = 9;
   let hasNumbers = true;
 
-  /** Draw on a stage's pictures whenever the stage was drawn: its listener comes first. */
-  function over(pictures, scene, run, player) {
-    player.listeners.push(() => {
-      const end = run.steps.length + 1;
-      const at = player.at >= player.last ? end : Math.min(player.at, end);
-      pictures.forEach(({ canvas }, place) => {
-        const state = run.states[at]?.[place];
-        if (state && canvas.clientWidth) paint(canvas, scene, run, state, run.steps[at - 1], player.view);
-      });
-    });
-  }
-
-  function paint(canvas, scene, run, state, step, view) {
-    const shared = { view, framed: run.framed, size: canvas.clientWidth };
-    const scratch = document.createElement("canvas");
-    const context = canvas.getContext("2d");
-    const tried = step ? block(scene, step) : null;
-    if (tried) {
-      const rgb = Stage.style("--tried-rgb");
-      Solid.draw(scratch, [tried], { ...shared, fresh: tried, accent: rgb.split(",").map(Number) });
-      context.shadowColor = `rgb(${rgb})`;
-      context.shadowBlur = GLOW_CSS_PX * canvas.width / canvas.clientWidth;
-      context.drawImage(scratch, 0, 0);
-      context.drawImage(scratch, 0, 0);
-      context.shadowBlur = 0;
-    }
-    if (!hasNumbers) return;
-    const marks = state.blocks.map((one) => mark(scene, one)).filter(Boolean);
-    if (tried) marks.push({ letter: String(step.number), position: tried.position });
-    Solid.draw(scratch, [], { ...shared, marks });
-    context.drawImage(scratch, 0, 0);
-  }
-
-  /** The number of the candidate that a block is, or one of its kind. */
-  function mark(scene, one) {
+  /** The number of the candidate that a block is, or one of its kind; "" for none. */
+  function number(scene, one) {
     const isAlike = (other) => sameKind(one, other) && String(one.euler) === String(other.euler);
     const exact = scene.candidates.findIndex(isAlike);
     const n = one.candidate || (exact < 0 ? scene.candidates.findIndex((other) => sameKind(one, other)) : exact) + 1;
-    return n ? { letter: String(n), position: one.position } : null;
+    return n ? String(n) : "";
   }
 
-  /** Marks of the blocks of a scene, where numbers are wanted. */
-  const marks = (scene) => (hasNumbers ? scene.blocks.map((one) => mark(scene, one)).filter(Boolean) : []);
+  /** The numbers of the blocks of a scene, where numbers are wanted. */
+  const badges = (scene) => (hasNumbers ? scene.blocks.map((one) => number(scene, one)) : []);
 
   const sameKind = (a, b) => a.type === b.type && a.color === b.color;
 
@@ -80,15 +46,14 @@ const Overlay = (() => {
   function words(scene, step) {
     const [v] = meant(scene, step);
     if (v === undefined) return "";
-    const candidate = scene.candidates[step.number - 1];
-    const place = `the place of block ${scene.blocks[v].order}`;
-    if (step.before.has(v)) return `Glowing: what was tried, in ${place}, which is taken.`;
-    return sameKind(scene.blocks[v], candidate) ? `Glowing: what was tried, in ${place}.`
-      : `Glowing: what was tried, in ${place}, the first that was open.`;
+    const place = Steps.placeOf(scene, v);
+    if (step.before.has(v)) return `Glowing: what was tried, ${place}, a place that is taken.`;
+    return sameKind(scene.blocks[v], scene.candidates[step.number - 1]) ? `Glowing: what was tried, ${place}.`
+      : `Glowing: what was tried, ${place}, the first open place.`;
   }
 
   return {
-    over, marks, words,
+    badges, number, block, words,
     get hasNumbers() {
       return hasNumbers;
     },

@@ -20,11 +20,11 @@ const Poses = (() => {
   const sizeOf = ({ scores: [{ tp, fn }] }) => tp + fn;
 
   /** The block that a step puts, or null for a number that no candidate has. */
-  function put(scene, given) {
+  function put(scene, given, number) {
     const candidate = scene.candidates[given.block - 1];
     if (!candidate) return null;
     const turned = { ...candidate, candidate: given.block, euler: given.euler_deg || candidate.euler };
-    return Solid.boxedAt(turned, inMeters(given.center_cm));
+    return { ...Solid.boxedAt(turned, inMeters(given.center_cm)), key: number };
   }
 
   /** The blocks in the world after each step: [{number of the step: block}, ...]. */
@@ -58,14 +58,15 @@ const Poses = (() => {
     const given = parse.steps;
     const steps = given.map((step, i) => describe(scene, step, outcomes[i], i + 1));
     const end = `${pose.reached} of ${Words.count(sizeOf(record), "block")} reached, IoU with the goal ${pose.iou.toFixed(2)}.`;
-    if (!scene) return Steps.run(scene, ["As given"], steps, [], end, "");
-    const blocks = given.map((step) => put(scene, step));
+    if (!scene) return Steps.run(scene, ["Planned"], steps, [], end, "");
+    const blocks = given.map((step, i) => put(scene, step, i + 1));
     const isKept = outcomes.every((outcome) => outcome.rests);
     const after = isKept ? worlds(blocks, outcomes) : [];
     const limit = pose.limits.reached_cm;
     const so = (i) => blocks.slice(0, i + 1).filter(Boolean);
     const states = given.map((_, i) => {
-      const planned = { blocks: so(i), fresh: blocks[i], ghosts: ghostOf(scene, outcomes[i]) };
+      const ghosts = ghostOf(scene, outcomes[i]);
+      const planned = { blocks: so(i), fresh: blocks[i], ghosts, arrow: arrowOf(blocks[i], ghosts[0], outcomes[i]) };
       return isKept ? [planned, carried(after[i], blocks[i], i + 1)] : [planned];
     });
     const whole = [{ blocks: so(given.length), ghosts: missed(scene, outcomes) }];
@@ -77,7 +78,7 @@ const Poses = (() => {
     const out = far.size ? " Some blocks lie outside the picture." : "";
     const note = isKept ? `Outlined: where blocks should be; goal blocks of whose kind none came to lie within ${limit} cm.${out}`
       : `Outlined: where blocks should be.${out} Where blocks came to lie was not kept in this run.`;
-    const titles = isKept ? ["As given", "Carried out"] : ["As given"];
+    const titles = isKept ? ["Planned", "Built"] : ["Planned"];
     return Steps.run(scene, titles, steps.map((step, i) => ({ ...step, thumb: thumbOf(scene, given[i], states[i]) })),
       [nothing, ...states, whole], end, note, all.filter((block) => !far.has(block)));
   }
@@ -100,6 +101,10 @@ const Poses = (() => {
   /** Where the block of a step should be, unless it is there. */
   const ghostOf = (scene, outcome) =>
     (outcome.vertex === null || isThere(outcome) ? [] : [scene.blocks[outcome.vertex]]);
+
+  /** From where a block was put to where it should be, with the distance. */
+  const arrowOf = (block, ghost, outcome) =>
+    (block && ghost && outcome.position_cm > SLIGHT_CM ? { from: block.position, to: ghost.position, text: cm(outcome.position_cm) } : null);
 
   /** Blocks of the goal where no step puts theirs. */
   function missed(scene, outcomes) {
@@ -134,7 +139,7 @@ const Poses = (() => {
 
   function offOf(scene, outcome) {
     if (outcome.vertex === null) return "It stands for no block of the goal.";
-    const name = scene ? `block ${scene.blocks[outcome.vertex].order} of the goal` : "its place in the goal";
+    const name = scene ? `its place ${Steps.placeOf(scene, outcome.vertex)}` : "its place in the goal";
     const turned = outcome.turn_deg >= 1 ? `, turned by ${outcome.turn_deg.toFixed(0)} degrees` : "";
     if (outcome.position_cm < 0.05) return `That is where ${name} is${turned}.`;
     const high = outcome.up_cm > 0 ? "too high" : "too low";

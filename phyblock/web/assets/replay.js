@@ -78,18 +78,17 @@ const Replay = (() => {
     const runs = records.map((record) => Runs.of(scene, record, setting, scoreOf(record, setting)));
     const longest = Math.max(...runs.map(({ steps }) => steps.length));
     const noun = records[0].turns ? "Turn" : "Step";
-    player = new Stage.Player(longest + 1);
-    const panels = runs.map((run) => (run.steps.length ? Stage.panel(run, player, noun) : null));
+    player = new Stage.Player(longest + 1, Stage.wrongSteps(runs));
+    const panels = runs.map((run) => (run.steps.length ? Stage.panel(run, player, noun, scene) : null));
     const isWide = runs.some(({ titles }) => titles.length > 1);
     const caption = (i, title) => (several ? `${samples[i].entry.name}${isWide ? `: ${title.toLowerCase()}` : ""}` : title);
-    if (scene) panels.forEach((panel, i) => panel && Overlay.over(panel.pictures, scene, runs[i], player));
     const told = panels.map((panel, i) => [several ? el("h2", { class: "model-name" }, samples[i].entry.name) : null,
       facts(samples[i], records[i], setting), panel ? panel.said : nothing(samples[i], records[i]),
       panel ? Why.note({ record: records[i] }, scene, runs[i].steps, player) : null]);
     return el("section", { class: "card", "aria-label": "Replay" },
       scene ? null : el("p", { class: "notice" }, Store.index.lacking || "The scene is not at hand, so that nothing can be drawn."),
       el("div", { class: ["sides", several && "two", isWide && "wide"].filter(Boolean).join(" ") },
-        scene ? el("figure", {}, el("figcaption", {}, "Goal"), Stage.picture("Goal", scene.blocks, { grid: true, marks: Overlay.marks(scene) })) : null,
+        scene ? el("figure", {}, el("figcaption", {}, "Goal"), Stage.picture("Goal", scene.blocks, { grid: true, badges: Overlay.badges(scene) }, "goal", player)) : null,
         panels.map((panel, i) => [
           (panel?.pictures || []).map(({ title, canvas }) => el("figure", { class: "built" }, el("figcaption", {}, caption(i, title)), canvas)),
           several ? null : el("div", { class: "about-step" }, told[i])])),

@@ -17,6 +17,12 @@ const Steps = (() => {
   /** What candidate `n` is, in words; nothing where there is none. */
   const nameOf = (scene, n) => (scene && scene.candidates[n - 1] ? Words.block(scene.candidates[n - 1]) : "");
 
+  /** Where a block of the goal stands, in words: on what, and on which side where there are several. */
+  function placeOf(scene, v) {
+    const under = scene.blocks[v].depend.map((d) => Words.block(scene.blocks[d]));
+    return under.length ? `on the ${[...new Set(under)].join(" and the ")}` : "on the floor";
+  }
+
   const label = (scene, n) => (nameOf(scene, n) ? `${n} (${nameOf(scene, n)})` : String(n));
 
   function listed(scene, setting, vertices) {
@@ -113,7 +119,7 @@ const Steps = (() => {
     said.ready = step.why ? readyIn(scene, step.before) : [];
     const isNumber = Number.isInteger(step.number);
     let text = "";
-    if (step.vertex !== null) text = `Placed as block ${scene.blocks[step.vertex].order} of the goal.`;
+    if (step.vertex !== null) text = `Placed ${placeOf(scene, step.vertex)}.`;
     else if (isNumber && step.why) text = reason(scene, setting, step.number, step.why, step.before);
     if (step.turn?.swapped?.length) text += " Blocks that look alike changed places for it.";
     if (step.turn?.fallen?.length) text += ` Let go, these blocks fall: ${step.turn.fallen.join(", ")}.`;
@@ -132,5 +138,5 @@ const Steps = (() => {
     return { ...scene, candidates, blocks: scene.blocks.map((block) => ({ ...block, candidate: number(block) })) };
   }
 
-  return { ofPlan, ofTurns, run, alone, nameOf, asShown };
+  return { ofPlan, ofTurns, run, alone, nameOf, placeOf, asShown };
 })();
