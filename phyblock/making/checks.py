@@ -4,111 +4,78 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from itertools import combinations
-from typing import Literal
-
-import numpy as np
+from functools import cached_property
+from typing import Literal, NamedTuple
 
 from phyblock.domain.aov import AOVGraph, CycleError
 from phyblock.domain.blocks import KIT_PALETTE, orientation_class
-from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, CandidateSet, Kind, Scene
+from phyblock.domain.scene import MAX_CANDIDATES, Block, CandidateSet, Kind, Scene
 from phyblock.errors import Problem
 from phyblock.making.scenes.sketch import POSES, find_twins
-from phyblock.making.workers import Workers, open_workers
 from phyblock.sim.contact import (
     FIT_TOLERANCE_M,
     GROUND,
-    Gap,
-    Overlap,
     find_gaps,
     find_overlaps,
     support_graph,
 )
-from phyblock.sim.dynamics import (
-    DEFAULT_TRIAL,
-    Rest,
-    Stability,
-    Trial,
-    check,
-    check_steps,
-)
-from phyblock.sim.pictures import (
-    LEAST_SHOWN,
-    PictureStyle,
-    candidate_camera,
-    hidden_blocks,
-    on_the_floor,
-    picture,
-    visible_shares,
-)
+from phyblock.sim.dynamics import DEFAULT_TRIAL, Rest, Stability, Trial, check, check_steps
+from phyblock.sim.pictures import LEAST_SHOWN, PictureStyle, hidden_blocks, visible_shares
 from phyblock.text import csv_cell
 
 CheckName = Literal[
     "size",
     "palette",
+    "layer",
+    "order",
+    "hidden",
     "overlap",
     "floating",
     "undeclared dependency",
     "dependency without contact",
-    "layer",
-    "order",
-    "unstable",
     "unstable step",
-    "hidden",
+    "unstable",
+    "candidates",
+    "distractor",
     "duplicate",
     "parents",
-    "candidates",
-    "too many candidates",
-    "distractor",
 ]
-Declared = str | int | tuple[int, ...]
-"""A value of the file, or what it should be: a text, a number, or orders of blocks."""
 
 
 @dataclass(frozen=True)
 class Finding:
     """One thing that is wrong with a scene, and the one sentence that says so.
 
-    `blocks` are orders of blocks, 0 the ground. `value` was measured and `tolerance` would have
-    passed, both in `unit`. `field` is where the file says `declared`; `derived` is what geometry,
-    physics or a limit says instead.
+    `blocks` are orders of blocks, 0 the ground. `field` is where the file says `found`; `allowed`
+    is what geometry, physics or a limit says instead. `value_mm` was measured, and up to
+    `tolerance_mm` would have passed.
     """
 
     scene: str
     check: CheckName
     message: str
     blocks: tuple[int, ...] = ()
-    value: float | None = None
-    tolerance: float | None = None
-    unit: str = ""
     field: str = ""
-    declared: Declared = ""
-    derived: Declared = ""
+    found: str = ""
+    allowed: str = ""
+    value_mm: float | None = None
+    tolerance_mm: float | None = None
 
     @property
     def problem(self) -> Problem:
-        """The finding as an error: orders as a list of the file, an empty one not at all."""
-        declared, derived = (
-            (str(list(one)) if one else "") if isinstance(one, tuple) else str(one)
-            for one in (self.declared, self.derived)
-        )
-        return Problem(self.scene, self.message, self.field, declared, derived)
+        """The finding as an error."""
+        return Problem(self.scene, self.message, self.field, self.found, self.allowed)
 
     def __str__(self) -> str:
         return str(self.problem)
 
 
-VIEW = PictureStyle(size_px=256)
-"""Style of the goal picture in which blocks have to show."""
-
-STEP_TRIAL = replace(DEFAULT_TRIAL, physics=DEFAULT_TRIAL.physics[:1])
-"""Every step is tried at the first of the two time steps, for two seconds or until at rest."""
-
 FINISHED_REST = Rest(quiet_s=0.5)
 """The rest at which the generator ends the trial of a finished structure."""
+STEP_TRIAL = replace(DEFAULT_TRIAL, physics=DEFAULT_TRIAL.physics[:1])
+"""Every step is tried at the first of the two time steps, for two seconds or until at rest."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +84,6 @@ class Tolerances:
 
     `trial` is that of the finished structure, which is watched to its end, or until it is at rest
     as `rest` says; `step_trial` that of every step, `last_step` whether of the last step, too.
-    Of every block at least the share `shown` of its outline shows in the goal picture.
     """
 
     fit_m: float = FIT_TOLERANCE_M
@@ -125,23 +91,19 @@ class Tolerances:
     step_trial: Trial = STEP_TRIAL
     rest: Rest | None = None
     last_step: bool = True
-    shown: float = LEAST_SHOWN
 
 
 OURS = Tolerances()
 """For scenes made here."""
-
 OURS_IN_HASTE = Tolerances(rest=FINISHED_REST)
 """For scenes that are being made: the same, but a trial ends once all is at rest."""
-
 # The last step of a foreign scene is left to the trial of the finished structure: what falls there
 # shall be told once. 2 mm cannot be seen in a picture.
 FOREIGN = Tolerances(fit_m=0.002, last_step=False, rest=FINISHED_REST)
 """For scenes made elsewhere, whose positions are written by hand in rounded millimeters."""
 
 
-@dataclass(frozen=True)
-class Limits:
+class Limits(NamedTuple):
     """The blocks and layers that a level allows (paper section 3.1)."""
 
     least_blocks: int
@@ -157,34 +119,17 @@ LEVEL_LIMITS: dict[int, Limits] = {
 }
 
 
+@dataclass(frozen=True)
 class SceneFacts:
-    """A scene whose orders are unique, and facts about it, each computed once, when asked for.
+    """A scene whose orders are unique, with what its checks go by; dependencies may be unsound.
 
-    The scene's dependencies need not be sound. Facts raise SimulationError as the simulator does.
+    Without `candidates` checks of them find nothing.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        candidates: CandidateSet | None = None,
-        tolerances: Tolerances = OURS,
-        palette: tuple[Kind, ...] = KIT_PALETTE,
-    ) -> None:
-        """Without `candidates` checks of them find nothing."""
-        self.scene = scene
-        self.candidates = candidates
-        self.tolerances = tolerances
-        self.palette = palette
-
-    @cached_property
-    def overlaps(self) -> tuple[Overlap, ...]:
-        """Blocks that share space, with one another or with the ground."""
-        return find_overlaps(self.scene.blocks, self.tolerances.fit_m)
-
-    @cached_property
-    def gaps(self) -> tuple[Gap, ...]:
-        """Blocks that hang above what is below them."""
-        return find_gaps(self.scene.blocks, self.tolerances.fit_m)
+    scene: Scene
+    candidates: CandidateSet | None = None
+    tolerances: Tolerances = OURS
+    palette: tuple[Kind, ...] = KIT_PALETTE
 
     @cached_property
     def contacts(self) -> Mapping[int, frozenset[int]]:
@@ -198,10 +143,7 @@ class SceneFacts:
     @cached_property
     def declared(self) -> Mapping[int, frozenset[int]]:
         """The same as the file declares it."""
-        return {
-            block.order: frozenset(block.depend) or frozenset({GROUND})
-            for block in self.scene.blocks
-        }
+        return declared_supports(self.scene)
 
     @cached_property
     def graph(self) -> AOVGraph | None:
@@ -215,119 +157,38 @@ class SceneFacts:
         except CycleError:
             return None
 
-    @cached_property
-    def finished(self) -> Stability:
-        """Stability of the finished structure, watched to the end or until it is at rest."""
-        blocks, trial, rest = self.scene.blocks, self.tolerances.trial, self.tolerances.rest
-        return check(blocks, trial) if rest is None else check(blocks, trial, rest)
-
-    @cached_property
-    def steps(self) -> tuple[Stability, ...]:
-        """Stability of the structure after each step of the stored order."""
-        blocks = self.scene.blocks if self.tolerances.last_step else self.scene.blocks[:-1]
-        return check_steps(blocks, self.tolerances.step_trial)
-
-    @cached_property
-    def shown(self) -> Mapping[int, float]:
-        """For each block, by its order, the share of its outline that shows in the goal picture."""
-        return visible_shares(self.scene, VIEW)
-
-    @cached_property
-    def hidden(self) -> tuple[int, ...]:
-        """Orders of the blocks that do not show in the goal picture."""
-        return hidden_blocks(self.scene)
+    def finding(self, check: CheckName, message: str, *blocks: int, **about: object) -> Finding:
+        """Return a finding about the scene; `about` are further fields of it."""
+        return Finding(self.scene.id, check, message, blocks, **about)  # type: ignore[arg-type]
 
 
-@dataclass(frozen=True)
-class Check:
-    """A check; `law` is what holds where it finds nothing, several checks may share one."""
-
-    name: CheckName
-    law: str
-    find: Callable[[SceneFacts], Iterable[Finding]]
+def declared_supports(scene: Scene) -> Mapping[int, frozenset[int]]:
+    """Return the orders that each block rests on as the file says; the ground only alone."""
+    return {block.order: frozenset(block.depend) or frozenset({GROUND}) for block in scene.blocks}
 
 
-CHECKS: dict[CheckName, Check] = {}
-"""The checks of a scene by itself."""
-_Find = Callable[[SceneFacts], Iterable[Finding]]
-
-
-def _check(name: CheckName, law: str) -> Callable[[_Find], _Find]:
-    def register(find: _Find) -> _Find:
-        CHECKS[name] = Check(name, law, find)
-        return find
-
-    return register
-
-
-def findings_of(facts: SceneFacts, names: Iterable[CheckName]) -> Iterator[Finding]:
-    """The findings of these checks, in the order given, each computed when it is asked for."""
-    for name in names:
-        yield from CHECKS[name].find(facts)
-
-
-@_check("size", "limits of its levels")
 def _size(facts: SceneFacts) -> Iterator[Finding]:
     """More or fewer blocks, or more layers, than a level of the scene allows."""
-    scene = facts.scene
+    count = len(facts.scene)
     layers = 0 if facts.graph is None else max(facts.graph.layers, default=0)
-    for level in scene.levels:
-        limits = LEVEL_LIMITS[level]
-        if not limits.least_blocks <= len(scene) <= limits.most_blocks:
-            allowed = f"{limits.least_blocks} to {limits.most_blocks} at level {level}"
-            yield Finding(
-                scene.id, "size", "wrong size", field="blocks", declared=len(scene), derived=allowed
-            )
-        if layers > limits.most_layers:
-            allowed = f"at most {limits.most_layers} at level {level}"
-            yield Finding(
-                scene.id, "size", "too high", field="layers", declared=layers, derived=allowed
-            )
+    for level in facts.scene.levels:
+        least, most, most_layers = LEVEL_LIMITS[level]
+        if not least <= count <= most:
+            about = {"found": str(count), "allowed": f"{least} to {most} at level {level}"}
+            yield facts.finding("size", "wrong size", field="blocks", **about)
+        if layers > most_layers:
+            about = {"found": str(layers), "allowed": f"at most {most_layers} at level {level}"}
+            yield facts.finding("size", "too high", field="layers", **about)
 
 
-@_check("palette", "colors of the palette")
 def _palette(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks whose pair of type and color is not in the palette."""
     for at, block in _blocks(facts):
         if block.kind not in facts.palette:
-            about, kind = (block.order,), " ".join(block.kind)
-            message = "not in the palette"
-            yield Finding(facts.scene.id, "palette", message, about, field=at, declared=kind)
+            found = " ".join(block.kind)
+            yield facts.finding("palette", "not in the palette", block.order, field=at, found=found)
 
 
-@_check("undeclared dependency", "dependencies are contacts")
-def _undeclared_dependency(facts: SceneFacts) -> Iterator[Finding]:
-    """Contacts that carry and are not declared."""
-    yield from _dependencies(
-        facts, "undeclared dependency", "block {} rests on {}, which is not declared"
-    )
-
-
-@_check("dependency without contact", "dependencies are contacts")
-def _dependency_without_contact(facts: SceneFacts) -> Iterator[Finding]:
-    """Declared dependencies that are no contacts that carry."""
-    yield from _dependencies(
-        facts, "dependency without contact", "block {} does not rest on {}, which is declared"
-    )
-
-
-def _dependencies(facts: SceneFacts, name: CheckName, message: str) -> Iterator[Finding]:
-    for at, block in _blocks(facts):
-        declared, contacts = facts.declared[block.order], facts.contacts[block.order]
-        is_undeclared = name == "undeclared dependency"
-        for other in sorted(contacts - declared if is_undeclared else declared - contacts):
-            yield Finding(
-                facts.scene.id,
-                name,
-                message.format(block.order, _name(other)),
-                (block.order, other),
-                field=f"{at}.depend",
-                declared=tuple(sorted(declared)),
-                derived=tuple(sorted(contacts)),
-            )
-
-
-@_check("layer", "layers are longest paths")
 def _layer(facts: SceneFacts) -> Iterator[Finding]:
     """Layers that are not the longest path of the declared dependencies, where these are sound."""
     layers = () if facts.graph is None else facts.graph.layers
@@ -337,143 +198,125 @@ def _layer(facts: SceneFacts) -> Iterator[Finding]:
                 f"block {block.order} is on layer {block.layer}, but on {layer} by the longest "
                 "path of dependencies"
             )
-            yield Finding(
-                facts.scene.id,
-                "layer",
-                message,
-                (block.order,),
-                field=f"{at}.layer",
-                declared=block.layer,
-                derived=layer,
-            )
+            yield facts.finding("layer", message, block.order, field=f"{at}.layer")
 
 
-@_check("order", "order can be built")
 def _order(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks that stand in the file before one that they depend on, if that is sound."""
-    if facts.graph is None:
-        return
     placed: set[int] = set()
-    for block in facts.scene.blocks:
-        early = sorted(set(block.depend) - placed)
-        if early:
+    for block in facts.scene.blocks if facts.graph else ():
+        if early := sorted(set(block.depend) - placed):
             supports = ", ".join(map(_name, early))
             message = f"the stored order puts block {block.order} before its support, {supports}"
-            about = (block.order, *early)
-            yield Finding(facts.scene.id, "order", message, about, field="blocks")
+            yield facts.finding("order", message, block.order, *early, field="blocks")
         placed.add(block.order)
 
 
-@_check("overlap", "no overlap")
-def _overlap(facts: SceneFacts) -> Iterator[Finding]:
-    """Blocks that share space, with one another or with the ground."""
-    for overlap in facts.overlaps:
-        depth_mm = overlap.depth_m * 1000
-        other = _name(overlap.first)
-        message = f"block {overlap.second} overlaps {other} by {depth_mm:.2f} mm"
-        pair = (overlap.first, overlap.second)
-        yield Finding(facts.scene.id, "overlap", message, pair, depth_mm, _fit_mm(facts), "mm")
-
-
-@_check("floating", "no gap")
-def _floating(facts: SceneFacts) -> Iterator[Finding]:
-    """Blocks that hang above what is below them."""
-    for gap in facts.gaps:
-        height_mm = gap.height_m * 1000
-        message = f"block {gap.order} floats {height_mm:.2f} mm above its support"
-        about = (gap.order,)
-        yield Finding(facts.scene.id, "floating", message, about, height_mm, _fit_mm(facts), "mm")
-
-
-@_check("unstable", "stands when finished")
-def _unstable(facts: SceneFacts) -> Iterator[Finding]:
-    """Blocks that fall from the finished structure."""
-    whole = facts.finished
-    if not whole.stable:
-        differing = "" if whole.agreed else ", not the same ones at every time step"
-        message = f"{{}} when all is built{differing}"
-        yield _fall(facts, "unstable", message, whole, facts.tolerances.trial)
-
-
-@_check("unstable step", "stands at every step")
-def _unstable_step(facts: SceneFacts) -> Iterator[Finding]:
-    """Steps of the stored order after which something falls."""
-    trial = facts.tolerances.step_trial
-    for count, (block, step) in enumerate(zip(facts.scene.blocks, facts.steps, strict=False), 1):
-        if not step.stable:
-            message = f"{{}} at step {count}, once block {block.order} is placed"
-            yield _fall(facts, "unstable step", message, step, trial)
-
-
-def _fall(
-    facts: SceneFacts, name: CheckName, message: str, shown: Stability, trial: Trial
-) -> Finding:
-    named = ", ".join(map(str, shown.fallen))
-    falling = f"blocks {named} fall" if len(shown.fallen) > 1 else f"block {named} falls"
-    moved_mm, limit_mm = shown.moved_m * 1000, trial.limit_m * 1000
-    return Finding(
-        facts.scene.id, name, message.format(falling), shown.fallen, moved_mm, limit_mm, "mm"
-    )
-
-
-@_check("hidden", "every block shows")
 def _hidden(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks of which too little shows in the goal picture, of the picture or of their outline."""
-    for order in facts.hidden:
-        message = f"block {order} does not show in the goal picture"
-        yield Finding(facts.scene.id, "hidden", message, (order,))
-    least = facts.tolerances.shown
-    for order, share in facts.shown.items():
-        if share < least and order not in facts.hidden:
+    hidden = hidden_blocks(facts.scene)
+    for order in hidden:
+        yield facts.finding("hidden", f"block {order} does not show in the goal picture", order)
+    for order, share in visible_shares(facts.scene, PictureStyle(size_px=256)).items():
+        if share < LEAST_SHOWN and order not in hidden:
             message = f"only {share:.1%} of the outline of block {order} shows in the goal picture"
-            covered, limit = 100 * (1 - share), 100 * (1 - least)
-            yield Finding(facts.scene.id, "hidden", message, (order,), covered, limit, "%")
+            yield facts.finding("hidden", message, order, allowed=f"at least {LEAST_SHOWN:.0%}")
 
 
-@_check("too many candidates", "candidate set")
-def _too_many_candidates(facts: SceneFacts) -> Iterator[Finding]:
-    """More candidates than a set may hold."""
-    count = 0 if facts.candidates is None else len(facts.candidates)
-    if count > MAX_CANDIDATES:
-        yield Finding(
-            facts.scene.id,
-            "too many candidates",
-            "the candidates are too many",
-            field="candidates",
-            declared=count,
-            derived=f"at most {MAX_CANDIDATES}",
-        )
+def _overlap(facts: SceneFacts) -> Iterator[Finding]:
+    """Blocks that share space, with one another or with the ground."""
+    for one in find_overlaps(facts.scene.blocks, facts.tolerances.fit_m):
+        depth_mm = one.depth_m * 1000
+        message = f"block {one.second} overlaps {_name(one.first)} by {depth_mm:.2f} mm"
+        measured = {"value_mm": depth_mm, "tolerance_mm": facts.tolerances.fit_m * 1000}
+        yield facts.finding("overlap", message, one.first, one.second, **measured)
 
 
-@_check("candidates", "candidate set")
-def _lacking_candidates(facts: SceneFacts) -> Iterator[Finding]:
-    """Blocks that no candidate can stand for."""
-    missing = () if facts.candidates is None else facts.candidates.missing(facts.scene)
-    for order in missing:
-        message = f"the candidates hold nothing that block {order} needs"
-        yield Finding(facts.scene.id, "candidates", message, (order,), field="candidates")
+def _floating(facts: SceneFacts) -> Iterator[Finding]:
+    """Blocks that hang above what is below them."""
+    for gap in find_gaps(facts.scene.blocks, facts.tolerances.fit_m):
+        height_mm = gap.height_m * 1000
+        message = f"block {gap.order} floats {height_mm:.2f} mm above its support"
+        measured = {"value_mm": height_mm, "tolerance_mm": facts.tolerances.fit_m * 1000}
+        yield facts.finding("floating", message, gap.order, **measured)
 
 
-@_check("distractor", "candidate set")
-def _distractors(facts: SceneFacts) -> Iterator[Finding]:
-    """Candidates that are not needed in poses that no design knows: these give themselves away."""
-    scene = facts.scene
-    looks = {block.look for block in scene.blocks}
-    poses = {
-        block_type: {orientation_class(block_type, euler) for euler in known.values()}
-        for block_type, known in POSES.items()
-    }
-    offered = () if facts.candidates is None else facts.candidates.candidates
-    for i, candidate in enumerate(offered):
-        if candidate.look not in looks and candidate.look[2] not in poses[candidate.type]:
-            message = "is not needed and stands as no block of a goal does"
-            yield Finding(
-                scene.id,
-                "distractor",
-                f"candidate {i + 1} {message}",
-                field=f"candidates[{i}]",
-                declared=str(candidate),
+def _undeclared(facts: SceneFacts) -> Iterator[Finding]:
+    """Contacts that carry and are not declared."""
+    message = "block {} rests on {}, which is not declared"
+    yield from _beyond(facts, "undeclared dependency", facts.contacts, facts.declared, message)
+
+
+def _without_contact(facts: SceneFacts) -> Iterator[Finding]:
+    """Declared dependencies that are no contacts that carry."""
+    message = "block {} does not rest on {}, which is declared"
+    yield from _beyond(facts, "dependency without contact", facts.declared, facts.contacts, message)
+
+
+def _beyond(
+    facts: SceneFacts,
+    name: CheckName,
+    more: Mapping[int, Collection[int]],
+    less: Mapping[int, Collection[int]],
+    message: str,
+) -> Iterator[Finding]:
+    for at, block in _blocks(facts):
+        for other in sorted(set(more[block.order]) - set(less[block.order])):
+            yield facts.finding(
+                *(name, message.format(block.order, _name(other)), block.order, other),
+                field=f"{at}.depend",
+                found=str(sorted(facts.declared[block.order])),
+                allowed=str(sorted(facts.contacts[block.order])),
             )
+
+
+def _unstable_step(facts: SceneFacts) -> Iterator[Finding]:
+    """Steps of the stored order after which something falls."""
+    blocks = facts.scene.blocks if facts.tolerances.last_step else facts.scene.blocks[:-1]
+    trial = facts.tolerances.step_trial
+    for count, step in enumerate(check_steps(blocks, trial), 1):
+        if not step.stable:
+            when = f"at step {count}, once block {blocks[count - 1].order} is placed"
+            yield _fall(facts, "unstable step", when, step, trial)
+
+
+def _unstable(facts: SceneFacts) -> Iterator[Finding]:
+    """Blocks that fall from the finished structure."""
+    trial, rest = facts.tolerances.trial, facts.tolerances.rest
+    blocks = facts.scene.blocks
+    whole = check(blocks, trial) if rest is None else check(blocks, trial, rest)
+    if not whole.stable:
+        differing = "" if whole.agreed else ", not the same ones at every time step"
+        yield _fall(facts, "unstable", f"when all is built{differing}", whole, trial)
+
+
+def _fall(facts: SceneFacts, name: CheckName, when: str, shown: Stability, trial: Trial) -> Finding:
+    named = ", ".join(map(str, shown.fallen))
+    falling = f"blocks {named} fall" if len(shown.fallen) > 1 else f"block {named} falls"
+    measured = {"value_mm": shown.moved_m * 1000, "tolerance_mm": trial.limit_m * 1000}
+    return facts.finding(name, f"{falling} {when}", *shown.fallen, **measured)
+
+
+def _candidates(facts: SceneFacts) -> Iterator[Finding]:
+    """More candidates than a set may hold, and blocks that none of them can stand for."""
+    if facts.candidates is None:
+        return
+    if len(facts.candidates) > MAX_CANDIDATES:
+        about = {"found": str(len(facts.candidates)), "allowed": f"at most {MAX_CANDIDATES}"}
+        yield facts.finding("candidates", "too many candidates", field="candidates", **about)
+    for order in facts.candidates.missing(facts.scene):
+        message = f"the candidates hold nothing that block {order} needs"
+        yield facts.finding("candidates", message, order, field="candidates")
+
+
+def _distractor(facts: SceneFacts) -> Iterator[Finding]:
+    """Candidates that are not needed in poses that no design knows: these give themselves away."""
+    needed = {block.look for block in facts.scene.blocks}
+    for i, one in enumerate(facts.candidates.candidates if facts.candidates else ()):
+        poses = {orientation_class(one.type, euler) for euler in POSES[one.type].values()}
+        if one.look not in needed and one.look[2] not in poses:
+            message = f"candidate {i + 1} is not needed and stands as no block of a goal does"
+            yield facts.finding("distractor", message, field=f"candidates[{i}]", found=str(one))
 
 
 def _blocks(facts: SceneFacts) -> Iterator[tuple[str, Block]]:
@@ -482,46 +325,44 @@ def _blocks(facts: SceneFacts) -> Iterator[tuple[str, Block]]:
         yield f"blocks[{i}]", block
 
 
-def _fit_mm(facts: SceneFacts) -> float:
-    return facts.tolerances.fit_m * 1000
-
-
 def _name(order: int) -> str:
     return "the ground" if order == GROUND else f"block {order}"
 
 
-def find_duplicates(scenes: Iterable[Scene]) -> tuple[Finding, ...]:
-    """Scenes that equal an earlier one up to quarter turns, mirroring and shifting."""
-    return tuple(
-        Finding(
-            name, "duplicate", f"is scene {twin}, turned, mirrored or shifted at most", derived=twin
-        )
-        for name, twin in find_twins(scenes).items()
-    )
-
-
-def find_orphans(scenes: Sequence[Scene]) -> Iterator[Finding]:
-    """Scenes whose parents are not base scenes of the same set."""
-    bases = {scene.id for scene in scenes if scene.parents == (scene.id,)}
-    for scene in scenes:
-        strange = [parent for parent in scene.parents if parent not in bases]
-        if strange or not scene.parents:
-            message = "name no base scene of the set"
-            yield Finding(scene.id, "parents", message, field="parents", declared=str(strange))
-
-
-FORM: tuple[CheckName, ...] = ("size", "palette", "layer", "order")
-"""Checks without physics."""
-# Cheap ones first.
-PHYSICS: tuple[CheckName, ...] = (
-    "overlap",
-    "floating",
-    "undeclared dependency",
-    "dependency without contact",
-    "unstable step",
-    "unstable",
-)
+CHECKS: dict[CheckName, Callable[[SceneFacts], Iterable[Finding]]] = {
+    "size": _size,
+    "palette": _palette,
+    "layer": _layer,
+    "order": _order,
+    "hidden": _hidden,
+    "overlap": _overlap,
+    "floating": _floating,
+    "undeclared dependency": _undeclared,
+    "dependency without contact": _without_contact,
+    "unstable step": _unstable_step,
+    "unstable": _unstable,
+    "candidates": _candidates,
+    "distractor": _distractor,
+}
+"""The checks of a scene by itself, cheap ones first, and causes before their effects."""
+_NAMES = tuple(CHECKS)
+FORM: tuple[CheckName, ...] = _NAMES[:4]
+"""Checks without geometry."""
+PHYSICS: tuple[CheckName, ...] = _NAMES[5:11]
 """Overlaps, floating blocks, wrong dependencies, and what does not stand."""
+VERIFIED: tuple[CheckName, ...] = tuple(name for name in CHECKS if name != "palette")
+"""Checks of a scene that was made here, with its candidates."""
+AUDITED: tuple[CheckName, ...] = (*PHYSICS, "layer", "order", "candidates")
+"""Checks of a scene made elsewhere."""
+
+
+def findings_of(facts: SceneFacts, names: Iterable[CheckName]) -> Iterator[Finding]:
+    """Yield the findings of these checks, each computed when it is asked for.
+
+    Raises SimulationError as the simulator does.
+    """
+    for name in names:
+        yield from CHECKS[name](facts)
 
 
 def is_acceptable(scene: Scene, palette: tuple[Kind, ...]) -> bool:
@@ -529,164 +370,52 @@ def is_acceptable(scene: Scene, palette: tuple[Kind, ...]) -> bool:
 
     It ends at the first fault, and a trial ends once all is at rest, at both time steps.
     """
-    facts = SceneFacts(scene, tolerances=OURS_IN_HASTE, palette=palette)
+    facts = SceneFacts(scene, None, OURS_IN_HASTE, palette)
     return next(findings_of(facts, (*FORM, "hidden", *PHYSICS)), None) is None
 
 
-_VERIFIED: tuple[CheckName, ...] = (
-    "size",
-    "undeclared dependency",
-    "dependency without contact",
-    "layer",
-    "order",
-    "overlap",
-    "floating",
-    "unstable",
-    "unstable step",
-    "hidden",
-    "too many candidates",
-    "candidates",
-    "distractor",
-)
-LAWS = tuple(dict.fromkeys(CHECKS[name].law for name in _VERIFIED))
-"""The laws of a scene by itself."""
-Verified = dict[str, tuple[Finding, ...]]
-"""Findings against each law; empty where it holds."""
-_Task = tuple[Scene, CandidateSet]
-_LEAST_PIXELS = 0.01
-"""Two looks must differ in this share of a candidate's picture."""
-_VISIBLE_STEP = 24
-_CELL_PX = 128
+Task = tuple[Scene, CandidateSet | None]
 
 
-def verify_scenes(tasks: Iterable[_Task], workers: Workers) -> Iterator[Verified]:
-    """All of `LAWS` on each scene and its candidate set, in the order given."""
-    return workers.map(verify_scene, tasks)
+def verify_scene(task: Task) -> tuple[Finding, ...]:
+    """Return what is wrong with a scene made here and its candidate set."""
+    return tuple(findings_of(SceneFacts(*task), VERIFIED))
 
 
-def verify_scene(task: _Task) -> Verified:
-    """All of `LAWS` on one scene and its candidate set."""
-    facts = SceneFacts(*task)
-    findings = tuple(findings_of(facts, _VERIFIED))
-    return {law: tuple(f for f in findings if CHECKS[f.check].law == law) for law in LAWS}
+def audit_scene(task: Task, tolerances: Tolerances = FOREIGN) -> tuple[Finding, ...]:
+    """Return what is wrong with a scene made elsewhere and, if there is one, its candidate set."""
+    return tuple(findings_of(SceneFacts(*task, tolerances), AUDITED))
 
 
-def check_looks(sets: Iterable[CandidateSet]) -> tuple[int, tuple[Problem, ...]]:
-    """Count the looks of candidate sets, and find the pairs that the camera cannot tell apart."""
-    looks = {candidate.look: candidate for offered in sets for candidate in offered.candidates}
-    pictures = {look: _pixels(candidate) for look, candidate in sorted(looks.items())}
-    alike = []
-    for (one, first), (other, second) in combinations(pictures.items(), 2):
-        differing = (np.abs(first - second).max(axis=2) > _VISIBLE_STEP).mean()
-        if differing < _LEAST_PIXELS:
-            message = f"looks like {_text_of(looks[other])}"
-            name = _text_of(looks[one])
-            alike.append(Problem(name, message, "candidates", f"{differing:.2%}"))
-    return len(looks), tuple(alike)
-
-
-def _pixels(candidate: Candidate) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
-    block = on_the_floor(candidate.type, candidate.color, candidate.euler_deg)
-    image = picture([block], candidate_camera(block, PictureStyle()), "white", _CELL_PX)
-    return np.asarray(image, dtype=np.int64)
-
-
-def _text_of(candidate: Candidate) -> str:
-    return f"{candidate.color} {candidate.type} at {candidate.euler_deg}"
-
-
-AUDITED: tuple[CheckName, ...] = (
-    "overlap",
-    "floating",
-    "undeclared dependency",
-    "dependency without contact",
-    "layer",
-    "order",
-    "unstable",
-    "unstable step",
-    "duplicate",
-    "candidates",
-)
-"""Checks of an audit in the order of its tables: causes before their effects."""
-_COLUMNS = ("scene", "level", "check", "blocks", "size", "unit", "declared", "found", "message")
-
-
-@dataclass(frozen=True)
-class SceneAudit:
-    """Findings about one scene.
-
-    `declared`, `contacts` and `shared` count dependencies (the ground is one): those declared,
-    those that are contacts, and those that are both.
+def check_set(scenes: Sequence[Scene]) -> tuple[Finding, ...]:
+    """Return scenes that equal an earlier one up to quarter turns, mirroring and shifting, and
+    those whose parents are not base scenes of the set.
     """
-
-    scene: Scene
-    findings: tuple[Finding, ...]
-    declared: int
-    contacts: int
-    shared: int
-
-    def has(self, *checks: CheckName) -> bool:
-        """True if one of these checks found something."""
-        return any(finding.check in checks for finding in self.findings)
-
-    @property
-    def badness(self) -> tuple[float, float, int]:
-        """Sort key: scenes that fall, then the largest overlap or gap [mm], then all findings."""
-        falls = 2.0 * self.has("unstable") + 1.0 * self.has("unstable step")
-        fit = [f.value or 0.0 for f in self.findings if f.check in ("overlap", "floating")]
-        return falls, max(fit, default=0.0), len(self.findings)
+    message = "is scene {}, turned, mirrored or shifted at most"
+    found = [
+        Finding(name, "duplicate", message.format(twin))
+        for name, twin in find_twins(scenes).items()
+    ]
+    bases = {scene.id for scene in scenes if scene.parents == (scene.id,)}
+    for scene in scenes:
+        strange = [parent for parent in scene.parents if parent not in bases]
+        if strange or not scene.parents:
+            message = "name no base scene of the set"
+            found.append(Finding(scene.id, "parents", message, (), "parents", str(strange)))
+    return tuple(found)
 
 
-def audit_scene(
-    task: tuple[Scene, CandidateSet | None], tolerances: Tolerances = FOREIGN
-) -> SceneAudit:
-    """Check one scene; without candidates these are not checked.
-
-    Raises SimulationError as the simulator does.
-    """
-    scene, candidates = task
-    facts = SceneFacts(scene, candidates, tolerances)
-    pairs = [(facts.declared[block.order], facts.contacts[block.order]) for block in scene.blocks]
-    return SceneAudit(
-        scene,
-        tuple(findings_of(facts, tuple(name for name in AUDITED if name != "duplicate"))),
-        declared=sum(len(declared) for declared, _ in pairs),
-        contacts=sum(len(contacts) for _, contacts in pairs),
-        shared=sum(len(declared & contacts) for declared, contacts in pairs),
-    )
+_COLUMNS = ("scene", "level", "check", "blocks", "value_mm", "tolerance_mm", "message")
 
 
-def audit_scenes(
-    tasks: Iterable[tuple[Scene, CandidateSet | None]],
-    tolerances: Tolerances = FOREIGN,
-    jobs: int = 1,
-) -> Iterator[SceneAudit]:
-    """Check many scenes in `jobs` processes; results come in the order given.
-
-    Raises PhyblockError when a process is killed, SimulationError as the simulator does.
-    """
-    with open_workers(jobs) as workers:
-        yield from workers.map(partial(audit_scene, tolerances=tolerances), tasks)
-
-
-def findings_csv(audits: Sequence[SceneAudit], others: Sequence[Finding] = ()) -> str:
-    """Return all findings as CSV text with a header, sorted by scene."""
-    levels = {audit.scene.id: audit.scene.level for audit in audits}
-    findings = [*others, *(finding for audit in audits for finding in audit.findings)]
+def findings_csv(findings: Iterable[Finding], levels: Mapping[str, int]) -> str:
+    """Return findings as CSV text with a header, sorted by scene; `levels` are by scene."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(_COLUMNS)
-    for finding in sorted(findings, key=lambda finding: finding.scene):
-        row = (
-            *(finding.scene, levels.get(finding.scene, ""), finding.check),
-            " ".join(map(str, finding.blocks)),
-            *("" if finding.value is None else f"{finding.value:.3f}", finding.unit),
-            *(shown_orders(finding.declared), shown_orders(finding.derived), finding.message),
-        )
+    for one in sorted(findings, key=lambda finding: finding.scene):
+        blocks = " ".join(map(str, one.blocks))
+        sizes = ("" if mm is None else f"{mm:.3f}" for mm in (one.value_mm, one.tolerance_mm))
+        row = (one.scene, levels[one.scene], one.check, blocks, *sizes, one.message)
         writer.writerow(map(csv_cell, row))
     return text.getvalue()
-
-
-def shown_orders(value: Declared) -> str:
-    """Return orders as numbers with spaces between them; anything else as text."""
-    return " ".join(map(str, value)) if isinstance(value, tuple) else str(value)

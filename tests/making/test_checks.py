@@ -18,22 +18,21 @@ from phyblock.making.checks import (
     AUDITED,
     CHECKS,
     FOREIGN,
-    LAWS,
     OURS,
+    VERIFIED,
     CheckName,
+    Finding,
     SceneFacts,
     audit_scene,
-    audit_scenes,
-    check_looks,
-    find_duplicates,
-    find_orphans,
+    check_set,
     findings_csv,
     findings_of,
     verify_scene,
 )
+from phyblock.making.files import SCENE_FILES, SUMS_FILE, check_sums, sums_text
 from phyblock.making.scenes.candidates import make_candidates
-from phyblock.making.scenes.files import SUMS_FILE, check_sums, sums_text
 from phyblock.making.scenes.sketch import make_scene, transformed
+from phyblock.making.workers import open_workers
 from phyblock.sim.contact import GROUND
 from phyblock.sim.dynamics import Trial
 from phyblock.sim.engine import Physics
@@ -107,17 +106,14 @@ SPOILED = {
         "blocks 2, 3 fall at step 3, once block 3 is placed",
     ),
     "hidden": (lambda: SceneFacts(cellar()), "does not show in the goal picture"),
-    "too many candidates": (lambda: offering(lambda offered: offered * 3), "16"),
     "candidates": (lambda: offering(lambda _: ()), "that block 1 needs"),
     "distractor": (lambda: offering(lambda offered: (*offered, STRANGE)), "stands as no block"),
 }
 
 
 def test_every_check_has_an_example_here_and_is_chosen_somewhere() -> None:
-    assert set(SPOILED) == set(CHECKS)
-    assert {check.law for name, check in CHECKS.items() if name != "palette"} == set(LAWS)
-    assert set(AUDITED) - {"duplicate"} <= set(CHECKS)
-    assert len(set(AUDITED)) == len(AUDITED) == 10
+    assert set(SPOILED) == set(CHECKS) == {*VERIFIED, "palette"}
+    assert set(AUDITED) <= set(VERIFIED)
 
 
 @pytest.mark.parametrize("name", SPOILED)
@@ -132,9 +128,14 @@ def test_a_check_finds_its_own_fault_measured_in_units(name: CheckName) -> None:
     for finding in findings:
         assert str(finding).startswith(facts.scene.id)
         assert orders.issuperset(finding.blocks)
-        assert (finding.value is None) == (finding.tolerance is None) == (finding.unit == "")
-        if finding.value is not None and finding.tolerance is not None:
-            assert finding.value > finding.tolerance
+        assert (finding.value_mm is None) == (finding.tolerance_mm is None)
+        if finding.value_mm is not None and finding.tolerance_mm is not None:
+            assert finding.value_mm > finding.tolerance_mm
+
+
+def test_too_many_candidates_are_found() -> None:
+    (finding,) = findings_of(offering(lambda offered: offered * 3), ["candidates"])
+    assert (finding.found, finding.allowed) == ("48", "at most 16")
 
 
 @pytest.mark.parametrize(
@@ -143,8 +144,8 @@ def test_a_check_finds_its_own_fault_measured_in_units(name: CheckName) -> None:
     ids=["floating", "overlap", "dependency", "layer"],
 )
 def test_accepting_verifying_and_auditing_say_the_same_words(scene: Scene) -> None:
-    audited = {finding.message for finding in audit_scene((scene, OFFERED), FOREIGN).findings}
-    verified = {f.message for found in verify_scene((scene, OFFERED)).values() for f in found}
+    audited = {finding.message for finding in audit_scene((scene, OFFERED))}
+    verified = {finding.message for finding in verify_scene((scene, OFFERED))}
     refused = {p.message for p in (*form_problems(scene), *physics_problems(scene))}
     assert audited
     assert audited <= verified
@@ -153,14 +154,12 @@ def test_accepting_verifying_and_auditing_say_the_same_words(scene: Scene) -> No
         accept(scene)
 
 
-def test_the_same_findings_with_two_processes_and_in_the_csv() -> None:
-    tasks = [(lifted(0.004), None), (GATE, OFFERED)]
-    alone = list(audit_scenes(tasks, QUICK_FOREIGN, 1))
-    assert list(audit_scenes(tasks, QUICK_FOREIGN, 2)) == alone
-    assert [bool(one.findings) for one in alone] == [True, False]
-    assert alone[1].declared == alone[1].contacts == alone[1].shared
-    rows = list(csv.DictReader(io.StringIO(findings_csv(alone))))
-    assert [row["check"] for row in rows] == [finding.check for finding in alone[0].findings]
+def test_the_csv_holds_every_finding() -> None:
+    found = audit_scene((lifted(0.004), None), QUICK_FOREIGN)
+    assert found
+    assert audit_scene((GATE, OFFERED), QUICK_FOREIGN) == ()
+    rows = list(csv.DictReader(io.StringIO(findings_csv(found, {GATE.id: 1}))))
+    assert [row["check"] for row in rows] == [finding.check for finding in found]
     assert {(row["scene"], row["level"]) for row in rows} == {("l1-gate", "1")}
 
 
@@ -171,21 +170,10 @@ def test_duplicates_and_orphans_of_a_set_are_found() -> None:
 
     image = transformed(GATE.blocks, Symmetry(1, mirrored=True))
     copy = replace(GATE, id="copy", blocks=tuple(map(moved, image)), parents=(GATE.id,))
-    (duplicate,) = find_duplicates([GATE, designed_scene("l1-dog"), copy])
-    assert (duplicate.scene, duplicate.derived) == ("copy", "l1-gate")
-    assert find_duplicates(designed_scenes()) == ()
-    orphan = replace(GATE, id="orphan", parents=("nowhere",))
-    assert [finding.scene for finding in find_orphans([GATE, copy, orphan])] == ["orphan"]
-
-
-def test_pictures_tell_apart_all_looks_in_use() -> None:
-    looks, alike = check_looks(task.candidates for task in TASKS)
-    assert alike == ()
-    assert looks >= 30  # Poses that no goal needs are not offered: they give themselves away.
-    candidate = TASKS[0].candidates.candidates[0]
-    turned = replace(candidate, euler_deg=(0.0, 0.0, 0.05))
-    twins = CandidateSet((replace(candidate, euler_deg=(0.0, 0.0, 0.0)), turned))
-    assert len(check_looks([twins])[1]) == 1
+    orphan = replace(designed_scene("l1-dog"), parents=("nowhere",))
+    found = [(one.scene, one.check) for one in check_set([GATE, copy, orphan])]
+    assert found == [("copy", "duplicate"), (orphan.id, "parents")]
+    assert check_set(designed_scenes()) == ()
 
 
 def test_a_changed_or_missing_file_is_named(tmp_path: Path) -> None:
@@ -207,39 +195,40 @@ def test_the_built_in_set_holds_what_the_paper_holds() -> None:
     assert count == {1: 36, 2: 121, 3: 138, 4: 119}
     assert sum(scene.levels == (1, 2) for scene in scenes) == 14
     assert sum(scene.parents == (scene.id,) for scene in scenes) == 150
-    assert find_duplicates(scenes) == ()
-    assert list(find_orphans(scenes)) == []
-    assert (BUILT_IN / SUMS_FILE).read_text() == sums_text(BUILT_IN)
+    assert check_set(scenes) == ()
+    assert (BUILT_IN / SUMS_FILE).read_text() == sums_text(BUILT_IN, SCENE_FILES)
     assert all(task.candidates == make_candidates(task.scene) for task in TASKS)
 
 
 @pytest.mark.parametrize("task", TASKS[::100], ids=lambda task: task.scene.id)
 def test_some_of_the_built_in_set_again(task) -> None:
-    assert not any(verify_scene((task.scene, task.candidates)).values())
+    assert verify_scene((task.scene, task.candidates)) == ()
+
+
+def checks_of(findings: tuple[Finding, ...]) -> set[str]:
+    return {finding.check for finding in findings}
 
 
 def test_official_annotation_errors_are_reported(official_checkout: Path) -> None:
     tasks = {task.scene.id: task for task in read_official(official_checkout).tasks}
     for name in ("000", "001", "040", "069", "187"):
-        audit = audit_scene((tasks[name].scene, tasks[name].candidates), QUICK_FOREIGN)
-        assert audit.has("overlap") == (name in OVERLAPPING)
-        assert audit.has("floating") == audit.has("unstable") == (name in FLOATING)
-        assert audit.has("dependency without contact") == (name in {"040", "069"})
+        found = checks_of(audit_scene((tasks[name].scene, tasks[name].candidates), QUICK_FOREIGN))
+        assert ("overlap" in found) == (name in OVERLAPPING)
+        assert ("floating" in found) == ("unstable" in found) == (name in FLOATING)
+        assert ("dependency without contact" in found) == (name in {"040", "069"})
 
 
 @pytest.mark.slow
 def test_the_whole_official_data(official_checkout: Path) -> None:
     tasks = [(task.scene, task.candidates) for task in read_official(official_checkout).tasks]
-    audits = list(audit_scenes(tasks, FOREIGN, 2))
+    with open_workers(2) as workers:
+        audits = dict(zip((s.id for s, _ in tasks), workers.map(audit_scene, tasks), strict=True))
 
     def having(*checks: CheckName) -> set[str]:
-        return {audit.scene.id for audit in audits if audit.has(*checks)}
+        return {name for name, found in audits.items() if checks_of(found) & set(checks)}
 
     assert having("overlap") == OVERLAPPING
     assert having("floating") == having("unstable") == FLOATING
-    shared = sum(audit.shared for audit in audits)
-    assert shared / sum(audit.declared for audit in audits) == pytest.approx(0.982, abs=0.001)
-    assert shared / sum(audit.contacts for audit in audits) == pytest.approx(0.987, abs=0.004)
     assert len(having("layer")) == 70
     assert len(audits) - len(having("unstable", "unstable step")) == 356
     assert not having("candidates")

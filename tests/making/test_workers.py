@@ -1,76 +1,49 @@
-"""Workers: tasks on a Ray cluster (extra `phyblock[ray]`), and the end of their processes."""
+"""Workers: the end of their processes, and a Ray cluster (extra `phyblock[ray]`)."""
 
 from __future__ import annotations
 
 import importlib.util
 import os
-import re
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from pathlib import Path
 
-import psutil
 import pytest
 
 from phyblock.errors import InputError
-from phyblock.making.scenes.production import Order, Share, produce
+from phyblock.making.scenes.production import Share, produce
 from phyblock.making.workers import open_workers
 
-ORDER = Order(3, "kit", (Share("1", 3, 1), Share("2", 4, 2), Share("3", 2, 1)))
-_IDLE = re.compile("IDLE|Agent")
+SHARES = (Share("1", 3, 1), Share("2", 4, 2), Share("3", 2, 1))
 HAS_RAY = importlib.util.find_spec("ray") is not None
 
 
-def ray_workers() -> list[psutil.Process]:
-    """Worker processes of the cluster that this test started."""
-    found = []
-    for process in psutil.Process().children(recursive=True):
-        try:
-            if process.name().startswith("ray::") and not _IDLE.search(process.name()):
-                found.append(process)
-        except psutil.NoSuchProcess:
-            continue
-    return found
-
-
-def squares(workers, killed: list[int]) -> Iterator[int]:
-    def slowly(task: int) -> int:
-        time.sleep(0.2)
-        return task * task
-
-    for count, answer in enumerate(workers.map(slowly, range(30))):
-        if count == 5:
-            busy = ray_workers()
-            assert busy
-            killed.append(busy[0].pid)
-            busy[0].kill()
-        yield answer
+def killed_once(mark: str) -> int:
+    """Kill the process that works on it, but for the second time."""
+    try:
+        Path(mark).touch(exist_ok=False)
+    except FileExistsError:
+        return os.getpid()
+    os.kill(os.getpid(), signal.SIGKILL)
+    raise AssertionError
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not HAS_RAY, reason="Ray is not installed: pip install 'phyblock[ray]'")
 @pytest.mark.filterwarnings("ignore")
-def test_a_killed_worker_loses_and_doubles_nothing() -> None:
+def test_a_killed_worker_loses_and_doubles_nothing(tmp_path: Path) -> None:
     with open_workers() as workers:
-        expected = list(produce(ORDER, workers))
-    killed: list[int] = []
+        expected = list(produce(3, "kit", SHARES, workers))
     with open_workers(2, "local") as workers:
-        assert list(squares(workers, killed)) == [n * n for n in range(30)]
-        assert len(killed) == 1
-        found = []
-        for scene in produce(ORDER, workers):
-            found.append(scene)
-            if len(found) == 5 and (busy := ray_workers()):
-                killed.append(busy[0].pid)
-                busy[0].kill()
-    assert found == expected
+        marks = [str(tmp_path / str(number)) for number in range(3)]
+        assert len(list(workers.map(killed_once, marks))) == 3
+        assert list(produce(3, "kit", SHARES, workers)) == expected
 
 
-@pytest.mark.skipif(HAS_RAY, reason="Ray is installed")
-def test_without_ray_the_extra_is_named() -> None:
-    with pytest.raises(InputError, match=r"phyblock\[ray\]"), open_workers(2, "local"):
+def test_no_ray_and_no_cluster_are_told() -> None:
+    with pytest.raises(InputError, match="--ray"), open_workers(2, "127.0.0.1:1"):
         pass
 
 
@@ -106,14 +79,12 @@ def is_alive(pid: int) -> bool:
 
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
 def test_workers_end_with_the_process_that_started_them(
-    sent: signal.Signals, tmp_path: os.PathLike[str]
+    sent: signal.Signals, tmp_path: Path
 ) -> None:
-    script = os.path.join(tmp_path, "work.py")
     for name, text in (("work.py", WORK), ("tasks.py", TASKS)):
-        with open(os.path.join(tmp_path, name), "w", encoding="utf-8") as file:
-            file.write(text)
+        (tmp_path / name).write_text(text, encoding="utf-8")
     with subprocess.Popen(
-        [sys.executable, script],
+        [sys.executable, str(tmp_path / "work.py")],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         start_new_session=True,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import cast
@@ -16,37 +16,42 @@ from phyblock.cli.options import NAME_OR_PATH, UserPath
 from phyblock.data import (
     SCENES_FILE,
     AssemblyTask,
+    Dataset,
     find_data_set,
     read_builtin,
     read_data_set,
 )
+from phyblock.domain.scene import Scene
 from phyblock.errors import DataError, Problem
 from phyblock.files import OutFolder, check_free, make_folder, write_named
 from phyblock.making.checks import (
     AUDITED,
-    FOREIGN,
-    LAWS,
-    CheckName,
+    VERIFIED,
     Finding,
-    SceneAudit,
-    audit_scenes,
-    check_looks,
-    find_duplicates,
-    find_orphans,
+    audit_scene,
+    check_set,
+    declared_supports,
     findings_csv,
-    verify_scenes,
+    verify_scene,
 )
 from phyblock.making.cli.options import (
-    find_scenes,
+    conclude,
     jobs_option,
-    ray_option,
-    seed_option,
-    tell_simulators,
+    making_options,
+    print_engine,
     tracked,
 )
+from phyblock.making.files import (
+    SCENE_FILES,
+    check_out,
+    check_sums,
+    completed_card,
+    scene_card,
+    write_scenes,
+)
+from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.completing import Completed, ReadScene, complete, palette_of, read_given
-from phyblock.making.scenes.files import card, check_folder, check_sums, completed_card, open_writer
-from phyblock.making.scenes.production import Order, produce, shares
+from phyblock.making.scenes.production import produce, shares
 from phyblock.making.scenes.sketch import PALETTES, Palette
 from phyblock.making.workers import open_workers
 from phyblock.sim.camera import VIEWS
@@ -58,7 +63,7 @@ from phyblock.sim.pictures import (
     goal_png,
     visible_shares,
 )
-from phyblock.text import counted
+from phyblock.text import counted, did_you_mean, some_of
 from phyblock.types import BACKGROUNDS
 
 
@@ -67,37 +72,16 @@ def scenes() -> None:
     """Make data sets of scenes, check them against physics, and look at them."""
 
 
-_PALETTE_TEXT: dict[Palette, str] = {
-    "kit": f"the official kit's {len(PALETTES['kit'])} pairs of type and color",
-    "full": f"all {len(PALETTES['full'])} pairs of type and color",
-}
-
-
 def _levels(ctx: click.Context, param: click.Parameter, value: str) -> tuple[int, ...]:
     words = value.split(",")
-    if not all(word in ("1", "2", "3", "4") for word in words) or len(set(words)) < len(words):
+    if not {"1", "2", "3", "4"}.issuperset(words) or len(set(words)) < len(words):
         raise click.BadParameter(f"{value!r}: give levels like 1,2,3,4", ctx, param)
-    return tuple(sorted(int(word) for word in words))
+    return tuple(sorted(map(int, words)))
 
 
 @scenes.command("generate")
-@click.option(
-    "--count",
-    type=click.IntRange(1),
-    default=400,
-    show_default=True,
-    metavar="N",
-    help="How many scenes.",
-)
-@seed_option("Another seed gives other scenes.")
-@click.option(
-    "--levels",
-    default="1,2,3,4",
-    show_default=True,
-    callback=_levels,
-    metavar="LEVELS",
-    help="Levels to make, in the proportions of the built-in set.",
-)
+@click.option("--count", type=click.IntRange(1), default=400, show_default=True, metavar="N")
+@click.option("--levels", default="1,2,3,4", show_default=True, callback=_levels)
 @click.option(
     "--palette",
     type=click.Choice(["kit", "full"]),
@@ -105,56 +89,41 @@ def _levels(ctx: click.Context, param: click.Parameter, value: str) -> tuple[int
     show_default=True,
     help=f"The kit's {len(PALETTES['kit'])} pairs of type and color, or all that there are.",
 )
-@jobs_option
-@ray_option
-@click.option(
-    *("--out", "-o"),
-    type=UserPath(),
-    required=True,
-    metavar="DIR",
-    help="Folder to write.",
-)
-@click.option("--replace", is_flag=True, help="Replace a data set that is in the folder.")
+@making_options
 def generate(
     count: int,
-    seed: int,
     levels: tuple[int, ...],
     palette: str,
+    seed: int,
     jobs: int,
     ray_address: str | None,
     out: Path,
-    replace: bool,
 ) -> None:
     """Make N scenes with candidate sets, each checked by physics, and their data card.
 
     The same N, seed, levels and palette give the same files with the same
     physics engine, on any Python, any number of processes or a cluster.
     """
+    check_out(out, SCENE_FILES)
     kind = cast(Palette, palette)
-    order = Order(seed, kind, shares(count, levels))
-    with (
-        open_workers(jobs, ray_address) as workers,
-        open_writer(out, kind, replace, "give another --out, or --replace") as writer,
-    ):
-        for scene in tracked(produce(order, workers), count, "Making"):
-            writer.add(scene)
-        chosen = ",".join(map(str, levels))
-        made_by = f"phyblock scenes generate --count {count} --seed {seed} --levels {chosen}"
-        made_by += f" --palette {palette} --out {out.name}"
-        writer.finish(card(out.name, writer, made_by, _PALETTE_TEXT[kind]))
+    with open_workers(jobs, ray_address) as workers:
+        produced = produce(seed, kind, shares(count, levels), workers)
+        tasks = [
+            (scene, make_candidates(scene, palette=PALETTES[kind]))
+            for scene in tracked(produced, count, "Making")
+        ]
+    chosen = ",".join(map(str, levels))
+    command = f"phyblock scenes generate --count {count} --seed {seed} --levels {chosen}"
+    command += f" --palette {palette} --out {out.name}"
+    write_scenes(out, tasks, scene_card(out.name, tasks, command, kind))
     click.echo(f"{counted(count, 'scene')}, all checks passed: {shown_path(out)}")
-    tell_simulators()
+    print_engine()
 
 
 @scenes.command("complete")
 @click.argument("data", metavar="FILE_OR_FOLDER", type=UserPath())
 @jobs_option
-@click.option(
-    *("--out", "-o"),
-    type=UserPath(),
-    metavar="DIR",
-    help="Folder to write.  [default: NAME-set here]",
-)
+@click.option("--out", "-o", type=UserPath(), help="Folder to write.  [default: NAME-set here]")
 def complete_set(data: Path, jobs: int, out: Path | None) -> None:
     """Make a data set from scenes that give type, color, position and euler of their blocks.
 
@@ -165,31 +134,25 @@ def complete_set(data: Path, jobs: int, out: Path | None) -> None:
     """
     given = read_given(data)
     folder = out or Path(f"{data.resolve().stem}-set")
-    check_folder(folder)
-    problems: list[Problem] = []
-    done: list[Completed] = []
-    with open_workers(min(jobs, len(given)), None) as workers:
-        for one in tracked(workers.map(_completed, given), len(given), "Completing"):
-            if isinstance(one, Completed):
-                done.append(one)
-            else:
-                problems += one
-    if problems:
+    check_out(folder, SCENE_FILES)
+    with open_workers(min(jobs, len(given))) as workers:
+        done = list(tracked(workers.map(_completed, given), len(given), "Completing"))
+    if problems := [problem for one in done if isinstance(one, tuple) for problem in one]:
         raise DataError(problems)
-    scenes = [one.scene for one in done]
-    palette = palette_of(scenes)
-    made_by = f"phyblock scenes complete {shlex.quote(data.name)} --out {shlex.quote(folder.name)}"
-    with open_writer(folder, palette) as writer:
-        for one in done:
-            writer.add(one.scene, one.offered)
-        writer.finish(completed_card(folder.name, len(done), made_by))
-    for one in done:
+    whole = [one for one in done if isinstance(one, Completed)]
+    made = [one.scene for one in whole]
+    palette = PALETTES[palette_of(made)]
+    tasks = [
+        (one.scene, one.offered or make_candidates(one.scene, palette=palette)) for one in whole
+    ]
+    command = f"phyblock scenes complete {shlex.quote(data.name)} --out {shlex.quote(folder.name)}"
+    write_scenes(folder, tasks, completed_card(folder.name, len(tasks), command))
+    for one in whole:
         for note in one.notes:
             click.echo(f"note: scene {one.scene.id}: {note}")
-    for finding in (*find_duplicates(scenes), *find_orphans(scenes)):
-        sentence = f"{finding.field} {finding.message}".strip()
-        click.echo(f"note: scene {finding.scene}: {sentence}")
-    click.echo(f"{counted(len(done), 'scene')} completed: {shown_path(folder)}")
+    for finding in check_set(made):
+        click.echo(f"note: scene {finding.scene}: {finding.field} {finding.message}")
+    click.echo(f"{counted(len(tasks), 'scene')} completed: {shown_path(folder)}")
     here = str(folder) if folder.is_absolute() else f"./{folder}"
     click.echo(f"Next: phyblock run quick --set dataset.path={shlex.quote(here)}")
 
@@ -204,14 +167,7 @@ def _completed(read: ReadScene) -> Completed | tuple[Problem, ...]:
 @scenes.command("verify")
 @click.argument("data", metavar="[PATH]", default="phyblock-400", type=NAME_OR_PATH)
 @jobs_option
-@ray_option
-@click.option(
-    "--limit",
-    type=click.IntRange(1),
-    metavar="M",
-    help="Simulate the first M scenes alone; the rest is checked for duplicates and the like.",
-)
-def verify(data: str, jobs: int, ray_address: str | None, limit: int | None) -> None:
+def verify(data: str, jobs: int) -> None:
     """Check every scene of PATH against geometry and physics, down to the last number.
 
     PATH is a folder with scenes.jsonl or a bundled set, by default the built-in phyblock-400.
@@ -224,123 +180,104 @@ def verify(data: str, jobs: int, ray_address: str | None, limit: int | None) -> 
     if not (where / SCENES_FILE).is_file():
         hint = f"phyblock scenes audit {data}"
         raise DataError(Problem(data, f"has no {SCENES_FILE} to verify", hint=hint))
-    tasks = read_builtin(where).tasks
-    simulated = [(task.scene, task.candidates) for task in tasks[:limit]]
-    passed = dict.fromkeys(LAWS, 0)
-    problems: list[Problem] = []
-    with open_workers(jobs, ray_address) as workers:
-        for broken in tracked(verify_scenes(simulated, workers), len(simulated), "Verifying"):
-            for law, findings in broken.items():
-                passed[law] += not findings
-                problems += [finding.problem for finding in findings]
-    scenes = [task.scene for task in tasks]
-    twins, orphans = find_duplicates(scenes), tuple(find_orphans(scenes))
-    looks, same = check_looks(task.candidates for task in tasks)
+    tasks = [(task.scene, task.candidates) for task in read_builtin(where).tasks]
+    found = list(check_set([scene for scene, _ in tasks]))
+    with open_workers(jobs) as workers:
+        for findings in tracked(workers.map(verify_scene, tasks), len(tasks), "Verifying"):
+            found += findings
     files, changed = check_sums(where)
-    rows = [(law, str(good), str(len(simulated))) for law, good in passed.items()]
-    alike = len({problem.where for problem in same})
-    for name, total, bad in (
-        ("no duplicate", len(scenes), len(twins)),
-        ("parents are base scenes", len(scenes), len(orphans)),
-        ("looks that pictures tell apart", looks, alike),
-        ("checksums", files, len(changed)),
-    ):
-        rows.append((name, str(total - bad), str(total)))
-    console = make_console()
-    print_rows(console, ("check", "passed", "of"), rows, numbers=2)
-    failures = [*problems, *(finding.problem for finding in (*twins, *orphans)), *same, *changed]
-    for problem in failures:
-        click.echo(f"failed: {problem}", err=True)
-    verdict = counted(len(failures), "failure") if failures else "all checks passed"
-    console.print(f"{data}: {verdict}", markup=False, soft_wrap=True)
-    if failures:
-        raise click.exceptions.Exit(1)
+    checks = _counts(found, (*VERIFIED, "duplicate", "parents"))
+    rows = [(check, str(len(tasks) - failed), str(len(tasks))) for check, failed, _ in checks]
+    rows.append(("checksums", str(files - len(changed)), str(files)))
+    print_rows(make_console(), ("check", "passed", "of"), rows, numbers=2)
+    conclude(data, (*(finding.problem for finding in found), *changed))
+
+
+def _counts(found: Sequence[Finding], checks: Sequence[str]) -> list[tuple[str, int, int]]:
+    """Each check with the number of scenes that it found something in, and of findings."""
+    scenes = Counter(check for _, check in {(one.scene, one.check) for one in found})
+    findings = Counter(one.check for one in found)
+    return [(check, scenes[check], findings[check]) for check in checks]  # type: ignore[index]
 
 
 _WORST = 15
 """The worst scenes of an audit that are shown."""
-_DEPENDING: tuple[CheckName, ...] = ("undeclared dependency", "dependency without contact")
 
 
 @scenes.command("audit")
 @click.argument("data", metavar="PATH", type=NAME_OR_PATH)
 @click.option("--csv", "table", type=UserPath(), metavar="FILE", help="All findings as CSV.")
 @jobs_option
-@click.option(
-    "--tolerance",
-    type=click.FloatRange(0.01, 10),
-    default=1000 * FOREIGN.fit_m,
-    show_default=True,
-    help="Overlaps and gaps up to this pass [mm].",
-)
-def audit(data: str, table: Path | None, jobs: int, tolerance: float) -> None:
+def audit(data: str, table: Path | None, jobs: int) -> None:
     """Audit the data set PATH: a folder with scenes.jsonl, an official checkout, or a bundled set.
 
     Changes nothing in PATH. Shows the worst scenes and totals: overlaps, gaps, declared
     dependencies against contacts, layers, orders, stability of every step and of the whole,
     candidates, duplicates. --csv writes every finding. Exits with 0, whatever it finds.
     """
-    if table is not None and table.is_dir():
-        check_free([table], "name another place")
     if table is not None:
+        if table.is_dir():
+            check_free([table], "name another place")
         make_folder(table.parent)
     tasks = [(task.scene, task.candidates) for task in read_data_set(data).tasks]
-    running = audit_scenes(tasks, replace(FOREIGN, fit_m=tolerance / 1000), min(jobs, len(tasks)))
-    audits = list(tracked(running, len(tasks), "Auditing"))
-    twins = find_duplicates(scene for scene, _ in tasks)
-    guilty = sorted((one for one in audits if one.findings), key=lambda one: one.badness)
-    _print_worst(guilty[::-1][:_WORST])
-    _print_totals(audits, twins)
+    with open_workers(min(jobs, len(tasks))) as workers:
+        found = {
+            scene.id: findings
+            for (scene, _), findings in tracked(
+                zip(tasks, workers.map(audit_scene, tasks), strict=True), len(tasks), "Auditing"
+            )
+        }
+    twins = [one for one in check_set([scene for scene, _ in tasks]) if one.check == "duplicate"]
+    every = [*twins, *(finding for findings in found.values() for finding in findings)]
     console = make_console()
-    if table is not None:
-        write_named(table, findings_csv(audits, twins))
-        console.print(f"all findings in {shown_path(table)}", markup=False)
-
-
-def _print_worst(worst: Sequence[SceneAudit]) -> None:
-    rows = []
-    for audit in worst:
-        # The cause before its effect: what overlaps or floats before what falls.
-        first = min(audit.findings, key=lambda finding: AUDITED.index(finding.check))
-        named = [
-            f"{b.order} {b.color} {b.type}" for b in audit.scene.blocks if b.order in first.blocks
-        ]
-        blocks = ", ".join(named[:3]) + (", ..." if len(named) > 3 else "")
-        facts = (first.check, first.message, blocks)
-        rows.append((audit.scene.id, str(audit.scene.level), *facts, str(len(audit.findings))))
-    if rows:
+    guilty = [scene for scene, _ in tasks if found[scene.id]]
+    if worst := sorted(guilty, key=lambda scene: _badness(found[scene.id]), reverse=True)[:_WORST]:
+        rows = [_worst_row(scene, found[scene.id]) for scene in worst]
         headings = ("scene", "level", "check", "first finding", "blocks", "findings")
-        print_rows(make_console(), headings, rows, numbers=1)
-
-
-def _print_totals(audits: Sequence[SceneAudit], twins: Sequence[Finding]) -> None:
-    findings = [*twins, *(finding for audit in audits for finding in audit.findings)]
-    rows = []
-    for check in AUDITED:
-        mine = [finding for finding in findings if finding.check == check]
-        rows.append((check, str(len({finding.scene for finding in mine})), str(len(mine))))
-    console = make_console()
+        print_rows(console, headings, rows, numbers=1)
+    counts = _counts(every, (*AUDITED, "duplicate"))
+    rows = [(check, str(scenes), str(findings)) for check, scenes, findings in counts]
     print_rows(console, ("check", "scenes", "findings"), rows, numbers=2)
-    declared, contacts, shared = (
-        sum(getattr(audit, name) for audit in audits) for name in ("declared", "contacts", "shared")
-    )
+    for line in _totals([scene for scene, _ in tasks], found, {check: n for check, _, n in counts}):
+        console.print(line, soft_wrap=True)
+    if table is not None:
+        levels = {scene.id: scene.level for scene, _ in tasks}
+        write_named(table, findings_csv(every, levels))
+        console.print(f"all findings in {shown_path(table)}")
 
-    def without(*checks: CheckName) -> int:
-        return sum(not audit.has(*checks) for audit in audits)
 
-    for line in (
-        f"{counted(len(audits), 'scene')} read; {without(*AUDITED)} with no finding",
+def _badness(findings: Sequence[Finding]) -> tuple[bool, bool, float, int]:
+    """Sort key: what falls, then the largest overlap or gap [mm], then the number of findings."""
+    checks = {finding.check for finding in findings}
+    fit = [f.value_mm or 0.0 for f in findings if f.check in ("overlap", "floating")]
+    return "unstable" in checks, "unstable step" in checks, max(fit, default=0.0), len(findings)
+
+
+def _worst_row(scene: Scene, findings: Sequence[Finding]) -> tuple[str, ...]:
+    first = findings[0]
+    named = [f"{b.order} {b.color} {b.type}" for b in scene.blocks if b.order in first.blocks]
+    facts = (first.check, first.message, ", ".join(named))
+    return scene.id, str(scene.level), *facts, str(len(findings))
+
+
+def _totals(
+    scenes: Sequence[Scene], found: Mapping[str, Sequence[Finding]], count: Mapping[str, int]
+) -> tuple[str, ...]:
+    """Sentences about scenes that stand, and dependencies against contacts."""
+
+    def without(*checks: str) -> int:
+        return sum(not any(f.check in checks for f in found[scene.id]) for scene in scenes)
+
+    declared = sum(len(below) for scene in scenes for below in declared_supports(scene).values())
+    shared = declared - count["dependency without contact"]
+    contacts = shared + count["undeclared dependency"]
+    return (
+        f"{counted(len(scenes), 'scene')} read; {without(*AUDITED)} with no finding",
         f"{without('unstable')} stand when finished, "
         f"{without('unstable', 'unstable step')} at every step as well",
-        f"{_share(shared, declared)} declared dependencies are contacts (precision)",
-        f"{_share(shared, contacts)} contacts are declared (recall)",
-        f"{without(*_DEPENDING)} declare their contacts and nothing else",
-    ):
-        console.print(line, markup=False, soft_wrap=True)
-
-
-def _share(part: int, whole: int) -> str:
-    return f"{part} of {whole} ({part / whole:.3f})" if whole else "no"
+        f"{shared} of {declared} ({shared / declared:.3f}) declared dependencies are contacts",
+        f"{shared} of {contacts} ({shared / max(contacts, 1):.3f}) contacts are declared",
+    )
 
 
 @scenes.command("show")
@@ -352,42 +289,48 @@ def show(data: str, scene: str) -> None:
     "on" names the blocks below, "pick" the candidate that stands for the block, "seen" the share
     of it that no other hides in the default goal picture.
     """
-    (task,) = find_scenes(read_data_set(data), (scene,))
+    (task,) = _find_scenes(read_data_set(data), (scene,))
+    shown, offered = task.scene, task.candidates
     console = make_console()
-    levels = " and ".join(map(str, task.scene.levels))
-    parents = ", ".join(task.scene.parents)
-    layers = counted(max(task.scene.graph.layers), "layer")
-    blocks = counted(len(task.scene), "block")
-    heading = f"scene {task.scene.id} · level {levels} · {blocks} · {layers}"
-    console.print(f"{heading} · made from {parents}", markup=False, soft_wrap=True)
-    headings = ("block", "type", "color", "on", "position mm", "euler deg")
-    numbers = ("layer", "pick", "seen")
-    print_rows(console, (*headings, *numbers), _blocks(task), numbers=3)
-    offered = ("candidate", "type", "color", "euler deg", "needed")
-    print_rows(console, offered, _candidates(task), numbers=1)
+    levels, parents = " and ".join(map(str, shown.levels)), ", ".join(shown.parents)
+    size = f"{counted(len(shown), 'block')} · {counted(max(shown.graph.layers), 'layer')}"
+    heading = f"scene {shown.id} · level {levels} · {size} · made from {parents}"
+    console.print(heading, soft_wrap=True)
+    seen = visible_shares(shown, PictureStyle())
+    blocks = [
+        (
+            *(str(block.order), block.type, block.color),
+            " ".join(map(str, sorted(block.depend))) or "ground",
+            " ".join(f"{round(1000 * c, 1) + 0.0:g}" for c in block.position_m),
+            _angles(block.euler_deg),
+            *(str(block.layer), str(offered.index_of(block.look)), f"{seen[block.order]:.0%}"),
+        )
+        for block in shown.blocks
+    ]
+    columns: tuple[str, ...]
+    columns = ("block", "type", "color", "on", "position mm", "euler deg", "layer", "pick", "seen")
+    print_rows(console, columns, blocks, numbers=3)
+    looks = Counter(block.look for block in shown.blocks)
+    candidates = [
+        (str(number), one.type, one.color, _angles(one.euler_deg), str(looks[one.look] or ""))
+        for number, one in enumerate(offered.candidates, 1)
+    ]
+    columns = ("candidate", "type", "color", "euler deg", "needed")
+    print_rows(console, columns, candidates, numbers=1)
 
 
-def _blocks(task: AssemblyTask) -> list[tuple[str, ...]]:
-    seen = visible_shares(task.scene, PictureStyle())
-    rows: list[tuple[str, ...]] = []
-    for block in task.scene.blocks:
-        place = " ".join(f"{1000 * c + 0.0:.1f}".removesuffix(".0") for c in block.position_m)
-        number = task.candidates.index_of(block.look)
-        below = " ".join(map(str, sorted(block.depend))) or "ground"
-        what = (str(block.order), block.type, block.color, below)
-        numbers = (str(block.layer), str(number), f"{100 * seen[block.order]:.0f} %")
-        rows.append((*what, place, _angles(block.euler_deg), *numbers))
-    return rows
-
-
-def _candidates(task: AssemblyTask) -> list[tuple[str, ...]]:
-    looks = [block.look for block in task.scene.blocks]
-    rows: list[tuple[str, ...]] = []
-    for number, candidate in enumerate(task.candidates.candidates, 1):
-        needed = looks.count(candidate.look)
-        what = (str(number), candidate.type, candidate.color, _angles(candidate.euler_deg))
-        rows.append((*what, f"{needed} x" if needed else ""))
-    return rows
+def _find_scenes(data: Dataset, names: Sequence[str]) -> tuple[AssemblyTask, ...]:
+    """The named scenes, in the order named; raises DataError with all that are not there."""
+    tasks = {task.scene.id: task for task in data.tasks}
+    if missing := [name for name in names if name not in tasks]:
+        raise DataError(
+            Problem(
+                *(str(data.root), "holds no such scene", "", name, some_of(list(tasks))),
+                hint=did_you_mean(name, tasks),
+            )
+            for name in missing
+        )
+    return tuple(tasks[name] for name in names)
 
 
 def _angles(euler_deg: tuple[float, float, float]) -> str:
@@ -397,33 +340,13 @@ def _angles(euler_deg: tuple[float, float, float]) -> str:
 @scenes.command("render")
 @click.argument("data", metavar="PATH", type=NAME_OR_PATH)
 @click.argument("scenes", metavar="[SCENE]...", nargs=-1)
-@click.option(
-    *("--out", "-o"),
-    type=UserPath(file_okay=False),
-    required=True,
-    metavar="DIR",
-    help="Folder for the pictures.",
-)
-@click.option(
-    "--view",
-    type=click.Choice([*VIEWS, "all"]),
-    default="oblique",
-    show_default=True,
-    help="Where the scene is seen from.",
-)
+@click.option("--out", "-o", type=UserPath(file_okay=False), required=True, metavar="DIR")
+@click.option("--view", type=click.Choice([*VIEWS, "all"]), default="oblique", show_default=True)
 @click.option(
     "--background",
     type=click.Choice([*BACKGROUNDS, "all"]),
     default="checkerboard",
     show_default=True,
-    help="What stands behind the blocks.",
-)
-@click.option(
-    "--size",
-    type=click.IntRange(128, 2048),
-    default=512,
-    show_default=True,
-    help="Edge of a picture [pixels].",
 )
 @click.option("--composite", is_flag=True, help="Goal and candidates side by side, too.")
 @click.option("--gif", is_flag=True, help="The assembly as an animated GIF, too.")
@@ -433,34 +356,32 @@ def render(
     out: Path,
     view: str,
     background: str,
-    size: int,
     composite: bool,
     gif: bool,
 ) -> None:
-    """Draw the scenes SCENE... of the data set PATH, or all of them.
+    """Draw the scenes SCENE... of the data set PATH, or all of them, at 512 by 512 pixels.
 
-    Files are named SCENE-VIEW-BACKGROUND-WHAT; it writes over those that it wrote before.
+    Files are named SCENE-VIEW-BACKGROUND; it writes over those that it wrote before.
     """
     read = read_data_set(data)
+    views = [name for name in VIEWS if view in (name, "all")]
+    floors = [name for name in BACKGROUNDS if background in (name, "all")]
     drawings: dict[str, Callable[[], bytes]] = {}
-    for task in find_scenes(read, scenes) if scenes else read.tasks:
-        scene = task.scene
-        for seen, (azimuth, elevation) in VIEWS.items():
-            for floor in BACKGROUNDS:
-                if view not in (seen, "all") or background not in (floor, "all"):
-                    continue
-                style = PictureStyle(size, floor, azimuth, elevation)
-                stem, goal = f"{scene.id}-{seen}-{floor}", partial(goal_png, scene, style)
-                drawings[f"{stem}.png"] = goal
+    for task in _find_scenes(read, scenes) if scenes else read.tasks:
+        for seen in views:
+            for floor in floors:
+                style = PictureStyle(512, floor, *VIEWS[seen])
+                stem = f"{task.scene.id}-{seen}-{floor}"
+                drawings[f"{stem}.png"] = partial(goal_png, task.scene, style)
                 if composite:
                     drawings[f"{stem}-composite.png"] = partial(_composite, task, style)
                 if gif:
-                    drawings[f"{stem}.gif"] = partial(assembly_gif, scene, style)
+                    drawings[f"{stem}.gif"] = partial(assembly_gif, task.scene, style)
     folder = OutFolder(out)
     folder.check(drawings)
-    for name, make in drawings.items():
-        folder.write({name: make()})
-    make_console().print(f"{counted(len(drawings), 'file')} in {shown_path(out)}")
+    for name, draw in drawings.items():
+        folder.write({name: draw()})
+    click.echo(f"{counted(len(drawings), 'file')} in {shown_path(out)}")
 
 
 def _composite(task: AssemblyTask, style: PictureStyle) -> bytes:

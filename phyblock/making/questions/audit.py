@@ -11,8 +11,9 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,6 @@ from phyblock.sim.question_pictures import changed_pixels, seen
 from phyblock.tracks.baselines import FOLDS, Folds, Guesses
 
 Floats = NDArray[np.float64]
-
 GUESSABLE = 0.35
 """Accuracy that no probe of a sound set exceeds beyond its interval."""
 _DARKEST_FACE = 60
@@ -33,11 +33,10 @@ _FEWEST = 12
 _RIDGE = 4.0
 
 
-@dataclass(frozen=True)
-class Probe:
-    """Accuracy of a probe on `n` questions, with a Wilson interval of 95 %."""
+class Probe(NamedTuple):
+    """The number of questions that a probe answered rightly, of `n`."""
 
-    right: float
+    right: int
     n: int
 
     @property
@@ -58,45 +57,33 @@ class Probe:
 class SubtaskAudit:
     """Facts about the questions of one subtask.
 
-    `letters` counts right answers by letter (ordering: by the letter that comes first), `repeats`
-    are questions that ask the same as an earlier one. Probes are None where they have nothing to
-    go by.
+    `letters` are shares of right answers by letter (ordering: by the letter that comes first),
+    `repeats` the questions that ask the same as an earlier one. `probes` are `majority`, `text`
+    and `pictures`, the last only where options are pictures.
     """
 
     subtask: Subtask
     n: int
-    base_scenes: int
-    letters: dict[str, int]
+    letters: tuple[float, ...]
     chance: float
-    majority: Probe
-    text: Probe | None
-    pictures: Probe | None
+    probes: Mapping[str, Probe]
     repeats: tuple[str, ...]
-
-    @property
-    def is_balanced(self) -> bool:
-        """True if every letter is right about as often as the others (not asked of ordering)."""
-        shares = [count / self.n for count in self.letters.values()]
-        return self.subtask == "OR" or (BALANCE[0] <= min(shares) and max(shares) <= BALANCE[1])
 
     def findings(self) -> Iterator[str]:
         """Yield what is wrong, a sentence each."""
-        if not self.is_balanced:
-            low, high = (round(100 * bound) for bound in BALANCE)
-            yield f"{self.subtask}: a letter is right outside {low} to {high} %"
-        probes = {"majority": self.majority, "text": self.text, "pictures": self.pictures}
-        for name, probe in probes.items():
-            if probe is not None and probe.interval[0] > max(GUESSABLE, self.chance):
+        low, high = BALANCE
+        if self.subtask != "OR" and not low <= min(self.letters) <= max(self.letters) <= high:
+            yield f"{self.subtask}: a letter is right outside {low:.0%} to {high:.0%}"
+        for name, probe in self.probes.items():
+            if probe.interval[0] > max(GUESSABLE, self.chance):
                 yield f"{self.subtask}: the {name} probe reaches {100 * probe.accuracy:.0f} %"
         yield from (f"{name}: asks what an earlier question asks" for name in self.repeats)
 
 
-def audit_questions(
-    questions: Sequence[Question], *, with_texts: bool = True, with_pictures: bool = True
-) -> Iterator[SubtaskAudit]:
+def audit_questions(questions: Sequence[Question]) -> Iterator[SubtaskAudit]:
     """Yield an audit of each subtask that has questions, in the paper's order.
 
-    Raises SpecError where the text probe is wanted and scikit-learn is not installed.
+    Raises SpecError where scikit-learn, which the text probe uses, is not installed.
     """
     guesses, folds = Guesses(questions), Folds(questions)
     repeated = duplicates_of(questions)
@@ -104,22 +91,20 @@ def audit_questions(
         mine = [question for question in questions if question.subtask == subtask]
         if not mine:
             continue
-        chances = [1 / math.factorial(4) if subtask == "OR" else 1 / len(q.options) for q in mine]
-        letters = Counter(q.answer_letters[0] for q in mine)
-        probes = ("majority", *(["text-only"] if with_texts else []))
-        right = {
-            name: Probe(sum(guesses.guess(name, q) == q.answer for q in mine), len(mine))
-            for name in probes
+        n, first = len(mine), Counter(question.answer[0] for question in mine)
+        probes = {
+            name: Probe(sum(guesses.guess(rule, q) == q.answer for q in mine), n)
+            for name, rule in (("majority", "majority"), ("text", "text-only"))
         }
+        if pictures := picture_probe(mine, folds):
+            probes["pictures"] = pictures
+        chances = [1 / math.factorial(4) if subtask == "OR" else 1 / len(q.options) for q in mine]
         yield SubtaskAudit(
             subtask=subtask,
-            n=len(mine),
-            base_scenes=len({base for q in mine for base in q.scene.parents or (q.scene.id,)}),
-            letters={letter: letters[letter] for letter in LETTERS},
-            chance=math.fsum(chances) / len(chances),
-            majority=right["majority"],
-            text=right.get("text-only"),
-            pictures=picture_probe(mine, folds) if with_pictures else None,
+            n=n,
+            letters=tuple(first[i] / n for i in range(len(LETTERS))),
+            chance=math.fsum(chances) / n,
+            probes=probes,
             repeats=tuple(q.id for q in mine if q.id in repeated),
         )
 
@@ -129,12 +114,27 @@ def duplicates_of(questions: Sequence[Question]) -> dict[str, str]:
     id of that one.
     """
     first: dict[str, str] = {}
-    repeats = {}
-    for question in questions:
-        earlier = first.setdefault(_content(question), question.id)
-        if earlier != question.id:
-            repeats[question.id] = earlier
-    return repeats
+    earlier = {one.id: first.setdefault(_content(one), one.id) for one in questions}
+    return {name: twin for name, twin in earlier.items() if twin != name}
+
+
+def _content(question: Question) -> str:
+    """Everything that a reader of the question sees, its options in no order, as JSON."""
+
+    def rounded(numbers: Sequence[float]) -> tuple[float, ...]:
+        return tuple(round(number, 6) + 0.0 for number in numbers)
+
+    def recipe(picture: QuestionPicture) -> str:
+        blocks = sorted(
+            (b.type, b.color, rounded(b.position_m), rounded(b.euler_deg)) for b in picture.blocks
+        )
+        marks = sorted((rounded(mark.position_m), mark.letter) for mark in picture.marks)
+        return json.dumps([picture.view_deg, blocks, marks])
+
+    pictures = {picture.label: recipe(picture) for picture in question.pictures}
+    shown = [recipe for label, recipe in pictures.items() if label not in LETTERS]
+    options = [pictures.get(a, b) for a, b in zip(LETTERS, question.options, strict=False)]
+    return json.dumps([question.subtask, question.text, shown, sorted(options)])
 
 
 def picture_probe(questions: Sequence[Question], folds: Folds) -> Probe | None:
@@ -146,16 +146,16 @@ def picture_probe(questions: Sequence[Question], folds: Folds) -> Probe | None:
     features = {q.id: _picture_features(q) for q in questions}
     kinds: dict[object, list[Question]] = {}
     for question in questions:
-        if features[question.id] is not None:
+        if len(features[question.id]):
             kinds.setdefault(question.evidence.get("kind", ""), []).append(question)
-    right, n = 0.0, 0
+    right = n = 0
     for members in kinds.values():
         for fold in range(FOLDS):
             held_out = [q for q in members if folds.of(q) == fold]
             known = [q for q in members if folds.is_known(fold, q)]
             if not held_out or len(known) < _FEWEST:
                 continue
-            rows = np.vstack([features[q.id] for q in known])  # type: ignore[misc]
+            rows = np.vstack([features[q.id] for q in known])
             worth = np.concatenate([_worth(q) for q in known])
             centered = rows - rows.mean(axis=0)
             gram = centered.T @ centered + _RIDGE * np.eye(rows.shape[1])
@@ -174,14 +174,14 @@ def _worth(question: Question) -> Floats:
     return worth
 
 
-def _picture_features(question: Question) -> Floats | None:
+def _picture_features(question: Question) -> Floats:
     """Features of each option's picture beside the other options', shape (options, 2 * features):
     deviations from their mean in standard deviations, and the absolute values of these.
     """
     pictures = {picture.label: picture for picture in question.pictures}
     shots = [seen(pictures[letter]) for letter in LETTERS if letter in pictures]
     if not shots:
-        return None
+        return np.empty((0, 0))
     columns = [_measures(shot) for shot in shots]
     colors = [_color_shares(shot) for shot in shots]
     for i, (shot, column) in enumerate(zip(shots, columns, strict=True)):
@@ -226,22 +226,3 @@ def _color_shares(shot: Shot) -> Floats:
     hues /= np.linalg.norm(hues, axis=1, keepdims=True)
     counts = np.bincount((faces @ hues.T).argmax(axis=1), minlength=len(hues)).astype(np.float64)
     return np.asarray(counts / max(counts.sum(), 1.0))
-
-
-def _content(question: Question) -> str:
-    """Everything that a reader of the question sees, its options in no order, as JSON."""
-
-    def rounded(numbers: Sequence[float]) -> tuple[float, ...]:
-        return tuple(round(number, 6) + 0.0 for number in numbers)
-
-    def recipe(picture: QuestionPicture) -> str:
-        blocks = sorted(
-            (b.type, b.color, rounded(b.position_m), rounded(b.euler_deg)) for b in picture.blocks
-        )
-        marks = sorted((rounded(mark.position_m), mark.letter) for mark in picture.marks)
-        return json.dumps([picture.view_deg, blocks, marks])
-
-    pictures = {picture.label: recipe(picture) for picture in question.pictures}
-    shown = [recipe for label, recipe in pictures.items() if label not in LETTERS]
-    options = [pictures.get(a, b) for a, b in zip(LETTERS, question.options, strict=False)]
-    return json.dumps([question.subtask, question.text, shown, sorted(options)])

@@ -7,8 +7,10 @@ requests of the scenes it is made from. So any process can draw any scene, in an
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -164,15 +166,6 @@ class Share:
     varied: int
 
 
-@dataclass(frozen=True)
-class Order:
-    """An order of scenes: the seed, the palette and the shares."""
-
-    seed: int
-    palette: Palette
-    shares: tuple[Share, ...]
-
-
 def shares(count: int, levels: Sequence[int] = (1, 2, 3, 4)) -> tuple[Share, ...]:
     """The shares of `count` scenes, in the proportions of the built-in 400, in these levels.
 
@@ -194,76 +187,68 @@ def shares(count: int, levels: Sequence[int] = (1, 2, 3, 4)) -> tuple[Share, ...
     return tuple(Share(group, given[group, 0], given[group, 1]) for group in groups)
 
 
-def produce(order: Order, workers: Workers) -> Iterator[Scene]:
-    """Accepted scenes: first all base scenes, group by group, then the variations.
+def produce(
+    seed: int, palette: Palette, wanted: Sequence[Share], workers: Workers
+) -> Iterator[Scene]:
+    """Yield accepted scenes: first all base scenes, group by group, then the variations.
 
-    The same order gives the same scenes with any workers: a candidate depends on its number
+    The same arguments give the same scenes with any workers: a candidate depends on its number
     alone, and of two that are alike the lower number is kept. Raises DataError when the rules
     give no more different scenes.
     """
-    maker = _Maker(order, workers)
-    for share in order.shares:
+    maker = _Maker(seed, palette, workers, max(3, len(str(sum(s.base + s.varied for s in wanted)))))
+    for share in wanted:
         yield from maker.bases(share.group, share.base)
-    for share in order.shares:
+    for share in wanted:
         yield from maker.variations(share.group, share.varied)
 
 
 class _Maker:
     """Remembers what was taken: 16 bytes a candidate, and a request a base scene."""
 
-    def __init__(self, order: Order, workers: Workers) -> None:
-        self._order, self._workers = order, workers
+    def __init__(self, seed: int, palette: Palette, workers: Workers, width: int) -> None:
+        self._seed, self._palette, self._workers, self._width = seed, palette, workers, width
         self._seen: set[bytes] = set()
         self._bases: dict[Group, list[tuple[str, Request]]] = {g: [] for g in GROUP_LEVELS}
-        self._next: dict[Group, int] = dict.fromkeys(GROUP_LEVELS, 0)
-        self._named: dict[int, int] = {}
-        self._width = max(3, len(str(sum(s.base + s.varied for s in order.shares))))
+        self._next: Counter[Group] = Counter()
+        self._named: Counter[int] = Counter()
 
     def bases(self, group: Group, wanted: int) -> Iterator[Scene]:
-        def request(number: int) -> Request:
-            return Request(self._order.seed, self._order.palette, group, number)
-
+        """Scenes that the grammar draws."""
         taken = 0
+        request = partial(Request, self._seed, self._palette, group)
         for made, scene in self._accepted(wanted, request, self._next[group]):
             taken, self._next[group] = taken + 1, made.number + 1
             name = self._name(scene)
             self._bases[group].append((name, made))
             yield replace(scene, id=name, parents=(name,))
         if taken < wanted:
-            raise DataError(_no_more(group, f"gave no more than {taken} new scenes of {wanted}"))
+            message = f"gave no more than {taken} new scenes of {wanted}"
+            hint = "ask for fewer scenes, for other levels, or for --palette full"
+            raise DataError(Problem(f"level {group}", message, hint=hint))
 
     def variations(self, group: Group, wanted: int) -> Iterator[Scene]:
         """Variations, and base scenes for what is missing where there are too few to vary."""
-        parents: dict[int, tuple[str, ...]] = {}
-
-        def request(number: int) -> Request:
-            chosen = self._parents(group, number)
-            parents[number] = tuple(name for name, _ in chosen)
-            made = Request(self._order.seed, self._order.palette, group, number)
-            return replace(made, parents=tuple(parent for _, parent in chosen))
-
-        taken = 0
-        if self._sources(group):
-            for made, scene in self._accepted(wanted, request, 0):
-                taken += 1
-                names = tuple(dict.fromkeys(parents[made.number]))
-                yield replace(scene, id=self._name(scene), parents=names)
-        yield from self.bases(group, wanted - taken)
-
-    def _parents(self, group: Group, number: int) -> list[tuple[str, Request]]:
-        text = f"{self._order.seed}/{group}/parents/{number}".encode()
-        rng = np.random.default_rng(list(text))
-        sources = self._sources(group)
-        count, bases = sources[int(rng.integers(len(sources)))]
-        return [bases[int(i)] for i in rng.choice(len(bases), size=count, replace=False)]
-
-    def _sources(self, group: Group) -> list[tuple[int, list[tuple[str, Request]]]]:
-        """Numbers of parents and the base scenes they come from, where there are enough."""
-        sources = [
-            (count, [base for name in groups for base in self._bases[name]])
+        named = [
+            (count, [b for g in groups for b in self._bases[g]])
             for count, groups in _SOURCES[group]
         ]
-        return [(count, bases) for count, bases in sources if len(bases) >= count]
+        sources = [(count, bases) for count, bases in named if len(bases) >= count]
+        name_of = {request: name for bases in self._bases.values() for name, request in bases}
+
+        def request(number: int) -> Request:
+            rng = np.random.default_rng(list(f"{self._seed}/{group}/parents/{number}".encode()))
+            count, bases = sources[int(rng.integers(len(sources)))]
+            chosen = rng.choice(len(bases), size=count, replace=False)
+            parents = tuple(bases[int(i)][1] for i in chosen)
+            return Request(self._seed, self._palette, group, number, parents)
+
+        taken = 0
+        for made, scene in self._accepted(wanted, request, 0) if sources else ():
+            taken += 1
+            names = tuple(dict.fromkeys(name_of[parent] for parent in made.parents))
+            yield replace(scene, id=self._name(scene), parents=names)
+        yield from self.bases(group, wanted - taken)
 
     def _accepted(
         self, wanted: int, request: Callable[[int], Request], first: int
@@ -285,31 +270,15 @@ class _Maker:
 
     def _sound(self, requests: list[Request]) -> Iterator[tuple[Request, Scene]]:
         fresh: list[tuple[Request, Scene]] = []
-        for made, drawn in zip(requests, self._workers.map(_drawn, requests), strict=True):
-            if drawn is not None and drawn[1] not in self._seen:
-                self._seen.add(drawn[1])
-                fresh.append((made, drawn[0]))
-        tasks = [(scene, self._order.palette) for _, scene in fresh]
-        for one, sound in zip(fresh, self._workers.map(_is_sound, tasks), strict=True):
-            if sound:
-                yield one
+        for made, scene in zip(requests, self._workers.map(draw, requests), strict=True):
+            if scene is not None and (form := fingerprint(scene.blocks)) not in self._seen:
+                self._seen.add(form)
+                fresh.append((made, scene))
+        is_sound = partial(is_acceptable, palette=PALETTES[self._palette])
+        sound = self._workers.map(is_sound, [scene for _, scene in fresh])
+        return (one for one, is_kept in zip(fresh, sound, strict=True) if is_kept)
 
     def _name(self, scene: Scene) -> str:
         level = scene.levels[0]
-        self._named[level] = self._named.get(level, 0) + 1
+        self._named[level] += 1
         return f"l{level}-{self._named[level]:0{self._width}d}-{scene.id}"
-
-
-def _drawn(request: Request) -> tuple[Scene, bytes] | None:
-    scene = draw(request)
-    return None if scene is None else (scene, fingerprint(scene.blocks))
-
-
-def _is_sound(task: tuple[Scene, Palette]) -> bool:
-    scene, palette = task
-    return is_acceptable(scene, PALETTES[palette])
-
-
-def _no_more(group: str, message: str) -> Problem:
-    hint = "ask for fewer scenes, for other levels, or for --palette full"
-    return Problem(f"level {group}", message, hint=hint)

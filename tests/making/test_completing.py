@@ -15,8 +15,8 @@ from phyblock.data import read_builtin
 from phyblock.domain import Scene
 from phyblock.errors import DataError
 from phyblock.making.checks import verify_scene
+from phyblock.making.files import check_sums
 from phyblock.making.scenes.completing import GivenScene, ReadScene, complete, derived, read_given
-from phyblock.making.scenes.files import check_sums
 from phyblock.resources import bundled
 from tests.workspace import SCENES, Workspace
 
@@ -170,11 +170,11 @@ def test_what_is_completed_is_a_data_set_that_validates_and_runs(workspace: Work
     gables, tower = read_builtin(folder).tasks
     assert (len(gables.candidates), len(tower.candidates)) == (16, 16)
     assert [c.look for c in tower.candidates.candidates][:1] == [tower.scene.blocks[0].look]
-    assert not any(verify_scene((gables.scene, gables.candidates)).values())
+    assert not verify_scene((gables.scene, gables.candidates))
     assert check_sums(folder) == (3, ())
     assert source.read_bytes() == before
     again = workspace.phyblock("scenes", "complete", "gables.yaml", "--jobs", "1")
-    assert (again.code, "holds a data set already" in again.err) == (2, True)
+    assert (again.code, "give another --out" in again.err) == (2, True)
     assert workspace.phyblock("validate", "gables-set").code == 0
     workspace.write_suite(models=["oracle"], dataset={"path": "./gables-set"}, seeds=[0])
     ran = workspace.run()
