@@ -34,7 +34,6 @@ from phyblock.models import (
     build_model,
     ends_on,
     is_billed,
-    is_unlisted,
     prices_of,
     today,
 )
@@ -101,13 +100,13 @@ def _row(name: str, config: ModelConfig) -> tuple[str, ...]:
     tariff = None if known is None else known.on(today())
     if tariff is None:
         return (name, config.id, key, "unknown", "unknown")
-    tiers = [rate.price for rate in tariff.rates]
+    tiers = [tariff, *tariff.tiers]
     return (
         name,
         config.id,
         key,
-        _usd(p.input_usd for p in tiers),
-        _usd(p.output_usd for p in tiers),
+        _usd(p.input for p in tiers),
+        _usd(p.output for p in tiers),
     )
 
 
@@ -121,16 +120,11 @@ def _print_retiring(console: Console, configs: Sequence[ModelConfig]) -> None:
     soon = date.today() + timedelta(days=_SOON_DAYS)
     dated = sorted((day, c.name, c.id) for c in configs if (day := ends_on(c)) is not None)
     rows = [(name, model_id, day.isoformat()) for day, name, model_id in dated if day <= soon]
-    rows += [(c.name, c.id, "not listed") for c in configs if is_unlisted(c)]
     if not rows:
         console.print(f"No model here is known to end within {_SOON_DAYS} days.")
         return
     print_rows(console, ("model", "id", "ends"), rows, numbers=0)
-    console.print(
-        f"By litellm {version('litellm')}, which may be behind. Not listed: retired already, or "
-        "newer than it.",
-        style="dim",
-    )
+    console.print(f"By litellm {version('litellm')}, which may be behind.", style="dim")
 
 
 @models.command()

@@ -256,8 +256,8 @@ def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) ->
     console.print(_sum_text(left))
     by_source: dict[str, list[str]] = {}
     for row in left:
-        if row.tariff is not None and row.tariff.source:
-            by_source.setdefault(row.tariff.source, []).append(row.model)
+        if row.price_source:
+            by_source.setdefault(row.price_source, []).append(row.model)
     if by_source:
         sources = [f"{source} ({', '.join(names)})" for source, names in by_source.items()]
         console.print(f"Prices of {left[0].day}: {'; '.join(sources)}.")

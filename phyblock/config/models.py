@@ -150,8 +150,8 @@ def _check_day(value: object) -> date:
     raise refuse("is no day", allowed="a day such as 2026-12-01")
 
 
-class BatchRateSpec(Section):
-    """Prices of tokens in the provider's batches."""
+class Price(Section):
+    """Prices of tokens [USD per million]."""
 
     input: UsdPerMillion
     """Prompt tokens [USD per million]."""
@@ -163,22 +163,22 @@ class BatchRateSpec(Section):
     """Prompt tokens that it puts into its cache [USD per million]; null: as the others."""
 
 
-class RateSpec(BatchRateSpec):
+class Rate(Price):
     """Prices of tokens."""
 
-    batch: BatchRateSpec | None = None
+    batch: Price | None = None
     """What they cost in batches; null: half at OpenAI's, Anthropic's and Google's own addresses,
     and at others as outside of batches."""
 
 
-class TierSpec(RateSpec):
+class Tier(Rate):
     """Prices of tokens in calls with long prompts."""
 
     above: Count
     """Prompts of more tokens than this."""
 
 
-def _check_rising(tiers: tuple[TierSpec, ...]) -> tuple[TierSpec, ...]:
+def _check_rising(tiers: tuple[Tier, ...]) -> tuple[Tier, ...]:
     for index, (tier, following) in enumerate(pairwise(tiers), start=1):
         if following.above <= tier.above:
             message, allowed = "is not above the one before it", f"more than {tier.above}"
@@ -186,17 +186,17 @@ def _check_rising(tiers: tuple[TierSpec, ...]) -> tuple[TierSpec, ...]:
     return tiers
 
 
-class PriceSpec(RateSpec):
+class Tariff(Rate):
     """The price of a model, where litellm's price map does not know it or is wrong."""
 
     since: Annotated[date, BeforeValidator(_check_day)] | None = Field(default=None, alias="from")
     """Day from which this holds (UTC). Before the first one that is named, litellm's price map
     does."""
-    tiers: Annotated[tuple[TierSpec, ...], AfterValidator(_check_rising)] = ()
+    tiers: Annotated[tuple[Tier, ...], AfterValidator(_check_rising)] = ()
     """Other prices of calls with long prompts, by rising `above`."""
 
 
-def _check_days(prices: tuple[PriceSpec, ...]) -> tuple[PriceSpec, ...]:
+def _check_days(prices: tuple[Tariff, ...]) -> tuple[Tariff, ...]:
     for index, (price, following) in enumerate(pairwise(prices), start=1):
         if following.since is None:
             message = "does not say from which day on it holds"
@@ -318,7 +318,7 @@ class ModelConfig(Section):
     """Further fields of the request body, sent as they are; not model, messages, n, best_of,
     stream, max_tokens, max_completion_tokens."""
     prices: Annotated[
-        tuple[PriceSpec, ...], AfterValidator(_check_days), BeforeValidator(_one_or_list)
+        tuple[Tariff, ...], AfterValidator(_check_days), BeforeValidator(_one_or_list)
     ] = Field(default=(), alias="price", json_schema_extra=_say_one_or_list)
     """Price, or a list of prices by the day from which they hold; null: litellm's price map, or
     unknown."""

@@ -9,17 +9,14 @@ from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.costs import (
     Budget,
     Estimate,
-    Price,
     Prices,
-    Tariff,
     ends_on,
     estimate,
     is_billed,
-    is_unlisted,
     most_usd,
     prices_of,
     today,
-)
+)  # fmt: skip
 from phyblock.models.keys import api_key_status, server_address
 from phyblock.models.litellm_client import known_providers
 from phyblock.models.model import ModelEvent, RetryPolicy, takes_format
@@ -31,41 +28,13 @@ from phyblock.models.request import (
     Message,
     Model,
     Request,
-)
+)  # fmt: skip
 from phyblock.records.record import Reply, Usage
 
 __all__ = [
-    "AskLaterError",
-    "BatchFiles",
-    "Budget",
-    "Estimate",
-    "GatheringModel",
-    "HaltedError",
-    "Image",
-    "Message",
-    "Model",
-    "ModelEvent",
-    "Price",
-    "Prices",
-    "Reply",
-    "ReplyCache",
-    "Request",
-    "RetryPolicy",
-    "Tariff",
-    "Usage",
-    "api_key_status",
-    "build_model",
-    "ends_on",
-    "estimate",
-    "is_billed",
-    "is_unlisted",
-    "known_providers",
-    "most_usd",
-    "prices_of",
-    "reply_key",
-    "server_address",
-    "takes_format",
-    "today",
-    "under_way",
+    "AskLaterError", "BatchFiles", "Budget", "Estimate", "GatheringModel", "HaltedError", "Image",
+    "Message", "Model", "ModelEvent", "Prices", "Reply", "ReplyCache", "Request", "RetryPolicy",
+    "Usage", "api_key_status", "build_model", "ends_on", "estimate", "is_billed", "known_providers",
+    "most_usd", "prices_of", "reply_key", "server_address", "takes_format", "today", "under_way",
     "waiting_keys",
-]
+]  # fmt: skip

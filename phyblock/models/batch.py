@@ -31,11 +31,11 @@ from phyblock.models.costs import (
     counted,
     estimate,
     may_be_billed,
-    most_usd,
     reply_cost_usd,
     today,
+    worst_usd,
 )
-from phyblock.models.model import EventKind, ModelEvent, Observer, RetryPolicy, format_refused
+from phyblock.models.model import EventKind, ModelEvent, Observer, RetryPolicy
 from phyblock.models.request import AskLaterError, Request
 from phyblock.records.files import BATCHES
 from phyblock.records.record import BatchEvent, BatchLine, Reply
@@ -203,7 +203,7 @@ class BatchModel:
     async def _add(self, key: str, request: Request) -> bool:
         """Put a request into the draft, or a new one; False where the budget has no room for it."""
         http, seeded = await self._written(request)
-        usd = self._most_usd(request)
+        usd = worst_usd(self.prices, self.budget, estimate(self.config, request), batched=True)
         held: int | None = None
         if self.budget is not None:
             # Under a limit prices are known.
@@ -228,18 +228,6 @@ class BatchModel:
             self._draft = _Draft(self._provider, seeded)
             self._draft.add(key, http, usd, held, seeded=seeded)
         return True
-
-    def _most_usd(self, request: Request) -> float | None:
-        """Return the most that a request can cost, also without a limit, as the command that reads
-        the answer may have one; None where no price is known.
-        """
-        day, prices = today(), self.prices
-        if prices is None or prices.on(day) is None:
-            return None
-        expected = estimate(self.config, request)
-        if self.budget is None:
-            return most_usd(prices, expected, day, batched=True)
-        return self.budget.most_usd(prices, expected, day, batched=True)
 
     def _settle(self, key: str, batch: Batch, usd: float | None) -> None:
         """Count the cost of a request, once; None is all that it can have cost."""
@@ -475,8 +463,6 @@ class BatchModel:
         except SeedRefusedError:
             self._go_without_seed()
             raise RetryableError("the provider takes no seed", sent="answered") from None
-        except ModelError as error:
-            raise format_refused(self.config, request, error) or error from None
         reply = counted(reply, estimate(self.config, request))
         return reply.model_copy(update={"latency_s": 0.0, "batched": True})
 

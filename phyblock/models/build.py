@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import re
+from typing import Any
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import Problem, SpecError
@@ -43,32 +43,25 @@ def build_model(
     if config.kind == "replay":
         return open_replay(config)
     if not config.provider:
-        hint = "for example openai/gpt-4o-2024-08-06"
-        raise SpecError(
-            Problem(f"model {config.name}", "needs a provider", "id", config.id, hint=hint)
-        )
+        where, hint = f"model {config.name}", "for example openai/gpt-4o-2024-08-06"
+        raise SpecError(Problem(where, "needs a provider", "id", config.id, hint=hint))
     policy = policy or RetryPolicy()
     own = None if budget is None else budget.of(config.name, config.max_cost_usd)
-    is_limited = own is not None and own.is_limited
-    prices = require_prices(config) if is_limited else prices_of(config)
+    prices = (require_prices if own is not None and own.is_limited else prices_of)(config)
 
     def client(at: ModelConfig, http: HttpClient | None = None) -> Client:
         return (OpenAIClient if at.is_direct else LitellmClient)(at, http)
 
+    shared: dict[str, Any] = {"config": config, "cache": cache, "budget": own, "prices": prices,
+                              "policy": policy, "observer": observer}  # fmt: skip
     if config.batch:
         assert batches is not None, "batches are kept in a run"
-        return BatchModel(
-            config=config,
-            client=lambda http: client(config, http),
-            files=batches,
-            cache=cache,
-            budget=own,
-            prices=prices,
-            policy=policy,
-            observer=observer,
-        )
-    at_each = [config.at(address) for address in config.addresses or (None,)]
-    servers = Servers([Server(_name_of(at), client(at)) for at in at_each], policy, tell)
+        return BatchModel(client=lambda http: client(config, http), files=batches, **shared)
+    each = [
+        Server(_origin(address) or config.provider, client(config.at(address)))
+        for address in config.addresses or (None,)
+    ]
+    servers = Servers(each, policy, tell)
     limits = Limits(
         config.max_concurrency,
         overall or asyncio.Semaphore(config.max_concurrency),
@@ -77,21 +70,9 @@ def build_model(
         rest_s=servers.rest_s,
         clock=policy.clock,
     )
-    return ChatModel(
-        config,
-        servers,
-        limits,
-        cache=cache,
-        budget=own,
-        prices=prices,
-        journal=journal,
-        policy=policy,
-        observer=observer,
-    )
+    return ChatModel(servers=servers, limits=limits, journal=journal, **shared)
 
 
-def _name_of(config: ModelConfig) -> str:
-    """Return scheme, host and port of a model's address; the provider where none is given."""
-    if config.api_base is None:
-        return config.provider
-    return re.split(r"(?<=[^/:])[/?#]", config.api_base, maxsplit=1)[0].lower()
+def _origin(address: str | None) -> str:
+    """Return scheme, host and port of an address."""
+    return "/".join((address or "").split("/")[:3]).lower()

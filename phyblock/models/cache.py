@@ -1,9 +1,8 @@
 """The reply cache: content-addressed, in one SQLite file that processes may share.
 
 A reply is found again when everything that decided it is the same: model, parameters, messages with
-their pictures, seed and prompt version. Where the model is served decides nothing: a server that
-comes up on another port is not asked everything again. Only whole answers are kept: no error, no
-empty, truncated or refused reply, no picture, no key.
+their pictures, seed and prompt version. Where the model is served decides nothing. Only whole
+answers are kept: no error, no empty, truncated or refused reply, no picture, no key.
 """
 
 from __future__ import annotations
@@ -27,17 +26,13 @@ SCHEMA = 1
 """Version of the file's layout and of what enters a key."""
 
 _BUSY_TIMEOUT_S = 2.0
-_FOREIGN = "belongs to another version of phyblock, or is no reply cache"
 _HINT = (
     "delete the file, or name another cache folder; answered samples of a run stay in its records"
 )
 _ELSEWHERE = "free some space, or name another cache folder with PHYBLOCK_CACHE"
 _CREATE = """
 CREATE TABLE IF NOT EXISTS replies (
-    key TEXT PRIMARY KEY,
-    model TEXT NOT NULL,
-    stored_at REAL NOT NULL,
-    reply TEXT NOT NULL
+    key TEXT PRIMARY KEY, model TEXT NOT NULL, stored_at REAL NOT NULL, reply TEXT NOT NULL
 ) WITHOUT ROWID
 """
 
@@ -77,16 +72,15 @@ class ReplyCache:
 
     Two processes that ask the same at the same time may both pay for it: the later reply stays.
     Within a process `asking` prevents that. Raises StoreError for a file that is broken, foreign or
-    cannot be used. With `tell`, which is for runs, what fails after the opening is reported once,
-    and the run goes on without the cache: replies are in its records too. A single row that cannot
-    be read is missing.
+    cannot be used. With `tell`, which is for runs, what fails after the opening is reported, and
+    the run goes on without the cache: replies are in its records too. A row that cannot be read is
+    missing.
     """
 
     def __init__(self, path: Path, tell: Callable[[str], None] | None = None) -> None:
         self.path = path
         self._tell = tell
         self._is_off = False
-        self._is_told = False
         self._asked: dict[str, asyncio.Future[None]] = {}
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -121,10 +115,8 @@ class ReplyCache:
             found = {**json.loads(row[0]), "cached": True, "attempts": 0}
             return Reply.model_validate(found, strict=True)
         except (ValueError, TypeError, RecursionError) as error:
-            if self._tell is not None and not self._is_told:
-                self._is_told = True
-                why = f"{type(error).__name__}: {error}"
-                self._tell(f"reply cache {self.path}: holds a broken reply, asked again ({why})")
+            if self._tell is not None:
+                self._tell(f"reply cache {self.path}: a broken reply is asked for again ({error})")
             return None
 
     def __contains__(self, key: object) -> bool:
@@ -143,15 +135,13 @@ class ReplyCache:
         return False
 
     @contextlib.asynccontextmanager
-    async def asking(self, key: str) -> AsyncIterator[bool]:
-        """Wait until nobody else of this process asks the same; True if somebody did."""
-        was_asked = False
+    async def asking(self, key: str) -> AsyncIterator[None]:
+        """Wait until nobody else of this process asks the same."""
         while (other := self._asked.get(key)) is not None:
-            was_asked = True
             await asyncio.wait((other,))
         self._asked[key] = asyncio.get_running_loop().create_future()
         try:
-            yield was_asked
+            yield
         finally:
             self._asked.pop(key).set_result(None)
 
@@ -175,11 +165,8 @@ class ReplyCache:
     def clear(self, model_id: str | None = None) -> int:
         """Drop all replies, or those of one model id; returns how many."""
         with self._using():
-            if model_id is None:
-                dropped = self._db.execute("DELETE FROM replies").rowcount
-            else:
-                sql = "DELETE FROM replies WHERE model = ?"
-                dropped = self._db.execute(sql, (model_id,)).rowcount
+            sql = "DELETE FROM replies WHERE ?1 IS NULL OR model = ?1"
+            dropped = self._db.execute(sql, (model_id,)).rowcount
             self._db.execute("VACUUM")
         return dropped
 
@@ -198,7 +185,9 @@ class ReplyCache:
         tables = self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
         self._db.execute("COMMIT")
         if version != SCHEMA and (version != 0 or tables != 0):
-            raise self._problem(_FOREIGN, found=f"schema {version}", allowed=f"schema {SCHEMA}")
+            message = "belongs to another version of phyblock, or is no reply cache"
+            found, allowed = f"schema {version}", f"schema {SCHEMA}"
+            raise self._problem(message, found=found, allowed=allowed)
         self._db.execute("PRAGMA journal_mode = WAL")
         self._db.execute("PRAGMA synchronous = NORMAL")
         if version != SCHEMA:
@@ -219,10 +208,8 @@ class ReplyCache:
             self._tell(f"reply cache {self.path}: cannot be used: {error}; going on without it")
 
     def _unusable(self, error: sqlite3.Error) -> StoreError:
-        hint = _HINT
-        if isinstance(error, sqlite3.OperationalError):
-            # The disk, the place or another process, not the content.
-            hint = _ELSEWHERE
+        # An operational error is of the disk, the place or another process, not of the content.
+        hint = _ELSEWHERE if isinstance(error, sqlite3.OperationalError) else _HINT
         return self._problem(f"cannot be used: {error}", hint=hint)
 
     def _problem(

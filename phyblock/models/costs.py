@@ -17,21 +17,23 @@ from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime, timedelta
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from phyblock.config.models import BatchRateSpec, ModelConfig, RateSpec, host_of
+from phyblock.config.models import ModelConfig, Price, Rate, Tariff, host_of
 from phyblock.errors import BudgetReachedError, ModelError, Problem, SpecError, UnavailableError
 from phyblock.models.keys import KEYLESS, api_key_status
 from phyblock.models.request import Image, Request, wire_params
 from phyblock.records.record import Reply, Usage
 from phyblock.types import ImageDetail
 
+_RateT = TypeVar("_RateT", bound=Rate)
+
 _MAP_FILE = "model_prices_and_context_window_backup.json"
 _MAP_KEYS = {
-    "input_usd": "input_cost_per_token",
-    "output_usd": "output_cost_per_token",
-    "cached_usd": "cache_read_input_token_cost",
-    "cache_write_usd": "cache_creation_input_token_cost",
+    "input": "input_cost_per_token",
+    "output": "output_cost_per_token",
+    "cached": "cache_read_input_token_cost",
+    "cache_write": "cache_creation_input_token_cost",
 }
 _ABOVE = re.compile(r"input_cost_per_token_above_(\d+)k_tokens")
 _HALVING_HOSTS = {
@@ -48,109 +50,72 @@ def today() -> date:
 
 
 @dataclass(frozen=True)
-class Price:
-    """US dollars per million tokens.
-
-    `cached_usd` is for prompt tokens that the provider had in its cache, `cache_write_usd` for
-    those that it put there; None: they cost as all others do.
+class Prices:
+    """Prices of a model day by day: tariffs in the order of their days; with `is_mapped` the first
+    is of litellm's map.
     """
 
-    input_usd: float
-    output_usd: float
-    cached_usd: float | None = None
-    cache_write_usd: float | None = None
-
-    @property
-    def is_free(self) -> bool:
-        """True if nothing is to be paid, whatever the numbers of tokens."""
-        return not any((self.input_usd, self.output_usd, self.cached_usd, self.cache_write_usd))
-
-    def input_cost(self, prompt: int, cached: int = 0, written: int = 0) -> float:
-        """Return US dollars of a prompt; `cached` and `written` are among its tokens."""
-        read_usd = self.input_usd if self.cached_usd is None else self.cached_usd
-        write_usd = self.input_usd if self.cache_write_usd is None else self.cache_write_usd
-        fresh = max(0, prompt - cached - written)
-        return (fresh * self.input_usd + cached * read_usd + written * write_usd) / 1_000_000
-
-    def output_cost(self, completion: int) -> float:
-        """Return US dollars of a reply."""
-        return completion * self.output_usd / 1_000_000
-
-    def cost(self, usage: Usage) -> float | None:
-        """Return US dollars of a call; None where the numbers of tokens are not known."""
-        if self.is_free:
-            return 0.0
-        if usage.prompt_tokens is None or usage.completion_tokens is None:
-            return None
-        cached, written = usage.cached_tokens or 0, usage.cache_write_tokens or 0
-        prompt = self.input_cost(usage.prompt_tokens, cached, written)
-        return prompt + self.output_cost(usage.completion_tokens)
-
-    def most(self, prompt: float, completion: int) -> float:
-        """Return the most US dollars that so many tokens can cost, all put into a cache."""
-        dearest = max(self.input_usd, self.cache_write_usd or 0.0)
-        return (prompt * dearest + completion * self.output_usd) / 1_000_000
-
-    def halved(self) -> Price:
-        """Return half the price, as batches cost at OpenAI, Anthropic and Google."""
-        halves = (None if n is None else n / 2 for n in (self.cached_usd, self.cache_write_usd))
-        return Price(self.input_usd / 2, self.output_usd / 2, *halves)
-
-
-@dataclass(frozen=True)
-class Rate:
-    """The price of calls with more prompt tokens than `above_tokens`; None in `batch`: the same."""
-
-    price: Price
-    above_tokens: int = 0
-    batch: Price | None = None
-
-
-@dataclass(frozen=True)
-class Tariff:
-    """Rates from a day on, by rising `above_tokens`, the first 0; `source` is where they stand."""
-
-    rates: tuple[Rate, ...]
-    since: date | None = None
-    source: str = ""
-
-    def at(self, prompt_tokens: int, *, batched: bool = False) -> Price:
-        """Return the price of a call with a prompt of so many tokens."""
-        longer = (rate for rate in reversed(self.rates) if prompt_tokens > rate.above_tokens)
-        rate = next(longer, self.rates[0])
-        return rate.batch if batched and rate.batch is not None else rate.price
-
-
-@dataclass(frozen=True)
-class Prices:
-    """Prices of a model day by day: tariffs in the order of their days."""
-
     tariffs: tuple[Tariff, ...]
+    is_mapped: bool = False
 
     @classmethod
     def flat(cls, input_usd: float, output_usd: float) -> Prices:
         """Return one price [US dollars per million tokens] for all days and prompts."""
-        return cls((Tariff((Rate(Price(input_usd, output_usd)),)),))
+        return cls((Tariff(input=input_usd, output=output_usd),))
 
     def on(self, day: date) -> Tariff | None:
         """Return the tariff of a day; None where nothing is known of it."""
         begun = (t for t in reversed(self.tariffs) if t.since is None or t.since <= day)
         return next(begun, None)
 
+    def source(self, day: date) -> str:
+        """Return where the tariff of a day stands."""
+        is_of_map = self.is_mapped and self.on(day) is self.tariffs[0]
+        return f"litellm {version('litellm')} map" if is_of_map else "the models file"
+
     def at(self, day: date, prompt_tokens: int = 0, *, batched: bool = False) -> Price | None:
-        """Return the price of a call; None where it is not known."""
-        tariff = self.on(day)
-        return None if tariff is None else tariff.at(prompt_tokens, batched=batched)
+        """Return the price of a call with such a prompt; None where it is not known."""
+        if (tariff := self.on(day)) is None:
+            return None
+        longer = (tier for tier in reversed(tariff.tiers) if prompt_tokens > tier.above)
+        rate: Rate = next(longer, tariff)
+        return rate.batch if batched and rate.batch is not None else rate
 
     def is_free_from(self, day: date) -> bool:
         """True if nothing is to be paid on this day and all that follow."""
         now = self.on(day)
         held = [t for t in self.tariffs if t is now or (t.since is not None and t.since > day)]
-        prices = [p for t in held for rate in t.rates for p in (rate.price, rate.batch)]
-        return now is not None and all(price is None or price.is_free for price in prices)
+        rates = [rate for tariff in held for rate in (tariff, *tariff.tiers)]
+        prices = [price for rate in rates for price in (rate, rate.batch) if price is not None]
+        return now is not None and not any(map(_numbers, prices))
 
 
-_FREE = Prices.flat(0.0, 0.0)
+def _numbers(price: Price) -> dict[str, float]:
+    """Return what is to be paid of a price, by name."""
+    return {name: usd for name in _MAP_KEYS if (usd := getattr(price, name))}
+
+
+def cost_usd(price: Price, usage: Usage) -> float | None:
+    """Return US dollars of a call; None where the numbers of tokens are not known."""
+    if not _numbers(price):
+        return 0.0
+    if usage.prompt_tokens is None or usage.completion_tokens is None:
+        return None
+    read, written = usage.cached_tokens or 0, usage.cache_write_tokens or 0
+    read_usd = price.input if price.cached is None else price.cached
+    write_usd = price.input if price.cache_write is None else price.cache_write
+    fresh = max(0, usage.prompt_tokens - read - written)
+    prompt = (fresh * price.input + read * read_usd + written * write_usd) / 1_000_000
+    return prompt + usage.completion_tokens * price.output / 1_000_000
+
+
+def reply_cost_usd(prices: Prices | None, reply: Reply, day: date) -> float | None:
+    """Return US dollars of a reply that was asked for on a day; None when price or tokens are not
+    known.
+    """
+    prompt = reply.usage.prompt_tokens or 0
+    price = None if prices is None else prices.at(day, prompt, batched=reply.batched)
+    return None if price is None else cost_usd(price, reply.usage)
 
 
 def prices_of(config: ModelConfig) -> Prices | None:
@@ -161,28 +126,24 @@ def prices_of(config: ModelConfig) -> Prices | None:
     calls elsewhere.
     """
     if config.kind != "litellm":
-        return _FREE
-
-    def price(spec: BatchRateSpec) -> Price:
-        return Price(spec.input, spec.output, spec.cached, spec.cache_write)
-
-    def rate(spec: RateSpec, above_tokens: int = 0) -> Rate:
-        batch = None if spec.batch is None else price(spec.batch)
-        return Rate(price(spec), above_tokens, batch)
-
-    tariffs = []
-    for spec in config.prices:
-        rates = (rate(spec), *(rate(tier, tier.above) for tier in spec.tiers))
-        tariffs.append(Tariff(rates, spec.since, "the models file"))
-    if not tariffs or tariffs[0].since is not None:
-        tariffs = [*_mapped_tariffs(config), *tariffs]
+        return Prices.flat(0.0, 0.0)
+    tariffs = config.prices
+    mapped = None if tariffs and tariffs[0].since is None else _mapped_tariff(config)
+    tariffs = tariffs if mapped is None else (mapped, *tariffs)
     host, base = _HALVING_HOSTS.get(config.provider), config.api_base
     if host is not None and (host_of(base) == host if base else not config.has_address):
-        tariffs = [
-            replace(t, rates=tuple(replace(r, batch=r.batch or r.price.halved()) for r in t.rates))
-            for t in tariffs
-        ]
-    return Prices(tuple(tariffs)) if tariffs else None
+        tariffs = tuple(
+            _halved(t).model_copy(update={"tiers": tuple(map(_halved, t.tiers))}) for t in tariffs
+        )
+    return Prices(tariffs, mapped is not None) if tariffs else None
+
+
+def _halved(rate: _RateT) -> _RateT:
+    """Return the rate with half its price for batches, unless it has one for them."""
+    half = Price.model_validate(
+        {name: usd if usd is None else usd / 2 for name, usd in rate if name in _MAP_KEYS}
+    )
+    return rate if rate.batch else rate.model_copy(update={"batch": half})
 
 
 def require_prices(config: ModelConfig) -> Prices:
@@ -203,15 +164,6 @@ def is_billed(config: ModelConfig) -> bool:
     if prices is None:
         return config.provider not in KEYLESS or api_key_status(config).is_set
     return not prices.is_free_from(today())
-
-
-def reply_cost_usd(prices: Prices | None, reply: Reply, day: date) -> float | None:
-    """Return US dollars of a reply that was asked for on a day; None when price or tokens are not
-    known.
-    """
-    prompt = reply.usage.prompt_tokens or 0
-    price = None if prices is None else prices.at(day, prompt, batched=reply.batched)
-    return None if price is None else price.cost(reply.usage)
 
 
 @functools.cache
@@ -250,43 +202,38 @@ def ends_on(config: ModelConfig) -> date | None:
         return None
 
 
-def is_unlisted(config: ModelConfig) -> bool:
-    """True if a provider's model is not in the map: retired already, or newer than the map."""
-    is_hosted = config.kind == "litellm" and not config.has_address
-    return is_hosted and config.provider not in KEYLESS and not map_entry(config)
-
-
-def _mapped_tariffs(config: ModelConfig) -> list[Tariff]:
-    """Return the tariff of the map, which knows no days; none where it knows no price."""
+def _mapped_tariff(config: ModelConfig) -> Tariff | None:
+    """Return the tariff of the map, which knows no days; None where it knows no price."""
     entry = map_entry(config)
-    tiers = entry.get("tiered_pricing")
-    if isinstance(tiers, list):
-        places = [(tier, "", int(tier["range"][0])) for tier in tiers if "range" in tier]
+    if isinstance(entry.get("tiered_pricing"), list):
+        tiers = entry["tiered_pricing"]
+        places = [(int(tier["range"][0]), tier, "") for tier in tiers if "range" in tier]
     else:
         found = (match[1] for match in map(_ABOVE.fullmatch, entry) if match)
-        above = [(entry, f"_above_{number}k_tokens", int(number) * 1000) for number in found]
-        places = [(entry, "", 0), *above]
+        above = [(int(number) * 1000, entry, f"_above_{number}k_tokens") for number in found]
+        places = [(0, entry, ""), *above]
     rates = [
-        Rate(price, above_tokens, _mapped_price(fields, f"{ending}_batches"))
-        for fields, ending, above_tokens in sorted(places, key=lambda place: place[2])
+        {"above": above, "batch": _mapped_price(fields, f"{ending}_batches"), **price}
+        for above, fields, ending in sorted(places, key=lambda place: place[0])
         if (price := _mapped_price(fields, ending)) is not None
     ]
-    if not rates or rates[0].above_tokens > 0:
-        return []
-    return [Tariff(tuple(rates), source=f"litellm {version('litellm')} map")]
+    if not rates or rates[0]["above"] != 0:
+        return None
+    first = {name: value for name, value in rates[0].items() if name != "above"}
+    return Tariff.model_validate({**first, "tiers": rates[1:]})
 
 
-def _mapped_price(entry: Mapping[str, Any], ending: str) -> Price | None:
+def _mapped_price(entry: Mapping[str, Any], ending: str) -> dict[str, float] | None:
     """Return the price in the keys that end so; that of a cached prompt may lack the ending, and
     is never more than that of the prompt.
     """
     found = {name: entry.get(key + ending) for name, key in _MAP_KEYS.items()}
     usd = {name: float(n) * 1_000_000 for name, n in found.items() if n is not None}
-    if "input_usd" not in usd or "output_usd" not in usd:
+    if "input" not in usd or "output" not in usd:
         return None
-    if (usual := entry.get(_MAP_KEYS["cached_usd"])) is not None:
-        usd.setdefault("cached_usd", min(float(usual) * 1_000_000, usd["input_usd"]))
-    return Price(**usd)
+    if (usual := entry.get(_MAP_KEYS["cached"])) is not None:
+        usd.setdefault("cached", min(float(usual) * 1_000_000, usd["input"]))
+    return usd
 
 
 _TYPICAL_REPLY_TOKENS = 500
@@ -342,11 +289,7 @@ class ModelBudget:
         self._under_way: set[int] = set()
         self._settled = 0
         self._prompt_ratio = self._reply_ratio = 1.0
-
-    @property
-    def is_limited(self) -> bool:
-        """True if a limit holds the model, its own or the run's."""
-        return min(self._max_usd, self._run.max_usd) < math.inf
+        self.is_limited = min(self._max_usd, run.max_usd) < math.inf
 
     def most_usd(
         self, prices: Prices, expected: Estimate, day: date, *, batched: bool = False
@@ -469,15 +412,34 @@ def estimate(config: ModelConfig, request: Request) -> Estimate:
 def most_usd(
     prices: Prices, expected: Estimate, day: date, ratio: float = 1.0, *, batched: bool = False
 ) -> float:
-    """Return the most US dollars that a call can cost, its prompt `ratio` times its estimate.
+    """Return the most US dollars that a call can cost, its prompt `ratio` times its estimate and
+    all put into a cache.
 
     There is a margin on the prompt, as its tokens are estimated, and a day: a call that is sent
     before midnight may be answered after it, and one of a batch a day after that.
     """
     prompt = expected.prompt_tokens * _PROMPT_MARGIN * ratio
     days = [day + timedelta(days=n) for n in range(3 if batched else 2)]
-    known = [prices.at(one, math.ceil(prompt), batched=batched) for one in days]
-    return max(p.most(prompt, expected.most_completion_tokens) for p in known if p is not None)
+    prices_then = [prices.at(one, math.ceil(prompt), batched=batched) for one in days]
+    longest = expected.most_completion_tokens
+    return max(
+        (prompt * max(p.input, p.cache_write or 0.0) + longest * p.output) / 1_000_000
+        for p in prices_then
+        if p is not None
+    )
+
+
+def worst_usd(
+    prices: Prices | None, budget: ModelBudget | None, expected: Estimate, *, batched: bool = False
+) -> float | None:
+    """Return the most that a call can cost today, as far as the model is known by now; None where
+    no price is known.
+    """
+    if prices is None or prices.on(today()) is None:
+        return None
+    if budget is None:
+        return most_usd(prices, expected, today(), batched=batched)
+    return budget.most_usd(prices, expected, today(), batched=batched)
 
 
 def may_be_billed(error: ModelError) -> bool:

@@ -61,8 +61,8 @@ class Limits:
     async def slot(self, tokens: int) -> AsyncIterator[Started]:
         """Hold a place of the model and of the whole run; `tokens` is the estimate for tpm.
 
-        Requests are admitted one after the other, so that nothing fills the window between the wait
-        and the start, and a model that waits for its minute holds no place that another could use.
+        Requests are admitted one after the other; a model that waits for its minute holds no place
+        that another could use.
         """
         async with self._under_way:
             async with self._admission:

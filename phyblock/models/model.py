@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import random
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
@@ -12,13 +11,7 @@ from typing import Literal
 from tenacity import AsyncRetrying, RetryCallState, retry_if_exception_type
 
 from phyblock.config.models import DIRECT_PROVIDERS, ModelConfig
-from phyblock.errors import (
-    BudgetReachedError,
-    ModelError,
-    RefusedError,
-    RetryableError,
-    UnavailableError,
-)
+from phyblock.errors import BudgetReachedError, ModelError, RetryableError, UnavailableError
 from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.client import SeedRefusedError
 from phyblock.models.costs import (
@@ -29,26 +22,17 @@ from phyblock.models.costs import (
     estimate,
     map_entry,
     may_be_billed,
-    most_usd,
     reply_cost_usd,
     today,
+    worst_usd,
 )
 from phyblock.models.limits import Clock, Limits
-from phyblock.models.request import Journal, Request, wire_params
+from phyblock.models.request import Journal, Request
 from phyblock.models.servers import Server, Servers
 from phyblock.records.record import Call, Reply
 
-_FORMAT_HINT = (
-    "if the provider takes no JSON schema, set response_format: never for this model in the models "
-    "file: the prompt says the form all the same"
-)
 _SCHEMA_PROVIDERS = ("predibase", "fireworks_ai", "lm_studio", "nebius", "databricks")
 """Providers of which litellm knows that all their models take a schema."""
-_SPEAKS_OF_FORMAT = re.compile(
-    r"response_?(?:format|schema|json_?schema)|json[_ ]?schema|structured[_ ]outputs?"
-    r"|output_(?:format|config)|guided[_ ](?:json|decoding)|\bgrammar\b",
-    re.IGNORECASE,
-)
 
 EventKind = Literal["retry", "seed_unsupported", "unavailable", "batch"]
 
@@ -72,7 +56,7 @@ class ModelEvent:
 Observer = Callable[[ModelEvent], None]
 
 Tell = Callable[[str], None]
-"""Told in plain words what concerns no single model: a server that is gone, a cache that fails."""
+"""Called with what concerns no single model: a server that is gone, a cache that fails."""
 
 
 @dataclass(frozen=True)
@@ -80,16 +64,12 @@ class RetryPolicy:
     """Limits on how often and how long a request is sent again.
 
     A request is given up when it has failed `attempts` times and `retry_for_s` have passed since
-    it first failed, both: attempts that fail at once outlast an outage, attempts that each take
-    long are bounded by their number. HTTP 2xx with an unreadable body is an answer that was paid
-    for: there the number alone decides.
+    it first failed, both. HTTP 2xx with an unreadable body is an answer that was paid for: there
+    the number alone decides.
 
     The wait before attempt n + 1 is uniform between 0 and min(`max_wait_s`, `base_s` * 2^(n-1)),
-    on top of the server's `Retry-After` (followed up to `max_retry_after_s`). Eight attempts leave
-    one request in a million unanswered when 18 % of the requests fail.
-
-    A server that has not answered once is given up after `max_connection_failures` tries already:
-    its address is probably wrong.
+    on top of the server's `Retry-After` (followed up to `max_retry_after_s`). A server that has not
+    answered once is given up after `max_connection_failures` tries: its address is probably wrong.
     """
 
     attempts: int = 8
@@ -102,15 +82,12 @@ class RetryPolicy:
 
     def gives_up(self, error: ModelError, failures: int, failing_for_s: float) -> bool:
         """Return True if what failed so often and so long is not tried again."""
-        if failures < self.attempts:
-            return False
         is_success = error.status is not None and 200 <= error.status < 300
-        return is_success or failing_for_s >= self.retry_for_s
+        return failures >= self.attempts and (is_success or failing_for_s >= self.retry_for_s)
 
     def followed_s(self, error: ModelError) -> float:
         """Return how much of the wait that the server asked for is followed [s]."""
-        asked_s = error.retry_after_s if isinstance(error, RetryableError) else None
-        return min(asked_s or 0.0, self.max_retry_after_s)
+        return min(getattr(error, "retry_after_s", None) or 0.0, self.max_retry_after_s)
 
     def retrying(
         self,
@@ -119,8 +96,8 @@ class RetryPolicy:
     ) -> AsyncRetrying:
         """Return tenacity's loop for one request: it goes on after a RetryableError alone.
 
-        `on_retry` hears of the error and the wait [s] before each wait; once `is_over`, nothing is
-        tried again.
+        `on_retry` is called with the error and the wait [s] before each wait; once `is_over`,
+        nothing is tried again.
         """
         first_failure_s: list[float] = []
 
@@ -130,19 +107,18 @@ class RetryPolicy:
             return error
 
         def stop(state: RetryCallState) -> bool:
-            now_s = self.clock.now()
-            first_failure_s.append(now_s)
-            lasted_s = now_s - first_failure_s[0]
+            first_failure_s.append(self.clock.now())
+            lasted_s = first_failure_s[-1] - first_failure_s[0]
             return is_over() or self.gives_up(error_of(state), state.attempt_number, lasted_s)
 
         def wait(state: RetryCallState) -> float:
             doubled_s = self.base_s * 2.0 ** min(state.attempt_number - 1, 60)
-            jitter_s = random.uniform(0.0, min(self.max_wait_s, doubled_s))
-            return self.followed_s(error_of(state)) + jitter_s
+            return self.followed_s(error_of(state)) + random.uniform(
+                0.0, min(self.max_wait_s, doubled_s)
+            )
 
         def before_sleep(state: RetryCallState) -> None:
-            wait_s = state.next_action.sleep if state.next_action is not None else 0.0
-            on_retry(error_of(state), wait_s)
+            on_retry(error_of(state), state.upcoming_sleep)
 
         return AsyncRetrying(
             sleep=self.clock.sleep,
@@ -170,36 +146,24 @@ class _Call:
     is_cancelled: bool = False
 
 
+@dataclass(eq=False, kw_only=True)
 class ChatModel:
     """Asks a provider, at most as often as needed."""
 
-    needs_messages = True
+    config: ModelConfig
+    servers: Servers
+    limits: Limits
+    cache: ReplyCache | None = None
+    budget: ModelBudget | None = None
+    prices: Prices | None = None
+    journal: Journal | None = None
+    policy: RetryPolicy
+    observer: Observer
+    needs_messages: bool = field(default=True, init=False)
 
-    def __init__(
-        self,
-        config: ModelConfig,
-        servers: Servers,
-        limits: Limits,
-        *,
-        cache: ReplyCache | None,
-        budget: ModelBudget | None,
-        prices: Prices | None,
-        journal: Journal | None,
-        policy: RetryPolicy,
-        observer: Observer,
-    ) -> None:
-        self.name = config.name
-        self._config = config
-        self._servers = servers
-        self._limits = limits
-        self._cache = cache
-        self._budget = budget
-        self._prices = prices
-        self._journal = journal
-        self._policy = policy
-        self._observer = observer
-        self._takes_seed = config.seed != "never"
-        self._took_format = False
+    def __post_init__(self) -> None:
+        self.name = self.config.name
+        self._takes_seed = self.config.seed != "never"
         self._is_told_unavailable = False
 
     async def ask(self, request: Request) -> Reply:
@@ -211,48 +175,47 @@ class ChatModel:
         Cancelled while it waits, it gives up at once. Cancelled while a request is under way, which
         is paid for, it returns the answer; a second cancellation gives that up too.
         """
-        if self._cache is None and self._journal is None:
-            return await self._ask(request, "")
-        key = reply_key(self._config, request)
-        if self._journal is not None and (answered := self._journal.kept(key)) is not None:
+        is_keyed = self.cache is not None or self.journal is not None
+        key = reply_key(self.config, request) if is_keyed else ""
+        if self.journal is not None and (answered := self.journal.kept(key)) is not None:
             return answered
-        if self._cache is None:
+        if self.cache is None:
             return await self._ask(request, key)
-        async with self._cache.asking(key):
-            kept = self._cache.get(key)
+        async with self.cache.asking(key):
+            kept = self.cache.get(key)
             if kept is not None:
                 return kept.model_copy(update={"cost_usd": self._cost_usd(kept)})
             reply = await self._ask(request, key)
-            self._cache.put(key, self._config.id, reply)
+            self.cache.put(key, self.config.id, reply)
             return reply
 
     @property
     def under_way(self) -> int:
         """Requests that were sent and are not answered."""
-        return sum(server.under_way for server in self._servers.all)
+        return sum(server.under_way for server in self.servers.all)
 
     async def aclose(self) -> None:
         """Release connections."""
-        for server in self._servers.all:
+        for server in self.servers.all:
             await server.client.aclose()
 
     async def _ask(self, request: Request, key: str) -> Reply:
         """Send until answered; whatever ends it, what was billed is reported."""
-        call = _Call(request, key, estimate(self._config, request))
+        call = _Call(request, key, estimate(self.config, request))
 
         def on_retry(error: RetryableError, wait_s: float) -> None:
             if call.failed_at is not None:
-                self._servers.pause(call.failed_at, error, wait_s)
-            self._tell("retry", str(error), wait_s, error.status)
+                self.servers.pause(call.failed_at, error, wait_s)
+            self.observer(ModelEvent(self.name, "retry", str(error), wait_s, error.status))
 
         try:
-            async for attempt in self._policy.retrying(on_retry, lambda: call.is_cancelled):
+            async for attempt in self.policy.retrying(on_retry, lambda: call.is_cancelled):
                 with attempt:
                     return await self._attempt(call)
         except (UnavailableError, BudgetReachedError, asyncio.CancelledError) as error:
             if isinstance(error, UnavailableError) and not self._is_told_unavailable:
                 self._is_told_unavailable = True
-                self._tell("unavailable", str(error))
+                self.observer(ModelEvent(self.name, "unavailable", str(error)))
             if not call.billed_usd or call.failure is None:
                 raise
             # These leave no record. The attempt that was billed needs one, and the next request
@@ -269,68 +232,53 @@ class ChatModel:
 
     async def _attempt(self, call: _Call) -> Reply:
         """Send once, at a server that does not refuse everything."""
-        expected, clock = call.expected, self._policy.clock
+        expected = call.expected
         while True:
-            async with self._limits.slot(
+            async with self.limits.slot(
                 expected.prompt_tokens + expected.completion_tokens
             ) as slot:
-                server = self._servers.pick(call.failed_at)
-                began_s = clock.now()
+                server, began_s = self.servers.pick(call.failed_at), self.policy.clock.now()
                 try:
                     reply = await self._send_as_taken(call, server)
                 except ModelError as error:
-                    who = (self.name, call.request.key, call.request.seed)
                     if isinstance(error, RetryableError):
                         call.failure, call.failed_at = error, server
-                    is_servers_fault = self._servers.failed(server, error, who, began_s)
-                    self._servers.usable()
+                    is_servers_fault = self.servers.failed(server, error, began_s)
+                    self.servers.usable()
                     if is_servers_fault and not call.is_cancelled:
                         continue
                     raise
-                self._servers.replied(server)
-                used = (reply.usage.prompt_tokens, reply.usage.completion_tokens)
-                if None not in used:
-                    self._limits.settle(slot, sum(n for n in used if n is not None))
+                self.servers.heard(server)
+                prompt, completion = reply.usage.prompt_tokens, reply.usage.completion_tokens
+                if prompt is not None and completion is not None:
+                    self.limits.settle(slot, prompt + completion)
                 return reply
 
     async def _send_as_taken(self, call: _Call, server: Server) -> Reply:
-        """Send with the seed and the format of the answer, as far as the provider takes them.
+        """Send with the seed, or without where the provider takes none.
 
         That an error speaks of a seed proves nothing, as some repeat the whole request: only a
-        reply to the same request without a seed does. A provider that refuses the format would
-        refuse it every time; one that has taken it once means something else.
+        reply to the same request without a seed does.
         """
-        with_seed = self._takes_seed
         try:
-            try:
-                reply = await self._send(call, server, with_seed=with_seed)
-            except SeedRefusedError as error:
-                call.sent -= error.sent == "no"
-                if self._config.seed == "always":
-                    why = "the provider takes no seed, and seed is `always`"
-                    raise UnavailableError(why) from None
-                reply = await self._send(call, server, with_seed=False)
-                if self._takes_seed:
-                    self._takes_seed = False
-                    self._tell("seed_unsupported", "takes no seed: seeds are independent repeats")
-        except ModelError as error:
-            refused = format_refused(self._config, call.request, error)
-            if refused is None or self._took_format:
-                raise
-            raise refused from None
-        self._took_format = True
+            return await self._send(call, server, with_seed=self._takes_seed)
+        except SeedRefusedError as error:
+            call.sent -= error.sent == "no"
+            if self.config.seed == "always":
+                why = "the provider takes no seed, and seed is `always`"
+                raise UnavailableError(why) from None
+            reply = await self._send(call, server, with_seed=False)
+        if self._takes_seed:
+            self._takes_seed = False
+            why = "takes no seed: seeds are independent repeats"
+            self.observer(ModelEvent(self.name, "seed_unsupported", why))
         return reply
 
     async def _send(self, call: _Call, server: Server, *, with_seed: bool) -> Reply:
-        """Send with the call's greatest cost reserved in the budget and written in the journal.
-
-        A failure that may have been billed counts in full; a model that is found unable before
-        anything is sent costs nothing.
-        """
-        budget = self._budget
+        """Send with the call's greatest cost reserved in the budget."""
         held: int | None = None
-        if budget is not None and self._most_usd(call) is not None:
-            held = await budget.reserve(lambda: self._most_usd(call) or 0.0)
+        if self.budget is not None and self._most_usd(call) is not None:
+            held = await self.budget.reserve(lambda: self._most_usd(call) or 0.0)
         exchange = asyncio.ensure_future(self._exchange(call, server, held, with_seed=with_seed))
         try:
             return await asyncio.shield(exchange)
@@ -341,15 +289,18 @@ class ChatModel:
     async def _exchange(
         self, call: _Call, server: Server, held: int | None, *, with_seed: bool
     ) -> Reply:
-        """Write that a call is sent, send it, and write what became of it."""
-        budget, journal = self._budget, self._journal
+        """Write that a call is sent, send it, and write what became of it.
+
+        A failure that may have been billed counts in full; a model that is found unable before
+        anything is sent, and a bug of ours, which ends the run, cost nothing.
+        """
         written: Call | None = None
         reply: Reply | None = None
         spent_usd: float | None = 0.0
         try:
-            if journal is not None:
+            if self.journal is not None:
                 sample, most_usd = call.request.sample, self._most_usd(call)
-                written = await journal.sent(self.name, sample, call.key, most_usd)
+                written = await self.journal.sent(self.name, sample, call.key, most_usd)
                 if call.is_cancelled:
                     raise asyncio.CancelledError
             call.sent += 1
@@ -362,60 +313,31 @@ class ChatModel:
                 server.under_way -= 1
             reply = counted(reply, call.expected)
             spent_usd = self._cost_usd(reply)
-            if budget is not None:
-                budget.learn(call.expected, reply.usage)
-        except UnavailableError:
-            spent_usd = 0.0
-            raise
+            if self.budget is not None:
+                self.budget.learn(call.expected, reply.usage)
         except ModelError as error:
-            spent_usd = None if may_be_billed(error) else 0.0
+            is_free = isinstance(error, UnavailableError) or not may_be_billed(error)
+            spent_usd = 0.0 if is_free else None
             raise
         except Exception:
-            # A bug of ours, which ends the run, is not charged.
             spent_usd = 0.0
             raise
         finally:
-            if held is not None and budget is not None:
-                spent_usd = budget.settle(held, spent_usd)
+            if held is not None and self.budget is not None:
+                spent_usd = self.budget.settle(held, spent_usd)
                 call.billed_usd = (call.billed_usd or 0.0) + spent_usd
             if reply is not None:
                 known = {"billed_usd": call.billed_usd, "attempts": call.sent}
                 reply = reply.model_copy(update={"cost_usd": self._cost_usd(reply), **known})
-            if journal is not None and written is not None:
-                await journal.ended(written, spent_usd, reply)
+            if self.journal is not None and written is not None:
+                await self.journal.ended(written, spent_usd, reply)
         return reply
 
     def _most_usd(self, call: _Call) -> float | None:
-        """Return the most that a call can cost by now; None where no price is known."""
-        day, prices = today(), self._prices
-        if prices is None or prices.on(day) is None:
-            return None
-        if self._budget is None:
-            return most_usd(prices, call.expected, day)
-        return self._budget.most_usd(prices, call.expected, day)
+        return worst_usd(self.prices, self.budget, call.expected)
 
     def _cost_usd(self, reply: Reply) -> float | None:
-        return reply_cost_usd(self._prices, reply, today())
-
-    def _tell(
-        self, kind: EventKind, message: str, wait_s: float = 0.0, status: int | None = None
-    ) -> None:
-        self._observer(ModelEvent(self.name, kind, message, wait_s, status))
-
-
-def format_refused(
-    config: ModelConfig, request: Request, error: ModelError
-) -> UnavailableError | None:
-    """Return the error of a provider that does not take the `response_format` that was sent; None
-    where an error cannot mean that.
-    """
-    is_sent = "response_format" in wire_params(config, request)
-    may_refuse = error.status in (400, 422) or error.sent == "no"
-    if not is_sent or not may_refuse or isinstance(error, RefusedError):
-        return None
-    if _SPEAKS_OF_FORMAT.search(str(error)) is None:
-        return None
-    return UnavailableError(f"{error} ({_FORMAT_HINT})", status=error.status, sent=error.sent)
+        return reply_cost_usd(self.prices, reply, today())
 
 
 def takes_format(config: ModelConfig) -> bool:
@@ -424,7 +346,6 @@ def takes_format(config: ModelConfig) -> bool:
     Self-hosted servers that speak the OpenAI protocol (vLLM, SGLang, llama.cpp, LM Studio, Ollama)
     do; of all others litellm's map of models is believed.
     """
-    if config.provider in DIRECT_PROVIDERS and config.has_address:
-        return True
-    is_known = config.provider in _SCHEMA_PROVIDERS
+    is_own = config.provider in DIRECT_PROVIDERS and config.has_address
+    is_known = is_own or config.provider in _SCHEMA_PROVIDERS
     return is_known or bool(map_entry(config).get("supports_response_schema"))

@@ -7,8 +7,8 @@ does not come in time shows neither: some requests are slow.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from phyblock.errors import ModelError, RetryableError, UnavailableError
@@ -18,23 +18,15 @@ if TYPE_CHECKING:
     from phyblock.models.model import RetryPolicy
 
 FAILURES_TO_REST = 5
-_REQUESTS_TO_REST = 2
-"""One request that a server cannot survive is no outage."""
 _LONGEST_REST_S = 15.0
-_WORTH_A_WORD_S = 10.0
 _GATEWAY = (502, 503, 504)
 _TOO_MUCH = (429, 529)
-"""Too many requests; overloaded, as Anthropic says it."""
 
 
 @dataclass(eq=False)
 class Server:
-    """One server, and what is known of it.
-
-    `failures` in a row show that it is not there, of the requests `failed`, the first at
-    `down_since_s`; since then it has rested `rests` times, until `rests_until_s`. `unreadable`
-    counts successes without a reply before the first reply. `refusal` is the reason why it is asked
-    no more.
+    """One server: `failures` in a row show that it is away, since `away_since_s`; from the fifth on
+    it rests after each. `refusal` is the reason why it is asked no more.
     """
 
     name: str
@@ -42,14 +34,10 @@ class Server:
     under_way: int = 0
     sent: int = 0
     failures: int = 0
-    failed: set[Hashable] = field(default_factory=set)
-    down_since_s: float = 0.0
-    rests: int = 0
+    away_since_s: float = 0.0
     rested_at_s: float = float("-inf")
     rests_until_s: float = float("-inf")
     was_heard: bool = False
-    has_replied: bool = False
-    unreadable: int = 0
     refusal: UnavailableError | None = None
 
 
@@ -63,19 +51,16 @@ class Servers:
         self._policy = policy
         self._tell = tell
 
-    def rest_s(self) -> float:
-        """Return the seconds until some server may be asked; UnavailableError when none is left."""
-        return max(0.0, min(s.rests_until_s for s in self.usable()) - self._policy.clock.now())
-
     def usable(self) -> list[Server]:
         """List the servers that are not given up; raises UnavailableError when there is none."""
         usable = [server for server in self.all if server.refusal is None]
-        if not usable:
-            refusal = self.all[-1].refusal
-            assert refusal is not None
-            more = f" (so it is with all {len(self.all)} servers)" if len(self.all) > 1 else ""
-            raise UnavailableError(f"{refusal}{more}", status=refusal.status, sent=refusal.sent)
+        if not usable and (refusal := self.all[-1].refusal) is not None:
+            raise UnavailableError(str(refusal), status=refusal.status, sent=refusal.sent)
         return usable
+
+    def rest_s(self) -> float:
+        """Return the seconds until some server may be asked; UnavailableError when none is left."""
+        return max(0.0, min(s.rests_until_s for s in self.usable()) - self._policy.clock.now())
 
     def pick(self, failed: Server | None = None) -> Server:
         """Return the server to ask: one that does not rest and has the fewest requests under way.
@@ -88,16 +73,19 @@ class Servers:
             self.usable(),
             key=lambda s: (max(0.0, s.rests_until_s - now_s), s is failed, s.under_way, s.sent),
         )
-        if chosen.rests:
+        if chosen.failures >= FAILURES_TO_REST:
             chosen.rests_until_s = now_s + self._rest_of(chosen)
         return chosen
 
-    def replied(self, server: Server) -> None:
-        """Note that a server gave a reply."""
-        server.has_replied = True
-        self._heard(server)
+    def heard(self, server: Server) -> None:
+        """Note that a server answered."""
+        if server.failures >= FAILURES_TO_REST:
+            lasted_s = self._policy.clock.now() - server.away_since_s
+            self._tell(f"{server.name} answers again after {lasted_s:.0f} s")
+            server.rests_until_s = float("-inf")
+        server.was_heard, server.failures = True, 0
 
-    def failed(self, server: Server, error: ModelError, request: Hashable, sent_s: float) -> bool:
+    def failed(self, server: Server, error: ModelError, sent_s: float) -> bool:
         """Note that a request that was sent at `sent_s` failed; True if that is the server's fault,
         so that another attempt is free.
 
@@ -105,41 +93,31 @@ class Servers:
         """
         if isinstance(error, UnavailableError):
             self._refuse(server, error)
-            return any(other.refusal is None for other in self.all)
-        server.was_heard |= error.status is not None
-        is_away = error.sent in ("no", "lost") or error.status in _GATEWAY
-        if not isinstance(error, RetryableError) or not is_away:
-            if error.sent == "answered":
-                self._heard(server)
-            if 200 <= (error.status or 0) < 300 and not server.has_replied:
-                server.unreadable += 1
-                if server.unreadable >= self._policy.max_connection_failures:
-                    self._give_up(server, "never gave a reply that can be read", error)
-            return False
-        now_s = self._policy.clock.now()
-        server.down_since_s = server.down_since_s if server.failures else now_s
-        server.failures += 1
-        server.failed.add(request)
-        if server.rests and sent_s <= server.rested_at_s:
             return True
-        if server.failures < FAILURES_TO_REST or len(server.failed) < _REQUESTS_TO_REST:
+        if error.sent not in ("no", "lost") and error.status not in _GATEWAY:
+            if error.sent == "answered":
+                self.heard(server)
             return False
-        server.rests += 1
+        server.was_heard |= error.status is not None
+        if server.failures >= FAILURES_TO_REST and sent_s <= server.rested_at_s:
+            return True
+        now_s = self._policy.clock.now()
+        server.away_since_s = server.away_since_s if server.failures else now_s
+        server.failures += 1
+        if server.failures < FAILURES_TO_REST:
+            return False
         server.rested_at_s = now_s
         wait_s = max(self._rest_of(server), self._policy.followed_s(error))
         server.rests_until_s = now_s + wait_s
-        lasted_s = now_s - server.down_since_s
-        tries = FAILURES_TO_REST + server.rests - 1
-        if self._policy.gives_up(error, server.rests, lasted_s):
-            self._give_up(server, f"could not be reached for {lasted_s:.0f} s", error)
-        elif not server.was_heard and tries >= self._policy.max_connection_failures:
-            self._give_up(server, f"never answered, {tries} times in a row", error)
-        elif server.rests == 1:
-            self._tell(f"{server.name} cannot be reached, trying now and then: {error}")
-        elif wait_s >= _WORTH_A_WORD_S:
-            self._tell(
-                f"{server.name} still cannot be reached: tried {tries} times, for {lasted_s:.0f} s"
-            )
+        lasted_s, name = now_s - server.away_since_s, server.name
+        if self._policy.gives_up(error, server.failures - FAILURES_TO_REST + 1, lasted_s):
+            why = f"{name} could not be reached for {lasted_s:.0f} s: {error}"
+            self._refuse(server, UnavailableError(why, sent="no"))
+        elif not server.was_heard and server.failures >= self._policy.max_connection_failures:
+            why = f"{name} never answered, {server.failures} times in a row: {error}"
+            self._refuse(server, UnavailableError(why, sent="no"))
+        elif server.failures == FAILURES_TO_REST:
+            self._tell(f"{name} cannot be reached, trying now and then: {error}")
         return True
 
     def pause(self, server: Server, error: RetryableError, wait_s: float) -> None:
@@ -148,23 +126,11 @@ class Servers:
             until_s = self._policy.clock.now() + wait_s
             server.rests_until_s = max(server.rests_until_s, until_s)
 
-    def _give_up(self, server: Server, why: str, error: ModelError) -> None:
-        self._refuse(server, UnavailableError(f"{server.name} {why}: {error}", sent="no"))
-
     def _refuse(self, server: Server, error: UnavailableError) -> None:
         is_first, server.refusal = server.refusal is None, error
         if is_first and any(other.refusal is None for other in self.all):
             self._tell(f"{server.name} is asked no more: {error}")
 
-    def _heard(self, server: Server) -> None:
-        if server.rests:
-            lasted_s = self._policy.clock.now() - server.down_since_s
-            self._tell(f"{server.name} answers again after {lasted_s:.0f} s: going on")
-            server.rests_until_s = float("-inf")
-        server.was_heard = True
-        server.failures = server.rests = 0
-        server.failed.clear()
-
     def _rest_of(self, server: Server) -> float:
-        most_s = min(_LONGEST_REST_S, self._policy.max_wait_s)
-        return min(most_s, self._policy.base_s * 2.0 ** min(server.rests, 60))
+        doubled_s = self._policy.base_s * 2.0 ** min(server.failures - FAILURES_TO_REST + 1, 60)
+        return min(_LONGEST_REST_S, self._policy.max_wait_s, doubled_s)

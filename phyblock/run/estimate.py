@@ -17,7 +17,6 @@ from phyblock.models import (
     Prices,
     ReplyCache,
     Request,
-    Tariff,
     is_billed,
     most_usd,
     prices_of,
@@ -100,8 +99,8 @@ class Estimate:
         if self.prices is not None:
             price = self.prices.at(self.day, expected.prompt_tokens, batched=self.batch)
         if self.prices is not None and price is not None:
-            reply_usd = price.output_cost(1)
-            self._prompt_usd += price.input_cost(expected.prompt_tokens)
+            reply_usd = price.output / 1_000_000
+            self._prompt_usd += expected.prompt_tokens * price.input / 1_000_000
             self._most_usd += most_usd(self.prices, expected, self.day, batched=self.batch)
         self.lengths[kind].coming[usual, most, reply_usd] += 1
 
@@ -117,20 +116,21 @@ class Estimate:
         return round(sum(lengths.expected()[0] for lengths in self.lengths.values()))
 
     @property
-    def tariff(self) -> Tariff | None:
-        """The prices of the day, with where they are said."""
-        return None if self.prices is None else self.prices.on(self.day)
+    def price_source(self) -> str:
+        """Where the price of the day stands, "" where none is known."""
+        is_known = self.prices is not None and self.prices.on(self.day) is not None
+        return self.prices.source(self.day) if is_known and self.prices is not None else ""
 
     @property
     def prompt_usd(self) -> float | None:
         """Dollars of the prompts alone."""
-        return None if self.tariff is None else self._prompt_usd
+        return None if not self.price_source else self._prompt_usd
 
     @property
     def reply_usd(self) -> float | None:
         """Dollars of the replies alone."""
         usd = sum(lengths.expected()[1] for lengths in self.lengths.values())
-        return None if self.tariff is None else usd
+        return None if not self.price_source else usd
 
     @property
     def cost_usd(self) -> float | None:
@@ -147,7 +147,7 @@ class Estimate:
     @property
     def most_usd(self) -> float | None:
         """Dollars if every reply were as long as it can be and no call had to be repeated."""
-        return None if self.tariff is None else self._most_usd
+        return None if not self.price_source else self._most_usd
 
 
 def estimate(

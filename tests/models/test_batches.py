@@ -413,22 +413,6 @@ def test_a_provider_that_takes_no_seed_is_asked_again_without(disk: Disk) -> Non
         assert "seed is `always`" in str(refused)
 
 
-def test_a_refused_schema_stops_the_model_with_what_to_do(disk: Disk) -> None:
-    class Schemaless(OpenAIBatches):
-        def line(self, custom_id: str, seen: Any, ending: str) -> dict[str, Any]:
-            line = super().line(custom_id, seen, ending)
-            error = self.error(400, "400", "response_format is not supported")
-            line["response"] = {"status_code": 400, "body": error}
-            return line
-
-    with Running(Schemaless()) as running:
-        config = config_at("direct", running.url, response_format="always")
-        request = replace(make_request(), response_format={"type": "json_schema"})
-        (refused,) = run_command(config, disk, [request])
-    assert isinstance(refused, UnavailableError)
-    assert "response_format: never" in str(refused)
-
-
 TOKEN = "pb0"
 keys = st.lists(st.sampled_from("abcdef"), unique=True, min_size=1)
 fates = st.sampled_from(["intended", "created", "lost", "ended"])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -15,7 +14,6 @@ from phyblock.errors import (
     ModelError,
     RetryableError,
     SampleError,
-    Sent,
     UnavailableError,
     UnreachableError,
 )
@@ -23,7 +21,7 @@ from phyblock.models import Model, Reply, Request, RetryPolicy
 from phyblock.models.limits import Limits
 from phyblock.models.model import ChatModel
 from phyblock.models.servers import FAILURES_TO_REST, Server, Servers
-from tests.models.factory import QUICK, ask, make_model, make_request, run, with_fields
+from tests.models.factory import ask, make_model, make_request, run, with_fields
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.models.test_limits import FakeTime
 from tests.servers.chassis import Faults, Running, kill, start
@@ -84,9 +82,10 @@ def ask_through(
         servers = Servers([Server("http://gone:1", client)], policy, told.append)  # type: ignore[arg-type]
         overall = asyncio.Semaphore(width)
         limits = Limits(width, overall, rest_s=servers.rest_s, clock=time.clock)
-        more: dict[str, Any] = {"cache": None, "budget": None, "prices": None, "journal": None}
         config = ModelConfig(name="m", id="openai/m", api_base="http://gone:1/v1")
-        model = ChatModel(config, servers, limits, policy=policy, observer=lambda _: None, **more)
+        model = ChatModel(
+            config=config, servers=servers, limits=limits, policy=policy, observer=lambda _: None
+        )
         queue = [make_request(f"{n:03}") for n in range(samples)]
 
         async def work() -> None:
@@ -137,12 +136,9 @@ def test_a_wrong_address_stops_the_model_after_few_attempts_and_leaves_its_sampl
     assert len(answers) == width
     assert f"http://gone:1 never answered, 20 times in a row: {LOST}" in str(answers[0])
     assert client.failed <= width + FAILURES_TO_REST + 30
-    first, *later = told
-    assert first.startswith(f"http://gone:1 cannot be reached, trying now and then: {LOST}")
+    (text,) = told
+    assert text.startswith(f"http://gone:1 cannot be reached, trying now and then: {LOST}")
     assert 100 <= time.now_s < 220
-    # A log is never silent for long, and says that it gets worse.
-    assert time.now_s / 20 <= len(later) <= time.now_s / 10
-    assert all("still cannot be reached: tried " in text for text in later)
 
 
 @settings(max_examples=20, deadline=None)
@@ -165,8 +161,8 @@ def servers_of(count: int, policy: RetryPolicy | None = None) -> Servers:
 
 
 def break_off(servers: Servers, server: Server, error: ModelError = REFUSED) -> None:
-    for number in range(FAILURES_TO_REST):
-        servers.failed(server, error, number, servers._policy.clock.now())
+    for _ in range(FAILURES_TO_REST):
+        servers.failed(server, error, servers._policy.clock.now())
 
 
 @settings(max_examples=60, deadline=None)
@@ -199,25 +195,11 @@ def test_whoever_is_asked_is_there_and_has_no_more_to_do_than_any_other_that_is(
 @pytest.mark.parametrize("status", [429, 500, 529, 400, None])
 def test_what_a_server_says_itself_and_what_is_late_is_no_outage(status: int | None) -> None:
     servers = servers_of(1)
-    for number in range(50):
-        error = RetryableError("x", status=status, sent="answered" if status else "maybe")
-        assert not servers.failed(servers.all[0], error, number, 0.0)
-    assert not servers.failed(servers.all[0], SampleError("no key", status=400), 1, 0.0)
-    assert servers.rest_s() == 0.0
-
-
-@pytest.mark.parametrize(
-    ("status", "sent"),
-    [(None, "no"), (None, "lost"), (502, None), (503, None), (504, None)],
-)
-def test_failures_of_one_request_alone_are_no_outage(status: int | None, sent: Sent | None) -> None:
-    servers = servers_of(1)
-    error = RetryableError("x", status=status, sent=sent)
     for _ in range(50):
-        assert not servers.failed(servers.all[0], error, "poison", 0.0)
+        error = RetryableError("x", status=status, sent="answered" if status else "maybe")
+        servers.failed(servers.all[0], error, 0.0)
+    servers.failed(servers.all[0], SampleError("no key", status=400), 0.0)
     assert servers.rest_s() == 0.0
-    assert servers.failed(servers.all[0], error, "another", 0.0)
-    assert servers.rest_s() > 0
 
 
 @given(st.none() | st.floats(0, 1000), st.integers(0, 20))
@@ -228,7 +210,7 @@ def test_the_next_try_waits_as_long_as_the_server_asks(asked_s: float | None, tr
     error = RetryableError("overloaded", status=503, retry_after_s=asked_s)
     break_off(servers, servers.all[0], error)
     least_s = min(asked_s or 0.0, policy.max_retry_after_s)
-    for number in range(tries):
+    for _ in range(tries):
         try:
             rest_s = servers.rest_s()
         except UnavailableError:
@@ -239,7 +221,7 @@ def test_the_next_try_waits_as_long_as_the_server_asks(asked_s: float | None, tr
         server = servers.pick()
         # Until it answers or fails, nobody else tries.
         assert servers.rest_s() > 0.0
-        servers.failed(server, error, f"try {number}", time.now_s)
+        servers.failed(server, error, time.now_s)
 
 
 @given(st.sampled_from([429, 529]), st.floats(0.1, 200))
@@ -251,7 +233,7 @@ def test_after_a_429_nobody_asks_before_the_server_wants(status: int, wait_s: fl
     assert servers.rest_s() == 0.0
     assert servers.pick() is servers.all[1]
     servers.pause(servers.all[1], error, 2 * wait_s)
-    servers.replied(servers.all[1])
+    servers.heard(servers.all[1])
     assert servers.rest_s() == pytest.approx(wait_s)
 
 
@@ -340,33 +322,3 @@ def test_a_server_that_refuses_everything_is_left_out_and_the_last_one_stops_the
         stopped = ask(make_model(config), *map(make_request, names(30)))
     assert {type(answer) for answer in stopped} == {UnavailableError}
     assert wrong.requests + right.ended["404"] <= 3 * 4
-
-
-@pytest.mark.parametrize("page", ["html", "cut", "empty"])
-def test_who_never_gives_a_reply_that_can_be_read_is_asked_no_more(page: str) -> None:
-    told: list[str] = []
-    wrong, right = OpenAIChat(Faults(mode=page)), OpenAIChat()
-    few = QUICK.max_connection_failures + 10
-    with Running(wrong) as first, Running(right) as second:
-        alone = ask(make_model(at(first.url, max_concurrency=3)), *map(make_request, names(30)))
-        assert wrong.requests <= few
-        beside = at(first.url, second.url, max_concurrency=4)
-        answers = ask(make_model(beside, told=told), *map(make_request, names(60)))
-        assert wrong.requests <= 2 * few
-        # One that has given a reply is there, whatever follows.
-        wrong.faults = Faults()
-        model = make_model(at(first.url))
-
-        async def main() -> list[object]:
-            first_of_all = await answers_of(model, "first")
-            wrong.faults = Faults(mode=page)
-            answers = first_of_all + await answers_of(model, *names(4))
-            await model.aclose()
-            return answers
-
-        later = run(main)
-    assert {type(answer) for answer in alone} <= {RetryableError, UnavailableError}
-    assert f"{first.url} never gave a reply that can be read: " in str(alone[-1])
-    assert [type(answer) for answer in answers] == [Reply] * 60
-    assert told[0].startswith(f"{first.url} is asked no more: ")
-    assert [type(answer) for answer in later] == [Reply, *[RetryableError] * 4]

@@ -7,21 +7,19 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from aiohttp import web
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.config.models import ModelConfig
 from phyblock.config.suite import Suite
-from phyblock.errors import ModelError, RefusedError, SampleError, UnavailableError
-from phyblock.models import Image, Message, Reply, Request
+from phyblock.models import Image, Message, Request
 from phyblock.models.request import json_body, wire_messages
 from phyblock.parsing.answer import choice_form
 from phyblock.parsing.move import move_form
 from phyblock.parsing.plan import parse_plan, plan_form
 from phyblock.run.plan import to_config
 from phyblock.types import ImageDetail
-from tests.models.factory import JPEG, PNG, ask, make_model, make_request, picture, reply_of
+from tests.models.factory import JPEG, PNG, make_model, make_request, picture, reply_of
 from tests.models.routes import KEY_VARIABLE, ROUTES
 from tests.servers.chassis import Running, Seen
 from tests.servers.openai_chat import OpenAIChat
@@ -191,17 +189,7 @@ def arrived(route: str, request: Request, **fields: Any) -> Seen:
 
 
 class Choosy(OpenAIChat):
-    """Plans in the schema that it is sent; refuses one after `takes` requests."""
-
-    def __init__(self, takes: int = 10**9, message: str = "") -> None:
-        super().__init__()
-        self.takes, self.message = takes, message
-
-    async def _end(self, seen: Seen, ending: str, request: web.Request) -> web.StreamResponse:
-        if "response_format" in seen.params and self.requests > self.takes:
-            error = self.error(400, "policy" if "safety" in self.message else "", self.message)
-            return web.json_response(error, status=400)
-        return await super()._end(seen, ending, request)
+    """Plans in the schema that it is sent."""
 
     def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
         body = super().reply(seen, ending)
@@ -224,38 +212,6 @@ def test_the_schema_arrives_as_it_is_declared_and_the_reply_is_read() -> None:
     }
     parsed = parse_plan(reply.text, 16)
     assert (parsed.plan.steps, parsed.rule) == ((1, 2, 3), "json")
-
-
-SPEAKING = (
-    "Invalid parameter: 'response_format' of type 'json_schema' is not supported with this model.",
-    "This model does not support structured outputs",
-    "json_schema is not supported by this backend: no grammar",
-)
-
-
-@pytest.mark.parametrize("message", SPEAKING)
-def test_a_provider_that_refuses_the_schema_is_left_with_the_setting_named(message: str) -> None:
-    answers = _answers(Choosy(0, message))
-    for answer in answers:
-        assert isinstance(answer, UnavailableError)
-        assert message in str(answer)
-        assert "set response_format: never for this model in the models file" in str(answer)
-
-
-def test_what_else_a_server_refuses_is_the_request_s_own() -> None:
-    policy = _answers(Choosy(0, "rejected by our safety system: response_format"))
-    assert {type(answer) for answer in policy} == {RefusedError}
-    other = _answers(Choosy(0, "Image too large"))
-    assert {type(answer) for answer in other} == {SampleError}
-    first, *later = _answers(Choosy(1, 'Bad request: {"response_format": {"type": "json_schema"}}'))
-    assert isinstance(first, Reply)
-    assert {type(answer) for answer in later} == {SampleError}
-
-
-def _answers(server: OpenAIChat) -> list[Reply | ModelError | None]:
-    with Running(server) as running:
-        config = ROUTES["direct"].config(running.url, response_format="always", max_concurrency=1)
-        return ask(make_model(config), asking("001"), asking("002"), asking("003"))
 
 
 JSON_SUITE = Suite(name="s", models=("m",), answer_format="json_schema")
