@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import json
 import math
 import os
 import re
+import textwrap
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
@@ -14,6 +17,7 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
+from PIL import Image, ImageDraw, ImageFont
 from pydantic import BaseModel
 
 from phyblock.bundle import named, opened_bundle, portable_manifest
@@ -24,9 +28,12 @@ from phyblock.records.manifest import MANIFEST, ManifestModel
 from phyblock.records.record import Record
 from phyblock.results.compare import Side, comparable, compare, ranks
 from phyblock.results.estimates import (
+    Floor,
     Value,
     headline_columns,
+    headline_floors,
     headline_of,
+    headline_rows,
     main_column,
     main_measure,
     track_estimates,
@@ -34,13 +41,18 @@ from phyblock.results.estimates import (
 )
 from phyblock.results.load import Run, load_run
 from phyblock.results.tables import cost_frame, coverage_frame
+from phyblock.results.text import number as rounded
+from phyblock.sim.pictures import PictureStyle, goal_png, to_png
+from phyblock.text import counted
 from phyblock.tracks.base import CARRYING, kind_of
+from phyblock.tracks.measures import Measure
 from phyblock.web.pack import (
     IN_INDEX,
     Columns,
     Numbers,
     Pack,
     Sources,
+    asset,
     build_of,
     fill,
     kit,
@@ -59,8 +71,8 @@ _DATA = "data/"
 _PARTIAL = re.compile(r"\.[0-9a-f]{32}\.part")
 _SCRIPTS = (
     *("dom.js", "chunks.js", "solid.js", "steps.js", "poses.js", "runs.js", "stage.js"),
-    *("quotes.js", "overlay.js", "why.js", "store.js", "table.js", "chart.js", "views.js"),
-    *("replay.js", "site.js"),
+    *("quotes.js", "overlay.js", "why.js", "store.js", "table.js", "chart.js", "board.js"),
+    *("views.js", "replay.js", "site.js"),
 )
 _STYLES = ("base.css", "samples.css", "reply.css", "site.css")
 _MAY_DIFFER = ("pictures",)
@@ -79,6 +91,12 @@ _LONGEST = {"text": 6000, "reasoning": 2000}
 """Characters of a reply that a site shows; the bundle has all of it."""
 _LEFT_OUT = IN_INDEX | {"reply", "scores", "turns", "prompt", "asked", "time", "counts"}
 """Fields of records that a replay needs otherwise or not at all; those that tracks add, it has."""
+_ABOUT = (
+    "A vision-language model sees a picture of a structure and sixteen numbered blocks, and says "
+    "which blocks to place, in which order."
+)
+_TELLING_BLOCKS = 6
+"""A failure tells most where its goal has about so many blocks."""
 _REPLY = ("text", "reasoning", "finish", "cost_usd", "usage", "latency_s")
 
 
@@ -186,8 +204,13 @@ def write_site(
                 write_script(new, "board", build, {**board, "title": title})
                 write_script(new, "samples", build, {**samples, "kit": kit()})
                 write_three(new)
+                finding = board["tracks"][0]["finding"]
+                image = _card(title, finding, runs, samples)
+                (new / "card.png").write_bytes(image)
                 size = sum(path.stat().st_size for path in new.iterdir())
             facts = {"title": title, "folder": f"{_DATA}{build}", "build": build}
+            facts |= {"description": f"{_ABOUT} {finding}".strip(), "image": f"{own}card.png"}
+            facts["icon"] = base64.b64encode(asset("icon.svg")).decode()
             page = fill("site.html.j2", _SCRIPTS, _STYLES, **facts)
             (path,) = folder.write({INDEX: page})
             folder.remove(name for name in folder.names(_DATA) if not name.startswith(own))
@@ -382,7 +405,7 @@ def _facts_of(
             return value
         return None if math.isnan(value) else float(f"{value:.6g}")
 
-    found = {}
+    errors, found = _error_shares(run, track), {}
     for model, row in outcomes.items():
         cost, solved, whole = costs[model], None, None
         if not math.isnan(best):
@@ -399,8 +422,21 @@ def _facts_of(
             "latency_s": cost["latency_median_s"],
             "usd_per_100": price,
             "usd_per_solved": whole,
+            "errors": errors.get(str(model), {}),
         }
         found[str(model)] = {name: known(value) for name, value in facts.items()}
+    return found
+
+
+def _error_shares(run: Run, track: str) -> dict[str, dict[str, float]]:
+    """Return the share [%] of each type of wrong step by model, in the headline setting."""
+    cell = kind_of(track).report().cells(run)[-1].name
+    rows = headline_rows(track_estimates(run, track), run.design)
+    wanted = rows["measure"].str.startswith("wrong_") & (rows["cell"] == cell)
+    found: dict[str, dict[str, float]] = {}
+    for row in rows[wanted & rows["value"].notna()].to_dict("records"):
+        name = str(row["measure"]).removeprefix("wrong_")
+        found.setdefault(str(row["model"]), {})[name] = round(100 * float(row["value"]), 2)
     return found
 
 
@@ -450,6 +486,8 @@ def board_of(
         about |= {"unit": measure.unit, "better": measure.better}
         about["best"] = None if math.isnan(measure.best) else measure.best
         about["notes"] = list(kind.report().notes(run))
+        floor = headline_floors(run, track).get(heading)
+        about["floor"] = floor and {"name": floor.name, "value": round(floor.value, 4)}
         tracks.append({**about, "physics": kind.physics(run.manifest.suite)})
         measures = {one.name: one for one in track_measures(track)}
         for setting in values[place, track].values:
@@ -460,6 +498,8 @@ def board_of(
                 columns.append({"id": _id(track, setting, column.heading), **told})
         main = _id(track, next(iter(values[place, track].values)), heading)
         ranked = [entry for entry in entries if main in numbers[entry.name]]
+        models = [entry.name for entry in ranked if not entry.model.is_baseline]
+        tracks[-1]["finding"] = _finding(floor, measure, [numbers[name][main] for name in models])
         ranges[track] = rank_ranges_of(track, ranked, runs, values)
     lacking = {key: shortfalls(runs[key[0]].run, key[1]) for key in values}
     rows = []
@@ -480,6 +520,46 @@ def board_of(
         )
     told = {"tracks": tracks, "columns": columns, "rows": rows}
     return {**told, "runs": [_run(one) for one in runs]}
+
+
+def _finding(
+    floor: Floor | None, measure: Measure, values: Sequence[Sequence[float | None]]
+) -> str:
+    """Say how many models, by their value and its interval, are above the strongest blind
+    baseline; "" where there is none of either.
+    """
+    if floor is None or not values:
+        return ""
+    place = 1 if measure.better == "higher" else 2
+    ends = [value[place] for value in values]
+    sign = 1 if measure.better == "higher" else -1
+    above = sum(end is not None and sign * (end - floor.value) > 0 for end in ends)
+    rule = f"a rule that never sees the goal ({floor.name}, {rounded(floor.value)})"
+    if not above:
+        return f"No model is shown to beat {rule}."
+    return f"{above} of {counted(len(values), 'model')} beat{'s' * (above == 1)} {rule}."
+
+
+def _card(title: str, finding: str, runs: Sequence[SiteRun], samples: Mapping[str, Any]) -> bytes:
+    """Return the picture of a site for links to it: its title and finding, and a goal, as PNG of
+    1200 x 630 pixels.
+    """
+    card = Image.new("RGB", (1200, 630), "#ffffff")
+    scenes = samples["scenes"]
+    for telling in samples["telling"]:
+        scene = scenes[samples["items"]["scene"][samples["rows"]["item"][telling["row"]]]]
+        tasks = (one.sources.tasks.get(scene) for one in runs)
+        if (task := next(filter(None, tasks), None)) is not None:
+            goal = goal_png(task.scene, PictureStyle(size_px=560))
+            card.paste(Image.open(io.BytesIO(goal)).convert("RGB"), (605, 35))
+            break
+    draw, top = ImageDraw.Draw(card), 110
+    for text, size, color, width in ((title, 58, "#16181d", 18), (finding, 36, "#3a4cc4", 30)):
+        for line in textwrap.wrap(text, width):
+            draw.text((50, top), line, color, ImageFont.load_default(size))
+            top += round(1.25 * size)
+        top += 36
+    return to_png(card)
 
 
 def _id(track: str, setting: str, heading: str) -> str:
@@ -529,6 +609,7 @@ def _write_samples(
     Raises OSError where the disk refuses, StoreError for a record that cannot be read.
     """
     packs = {kind: Pack(folder, kind, build) for kind in ("replays", "scenes", "questions")}
+    failures: dict[str, list[tuple[float, int, str]]] = {}
     scenes, numbered, tracks, outcomes, ways = (Numbers() for _ in range(5))
     items = Columns("track", "key", "scene", "levels", "part", "question")
     rows = Columns("entry", "item", "seed", "way", "outcome", "score")
@@ -567,14 +648,31 @@ def _write_samples(
                 outcome=outcomes.of(record.outcome),
                 score=None if score is None else round(score * 10),
             )
-            packs["replays"].add(_replay(record, one.run))
+            replay = packs["replays"].add(_replay(record, one.run))
+            if (
+                not entries[rows["entry"][-1]].model.is_baseline
+                and record.scene in one.sources.tasks
+            ):
+                for error, worth_seeing in _failure(record, one.run):
+                    found = (worth_seeing, replay, record.model)
+                    failures.setdefault(error, []).append(found)
     is_drawn = pack_scenes(scenes, [one.sources for one in runs], packs["scenes"])
     for pack in packs.values():
         pack.close()
     parts: dict[str, str] = {}
     for track in tracks:
         parts |= kind_of(track).report().part_names
+    telling: dict[int, str] = {}
+    models: set[str] = set()
+    for error, found_in in sorted(failures.items(), key=lambda pair: len(pair[1])):
+        # Of every type of error another model's and another sample, where there is one.
+        rest = [one for one in found_in if one[1] not in telling]
+        if rest:
+            _, row, model = min(rest, key=lambda one: (one[2] in models, -one[0], one[1]))
+            telling[row] = error
+            models.add(model)
     return {
+        "telling": [{"row": row, "error": error} for row, error in telling.items()],
         "tracks": list(tracks),
         "items": items,
         "outcomes": list(outcomes),
@@ -585,6 +683,21 @@ def _write_samples(
         "parts": parts,
         "lacking": "" if is_drawn else runs[0].sources.lacking,
     }
+
+
+def _failure(record: Record, run: Run) -> Iterator[tuple[str, float]]:
+    """Yield the type of a sample's first wrong step, and how much the sample tells: it goes well
+    for some steps first, and its goal is neither tiny nor large.
+    """
+    design = run.design
+    for score in record.scores:
+        wanted = score.setting == design.setting and score.matcher in (None, design.matcher)
+        if not wanted or score.why is None:
+            continue
+        first = next((n for n, why in enumerate(score.why) if why is not None), None)
+        if first is not None and first >= 2:
+            yield str(score.why[first]), min(first, 4) - abs(record.n_blocks - _TELLING_BLOCKS)
+        return
 
 
 def _replay(record: Record, run: Run) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from phyblock.results.tables import write_tables
 from phyblock.scoring.plan import ERROR_TYPES
 from phyblock.web.report import write_report
 from tests.browser import expect
-from tests.web.conftest import HOSTILE, MARKUP, NAME, ReportVisit, SiteVisit
+from tests.web.conftest import HOSTILE, MARKUP, NAME, VIEWPORT, ReportVisit, SiteVisit
 from tests.web.factory import manifest, write_run
 from tests.workspace import Workspace
 
@@ -498,8 +498,50 @@ def test_every_view_of_a_site_can_be_read_and_hostile_names_do_nothing(
         assert page.locator("canvas.stage").count() == stages
 
 
+def test_a_leaderboard_says_what_was_found_and_shows_how_models_fail(
+    official_checkout: Path,
+    browser: Browser,
+    tmp_path_factory: pytest.TempPathFactory,
+    pictures_dir: Path,
+) -> None:
+    made = Workspace(tmp_path_factory.mktemp("paper"), pictures_dir)
+    path = f"dataset.path={official_checkout}"
+    made.phyblock("run", "paper-table1", "--set", path, "--limit", "60", "--out", "out")
+    done = made.phyblock("site", "out", "--data", official_checkout, "--out", "site")
+    assert done.code == 0, done.err
+    page = browser.new_page(viewport=VIEWPORT, color_scheme="light")  # type: ignore[arg-type]
+    visit = SiteVisit(page, made.root / "site" / "index.html")
+    visit.open()
+    assert re.fullmatch(
+        r"(No model is shown to beat|\d+ of \d+ models beats?) a rule that never sees the goal "
+        r"\(goal-blind, [\d.]+\)\.",
+        page.inner_text(".finding"),
+    )
+    assert page.inner_text(".finding") in str(
+        page.locator("meta[name=description]").get_attribute("content")
+    )
+    assert page.locator(".bars .line.floor").count() == page.locator(".bars tbody tr").count()
+    expect(page.locator(".hero-build canvas.goal")).not_to_have_count(0)
+    page.locator(".failures").scroll_into_view_if_needed()
+    for canvas in page.locator(".failures canvas").all():
+        expect(canvas).to_have_attribute("data-drawn", re.compile(r"\d"))
+    page.locator(".failures a").first.click()
+    expect(page.locator(".controls output")).to_contain_text("Step ")
+    page.get_by_role("link", name="Scenes").first.click()
+    expect(page.locator(".thumbs canvas").first).to_have_attribute("data-drawn", re.compile(r"\d"))
+    page.select_option("#level", "4")
+    assert set(page.locator(".thumbs small").all_inner_texts()) == {"level 4"}
+    page.locator(".thumbs a").first.click()
+    expect(page.locator(".wall canvas").first).to_have_attribute("data-drawn", re.compile(r"\d"))
+    assert page.evaluate(STRUCTURE) == SOUND
+    page.close()
+    assert visit.complaints == []
+
+
 def test_the_board_is_sorted_by_keyboard_and_ranked_by_any_track(site_visit: SiteVisit) -> None:
     page = site_visit.open()
+    assert page.locator(".bars tbody th a").first.inner_text() == "oracle"
+    page.locator("#more summary").click()
     names = page.locator(".board tbody th a")
     # The first track of the suite comes first.
     assert page.locator("#by option:checked").inner_text() == "Full planning: Overall F1"
@@ -512,7 +554,8 @@ def test_the_board_is_sorted_by_keyboard_and_ranked_by_any_track(site_visit: Sit
     page.keyboard.press("Enter")
     expect(page.locator("th[aria-sort=descending]")).to_have_count(1)
     page.select_option("#by", label="VQA: Overall")
-    expect(page.locator("caption")).to_have_text("Models ranked by VQA, Overall")
+    caption = page.locator(".bars caption")
+    expect(caption).to_have_text("Models ranked by VQA, Overall")
 
 
 def test_from_the_board_to_a_replay_and_back(site_visit: SiteVisit) -> None:
@@ -520,6 +563,7 @@ def test_from_the_board_to_a_replay_and_back(site_visit: SiteVisit) -> None:
     page.get_by_role("link", name="oracle").first.click()
     expect(page.locator("h1")).to_have_text("oracle")
     assert page.evaluate("document.activeElement.id") == "content"
+    page.locator("summary", has_text="Every scene").first.click()
     page.get_by_role("link", name="t5").first.click()
     expect(page.locator("output")).to_have_text("End")
     page.keyboard.press("ArrowLeft")
@@ -532,7 +576,7 @@ def test_from_the_board_to_a_replay_and_back(site_visit: SiteVisit) -> None:
         page.go_back()
     expect(page.locator(".stage")).to_have_count(1)
     page.get_by_role("link", name="t5").click()
-    assert page.locator(".answers li").count() >= 4
+    assert page.locator(".wall li").count() >= 4
     for view in ("model", "scene", "replay", "nothing"):
         site_visit.open(view, m="<b>x", s="<b>y", i="z")
         expect(page.locator("h1")).to_contain_text("There is no such")

@@ -34,7 +34,7 @@ var Site = (() => {
     return null;
   }
 
-  const VIEWS = { board: (w) => Views.board(w), model: (w) => Views.model(w), scenes: (w) => Views.scenes(w), scene: (w) => Views.scene(w), replay: (w) => Replay.view(w) };
+  const VIEWS = { board: (w) => Board.view(w), model: (w) => Views.model(w), scenes: (w) => Views.scenes(w), scene: (w) => Views.scene(w), replay: (w) => Replay.view(w) };
 
   async function show() {
     const mine = ++turn;

@@ -25,10 +25,10 @@ const Table = (() => {
     : value === 0 ? "0" : value >= 1 ? text(value, 2) : value.toPrecision(2));
 
   /** A value column: what stands in a row, and how it is sorted. */
-  function valueColumn(column, track, several) {
+  function valueColumn(column, track) {
     const share = column.unit ? `${column.unit === "%" ? "%" : column.unit}` : "";
     return {
-      id: column.id, heading: column.heading, group: several ? track.title : "", setting: column.setting,
+      id: column.id, heading: column.heading, 
       about: [track.title, column.setting && `setting ${column.setting}`, share && `in ${share}`].filter(Boolean).join(", "),
       isMain: column.heading === track.main, better: column.better,
       value: (row) => (row.values[column.id] ? row.values[column.id][0] : null),
@@ -36,15 +36,14 @@ const Table = (() => {
         const found = row.values[column.id];
         if (!found) return { text: DASH };
         const [value, lo, hi] = found;
-        return { text: text(value), below: lo === null ? "" : `${text(lo)} to ${text(hi)}`, strip: column.share ? found : null };
+        return { text: text(value), below: lo === null ? "" : `${text(lo)} to ${text(hi)}` };
       },
     };
   }
 
-  function factColumn([name, heading, of], track, several) {
+  function factColumn([name, heading, of], track) {
     return {
-      id: `${track.name}/${name}`, heading: heading.replace("{item}", track.item), group: several ? track.title : "",
-      setting: "", about: track.title + (RECORDED.includes(name) ? ", as the records say" : ""), better: LOWER_FIRST.includes(name) ? "lower" : "higher",
+      id: `${track.name}/${name}`, heading: heading.replace("{item}", track.item), about: track.title + (RECORDED.includes(name) ? ", as the records say" : ""), better: LOWER_FIRST.includes(name) ? "lower" : "higher",
       value: (row) => (row.facts[track.name] ? of(row.facts[track.name])[0] ?? null : null),
       cell: (row) => {
         if (!row.facts[track.name]) return { text: DASH };
@@ -57,7 +56,7 @@ const Table = (() => {
 
   function rowColumns(board) {
     const plain = (id, heading, value, shown = value, about = "") => ({
-      id, heading, group: "", setting: "", about, better: "higher", value,
+      id, heading, about, better: "higher", value,
       cell: (row) => ({ text: shown(row) || DASH, isText: true }) });
     const of = (row, what) => [...new Set(Object.values(row.runs).map((n) => what(board.runs[n])).filter(Boolean))].join(", ");
     return [
@@ -67,45 +66,23 @@ const Table = (() => {
       plain("seeds", "Seeds", (row) => board.runs[Object.values(row.runs)[0]].seeds, (row) => of(row, (run) => String(run.seeds))),
       plain("asked", "Asked how", (row) => of(row, (run) => run.asked.join(", ")), (row) => of(row, (run) => run.asked.join(", ")) || DASH),
       plain("run", "Run", (row) => of(row, (run) => run.id), (row) => of(row, (run) => run.id)),
-      plain("verified", "Scored again", (row) => of(row, (run) => (run.verified ? "yes" : "no")),
+      plain("verified", "Independently re-scored", (row) => of(row, (run) => (run.verified ? "yes" : "no")),
         (row) => of(row, (run) => (run.verified ? "yes" : "no"))),
     ];
   }
 
-  const mainFirst = (columns, track) => [...columns].sort((a, b) => (b.heading === track.main) - (a.heading === track.main));
-
   const factsOf = (track) => FACTS.filter(([name]) => track.best !== null || !OF_SOLVED.includes(name));
 
-  /** Every column there is, in groups [{title, columns}]. */
-  function groups(board) {
-    const several = board.tracks.length > 1;
-    const found = board.tracks.flatMap((track) => {
-      const mine = board.columns.filter((column) => column.track === track.name);
-      const settings = [...new Set(mine.map((column) => column.setting))];
-      return [
-        ...settings.map((setting) => ({
-          title: track.title + (setting ? `, setting ${setting}` : ""),
-          columns: mainFirst(mine.filter((column) => column.setting === setting), track).map((column) => valueColumn(column, track, several)),
-        })),
-        { title: `${track.title}, samples and cost`, columns: factsOf(track).map((fact) => factColumn(fact, track, several)) },
-      ];
-    });
-    return [...found, { title: "Model and run", columns: rowColumns(board) }];
-  }
-
-  /** The columns that are shown unless others were chosen: the first track's, the others' main ones. */
-  function usual(board) {
-    const [first, ...others] = board.tracks;
-    const of = (track) => board.columns.filter((column) => column.track === track.name);
-    const main = (track) => of(track).find((column) => column.heading === track.main);
-    const priced = board.rows.some((row) => row.facts[first.name]?.usd_per_solved);
-    const solved = first.best === null ? null : `${first.name}/${priced ? "usd_per_solved" : "solved"}`;
-    const told = board.rows.some((row) => row.facts[first.name]?.completion_tokens);
-    return [
-      ...mainFirst(of(first).filter((column) => column.setting === main(first).setting), first).map((column) => column.id),
-      solved, told ? `${first.name}/completion_tokens` : null,
-      ...others.map((track) => main(track).id),
-    ].filter(Boolean);
+  /** Every column of a track, its main one first, then what its samples took, then the run. */
+  function columns(board, track) {
+    const mine = board.columns.filter((column) => column.track === track.name);
+    const settings = [...new Set(mine.map((column) => column.setting))];
+    const values = settings.flatMap((setting) => mine.filter((column) => column.setting === setting)
+      .sort((a, b) => (b.heading === track.main) - (a.heading === track.main))
+      .map((column) => ({ ...valueColumn(column, track), over: setting && `Setting ${setting}` })));
+    const facts = factsOf(track).map((fact) => ({ ...factColumn(fact, track), over: "Samples and cost" }))
+      .filter((column) => board.rows.some((row) => column.value(row) !== null));
+    return [...values, ...facts, ...rowColumns(board).map((column) => ({ ...column, over: "Model and run" }))];
   }
 
   /** Rows by a column, those without a value last, then by name. */
@@ -142,15 +119,7 @@ const Table = (() => {
     return Boolean(fact) && fact.done < fact.expected;
   }
 
-  function strip([value, lo, hi]) {
-    const spread = lo === null ? [value, value] : [Math.max(0, lo), Math.min(100, hi)];
-    return svg("svg", { viewBox: "0 0 104 12", class: "strip-plot", "aria-hidden": "true" },
-      svg("line", { class: "axis", x1: 2, x2: 102, y1: 6, y2: 6 }),
-      svg("line", { class: "interval", x1: 2 + spread[0], x2: 2 + spread[1], y1: 6, y2: 6 }),
-      svg("circle", { cx: 2 + value, cy: 6, r: 2.5 }));
-  }
-
-  return { groups, usual, sorted, rank, lacking, isCut, strip, text, dollars, DASH };
+  return { columns, sorted, rank, lacking, isCut, text, dollars, DASH };
 })();
 
 /** An element of a drawing. */

@@ -1,149 +1,10 @@
-/* The pages but for replays: the board, a model, all scenes, a scene. */
+/* The pages of a site below the first: a model, all scenes, a scene. */
 "use strict";
 
 const Views = (() => {
   const { text, DASH } = Table;
   const link = (view, words, ...children) => el("a", { href: Site.address(view, words) }, ...children);
-  const capital = (name) => name[0].toUpperCase() + name.slice(1);
   const plural = (n, noun) => Words.count(n, noun);
-
-  // ---- the board
-
-  async function board(words) {
-    const data = await Store.openBoard();
-    const track = data.tracks.find(({ name }) => name === words.get("by")) || data.tracks[0];
-    const groups = Table.groups(data);
-    const all = new Map(groups.flatMap(({ columns }) => columns.map((column) => [column.id, column])));
-    const wanted = (words.get("cols") ? words.get("cols").split("~") : Table.usual(data)).filter((id) => all.has(id));
-    const main = mainOf(data, track);
-    const state = {
-      by: track.name, cols: words.get("cols") || "", sort: all.has(words.get("sort")) ? words.get("sort") : main?.id,
-      down: words.get("down") !== null ? words.get("down") === "1" : track.better === "higher",
-      axis: words.get("x") || "", data, track, groups, all, wanted, main,
-    };
-    const runs = data.runs;
-    const samples = data.rows.flatMap((row) => Object.values(row.facts)).reduce((sum, fact) => sum + fact.done, 0);
-    const dates = runs.map((run) => run.date).filter(Boolean).sort();
-    const facts = [
-      ["Models", data.rows.length], ["Samples", samples.toLocaleString("en")], ["Runs", runs.length],
-      ["Data", runs[0].data ? `${runs[0].data}, version ${runs[0].version}` : DASH],
-      ["Runs begun", dates.length ? (dates[0] === dates.at(-1) ? dates[0] : `${dates[0]} to ${dates.at(-1)}`) : DASH],
-      ["Scored again", `${runs.filter((run) => run.verified).length} of ${plural(runs.length, "run")}`],
-    ];
-    return [
-      el("h1", {}, data.title),
-      el("dl", { class: "about" }, facts.map(([name, value]) =>
-        el("div", {}, el("dt", {}, name), el("dd", { class: "number" }, String(value))))),
-      el("section", { class: "ranking", "aria-labelledby": "ranking" },
-        el("h2", { id: "ranking" }, "Ranking"), tools(state), table(state), notes(state)),
-      chart(state),
-    ].filter(Boolean);
-  }
-
-  const mainOf = (data, track) =>
-    data.columns.find((column) => column.track === track.name && column.heading === track.main);
-
-  const go = (state, changes) => {
-    const { by, cols, sort, down, axis } = { ...state, ...changes };
-    Site.go("board", { by: by === state.data.tracks[0].name ? "" : by, cols,
-      sort: sort === state.main?.id ? "" : sort, down: sort === state.main?.id && down === (state.track.better === "higher") ? "" : down ? "1" : "0", x: axis });
-  };
-
-  function tools(state) {
-    const { data, track } = state;
-    const choice = data.tracks.length > 1 ? el("label", { class: "choice" }, el("span", {}, "Ranked by"),
-      el("select", { id: "by", onchange: (event) => go(state, { by: event.target.value, sort: "", down: true, axis: "" }) },
-        data.tracks.map((one) => el("option", { value: one.name, selected: one === track }, `${one.title}: ${one.main}`)))) : null;
-    const boxes = state.groups.map((group) => el("fieldset", {}, el("legend", {}, group.title),
-      group.columns.map((column) => el("label", {}, el("input", { type: "checkbox", value: column.id,
-        checked: state.wanted.includes(column.id), onchange: (event) => toggle(state, column.id, event.target.checked) }), ` ${column.heading}`))));
-    const menu = el("details", { class: "columns-menu", id: "columns" },
-      el("summary", {}, `Columns (${state.wanted.length} of ${state.all.size})`),
-      el("div", { class: "column-groups" }, boxes),
-      el("button", { type: "button", class: "quiet", onclick: () => go(state, { cols: "" }) }, "The usual columns"));
-    menu.open = Site.kept("phyblock-site-columns") === "yes";
-    menu.addEventListener("toggle", () => Site.kept("phyblock-site-columns", menu.open ? "yes" : "no"));
-    return el("div", { class: "tools" }, choice, menu);
-  }
-
-  function toggle(state, id, isOn) {
-    // Columns keep the order of the menu, whatever was clicked first.
-    const chosen = new Set(isOn ? [...state.wanted, id] : state.wanted.filter((one) => one !== id));
-    const isUsual = Table.usual(state.data);
-    const ids = isUsual.every((one) => chosen.has(one)) && chosen.size === isUsual.length ? ""
-      : [...state.all.keys()].filter((one) => chosen.has(one)).join("~");
-    go(state, { cols: ids });
-  }
-
-  function table(state) {
-    const columns = state.wanted.map((id) => state.all.get(id));
-    const sorting = state.all.get(state.sort) || state.all.get(state.main?.id);
-    const rows = sorting ? Table.sorted(state.data.rows, sorting, state.down) : state.data.rows;
-    const bySetting = columns.some((column) => column.setting);
-    const grouped = columns.some((column) => column.group);
-    const over = (column) => [grouped && column.group, bySetting && column.setting && `setting ${column.setting}`].filter(Boolean).join(", ");
-    const heads = columns.map((column) => {
-      const isSorted = column === sorting;
-      const down = isSorted ? !state.down : column.better !== "lower";
-      return el("th", { scope: "col", "aria-sort": isSorted ? (state.down ? "descending" : "ascending") : null,
-        class: column.isMain ? "main" : null, title: column.about || null },
-      el("button", { type: "button", "data-column": column.id, onclick: () => go(state, { sort: column.id, down }) }, column.heading));
-    });
-    const spans = [];
-    for (const name of columns.map(over)) {
-      if (spans.length && spans.at(-1).name === name) spans.at(-1).span += 1;
-      else spans.push({ name, span: 1 });
-    }
-    const above = columns.some(over) ? el("tr", {}, el("td", { colspan: 2 }), spans.map(({ name, span }) =>
-      (name ? el("th", { scope: "colgroup", colspan: span, class: "over" }, capital(name)) : el("td", { colspan: span })))) : null;
-    return el("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Table of the ranking" },
-      el("table", { class: "board" },
-        el("caption", { class: "unseen" }, `Models ranked by ${state.track.title}, ${state.track.main}`),
-        el("thead", {}, above, el("tr", {}, el("th", { scope: "col", class: "rank" }, "Rank"), el("th", { scope: "col", class: "text name" }, "Model"), heads)),
-        el("tbody", {}, rows.map((row) => el("tr", { class: row.kind },
-          el("td", { class: "rank number" }, Table.rank(row, state.track.name)),
-          el("th", { scope: "row", class: "text name" }, link("model", { m: row.name }, row.name),
-            row.kind === "baseline" ? el("small", {}, "baseline") : null,
-            Table.lacking(row, state.track.name) ? el("small", {}, Table.lacking(row, state.track.name)) : null),
-          columns.map((column) => cell(row, column)))))));
-  }
-
-  function cell(row, column) {
-    const { text: shown, below, strip, isText } = column.cell(row);
-    return el("td", { class: [column.isMain && "main", isText && "text"].filter(Boolean).join(" ") || null }, shown,
-      column.isMain && strip ? Table.strip(strip) : null, below ? el("small", {}, below) : null);
-  }
-
-  function notes(state) {
-    const { track } = state;
-    return el("div", { class: "notes" },
-      el("p", {}, `Rank: the best and the worst place that a model may have by ${track.title}, ${track.main}, from tests of every pair of models on the samples that both have, corrected for their number (Holm, 95 %). Models whose ranks overlap may be equally good. Baselines have no rank, nor have models that were not asked everything.`),
-      el("p", {}, "Under a value stands its 95 % interval, from leaving out each base scene in turn."),
-      state.wanted.includes("date") ? el("p", {}, `Asked on: ${Table.ASKED[0].toLowerCase()}${Table.ASKED.slice(1)}.`) : null,
-      track.notes.map((note) => el("p", {}, note)),
-      el("p", {}, "“Scored again” are runs that came as a bundle, whose replies were scored again when this page was made and came out the same. A model's page lists what was not verified."),
-      track.physics ? el("p", {}, `${track.title}: physics is not carried out again, what fell is taken from the records.`) : null);
-  }
-
-  function chart(state) {
-    const { data, track } = state;
-    const column = state.main;
-    const axes = column ? Chart.axes(data, track) : [];
-    if (!axes.length) {
-      return el("section", { class: "costs" }, el("h2", {}, "Cost against score"),
-        el("p", { class: "muted" }, "Nothing to draw: fewer than two models have a known price, token count or time."));
-    }
-    const axis = axes.some(([name]) => name === state.axis) ? state.axis : axes[0][0];
-    const { drawing, without } = Chart.draw(data, track, column, axis);
-    const choice = el("label", { class: "choice" }, el("span", {}, "Across"),
-      el("select", { id: "axis", onchange: (event) => go(state, { axis: event.target.value }) },
-        axes.map(([name, title]) => el("option", { value: name, selected: name === axis }, title))));
-    return el("section", { class: "costs" }, el("h2", {}, "Cost against score"), el("div", { class: "tools" }, choice),
-      el("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Cost against score" }, drawing),
-      el("p", { class: "notes" }, [`${track.title}. Bars are 95 % intervals. Squares are baselines.`,
-        data.rows.some((row) => Table.isCut(row, track.name)) ? " Hollow points were not asked everything." : "",
-        without.length ? ` Not drawn, as nothing is known: ${without.map((row) => row.name).join(", ")}.` : ""].join("")));
-  }
 
   // ---- a model
 
@@ -157,7 +18,7 @@ const Views = (() => {
       ["Kind", { litellm: "asked over the network", replay: "a recording", baseline: "a baseline: a rule" }[row.kind] || row.kind],
       ["Parameters", row.size_b === null ? null : `${row.size_b} billion`],
       ...runs.flatMap((run) => [["Run", `${run.suite || "run"} ${run.id}, begun ${run.date || "on an unknown day"}`],
-        ["Scored again", run.verified ? "yes, from a bundle" : "no: taken from a run folder"],
+        ["Independently re-scored", run.verified ? "yes, from a bundle" : "no: taken from a run folder"],
         ["Not verified", run.unverified.join(" ") || null],
         ["Seeds", String(run.seeds)], ["Asked how", run.asked.join(", ") || null]]),
     ];
@@ -198,9 +59,54 @@ const Views = (() => {
             return el("td", { class: heading === track.main ? "main" : null }, found ? text(found[0]) : DASH,
               found && found[1] !== null ? el("small", {}, `${text(found[1])} to ${text(found[2])}`) : null);
           })))))),
-      el("h3", {}, `Every ${track.item}`),
-      el("p", { class: "notes" }, `The number is what it scored (${track.main}), the mean where it was asked several times. Choose one to see a replay.`),
-      tiles(items(Store.index.rowsOfEntry[place], track)));
+      profile(data, row, track), telling(row, place, track), neighbours(data, row, track),
+      el("details", {}, el("summary", {}, `Every ${track.item}`),
+        el("p", { class: "notes" }, `The number is what it scored (${track.main}), the mean where it was asked several times. Choose one to see a replay.`),
+        tiles(items(Store.index.rowsOfEntry[place], track))));
+  }
+
+  /** What its wrong steps are of, as bars. */
+  function profile(data, row, track) {
+    const errors = Object.entries(row.facts[track.name].errors || {}).sort((a, b) => b[1] - a[1]);
+    if (!errors.length) return null;
+    return [el("h3", {}, "Its wrong steps"), el("div", { class: "profile" }, errors.flatMap(([name, share]) => {
+      const fill = el("i");
+      fill.style.width = `${share}%`;
+      return [el("span", {}, Words.named(name)), el("span", { class: "score-bar", "aria-hidden": "true" }, fill), el("span", { class: "number" }, `${text(share)} %`)];
+    }))];
+  }
+
+  /** Six samples that it failed where most others did better. */
+  function telling(row, place, track) {
+    const mean = (list) => list.reduce((sum, one) => sum + one, 0) / list.length;
+    const sign = track.better === "lower" ? -1 : 1;
+    const mine = Store.index.rowsOfEntry[place].map(Store.sample).filter((one) => one.track === track && one.score !== null && isBuilt(one));
+    const gaps = mine.map((sample) => {
+      const others = Store.index.rowsOfItem[sample.item].map(Store.sample)
+        .filter((one) => one.entry !== row && one.entry.kind !== "baseline" && one.score !== null).map((one) => one.score);
+      return { sample, gap: others.length ? sign * (mean(others) - sample.score) : -Infinity };
+    }).filter(({ sample, gap }) => gap > 0 && sample.score > 0).sort((a, b) => b.gap - a.gap || a.sample.key.localeCompare(b.sample.key)).slice(0, 6);
+    if (!gaps.length) return null;
+    return [el("h3", {}, "Where it falls furthest behind the others"), el("ul", { class: "wall" }, gaps.map(({ sample, gap }) => el("li", {},
+      link("replay", Site.wordsOf(sample), brought(`Built in ${sample.key}`, () => builtBy(sample)), el("strong", {}, sample.key),
+        el("span", { class: "muted" }, ` ${text(gap)} behind the mean`), bar(sample.score, track)))))];
+  }
+
+  /** On how many items it beats the models beside it in the ranking, and loses to them. */
+  function neighbours(data, row, track) {
+    const main = data.columns.find((column) => column.track === track.name && column.heading === track.main);
+    if (row.kind === "baseline" || !main) return null;
+    const ranked = Table.sorted(data.rows.filter((one) => one.kind !== "baseline" && one.values[main.id]), { value: (one) => one.values[main.id][0] }, track.better !== "lower");
+    const at = ranked.indexOf(row);
+    const scores = (one) => new Map(Store.index.rowsOfEntry[data.rows.indexOf(one)].map(Store.sample)
+      .filter((sample) => sample.track === track && sample.score !== null).map((sample) => [`${sample.item} ${sample.seed} ${sample.way}`, sample.score]));
+    const mine = scores(row);
+    const lines = [ranked[at - 1], ranked[at + 1]].filter(Boolean).map((other) => {
+      const pairs = [...scores(other)].filter(([key]) => mine.has(key)).map(([key, score]) => (track.better === "lower" ? -1 : 1) * (mine.get(key) - score));
+      return el("li", {}, `${plural(pairs.filter((gap) => gap > 0).length, track.item)} better than `, link("model", { m: other.name }, other.name),
+        `, ${pairs.filter((gap) => gap < 0).length} worse, ${pairs.filter((gap) => gap === 0).length} alike`);
+    });
+    return lines.length ? [el("h3", {}, "Beside its neighbors"), el("ul", { class: "notes" }, lines)] : null;
   }
 
   /** Samples by item: [{sample, scores, outcomes}], the worst first. */
@@ -255,23 +161,63 @@ const Views = (() => {
       sum.sum += index.rows.score[row] / 10;
       sums.set(scene, sum);
     });
-    const wanted = (words.get("q") || "").toLowerCase();
-    const list = [...sums].map(([scene, { n, sum, levels }]) => ({ name: index.scenes[scene], score: sum / n, levels }))
-      .filter(({ name }) => name.toLowerCase().includes(wanted))
-      .sort((a, b) => worse(a.score, b.score, track) || a.name.localeCompare(b.name));
-    const choice = data.tracks.length > 1 ? el("label", { class: "choice" }, el("span", {}, "Track"),
-      el("select", { id: "track", onchange: (event) => Site.go("scenes", { t: event.target.value, q: words.get("q") }) },
-        data.tracks.map((one) => el("option", { value: one.name, selected: one === track }, one.title)))) : null;
+    const wanted = (words.get("q") || "").toLowerCase(), level = words.get("l") || "";
+    const all = [...sums].map(([scene, { n, sum, levels }]) => ({ scene, name: index.scenes[scene], score: sum / n, levels }));
+    const levels = [...new Set(all.flatMap((one) => one.levels))].sort((one, other) => one - other);
+    const list = all.filter((one) => one.name.toLowerCase().includes(wanted) && (!level || one.levels.map(String).includes(level)))
+      .sort((one, other) => worse(one.score, other.score, track) || one.name.localeCompare(other.name));
+    const go = (changes) => Site.go("scenes", { t: words.get("t"), q: words.get("q"), l: level, ...changes });
+    const choice = (id, name, options, act) => el("label", { class: "choice" }, el("span", {}, name),
+      el("select", { id, onchange: (event) => act(event.target.value) }, options.map(([value, shown, isOn]) => el("option", { value, selected: isOn }, shown))));
     const search = el("label", { class: "choice" }, el("span", {}, "Find"), el("input", { type: "search", id: "find", value: words.get("q") || "",
-      onchange: (event) => Site.go("scenes", { t: words.get("t"), q: event.target.value }) }));
+      onchange: (event) => go({ q: event.target.value }) }));
     return [
       el("h1", {}, "Scenes"),
       el("p", { class: "lead" }, `The mean score of all ${isModel.includes(true) ? "models" : "baselines"} in ${track.title.toLowerCase()}, the hardest first.`),
-      el("div", { class: "tools" }, choice, search),
+      el("div", { class: "tools" },
+        data.tracks.length > 1 ? choice("track", "Track", data.tracks.map((one) => [one.name, one.title, one === track]), (value) => go({ t: value })) : null,
+        levels.length > 1 ? choice("level", "Level", [["", "All", !level], ...levels.map((one) => [String(one), `Level ${one}`, String(one) === level])], (value) => go({ l: value })) : null,
+        search),
       el("p", { class: "muted", role: "status" }, plural(list.length, "scene")),
-      el("ul", { class: "tiles" }, list.map(({ name, score, levels }) => el("li", {},
-        link("scene", { s: name }, el("span", { class: "tile-name" }, name, el("small", {}, `level ${levels.join(", ")}`)), shade(score, track))))),
+      el("ul", { class: "thumbs" }, list.map((one) => thumb(one, track))),
     ];
+  }
+
+  const inSight = new IntersectionObserver((seen) => {
+    for (const { target, isIntersecting } of seen) {
+      if (!isIntersecting) continue;
+      inSight.unobserve(target);
+      target.bring();
+    }
+  }, { rootMargin: "300px" });
+
+  /** A picture that is brought and drawn when it comes into sight: `blocks` gives it, or null. */
+  function brought(label, blocks) {
+    const canvas = el("canvas", { class: "picture goal", role: "img", "aria-label": label });
+    canvas.drawing = [[], { grid: true }];
+    canvas.bring = async () => {
+      const found = await blocks();
+      if (!found || !canvas.isConnected) return;
+      canvas.drawing = [found.blocks, { grid: true, ...found.options }];
+      Stage.draw(canvas.parentElement);
+    };
+    inSight.observe(canvas);
+    return canvas;
+  }
+
+  function thumb({ scene, name, score, levels }, track) {
+    const isDrawn = Store.index.starts.scenes.length;
+    return el("li", {}, link("scene", { s: name },
+      isDrawn ? brought(`The goal of ${name}`, () => Store.entry("scenes", scene)) : null,
+      el("span", { class: "tile-name" }, name, el("small", {}, `level ${levels.join(", ")}`)), bar(score, track)));
+  }
+
+  /** A score as a bar with its number. */
+  function bar(score, track) {
+    const share = score === null || track.best === null ? 0 : Math.max(0, Math.min(1, track.better === "lower" ? 1 - score / (track.best || 100) : score / track.best));
+    const fill = el("i");
+    fill.style.width = `${100 * share}%`;
+    return [el("span", { class: "number score" }, score === null ? "–" : text(score)), el("span", { class: "score-bar", "aria-hidden": "true" }, fill)];
   }
 
   async function scene(words) {
@@ -307,11 +253,23 @@ const Views = (() => {
     for (const sample of samples) byEntry.set(sample.entry, [...(byEntry.get(sample.entry) || []), sample]);
     const best = (list) => list.map((sample) => sample.score).sort((a, b) => worse(b, a, track))[0];
     const rows = [...byEntry].sort((a, b) => worse(best(b[1]), best(a[1]), track) || a[0].name.localeCompare(b[0].name));
-    return el("ul", { class: "answers" }, rows.map(([entry, list]) => el("li", {},
-      el("span", { class: "answer-name" }, link("model", { m: entry.name }, entry.name)),
-      el("span", { class: "answer-scores" }, list.map((sample) => link("replay", Site.wordsOf(sample),
-        el("span", { class: "unseen" }, `${entry.name}${list.length > 1 ? `, seed ${sample.seed}` : ""}${sample.way ? `, ${sample.way}` : ""}: `),
-        shade(sample.score, track, sample.outcome)))))));
+    return el("ul", { class: "wall" }, rows.flatMap(([entry, list]) => list.map((sample) => el("li", {}, link("replay", Site.wordsOf(sample),
+      isBuilt(sample) ? brought(`Built by ${entry.name}`, () => builtBy(sample)) : null,
+      el("strong", {}, entry.name), el("span", { class: "muted" }, list.length > 1 ? ` seed ${sample.seed}` : "", sample.way ? ` ${sample.way}` : ""),
+      sample.score === null ? el("span", { class: "muted" }, ` ${Words.named(sample.outcome)}`) : bar(sample.score, track))))));
+  }
+
+  const isBuilt = (sample) => Store.index.starts.scenes.length > 0 && sample.part === null && sample.score !== null;
+
+  /** What stands at the end of a sample, framed as its goal; null where nothing is known of it. */
+  async function builtBy(sample) {
+    const scene = await Store.entry("scenes", sample.sceneNumber), record = await Store.entry("replays", sample.row);
+    const score = (record.scores || []).find(({ placed }) => placed);
+    if (!scene || !(score || record.turns || record.pose)) return null;
+    const shown = Steps.asShown(scene, record);
+    const { states, framed } = Runs.of(shown, record, score?.setting || "A", score);
+    const end = states.at(-1)?.at(-1);
+    return end ? { blocks: end.blocks, options: { framed } } : null;
   }
 
   // ---- common
@@ -325,5 +283,5 @@ const Views = (() => {
       el("p", { class: "lead" }, name ? `This site has no ${noun} called “${name}”.` : `The address names no ${noun}.`)];
   }
 
-  return { board, model, scenes, scene, unknown, crumbs, link, shade };
+  return { model, scenes, scene, unknown, crumbs, link, shade };
 })();
