@@ -5,9 +5,11 @@ const Address = (() => {
   const WAIT_MS = 250;
   let describe = () => location.hash;
   let waiting = 0;
+  let shown = location.hash;
 
   /** The view that the address names, and its words. */
   function read() {
+    shown = location.hash;
     const [view, query] = location.hash.slice(1).split(/\?(.*)/s);
     return { view: view || "results", words: new URLSearchParams(query || "") };
   }
@@ -23,8 +25,10 @@ const Address = (() => {
   function note(isNew = false) {
     clearTimeout(waiting);
     const seen = describe();
-    if (seen === location.hash) return;
+    // Back may have gone to another place that is not shown yet: it is not written over.
+    if (seen === location.hash || (!isNew && location.hash !== shown)) return;
     history[isNew ? "pushState" : "replaceState"](null, "", seen);
+    shown = location.hash;
   }
 
   /** Write over the present place once nothing has changed for a while: browsers ration it. */
