@@ -12,7 +12,9 @@ Linear programming settles the rest.
 
 `surely_stands` and `surely_falls` ask so with all weights off by up to `MARGIN_M` to any side and
 long blocks heavier or lighter by `MASS_FACTORS`, with all that lies between, so that no verdict
-hangs on an edge that a weight is nearly over.
+hangs on an edge that a weight is nearly over. Weights alone do not tell a block that rests on two
+edges with nothing over them, so what stands has to stand on smaller contacts too: those that are
+left wherever two blocks are off by up to the margin from one another.
 """
 
 from __future__ import annotations
@@ -55,8 +57,6 @@ MASSES: tuple[Masses, ...] = tuple(
 )
 """Factors of mass at the ends of that range: long blocks heavier, and lighter."""
 _SIDES = np.array([(math.cos(a), math.sin(a)) for a in np.arange(8) * math.pi / 4])
-_CORNER_M = MARGIN_M / math.cos(math.pi / 8)
-"""Distance of the corners of an octagon that has all shifts of `MARGIN_M` inside [m]."""
 _LEAST_VERTICAL = 0.15
 _TOLERANCE = 1e-5
 _PROOF = 1e4
@@ -68,17 +68,8 @@ _KEPT = 2048
 
 
 def surely_stands(blocks: Sequence[Block]) -> bool:
-    """True if blocks stand with weights off by up to `MARGIN_M`, little friction, any masses.
-
-    Asked at the corners of an octagon of shifts, at both ends of the range of masses. What lies
-    between two shifts, or two masses, that can be borne is borne by the mean of their forces.
-    """
-    forces = _forces(blocks, FRICTIONS[0])
-    return all(
-        _bears(forces, _weights(blocks, (x, y), masses))
-        for x, y in (_CORNER_M * _SIDES).tolist()
-        for masses in MASSES
-    )
+    """True if blocks are in balance with a margin of `MARGIN_M`, little friction, any masses."""
+    return is_balanced(blocks, FRICTIONS[0], MARGIN_M, MASSES)
 
 
 def surely_falls(blocks: Sequence[Block]) -> bool:
@@ -108,12 +99,25 @@ def surely_falls(blocks: Sequence[Block]) -> bool:
     return left >= _TOLERANCE
 
 
-def is_balanced(blocks: Sequence[Block], friction: float = FRICTION, margin_m: float = 0.0) -> bool:
-    """True if contacts can bear all weights, or, with a margin, all moved to each of four sides."""
+def is_balanced(
+    blocks: Sequence[Block],
+    friction: float = FRICTION,
+    margin_m: float = 0.0,
+    masses: Sequence[Masses] = ((),),
+) -> bool:
+    """True if contacts can bear all weights, whichever of the masses blocks have.
+
+    With a margin [m], also all weights moved by up to so much to any side, and
+    those in their place
+    where every contact is narrower by it. The former is asked at the corners of an octagon: of two
+    shifts, or masses, that can be borne, what lies between is borne by the mean of their forces.
+    """
     forces = _forces(blocks, friction)
-    sides = _SIDES[::2] if margin_m else _SIDES[:1]
-    shifts = ((margin_m * x, margin_m * y) for x, y in sides)
-    return all(_bears(forces, _weights(blocks, shift, ())) for shift in shifts)
+    shifts = margin_m / math.cos(math.pi / 8) * _SIDES if margin_m else np.zeros((1, 2))
+    if not all(_bears(forces, _weights(blocks, at, kg)) for at in shifts for kg in masses):
+        return False
+    narrow = _forces(blocks, friction, margin_m) if margin_m else forces
+    return not margin_m or all(_bears(narrow, _weights(blocks, (0, 0), kg)) for kg in masses)
 
 
 def _bears(forces: Floats, weights: Floats) -> bool:
@@ -167,7 +171,7 @@ def _least_residual(
     return float(solution.fun)
 
 
-def _weights(blocks: Sequence[Block], shift_m: tuple[float, float], masses: Masses) -> Floats:
+def _weights(blocks: Sequence[Block], shift_m: Sequence[float] | Floats, masses: Masses) -> Floats:
     """The force up that each block needs, and its moment, shape (6 n,), of a whole weight of 1."""
     factors = dict(masses)
     weights = np.array([SHAPES[b.type].mass_kg * factors.get(b.type, 1.0) for b in blocks])
@@ -186,7 +190,7 @@ def _loads(blocks: Sequence[Block], chosen: NDArray[np.bool_]) -> Floats:
 def _needs(
     blocks: Sequence[Block],
     weights: Floats,
-    shift_m: tuple[float, float] = (0.0, 0.0),
+    shift_m: Sequence[float] | Floats = (0.0, 0.0),
 ) -> Floats:
     """The force up that each block of some weight needs, and its moment, shape (6 n,)."""
     if not blocks:
@@ -202,16 +206,17 @@ def _needs(
     return _wrenches(centers, np.outer(weights, _UP)).ravel()
 
 
-def _forces(blocks: Sequence[Block], friction: float) -> Floats:
+def _forces(blocks: Sequence[Block], friction: float, margin_m: float = 0.0) -> Floats:
     """Effect of a unit of force along each edge of each cone on each block, shape (6 n, k).
 
+    With a margin [m] contacts between blocks are narrower by it; the ground has no rim to miss.
     A contact is who pushes (None: the ground), who is pushed, the corners [m], and the normal.
     """
     contacts: list[tuple[int | None, int, Floats, Floats]] = [
         (None, i, corners, _UP) for i, b in enumerate(blocks) for corners in _on_floor(b)
     ]
     for (below, one), (above, other) in combinations(enumerate(blocks), 2):
-        contacts += [(below, above, *place) for place in _between(one, other)]
+        contacts += [(below, above, *place) for place in _between(one, other, margin_m)]
     columns = []
     for pusher, pushed, corners_m, normal in contacts:
         helper = _UP if abs(normal[2]) < _STEEP else np.array([1.0, 0.0, 0.0])
@@ -248,7 +253,7 @@ def _on_floor(block: Block) -> tuple[Floats, ...]:
 
 
 @functools.lru_cache(maxsize=_KEPT)
-def _between(one: Block, other: Block) -> tuple[tuple[Floats, Floats], ...]:
+def _between(one: Block, other: Block, margin_m: float) -> tuple[tuple[Floats, Floats], ...]:
     """Corners and normal of each contact of two blocks, the normal from the first on."""
     if not boxes_near(bounds_m(one), bounds_m(other), CONTACT_TOLERANCE_M):
         return ()
@@ -259,7 +264,7 @@ def _between(one: Block, other: Block) -> tuple[tuple[Floats, Floats], ...]:
             continue
         best = axes.directions[axes.gaps_m > axes.gap_m - _SAME_GAP_M]
         direction = best[int(np.argmax(np.abs(best[:, 2])))]
-        corners = contact_corners_m(first, second, direction)
+        corners = contact_corners_m(first, second, direction, margin_m)
         if abs(direction[2]) >= _LEAST_VERTICAL and len(corners):
             met.append((corners, direction))
     return tuple(met)

@@ -248,13 +248,19 @@ def _contact_rise(first: ConvexPiece, second: ConvexPiece, axes: Axes) -> tuple[
     return rim, True
 
 
-def contact_corners_m(first: ConvexPiece, second: ConvexPiece, direction: Floats) -> Floats:
+def contact_corners_m(
+    first: ConvexPiece, second: ConvexPiece, direction: Floats, margin_m: float = 0.0
+) -> Floats:
     """Corners of the contact of two touching pieces, in the world, shape (k, 3) [m].
 
     `direction` (3,) is the contact's normal, from the first to the second; none where they meet in
-    less than a line.
+    less than a line. With a margin [m], half of it is left out along the rims of either piece, as
+    is certain to touch where they may be off by so much from one another.
     """
-    _, _, shared, basis = _patches(first, second, direction)
+    lower, upper, shared, basis = _patches(first, second, direction)
+    if margin_m:
+        for outline in (lower, upper):
+            shared = _clip(shared, outline, margin_m / 2)
     if len(shared) < 2:
         return np.empty((0, 3))
     corners: Floats = shared @ basis
@@ -309,14 +315,18 @@ def _hull(points: Floats) -> Floats:
     return np.array([*half(ordered)[:-1], *half(ordered[::-1])[:-1]])
 
 
-def _clip(subject: Floats, window: Floats) -> Floats:
-    """The part of a polygon, segment or point inside a convex polygon (Sutherland-Hodgman)."""
-    if len(window) < 3:
+def _clip(subject: Floats, window: Floats, inset_m: float = 0.0) -> Floats:
+    """The part of a polygon, segment or point inside a convex polygon (Sutherland-Hodgman).
+
+    With an inset [m], the part so far from the polygon's sides, or from the ends of a segment.
+    """
+    if len(window) < 3 and not (len(window) == 2 and inset_m):
         return np.empty((0, 2))
     kept = subject
     for start, end in zip(window, np.roll(window, -1, axis=0), strict=True):
-        inward = np.array([start[1] - end[1], end[0] - start[0]])
-        depths = (kept - start) @ inward
+        along = end - start
+        inward = along if len(window) == 2 else np.array([-along[1], along[0]])
+        depths = (kept - start) @ inward - inset_m * np.linalg.norm(inward)
         corners: list[Floats] = []
         for i in range(len(kept)):
             j = (i + 1) % len(kept)
