@@ -2,7 +2,7 @@
 
 Motifs are written for the front, along y, and are symmetric about their middle where they can be.
 Sizes are grid units of 2.5 cm: a cube is 2 wide, a cuboid2 4, a cuboid3 6, an arch 4 wide and 2
-high, a cylinder 4 high.
+high, a cylinder 4 high. `Draft.build` says how blocks are written.
 """
 
 from __future__ import annotations
@@ -12,168 +12,94 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from phyblock.domain.blocks import BlockType
 from phyblock.domain.scene import Block
 from phyblock.domain.symmetry import Symmetry
 from phyblock.making.scenes.sketch import UNIT_M, Draft, Theme, transformed
 from phyblock.sim.contact import whole_bounds_m
 
-OUT = ("ramp-y", "ramp+y")
-"""A pair of ramps that slope away from the middle."""
-EDGES = ("edge-x", "edge-x")
-"""A pair of slabs on edge, thin from front to back."""
-_ROUND_OUT = ("round-y", "round+y")
-
-
-def topping(d: Draft, y: float = 0.0) -> None:
-    """A roof or a dome on something two wide, its ridge either way."""
-    if d.pick_type("triangle", "semi_cylinder") == "triangle":
-        d.put("triangle", y, pose=d.pick(("roof", "roof-turned")))
-    else:
-        d.put("semi_cylinder", y, pose=d.pick(("dome", "dome-turned")))
+_PIERS = {
+    4: ("arch", "arch", "2 cube 1", "2 cylinder 1", "2 cuboid1:edge-x 1", "2 cuboid1 1"),
+    6: (
+        *("2 cube 2", "2 cylinder 2", "2 cylinder 2", "2 cuboid1:edge-x 2", "2 cube 2; cube +1"),
+        *("2 cuboid1 2; 2 cylinder 2", "2 cylinder:lying-x 2"),
+    ),
+    8: (
+        *("2 arch 2", "2 arch 2", "arch; 2 cube 3"),
+        *("2 cuboid1 3; 2 cube 3; cuboid2:flat-y; arch", "2 cube 3; arch"),
+    ),
+}
+_DECKS = {4: "cuboid2:flat-y", 6: "cuboid3:flat-y", 8: "2 cuboid2:flat-y 2"}
+_GABLES = {
+    4: "2 triangle:ramp 1",
+    6: "cube; 2 triangle:ramp 2; top",
+    8: "2 cube 1; 2 triangle:ramp 3; triangle",
+}
 
 
 def column(d: Draft, parts: int) -> None:
-    """Blocks two wide on one another, no two slabs running."""
+    """Blocks two wide on one another, no two slabs or cylinders running."""
     last = ""
     for number in range(parts):
-        kinds = [kind for kind in ("cube", "cylinder", "cuboid1") if kind != last or kind == "cube"]
-        last = d.pick(kinds)
-        if last == "cube":
-            d.put("cube", tone=number)
-        elif last == "cylinder":
-            d.put("cylinder")
-        else:
-            d.put("cuboid1")
+        last = d.pick([k for k in ("cube", "cylinder", "cuboid1") if k != last or k == "cube"])
+        d.build(last, number)
 
 
-def piers(d: Draft, width: int, tone: int = 0) -> None:
-    """A row that carries a deck `width` wide (4, 6 or 8), level on top."""
-    kinds = {
-        4: ("arch", "arch", "cube", "cylinder", "edge", "slab"),
-        6: ("cube", "cylinder", "cylinder", "edge", "three", "post", "barrel"),
-        8: ("arches", "arches", "arch+cubes", "post", "cube"),
-    }
-    kind, y = d.pick(kinds[width]), width / 2 - 1
-    if kind == "arch":
-        d.put("arch")
-    elif kind in ("cube", "three"):
-        d.pair("cube", y, tone=tone)
-        if kind == "three" or width == 8:
-            d.put("cube" if width == 6 else "arch", tone=tone + 1)
-    elif kind == "cylinder":
-        d.pair("cylinder", y)
-    elif kind == "edge":
-        d.pair("cuboid1", y, EDGES)
-    elif kind == "slab":
-        d.pair("cuboid1", y)
-    elif kind == "post":
-        d.pair("cuboid1", y)
-        d.pair("cylinder" if width == 6 else "cube", y, tone=tone)
-        if width == 8:
-            d.put("cuboid2", pose="flat-y")
-            d.put("arch")
-    elif kind == "barrel":
-        d.pair("cylinder", y, ("lying-x", "lying-x"))
-    elif kind == "arches":
-        d.pair("arch", 2)
-    else:
-        d.put("arch")
-        d.pair("cube", 3, tone=tone)
-
-
-def deck(d: Draft, width: int) -> None:
-    """Slabs over a row of piers."""
-    if width == 8:
-        d.pair("cuboid2", 2, ("flat-y", "flat-y"))
-    else:
-        d.put("cuboid2" if width == 4 else "cuboid3", pose="flat-y")
-
-
-def gable(d: Draft, width: int, tone: int = 1) -> None:
-    """A roof as wide as the deck: two ramps, with blocks between when it is wider."""
-    if width == 8:
-        d.pair("cube", 1, tone=tone)
-        d.pair("triangle", 3, OUT)
-        d.put("triangle")
-    elif width == 6:
-        d.put("cube", tone=tone)
-        d.pair("triangle", 2, OUT)
-        topping(d)
-    else:
-        d.pair("triangle", 1, OUT)
+def storey(d: Draft, width: int, tone: int = 0) -> None:
+    """A row that carries a deck `width` wide (4, 6 or 8), and the deck."""
+    d.any_of(*_PIERS[width], tone=tone)
+    d.build(_DECKS[width])
 
 
 def crown(d: Draft, width: int, tone: int = 1) -> None:
-    """The end of a structure, on a deck `width` wide (2, 4, 6 or 8)."""
-    if width == 2:
-        topping(d)
-        return
-    kinds = ("gable", "middle", "turret", "pair", "lantern", "cradle", "battlement", "temple")
-    kind, y = d.pick(kinds), width / 2 - 1
-    if kind == "gable":
-        gable(d, width, tone)
-    elif kind == "middle":
-        topping(d)
-    elif kind == "turret":
-        d.put("cube", tone=tone)
-        topping(d)
-    elif kind == "pair":
-        d.pair("cube", y, tone=tone)
-        d.pair(d.pick(("triangle", "semi_cylinder")), y)
-        if width > 4:
-            topping(d)
-    elif kind == "lantern":
-        d.put("cuboid1")
-        d.put("cylinder")
-        topping(d)
-    elif kind == "cradle":
-        d.put("arch", pose="cradle")
-        if width > 4:
-            d.pair("semi_cylinder", max(3.0, y))
+    """The end of a structure, on a deck `width` wide (4, 6 or 8)."""
+    y, is_wide = width / 2 - 1, width > 4
+    kind = d.pick(
+        ("gable", "middle", "turret", "pair", "lantern", "cradle", "battlement", "temple")
+    )
+    if kind == "pair":
+        d.build(f"2 cube {y}", tone)
+        d.any_of(f"2 triangle {y}", f"2 semi_cylinder {y}")
+        d.build("top" if is_wide else "")
     elif kind == "battlement":
-        d.pair("semi_cylinder" if d.maybe() else "cuboid1", y)
-        if width > 4:
-            d.put("cube", tone=tone)
-            topping(d)
+        d.build(f"2 semi_cylinder {y}" if d.maybe() else f"2 cuboid1 {y}")
+        d.build("cube; top" if is_wide else "", tone)
     else:
-        d.put("arch")
-        if width > 4:
-            d.pair("semi_cylinder", 3)
-        topping(d)
+        texts = {
+            "gable": _GABLES[width],
+            "middle": "top",
+            "turret": "cube; top",
+            "lantern": "cuboid1; cylinder; top",
+            "cradle": f"arch:cradle; 2 semi_cylinder {max(3.0, y)}" if is_wide else "arch:cradle",
+            "temple": "arch; 2 semi_cylinder 3; top" if is_wide else "arch; top",
+        }
+        d.build(texts[kind], tone)
 
 
 def flank(d: Draft, width: int, tone: int = 0) -> None:
     """Blocks that lean on both ends of a row that stands on the ground."""
     kind, y = d.pick(("ramp", "ramp", "turret", "apse", "fence")), width / 2 + 1
-    if kind == "ramp":
-        d.pair("triangle", y, OUT)
-    elif kind == "turret":
-        d.pair("cube", y, tone=tone)
-        d.pair(d.pick(("triangle", "semi_cylinder")), y)
-    elif kind == "apse":
-        d.pair("semi_cylinder", width / 2 + 0.5, _ROUND_OUT)
+    if kind == "turret":
+        d.build(f"2 cube {y}", tone)
+        d.any_of(f"2 triangle {y}", f"2 semi_cylinder {y}")
     else:
-        d.pair("cuboid1", y)
+        apse = f"2 semi_cylinder:round {width / 2 + 0.5}"
+        d.build({"ramp": f"2 triangle:ramp {y}", "apse": apse, "fence": f"2 cuboid1 {y}"}[kind])
 
 
 def _tower(d: Draft) -> None:
     for width in d.pick(((), (4,), (4, 4), (6,), (6, 4))):
-        piers(d, width)
-        deck(d, width)
+        storey(d, width)
     column(d, d.pick((1, 1, 2, 2, 3)))
-    topping(d)
+    d.build("top")
     if d.maybe(0.25):
         flank(d, 2)
 
 
 def _gate(d: Draft) -> None:
     width = d.pick((4, 6))
-    piers(d, width)
-    deck(d, width)
-    crown(d, width, 1)
+    storey(d, width)
+    crown(d, width)
     if d.maybe(0.35):
         flank(d, width)
 
@@ -181,10 +107,9 @@ def _gate(d: Draft) -> None:
 def _house(d: Draft) -> None:
     storeys = d.pick(((4,), (6,), (8,), (6, 4), (8, 4), (8, 6), (6, 6)))
     for number, width in enumerate(storeys):
-        piers(d, width, number)
-        deck(d, width)
+        storey(d, width, number)
     if d.maybe(0.6):
-        gable(d, storeys[-1], len(storeys))
+        d.build(_GABLES[storeys[-1]], len(storeys))
     else:
         crown(d, storeys[-1], len(storeys))
     if d.maybe(0.35):
@@ -193,188 +118,143 @@ def _house(d: Draft) -> None:
 
 def _bridge(d: Draft) -> None:
     width = d.pick((4, 8, 8))
-    if width == 4:
-        d.put("arch")
-    else:
-        d.pair("arch", 2)
-    d.pair("triangle", width / 2 + 1, OUT)
+    d.build("arch; 2 triangle:ramp 3" if width == 4 else "2 arch 2; 2 triangle:ramp 5")
     if d.maybe(0.7):
-        deck(d, width)
+        d.build(_DECKS[width])
         if d.maybe(0.6):
             crown(d, width)
     elif width == 8:
         crown(d, d.pick((4, 6, 8)))
     else:
-        topping(d)
+        d.build("top")
+
+
+def _row(block: str, ys: Sequence[float], tone: int = 0) -> str:
+    """One block of a sort at each place."""
+    return "; ".join(f"{block} {y} +{tone}" for y in ys)
+
+
+def _spaced(count: int, step: float) -> list[float]:
+    """Places of `count` blocks, the middle of which is 0."""
+    return [step * (i - (count - 1) / 2) for i in range(count)]
 
 
 def _arcade(d: Draft) -> None:
     spans = d.pick((2, 3))
-    ys = [4.0 * i - 2.0 * (spans - 1) for i in range(spans)]
-    for y in ys:
-        d.put("arch", y)
-    for y in ys:
-        d.put("cuboid2", y, pose="flat-y")
+    ys = _spaced(spans, 4)
+    d.build(f"{_row('arch', ys)}; {_row('cuboid2:flat-y', ys)}")
     upper = d.pick(("arches", "toppings", "alternate", "row"))
     inner = [(a + b) / 2 for a, b in pairwise(ys)]
-    for y in inner if upper == "arches" else ys:
-        if upper == "arches":
-            d.put("arch", y)
-        elif upper == "row":
-            d.put("cube", y, tone=1)
-    if upper == "alternate":
-        d.pair("cube", ys[-1], tone=1)
-        d.pair("triangle", ys[-1])
-        d.put("arch" if spans == 3 else "semi_cylinder")
-    elif upper == "arches" and d.maybe():
-        d.pair("cube", 2 * spans - 1, tone=1)
-        d.pair("semi_cylinder", 2 * spans - 1)
-    for y in inner if upper == "arches" else (ys if upper != "alternate" else ()):
-        d.put("triangle" if spans == 3 else "semi_cylinder", y)
+    if upper == "arches":
+        d.build(_row("arch", inner))
+        if d.maybe():
+            d.build(f"2 cube {2 * spans - 1} +1; 2 semi_cylinder {2 * spans - 1}")
+    elif upper == "row":
+        d.build(_row("cube", ys, 1))
+    elif upper == "alternate":
+        middle = "arch" if spans == 3 else "semi_cylinder"
+        d.build(f"2 cube {ys[-1]} +1; 2 triangle {ys[-1]}; {middle}")
+    if upper != "alternate":
+        top = "triangle" if spans == 3 else "semi_cylinder"
+        d.build(_row(top, inner if upper == "arches" else ys))
 
 
 def _wall(d: Draft) -> None:
     kind = d.pick(("bond", "panels", "slabs"))
     length = d.pick((2, 3))
-    ends = 2.0 * length - 1
+    ys = _spaced(length, 4)
     if kind == "bond":
-        for i in range(length):
-            d.put("cuboid2", 4.0 * i - 2.0 * (length - 1), pose="edge-x")
-        for i in range(length - 1):
-            d.put("cuboid2", 4.0 * i - 2.0 * (length - 2), pose="flat-y")
+        d.build(f"{_row('cuboid2:edge-x', ys)}; {_row('cuboid2:flat-y', _spaced(length - 1, 4))}")
     elif kind == "panels":
-        for i in range(length):
-            d.put("cube" if i % 2 else "arch", 4.0 * i - 2.0 * (length - 1))
-        for y in [4.0 * i - 2.0 * (length - 1) for i in range(length)]:
-            d.put("cuboid2", y, pose="flat-y")
+        for i, y in enumerate(ys):
+            d.build(f"{'cube' if i % 2 else 'arch'} {y}")
+        d.build(_row("cuboid2:flat-y", ys))
     else:
-        d.pair("cube", ends - 1)
-        d.put("cube", tone=1)
-        d.put("cuboid3", pose="flat-y")
+        d.build(f"2 cube {2 * length - 2}; cube +1; cuboid3:flat-y")
     count = d.pick((2, 3))
-    for i in range(count):
-        y = (i - (count - 1) / 2) * (4 if count == 2 else 2.5)
-        d.put("cube", y, tone=i)
-    for i in range(count):
-        y = (i - (count - 1) / 2) * (4 if count == 2 else 2.5)
-        d.put("triangle" if count == 2 else "semi_cylinder", y)
+    ys = _spaced(count, 4 if count == 2 else 2.5)
+    for i, y in enumerate(ys):
+        d.build(f"cube {y}", i)
+    d.build(_row("triangle" if count == 2 else "semi_cylinder", ys))
 
 
 def _pyramid(d: Draft) -> None:
     base = d.pick((2, 3, 3, 4))
     for row in range(base, 0, -1):
-        ys = [2.0 * i - (row - 1) for i in range(row)]
         # From both ends inward, so that the row below is loaded evenly.
-        for y in sorted(ys, key=lambda at: (-abs(at), at)):
-            d.put("cube", y, tone=row)
+        d.build(_row("cube", sorted(_spaced(row, 2), key=lambda at: (-abs(at), at)), row))
         if row == base and d.maybe(0.4):
-            d.pair("triangle", row + 1, OUT)
+            d.build(f"2 triangle:ramp {row + 1}")
         if row == 2 and d.maybe(0.4):
-            d.put("cuboid2", pose="flat-y")
-    topping(d)
+            d.build("cuboid2:flat-y")
+    d.build("top")
 
 
 def _stair(d: Draft) -> None:
-    steps, double = d.pick((2, 3)), d.maybe(0.4)
-    heights = [*range(1, steps + 1), *(range(steps - 1, 0, -1) if double else ())]
-    start = -(len(heights) - 1.0)
-    for i, height in enumerate(heights):
+    steps, is_double = d.pick((2, 3)), d.maybe(0.4)
+    heights = [*range(1, steps + 1), *(range(steps - 1, 0, -1) if is_double else ())]
+    ys = _spaced(len(heights), 2)
+    for y, height in zip(ys, heights, strict=True):
         for number in range(height):
-            d.put("cube", start + 2 * i, tone=number)
-    style = d.pick(("ramps", "slabs"))
-    for i, height in enumerate(heights):
-        top = height == steps
-        if not top and style == "ramps":
-            d.put("triangle", start + 2 * i, pose="ramp-y" if i < steps - 1 else "ramp+y")
-        elif not top:
-            d.put("cuboid1", start + 2 * i)
-        else:
-            topping(d, start + 2 * i)
-    if style == "ramps":
-        d.put("triangle", start - 2, pose="ramp-y")
+            d.build(f"cube {y}", number)
+    has_ramps = d.pick((True, False))
+    for i, (y, height) in enumerate(zip(ys, heights, strict=True)):
+        ramp = f"triangle:{'ramp-y' if i < steps - 1 else 'ramp+y'}"
+        d.build(f"{'top' if height == steps else ramp if has_ramps else 'cuboid1'} {y}")
+    if has_ramps:
+        d.build(f"triangle:ramp-y {ys[0] - 2}")
 
 
 def _court(d: Draft) -> None:
     """Four columns, two beams, a roof across: a structure that is as deep as it is wide."""
-    posts: tuple[tuple[BlockType, tuple[str, str]], ...] = (
-        ("cylinder", ("", "")),
-        ("cube", ("", "")),
-        ("cuboid1", ("", "")),
-        ("cuboid1", EDGES),
-    )
-    post, poses = d.pick(posts)
+    post = d.pick(("cylinder", "cube", "cuboid1", "cuboid1:edge-x"))
     half = d.pick((1, 2))
-    for x in (-1, 1):
-        d.pair(post, half, poses, x=x)
-    for x in (-1, 1):
-        d.put("cuboid3" if half == 2 else "cuboid2", 0, x, "flat-y")
+    beam = "cuboid3:flat-y" if half == 2 else "cuboid2:flat-y"
+    d.build(f"2 {post} {half},-1; 2 {post} {half},1; {beam} 0,-1; {beam} 0,1")
     kind = d.pick(("hall", "nave", "across", "tower"))
     if kind == "hall":
-        for y in (-1, 1):
-            d.put("cuboid2", y, pose="flat-x")
+        d.build("2 cuboid2:flat-x 1")
         column(d, 1)
-        topping(d)
-    elif kind == "nave":
-        for x in (-1, 1):
-            d.pair("triangle", 1, OUT, x=x)
-    elif kind == "across":
-        for y in (-half, half):
-            d.put("cuboid2", y, pose="flat-x")
-        for y in (-half, half):
-            topping(d, y)
-    else:
-        d.put("cuboid2", pose="flat-x")
-        d.put("cylinder")
-        topping(d)
+    texts = {
+        "hall": "top",
+        "nave": "2 triangle:ramp 1,-1; 2 triangle:ramp 1,1",
+        "across": f"2 cuboid2:flat-x {half}; top {-half}; top {half}",
+        "tower": "cuboid2:flat-x; cylinder; top",
+    }
+    d.build(texts[kind])
 
 
 def _monument(d: Draft) -> None:
-    base = d.pick(("plate", "cross", "step", "block"))
-    if base == "plate":
-        for x in (-1, 1):
-            d.put("cuboid2", 0, x, "flat-y")
-    elif base == "cross":
-        d.put("cuboid3", pose="flat-y")
-        d.put("cuboid2", pose="flat-x")
-    elif base == "step":
-        d.put("cuboid3", pose="flat-y")
-        d.put("cuboid2", pose="flat-y")
-    else:
-        for x in (-1, 1):
-            d.pair("cube", 1, x=x)
-        d.put("cuboid2", pose="flat-y")
+    bases = {
+        "plate": "cuboid2:flat-y 0,-1; cuboid2:flat-y 0,1",
+        "cross": "cuboid3:flat-y; cuboid2:flat-x",
+        "step": "cuboid3:flat-y; cuboid2:flat-y",
+        "block": "2 cube 1,-1; 2 cube 1,1; cuboid2:flat-y",
+    }
+    base = d.pick(tuple(bases))
+    d.build(bases[base])
     column(d, d.pick((1, 2, 2)))
-    if base != "cross" and d.maybe(0.4):
-        d.put("cuboid2", pose="flat-y")
-        d.pair("semi_cylinder", 1)
-    else:
-        topping(d)
+    d.build("cuboid2:flat-y; 2 semi_cylinder 1" if base != "cross" and d.maybe(0.4) else "top")
     if base == "step":
-        d.pair("semi_cylinder" if d.maybe() else "triangle", 3 if d.maybe() else 4)
+        side = "semi_cylinder" if d.maybe() else "triangle"
+        d.build(f"2 {side} {3 if d.maybe() else 4}")
 
 
 def _henge(d: Draft) -> None:
     spans = d.pick((1, 2))
     ys = (-2.0, 2.0) if spans == 1 else (-4.0, 0.0, 4.0)
-    post = d.pick_type("cylinder", "cube", "cuboid2")
-    for y in ys:
-        d.put(post, y, pose="upright-x" if post == "cuboid2" else "")
-    if spans == 1:
-        d.put("cuboid3", pose="flat-y")
-    else:
-        d.pair("cuboid2", 2, ("flat-y", "flat-y"))
-    for y in ys if d.maybe() else ys[:: len(ys) - 1]:
-        d.put("cuboid1", y)
-    d.put("cuboid3" if spans == 1 else "cuboid2", pose="flat-y")
-    topping(d)
+    d.build(_row(d.pick(("cylinder", "cube", "cuboid2:upright-x")), ys))
+    d.build("cuboid3:flat-y" if spans == 1 else "2 cuboid2:flat-y 2")
+    d.build(_row("cuboid1", ys if d.maybe() else ys[:: len(ys) - 1]))
+    d.build("cuboid3:flat-y; top" if spans == 1 else "cuboid2:flat-y; top")
 
 
 def _balance(d: Draft) -> None:
     column(d, d.pick((1, 2)))
-    d.put(d.pick(("cuboid3", "cuboid3", "cuboid2")), pose="flat-y")
-    half = d.pick((1.0, 2.0)) if d.blocks[-1].type == "cuboid3" else 1.0
-    d.pair("cube" if d.maybe() else "cuboid1", half)
-    d.pair(d.pick(("semi_cylinder", "triangle")), half)
+    beam = d.any_of("cuboid3:flat-y", "cuboid3:flat-y", "cuboid2:flat-y")
+    half = d.pick((1.0, 2.0)) if beam.startswith("cuboid3") else 1.0
+    d.build(f"2 cube {half}" if d.maybe() else f"2 cuboid1 {half}")
+    d.any_of(f"2 semi_cylinder {half}", f"2 triangle {half}")
 
 
 BUILDINGS: dict[str, Theme] = {
@@ -397,248 +277,156 @@ def _animal(d: Draft) -> None:
     """Four legs, a back, a neck and a head at one end, a tail at the other."""
     legs = d.pick(("arch", "arch", "arches", "cubes", "posts", "feet"))
     width = 4 if legs in ("arch", "feet") else d.pick((4, 6))
-    end = width / 2 - 1
-    if legs == "arch":
-        d.put("arch")
-    elif legs == "arches":
-        d.put("arch", x=-1)
-        d.put("arch", x=1)
-        width, end = 4, 1.0
-    elif legs == "cubes":
-        d.pair("cube", end)
-    elif legs == "posts":
-        d.pair("cylinder", end)
-    else:
-        d.pair("cuboid1", end, EDGES)
+    back = _DECKS[width]
     if legs == "arches":
-        d.pair("cuboid2", 1, ("flat-x", "flat-x"))
-    elif legs != "arch" or d.maybe():
-        d.put("cuboid2" if width == 4 else "cuboid3", pose="flat-y")
-    neck = d.pick(("none", "cube", "cube", "long", "thick"))
-    if neck == "cube":
-        d.put("cube", end, tone=1)
-    elif neck == "long":
-        d.put("cylinder", end)
-    elif neck == "thick":
-        d.put("cuboid1", end)
-        d.put("cube", end, tone=1)
+        width, back = 4, "2 cuboid2:flat-x 1"
+    end = width / 2 - 1
+    texts = {
+        "arch": "arch",
+        "arches": "arch 0,-1; arch 0,1",
+        "cubes": f"2 cube {end}",
+        "posts": f"2 cylinder {end}",
+        "feet": f"2 cuboid1:edge-x {end}",
+    }
+    d.build(texts[legs])
+    if legs != "arch" or d.maybe():
+        d.build(back)
+    cube = f"cube {end} +1"
+    d.any_of("", cube, cube, f"cylinder {end}", f"cuboid1 {end}; {cube}")
     if d.maybe(0.6):
-        tail = d.pick_type("triangle", "semi_cylinder")
-        d.put(tail, -end, pose="ramp-y" if tail == "triangle" else "dome")
-    head = d.pick(("snout", "dome", "ears", "muzzle"))
-    if head == "snout":
-        d.put("triangle", end, pose="ramp+y")
-    elif head == "dome":
-        d.put("semi_cylinder", end, pose="dome-turned")
-    elif head == "ears":
-        d.put("triangle", end)
-    else:
-        d.put("cuboid2", end + 0.5, pose="flat-y")
-        d.put("triangle", end, pose="ramp+y")
-
-
-_LEGS: dict[str, BlockType] = {"cylinder": "cylinder", "cube": "cube", "cuboid1": "cuboid1"}
+        d.any_of(f"triangle:ramp-y {-end}", f"semi_cylinder:dome {-end}")
+    d.any_of(
+        f"triangle:ramp+y {end}",
+        f"semi_cylinder:dome-turned {end}",
+        f"triangle {end}",
+        f"cuboid2:flat-y {end + 0.5}; triangle:ramp+y {end}",
+    )
 
 
 def _figure(d: Draft) -> None:
     """Two legs, a trunk with arms, a head with a hat."""
-    legs = d.pick(("cylinder", "cube", "cuboid1", "boots", "skirt"))
-    if legs == "skirt":
-        d.pair("triangle", 1, OUT)
-        d.put("cube")
-    elif legs == "boots":
-        d.pair("cuboid1", 1)
-        d.pair("cube", 1)
-    else:
-        d.pair(_LEGS[legs], 1)
-    if legs != "skirt":
-        d.put("cuboid2", pose="flat-y")
-    trunk = d.pick(("cube", "two", "arch", "barrel"))
-    if legs == "skirt":
-        trunk = "none"
-    if trunk == "cube":
-        d.put("cube", tone=1)
-    elif trunk == "two":
-        d.pair("cube", 1, tone=1)
-    elif trunk == "arch":
-        d.put("arch", pose="cradle")
-    elif trunk == "barrel":
-        d.put("cylinder")
-    d.put(d.pick(("cuboid3", "cuboid2")), pose="flat-y")
-    head = d.pick(("cube", "cuboid1", "dome"))
-    if head == "dome":
-        d.put("semi_cylinder")
-        return
-    if head == "cube":
-        d.put("cube", tone=0)
-    else:
-        d.put("cuboid1")
-    if d.maybe(0.8):
-        topping(d)
+    skirt = "2 triangle:ramp 1; cube"
+    posts = ("2 cylinder 1", "2 cube 1", "2 cuboid1 1", "2 cuboid1 1; 2 cube 1")
+    legs = d.any_of(*posts, skirt)
+    trunk = d.pick(("cube +1", "2 cube 1 +1", "arch:cradle", "cylinder"))
+    if legs != skirt:
+        d.build(f"cuboid2:flat-y; {trunk}")
+    d.any_of("cuboid3:flat-y", "cuboid2:flat-y")
+    head = d.any_of("cube", "cuboid1", "semi_cylinder")
+    if head != "semi_cylinder" and d.maybe(0.8):
+        d.build("top")
 
 
 def _car(d: Draft) -> None:
     """Wheels, a chassis, and a cab, a load or a chimney on it."""
-    wheels = d.pick((2, 2, 3))
-    if wheels == 3:
-        d.put("cylinder", -2, pose="lying-x")
-        d.put("cylinder", 0, pose="lying-x")
-        d.put("cylinder", 2, pose="lying-x")
-    else:
-        d.pair("cylinder", d.pick((1.5, 2.0)), ("lying-x", "lying-x"))
-    d.put("cuboid3", pose="flat-y")
-    cab = d.pick(("cube", "high", "arch", "slab"))
-    if cab == "arch":
-        d.put("arch", -1)
-    elif cab == "slab":
-        d.put("cuboid2", -1, pose="flat-y")
-    else:
-        d.put("cube", -2, tone=0)
-    if cab == "high":
-        d.put("cuboid1", -2)
-    front = d.pick(("hood", "round", "load", "ramp", "tank"))
-    if front == "hood":
-        d.put("cube", 2 if cab in ("arch", "slab") else 0, tone=1)
-        d.put("triangle", 2, pose="ramp+y")
-    elif front == "round":
-        d.put("semi_cylinder", 2, pose="round+y")
-    elif front == "load":
-        d.put("cuboid1", 2)
-        d.put("semi_cylinder", 2)
-    elif front == "ramp":
-        d.put("triangle", 2, pose="ramp+y")
-    elif cab in ("arch", "slab"):
-        d.put("cube", 2, tone=1)
-    else:
-        d.put("cylinder", 1, pose="lying-y")
+    wheel = "cylinder:lying-x"
+    is_long = d.pick((False, False, True))
+    d.build(_row(wheel, (-2, 0, 2)) if is_long else f"2 {wheel} {d.pick((1.5, 2.0))}")
+    d.build("cuboid3:flat-y")
+    cab = d.any_of("cube -2", "cube -2; cuboid1 -2", "arch -1", "cuboid2:flat-y -1")
+    is_wide = not cab.startswith("cube")
+    d.any_of(
+        f"cube {2 if is_wide else 0} +1; triangle:ramp+y 2",
+        "semi_cylinder:round+y 2",
+        "cuboid1 2; semi_cylinder 2",
+        "triangle:ramp+y 2",
+        "cube 2 +1" if is_wide else "cylinder:lying-y 1",
+    )
     if d.maybe(0.6):
-        d.put(d.pick_type("semi_cylinder", "triangle", "cuboid1"), -2)
+        d.any_of("semi_cylinder -2", "triangle -2", "cuboid1 -2")
 
 
 def _ship(d: Draft) -> None:
-    hull = d.pick(("cradle", "twin", "slab"))
-    if hull == "cradle":
-        d.put("arch", pose="cradle")
-        d.put("cuboid3", pose="flat-y")
-    elif hull == "twin":
-        d.pair("arch", 2, ("cradle", "cradle"))
-        d.pair("cuboid2", 2, ("flat-y", "flat-y"))
-    else:
-        d.put("cuboid2", pose="flat-y")
-        d.put("cuboid3", pose="flat-y")
+    hull = d.any_of(
+        "arch:cradle; cuboid3:flat-y",
+        "2 arch:cradle 2; 2 cuboid2:flat-y 2",
+        "cuboid2:flat-y; cuboid3:flat-y",
+    )
+    is_twin = hull.startswith("2")
     cabin = d.pick(("house", "mast", "bridge", "funnel"))
-    if cabin == "house":
-        d.put("cube", tone=0)
-        topping(d)
-    elif cabin == "mast":
-        d.put("cylinder")
-        d.put("triangle", 0, 0, d.pick(("roof", "ramp+y")))
-    elif cabin == "bridge":
-        d.put("cuboid2", pose="flat-y")
-        d.put("cube", tone=0)
-        d.put("semi_cylinder")
+    if cabin == "mast":
+        d.build("cylinder")
+        d.any_of("triangle:roof", "triangle:ramp+y")
     else:
-        d.put("cube", -1, tone=0)
-        d.put("cuboid1", 1)
-        d.put("semi_cylinder", -1)
-    if hull == "twin" or d.maybe(0.4):
-        d.pair("semi_cylinder" if d.maybe() else "triangle", 3 if hull == "twin" else 2)
+        texts = {
+            "house": "cube; top",
+            "bridge": "cuboid2:flat-y; cube; semi_cylinder",
+            "funnel": "cube -1; cuboid1 1; semi_cylinder -1",
+        }
+        d.build(texts[cabin])
+    if is_twin or d.maybe(0.4):
+        side = "semi_cylinder" if d.maybe() else "triangle"
+        d.build(f"2 {side} {3 if is_twin else 2}")
 
 
 def _rocket(d: Draft) -> None:
-    body = d.pick(("cylinder", "cylinder", "cube", "pad"))
-    if body == "pad":
-        d.put("cuboid3", pose="flat-y")
-        d.put("cylinder")
-        d.pair("triangle", 2, OUT)
-    else:
-        d.put("cube" if body == "cube" else "cylinder")
-        d.pair("triangle", 2, OUT)
-        if d.maybe(0.4):
-            d.put("triangle", 0, 2, "ramp+x")
+    body = d.any_of("cylinder", "cylinder", "cube", "cuboid3:flat-y; cylinder")
+    d.build("2 triangle:ramp 2")
+    if not body.startswith("cuboid3") and d.maybe(0.4):
+        d.build("triangle:ramp+x 0,2")
     for tone in range(d.pick((1, 2))):
-        d.put(d.pick_type("cube", "cylinder", "cuboid1"), tone=tone)
-    topping(d)
+        d.any_of("cube", "cylinder", "cuboid1", tone=tone)
+    d.build("top")
 
 
 def _table(d: Draft) -> None:
     """A table, bench or bed, and what stands on it or beside it."""
     width = d.pick((4, 6, 6))
-    end = width / 2 - 1
-    d.pair(d.pick(("cube", "cuboid1", "cylinder")), end)
-    d.put("cuboid2" if width == 4 else "cuboid3", pose="flat-y")
+    end, board = width / 2 - 1, _DECKS[width].partition(":")[0]
+    d.any_of(f"2 cube {end}", f"2 cuboid1 {end}", f"2 cylinder {end}")
+    d.build(_DECKS[width])
     kind = d.pick(("vase", "meal", "bed", "back", "lamp", "bowl"))
     if kind == "vase":
-        d.put("cylinder", d.pick((0.0, end)))
+        d.build(f"cylinder {d.pick((0.0, end))}")
     elif kind == "meal":
-        d.pair("semi_cylinder", end)
-        if d.maybe():
-            d.put("cuboid1")
-    elif kind == "bed":
-        d.put("semi_cylinder", -end, pose="dome")
-        d.put("cuboid1", -end + 2 if width == 6 else end)
-    elif kind == "back":
-        d.put("cuboid2" if width == 4 else "cuboid3", 0, -0.5, "edge-x")
-    elif kind == "lamp":
-        d.put("cuboid1", end)
-        d.put("triangle", end)
+        d.build(f"2 semi_cylinder {end}")
+        d.build("cuboid1" if d.maybe() else "")
     else:
-        d.put("arch", pose="cradle")
+        texts = {
+            "bed": f"semi_cylinder:dome {-end}; cuboid1 {-end + 2 if width == 6 else end}",
+            "back": f"{board}:edge-x 0,-0.5",
+            "lamp": f"cuboid1 {end}; triangle {end}",
+            "bowl": "arch:cradle",
+        }
+        d.build(texts[kind])
 
 
 def _chair(d: Draft) -> None:
-    seat = d.pick_type("cube", "cuboid1", "arch")
-    d.put(seat)
-    width = 2 if seat == "arch" else 1
-    d.put("cuboid2", 0, -1.5, d.pick(("upright-x", "edge-x")))
-    if seat != "arch":
-        d.pair("cuboid1", width + 0.5, ("edge-y", "edge-y"))
-    d.put(d.pick_type("semi_cylinder", "cuboid1", "triangle"))
+    seat = d.any_of("cube", "cuboid1", "arch")
+    d.any_of("cuboid2:upright-x 0,-1.5", "cuboid2:edge-x 0,-1.5")
+    d.build("" if seat == "arch" else "2 cuboid1:edge-y 1.5")
+    d.any_of("semi_cylinder", "cuboid1", "triangle")
 
 
 def _slide(d: Draft) -> None:
     height = d.pick((1, 2))
-    d.put("cube", -2 * height + 2)
-    for _ in range(height - 1):
-        d.put("cube", 0, tone=1)
-        d.put("cube", -2, tone=1)
-        d.put("triangle", 0, pose="ramp+y")
-    d.put("triangle", 2, pose="ramp+y")
     top = -2 * height + 2
-    if d.maybe():
-        d.put("triangle", top - 2, pose="ramp-y")
-    if d.maybe():
-        d.put("cuboid1", top)
-    topping(d, top)
+    d.build(f"cube {top}")
+    d.build("cube +1; cube -2 +1; triangle:ramp+y" if height == 2 else "")
+    d.build("triangle:ramp+y 2")
+    d.build(f"triangle:ramp-y {top - 2}" if d.maybe() else "")
+    d.build(f"cuboid1 {top}" if d.maybe() else "")
+    d.build(f"top {top}")
 
 
 def _fountain(d: Draft) -> None:
-    for x, y in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
-        d.put("cuboid1", y, x)
-    d.put(d.pick(("cylinder", "cube")))
-    if d.maybe():
-        d.put("arch", pose="cradle")
-    topping(d)
-    if d.maybe():
-        d.pair("semi_cylinder", 2.5, ("round-y", "round+y"))
+    d.build("2 cuboid1 1,-1; 2 cuboid1 1,1")
+    d.any_of("cylinder", "cube")
+    d.build("arch:cradle; top" if d.maybe() else "top")
+    d.build("2 semi_cylinder:round 2.5" if d.maybe() else "")
 
 
 def _tree(d: Draft) -> None:
-    d.put(d.pick(("cylinder", "cylinder", "cube")))
-    if d.maybe(0.5):
-        d.put("cuboid1")
+    d.any_of("cylinder", "cylinder", "cube")
+    d.build("cuboid1" if d.maybe() else "")
     leaves = d.pick(("fir", "crown", "palm"))
     if leaves == "fir":
-        d.put("cuboid3" if d.maybe() else "cuboid2", pose="flat-y")
-        d.pair("triangle", 1, OUT)
+        d.build("cuboid3:flat-y" if d.maybe() else "cuboid2:flat-y")
+        d.build("2 triangle:ramp 1")
     elif leaves == "crown":
-        d.put("arch")
-        d.put("semi_cylinder", pose="dome")
+        d.build("arch; semi_cylinder:dome")
     else:
-        d.put("cuboid3", pose="flat-y")
-        d.pair("semi_cylinder", 2)
-        d.put("cube", tone=1)
-        d.put("triangle")
+        d.build("cuboid3:flat-y; 2 semi_cylinder 2; cube +1; triangle")
 
 
 CREATURES: dict[str, Theme] = {
@@ -653,16 +441,15 @@ CREATURES: dict[str, Theme] = {
     "table": _table,
     "tree": _tree,
 }
-
-
-Axis = int
-"""Along which parts stand side by side: 0 is x, the depth; 1 is y, the front."""
 _ACROSS = Symmetry(2, mirrored=True)
 """The mirror image across the plane y = 0."""
 
 
-def beside(parts: Sequence[Sequence[Block]], gap_units: float, axis: Axis = 1) -> list[Block]:
-    """The parts in a row with gaps between their outlines [grid units], numbered through."""
+def beside(parts: Sequence[Sequence[Block]], gap_units: float, axis: int = 1) -> list[Block]:
+    """Return the parts in a row with gaps between their outlines [grid units], numbered through.
+
+    They stand side by side along x, the depth (`axis` 0), or y, the front (1).
+    """
     row: list[Block] = []
     edge_m = 0.0
     for part in parts:
@@ -670,52 +457,45 @@ def beside(parts: Sequence[Sequence[Block]], gap_units: float, axis: Axis = 1) -
         shift = -(low_m + high_m) / 2
         shift[2] = 0.0
         shift[axis] = edge_m - low_m[axis]
-        row += [_shifted(block, shift, len(row) + i) for i, block in enumerate(part, 1)]
+        for block in part:
+            x, y, z = np.round(np.array(block.position_m) + shift, 6) + 0.0
+            place = (float(x), float(y), float(z))
+            row.append(replace(block, order=len(row) + 1, position_m=place))
         edge_m += float(high_m[axis] - low_m[axis]) + gap_units * UNIT_M
     return row
 
 
-def _shifted(block: Block, shift: NDArray[np.float64], order: int) -> Block:
-    x, y, z = (np.array(block.position_m) + shift).tolist()
-    place = (round(x, 6) + 0.0, round(y, 6) + 0.0, round(z, 6) + 0.0)
-    return replace(block, order=order, position_m=place)
-
-
-def _part(d: Draft, *themes: Theme) -> list[Block]:
+def _part(d: Draft, *names: str) -> list[Block]:
     """The blocks of a part drawn apart, in the colors of the whole."""
     apart = d.fresh()
-    d.pick(themes)(apart)
+    d.pick([{**BUILDINGS, **CREATURES}[name] for name in names])(apart)
     return apart.blocks
 
 
 def _framed(d: Draft) -> None:
     """A building between two towers that mirror one another."""
-    names = ("tower", "monument", "balance", "pyramid")
-    side = _part(d, *(BUILDINGS[name] for name in names))
-    middle = _part(d, *(BUILDINGS[name] for name in ("house", "gate", "arcade", "court")))
-    parts = [side, middle, transformed(side, _ACROSS)]
-    d.take(beside(parts, d.pick((0.0, 0.0, 1.0))))
+    side = _part(d, "tower", "monument", "balance", "pyramid")
+    middle = _part(d, "house", "gate", "arcade", "court")
+    d.take(beside([side, middle, transformed(side, _ACROSS)], d.pick((0.0, 0.0, 1.0))))
 
 
 def _avenue(d: Draft) -> None:
     """A structure, its mirror image, and something between them."""
-    names = ("bridge", "stair", "house", "gate")
-    side = _part(d, *(BUILDINGS[name] for name in names))
-    middle = _part(d, CREATURES["fountain"], CREATURES["tree"], BUILDINGS["monument"])
+    side = _part(d, "bridge", "stair", "house", "gate")
+    middle = _part(d, "fountain", "tree", "monument")
     d.take(beside([side, middle, transformed(side, _ACROSS)], d.pick((1.0, 2.0))))
 
 
 def _street(d: Draft) -> None:
     """A building with a scene before its door."""
-    building = _part(d, *(BUILDINGS[name] for name in ("house", "arcade", "court", "tower")))
-    names = ("animal", "car", "figure", "tree", "table")
-    second = _part(d, *(CREATURES[name] for name in names))
+    building = _part(d, "house", "arcade", "court", "tower")
+    second = _part(d, "animal", "car", "figure", "tree", "table")
     d.take(beside([building, second], d.pick((1.0, 2.0))))
 
 
 def _train(d: Draft) -> None:
     """Two or three cars in a row."""
-    cars = [_part(d, CREATURES["car"]) for _ in range(d.pick((2, 2, 3)))]
+    cars = [_part(d, "car") for _ in range(d.pick((2, 2, 3)))]
     d.take(beside(cars, 1.0))
 
 

@@ -185,31 +185,38 @@ class Draft:
         """One of the options, all alike."""
         return options[int(self.rng.integers(len(options)))]
 
-    def pick_type(self, *options: BlockType) -> BlockType:
-        """One of the block types, all alike."""
-        return self.pick(options)
-
     def maybe(self, chance: float = 0.5) -> bool:
         """True in a share `chance` of cases."""
         return float(self.rng.random()) < chance
 
-    def put(
-        self, block_type: BlockType, y: float = 0.0, x: float = 0.0, pose: str = "", tone: int = 0
-    ) -> None:
-        """Let a block down at (y, x) [grid units], as `Sketch.put`."""
-        self.sketch.put(block_type, y, x, pose, self._color(block_type, tone))
+    def build(self, text: str, tone: int = 0) -> None:
+        """Let blocks down one after another, as `2 cube 1; arch:cradle 0,-1; cube +1; top`.
 
-    def pair(
-        self,
-        block_type: BlockType,
-        y: float,
-        poses: tuple[str, str] = ("", ""),
-        tone: int = 0,
-        x: float = 0.0,
-    ) -> None:
-        """The same block at -y and at +y."""
-        self.put(block_type, -y, x, poses[0], tone)
-        self.put(block_type, y, x, poses[1], tone)
+        Each is a type with, after a colon, a pose, its place y or y,x [grid units], and how many
+        tones it is above `tone`. A 2 puts one at -y and one at +y, where the poses `ramp` and
+        `round` look away from the middle. `top` is a roof or a dome, drawn, its ridge either way.
+        """
+        for part in filter(None, text.split("; ")):
+            words = part.split()
+            is_pair = words[0] == "2"
+            block_type, _, pose = words[is_pair].partition(":")
+            place = [word for word in words[is_pair + 1 :] if word[0] != "+"]
+            y, _, x = place[0].partition(",") if place else ("0", "", "")
+            if block_type == "top":
+                block_type = self.pick(("triangle", "semi_cylinder"))
+                kind = "roof" if block_type == "triangle" else "dome"
+                pose = self.pick((kind, f"{kind}-turned"))
+            raised = sum(int(word) for word in words if word[0] == "+")
+            color = self._color(block_type, tone + raised)  # type: ignore[arg-type]
+            for sign in (-1, 1) if is_pair else (1,):
+                sided = f"{pose}{'-+'[sign > 0]}y" if pose in ("ramp", "round") else pose
+                self.sketch.put(block_type, sign * float(y), float(x or 0), sided, color)  # type: ignore[arg-type]
+
+    def any_of(self, *texts: str, tone: int = 0) -> str:
+        """Build one of the texts, all alike, and return it."""
+        text = self.pick(texts)
+        self.build(text, tone)
+        return text
 
     def _color(self, block_type: BlockType, tone: int) -> Color:
         return self._tones[tone % 2] if block_type == "cube" else self._colors[block_type]
