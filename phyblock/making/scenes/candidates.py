@@ -60,23 +60,31 @@ _MOST_DRAWN = 0.98
 def make_candidates(
     scene: Scene, seed: int = 0, *, palette: tuple[Kind, ...] = KIT_PALETTE
 ) -> CandidateSet:
-    """Up to `MAX_CANDIDATES` candidates that look different, all that the scene needs among them.
+    """Return up to `MAX_CANDIDATES` candidates that look different, with all that a scene needs.
 
     Distractors come from `palette`. Types that goals have low stand first, candidates of one type
     in an order that is drawn. The same scene id and seed give the same set everywhere. Raises
     DataError when the scene needs more looks than that.
     """
-    needed = _by_look([Candidate(b.type, b.color, b.euler_deg) for b in scene.blocks])
+    needed: dict[Look, Candidate] = {}
+    for block in scene.blocks:
+        needed.setdefault(block.look, Candidate(block.type, block.color, block.euler_deg))
     if len(needed) > MAX_CANDIDATES:
         allowed = f"at most {MAX_CANDIDATES}"
         message = "needs more different blocks than a candidate set holds"
         raise DataError(Problem(scene.id, message, "blocks", str(len(needed)), allowed))
     salt = f"{seed}/{scene.id}"
-    rates = _rates(palette)
-    others = [one for one in rates if one.look not in needed]
-    first = sorted(others, key=lambda one: _waiting(one, rates[one], salt))
-    chosen = [*needed.values(), *first[: MAX_CANDIDATES - len(needed)]]
-    return CandidateSet(tuple(sorted(chosen, key=lambda one: _place(one, salt))))
+    others = {one: rate for one, rate in _rates(palette).items() if one.look not in needed}
+
+    def waiting(one: Candidate) -> float:
+        """When a candidate comes up: an exponential waiting time (Efraimidis and Spirakis 2006)."""
+        return -math.log(_drawn(one, f"{salt}/drawn")) / others[one]
+
+    def place(one: Candidate) -> tuple[int, float]:
+        return _TIERS.get(one.type, len(_RISING)), _drawn(one, f"{salt}/place")
+
+    distractors = sorted(others, key=waiting)[: MAX_CANDIDATES - len(needed)]
+    return CandidateSet(tuple(sorted([*needed.values(), *distractors], key=place)))
 
 
 def _rates(palette: tuple[Kind, ...]) -> dict[Candidate, float]:
@@ -95,24 +103,7 @@ def _rates(palette: tuple[Kind, ...]) -> dict[Candidate, float]:
     return rates
 
 
-def _waiting(candidate: Candidate, rate: float, salt: str) -> float:
-    """When a candidate comes up: an exponential waiting time (Efraimidis and Spirakis 2006)."""
-    return -math.log(_drawn(candidate, f"{salt}/drawn")) / rate
-
-
-def _place(candidate: Candidate, salt: str) -> tuple[int, float]:
-    return _TIERS.get(candidate.type, len(_RISING)), _drawn(candidate, f"{salt}/place")
-
-
 def _drawn(candidate: Candidate, salt: str) -> float:
     """A number in (0, 1) by a hash: the same on every platform and Python."""
     digest = drawn_bytes(f"{salt}/{candidate}")
     return (int.from_bytes(digest[:6], "big") + 0.5) / 2**48
-
-
-def _by_look(candidates: list[Candidate]) -> dict[Look, Candidate]:
-    """The first of each look, in the order given."""
-    first: dict[Look, Candidate] = {}
-    for candidate in candidates:
-        first.setdefault(candidate.look, candidate)
-    return first
