@@ -9,7 +9,8 @@ import functools
 import itertools
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from phyblock.domain.blocks import (
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import angles_deg
+from phyblock.making.questions import base
 from phyblock.making.questions.base import (
     NAMED,
     STUDIED,
@@ -37,20 +39,13 @@ from phyblock.making.questions.base import (
     center_m,
     draft,
     goal_picture,
-    index_of,
-    length_axis,
-    only_index,
     orders_of,
-    outermost,
     pick,
-    picture_axes,
     recolored,
     require_seen,
     right_first,
     seen_blocks,
     shuffled,
-    stem_of,
-    with_own_colors,
 )
 from phyblock.making.questions.names import plain_names, resolve_one, shape_word
 from phyblock.sim.contact import (
@@ -69,11 +64,10 @@ from phyblock.sim.outcomes import holds
 
 _CORNERS: Sequence[str] = WORDS["sides_of_floor"]
 _UPRIGHT: Sequence[str] = WORDS["places_upright"]
-_CLEAR_M, _ABOVE_M, _LEVEL_M = 0.03, 0.015, 0.005
+_CLEAR_M, _ABOVE_M, _LEVEL_M, _GAP_M = 0.03, 0.015, 0.005, 0.024
 _SIDES = ("farthest left", "farthest right")
 _RANKED = ("highest", "lowest", "front", "back")
-"""Told by wordings of their own, because they are not about the picture but about the ground."""
-_GAP_M = 0.024
+"""Asked by wordings of their own, because they are not about the picture but about the ground."""
 _NEARER = 0.75
 """The nearest block is at most this share of the next one's distance away."""
 
@@ -98,19 +92,13 @@ class PositionMaker(StaticMaker):
             for one, other in shuffled(rng, list(itertools.permutations(blocks, 2)))[:2]:
                 offset = [round(float(x), 6) for x in _offset_m(one, other, view)]
                 slots = {"block": named[one.order], "other": named[other.order]}
-                for kind, rule, words in (
-                    ("corner", _corner, _CORNERS),
-                    ("upright", _upright, _UPRIGHT),
-                ):
+                for kind, (rule, words) in _PAIR_RULES.items():
                     try:
                         options = right_first(rule(one, other, view), words)
                     except UnfairError:
                         continue
-                    yield draft(
-                        *(shown, rng, f"rp-{kind}", options, [picture], slots),
-                        kind=kind,
-                        offset_m=offset,
-                    )
+                    about = (f"rp-{kind}", options, [picture], slots)
+                    yield draft(shown, rng, *about, kind=kind, offset_m=offset)
 
     def answer(self, question: Question, picture: QuestionPicture, slots: Slots) -> tuple[int, ...]:
         """By the places of the blocks that the text or the options name."""
@@ -118,13 +106,13 @@ class PositionMaker(StaticMaker):
             one, other = (resolve_one(slots[name], picture) for name in ("block", "other"))
             require_seen(picture, orders_of([one, other]), NAMED)
             rule = _corner if set(question.options) == set(_CORNERS) else _upright
-            return index_of(question, rule(one, other, picture.view_deg))
+            return base.index_of(question, rule(one, other, picture.view_deg))
         named = [resolve_one(option, picture) for option in question.options]
         anchor = [resolve_one(slots["other"], picture)] if "other" in slots else []
         require_seen(picture, orders_of([*named, *anchor]), NAMED)
         if anchor:
             return (named.index(_nearest(anchor[0], named)),)
-        kind = slots.get("extreme") or stem_of(question.wording).removeprefix("rp-")
+        kind = slots.get("extreme") or base.stem_of(question.wording).removeprefix("rp-")
         return (named.index(_extreme(kind, named, picture)),)
 
 
@@ -155,7 +143,7 @@ def _of_four(
 
 def _offset_m(block: Block, other: Block, view: View) -> Floats:
     """From `other` to `block`: to the right of the picture, away from the viewer, up [m], (3,)."""
-    right, away = picture_axes(view)
+    right, away = base.picture_axes(view)
     step = center_m(block) - center_m(other)
     return np.array([step @ right, step @ away, step[2]])
 
@@ -180,6 +168,9 @@ def _upright(one: Block, other: Block, view: View) -> str:
     raise UnfairError("is neither over, under nor beside it")
 
 
+_PAIR_RULES = {"corner": (_corner, _CORNERS), "upright": (_upright, _UPRIGHT)}
+
+
 def _nearest(anchor: Block, blocks: Sequence[Block]) -> Block:
     """The block whose middle is clearly nearest to that of another."""
     far = {b.order: float(np.linalg.norm(center_m(b) - center_m(anchor))) for b in blocks}
@@ -192,16 +183,17 @@ def _nearest(anchor: Block, blocks: Sequence[Block]) -> Block:
 def _extreme(extreme: str, blocks: Sequence[Block], picture: QuestionPicture) -> Block:
     """The one of `blocks` that is clearly farthest to a side, to the front, or reaches highest."""
     if extreme in _SIDES:
-        order = outermost(orders_of(blocks), picture, to_left=extreme == _SIDES[0])
+        order = base.outermost(orders_of(blocks), picture, to_left=extreme == _SIDES[0])
         if order is None:
             raise UnfairError(f"two blocks are about the {extreme}")
         return next(block for block in blocks if block.order == order)
     if extreme not in _RANKED:
         raise UnfairError(f"{extreme!r} is no place")
-    away = picture_axes(picture.view_deg)[1]
-    upright = extreme in ("highest", "lowest")
-    sign = -1.0 if extreme in ("highest", "back") else 1.0
-    reach = {b.order: sign * (_top_m(b) if upright else float(center_m(b) @ away)) for b in blocks}
+    away = base.picture_axes(picture.view_deg)[1]
+    is_upright, sign = extreme in _RANKED[:2], -1.0 if extreme in ("highest", "back") else 1.0
+    reach = {
+        b.order: sign * (_top_m(b) if is_upright else float(center_m(b) @ away)) for b in blocks
+    }
     ranked = sorted(blocks, key=lambda block: reach[block.order])
     if reach[ranked[1].order] - reach[ranked[0].order] < _GAP_M:
         raise UnfairError(f"two blocks are about as {extreme}")
@@ -212,18 +204,17 @@ def _extreme(extreme: str, blocks: Sequence[Block], picture: QuestionPicture) ->
 
 Values = tuple[float, ...]
 """A length, or how far along and across [cm]."""
-_SIDE_M = 0.001
-_EXACT_CM = 0.1
+_SIDE_M, _EXACT_CM = 0.001, 0.1
 _SCALES: Mapping[str, str] = WORDS["scales"]
 _STEP_CM, _LONGEST_CM, _PLACE_STEP_CM = 2.5, 50.0, 5.0
 _APART = (1.2, 2.0)
 """Values that are options together: each at least and at most so many times the one before."""
-_KINDS: Mapping[str, str] = {
+_KINDS = {
     **{"top": "height", "bottom": "height"},
-    **{kind: kind for kind in ("rise", "apart", "gap", "place")},
+    **{"rise": "rise", "apart": "apart", "gap": "gap", "place": "place"},
 }
 """Wordings, and the sorts of questions whose shares are even: heights are one of five."""
-PAIRED = ("apart", "rise", "gap", "place")
+_PAIRED = ("apart", "rise", "gap", "place")
 """Kinds that are asked of two blocks."""
 _FEW_A_SCENE = ("gap", "place")
 """Kinds of which hardly any scene has four values that could be offered together."""
@@ -235,7 +226,7 @@ def _top_m(block: Block) -> float:
 
 
 def grid_cm(length_m: float) -> float:
-    """The length in centimeters where it is a multiple of 2.5 cm; else UnfairError."""
+    """Return the length in centimeters where it is a multiple of 2.5 cm; else UnfairError."""
     steps = round(length_m * 100 / _STEP_CM)
     if abs(length_m * 100 - _STEP_CM * steps) > _EXACT_CM:
         raise UnfairError(f"{length_m * 100:.1f} cm is no multiple of 2.5 cm")
@@ -257,19 +248,16 @@ def _gap(one: Block, other: Block, blocks: Sequence[Block]) -> float:
     _require_joined(one, other, blocks)
     low = np.minimum(bounds_m(one)[1], bounds_m(other)[1])
     high = np.maximum(bounds_m(one)[0], bounds_m(other)[0])
-    open_axes = [axis for axis in (0, 1) if high[axis] - low[axis] > _SIDE_M]
-    if len(open_axes) != 1 or any(
-        low[axis] - high[axis] < 0.5 * np.diff(bounds_m(one), axis=0)[0, axis]
-        for axis in range(3)
-        if axis not in open_axes
-    ):
+    is_open = high - low > _SIDE_M
+    shared = low - high >= 0.5 * np.diff(bounds_m(one), axis=0)[0]
+    if is_open[2] or is_open.sum() != 1 or not (shared | is_open).all():
         raise UnfairError("the blocks do not face each other")
     start, end = np.minimum(low, high) + _SIDE_M, np.maximum(low, high) - _SIDE_M
     for block in blocks:
         its_low, its_high = bounds_m(block)
         if block not in (one, other) and np.all(its_low < end) and np.all(its_high > start):
             raise UnfairError("another block stands in the gap")
-    return float(high[open_axes[0]] - low[open_axes[0]])
+    return float((high - low)[is_open][0])
 
 
 LENGTHS: Mapping[str, Callable[[Block, Block, Sequence[Block]], float]] = {
@@ -279,7 +267,7 @@ LENGTHS: Mapping[str, Callable[[Block, Block, Sequence[Block]], float]] = {
     "rise": lambda one, other, _: abs(_top_m(one) - _top_m(other)),
     "gap": _gap,
 }
-"""By kind, of a block, another, and all blocks; UnfairError for what cannot be told."""
+"""By kind, of a block, another, and all blocks; UnfairError for what cannot be determined."""
 
 
 def _require_joined(one: Block, other: Block, blocks: Sequence[Block]) -> None:
@@ -321,18 +309,15 @@ class DistanceMaker(StaticMaker):
         require_seen(picture, orders_of(named), NAMED)
         if slots["scale"] not in [_SCALES.get(b.type) for b in seen_blocks(picture, NAMED)]:
             raise UnfairError("the block that gives the scale cannot be seen")
-        rule = stem_of(question.wording).removeprefix("ap-")
-        if rule not in _KINDS or (rule in PAIRED) != (len(named) == 2):
+        rule = base.stem_of(question.wording).removeprefix("ap-")
+        if rule not in _KINDS or (rule in _PAIRED) != (len(named) == 2):
             raise UnfairError(f"the wording {question.wording!r} asks for no length")
         right_cm = _values_cm(rule, named[0], named[-1], picture)
         if rule != "place":
-            try:
-                values = sorted(float(option.removesuffix(" cm")) for option in question.options)
-            except ValueError as error:
-                raise UnfairError("some option is no length in centimeters") from error
+            values = sorted(float(option.removesuffix(" cm")) for option in question.options)
             if any(high < _APART[0] * low for low, high in itertools.pairwise(values)):
                 raise UnfairError("two values are less than 20 % apart")
-        return index_of(question, _text_of(right_cm))
+        return base.index_of(question, _text_of(right_cm))
 
 
 def _distances(
@@ -344,7 +329,7 @@ def _distances(
     pairs = shuffled(rng, list(itertools.permutations(blocks, 2)))[:90]
     for rule in shuffled(rng, list(_KINDS)):
         found: dict[Values, list[tuple[Block, Block]]] = {}
-        for one, other in pairs if rule in PAIRED else [(block, block) for block in blocks]:
+        for one, other in pairs if rule in _PAIRED else [(block, block) for block in blocks]:
             try:
                 found.setdefault(_values_cm(rule, one, other, picture), []).append((one, other))
             except UnfairError:
@@ -354,12 +339,11 @@ def _distances(
             continue
         one, other = pick(rng, found[values[0]])
         slots = {"block": named[one.order], "scale": scale}
-        if rule in PAIRED:
+        if rule in _PAIRED:
             slots["other"] = named[other.order]
         right, *_ = options = list(map(_text_of, values))
-        yield draft(
-            *(scene, rng, f"ap-{rule}", options, [picture], slots), kind=_KINDS[rule], right=right
-        )
+        about = (f"ap-{rule}", options, [picture], slots)
+        yield draft(scene, rng, *about, kind=_KINDS[rule], right=right)
 
 
 def _values_cm(rule: str, one: Block, other: Block, picture: QuestionPicture) -> Values:
@@ -367,7 +351,7 @@ def _values_cm(rule: str, one: Block, other: Block, picture: QuestionPicture) ->
     if rule != "place":
         return (grid_cm(LENGTHS[rule](one, other, picture.blocks)),)
     _require_joined(one, other, picture.blocks)
-    axis, step = length_axis(other), np.abs(center_m(one) - center_m(other))
+    axis, step = base.length_axis(other), np.abs(center_m(one) - center_m(other))
     return grid_cm(float(step[axis])), grid_cm(float(step[1 - axis]))
 
 
@@ -454,32 +438,29 @@ class DependencyMaker(StaticMaker):
                     chosen = [pick(rng, right), *wrong]
                     options, slots = [f"the {named[o]}" for o in chosen], {"block": named[anchor]}
                     contacts = {str(o): sorted(below[o]) for o in (anchor, *chosen)}
-                    yield draft(
-                        *(shown, rng, f"rd-{rule}", options, [picture], slots),
-                        kind=rule,
-                        rests_on=contacts,
-                    )
+                    about = (f"rd-{rule}", options, [picture], slots)
+                    yield draft(shown, rng, *about, kind=rule, rests_on=contacts)
 
     def answer(self, question: Question, picture: QuestionPicture, slots: Slots) -> tuple[int, ...]:
         """By the contacts of the blocks that the text and the options name."""
         anchor = resolve_one(slots["block"], picture)
         named = [resolve_one(option, picture) for option in question.options]
         require_seen(picture, orders_of([anchor, *named]), NAMED)
-        rule = stem_of(question.wording).removeprefix("rd-")
+        rule = base.stem_of(question.wording).removeprefix("rd-")
         if rule not in _RELATIONS or anchor in named:
             raise UnfairError("asks about no dependency, or a block about itself")
         below = support_graph(picture.blocks)
-        return only_index([_RELATIONS[rule](b.order, anchor.order, below) for b in named])
+        return base.only_index([_RELATIONS[rule](b.order, anchor.order, below) for b in named])
 
 
 def _all_below(order: int, below: Below) -> set[int]:
-    below_it: set[int] = set()
+    found: set[int] = set()
     waiting = [order]
     while waiting:
-        for other in below[waiting.pop()] - {GROUND} - below_it:
-            below_it.add(other)
-            waiting.append(other)
-    return below_it
+        new = below[waiting.pop()] - {GROUND} - found
+        found |= new
+        waiting += new
+    return found
 
 
 # RR
@@ -512,21 +493,21 @@ def _is_alike(block_type: BlockType, one_deg: Euler, other_deg: Euler) -> bool:
 
 
 def axis_turns(block: Block, other: Block) -> tuple[str, ...]:
-    """Those of `AXIS_TURNS` that take `other` to how `block` is oriented, up to symmetry.
+    """Return those of `AXIS_TURNS` that take `other` to how `block` is oriented, up to symmetry.
 
     None when they are of different types; UnfairError where `other` has no length that lies
     along the ground.
     """
     if block.type != other.type or not SHAPES[block.type].is_long:
         return ()
-    images = _images(other.euler_deg, length_axis(other))
+    images = _images(other.euler_deg, base.length_axis(other))
     fitting = (name for name, deg in images if _is_alike(block.type, block.euler_deg, deg))
     return tuple(dict.fromkeys(fitting))
 
 
 def tipped_over(block: Block) -> tuple[Block, ...]:
-    """The block after each of `AXIS_TURNS`, to either side; UnfairError as `axis_turns`."""
-    angles = dict.fromkeys(angle for _, angle in _images(block.euler_deg, length_axis(block)))
+    """Return the block after each of `AXIS_TURNS`, to either side; UnfairError as `axis_turns`."""
+    angles = dict.fromkeys(angle for _, angle in _images(block.euler_deg, base.length_axis(block)))
     return tuple(replace(block, euler_deg=angle) for angle in angles)
 
 
@@ -549,37 +530,30 @@ def vertical_turns_deg(block: Block, other: Block) -> tuple[int, ...]:
     """
     if block.type != other.type:
         return ()
-    roll, pitch, yaw = other.euler_deg
     turns = sorted(range(-180 + _STEP_DEG, 181, _STEP_DEG), key=lambda turn: (abs(turn), -turn))
-    return tuple(
-        turn
-        for turn in turns
-        if _is_alike(block.type, block.euler_deg, (roll, pitch, _yaw_deg(yaw, turn)))
-    )
+    fits = functools.partial(_is_alike, block.type, block.euler_deg)
+    return tuple(turn for turn in turns if fits(_yawed(other.euler_deg, turn)))
 
 
 def turned_about_vertical(block: Block, angle_deg: float) -> Block:
-    """The block turned about the vertical line through the middle of its bounding box."""
+    """Return the block turned about the vertical line through the middle of its bounding box."""
     about = center_m(block)
-    cosine, sine = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
-    turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-    x, y, z = (about + turn @ (np.array(block.position_m) - about)).tolist()
-    roll, pitch, yaw = block.euler_deg
-    euler_deg = (roll, pitch, _yaw_deg(yaw, angle_deg))
-    return replace(block, position_m=(round(x, 6), round(y, 6), round(z, 6)), euler_deg=euler_deg)
+    place = about + _about(2, angle_deg) @ (np.array(block.position_m) - about)
+    x, y, z = (round(part, 6) for part in place.tolist())
+    return replace(block, position_m=(x, y, z), euler_deg=_yawed(block.euler_deg, angle_deg))
 
 
-def _yaw_deg(yaw_deg: float, turn_deg: float) -> float:
-    return round((yaw_deg + turn_deg) % 360, 6)
+def _yawed(euler_deg: Euler, turn_deg: float) -> Euler:
+    roll, pitch, yaw = euler_deg
+    return roll, pitch, round((yaw + turn_deg) % 360, 6)
 
 
 def put_beside(block: Block, blocks: Sequence[Block], rng: np.random.Generator) -> Block:
-    """The block, as it is oriented, on the ground in a direction drawn from the blocks' middle.
+    """Put the block, as it is oriented, on the ground in a direction drawn from the blocks' middle.
 
     It gets an order that none of them has, and stands as near to them as leaves 2 cm free.
     """
-    low, high = whole_bounds_m(blocks)
-    middle = (low + high) / 2
+    middle = whole_bounds_m(blocks).mean(axis=0)
     angle = float(rng.uniform(0, 2 * math.pi))
     direction = np.array([math.cos(angle), math.sin(angle)])
     loose = replace(block, order=max(b.order for b in blocks) + 1, depend=(), layer=1)
@@ -595,8 +569,7 @@ def put_beside(block: Block, blocks: Sequence[Block], rng: np.random.Generator) 
         distance += _STEP_M
 
 
-@dataclass(frozen=True)
-class _Rule:
+class _Rule(NamedTuple):
     """One way to tell the turn of a block, compared with another of its type.
 
     `phrases` are those of the options that are true of the two.
@@ -629,6 +602,7 @@ _ON_THE_SPOT = (
 )
 _AXIS = _Rule("rr-axis", "axis", AXIS_TURNS, axis_turns)
 """Of one with a length, which may roll over or stand on end as well."""
+_RULES = {rule.stem: rule for rule in (*_ON_THE_SPOT, _AXIS)}
 
 
 class RotationMaker(StaticMaker):
@@ -660,12 +634,11 @@ class RotationMaker(StaticMaker):
         """By the orientations in the picture, up to the symmetry of the type."""
         pair = [resolve_one(slots[name], picture) for name in ("block", "other")]
         require_seen(picture, orders_of(pair), STUDIED)
-        stem = stem_of(question.wording)
-        rule = next((rule for rule in (*_ON_THE_SPOT, _AXIS) if rule.stem == stem), None)
+        rule = _RULES.get(base.stem_of(question.wording))
         true = rule.phrases(*pair) if rule else ()
         if not true:
             raise UnfairError("are not of one type, or not turned as the wording asks")
-        return only_index([option in true for option in question.options])
+        return base.only_index([option in true for option in question.options])
 
 
 def _about_some_axis(
@@ -686,12 +659,12 @@ def _about_some_axis(
     for _ in range(_PLACES):
         loose = put_beside(pick(rng, turned), scene.blocks, rng)
         every = replace(scene, blocks=(*scene.blocks, loose))
-        every = with_own_colors(every, [other.order, loose.order], rng)
+        every = base.with_own_colors(every, [other.order, loose.order], rng)
         picture, both = goal_picture(every, view), (loose.order, other.order)
         if are_seen(picture, both, STUDIED) and holds(every.blocks, loose.order):
             colored = replace(every, blocks=every.blocks[:-1])
-            its = next(block for block in colored.blocks if block.order == other.order)
-            yield from _drafted(colored, picture, (every.blocks[-1], its), _AXIS, phrase, rng)
+            pair = (every.blocks[-1], next(b for b in colored.blocks if b.order == other.order))
+            yield from _drafted(colored, picture, pair, _AXIS, phrase, rng)
             return
 
 
@@ -700,7 +673,7 @@ def _turned_on_the_spot(
 ) -> Iterator[Draft]:
     """The first of two is turned about the vertical so that a phrase drawn is true."""
     phrase = pick(rng, rule.options)
-    colored = with_own_colors(scene, orders_of(pair), rng)
+    colored = base.with_own_colors(scene, orders_of(pair), rng)
     mine, its = (next(b for b in colored.blocks if b.order == x.order) for x in pair)
     for turn in shuffled(rng, range(0, 360, _STEP_DEG)):
         moved = turned_about_vertical(mine, turn) if turn else mine
