@@ -44,10 +44,93 @@ T = TypeVar("T")
 
 _FIRST_PAUSE_S = 5.0
 _CLOCKS_APART_S = 3600.0
+_TIME = "%Y-%m-%dT%H:%M:%SZ"
 
 
 class UnsureError(UnavailableError):
     """It is not known whether the provider has a batch."""
+
+
+@dataclass(frozen=True)
+class BatchFiles:
+    """Batches of a run as they are kept: the lines written so far, oldest first, and a callback
+    that appends one and returns when it is on disk. A batch is looked at every `poll_s` at least.
+    """
+
+    earlier: tuple[BatchLine, ...]
+    put: Callable[[BatchLine], Awaitable[None]]
+    run_folder: Path
+    poll_s: float = 60.0
+
+    def answers(self, token: str) -> Path:
+        """Return the file of a batch's answers, which is there once it has ended."""
+        return self.run_folder / "batches" / f"{token}.answers.jsonl"
+
+
+@dataclass(eq=False)
+class Batch:
+    """A batch, from its draft, with `lines` to send, to its answers by request.
+
+    `most_usd` are its requests by their keys in the reply cache, with the most that each can cost
+    [US dollars], None where no price is known; `held` are their reservations in the budget. `token`
+    is our name for it, `id` the provider's. `following` is the work that ends when it has ended.
+    """
+
+    # What the providers allow in names and boundaries.
+    token: str = field(default_factory=lambda: f"pb{secrets.token_hex(12)}")
+    seeded: bool = True
+    most_usd: dict[str, float | None] = field(default_factory=dict)
+    created: datetime = field(default_factory=lambda: datetime.now(UTC))
+    event: BatchEvent | None = None
+    id: str = ""
+    held: dict[str, int] = field(default_factory=dict)
+    lines: list[bytes] = field(default_factory=list)
+    size: int = 0
+    following: asyncio.Future[None] | None = None
+    answers: dict[str, Answer | str] | None = None
+    is_blank: bool = False
+
+    @property
+    def shown(self) -> str:
+        """Its name for people."""
+        return self.id or self.token
+
+
+class Ledger:
+    """The batches of one model; every change is on disk when `note` returns."""
+
+    def __init__(self, model: str, files: BatchFiles) -> None:
+        self._model = model
+        self._files = files
+        self.batches: dict[str, Batch] = {}
+        for line in files.earlier:
+            if line.model == model and line.event == "intended":
+                costs = line.most_usd or [None] * len(line.keys)
+                created = datetime.strptime(line.time, _TIME).replace(tzinfo=UTC)
+                most_usd = dict(zip(line.keys, costs, strict=True))
+                self._take(Batch(line.batch, line.seeded, most_usd, created), line)
+            elif line.model == model:
+                self._take(self.batches[line.batch], line)
+
+    def newest(self, key: str) -> Batch | None:
+        """Return the last batch that a request went out in, or is about to."""
+        return next((b for b in reversed(self.batches.values()) if key in b.most_usd), None)
+
+    async def note(self, batch: Batch, event: BatchEvent, **fields: object) -> None:
+        """Write the newest state of a batch; one that is `intended` counts as under way."""
+        batch.created = datetime.now(UTC) if event == "intended" else batch.created
+        known = {"batch": batch.token, "model": self._model, "event": event}
+        now = datetime.now(UTC).strftime(_TIME)
+        line = BatchLine.model_validate({**known, "time": now, **fields})
+        await self._files.put(line)
+        self._take(batch, line)
+
+    def _take(self, batch: Batch, line: BatchLine) -> None:
+        self.batches[batch.token] = batch
+        batch.event, batch.id = line.event, line.id or batch.id
+        if line.event == "lost":
+            # Its requests count as not sent in it.
+            del self.batches[batch.token]
 
 
 @dataclass(eq=False, kw_only=True)
@@ -74,9 +157,9 @@ class BatchModel:
         self.name = self.config.name
         self._provider = PROVIDERS[self.config.provider](self.config)
         self._ledger = Ledger(self.name, self.files)
-        self._earlier = {key for batch in self._ledger.batches.values() for key in batch.places}
+        self._earlier = {key for batch in self._ledger.batches.values() for key in batch.most_usd}
         self._drafting = asyncio.Lock()
-        self._draft: _Draft | None = None
+        self._draft: Batch | None = None
         self._refusal: UnavailableError | None = None
         self._has_begun = False
         self._takes_seed = self.config.seed != "never"
@@ -96,13 +179,12 @@ class BatchModel:
         self._has_begun = True
         for batch in tuple(self._ledger.batches.values()):
             if batch.event == "intended":
-                self._tell(f"looking for a batch of {len(batch.places):,} that was being sent")
                 # A call that was cut off may still be worked on over there.
                 status = await self._find(batch, time.time() + 2 * self.files.poll_s)
                 if status is None:
-                    await self._ledger.note(batch.token, "lost", words="not found at the provider")
+                    await self._ledger.note(batch, "lost", words="not found at the provider")
                 else:
-                    await self._ledger.note(batch.token, "created", id=status.id)
+                    await self._ledger.note(batch, "created", id=status.id)
             if batch.event == "created":
                 self._following(batch)
 
@@ -110,7 +192,7 @@ class BatchModel:
         """See GatheringModel."""
         key = reply_key(self.config, request)
         async with self._drafting:
-            is_drafted = self._draft is not None and key in self._draft.keys
+            is_drafted = self._draft is not None and key in self._draft.most_usd
             if is_drafted or await self._is_answered(key, request, anew=anew):
                 return True
             return self._refusal is None and await self._add(key, request)
@@ -141,7 +223,7 @@ class BatchModel:
         except UnavailableError:
             # No more is heard in this command of what is under way: it counts as spent.
             for each in self._ledger.batches.values():
-                self._settle_all(each.held, None)
+                self._settle_all(each, None)
             raise
         except ModelError as error:
             self._settle(key, batch, None if may_be_billed(error) else 0.0)
@@ -185,7 +267,7 @@ class BatchModel:
             if key in self._earlier and self.budget is not None:
                 # Held once, however often it is gathered.
                 self._earlier.discard(key)
-                batch.held[key] = self.budget.hold(batch.most_usd(key))
+                batch.held[key] = self.budget.hold(batch.most_usd[key] or 0.0)
             if batch.event != "ended":
                 return True
             await asyncio.shield(self._following(batch))
@@ -203,7 +285,8 @@ class BatchModel:
     async def _add(self, key: str, request: Request) -> bool:
         """Put a request into the draft, or a new one; False where the budget has no room for it."""
         http, seeded = await self._written(request)
-        usd = worst_usd(self.prices, self.budget, estimate(self.config, request), batched=True)
+        expected = estimate(self.config, request)
+        usd = worst_usd(self.prices, self.budget, expected, batched=True)
         held: int | None = None
         if self.budget is not None:
             # Under a limit prices are known.
@@ -214,7 +297,14 @@ class BatchModel:
                 return False
             else:
                 held = await self.budget.reserve(lambda: most)
-        if self._draft is not None and not self._draft.add(key, http, usd, held, seeded=seeded):
+        for draft in (self._draft, Batch(seeded=seeded)):
+            if draft is None:
+                continue
+            line = self._provider.line(custom_id(draft, len(draft.lines)), http.body, http.headers)
+            fits = len(draft.lines) < self._provider.most_requests
+            fits = fits and draft.size + len(line) < self._provider.most_bytes
+            if not draft.lines or (fits and seeded == draft.seeded):
+                break
             sending = asyncio.ensure_future(self._send_draft())
             try:
                 await asyncio.shield(sending)
@@ -222,11 +312,16 @@ class BatchModel:
                 await sending
                 raise
             if self._refusal is not None:
-                self._settle_all({} if held is None else {key: held}, 0.0)
+                if held is not None and self.budget is not None:
+                    self.budget.settle(held, 0.0)
                 return False
-        if self._draft is None:
-            self._draft = _Draft(self._provider, seeded)
-            self._draft.add(key, http, usd, held, seeded=seeded)
+        self._draft = draft
+        assert draft is not None
+        draft.lines.append(line)
+        draft.size += len(line) + 1
+        draft.most_usd[key] = usd
+        if held is not None:
+            draft.held[key] = held
         return True
 
     def _settle(self, key: str, batch: Batch, usd: float | None) -> None:
@@ -235,9 +330,9 @@ class BatchModel:
             spent_usd = self.budget.settle(batch.held.pop(key), usd)
             self._billed_usd[key] = self._billed_usd.get(key, 0.0) + spent_usd
 
-    def _settle_all(self, held: dict[str, int], usd: float | None) -> None:
-        while self.budget is not None and held:
-            self.budget.settle(held.popitem()[1], usd)
+    def _settle_all(self, batch: Batch, usd: float | None) -> None:
+        while self.budget is not None and batch.held:
+            self.budget.settle(batch.held.popitem()[1], usd)
 
     # Sending, and finding again what an earlier process was sending.
 
@@ -246,33 +341,29 @@ class BatchModel:
         if draft is None:
             return
         try:
-            batch = await self._send(draft)
+            await self._send(draft)
         except UnavailableError as error:
             # Whether one was sent of which that is not known, the next command finds out.
             self._refusal = error
-            self._settle_all(draft.held, None if isinstance(error, UnsureError) else 0.0)
+            self._settle_all(draft, None if isinstance(error, UnsureError) else 0.0)
             return
-        self._again.difference_update(batch.places)
-        requests = "1 request" if len(batch.places) == 1 else f"{len(batch.places):,} requests"
-        self._tell(f"sent batch {batch.shown}: {requests}")
-        self._following(batch)
+        self._again.difference_update(draft.most_usd)
+        self._tell(f"sent batch {draft.shown} of {len(draft.most_usd):,}")
+        self._following(draft)
 
-    async def _send(self, draft: _Draft) -> Batch:
-        """Send a draft; return the batch, which the provider has, with its id on disk.
+    async def _send(self, batch: Batch) -> None:
+        """Send a draft; then the provider has it, and its id is on disk.
 
         Raises UnavailableError where it cannot be sent, and nothing was asked; UnsureError where
         that is not known.
         """
-        known = [usd for usd in draft.keys.values() if usd is not None]
-        costs = tuple(known) if len(known) == len(draft.keys) else ()
-        fields = {"keys": tuple(draft.keys), "most_usd": costs, "seeded": draft.seeded}
-        await self._ledger.note(draft.token, "intended", **fields)
-        batch = self._ledger.batches[draft.token]
-        batch.held = draft.held
+        costs = [] if None in batch.most_usd.values() else list(batch.most_usd.values())
+        fields = {"keys": tuple(batch.most_usd), "most_usd": costs, "seeded": batch.seeded}
+        await self._ledger.note(batch, "intended", **fields)
 
         async def create() -> BatchStatus:
             try:
-                return await self._provider.create(batch.token, draft.lines)
+                return await self._provider.create(batch.token, batch.lines)
             except RetryableError as error:
                 if error.sent == "no" or error.status == 429:
                     raise
@@ -286,11 +377,11 @@ class BatchModel:
         except UnsureError:
             raise
         except UnavailableError as error:
-            await self._ledger.note(batch.token, "lost", words=str(error))
+            await self._ledger.note(batch, "lost", words=str(error))
             why = f"a batch could not be sent: {error}"
             raise UnavailableError(why, status=error.status, sent=error.sent) from None
-        await self._ledger.note(batch.token, "created", id=status.id)
-        return batch
+        await self._ledger.note(batch, "created", id=status.id)
+        batch.lines.clear()
 
     async def _find(self, batch: Batch, until_s: float) -> BatchStatus | None:
         """Return the batch that was being sent; None where there is none until then.
@@ -299,54 +390,46 @@ class BatchModel:
         Raises UnsureError where the list or the answers of one cannot be read.
         """
         strangers = {one.id for one in self._ledger.batches.values()}
+        earliest_s = batch.created.timestamp() - _CLOCKS_APART_S
 
         async def candidates() -> list[BatchStatus]:
             found = []
             async for status in self._provider.listed():
-                earliest_s = batch.created.timestamp() - _CLOCKS_APART_S
                 if status.created_s is not None and status.created_s < earliest_s:
                     break
-                is_like = status.total in (None, 0, len(batch.places)) and status.state != "refused"
-                is_nameless = status.token is None and is_like and status.id not in strangers
-                if status.token == batch.token or is_nameless:
+                is_like = status.total in (None, 0, len(batch.most_usd))
+                is_like = is_like and status.state != "refused" and status.id not in strangers
+                if status.token == batch.token or (status.token is None and is_like):
                     found.append(status)
             return sorted(found, key=lambda status: status.token is None)
 
         try:
             while True:
-                running = False
+                is_running = False
                 for status in await self._patiently(candidates):
                     if status.token == batch.token:
                         return status
                     if status.state == "running":
-                        running = True
+                        is_running = True
                         continue
                     lines = await self._patiently(partial(self._provider.results, status))
-                    if (await asyncio.to_thread(Answers, lines, self._provider, batch)).found:
+                    if answers_of(lines, self._provider, batch):
                         return status
                     strangers.add(status.id)
-                if not running and time.time() >= until_s:
+                if not is_running and time.time() >= until_s:
                     return None
-                left_s = self.files.poll_s if running else until_s - time.time()
-                await asyncio.sleep(max(0.01, min(self.files.poll_s, left_s)))
+                await asyncio.sleep(self.files.poll_s)
         except UnavailableError as error:
-            raise UnsureError(
-                f"it is not known whether a batch of {len(batch.places):,} was sent: {error}. If "
-                f"it was not, remove the lines of {batch.token} from {BATCHES}: its questions are "
-                "then asked again, and billed again if it was",
-                status=error.status, sent=error.sent,
-            ) from None  # fmt: skip
+            why = (
+                f"it is not known whether a batch was sent: {error}. If it was not, remove the "
+                f"lines of {batch.token} from {BATCHES}: its questions are then asked again"
+            )
+            raise UnsureError(why, status=error.status, sent=error.sent) from None
 
     async def _patiently(self, call: Callable[[], Awaitable[T]]) -> T:
         """Call until it succeeds or cannot; UnavailableError where it never does."""
-
-        def on_retry(error: RetryableError, wait_s: float) -> None:
-            # A log would fall silent over a long wait.
-            if wait_s >= 2.0:
-                self._tell(f"trying again in {wait_s:.0f} s: {error}")
-
         try:
-            async for attempt in self.policy.retrying(on_retry):
+            async for attempt in self.policy.retrying(lambda *_: None):
                 with attempt:
                     return await call()
         except UnavailableError:
@@ -374,9 +457,9 @@ class BatchModel:
                 status = await self._end(batch)
                 words = self._provider.shown(status.words)
                 if status.state == "refused":
-                    await self._ledger.note(batch.token, "lost", words=words)
+                    await self._ledger.note(batch, "lost", words=words)
                     self._refusal = UnavailableError(f"batch {batch.shown} was refused: {words}")
-                    self._settle_all(batch.held, 0.0)
+                    self._settle_all(batch, 0.0)
                     return
                 lines = await self._patiently(lambda: self._provider.results(status))
             except ModelError as error:
@@ -386,28 +469,22 @@ class BatchModel:
             with writing(path):
                 path.parent.mkdir(parents=True, exist_ok=True)
                 await asyncio.to_thread(atomic_write, path, lines, sync=True)
-            fields = {"words": words, "is_complete": status.is_complete}
-            await self._ledger.note(batch.token, "ended", **fields)
-            if not status.is_complete:
-                self._refusal = UnavailableError(
-                    f"batch {batch.shown} was taken back before all of it was asked: give the same "
-                    "command again to ask the rest"
-                )
+            await self._ledger.note(batch, "ended", words=words)
+            if status.state == "cancelled":
+                why = f"batch {batch.shown} was cancelled; the same command asks the rest"
+                self._refusal = UnavailableError(why)
         if not path.exists():
             raise UnavailableError(
                 f"the answers of batch {batch.shown} are gone ({path}): without its lines in "
                 f"{BATCHES} its questions are asked again"
             )
         lines = await asyncio.to_thread(path.read_bytes)
-        batch.answers = await asyncio.to_thread(Answers, lines, self._provider, batch)
-        if faults := batch.answers.faults:
-            said = ", ".join(f"{n} {what}" for what, n in sorted(faults.items()))
-            self._tell(f"batch {batch.shown} holds lines {said}")
+        batch.is_blank = not lines.strip()
+        batch.answers = await asyncio.to_thread(answers_of, lines, self._provider, batch)
 
     async def _end(self, batch: Batch) -> BatchStatus:
         """Look at a batch now and then; return its last state."""
         pause_s, failures, told = min(_FIRST_PAUSE_S, self.files.poll_s), 0, ""
-        since = datetime.fromtimestamp(batch.created.timestamp()).strftime("%d %b %H:%M")
         while True:
             try:
                 status = await self._provider.status(batch.id)
@@ -421,6 +498,7 @@ class BatchModel:
                     raise
                 said = f"cannot be looked at now ({error})"
             if said != told:
+                since = batch.created.astimezone().strftime("%d %b %H:%M")
                 self._tell(f"waiting for batch {batch.shown} since {since}: {said}")
                 told = said
             await asyncio.sleep(pause_s)
@@ -449,17 +527,16 @@ class BatchModel:
         RetryableError also where there is no answer, or none that can be read.
         """
         assert batch.answers is not None, "the batch has ended"
-        answer = batch.answers.found.get(batch.places[key])
+        answer = batch.answers.get(key)
         if answer is None:
-            has_lines = batch.answers.found or batch.answers.faults
             why = f"batch {batch.shown} holds no answer that can be read"
-            raise RetryableError(why, status=200) if has_lines else RetryableError(why, sent="no")
+            raise RetryableError(why, **{"sent": "no"} if batch.is_blank else {"status": 200})
         if isinstance(answer, str):
             why = f"batch {batch.shown} ended before this was asked: {answer}"
             raise RetryableError(self._provider.shown(why), sent="no")
         client = self.client(_NoConnection(answer))
         try:
-            reply = await client.complete(request, with_seed=batch.intent.seeded)
+            reply = await client.complete(request, with_seed=batch.seeded)
         except SeedRefusedError:
             self._go_without_seed()
             raise RetryableError("the provider takes no seed", sent="answered") from None
@@ -496,157 +573,26 @@ class _NoConnection(HttpClient):
         """Nothing is open."""
 
 
-@dataclass(eq=False)
-class _Draft:
-    """A batch that is being put together; `keys` are its requests with the most that each can cost
-    [US dollars], None where no price is known; `held` are their reservations.
-    """
-
-    provider: BatchProvider
-    seeded: bool
-    # What the providers allow in names and boundaries.
-    token: str = field(default_factory=lambda: f"pb{secrets.token_hex(12)}")
-    keys: dict[str, float | None] = field(default_factory=dict)
-    held: dict[str, int] = field(default_factory=dict)
-    lines: list[bytes] = field(default_factory=list)
-    size: int = 0
-
-    def add(
-        self, key: str, http: _NoConnection, usd: float | None, held: int | None, *, seeded: bool
-    ) -> bool:
-        """Take a request in; return False where it does not fit, by the bounds of a batch and as
-        all ask with a seed or without.
-        """
-        name = custom_id(self.token, len(self.keys))
-        line = self.provider.line(name, http.body, http.headers)
-        is_full = len(self.keys) >= self.provider.most_requests
-        is_full = is_full or self.size + len(line) >= self.provider.most_bytes
-        if self.keys and (is_full or seeded != self.seeded):
-            return False
-        self.lines.append(line)
-        self.size += len(line) + 1
-        self.keys[key] = usd
-        if held is not None:
-            self.held[key] = held
-        return True
-
-
-@dataclass(frozen=True)
-class BatchFiles:
-    """Batches of a run as they are kept: the lines written so far, oldest first, and a callback
-    that appends one and returns when it is on disk. A batch is looked at every `poll_s` at least.
-    """
-
-    earlier: tuple[BatchLine, ...]
-    put: Callable[[BatchLine], Awaitable[None]]
-    run_folder: Path
-    poll_s: float = 60.0
-
-    def answers(self, token: str) -> Path:
-        """Return the file of a batch's answers, which is there once it has ended."""
-        return self.run_folder / "batches" / f"{token}.answers.jsonl"
-
-
-@dataclass(eq=False)
-class Batch:
-    """A batch: its line of intent, its newest state, and its answers when they are here.
-
-    `places` are its requests by their keys in the reply cache, `held` their reservations in the
-    budget. `following` is the work that ends when it has ended.
-    """
-
-    intent: BatchLine
-    event: BatchEvent = "intended"
-    id: str = ""
-    places: dict[str, int] = field(default_factory=dict)
-    held: dict[str, int] = field(default_factory=dict)
-    following: asyncio.Future[None] | None = None
-    answers: Answers | None = None
-
-    def __post_init__(self) -> None:
-        self.places = {key: place for place, key in enumerate(self.intent.keys)}
-
-    @property
-    def token(self) -> str:
-        """Our name for it."""
-        return self.intent.batch
-
-    @property
-    def shown(self) -> str:
-        """Its name for people."""
-        return self.id or self.token
-
-    @property
-    def created(self) -> datetime:
-        """When it was about to be sent, in UTC; its answers are priced by that day."""
-        return datetime.strptime(self.intent.time, "%Y-%m-%dT%H:%M:%SZ").replace(tzinfo=UTC)
-
-    def most_usd(self, key: str) -> float:
-        """Return the most that one of its requests can cost."""
-        return self.intent.most_usd[self.places[key]] if self.intent.most_usd else 0.0
-
-
-class Ledger:
-    """The batches of one model; every change is on disk when `note` returns."""
-
-    def __init__(self, model: str, files: BatchFiles) -> None:
-        self._model = model
-        self._files = files
-        self.batches: dict[str, Batch] = {}
-        for line in files.earlier:
-            if line.model == model:
-                self._take(line)
-
-    def newest(self, key: str) -> Batch | None:
-        """Return the last batch that a request went out in, or is about to."""
-        return next((b for b in reversed(self.batches.values()) if key in b.places), None)
-
-    async def note(self, token: str, event: BatchEvent, **fields: object) -> None:
-        """Write the newest state of a batch; one that is `intended` counts as under way."""
-        time = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-        told = {"batch": token, "model": self._model, "event": event, "time": time, **fields}
-        line = BatchLine.model_validate(told)
-        await self._files.put(line)
-        self._take(line)
-
-    def _take(self, line: BatchLine) -> None:
-        if line.event == "intended":
-            self.batches[line.batch] = Batch(line)
-        elif line.event == "lost":
-            # Its requests count as not sent in it.
-            self.batches.pop(line.batch).event = "lost"
-        else:
-            batch = self.batches[line.batch]
-            batch.event, batch.id = line.event, line.id or batch.id
-
-
-class Answers:
-    """The first readable answer to each request of a batch that has one, by its place there; a text
-    says why the request was never asked. `faults` counts other lines by what is wrong with them.
-    """
-
-    def __init__(self, lines: bytes, provider: BatchProvider, batch: Batch) -> None:
-        self.found: dict[int, Answer | str] = {}
-        self.faults: Counter[str] = Counter()
-        places = {custom_id(batch.token, place): place for place in batch.places.values()}
-        for line in filter(None, map(bytes.strip, lines.splitlines())):
-            try:
-                name, answer = provider.read(load_json(line))
-                place = places.get(name)
-            except UNREADABLE:
-                self.faults["that cannot be read"] += 1
-                continue
-            if place is None:
-                self.faults["to what was not asked"] += 1
-            elif place in self.found:
-                self.faults["to what has an answer already"] += 1
-            else:
-                self.found[place] = answer
-
-
-def custom_id(token: str, place: int) -> str:
+def custom_id(batch: Batch, place: int) -> str:
     """Return the name of a request in a batch."""
-    return f"{token}-{place}"
+    return f"{batch.token}-{place}"
+
+
+def answers_of(lines: bytes, provider: BatchProvider, batch: Batch) -> dict[str, Answer | str]:
+    """Return the first readable answer to each request of a batch that has one; a text says why
+    the request was never asked.
+    """
+    keys = {custom_id(batch, place): key for place, key in enumerate(batch.most_usd)}
+    found: dict[str, Answer | str] = {}
+    for line in filter(None, map(bytes.strip, lines.splitlines())):
+        try:
+            name, answer = provider.read(load_json(line))
+            key = keys.get(name)
+        except UNREADABLE:
+            continue
+        if key is not None:
+            found.setdefault(key, answer)
+    return found
 
 
 def under_way(lines: Iterable[BatchLine]) -> dict[str, str]:
@@ -676,11 +622,8 @@ def waiting_keys(
         path = files.answers(batch.token)
         # Without its answers a batch stops its model: nothing of it is asked again.
         if batch.event != "ended" or not path.is_file():
-            waiting |= batch.places.keys()
+            waiting |= batch.most_usd.keys()
             continue
-        found = Answers(path.read_bytes(), provider, batch).found
-        for key, place in batch.places.items():
-            answer = found.get(place)
-            if isinstance(answer, Answer) and answer.is_success:
-                waiting.add(key)
+        found = answers_of(path.read_bytes(), provider, batch)
+        waiting |= {k for k, one in found.items() if isinstance(one, Answer) and one.is_success}
     return frozenset(waiting)

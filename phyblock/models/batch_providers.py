@@ -39,20 +39,19 @@ _LARGEST_RESULTS_BYTES = 1024**3
 class BatchStatus:
     """The state of a batch, as its provider says.
 
-    A `refused` batch asked nothing of anyone. `token` is the name that we gave it, None where the
-    provider does not tell. `total` counts requests, None where it does not say, `created_s` is a
-    Unix time. `results` are the addresses of the answers; with `is_complete` False some were not
-    asked, as the batch was cancelled. `words` are its own, with counts and errors.
+    A `refused` batch asked nothing of anyone, of a `cancelled` one some was not asked. `token` is
+    the name that we gave it, None where the provider does not tell. `total` counts requests, None
+    where it does not say, `created_s` is a Unix time. `results` are the addresses of the answers,
+    `words` its own, with counts and errors.
     """
 
     id: str
-    state: Literal["running", "ended", "refused"]
+    state: Literal["running", "ended", "cancelled", "refused"]
     words: str
     token: str | None
     total: int | None
     created_s: float | None
     results: tuple[str, ...]
-    is_complete: bool
 
 
 class BatchProvider(ABC):
@@ -229,7 +228,7 @@ class _OpenAI(BatchProvider):
         total, done, failed = (_count(counts.get(n)) for n in ("total", "completed", "failed"))
         files = [batch[name] for name in ("output_file_id", "error_file_id") if batch.get(name)]
         # Taken for empty, a batch whose files are not there yet would be asked again.
-        ends = {"expired": "ended", "cancelled": "ended", "failed": "refused"}
+        ends = {"expired": "ended", "cancelled": "cancelled", "failed": "refused"}
         state: Any = "ended" if word == "completed" and files else ends.get(word, "running")
         return BatchStatus(
             _name(batch["id"]),
@@ -239,7 +238,6 @@ class _OpenAI(BatchProvider):
             total,
             _count(batch.get("created_at")),
             tuple(f"{self._base}/files/{file}/content" for file in files),
-            word != "cancelled",
         )
 
 
@@ -288,16 +286,16 @@ class _Anthropic(BatchProvider):
         counts = {name: int(number or 0) for name, number in batch["request_counts"].items()}
         failed = sum(counts.get(name, 0) for name in ("errored", "expired", "canceled"))
         total, done, has_ended = sum(counts.values()), counts.get("succeeded", 0), word == "ended"
+        end: Any = "cancelled" if counts.get("canceled") else "ended"
         return BatchStatus(
             _name(batch["id"]),
-            "ended" if has_ended else "running",
+            end if has_ended else "running",
             _words(word, n=(total, done, failed)),
             None,
             total,
             _unix_s(batch.get("created_at")),
             # Not `results_url`, which behind a gateway is the provider's own and out of reach.
             (f"{self._url}/{batch['id']}/results",) if has_ended else (),
-            not (has_ended and counts.get("canceled")),
         )
 
     def _read_page(self, page: Any, after: str = "after_id") -> tuple[Sequence[BatchStatus], str]:
@@ -355,7 +353,8 @@ class _Gemini(BatchProvider):
         facts = batch.get("metadata") or {}
         # BATCH_STATE_... or JOB_STATE_..., by version.
         word = (facts.get("state") or "").rpartition("STATE_")[2].lower()
-        ends = dict.fromkeys(("succeeded", "expired", "cancelled"), "ended") | {"failed": "refused"}
+        ends = dict.fromkeys(("succeeded", "expired"), "ended")
+        ends |= {"failed": "refused", "cancelled": "cancelled"}
         state: Any = ends.get(word, "running")
         stats = facts.get("batchStats") or {}
         names = ("requestCount", "successfulRequestCount", "failedRequestCount")
@@ -370,7 +369,6 @@ class _Gemini(BatchProvider):
             total,
             _unix_s(facts.get("createTime")),
             (f"{self._base}/download/v1beta/{file}:download?alt=media",) if file else (),
-            word != "cancelled",
         )
 
     def _read_page(self, page: Any, after: str = "pageToken") -> tuple[Sequence[BatchStatus], str]:

@@ -40,6 +40,8 @@ from phyblock.text import well_formed
 if TYPE_CHECKING:
     import aiohttp
 
+OPENAI_API_BASE = "https://api.openai.com/v1"
+
 _LONGEST_CONNECT_S = 30.0
 _LONGEST_MESSAGE = 500
 _LONGEST_WORDS = 20_000
@@ -137,12 +139,7 @@ class HttpClient:
         self._proxies: dict[tuple[str, str], str | None] = {}
 
     async def send(
-        self,
-        url: str,
-        body: bytes,
-        headers: Mapping[str, str],
-        *,
-        method: str = "POST",
+        self, url: str, body: bytes, headers: Mapping[str, str], *, method: str = "POST"
     ) -> Answer:
         """Send once and read the answer.
 
@@ -153,11 +150,10 @@ class HttpClient:
         import yarl
 
         if self._session is None:
+            connect_s = min(_LONGEST_CONNECT_S, self._timeout_s / 2)
             self._session = aiohttp.ClientSession(
                 connector=aiohttp.TCPConnector(limit=0),
-                timeout=aiohttp.ClientTimeout(
-                    total=self._timeout_s, connect=min(_LONGEST_CONNECT_S, self._timeout_s / 2)
-                ),
+                timeout=aiohttp.ClientTimeout(total=self._timeout_s, connect=connect_s),
                 cookie_jar=aiohttp.DummyCookieJar(),
             )
         host = host_of(url)
@@ -170,36 +166,49 @@ class HttpClient:
                 proxy=self._proxy(url),
                 allow_redirects=False,
             ) as response:
-                status, found = response.status, response.headers
-                if 300 <= status < 400:
+                content, fault = await self._read(response, url)
+                if fault:
                     response.close()
-                    return Answer(status, found, b"", _redirect(url, found.get("Location")))
-                pieces: list[bytes] = []
-                size = 0
-                try:
-                    async for piece in response.content.iter_any():
-                        size += len(piece)
-                        if size > self._most_bytes:
-                            response.close()
-                            limit = f"{self._most_bytes / 2**20:g} MB"
-                            return Answer(status, found, b"", f"the body is larger than {limit}")
-                        pieces.append(piece)
-                except aiohttp.ClientPayloadError:
-                    response.close()
-                    fault = "the body breaks off, or is not encoded as it says"
-                    return Answer(status, found, b"", fault)
-                return Answer(status, found, b"".join(pieces))
+                return Answer(response.status, response.headers, content, fault)
         except aiohttp.ConnectionTimeoutError:
             raise UnreachableError(f"no connection to {host} in time") from None
         except TimeoutError:
             within = f"no whole answer within {self._timeout_s:g} s"
             raise RetryableError(within, sent="maybe") from None
         except aiohttp.ClientConnectorError as error:
-            raise _unconnected(error, host) from None
+            where = "the proxy" if isinstance(error, aiohttp.ClientProxyConnectionError) else host
+            dns = " (DNS)" if isinstance(error, aiohttp.ClientConnectorDNSError) else ""
+            reason = getattr(error, "certificate_error", None) or error.os_error.strerror
+            why = f"no connection to {where}{dns}: {reason or error.os_error}"
+            raise UnreachableError(why) from None
         except (aiohttp.ClientError, OSError) as error:
             said = f"{type(error).__name__}: {error}".strip(": ")
             lost = f"the connection to {host} was lost ({said})"
             raise RetryableError(lost, sent="lost") from None
+
+    async def _read(self, response: aiohttp.ClientResponse, url: str) -> tuple[bytes, str]:
+        """Return the body, or b"" and what is wrong with it."""
+        import aiohttp
+
+        if 300 <= response.status < 400:
+            location = response.headers.get("Location")
+            try:
+                # Without its path and query, which may hold a secret.
+                target = host_of(urllib.parse.urljoin(url, location)) if location else "nowhere"
+            except ValueError:
+                target = "nowhere"
+            return b"", f"redirects to {target}, and no redirect is followed"
+        pieces: list[bytes] = []
+        size = 0
+        try:
+            async for piece in response.content.iter_any():
+                size += len(piece)
+                if size > self._most_bytes:
+                    return b"", f"the body is larger than {self._most_bytes / 2**20:g} MB"
+                pieces.append(piece)
+        except aiohttp.ClientPayloadError:
+            return b"", "the body breaks off, or is not encoded as it says"
+        return b"".join(pieces), ""
 
     async def aclose(self) -> None:
         """Close all connections."""
@@ -218,146 +227,6 @@ class HttpClient:
                 proxy = None
             self._proxies[place] = f"http://{proxy}" if proxy and "://" not in proxy else proxy
         return self._proxies[place]
-
-
-def _redirect(url: str, location: str | None) -> str:
-    """Name the target of a redirect without its path and query."""
-    if location is None:
-        return "redirects, but not to where"
-    try:
-        target = urllib.parse.urljoin(url, location)
-    except ValueError:
-        target = ""
-    return f"redirects to {host_of(target)}, and no redirect is followed"
-
-
-def _unconnected(error: aiohttp.ClientConnectorError, host: str) -> UnreachableError:
-    """Say why no connection could be made: a wrong name, or a server that is not there."""
-    import aiohttp
-
-    if isinstance(error, aiohttp.ClientConnectorCertificateError):
-        return UnreachableError(f"no trusted connection to {host}: {error.certificate_error}")
-    reason = error.os_error.strerror or error.os_error
-    if isinstance(error, aiohttp.ClientConnectorDNSError):
-        return UnreachableError(f"the name of {host} is not known (DNS): {reason}")
-    if isinstance(error, aiohttp.ClientProxyConnectionError):
-        return UnreachableError(f"no connection to the proxy: {reason}")
-    return UnreachableError(f"no connection to {host}: {reason}")
-
-
-def read_json(answer: Answer) -> object:
-    """Return the decoded body of an answer whose status promises a reply.
-
-    Raises a ModelError for a body that is not whole, is no JSON within bounds, or is an error: some
-    servers send those with status 200.
-    """
-    if answer.fault or not answer.is_success:
-        raise error_of(answer)
-    try:
-        body = load_json(answer.body)
-    except ValueError as error:
-        start = answer.body[:2_000].decode("utf-8", "replace")
-        why = f"no JSON that can be read ({error}): {start}" if start else "no body"
-        raise malformed(answer.status, why) from None
-    if isinstance(body, Mapping) and body.get("error"):
-        raise error_of(answer)
-    return body
-
-
-def read_completion(body: object, latency_s: float, status: int = 200) -> Reply:
-    """Return the reply in the decoded body of a success.
-
-    Thoughts that a server leaves in the text between think tags become reasoning, as litellm does
-    it. Raises RetryableError when the body is no chat completion, or one without choices.
-    """
-    raw = read_chat_completion(body)
-    if raw is None:
-        found = type(body).__name__
-        if isinstance(body, Mapping):
-            words = [body[key] for key in ("message", "detail") if isinstance(body.get(key), str)]
-            found = ": ".join([", ".join(map(str, body)) or "nothing", *words])
-        raise malformed(status, f"no choices in it (found {found})")
-    if not raw.reasoning and (match := _THINKING.match(raw.text)):
-        raw = raw.model_copy(update={"reasoning": match[2], "text": match[3]})
-    return raw.model_copy(update={"latency_s": latency_s})
-
-
-def malformed(status: int, why: str) -> RetryableError:
-    """Return the error of a success that holds no reply: it was answered, and may be billed."""
-    return RetryableError(f"HTTP {status}: malformed reply: {why}", status=status)
-
-
-def error_of(answer: Answer) -> ModelError:
-    """Return the error of an answer that holds no reply."""
-    status, wish_s = answer.status, retry_after_s(answer.headers)
-    if answer.fault and answer.is_success:
-        return malformed(status, answer.fault)
-    words = answer.fault or _words(answer.body)
-    text = f"HTTP {status}: {words}"
-    if answer.is_success:
-        # An error that came as a success: its own code says which. A limit that is reached and a
-        # fault behind a gateway are no replies that were paid for.
-        codes = _codes(answer.body)
-        if _POLICY.search(text):
-            return RefusedError(text, status=status)
-        if _NEVER.search(text) or any(str(code) in codes for code in _UNAVAILABLE):
-            return UnavailableError(text, status=status)
-        own = next((int(code) for code in codes if _PASSING.fullmatch(code)), status)
-        return RetryableError(text, status=own, retry_after_s=wish_s)
-    if status >= 500:
-        return RetryableError(text, status=status, retry_after_s=wish_s)
-    if _POLICY.search(words):
-        return RefusedError(text, status=status)
-    if status in _UNAVAILABLE or _NEVER.search(words):
-        return UnavailableError(text, status=status)
-    if status in _RETRYABLE:
-        return RetryableError(text, status=status, retry_after_s=wish_s)
-    if 300 <= status < 400:
-        return UnavailableError(f"{text} (is api_base the address of the API?)", status=status)
-    return SampleError(text, status=status)
-
-
-def _words(body: bytes) -> str:
-    """Return what an error body says: message and code of the usual forms, else its text."""
-    text = body[: 4 * _LONGEST_WORDS].decode("utf-8", "replace")[:_LONGEST_WORDS]
-    try:
-        raw = load_json(body)
-    except ValueError:
-        return text
-    raw = raw[0] if isinstance(raw, list) and len(raw) == 1 else raw
-    error = (raw.get("error") or raw) if isinstance(raw, Mapping) else raw
-    if not isinstance(error, Mapping):
-        return str(error)[:_LONGEST_WORDS]
-    said = [error.get(name) for name in ("message", "detail", "code", "status", "type")]
-    return " ".join(str(item) for item in said if item)[:_LONGEST_WORDS] or text
-
-
-def _codes(body: bytes) -> tuple[str, ...]:
-    """Return the codes of an error body as text: servers write numbers and names in either form."""
-    raw: Any = load_json(body)
-    error = raw.get("error") if isinstance(raw, Mapping) else None
-    named = [error.get(name) for name in ("code", "status")] if isinstance(error, Mapping) else []
-    return tuple(str(code) for code in named if isinstance(code, str | int))
-
-
-def retry_after_s(headers: Mapping[str, str]) -> float | None:
-    """Return the seconds that a `Retry-After` header asks for, given as seconds or HTTP date."""
-    value = next((v for k, v in headers.items() if k.lower() == "retry-after"), None)
-    if value is None:
-        return None
-    try:
-        asked_s = float(value)
-    except ValueError:
-        try:
-            then = email.utils.parsedate_to_datetime(value)
-        except (ValueError, OverflowError):
-            return None
-        then = then if then.tzinfo else then.replace(tzinfo=UTC)
-        asked_s = (then - datetime.now(UTC)).total_seconds()
-    return max(0.0, asked_s) if math.isfinite(asked_s) else None
-
-
-OPENAI_API_BASE = "https://api.openai.com/v1"
 
 
 class OpenAIClient(Client):
@@ -390,3 +259,98 @@ class OpenAIClient(Client):
         started_s = time.perf_counter()
         answer = await self.http.send(self._url, body, headers)
         return read_completion(read_json(answer), time.perf_counter() - started_s, answer.status)
+
+
+def read_json(answer: Answer) -> object:
+    """Return the decoded body of an answer whose status promises a reply.
+
+    Raises a ModelError for a body that is not whole, is no JSON within bounds, or is an error: some
+    servers send those with status 200.
+    """
+    if answer.fault or not answer.is_success:
+        raise error_of(answer)
+    try:
+        body = load_json(answer.body)
+    except ValueError as error:
+        start = answer.body[:2_000].decode("utf-8", "replace")
+        raise malformed(answer.status, f"no JSON ({error}): {start}") from None
+    if isinstance(body, Mapping) and body.get("error"):
+        raise error_of(answer)
+    return body
+
+
+def read_completion(body: object, latency_s: float, status: int = 200) -> Reply:
+    """Return the reply in the decoded body of a success.
+
+    Thoughts that a server leaves in the text between think tags become reasoning, as litellm does
+    it. Raises RetryableError when the body is no chat completion, or one without choices.
+    """
+    raw = read_chat_completion(body)
+    if raw is None:
+        raise malformed(status, f"no choices in it: {str(body)[:2_000]}")
+    if not raw.reasoning and (match := _THINKING.match(raw.text)):
+        raw = raw.model_copy(update={"reasoning": match[2], "text": match[3]})
+    return raw.model_copy(update={"latency_s": latency_s})
+
+
+def malformed(status: int, why: str) -> RetryableError:
+    """Return the error of a success that holds no reply: it was answered, and may be billed."""
+    return RetryableError(f"HTTP {status}: malformed reply: {why}", status=status)
+
+
+def error_of(answer: Answer) -> ModelError:
+    """Return the error of an answer that holds no reply.
+
+    An error that came as a success says by its own code which it is: a limit that is reached and a
+    fault behind a gateway are no replies that were paid for.
+    """
+    status = code = answer.status
+    if answer.fault and answer.is_success:
+        return malformed(status, answer.fault)
+    words, codes = (answer.fault, ()) if answer.fault else _words(answer.body)
+    text = f"HTTP {status}: {words}"
+    if answer.is_success:
+        code = next((int(one) for one in codes if _PASSING.fullmatch(one)), status)
+        code = next((one for one in _UNAVAILABLE if str(one) in codes), code)
+    if code < 500 and _POLICY.search(words):
+        return RefusedError(text, status=status)
+    if code in _UNAVAILABLE or (code < 500 and _NEVER.search(words)):
+        return UnavailableError(text, status=status)
+    if answer.is_success or code >= 500 or code in _RETRYABLE:
+        return RetryableError(text, status=code, retry_after_s=retry_after_s(answer.headers))
+    if 300 <= status < 400:
+        return UnavailableError(f"{text} (is api_base the address of the API?)", status=status)
+    return SampleError(text, status=status)
+
+
+def _words(body: bytes) -> tuple[str, tuple[str, ...]]:
+    """Return what an error body says, and its codes: servers write them as numbers and as names."""
+    text = body[: 4 * _LONGEST_WORDS].decode("utf-8", "replace")[:_LONGEST_WORDS]
+    try:
+        raw: Any = load_json(body)
+    except ValueError:
+        return text, ()
+    raw = raw[0] if isinstance(raw, list) and len(raw) == 1 else raw
+    error = (raw.get("error") or raw) if isinstance(raw, Mapping) else raw
+    if not isinstance(error, Mapping):
+        return str(error)[:_LONGEST_WORDS], ()
+    said = [error.get(name) for name in ("message", "detail", "code", "status", "type")]
+    codes = tuple(str(code) for code in said[2:4] if isinstance(code, str | int))
+    return " ".join(str(item) for item in said if item)[:_LONGEST_WORDS] or text, codes
+
+
+def retry_after_s(headers: Mapping[str, str]) -> float | None:
+    """Return the seconds that a `Retry-After` header asks for, given as seconds or HTTP date."""
+    value = next((v for k, v in headers.items() if k.lower() == "retry-after"), None)
+    if value is None:
+        return None
+    try:
+        asked_s = float(value)
+    except ValueError:
+        try:
+            then = email.utils.parsedate_to_datetime(value)
+        except (ValueError, OverflowError):
+            return None
+        then = then if then.tzinfo else then.replace(tzinfo=UTC)
+        asked_s = (then - datetime.now(UTC)).total_seconds()
+    return max(0.0, asked_s) if math.isfinite(asked_s) else None

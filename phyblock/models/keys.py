@@ -35,14 +35,8 @@ _ADDRESS_VARIABLES: Mapping[str, tuple[str, ...]] = {
 """Where litellm looks for a server's address, if not in `<PROVIDER>_API_BASE`, in its order."""
 
 _OWN_CREDENTIALS = (
-    "azure",
-    "bedrock",
-    "github_copilot",
-    "oci",
-    "sagemaker",
-    "vertex_ai",
-    "watsonx",
-)
+    "azure", "bedrock", "github_copilot", "oci", "sagemaker", "vertex_ai", "watsonx",
+)  # fmt: skip
 """Providers that can sign in without an API key: litellm finds out by itself."""
 
 KEYLESS = ("hosted_vllm", "lm_studio", "llamafile", "ollama", "ollama_chat")
@@ -138,13 +132,14 @@ def secrets_of(config: ModelConfig) -> tuple[str, ...]:
     are not the model's key) and usual words for "no key" are none: to take them out of all text
     would ruin the text and hide nothing.
     """
-    values = {os.environ.get(name, "").strip() for name in _variables(config)}
-    values |= {
+    own = _variables(config)
+    secrets = {
         value.strip()
         for name, value in os.environ.items()
-        if _CALLED_SECRET.search(name) and len(value.strip()) >= _SHORT
+        if (name in own and len(value.strip()) >= _SHORTEST_KEY)
+        or (_CALLED_SECRET.search(name) and len(value.strip()) >= _SHORT)
     }
-    secrets = {v for v in values if len(v) >= _SHORTEST_KEY and v.lower() not in _PLACEHOLDERS}
+    secrets = {value for value in secrets if value.lower() not in _PLACEHOLDERS}
     return tuple(sorted(secrets, key=lambda value: (-len(value), value)))
 
 
@@ -194,21 +189,11 @@ def _forms(secrets: tuple[str, ...]) -> tuple[str, ...]:
     """
     forms: set[str] = set()
     for secret in secrets:
-        quoted = urllib.parse.quote(secret, safe="")
-        escaped = json.dumps(secret)[1:-1]
-        forms |= {
-            secret,
-            " ".join(secret.split()),
-            escaped,
-            escaped.replace("/", "\\/"),
-            repr(secret)[1:-1],
-            secret.replace("'", "\\'"),
-            html.escape(secret),
-            urllib.parse.quote(secret),
-            quoted,
-            urllib.parse.quote_plus(secret),
-            re.sub("%..", lambda match: match[0].lower(), quoted),
-        }
+        quoted, escaped = urllib.parse.quote(secret, safe=""), json.dumps(secret)[1:-1]
+        forms |= {secret, " ".join(secret.split()), repr(secret)[1:-1], html.escape(secret)}
+        forms |= {escaped, escaped.replace("/", "\\/"), secret.replace("'", "\\'")}
+        forms |= {quoted, urllib.parse.quote(secret), urllib.parse.quote_plus(secret)}
+        forms.add(re.sub("%..", lambda match: match[0].lower(), quoted))
         for before in range(3):
             data = bytes(before) + secret.encode()
             inside = slice((before * 8 + 5) // 6, len(data) * 8 // 6)

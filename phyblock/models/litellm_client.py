@@ -14,7 +14,6 @@ import importlib.util
 import logging
 import os
 import time
-from collections.abc import Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import cache
@@ -52,18 +51,9 @@ _WHILE_IMPORTED = {
     "MAX_BASE64_LENGTH_FOR_LOGGING": "0",  # else a regex goes over every picture for its log
 }
 _OWN_CLIENTS = (
-    "aiohttp_openai",
-    "amazon_nova",
-    "cloudflare",
-    "cohere",
-    "cohere_chat",
-    "maritalk",
-    "nlp_cloud",
-    "oobabooga",
-    "petals",
-    "predibase",
-    "replicate",
-)
+    "aiohttp_openai", "amazon_nova", "cloudflare", "cohere", "cohere_chat", "maritalk", "nlp_cloud",
+    "oobabooga", "petals", "predibase", "replicate",
+)  # fmt: skip
 """Providers whose code in litellm sends with an HTTP client of its own. They are called all the
 same: litellm then decides about redirects, sizes and what is sent twice.
 """
@@ -92,26 +82,26 @@ class LitellmClient(Client):
         litellm = _litellm()
         if self._sender is None:
             self._sender = _sender(config)
-        seed = request.seed if with_seed else None
-        optional = {"api_key": api_key(config), "api_base": config.api_base, "seed": seed}
+        fields = {
+            **wire_params(config, request),
+            "model": config.id,
+            "messages": wire_messages(request.messages, config.image_detail),
+            "timeout": config.timeout_s,
+            "num_retries": 0,
+            "max_retries": 0,
+            "client": self._sender,
+            "no-log": True,
+            "api_key": api_key(config),
+            "api_base": config.api_base,
+            "seed": request.seed if with_seed else None,
+        }
+        given = {name: value for name, value in fields.items() if value is not None}
         exchange = _Exchange(self.http)
         token = _CURRENT.set(exchange)
         started_s = time.perf_counter()
         try:
-            response = await asyncio.wait_for(
-                litellm.acompletion(
-                    **wire_params(config, request),
-                    model=config.id,
-                    messages=wire_messages(request.messages, config.image_detail),
-                    timeout=config.timeout_s,
-                    num_retries=0,
-                    max_retries=0,
-                    client=self._sender,
-                    **{"no-log": True},
-                    **{name: value for name, value in optional.items() if value is not None},
-                ),
-                config.timeout_s + _GRACE_S,
-            )
+            limit_s = config.timeout_s + _GRACE_S
+            response = await asyncio.wait_for(litellm.acompletion(**given), limit_s)
         except TimeoutError:
             raise RetryableError("no answer in time", sent="maybe") from None
         except Exception as error:
@@ -151,12 +141,10 @@ class LitellmClient(Client):
             if isinstance(error, _litellm().ContentPolicyViolationError):
                 failure = RefusedError(str(failure), status=answer.status)
             raise failure from None
-        body = read_json(answer)
-        if isinstance(body, Mapping) and {"choices", "content", "candidates"} & body.keys():
-            with contextlib.suppress(DataError):
-                reply = read_raw_reply(body, "")
-                if reply.text:
-                    return reply.model_copy(update={"usage": Usage(), "latency_s": latency_s})
+        with contextlib.suppress(DataError):
+            reply = read_raw_reply(read_json(answer), "")
+            if reply.text:
+                return reply.model_copy(update={"usage": Usage(), "latency_s": latency_s})
         raise malformed(answer.status, said) from None
 
 
@@ -209,11 +197,11 @@ def _sender(config: ModelConfig) -> Any:
         def __getattr__(self, name: str) -> Any:
             if name.startswith("__"):
                 raise AttributeError(name)
-            if self.__dict__.get("_sdk") is None:
-                self.__dict__["_sdk"] = openai.AsyncOpenAI(
-                    api_key=api_key(config), base_url=config.api_base, **fields
-                )
-            return getattr(self.__dict__["_sdk"], name)
+            known = self.__dict__
+            if known.get("_sdk") is None:
+                base, key = config.api_base, api_key(config)
+                known["_sdk"] = openai.AsyncOpenAI(api_key=key, base_url=base, **fields)
+            return getattr(known["_sdk"], name)
 
     return Sender()
 
@@ -238,16 +226,14 @@ async def _send(exchange: _Exchange, config: ModelConfig, request: httpx.Request
 @cache
 def _litellm() -> types.ModuleType:
     """Import litellm; the environment is as it was when that is done."""
-    before = {name: os.environ.get(name) for name in _WHILE_IMPORTED}
+    before = {name: os.environ.pop(name, None) for name in _WHILE_IMPORTED}
     os.environ.update(_WHILE_IMPORTED)
     try:
         import litellm
     finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        for name in _WHILE_IMPORTED:
+            del os.environ[name]
+        os.environ.update({name: value for name, value in before.items() if value is not None})
     if _is_quiet:
         litellm.suppress_debug_info = True
         for name in ("LiteLLM", "LiteLLM Router", "LiteLLM Proxy"):

@@ -232,7 +232,7 @@ class ChatModel:
 
     async def _attempt(self, call: _Call) -> Reply:
         """Send once, at a server that does not refuse everything."""
-        expected = call.expected
+        expected, who = call.expected, (self.name, call.request.key, call.request.seed)
         while True:
             async with self.limits.slot(
                 expected.prompt_tokens + expected.completion_tokens
@@ -243,7 +243,7 @@ class ChatModel:
                 except ModelError as error:
                     if isinstance(error, RetryableError):
                         call.failure, call.failed_at = error, server
-                    is_servers_fault = self.servers.failed(server, error, began_s)
+                    is_servers_fault = self.servers.failed(server, error, who, began_s)
                     self.servers.usable()
                     if is_servers_fault and not call.is_cancelled:
                         continue

@@ -1,7 +1,8 @@
-"""Recorded replies in the place of a model, and raw replies of providers in all their shapes.
+"""Recorded replies and baselines in the place of a model, and raw replies of providers.
 
-Known are the six shapes of the official outputs and their near relatives. The reader of each
-returns None for anything that is not of its shape.
+Known are the shapes of the official outputs: chat completions, Anthropic messages, Gemini responses
+(as the REST API and as its Python client write them), and a text under `predict`, `text` or
+`response`.
 """
 
 from __future__ import annotations
@@ -67,10 +68,8 @@ def open_replay(config: ModelConfig) -> ReplayModel:
     """
     folder = config.recording
     if folder is None or not folder.is_dir():
-        hint = "check the path; it is taken relative to the file that names it"
-        where = f"model {config.name}"
-        problem = Problem(where, "recordings not found", "replay", str(folder), "a folder", hint)
-        raise DataError(problem)
+        where, found = f"model {config.name}", str(folder)
+        raise DataError(Problem(where, "recordings not found", "replay", found, "a folder"))
     if (folder / RECORDS).is_file():
         return ReplayModel(config, partial(_recorded, _read_records(folder, config.name)))
     if not any(folder.glob("*.json")):
@@ -128,48 +127,41 @@ def read_raw_reply(raw: object, where: str) -> Reply:
 
     Raises DataError when it has no known shape.
     """
-    if (reply := _read(raw)) is not None:
-        return reply
+    for read in (read_chat_completion, _anthropic, _gemini, _text_alone):
+        if (reply := read(raw)) is not None:
+            return reply
     found = f"keys {', '.join(map(str, raw))}" if isinstance(raw, Mapping) else type(raw).__name__
     allowed = "a chat completion, an Anthropic message, a Gemini response, predict, text, response"
     raise DataError(Problem(where, "is no recorded reply of a known shape", "", found, allowed))
 
 
-def finish_of(word: object) -> Finish:
-    """Return the end that a provider's word stands for."""
-    return _FINISH.get(str(word).rpartition(".")[2].lower(), "unknown")
-
-
-def token_count(value: object) -> int | None:
-    """Return a number of tokens as a server wrote it; None, not known, for what cannot be one."""
-    if not isinstance(value, int) or isinstance(value, bool):
-        return None
-    return value if 0 <= value <= _MOST_TOKENS else None
-
-
 def read_chat_completion(raw: object) -> Reply | None:
     """Read OpenAI's shape and its copies: `choices[0].message`, or `choices[0].text`."""
     choice = _first(_get(raw, "choices"))
-    if not isinstance(choice, Mapping):
-        return None
-    message = choice.get("message", choice)
+    message = choice.get("message", choice) if isinstance(choice, Mapping) else None
     if not isinstance(message, Mapping) or not {"content", "text", "refusal"} & message.keys():
         return None
     text, thoughts = _parts(message.get("content", message.get("text")))
     shown = _text(message.get("reasoning_content") or message.get("reasoning"))
-    refusal = message.get("refusal")
+    refusal, counts = message.get("refusal"), _get(raw, "usage")
+    kept = _get(counts, "prompt_tokens_details")
+    cached = _count(kept, "cached_tokens")
+    if cached is None:
+        cached = _count(counts, "cached_tokens", "prompt_cache_hit_tokens")
+    usage = Usage(
+        prompt_tokens=_count(counts, "prompt_tokens"),
+        completion_tokens=_count(counts, "completion_tokens"),
+        reasoning_tokens=_count(_get(counts, "completion_tokens_details"), "reasoning_tokens"),
+        cached_tokens=cached,
+        cache_write_tokens=_count(kept, "cache_write_tokens", "cache_creation_tokens"),
+    )
     return _reply(
         text or _text(refusal),
         "\n".join(filter(None, (shown, thoughts))),
-        "refusal" if refusal and not text else finish_of(choice.get("finish_reason")),
-        _usage(_get(raw, "usage"), "prompt_tokens", "completion_tokens"),
+        "refusal" if refusal and not text else _finish(_get(choice, "finish_reason")),
+        usage,
         _get(raw, "model"),
     )
-
-
-def _read(raw: object) -> Reply | None:
-    readers = (read_chat_completion, _anthropic, _gemini, _single_field, _bare)
-    return next((reply for reader in readers if (reply := reader(raw)) is not None), None)
 
 
 def _anthropic(raw: object) -> Reply | None:
@@ -180,19 +172,18 @@ def _anthropic(raw: object) -> Reply | None:
     content, counts = _get(raw, "content"), _get(raw, "usage")
     if not isinstance(content, list) or not all(isinstance(b, Mapping) for b in content):
         return None
-    usage = _usage(counts, "input_tokens", "output_tokens")
-    if usage.prompt_tokens is not None:
-        cached = token_count(_get(counts, "cache_read_input_tokens"))
-        written = token_count(_get(counts, "cache_creation_input_tokens"))
-        usage = usage.model_copy(
-            update={
-                "prompt_tokens": usage.prompt_tokens + (cached or 0) + (written or 0),
-                "cached_tokens": cached,
-                "cache_write_tokens": written,
-            }
+    fresh, out = _count(counts, "input_tokens"), _count(counts, "output_tokens")
+    usage = Usage(completion_tokens=out)
+    if fresh is not None:
+        cached = _count(counts, "cache_read_input_tokens")
+        written = _count(counts, "cache_creation_input_tokens")
+        usage = Usage(
+            prompt_tokens=fresh + (cached or 0) + (written or 0),
+            completion_tokens=out,
+            cached_tokens=cached,
+            cache_write_tokens=written,
         )
-    finish = finish_of(_get(raw, "stop_reason"))
-    return _reply(*_parts(content), finish, usage, _get(raw, "model"))
+    return _reply(*_parts(content), _finish(_get(raw, "stop_reason")), usage, _get(raw, "model"))
 
 
 def _gemini(raw: object) -> Reply | None:
@@ -207,44 +198,22 @@ def _gemini(raw: object) -> Reply | None:
     counts = _get(raw, "usageMetadata", "usage_metadata")
     if not isinstance(candidate, Mapping) and not blocked and counts is None:
         return None
-    finish = finish_of(_get(candidate, "finishReason", "finish_reason"))
-    cached = _get(counts, "cachedContentTokenCount", "cached_content_token_count")
+    finish = _finish(_get(candidate, "finishReason", "finish_reason"))
     usage = Usage(
-        prompt_tokens=token_count(_get(counts, "promptTokenCount", "prompt_token_count")),
-        completion_tokens=token_count(
-            _get(counts, "candidatesTokenCount", "candidates_token_count")
-        ),
-        reasoning_tokens=token_count(_get(counts, "thoughtsTokenCount", "thoughts_token_count")),
-        cached_tokens=token_count(cached),
+        prompt_tokens=_count(counts, "promptTokenCount", "prompt_token_count"),
+        completion_tokens=_count(counts, "candidatesTokenCount", "candidates_token_count"),
+        reasoning_tokens=_count(counts, "thoughtsTokenCount", "thoughts_token_count"),
+        cached_tokens=_count(counts, "cachedContentTokenCount", "cached_content_token_count"),
     )
-    parts = _get(_get(candidate, "content"), "parts")
-    text, thoughts = _parts(parts if isinstance(parts, list) else [])
+    text, thoughts = _parts(_get(_get(candidate, "content"), "parts"))
     model = _get(raw, "modelVersion", "model_version")
     return _reply(text, thoughts, "refusal" if blocked else finish, usage, model)
 
 
-def _single_field(raw: object) -> Reply | None:
-    """Read a dump with the reply under one name; `predict` may stand beside a dataset's `output`.
-
-    A document that wraps another, as a line of a batch does, is read as that one.
-    """
-    for name in ("predict", "prediction", "text", "response", "answer", "outputs", "output"):
-        value = _get(raw, name)
-        if isinstance(value, list) and len(value) == 1:
-            value = value[0]
-        if isinstance(value, str):
-            return _reply(value)
-    inner = _get(raw, "response", "body")
-    return _read(inner) if isinstance(inner, Mapping) else None
-
-
-def _bare(raw: object) -> Reply | None:
-    """Read a lone text, or a list of one document."""
-    if isinstance(raw, list) and len(raw) == 1:
-        raw = raw[0]
-        if isinstance(raw, Mapping):
-            return _read(raw)
-    return _reply(raw) if isinstance(raw, str) else None
+def _text_alone(raw: object) -> Reply | None:
+    """Read a dump with the reply under one name."""
+    text = _get(raw, "predict", "text", "response")
+    return _reply(text) if isinstance(text, str) else None
 
 
 def _reply(
@@ -264,6 +233,11 @@ def _reply(
     )
 
 
+def _finish(word: object) -> Finish:
+    """Return the end that a provider's word stands for."""
+    return _FINISH.get(str(word).rpartition(".")[2].lower(), "unknown")
+
+
 def _parts(content: object) -> tuple[str, str]:
     """Return text and thoughts of a content: a string, or a list of parts in any dialect."""
     if isinstance(content, str):
@@ -280,26 +254,18 @@ def _parts(content: object) -> tuple[str, str]:
     return "".join(texts), "\n".join(text for text in thoughts if text)
 
 
-def _usage(counts: object, prompt: str, completion: str) -> Usage:
-    details = _get(counts, "completion_tokens_details", "output_tokens_details")
-    kept = _get(counts, "prompt_tokens_details", "input_tokens_details")
-    cached = _get(kept, "cached_tokens")
-    if cached is None:
-        cached = _get(counts, "cached_tokens", "prompt_cache_hit_tokens")
-    return Usage(
-        prompt_tokens=token_count(_get(counts, prompt)),
-        completion_tokens=token_count(_get(counts, completion)),
-        reasoning_tokens=token_count(_get(details, "reasoning_tokens")),
-        cached_tokens=token_count(cached),
-        cache_write_tokens=token_count(_get(kept, "cache_write_tokens", "cache_creation_tokens")),
-    )
-
-
 def _get(raw: object, *names: str) -> Any:
     """Return the first of the names that a mapping holds with a value, else None."""
     if not isinstance(raw, Mapping):
         return None
     return next((raw[name] for name in names if raw.get(name) is not None), None)
+
+
+def _count(raw: object, *names: str) -> int | None:
+    """Return a number of tokens as a server wrote it; None, not known, for what cannot be one."""
+    value = _get(raw, *names)
+    is_count = isinstance(value, int) and not isinstance(value, bool)
+    return value if is_count and 0 <= value <= _MOST_TOKENS else None
 
 
 def _first(items: object) -> object:

@@ -55,14 +55,10 @@ class Message:
 class Request:
     """One question to a model.
 
-    `key` names the question inside its `track` (a scene id for full planning): by both a recording
-    is looked up; `seed` is the sample's seed, which also tells repeats apart;
-    `params` are sampling parameters by their OpenAI names; `prompt_version` hashes the template.
-    `response_format` asks for an answer as JSON, as the OpenAI protocol does; None asks for text.
-    `examples` are the keys of worked examples that `messages` show before the question; `sample`
-    names the sample that it is made for.
-    `subject` is what the question is about, of the type that its track says: only the rules of
-    baselines look at it.
+    `key` names the question inside its `track`: by both a recording is looked up. `params` are
+    sampling parameters by their OpenAI names; `prompt_version` hashes the template; `subject` is
+    what baselines look at, of the type that its track says. `response_format` asks for JSON, None
+    for text. `examples` are keys of worked examples; `sample` names what it is made for.
     """
 
     key: str
@@ -190,7 +186,7 @@ def json_body(
     pictures: list[bytes] = []
 
     def placeholder(image: Image) -> str:
-        pictures.append(f"data:{mime_type(image)};base64,".encode() + base64.b64encode(image.data))
+        pictures.append(data_uri(image).encode())
         return mark
 
     mark = secrets.token_hex(16)

@@ -7,8 +7,8 @@ does not come in time shows neither: some requests are slow.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from phyblock.errors import ModelError, RetryableError, UnavailableError
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from phyblock.models.model import RetryPolicy
 
 FAILURES_TO_REST = 5
+_REQUESTS_TO_REST = 2
+"""One request that a server cannot survive is no outage."""
 _LONGEST_REST_S = 15.0
 _GATEWAY = (502, 503, 504)
 _TOO_MUCH = (429, 529)
@@ -25,8 +27,8 @@ _TOO_MUCH = (429, 529)
 
 @dataclass(eq=False)
 class Server:
-    """One server: `failures` in a row show that it is away, since `away_since_s`; from the fifth on
-    it rests after each. `refusal` is the reason why it is asked no more.
+    """One server: `failures` in a row, of the requests `failed`, show that it is away, since
+    `away_since_s`; it has rested `rests` times since. `refusal` is why it is asked no more.
     """
 
     name: str
@@ -34,7 +36,9 @@ class Server:
     under_way: int = 0
     sent: int = 0
     failures: int = 0
+    failed: set[Hashable] = field(default_factory=set)
     away_since_s: float = 0.0
+    rests: int = 0
     rested_at_s: float = float("-inf")
     rests_until_s: float = float("-inf")
     was_heard: bool = False
@@ -73,19 +77,20 @@ class Servers:
             self.usable(),
             key=lambda s: (max(0.0, s.rests_until_s - now_s), s is failed, s.under_way, s.sent),
         )
-        if chosen.failures >= FAILURES_TO_REST:
+        if chosen.rests:
             chosen.rests_until_s = now_s + self._rest_of(chosen)
         return chosen
 
     def heard(self, server: Server) -> None:
         """Note that a server answered."""
-        if server.failures >= FAILURES_TO_REST:
+        if server.rests:
             lasted_s = self._policy.clock.now() - server.away_since_s
             self._tell(f"{server.name} answers again after {lasted_s:.0f} s")
             server.rests_until_s = float("-inf")
-        server.was_heard, server.failures = True, 0
+        server.was_heard, server.failures, server.rests = True, 0, 0
+        server.failed.clear()
 
-    def failed(self, server: Server, error: ModelError, sent_s: float) -> bool:
+    def failed(self, server: Server, error: ModelError, request: Hashable, sent_s: float) -> bool:
         """Note that a request that was sent at `sent_s` failed; True if that is the server's fault,
         so that another attempt is free.
 
@@ -99,24 +104,27 @@ class Servers:
                 self.heard(server)
             return False
         server.was_heard |= error.status is not None
-        if server.failures >= FAILURES_TO_REST and sent_s <= server.rested_at_s:
+        if server.rests and sent_s <= server.rested_at_s:
             return True
         now_s = self._policy.clock.now()
         server.away_since_s = server.away_since_s if server.failures else now_s
         server.failures += 1
-        if server.failures < FAILURES_TO_REST:
+        server.failed.add(request)
+        if server.failures < FAILURES_TO_REST or len(server.failed) < _REQUESTS_TO_REST:
             return False
+        server.rests += 1
         server.rested_at_s = now_s
         wait_s = max(self._rest_of(server), self._policy.followed_s(error))
         server.rests_until_s = now_s + wait_s
         lasted_s, name = now_s - server.away_since_s, server.name
-        if self._policy.gives_up(error, server.failures - FAILURES_TO_REST + 1, lasted_s):
+        tries = FAILURES_TO_REST + server.rests - 1
+        if self._policy.gives_up(error, server.rests, lasted_s):
             why = f"{name} could not be reached for {lasted_s:.0f} s: {error}"
             self._refuse(server, UnavailableError(why, sent="no"))
-        elif not server.was_heard and server.failures >= self._policy.max_connection_failures:
-            why = f"{name} never answered, {server.failures} times in a row: {error}"
+        elif not server.was_heard and tries >= self._policy.max_connection_failures:
+            why = f"{name} never answered, {tries} times in a row: {error}"
             self._refuse(server, UnavailableError(why, sent="no"))
-        elif server.failures == FAILURES_TO_REST:
+        elif server.rests == 1:
             self._tell(f"{name} cannot be reached, trying now and then: {error}")
         return True
 
@@ -132,5 +140,5 @@ class Servers:
             self._tell(f"{server.name} is asked no more: {error}")
 
     def _rest_of(self, server: Server) -> float:
-        doubled_s = self._policy.base_s * 2.0 ** min(server.failures - FAILURES_TO_REST + 1, 60)
+        doubled_s = self._policy.base_s * 2.0 ** min(server.rests, 60)
         return min(_LONGEST_REST_S, self._policy.max_wait_s, doubled_s)

@@ -440,8 +440,6 @@ class BatchLine(Line):
     """True if the requests of an intended batch carry seeds."""
     words: str = ""
     """The reason why it was lost, or how it ended."""
-    is_complete: bool = True
-    """False where the provider took back what it had not asked when the batch ended."""
 
 
 class Stopped(Line):

@@ -239,16 +239,8 @@ SHAPES: dict[str, tuple[object, Reply]] = {
         {"instruction": "i", "input": "", "output": "gold", "image": ["a"], "predict": STEPS},
         reply(STEPS),
     ),
-    "predict in a list": ({"predict": [STEPS]}, reply(STEPS)),
     "text": ({"text": STEPS, "model_id": "llava"}, reply(STEPS)),
     "response": ({"response": STEPS}, reply(STEPS)),
-    "batch response": (
-        {"custom_id": "7", "response": {"status_code": 200, "body": choice({"content": STEPS})}},
-        reply(STEPS, "stop"),
-    ),
-    "bare": (STEPS, reply(STEPS)),
-    "bare in a list": ([STEPS], reply(STEPS)),
-    "list of one": ([choice({"content": STEPS})], reply(STEPS, "stop")),
 }  # fmt: skip
 
 
@@ -265,6 +257,7 @@ def test_a_shape_is_read(name: str) -> None:
         ({"error": {"message": "overloaded"}, "id": 3}, "keys error, id"),
         ({"choices": []}, "keys choices"),
         ([], "list"),
+        ("a text", "str"),
         (None, "NoneType"),
         (17, "int"),
         ({"candidates": []}, "keys candidates"),

@@ -161,8 +161,8 @@ def servers_of(count: int, policy: RetryPolicy | None = None) -> Servers:
 
 
 def break_off(servers: Servers, server: Server, error: ModelError = REFUSED) -> None:
-    for _ in range(FAILURES_TO_REST):
-        servers.failed(server, error, servers._policy.clock.now())
+    for number in range(FAILURES_TO_REST):
+        servers.failed(server, error, number, servers._policy.clock.now())
 
 
 @settings(max_examples=60, deadline=None)
@@ -195,10 +195,10 @@ def test_whoever_is_asked_is_there_and_has_no_more_to_do_than_any_other_that_is(
 @pytest.mark.parametrize("status", [429, 500, 529, 400, None])
 def test_what_a_server_says_itself_and_what_is_late_is_no_outage(status: int | None) -> None:
     servers = servers_of(1)
-    for _ in range(50):
+    for number in range(50):
         error = RetryableError("x", status=status, sent="answered" if status else "maybe")
-        servers.failed(servers.all[0], error, 0.0)
-    servers.failed(servers.all[0], SampleError("no key", status=400), 0.0)
+        servers.failed(servers.all[0], error, number, 0.0)
+    servers.failed(servers.all[0], SampleError("no key", status=400), 1, 0.0)
     assert servers.rest_s() == 0.0
 
 
@@ -210,7 +210,7 @@ def test_the_next_try_waits_as_long_as_the_server_asks(asked_s: float | None, tr
     error = RetryableError("overloaded", status=503, retry_after_s=asked_s)
     break_off(servers, servers.all[0], error)
     least_s = min(asked_s or 0.0, policy.max_retry_after_s)
-    for _ in range(tries):
+    for number in range(tries):
         try:
             rest_s = servers.rest_s()
         except UnavailableError:
@@ -221,7 +221,7 @@ def test_the_next_try_waits_as_long_as_the_server_asks(asked_s: float | None, tr
         server = servers.pick()
         # Until it answers or fails, nobody else tries.
         assert servers.rest_s() > 0.0
-        servers.failed(server, error, time.now_s)
+        servers.failed(server, error, f"try {number}", time.now_s)
 
 
 @given(st.sampled_from([429, 529]), st.floats(0.1, 200))

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
-import ssl
 
-import aiohttp
 import pytest
 
 from phyblock.errors import (
@@ -17,7 +15,6 @@ from phyblock.errors import (
     UnreachableError,
 )
 from phyblock.models import Reply, RetryPolicy
-from phyblock.models.client import _unconnected
 from tests.models.factory import ask, make_model, make_request
 from tests.models.routes import KEY_VARIABLE, ROUTES, Route
 from tests.servers.chassis import Faults, LocalServer, Running
@@ -156,14 +153,6 @@ def test_a_closed_port_and_a_server_without_tls_are_named(name: str) -> None:
             (answer,) = ask(make_model(config, policy=ONCE), make_request())
             assert isinstance(answer, UnreachableError), answer
             assert f"no connection to {url.partition('//')[2]}" in str(answer)
-
-
-def test_a_certificate_that_is_not_trusted_is_said() -> None:
-    key = aiohttp.client_reqrep.ConnectionKey("host", 8443, True, True, None, None, None)
-    error = aiohttp.ClientConnectorCertificateError(key, ssl.CertificateError("self-signed"))
-    said = str(_unconnected(error, "host:8443"))
-    assert said.startswith("no trusted connection to host:8443: ")
-    assert "self-signed" in said
 
 
 def test_a_connection_that_is_not_made_in_time_was_not_sent() -> None:
