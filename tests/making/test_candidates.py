@@ -1,10 +1,9 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 from collections import Counter
 from dataclasses import replace
-from itertools import combinations, islice
+from itertools import islice
 from pathlib import Path
 
 import pytest
@@ -15,7 +14,7 @@ from phyblock.data import read_builtin
 from phyblock.domain import KIT_PALETTE, MAX_CANDIDATES, Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.errors import DataError
 from phyblock.making.scenes.candidates import NEEDED, make_candidates
-from phyblock.making.scenes.production import Group, Request, draw, shares
+from phyblock.making.scenes.production import Request, draw, shares
 from phyblock.making.scenes.sketch import POSES
 from phyblock.scoring.counts import micro
 from phyblock.scoring.plan import Goal, match_plan
@@ -28,8 +27,6 @@ GAIN = 0.02
 """What a learner may win without seeing the goal: what is left is chance."""
 DEVIATIONS = 4.0
 """Of a binomial count, for every one of the some thirty that are looked at."""
-SOURCES: dict[Group, tuple[int, Group]] = {"3": (2, "2"), "4": (2, "3")}
-"""How many base scenes of which group a variation is made from here; one of its own by default."""
 Tasks = list[tuple[Scene, CandidateSet]]
 
 
@@ -49,43 +46,17 @@ def built_in() -> Tasks:
     return [(task.scene, task.candidates) for task in read_builtin(BUILT_IN).tasks]
 
 
-@functools.cache
 def fresh(count: int, seed: int) -> Tasks:
-    """Goals of the grammar from another seed, in the shares of the built-in set."""
-    bases: dict[Group, list[tuple[str, Request]]] = {}
+    """Base scenes of the grammar from another seed, in the shares of the built-in set."""
     tasks: Tasks = []
     for share in shares(count):
-        drawn = _drawn([Request(seed, "kit", share.group, n) for n in range(9 * count)], share.base)
-        bases[share.group] = [(scene.id, request) for scene, request in drawn]
-        tasks += [(scene, make_candidates(scene, seed)) for scene, _ in drawn]
-    for share in shares(count):
-        number, source = SOURCES.get(share.group, (1, share.group))
-        pairs = combinations(bases[source], number)
-        varied = [
-            (Request(seed, "kit", share.group, n, tuple(r for _, r in chosen)), chosen)
-            for n, chosen in enumerate(sorted(pairs, key=lambda pair: hash_of(pair, seed)))
-        ]
-        names = {request: tuple(name for name, _ in chosen) for request, chosen in varied}
-        drawn = _drawn([request for request, _ in varied], share.varied)
-        made = [replace(scene, parents=names[request]) for scene, request in drawn]
-        tasks += [(scene, make_candidates(scene, seed)) for scene in made]
+        goals = (draw(Request(seed, "kit", share.group, n)) for n in range(9 * count))
+        found = islice((goal for goal in goals if goal), share.base + share.varied)
+        named = (
+            replace(s, id=(n := f"{share.group}-{i}"), parents=(n,)) for i, s in enumerate(found)
+        )
+        tasks += [(scene, make_candidates(scene, seed)) for scene in named]
     return tasks
-
-
-def hash_of(pair: object, seed: int) -> bytes:
-    return hashlib.sha256(f"{seed}/{pair}".encode()).digest()
-
-
-def _drawn(requests: list[Request], count: int) -> list[tuple[Scene, Request]]:
-    """The first `count` goals that the grammar gives, each named and its own parent."""
-    goals = ((draw(request), request) for request in requests)
-    found = islice(((goal, request) for goal, request in goals if goal is not None), count)
-    made = []
-    for goal, request in found:
-        kind = "varied" if request.parents else "base"
-        name = f"{request.group}-{kind}-{request.number}"
-        made.append((replace(goal, id=name, parents=(name,)), request))
-    return made
 
 
 @given(scenes, st.integers(0, 9))
@@ -112,12 +83,6 @@ def test_distractors_are_of_the_palette_in_poses_that_goals_need(scene: Scene) -
 def test_too_many_different_blocks_are_refused() -> None:
     with pytest.raises(DataError, match="at most 16"):
         make_candidates(scene_of(EVERY_LOOK[:17]))
-
-
-def test_angles_from_elsewhere_are_kept_as_they_are() -> None:
-    """An official scene may name an orientation in its own way; the candidate keeps the name."""
-    scene = scene_of([(("arch", "red"), (0.0, 180.0, 180.0))])
-    assert Candidate("arch", "red", (0.0, 180.0, 180.0)) in make_candidates(scene).candidates
 
 
 def test_distractors_are_drawn_as_goals_of_the_grammar_need_them() -> None:

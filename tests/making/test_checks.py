@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +11,6 @@ import pytest
 from phyblock.data import read_builtin, read_official
 from phyblock.domain import Block, CandidateSet, Scene
 from phyblock.domain.symmetry import Symmetry
-from phyblock.errors import DataError
 from phyblock.making.checks import (
     AUDITED,
     CHECKS,
@@ -25,7 +22,6 @@ from phyblock.making.checks import (
     SceneFacts,
     audit_scene,
     check_set,
-    findings_csv,
     findings_of,
     verify_scene,
 )
@@ -36,7 +32,6 @@ from phyblock.making.workers import open_workers
 from phyblock.sim.contact import GROUND
 from phyblock.sim.dynamics import Trial
 from phyblock.sim.engine import Physics
-from tests.designs.acceptance import accept, form_problems, physics_problems
 from tests.designs.pad import Pad
 from tests.designs.scenes import designed_scene, designed_scenes
 from tests.sim.test_support import FLOATING, OVERLAPPING
@@ -131,36 +126,6 @@ def test_a_check_finds_its_own_fault_measured_in_units(name: CheckName) -> None:
         assert (finding.value_mm is None) == (finding.tolerance_mm is None)
         if finding.value_mm is not None and finding.tolerance_mm is not None:
             assert finding.value_mm > finding.tolerance_mm
-
-
-def test_too_many_candidates_are_found() -> None:
-    (finding,) = findings_of(offering(lambda offered: offered * 3), ["candidates"])
-    assert (finding.found, finding.allowed) == ("48", "at most 16")
-
-
-@pytest.mark.parametrize(
-    "scene",
-    [lifted(0.004), lifted(-0.004), with_block(3, depend=(1,)), with_block(3, layer=2)],
-    ids=["floating", "overlap", "dependency", "layer"],
-)
-def test_accepting_verifying_and_auditing_say_the_same_words(scene: Scene) -> None:
-    audited = {finding.message for finding in audit_scene((scene, OFFERED))}
-    verified = {finding.message for finding in verify_scene((scene, OFFERED))}
-    refused = {p.message for p in (*form_problems(scene), *physics_problems(scene))}
-    assert audited
-    assert audited <= verified
-    assert audited <= refused
-    with pytest.raises(DataError):
-        accept(scene)
-
-
-def test_the_csv_holds_every_finding() -> None:
-    found = audit_scene((lifted(0.004), None), QUICK_FOREIGN)
-    assert found
-    assert audit_scene((GATE, OFFERED), QUICK_FOREIGN) == ()
-    rows = list(csv.DictReader(io.StringIO(findings_csv(found, {GATE.id: 1}))))
-    assert [row["check"] for row in rows] == [finding.check for finding in found]
-    assert {(row["scene"], row["level"]) for row in rows} == {("l1-gate", "1")}
 
 
 def test_duplicates_and_orphans_of_a_set_are_found() -> None:

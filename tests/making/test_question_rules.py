@@ -30,7 +30,6 @@ from phyblock.making.questions.relations import (
     AXIS_TURNS,
     LENGTHS,
     axis_turns,
-    grid_cm,
     put_beside,
     tipped_over,
 )
@@ -38,7 +37,6 @@ from phyblock.making.questions.selection import BALANCE, Texts, even_letters, ke
 from phyblock.making.questions.structures import (
     is_sure,
     lowered,
-    stays_round,
     with_annex,
 )
 from phyblock.making.questions.views import ViewpointMaker, shifted
@@ -166,15 +164,6 @@ def test_lengths_stay_what_they_are_in_a_mirror_and_after_a_turn(
         assert LENGTHS[rule](x, y, other) == pytest.approx(length, abs=1e-5)
 
 
-def test_a_gap_is_measured_between_sides_and_with_nothing_in_it() -> None:
-    left, right = block(2, (-0.05, 0, 0.05), (1,)), block(3, (0.05, 0, 0.05), (1,))
-    slab = block(1, (0, 0, 0.0125), kind="cuboid3")
-    between = block(4, (0, 0, 0.05), (1,), kind="cuboid1")
-    assert grid_cm(LENGTHS["gap"](left, right, (slab, left, right))) == 5
-    with pytest.raises(UnfairError, match="stands in the gap"):
-        LENGTHS["gap"](left, right, (slab, left, right, between))
-
-
 def test_a_hidden_block_is_sure_where_one_that_shows_rests_on_it_alone() -> None:
     wall = [block(i, (0.06, y, 0.025)) for i, y in enumerate((-0.05, 0.0, 0.05), 1)]
     low, high = block(5, (0, 0, 0.025)), block(6, (0, 0, 0.075), (5,))
@@ -231,27 +220,6 @@ def test_a_block_stays_where_the_plank_does_not_tip(
     assert is_on_face(plain, put, (*place_m, TOP_M)) is (place_m[1] <= 0)
 
 
-def test_a_place_where_the_block_stays_on_its_neighbors_is_none() -> None:
-    posts = [
-        solid(n, "cube", (x, 0, z))
-        for n, (x, z) in enumerate(((-0.055, 0.025), (-0.055, 0.075), (0.055, 0.025)), 5)
-    ]
-    between = (*tower(1), *posts, solid(8, "cube", (0.055, 0, 0.075)))
-    at = (0.0, 0.0, 0.05)
-    plain = QuestionPicture("scene", between, VIEW, marks=(Mark("A", at),))
-    assert stays_round(lowered(PUT, between, 0.0, 0.0), between, (0.005,)) is True
-    assert is_on_face(plain, lowered(PUT, between, 0.0, 0.0), at) is False
-    assert stays_at(plain, PUT, at) is None
-
-
-def test_a_verdict_that_turns_close_by_is_none() -> None:
-    """A thin slab put over a gap of 5.2 cm bridges it, and drops in where it is 1 cm off."""
-    posts = [solid(1, "cube", (-0.051, 0, 0.025)), solid(2, "cube", (0.051, 0, 0.025))]
-    put = lowered(solid(3, "cuboid2", (0, 0, 0)), posts, 0.0, 0.0)
-    assert stays_round(put, posts, (0.005,)) is True
-    assert stays_round(put, posts, (0.03,)) is None
-
-
 @settings(max_examples=5, deadline=None)
 @given(scenes, seeds)
 def test_a_shifted_block_rests_on_something_and_overlaps_nothing(scene: Scene, seed: int) -> None:
@@ -289,10 +257,6 @@ def drawn(seed: int, n: int = 10) -> tuple[np.random.Generator, np.ndarray]:
     return rng, rng.normal(size=(n, 4))
 
 
-def everywhere(n: int) -> np.ndarray:
-    return np.ones((n, n), dtype=bool)
-
-
 @given(seed=seeds, rights=st.integers(1, 4), held=st.integers(0, 3))
 def test_options_that_are_taken_are_apart_and_of_the_rank_that_is_held(
     seed: int, rights: int, held: int
@@ -312,24 +276,6 @@ def test_options_that_are_taken_are_apart_and_of_the_rank_that_is_held(
         assert right < rights <= min(wrong)
         ranks = [sum(measures[i, m] < measures[right, m] for i in wrong) for m in range(4)]
         assert np.abs(np.array(four.ranks) - ranks).max() <= 0.5
-
-
-@pytest.mark.parametrize("rights", [1, 4])
-def test_a_right_one_that_stands_out_in_the_pool_has_any_rank_among_four(rights: int) -> None:
-    """It would be the most of four in 47 cases of a hundred."""
-    ranks = []
-    for seed in range(300):
-        rng, measures = drawn(seed, n=10 if rights == 1 else 16)
-        measures[:rights, 0] = np.abs(measures[:rights, 0])
-        if rights == 1:
-            right, chosen = 0, ranked_as_drawn(measures, everywhere(10), rng, {})
-        else:
-            right, *chosen = four_alike(measures, everywhere(16), rng, rights=4).chosen or (0,)
-        if chosen:
-            ranks.append(sum(measures[i, 0] < measures[right, 0] for i in chosen))
-    shares = np.bincount(ranks, minlength=4) / len(ranks)
-    assert len(ranks) > 200
-    assert shares.max() < 0.42
 
 
 @given(st.integers(0, 200), seeds)
@@ -375,22 +321,3 @@ def test_of_the_drafts_kept_each_option_is_right_equally_often() -> None:
         assert rate_off([one for one in before if rng.random() < odds[id(one)]]) < 0.08
     assert np.mean(keeping_odds(pool(800, (0.2,) * 5, 3))) > 0.7
     assert keeping_odds([Texts("s", "k", "Which picture?", ())] * 5) == [1.0] * 5
-
-
-@pytest.mark.parametrize("is_middle", [False, True])
-def test_of_the_drafts_kept_no_look_is_right_more_often(is_middle: bool) -> None:
-    """By the most of a measure, or by what is nearest to the others."""
-    rng, looked = np.random.default_rng(4), []
-    for number in range(1500):
-        looks = rng.normal(size=(4, 2))
-        off = -np.abs(looks[:, 1] - looks[:, 1].mean()) if is_middle else looks[:, 1]
-        right = int(np.argmax(1.5 * off + rng.gumbel(size=4)))
-        order = [right, *(i for i in range(4) if i != right)]
-        rows = tuple(tuple(row) for row in looks[order].tolist())
-        texts = Texts(f"s{number % 60}", "k", "Which?", (), rows)
-        looked.append((texts, int(off[right] == off.max())))
-    odds = keeping_odds([texts for texts, _ in looked])
-    kept = [most for (_, most), odd in zip(looked, odds, strict=True) if rng.random() < odd]
-    assert np.mean([most for _, most in looked]) > 0.4
-    assert len(kept) > 200
-    assert abs(np.mean(kept) - 0.25) < 0.08

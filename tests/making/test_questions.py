@@ -8,7 +8,6 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from phyblock.data import QuestionSet, read_builtin, read_questions
@@ -19,7 +18,7 @@ from phyblock.domain.question import rotated
 from phyblock.errors import DataError, StoreError
 from phyblock.making.files import question_card, write_questions
 from phyblock.making.questions.audit import SubtaskAudit, audit_questions, duplicates_of
-from phyblock.making.questions.base import ELEVATIONS_DEG, LEAST_PIXELS
+from phyblock.making.questions.base import LEAST_PIXELS
 from phyblock.making.questions.dynamics import OUTCOME_TEXTS
 from phyblock.making.questions.production import (
     PER_SUBTASK,
@@ -32,8 +31,7 @@ from phyblock.making.workers import open_workers
 from phyblock.resources import bundled
 from phyblock.sim.contact import find_gaps
 from phyblock.sim.engine import other_engine
-from phyblock.sim.question_pictures import is_inside, least_difference, mark_pixel, seen
-from phyblock.types import BACKGROUNDS
+from phyblock.sim.question_pictures import is_inside, least_difference, seen
 from tests.vqa_set import questions as asked_questions
 from tests.vqa_set import write_questions as write_asked
 from tests.workspace import Workspace
@@ -109,34 +107,6 @@ def test_what_was_changed_is_found(static: list[Question]) -> None:
         if "-all-" in question.wording:
             picture = replace(question.pictures[0], blocks=question.scene.blocks[:1])
             assert problem_of(replace(question, pictures=(picture,))) is not None
-
-
-def test_views_backgrounds_and_colors_are_drawn_for_each_question(static: list[Question]) -> None:
-    views = [question.pictures[0].view_deg for question in static]
-    low, high = ELEVATIONS_DEG
-    assert len({azimuth // 30 for azimuth, _ in views}) == 12
-    assert all(low <= elevation <= high for _, elevation in views)
-    assert {q.pictures[0].background for q in static} == set(BACKGROUNDS)
-    recolored = Counter(
-        q.subtask for q in static if "colors" in StoredQuestion.of(q, SCENES[q.scene.id]).fields()
-    )
-    assert [recolored[subtask] for subtask in ("SH", "CO", "SI", "NU")] == [COUNT] * 3 + [0]
-
-
-def test_what_depends_on_the_view_is_told_for_the_view() -> None:
-    """Seen from the other side, in front is behind and left is right, or a named block hides."""
-    stored = read_questions(FOLDER, DATA).tasks
-    corners = [task.question for task in stored if task.question.wording.startswith("rp-corner")]
-    problems = []
-    for question in corners:
-        (picture,) = question.pictures
-        azimuth, elevation = picture.view_deg
-        behind = replace(picture, view_deg=((azimuth + 180) % 360, elevation))
-        problems.append(str(problem_of(replace(question, pictures=(behind,)))))
-    others = sum("the answer is" in problem for problem in problems)
-    hidden = sum("less than 40% of themselves" in problem for problem in problems)
-    assert others + hidden == len(problems)
-    assert others > len(problems) / 2
 
 
 def test_pictures_of_options_are_whole_and_told_apart(pictured: list[Question]) -> None:
@@ -243,17 +213,6 @@ def test_a_sample_of_the_answers_is_derived_again(built_in: QuestionSet) -> None
     scene, block = question.pictures
     bare = replace(question, pictures=(replace(scene, marks=scene.marks[1:]), block))
     assert problem_of(bare) == "no place A is marked on a block"
-
-
-def test_the_right_place_is_apart_from_the_others_as_often_as_any(built_in: QuestionSet) -> None:
-    ranks: Counter[int] = Counter()
-    for question in (t.question for t in built_in.tasks if t.question.subtask == "AD"):
-        shown = question.pictures[0]
-        places = np.array([mark_pixel(shown, mark.position_m) for mark in shown.marks])
-        apart = np.linalg.norm(places[:, None] - places, axis=2).sum(axis=1)
-        ranks[int((apart < apart[question.answer[0]]).sum())] += 1
-    assert ranks.keys() == set(range(len(LETTERS)))
-    assert max(ranks.values()) <= 17
 
 
 UNPROVEN = {"cf-068", "cf-096", "cf-111", "pd-078", "pd-102"}

@@ -15,7 +15,7 @@ from PIL import Image
 from phyblock.cli.main import phyblock
 from phyblock.errors import DataError
 from phyblock.resources import bundled
-from phyblock.sim.engine import described_engine, installed_engines, other_engine
+from phyblock.sim.engine import other_engine
 
 QUESTION_LINES = "questions.jsonl"
 
@@ -62,20 +62,6 @@ def test_questions_are_written_with_card_and_checksums(folder: Path) -> None:
     card = (folder / "q" / "CARD.md").read_text(encoding="utf-8")
     assert f"generate --data {folder}" in card
     assert f"scenes of `{folder.name}`" in card
-
-
-def test_a_set_by_another_engine_is_said_to_be(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if "mujoco" not in installed_engines():
-        pytest.skip("MuJoCo is not installed")
-    monkeypatch.setenv("PHYBLOCK_PHYSICS", "mujoco")
-    few = ("--subtasks", "CO", "--per-subtask", 1, "--jobs", 1)
-    told = vqa("generate", "--data", folder, "--out", tmp_path / "q", *few)
-    assert (
-        f"made with the physics engine {described_engine()}: the default one may make another"
-        in told.stderr
-    )
 
 
 @pytest.mark.parametrize("names", ["XX", "CO,CO", ""])

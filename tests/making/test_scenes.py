@@ -5,20 +5,15 @@ from __future__ import annotations
 import functools
 from dataclasses import replace
 from itertools import islice
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from phyblock.data import read_builtin
-from phyblock.domain import BLOCK_TYPES, KIT_PALETTE, Scene, orientation_class
+from phyblock.domain import BLOCK_TYPES, KIT_PALETTE, Scene
 from phyblock.domain.symmetry import canonical_form
-from phyblock.errors import StoreError
-from phyblock.making.files import SCENE_FILES, scene_card, sums_text, write_scenes
-from phyblock.making.scenes.candidates import make_candidates
-from phyblock.making.scenes.designs import BUILDINGS, COMPOSITIONS, CREATURES, beside
+from phyblock.making.scenes.designs import BUILDINGS, COMPOSITIONS, CREATURES
 from phyblock.making.scenes.production import (
     GROUP_LEVELS,
     Request,
@@ -29,11 +24,10 @@ from phyblock.making.scenes.production import (
 )
 from phyblock.making.scenes.sketch import PALETTES, POSES, Draft
 from phyblock.making.workers import open_workers
-from phyblock.sim.contact import bounds_m, find_gaps, find_overlaps, support_graph
+from phyblock.sim.contact import find_gaps, find_overlaps
 from phyblock.sim.pictures import hidden_blocks
 from tests.designs.acceptance import accept, form_problems
 from tests.designs.pad import Pad
-from tests.designs.scenes import designed_scene, designed_scenes
 
 grid = st.integers(-3, 3)
 steps = st.lists(
@@ -55,20 +49,6 @@ def test_whatever_is_put_down_neither_overlaps_nor_floats(drawn) -> None:
         sketch.put(block_type, y, x, pose)
     assert find_overlaps(sketch.blocks, 1e-5) == ()
     assert find_gaps(sketch.blocks, 1e-5) == ()
-
-
-@pytest.mark.parametrize("block_type", BLOCK_TYPES)
-def test_poses_of_a_type_look_different(block_type) -> None:
-    poses = POSES[block_type].values()
-    assert len({orientation_class(block_type, euler) for euler in poses}) == len(poses)
-
-
-def test_designs_declare_what_contact_says() -> None:
-    for scene in designed_scenes():
-        below = support_graph(scene.blocks)
-        for block, layer in zip(scene.blocks, scene.graph.layers, strict=True):
-            assert set(block.depend) == below[block.order] - {0}
-            assert block.layer == layer
 
 
 GROUPS = tuple(GROUP_LEVELS)
@@ -145,34 +125,6 @@ def test_a_combined_scene_holds_both_parents() -> None:
     assert canonical_form(scene.blocks[split:]) == canonical_form(whole[1].blocks)
 
 
-@given(st.integers(0, 3), st.integers(0, 3), st.sampled_from([0.0, 1.0, 2.5]), st.booleans())
-@settings(deadline=None, max_examples=20)
-def test_parts_stand_beside_one_another_with_their_gap(one, other, gap, deep) -> None:
-    axis = 0 if deep else 1
-    parts = [draw(request).blocks for request in (some("2", 4)[one], some("2", 4)[other])]
-    row = beside(parts, gap, axis)
-    low = min(bounds_m(block)[0][axis] for block in row[len(parts[0]) :])
-    high = max(bounds_m(block)[1][axis] for block in row[: len(parts[0])])
-    assert low - high == pytest.approx(gap * 0.025, abs=1e-5)
-    assert [block.order for block in row] == list(range(1, len(row) + 1))
-
-
-RECHECKED = ("l1-boat", "l1-dolmen", "l2-bridge", "l2-rocket", "l3-balance", "l3-robot")
-
-
-@pytest.mark.parametrize("scene", designed_scenes(), ids=lambda scene: scene.id)
-def test_a_scene_is_in_form_fits_together_and_shows(scene) -> None:
-    assert form_problems(scene) == ()
-    assert find_overlaps(scene.blocks) == ()
-    assert find_gaps(scene.blocks) == ()
-    assert hidden_blocks(scene) == ()
-
-
-@pytest.mark.parametrize("name", RECHECKED)
-def test_physics_again(name: str) -> None:
-    accept(designed_scene(name))
-
-
 SMALL = (Share("1", 3, 1), Share("2", 4, 2), Share("3", 2, 1))
 
 
@@ -214,21 +166,3 @@ def test_variations_name_base_scenes(scenes: list[Scene]) -> None:
 @pytest.mark.slow
 def test_two_processes_give_the_same_scenes(scenes: list[Scene]) -> None:
     assert made(jobs=2) == scenes
-
-
-def test_what_is_written_is_read_back(tmp_path: Path, scenes: list[Scene]) -> None:
-    folder = tmp_path / "set"
-    tasks = [(scene, make_candidates(scene)) for scene in scenes]
-    write_scenes(folder, tasks, scene_card("set", tasks, "command", "kit"))
-    assert [task.scene for task in read_builtin(folder).tasks] == sorted(
-        scenes, key=lambda scene: scene.id
-    )
-    assert (folder / "SHA256SUMS").read_text() == sums_text(folder, SCENE_FILES)
-    assert sorted(path.name for path in folder.iterdir()) == [
-        "README.md",
-        "SHA256SUMS",
-        "VERSION",
-        "scenes.jsonl",
-    ]
-    with pytest.raises(StoreError, match="give another --out"):
-        write_scenes(folder, tasks, "card")

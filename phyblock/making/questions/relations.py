@@ -314,7 +314,10 @@ class DistanceMaker(StaticMaker):
             raise UnfairError(f"the wording {question.wording!r} asks for no length")
         right_cm = _values_cm(rule, named[0], named[-1], picture)
         if rule != "place":
-            values = sorted(float(option.removesuffix(" cm")) for option in question.options)
+            try:
+                values = sorted(float(option.removesuffix(" cm")) for option in question.options)
+            except ValueError as error:
+                raise UnfairError("some option is no length in centimeters") from error
             if any(high < _APART[0] * low for low, high in itertools.pairwise(values)):
                 raise UnfairError("two values are less than 20 % apart")
         return base.index_of(question, _text_of(right_cm))
