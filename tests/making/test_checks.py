@@ -34,7 +34,7 @@ from phyblock.sim.dynamics import Trial
 from phyblock.sim.engine import Physics
 from tests.designs.pad import Pad
 from tests.designs.scenes import designed_scene, designed_scenes
-from tests.sim.test_support import FLOATING, OVERLAPPING
+from tests.sim.test_geometry import FLOATING, OVERLAPPING
 
 BUILT_IN = Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400"
 TASKS = read_builtin(BUILT_IN).tasks

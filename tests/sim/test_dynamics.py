@@ -14,13 +14,11 @@ import pytest
 
 from phyblock.data import read_builtin, read_official
 from phyblock.domain import Block, BlockType
-from phyblock.errors import SimulationError
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim.contact import drop_height_m
 from phyblock.sim.dynamics import (
     DEFAULT_TRIAL,
     ONE_SETTING,
-    Settled,
     Site,
     Trial,
     check,
@@ -33,7 +31,7 @@ from phyblock.sim.outcomes import OUTCOME_SETTINGS, Push, after, after_removal, 
 from tests.designs.pad import Pad
 from tests.designs.scenes import designed_scenes
 from tests.sim.structures import block, counterweighted_beam, tower
-from tests.sim.test_support import FLOATING
+from tests.sim.test_geometry import FLOATING
 
 BUILT_IN = read_builtin(Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400").tasks
 SCENES = {scene.id: scene.blocks for scene in designed_scenes()}
@@ -85,32 +83,6 @@ def test_the_same_scene_gives_the_same_bits_in_another_process_that_loads_engine
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
     assert (answer.stdout.strip(), answer.stderr) == (here, "")
-
-
-def test_wrong_use_is_said() -> None:
-    world = World()
-    with pytest.raises(SimulationError, match="not open"):
-        world.step(0.1)
-    with world:
-        world.place(block(1, "cube", (0.0, 0.0, 0.025)))
-        with pytest.raises(SimulationError, match="already"):
-            world.place(block(1, "cube", (0.0, 0.0, 0.025)))
-        with pytest.raises(SimulationError, match="not in the world"):
-            world.remove(2)
-    with pytest.raises(SimulationError, match="not open"):
-        world.place(block(1, "cube", (0.0, 0.0, 0.025)))
-
-
-@pytest.mark.parametrize(
-    ("name", "stands"),
-    [("000", True), ("018", True), ("089", True), ("040", False), ("116", False), ("184", False)],
-)
-def test_official_scenes_stand_unless_a_block_floats(
-    name: str, stands: bool, official_checkout: Path
-) -> None:
-    scenes = {task.scene.id: task.scene for task in read_official(official_checkout).tasks}
-    quick = Trial(duration_s=1.0, physics=(Physics(),))
-    assert check(scenes[name].blocks, quick).stable == stands
 
 
 @pytest.mark.slow
@@ -170,37 +142,6 @@ def test_a_site_gives_the_same_verdict_whatever_was_tried_on_it_before(trial: Tr
     assert tipped.fallen == check(SEESAW[:2]).fallen == (2,)
     assert tipped.blocks[0] == SEESAW[0]
     assert tipped.blocks[1].position_m[2] < SEESAW[1].position_m[2] - 0.01
-
-
-def elsewhere(blocks: Sequence[Block]) -> tuple[Block, ...]:
-    """The same arrangement in another place and in one color."""
-    places = ((b.position_m[0] + 0.3, *b.position_m[1:]) for b in blocks)
-    return tuple(
-        replace(b, color="green", position_m=place) for b, place in zip(blocks, places, strict=True)
-    )
-
-
-def test_an_arrangement_is_tried_once_wherever_it_stands(monkeypatch: pytest.MonkeyPatch) -> None:
-    simulated: list[float] = []
-    step = World.step
-
-    def counted(world: World, duration_s: float) -> None:
-        simulated.append(duration_s)
-        step(world, duration_s)
-
-    monkeypatch.setattr(World, "step", counted)
-    with closing(Site(ONE_SETTING)) as site:
-        assert site.settle(SEESAW).stands
-        once = len(simulated)
-        moved = elsewhere(SEESAW)
-        assert site.settle(moved) == Settled((), moved)
-        third = tuple(replace(b, order=b.order + 10) for b in elsewhere(moved))
-        assert site.settle((*SEESAW, *third)).stands, "two apart are each the one"
-        assert len(simulated) == once > 0
-        assert site.settle(SEESAW[:2]).fallen == (2,)
-        fell = len(simulated)
-        assert site.settle(SEESAW[:2]).fallen == (2,)
-        assert len(simulated) == fell > once
 
 
 def test_what_rests_on_a_removed_block_moves_and_nothing_else() -> None:

@@ -1,15 +1,42 @@
+"""Geometry: the blocks themselves, and blocks in contact."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
-from phyblock.domain import BLOCK_TYPES, KIT_PALETTE, SHAPES, BlockType, Color
-from phyblock.sim.geometry import Mesh, collision_pieces, drawn_mesh, solid_mesh
+from phyblock.data import read_official
+from phyblock.domain import (
+    BLOCK_TYPES,
+    KIT_PALETTE,
+    SHAPES,
+    Block,
+    BlockType,
+    Color,
+    euler_deg_to_quat_xyzw,
+    quat_xyzw_to_matrix,
+)
+from phyblock.sim.contact import (
+    GROUND,
+    drop_height_m,
+    drop_m,
+    find_gaps,
+    find_overlaps,
+    moved,
+    separating_axes,
+    support_graph,
+)
+from phyblock.sim.geometry import ConvexPiece, Mesh, collision_pieces, drawn_mesh, solid_mesh
+from tests.sim.structures import angles_deg, block, block_types, clouds, eulers, tower, turned
 
 every_type = pytest.mark.parametrize("block_type", BLOCK_TYPES)
 
@@ -75,34 +102,130 @@ def test_a_round_side_is_one_face(
 
 
 @pytest.mark.parametrize(("block_type", "color"), KIT_PALETTE)
-def test_agrees_with_the_official_mesh(
+def test_extents_are_those_of_the_official_mesh(
     block_type: BlockType, color: Color, official_checkout: Path
 ) -> None:
+    """Of its part in the block's color, without black edges."""
     path = official_checkout / "data" / "block_assets" / f"{block_type}_{color}.obj"
-    official, solid = _colored_part(path), solid_mesh(block_type)
-    for low_or_high in (np.min, np.max):
-        ours = low_or_high(solid.vertices_m, axis=0)
-        theirs = low_or_high(official.vertices_m, axis=0)
-        assert_allclose(ours, theirs, atol=1e-4)
-    assert solid.volume_m3 == pytest.approx(official.volume_m3, rel=0.005)
-    assert_allclose(solid.center_of_mass_m, official.center_of_mass_m, atol=1e-4)
-
-
-def _colored_part(path: Path) -> Mesh:
-    """The object of an OBJ whose material is the block's color, not its black edges."""
-    vertices: list[list[float]] = []
-    triangles: list[list[int]] = []
-    colored = False
-    for line in path.read_text(encoding="utf-8").splitlines():
-        word, _, rest = line.partition(" ")
+    vertices, used, colored = [], set(), False
+    for word, *rest in filter(None, map(str.split, path.read_text(encoding="utf-8").splitlines())):
+        colored = rest[0].startswith("block_") if word == "usemtl" else colored
         if word == "v":
-            vertices.append([float(number) for number in rest.split()])
-        elif word == "usemtl":
-            colored = rest.startswith("block_")
+            vertices.append([float(number) for number in rest])
         elif word == "f" and colored:
-            corners = [int(corner.split("/")[0]) - 1 for corner in rest.split()]
-            triangles += [[corners[0], *corners[i : i + 2]] for i in range(1, len(corners) - 1)]
-    used = sorted({corner for triangle in triangles for corner in triangle})
-    number = {corner: index for index, corner in enumerate(used)}
-    faces = [[number[corner] for corner in triangle] for triangle in triangles]
-    return Mesh(np.array([vertices[corner] for corner in used]), np.array(faces))
+            used |= {int(corner.split("/")[0]) - 1 for corner in rest}
+    points, solid = np.array([vertices[number] for number in used]), solid_mesh(block_type)
+    for end in (np.min, np.max):
+        assert_allclose(end(points, axis=0), end(solid.vertices_m, axis=0), atol=1e-4)
+
+
+OVERLAPPING = {"001", "003", "187", "214", "297", "342"}
+FLOATING = {
+    *("006", "040", "097", "116", "117", "153", "184", "212", "242", "254", "255"),
+    *("274", "288", "290", "292", "307", "313", "318", "325", "327", "333"),
+}
+ANNOTATION_ERROR_M = 0.002
+
+shifts_m = st.floats(-0.12, 0.12, allow_nan=False)
+
+
+def placed(one: Block) -> list[ConvexPiece]:
+    rotation = quat_xyzw_to_matrix(euler_deg_to_quat_xyzw(one.euler_deg))
+    return [moved(p, rotation, np.array(one.position_m)) for p in collision_pieces(one.type)]
+
+
+def share_a_point(first: ConvexPiece, second: ConvexPiece) -> bool:
+    """True if two convex hulls meet, asked of a linear program."""
+    n, m = len(first.vertices_m), len(second.vertices_m)
+    equal = np.zeros((5, n + m))
+    equal[:3, :n], equal[:3, n:] = first.vertices_m.T, -second.vertices_m.T
+    equal[3, :n], equal[4, n:] = 1.0, 1.0
+    answer = linprog(np.zeros(n + m), A_eq=equal, b_eq=[0, 0, 0, 1, 1], bounds=(0, None))
+    return bool(answer.status == 0)
+
+
+@given(block_types, eulers, block_types, eulers, shifts_m, shifts_m, shifts_m)
+@settings(max_examples=60, deadline=None)
+def test_separation_agrees_with_a_linear_program(one, turn, other, twist, x, y, z) -> None:
+    first = placed(block(1, one, (0.0, 0.0, 0.0), turn))[0]
+    second = placed(block(2, other, (x, y, z), twist))[0]
+    gap_m = separating_axes(first, second).gap_m
+    assume(abs(gap_m) > 1e-5)
+    assert share_a_point(first, second) == (gap_m < 0)
+    assert separating_axes(second, first).gap_m == pytest.approx(gap_m, abs=1e-12)
+
+
+@given(block_types, eulers, block_types, eulers, shifts_m, shifts_m)
+@settings(max_examples=60, deadline=None)
+def test_a_block_falls_just_until_it_touches(one, turn, other, twist, x, y) -> None:
+    first = placed(block(1, one, (0.0, 0.0, 0.0), turn))[0]
+    second = placed(block(2, other, (x, y, 0.4), twist))[0]
+    fall_m = drop_m(separating_axes(first, second))
+    low = replace(second, vertices_m=second.vertices_m - [0.0, 0.0, fall_m or 0.4])
+    gap_m = separating_axes(first, low).gap_m
+    if fall_m is None:
+        assert gap_m > -1e-9
+    else:
+        assert gap_m == pytest.approx(0.0, abs=1e-9)
+
+
+@given(clouds(), angles_deg, shifts_m, shifts_m)
+@settings(max_examples=25, deadline=None)
+def test_turning_a_structure_changes_nothing(blocks, angle_deg, x, y) -> None:
+    other = turned(blocks, angle_deg, (x, y))
+    before = {(o.first, o.second): o.depth_m for o in find_overlaps(blocks, 1e-5)}
+    after = {(o.first, o.second): o.depth_m for o in find_overlaps(other, 1e-5)}
+    for pair in before.keys() | after.keys():
+        assert before.get(pair, 0.0) == pytest.approx(after.get(pair, 0.0), abs=1.1e-5)
+    for one, same in zip(blocks, other, strict=True):
+        assert drop_height_m(same, []) == pytest.approx(drop_height_m(one, []), abs=1e-9)
+
+
+@given(angles_deg, shifts_m, shifts_m, st.integers(1, 5))
+@settings(max_examples=25, deadline=None)
+def test_support_of_a_turned_tower(angle_deg, x, y, height) -> None:
+    graph = support_graph(turned(tower(height), angle_deg, (x, y)))
+    assert graph == {i + 1: frozenset({i}) for i in range(height)}
+
+
+@given(st.floats(-0.02, 0.3))
+def test_a_block_hangs_or_overlaps_by_what_it_was_moved(rise_m: float) -> None:
+    assume(abs(rise_m) > 0.0011)
+    lower, upper = tower(2)
+    moved_one = replace(upper, position_m=(0.0, 0.0, upper.position_m[2] + rise_m))
+    gaps, overlaps = find_gaps([lower, moved_one], 0.001), find_overlaps([lower, moved_one], 0.001)
+    assert [one.order for one in gaps] == [2] * (rise_m > 0)
+    assert [(one.first, one.second) for one in overlaps] == [(1, 2)] * (rise_m < 0)
+    found_m = gaps[0].height_m if gaps else -overlaps[0].depth_m
+    assert found_m == pytest.approx(rise_m, abs=1e-9)
+
+
+def test_a_plank_rests_on_both_its_posts_and_nothing_under_the_arch() -> None:
+    posts = [block(i, "cube", (0.0, y, 0.025)) for i, y in ((1, -0.05), (2, 0.05))]
+    plank = block(3, "cuboid3", (0.0, 0.0, 0.0625), (0.0, 0.0, 90.0))
+    arch = block(4, "arch", (0.0, 0.0, 0.1))
+    under = block(5, "semi_cylinder", (0.0, 0.0, 0.075))
+    graph = support_graph([*posts, plank, arch, under])
+    assert graph[3] == {1, 2}
+    assert graph[4] == {3}
+    assert graph[5] == {3}
+
+
+@pytest.mark.slow
+def test_all_official_scenes(official_checkout: Path) -> None:
+    tasks = read_official(official_checkout).tasks
+    assert _broken(tasks) == (OVERLAPPING, FLOATING)
+    hits = found = declared = 0
+    for task in tasks:
+        graph = support_graph(task.scene.blocks)
+        for one in task.scene.blocks:
+            said, seen = set(one.depend) or {GROUND}, graph[one.order]
+            hits, found, declared = hits + len(said & seen), found + len(seen), declared + len(said)
+    assert hits / found > 0.98
+    assert hits / declared > 0.98
+
+
+def _broken(tasks) -> tuple[set[str], set[str]]:
+    overlapping = {t.scene.id for t in tasks if find_overlaps(t.scene.blocks, ANNOTATION_ERROR_M)}
+    floating = {t.scene.id for t in tasks if find_gaps(t.scene.blocks, ANNOTATION_ERROR_M)}
+    return overlapping, floating

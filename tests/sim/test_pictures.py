@@ -20,14 +20,14 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
-from phyblock.data import read_builtin, read_official, read_questions
-from phyblock.domain import BLOCK_TYPES, KIT_PALETTE, SHAPES, Candidate, CandidateSet, Color, Scene
+from phyblock.data import read_builtin, read_questions
+from phyblock.domain import BLOCK_TYPES, KIT_PALETTE, Candidate, CandidateSet, Color, Scene
 from phyblock.domain.question import Mark, QuestionPicture
 from phyblock.errors import DataError
 from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim import ruled
-from phyblock.sim.backgrounds import PERIOD_M, TEXTURED, sample, surface_map
+from phyblock.sim.backgrounds import TEXTURED
 from phyblock.sim.camera import VIEWS, Camera, Window, frame, view_axes
 from phyblock.sim.engine import Pose, quat_xyzw_to_euler_deg
 from phyblock.sim.film import (
@@ -35,7 +35,6 @@ from phyblock.sim.film import (
     assembly_gif,
     episode_gif,
     episode_images,
-    step_images,
 )
 from phyblock.sim.pictures import (
     COLOR_RGB,
@@ -68,7 +67,7 @@ from phyblock.sim.question_pictures import (
     seen_order,
     state_picture,
 )
-from phyblock.sim.ruled import box_cm, kit_key, ruled_key, ruled_png
+from phyblock.sim.ruled import kit_key, ruled_key
 from phyblock.types import BACKGROUNDS, Background
 from tests.designs.scenes import designed_scene
 from tests.sim.structures import block, clouds, scene_of, tower
@@ -140,21 +139,11 @@ def test_framing_keeps_every_point_in_the_window_and_comes_as_close_as_it_may(
     assert spans.max() == pytest.approx(1.0, abs=1e-6) or is_close
 
 
-@given(clouds(), angles, elevations)
-def test_a_goal_picture_never_cuts_a_block_off(blocks, azimuth_deg, elevation_deg) -> None:
-    style = PictureStyle(azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
-    assert np.abs(projected(scene_of(blocks), style)).max() <= 1 - MARGIN + 1e-9
-
-
 @pytest.mark.parametrize("view", sorted(VIEWS))
-def test_the_renderer_draws_where_the_camera_says(view: str, official_checkout: Path) -> None:
-    style = PictureStyle.from_view(view)
-    for task in read_official(official_checkout).tasks:
-        assert np.abs(projected(task.scene, style)).max() <= 1 - MARGIN + 1e-9, task.scene.id
-    scene = designed_scene("l2-rocket")
-    camera, blocks = goal_camera(scene, style), drawn(scene.blocks)
-    rows, columns = np.nonzero(shoot(blocks, camera, 512).block >= 0)
-    places = np.vstack([camera.to_pixels(block.vertices_m, 512) for block in blocks])
+def test_the_renderer_draws_where_the_camera_says(view: str) -> None:
+    camera = goal_camera(scene := designed_scene("l2-rocket"), PictureStyle.from_view(view))
+    rows, columns = np.nonzero(shoot(drawn(scene.blocks), camera, 512).block >= 0)
+    places = np.vstack([camera.to_pixels(one.vertices_m, 512) for one in drawn(scene.blocks)])
     found = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
     assert_allclose(found, [*places.min(axis=0), *places.max(axis=0)], atol=3.0)
 
@@ -243,25 +232,6 @@ def test_every_face_stands_out_from_the_floor(background: Background, color: Col
     assert np.mean(clear) >= 0.9
 
 
-@pytest.mark.parametrize("surface", TEXTURED)
-def test_a_surface_is_seamless_and_its_mean_color_far_away(surface: Background) -> None:
-    """A step across the seam is no larger than steps elsewhere."""
-    texture = surface_map(surface)[0].astype(np.int16)
-    for axis in (0, 1):
-        steps = np.abs(np.diff(texture, axis=axis)).mean(axis=(1 - axis, 2))
-        seam = np.abs(texture.take(0, axis) - texture.take(-1, axis)).mean()
-        assert seam <= steps.max() + 1e-3
-    at_m = ((np.arange(24) + 0.31) / 24 * PERIOD_M).astype(np.float32)
-    x_m, y_m = np.meshgrid(at_m, at_m)
-    near, far = (
-        sample(surface, x_m, y_m, np.full(x_m.shape, width_m, dtype=np.float32))
-        for width_m in (0.0001, 2 * PERIOD_M)
-    )
-    assert near.std(axis=(0, 1)).min() > 2
-    assert np.ptp(far, axis=(0, 1)).max() < 0.01
-    assert np.abs(far - texture.mean(axis=(0, 1), dtype=np.float64)).max() < 0.51
-
-
 def test_the_same_bytes_in_every_process() -> None:
     scene = designed_scene("l3-torii")
     candidates = make_candidates(scene)
@@ -318,34 +288,29 @@ def test_any_orientation_comes_back_from_its_quaternion(x: float, y: float, z: f
     assert Pose.goal(back).angle_deg(pose) < 0.01
 
 
-@settings(max_examples=12, deadline=None)
-@given(angles, angles, angles, st.floats(0, 360), st.floats(5, 90))
-def test_no_picture_of_a_question_cuts_anything_off_whatever_the_pose(
-    x: float, y: float, z: float, azimuth: float, elevation: float
-) -> None:
-    tilted = replace(TOWER[1], euler_deg=(x, y, z))
-    assert is_inside(QuestionPicture("scene", (TOWER[0], tilted), (azimuth, elevation)))
-
-
 @given(clouds(), st.integers(1, 6), angles, elevations)
 @settings(max_examples=30, deadline=None)
-def test_no_picture_of_a_question_is_cut_open_whatever_it_frames(
+def test_no_picture_is_cut_off_or_open_whatever_it_frames(
     blocks, framed, azimuth, elevation
 ) -> None:
     """Not even where blocks lie behind the place from which those in the frame are seen best."""
+    style = PictureStyle(azimuth_deg=azimuth, elevation_deg=elevation)
+    corners = np.vstack([one.vertices_m for one in drawn(blocks)])
+    assert np.abs(goal_camera(scene_of(blocks), style).project(corners)).max() <= 1 - MARGIN + 1e-9
+    assert is_inside(QuestionPicture("s", tuple(blocks), (azimuth, elevation)))
     recipe = QuestionPicture(
         "s", tuple(blocks), (azimuth, elevation), framed=tuple(blocks[:framed])
     )
     assert lies_between_planes(drawn_blocks(recipe), question_camera(recipe, STYLE))
 
 
-@pytest.mark.parametrize("background", slowly)
-def test_marks_change_the_picture_on_every_background(background: Background) -> None:
-    style = PictureStyle(256, background)
-    marked, plain = (pixels(question_png(one, style)) for one in (MARKED, PLAIN))
-    assert 300 < (np.abs(marked - plain).max(axis=2) > 60).sum() < 3000
-    own = replace(PLAIN, background=background)
-    assert question_png(own, replace(STYLE, size_px=256)) == question_png(PLAIN, style)
+def test_marks_show_on_the_blocks_that_they_are_on() -> None:
+    marked, plain = (pixels(question_png(one, STYLE)) for one in (MARKED, PLAIN))
+    assert 1000 < (np.abs(marked - plain).max(axis=2) > 60).sum() < 12000
+    for one in TOWER:
+        mark = block_mark(PLAIN, seen(PLAIN), one.order, "A")
+        assert mark is not None
+        assert seen_order(PLAIN, seen(PLAIN), mark.position_m) == one.order
 
 
 def test_keys_of_questions_differ_exactly_where_pixels_may() -> None:
@@ -365,14 +330,6 @@ def test_keys_of_questions_differ_exactly_where_pixels_may() -> None:
     assert question_key(PLAIN, replace(STYLE, size_px=256)) not in keys
     high, low = (QuestionPicture("block", (one,), VIEW) for one in (TOWER[1], TOWER[0]))
     assert question_key(high, STYLE) == question_key(low, STYLE)
-
-
-def test_a_mark_on_a_block_shows_on_that_block() -> None:
-    shot = seen(PLAIN)
-    for one in TOWER:
-        mark = block_mark(PLAIN, shot, one.order, "A")
-        assert mark is not None
-        assert seen_order(PLAIN, shot, mark.position_m) == one.order
 
 
 def test_a_state_is_seen_as_the_goal_is_and_changes_where_a_block_comes() -> None:
@@ -413,30 +370,15 @@ def test_all_that_is_ruled_and_written_is_in_the_picture(
     assert near @ -camera.axes[2, :2] >= -1e-6
 
 
-@pytest.mark.parametrize("block_type", BLOCK_TYPES)
-def test_the_sheet_says_the_dimensions_of_a_block_as_it_is_turned(block_type) -> None:
-    assert ruled_png(scene_of(tower(2)), SMALL) == ruled_png(scene_of(tower(2)), SMALL)
-    upright = np.array(SHAPES[block_type].high_m) - np.array(SHAPES[block_type].low_m)
-    for yaw_deg, sides in ((0.0, upright), (90.0, upright[[1, 0, 2]])):
-        low, high = box_cm(on_the_floor(block_type, "red", (0.0, 0.0, yaw_deg)))
-        assert (high - low) / 100 == pytest.approx(sides, abs=0.001)
-        assert low[2] == pytest.approx(0)
-
-
-def test_an_animation_shows_every_step_for_ever() -> None:
+def test_an_animation_ends_in_the_goal_and_blocks_are_placed_in_order() -> None:
     scene = designed_scene("l2-rocket")
     with Image.open(io.BytesIO(assembly_gif(scene, SMALL))) as image:
-        shown = [one.convert("RGB") for one in ImageSequence.Iterator(image)]
-        assert image.info["loop"] == 0
-    steps = [np.asarray(one).astype(int) for one in step_images(scene, SMALL)]
-    frames = [np.asarray(one).astype(int) for one in shown]
-    assert len(frames) == len(steps) == len(scene)
-    assert np.array_equal(steps[-1], pixels(goal_png(scene, SMALL)))
-    for one, step in zip(frames, steps, strict=True):
-        assert np.abs(one - step).mean() < 3
+        assert (image.n_frames, image.info["loop"]) == (len(scene), 0)
+        *_, last = (np.asarray(one.convert("RGB")) for one in ImageSequence.Iterator(image))
+    assert np.abs(last - pixels(goal_png(scene, SMALL))).mean() < 3
     backward = Scene("backward", (1,), scene.blocks[::-1], ("backward",))
     with pytest.raises(DataError, match="backward"):
-        step_images(backward, SMALL)
+        assembly_gif(backward, SMALL)
 
 
 def test_frames_of_an_episode_show_goal_candidates_and_world() -> None:

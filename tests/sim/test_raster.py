@@ -189,20 +189,6 @@ def test_the_order_of_blocks_changes_their_numbers_alone(blocks, view, random) -
     assert (np.append(order, -1)[other.prop] == one.prop).all()
 
 
-@given(clouds(), views)
-@settings(max_examples=20, deadline=None)
-def test_a_picture_is_the_same_with_its_planes_wide_open(blocks, view) -> None:
-    props = props_of(blocks)
-    camera = camera_on(props, view)
-    depths = [(triangles_m(prop).reshape(-1, 3) - camera.eye_m) @ camera.axes[2] for prop in props]
-    assert camera.near_m < np.min(np.concatenate(depths))
-    assert np.max(np.concatenate(depths)) < camera.far_m
-    wide = drawn(props, replace(camera, near_m=1e-6, far_m=1e9))
-    one = drawn(props, camera)
-    assert one.rgb.tobytes() == wide.rgb.tobytes()
-    assert one.prop.tobytes() == wide.prop.tobytes()
-
-
 def test_nothing_shows_before_the_near_plane_or_behind_the_far_one_in_any_thread() -> None:
     props = props_of([block(1, "cube", (0.0, 0.0, 0.025)), block(2, "cube", (0.0, 0.3, 0.025))])
     camera = camera_on(props, (60.0, 25.0))

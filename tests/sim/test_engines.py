@@ -1,0 +1,266 @@
+"""Laws of every physics engine that is installed, and of plans executed in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from phyblock.domain import BLOCK_TYPES, SHAPES, Block, BlockType, euler_deg_to_matrix
+from phyblock.errors import InputError
+from phyblock.scoring.pose import blocks_reached, overlap_volume, placed
+from phyblock.sim.contact import VOXEL_M, filled_voxels, voxel_iou
+from phyblock.sim.dynamics import ExecutionLimits, execute
+from phyblock.sim.engine import (
+    ENGINES,
+    GRAVITY_M_S2,
+    Physics,
+    PhysicsEngine,
+    Pose,
+    Simulation,
+    installed_engines,
+    physics_engine,
+)
+from phyblock.tracks.pose_planning import pieces_of
+from tests.sim.structures import block, block_types, counterweighted_beam, eulers, tower
+
+PHYSICS = Physics()
+heights = st.floats(0.5, 2.0)
+
+
+def chosen(word: str) -> PhysicsEngine:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PHYBLOCK_PHYSICS", word)
+        return physics_engine()
+
+
+@pytest.fixture(params=installed_engines(), scope="module")
+def engine(request: pytest.FixtureRequest) -> PhysicsEngine:
+    """Any engine."""
+    return chosen(request.param)
+
+
+@pytest.fixture
+def simulation(engine: PhysicsEngine) -> Iterator[Simulation]:
+    with engine.open(PHYSICS) as opened:
+        yield opened
+
+
+def add_all(simulation: Simulation, blocks: list[Block]) -> None:
+    for one in blocks:
+        simulation.add(one.order, one.type, Pose.goal(one))
+
+
+def bits(simulation: Simulation, blocks: list[Block]) -> str:
+    """Where blocks are and how they move, to the last bit."""
+    rows = []
+    for one in blocks:
+        pose, velocity = simulation.pose(one.order), simulation.velocity(one.order)
+        rows += [pose.position_m, pose.quat_xyzw, *map(np.array, velocity)]
+    return np.concatenate(rows).tobytes().hex()
+
+
+def fall(engine: PhysicsEngine, blocks: list[Block], steps: int) -> str:
+    with engine.open(PHYSICS) as opened:
+        add_all(opened, blocks)
+        opened.step(steps)
+        return bits(opened, blocks)
+
+
+@given(block_types, heights, eulers)
+@settings(max_examples=20)
+def test_a_block_is_where_it_was_put_and_at_rest(
+    engine: PhysicsEngine, block_type: BlockType, height_m: float, euler_deg
+) -> None:
+    one = block(3, block_type, (0.3, -0.2, height_m), euler_deg)
+    with engine.open(PHYSICS) as opened:
+        add_all(opened, [one])
+        assert opened.pose(3).distance_m(Pose.goal(one)) < 1e-9
+        assert opened.pose(3).angle_deg(Pose.goal(one)) < 1e-3
+        assert_allclose(opened.velocity(3), 0.0)
+
+
+@pytest.mark.parametrize("block_type", BLOCK_TYPES)
+def test_a_block_on_the_floor_stands(simulation: Simulation, block_type: BlockType) -> None:
+    one = block(1, block_type, (0.1, 0.2, -SHAPES[block_type].low_m[2]))
+    add_all(simulation, [one])
+    simulation.step(120)
+    assert simulation.pose(1).distance_m(Pose.goal(one)) < 0.001
+    assert simulation.pose(1).angle_deg(Pose.goal(one)) < 1.0
+
+
+def test_the_same_calls_give_the_same_bits_beside_others(engine: PhysicsEngine) -> None:
+    falling = counterweighted_beam()[:3]
+    alone = fall(engine, falling, 40)
+    with engine.open(Physics(1 / 300, 80, 0.1)) as other:
+        add_all(other, tower(3))
+        other.step(5)
+        assert fall(engine, falling, 40) == alone
+        other.step(5)
+    assert fall(engine, falling, 40) == alone
+
+
+def test_a_block_in_the_air_falls_the_way_of_gravity(engine: PhysicsEngine) -> None:
+    downhill = (0.6, 0.0, -0.8)
+    x, y, z = (GRAVITY_M_S2 * part for part in downhill)
+    one, duration_s = block(1, "triangle", (0.0, 0.0, 3.0)), 0.25
+    with engine.open(Physics(1 / 2000, gravity_m_s2=(x, y, z))) as opened:
+        add_all(opened, [one])
+        opened.step(500)
+        way = opened.pose(1).position_m - np.array(one.position_m)
+        speed = opened.velocity(1).linear_m_s
+    assert_allclose(
+        way, GRAVITY_M_S2 * np.array(downhill) * duration_s**2 / 2, rtol=0.03, atol=1e-9
+    )
+    assert_allclose(speed, GRAVITY_M_S2 * np.array(downhill) * duration_s, rtol=0.03, atol=1e-9)
+
+
+@pytest.mark.parametrize(("friction", "slides"), [(0.5, True), (0.7, False)])
+def test_friction_holds_a_block_on_a_floor_that_leans(
+    engine: PhysicsEngine, friction: float, slides: bool
+) -> None:
+    """By 31 degrees: a coefficient over 0.6 holds."""
+    x, z = (GRAVITY_M_S2 * part for part in (0.6 * 0.857, -0.857))
+    one = block(1, "cuboid2", (0.0, 0.0, 0.0125))
+    with engine.open(Physics(friction=friction, gravity_m_s2=(x, 0.0, z))) as opened:
+        add_all(opened, [one])
+        opened.step(60)
+        assert (opened.pose(1).distance_m(Pose.goal(one)) > 0.02) == slides
+
+
+def test_masses_decide_on_a_beam(engine: PhysicsEngine) -> None:
+    """A slab holds a cylinder on the other end where it is heavy."""
+    beam = counterweighted_beam()
+    beam[2] = replace(beam[2], type="cylinder", position_m=(0.0, 0.07, 0.125))
+    beam[3] = replace(beam[3], type="cuboid1", position_m=(0.0, -0.05, 0.0875))
+    for factor, falls in ((0.3, True), (2.0, False)):
+        with engine.open(Physics(mass_factors=(("cuboid1", factor),))) as opened:
+            add_all(opened, beam)
+            opened.step(240)
+            assert (opened.pose(2).angle_deg(Pose.goal(beam[1])) > 5) == falls
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_an_engine_that_is_unknown_or_not_installed_is_refused(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(InputError, match=f"allowed: {', '.join(ENGINES)}"):
+        chosen("phyblock.sim.mujoco:MujocoEngine")
+    monkeypatch.setattr("phyblock.sim.engine.find_spec", lambda _: None)
+    with pytest.raises(InputError, match="is not installed") as caught:
+        chosen(name)
+    assert ENGINES[name].hint in str(caught.value)
+    assert installed_engines() == ()
+
+
+def at(one: Block, x_m: float, y_m: float, z_m: float) -> Block:
+    return replace(one, position_m=(x_m, y_m, z_m))
+
+
+def ends(blocks: list[Block | None], engine: PhysicsEngine, **limits: float) -> list[str]:
+    return [step.end for step in execute(blocks, ExecutionLimits(**limits), engine).steps]
+
+
+def test_a_tower_stands_in_its_order_and_falls_in_the_opposite_one(engine: PhysicsEngine) -> None:
+    done = execute(tower(3), engine=engine)
+    assert [step.end for step in done.steps] == ["stands"] * 3
+    assert [len(world) for world in done.worlds] == [1, 2, 3]
+    assert voxel_iou(tower(3), done.blocks) == 1
+    assert blocks_reached(tower(3), done.blocks, 1, 10) == 3
+    assert ends(tower(3)[::-1], engine)[0] == "falls"
+
+
+def test_what_floats_falls_as_far_as_the_gap_below_it(engine: PhysicsEngine) -> None:
+    (step,) = execute([at(tower(1)[0], 0, 0, 0.065)], engine=engine).steps
+    assert (step.end, step.gap_cm, step.overlap_cm) == ("falls", pytest.approx(4), 0)
+    assert step.moved_cm == pytest.approx(4, abs=0.1)
+
+
+def test_overlaps_beyond_the_tolerance_are_refused_and_smaller_ones_give_way(
+    engine: PhysicsEngine,
+) -> None:
+    first = tower(1)[0]
+    deep, slight = at(first, 0.03, 0, 0.025), at(first, 0.046, 0, 0.025)
+    assert ends([first, deep, slight], engine) == ["stands", "overlaps", "stands"]
+    assert ends([first, slight], engine, overlap_cm=0.3) == ["stands", "overlaps"]
+    done = execute([first, deep, slight], engine=engine)
+    assert [len(world) for world in done.worlds] == [1, 1, 2]
+    assert done.steps[1].overlap_cm == pytest.approx(2, abs=0.01)
+    assert done.steps[2].overlap_cm == pytest.approx(0.4, abs=0.05)
+    assert done.blocks[1].position_m[0] == pytest.approx(0.05, abs=0.001)
+
+
+def test_what_is_under_the_floor_or_no_block_is_not_put(engine: PhysicsEngine) -> None:
+    first = tower(1)[0]
+    blocks = [at(first, 0, 0, 0.01), at(first, 0, 0, -0.5), None, at(first, 0, 0, 0.0215)]
+    done = execute(blocks, engine=engine)
+    found = [step.end for step in done.steps]
+    assert found == ["under_floor", "under_floor", "no_block", "stands"]
+    assert done.blocks[0].order == 4
+
+
+def test_who_is_knocked_over_is_named_and_stays_so(engine: PhysicsEngine) -> None:
+    beam = counterweighted_beam()
+    done = execute([*beam[:3], None, beam[0]], engine=engine)
+    assert [step.end for step in done.steps[:2]] == ["stands", "stands"]
+    assert done.steps[2].end == "knocks_over"
+    assert done.steps[2].knocked == (2,)
+    lying = {one.order: one for one in done.worlds[3]}
+    assert lying == {one.order: one for one in done.worlds[2]}
+    assert blocks_reached(beam, done.blocks, 1, 10) < len(beam)
+
+
+def test_the_same_plan_ends_the_same_to_the_last_digit_whatever_came_before(
+    engine: PhysicsEngine,
+) -> None:
+    beam: list[Block | None] = [*counterweighted_beam()[:3]]
+    first = execute(beam, engine=engine)
+    execute(tower(2), engine=engine)
+    assert execute(beam, engine=engine) == first
+
+
+def test_what_stands_elsewhere_changes_no_verdict(engine: PhysicsEngine) -> None:
+    far = [at(one, 0.3, 0.3, one.position_m[2]) for one in tower(3)]
+    near = counterweighted_beam()[:3]
+    alone, beside = execute(near, engine=engine), execute([*far, *near], engine=engine)
+    places = [one.position_m for one in beside.blocks[len(far) :]]
+    assert places == [one.position_m for one in alone.blocks]
+    assert [s.end for s in beside.steps[len(far) :]] == [s.end for s in alone.steps]
+
+
+@settings(max_examples=40)
+@given(
+    st.sampled_from(("cube", "cuboid2", "triangle", "arch", "cylinder")),
+    st.tuples(*[st.floats(-0.03, 0.03, allow_nan=False)] * 3),
+    st.floats(0.0, 90.0, allow_nan=False),
+)
+def test_voxels_know_what_two_blocks_share_nearly(
+    kind: BlockType, way_m: tuple[float, float, float], turn_deg: float
+) -> None:
+    one = block(1, kind, (0.01, 0.02, 0.06))
+    x, y, z = one.position_m
+    dx, dy, dz = way_m
+    other = replace(one, position_m=(x + dx, y + dy, z + dz), euler_deg=(0.0, 0.0, turn_deg))
+    pieces = [
+        placed(pieces_of(kind), euler_deg_to_matrix(b.euler_deg), np.array(b.position_m))
+        for b in (one, other)
+    ]
+    shared = overlap_volume(*pieces)
+    iou = shared / (2 * SHAPES[kind].volume_m3 - shared)
+    assert voxel_iou([one], [other]) == pytest.approx(iou, abs=0.08)
+    assert voxel_iou([one], [one]) == 1
+
+
+def test_a_voxel_counts_by_how_much_of_it_a_block_fills() -> None:
+    cube = block(1, "cube", (0.0, 0.0, 0.025))
+    assert len(filled_voxels([cube])[0]) == round((0.05 / VOXEL_M) ** 3)
+    assert voxel_iou([cube], [at(cube, 0.025, 0, 0.025)]) == pytest.approx(1 / 3)
+    assert voxel_iou([cube], [at(cube, 0, 0, 0.02625)]) == pytest.approx(39 / 41)
+    assert voxel_iou([cube, cube], [cube]) == 1
+    assert voxel_iou([], []) == 1
+    assert voxel_iou([cube], []) == 0
