@@ -22,7 +22,7 @@ MODULES = {
     "sklearn": "scikit-learn",
     "typing_extensions": "typing-extensions",
     "yaml": "pyyaml",
-    **{engine.library: engine.distribution for engine in ENGINES.values()},
+    **{name: engine.distribution for name, engine in ENGINES.items()},
 }
 """Import names that differ from the package's."""
 

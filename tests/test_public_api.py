@@ -41,7 +41,7 @@ def test_importing_phyblock_imports_nothing_heavy() -> None:
         "numpy",
         "pandas",
         "litellm",
-        *(engine.library for engine in ENGINES.values()),
+        *ENGINES,
         "aiohttp",
         "pydantic",
         "yaml",

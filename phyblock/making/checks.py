@@ -21,7 +21,7 @@ from phyblock.sim.contact import (
     find_overlaps,
     support_graph,
 )
-from phyblock.sim.dynamics import DEFAULT_TRIAL, Rest, Stability, Trial, check, check_steps
+from phyblock.sim.dynamics import DEFAULT_TRIAL, Stability, Trial, check, check_steps
 from phyblock.sim.pictures import LEAST_SHOWN, PictureStyle, hidden_blocks, visible_shares
 from phyblock.text import csv_cell
 
@@ -72,8 +72,8 @@ class Finding:
         return str(self.problem)
 
 
-FINISHED_REST = Rest(quiet_s=0.5)
-"""The rest at which the generator ends the trial of a finished structure."""
+FINISHED_QUIET_S = 0.5
+"""Time at rest after which the generator ends the trial of a finished structure [s]."""
 STEP_TRIAL = replace(DEFAULT_TRIAL, physics=DEFAULT_TRIAL.physics[:1])
 """Every step is tried at the first of the two time steps, for two seconds or until at rest."""
 
@@ -83,23 +83,23 @@ class Tolerances:
     """Limits: overlaps and gaps up to `fit_m` [m], movement within the limits of the trials.
 
     `trial` is that of the finished structure, which is watched to its end, or until it is at rest
-    as `rest` says; `step_trial` that of every step, `last_step` whether of the last step, too.
+    for `quiet_s` [s]; `step_trial` that of every step, `last_step` whether of the last step, too.
     """
 
     fit_m: float = FIT_TOLERANCE_M
     trial: Trial = DEFAULT_TRIAL
     step_trial: Trial = STEP_TRIAL
-    rest: Rest | None = None
+    quiet_s: float | None = None
     last_step: bool = True
 
 
 OURS = Tolerances()
 """For scenes made here."""
-OURS_IN_HASTE = Tolerances(rest=FINISHED_REST)
+OURS_IN_HASTE = Tolerances(quiet_s=FINISHED_QUIET_S)
 """For scenes that are being made: the same, but a trial ends once all is at rest."""
 # The last step of a foreign scene is left to the trial of the finished structure: what falls there
 # shall be told once. 2 mm cannot be seen in a picture.
-FOREIGN = Tolerances(fit_m=0.002, last_step=False, rest=FINISHED_REST)
+FOREIGN = Tolerances(fit_m=0.002, last_step=False, quiet_s=FINISHED_QUIET_S)
 """For scenes made elsewhere, whose positions are written by hand in rounded millimeters."""
 
 
@@ -282,9 +282,8 @@ def _unstable_step(facts: SceneFacts) -> Iterator[Finding]:
 
 def _unstable(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks that fall from the finished structure."""
-    trial, rest = facts.tolerances.trial, facts.tolerances.rest
-    blocks = facts.scene.blocks
-    whole = check(blocks, trial) if rest is None else check(blocks, trial, rest)
+    trial = facts.tolerances.trial
+    whole = check(facts.scene.blocks, trial, facts.tolerances.quiet_s)
     if not whole.stable:
         differing = "" if whole.agreed else ", not the same ones at every time step"
         yield _fall(facts, "unstable", f"when all is built{differing}", whole, trial)

@@ -13,10 +13,10 @@ from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
 from phyblock.domain.scene import CandidateSet, Scene
 from phyblock.errors import Problem
 from phyblock.files import atomic_write, check_free, make_folder, read_text, writing
-from phyblock.making.checks import FINISHED_REST, LEVEL_LIMITS
+from phyblock.making.checks import FINISHED_QUIET_S, LEVEL_LIMITS
 from phyblock.making.scenes.sketch import PALETTES, Palette
 from phyblock.sim.contact import FIT_TOLERANCE_M
-from phyblock.sim.dynamics import DEFAULT_REST, DEFAULT_TRIAL
+from phyblock.sim.dynamics import DEFAULT_TRIAL, QUIET_S, REST_SPEED_M_S
 from phyblock.sim.engine import other_engine
 from phyblock.sim.pictures import LEAST_SHARE, LEAST_SHOWN
 from phyblock.stable import hex_digest
@@ -130,9 +130,9 @@ def scene_card(name: str, tasks: _Tasks, command: str, palette: Palette) -> str:
         settings=settings,
         limit_mm=DEFAULT_TRIAL.limit_m * 1000,
         limit_deg=DEFAULT_TRIAL.limit_deg,
-        speed=DEFAULT_REST.speed_m_s * 1000,
-        finished_quiet=FINISHED_REST.quiet_s,
-        quiet=DEFAULT_REST.quiet_s,
+        speed=REST_SPEED_M_S * 1000,
+        finished_quiet=FINISHED_QUIET_S,
+        quiet=QUIET_S,
         pixels=LEAST_SHARE * 512**2,
         shown=LEAST_SHOWN,
         version=SCENE_SET_VERSION,

@@ -22,7 +22,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from itertools import combinations, product
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -36,8 +36,8 @@ from phyblock.sim.contact import (
     bounds_m,
     boxes_near,
     contact_corners_m,
+    piece_pairs,
     pieces_of,
-    separating_axes,
 )
 from phyblock.sim.geometry import cross
 
@@ -86,7 +86,13 @@ def surely_falls(blocks: Sequence[Block]) -> bool:
     if not forces.size:
         return bool(blocks)
     is_long = np.array([SHAPES[block.type].is_long for block in blocks])
-    loads = [_loads(blocks, ~is_long), _loads(blocks, is_long)]
+    masses = np.array([SHAPES[block.type].mass_kg for block in blocks])
+    loads = []
+    for chosen in (~is_long, is_long):  # What they need, and its growth for `MARGIN_M` along x, y.
+        weights = masses * chosen / masses.sum()
+        needs = _needs(blocks, weights)
+        steps = [_needs(blocks, weights, MARGIN_M * side) - needs for side in np.eye(2)]
+        loads.append(np.column_stack([needs, *steps]))
     count = forces.shape[1]
     # A mass, and the mass times each part of its shift: the shift alone would not be linear.
     octagon = np.column_stack([-np.ones(len(_SIDES)), _SIDES])
@@ -171,37 +177,23 @@ def _least_residual(
     return float(solution.fun)
 
 
-def _weights(blocks: Sequence[Block], shift_m: Sequence[float] | Floats, masses: Masses) -> Floats:
+def _weights(
+    blocks: Sequence[Block], shift_m: Sequence[float] | Floats, masses: Masses = ()
+) -> Floats:
     """The force up that each block needs, and its moment, shape (6 n,), of a whole weight of 1."""
     factors = dict(masses)
     weights = np.array([SHAPES[b.type].mass_kg * factors.get(b.type, 1.0) for b in blocks])
     return _needs(blocks, weights / weights.sum(), shift_m)
 
 
-def _loads(blocks: Sequence[Block], chosen: NDArray[np.bool_]) -> Floats:
-    """Needs of the chosen blocks, and their growth for `MARGIN_M` along x, and y: (6 n, 3)."""
-    weights = np.array([SHAPES[block.type].mass_kg for block in blocks])
-    weights = np.where(chosen, weights, 0.0) / weights.sum()
-    needs = _needs(blocks, weights)
-    steps = [_needs(blocks, weights, step) - needs for step in ((MARGIN_M, 0.0), (0.0, MARGIN_M))]
-    return np.column_stack([needs, *steps])
-
-
 def _needs(
-    blocks: Sequence[Block],
-    weights: Floats,
-    shift_m: Sequence[float] | Floats = (0.0, 0.0),
+    blocks: Sequence[Block], weights: Floats, shift_m: Sequence[float] | Floats = (0.0, 0.0)
 ) -> Floats:
     """The force up that each block of some weight needs, and its moment, shape (6 n,)."""
-    if not blocks:
-        return np.empty(0)
-    centers = np.array(
-        [
-            np.array(b.position_m)
-            + euler_deg_to_matrix(b.euler_deg) @ np.array(SHAPES[b.type].center_of_mass_m)
-            for b in blocks
-        ]
-    )
+    centers = np.zeros((len(blocks), 3))
+    for center, b in zip(centers, blocks, strict=True):
+        center += euler_deg_to_matrix(b.euler_deg) @ np.array(SHAPES[b.type].center_of_mass_m)
+        center += b.position_m
     centers[:, :2] += shift_m
     return _wrenches(centers, np.outer(weights, _UP)).ravel()
 
@@ -258,8 +250,7 @@ def _between(one: Block, other: Block, margin_m: float) -> tuple[tuple[Floats, F
     if not boxes_near(bounds_m(one), bounds_m(other), CONTACT_TOLERANCE_M):
         return ()
     met = []
-    for first, second in product(pieces_of(one), pieces_of(other)):
-        axes = separating_axes(first, second)
+    for first, second, axes in piece_pairs(one, other):
         if not -2 * CONTACT_TOLERANCE_M <= axes.gap_m <= CONTACT_TOLERANCE_M:
             continue
         best = axes.directions[axes.gaps_m > axes.gap_m - _SAME_GAP_M]

@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -66,13 +66,6 @@ def pieces_of(block: Block) -> tuple[ConvexPiece, ...]:
     return tuple(moved(piece, rotation, position_m) for piece in collision_pieces(block.type))
 
 
-@functools.lru_cache(maxsize=_KEPT)
-def _box_m(block: Block) -> Floats:
-    """Low and high corner of the box round a block's convex pieces, shape (2, 3) [m]."""
-    points = np.vstack([piece.vertices_m for piece in pieces_of(block)])
-    return np.stack([points.min(axis=0), points.max(axis=0)])
-
-
 def moved(piece: ConvexPiece, rotation: Floats, position_m: Floats) -> ConvexPiece:
     """The piece turned by `rotation` (3, 3) and then shifted to `position_m` (3,) [m]."""
     return ConvexPiece(
@@ -83,9 +76,8 @@ def moved(piece: ConvexPiece, rotation: Floats, position_m: Floats) -> ConvexPie
 
 
 class Axes(NamedTuple):
-    """All axes that can separate a pair, and the free distance along each.
+    """Unit axes (k, 3) that can separate a pair, first to second, and `gaps_m` (k,) along each [m].
 
-    `directions` shape (k, 3), unit, from the first piece to the second; `gaps_m` shape (k,) [m].
     The pair overlaps when every gap is negative, by the depth of the largest; when the largest is
     positive, the pieces are at least that far apart.
     """
@@ -147,10 +139,10 @@ def find_overlaps(
     blocks: Sequence[Block], tolerance_m: float = FIT_TOLERANCE_M
 ) -> tuple[Overlap, ...]:
     """Pairs of blocks that share space deeper than `tolerance_m` [m]; blocks in the ground too."""
-    bottoms_m = [(block.order, float(_box_m(block)[0, 2])) for block in blocks]
+    bottoms_m = [(block.order, float(bounds_m(block)[0, 2])) for block in blocks]
     overlaps = [Overlap(GROUND, o, -low) for o, low in bottoms_m if low < -tolerance_m]
     for first, second in _near_pairs(blocks, 0.0):
-        depth_m = -min(axes.gap_m for _, _, axes in _piece_pairs(first, second))
+        depth_m = -min(axes.gap_m for _, _, axes in piece_pairs(first, second))
         if depth_m > tolerance_m:
             overlaps.append(Overlap(first.order, second.order, depth_m))
     return tuple(overlaps)
@@ -158,12 +150,8 @@ def find_overlaps(
 
 def find_gaps(blocks: Sequence[Block], tolerance_m: float = FIT_TOLERANCE_M) -> tuple[Gap, ...]:
     """Blocks that are more than `tolerance_m` [m] above the block or ground below them."""
-    gaps = []
-    for block in blocks:
-        height_m = drop_height_m(block, [other for other in blocks if other is not block])
-        if height_m > tolerance_m:
-            gaps.append(Gap(block.order, height_m))
-    return tuple(gaps)
+    heights_m = {b.order: drop_height_m(b, [o for o in blocks if o is not b]) for b in blocks}
+    return tuple(Gap(order, high) for order, high in heights_m.items() if high > tolerance_m)
 
 
 def drop_height_m(block: Block, others: Sequence[Block]) -> float:
@@ -171,14 +159,14 @@ def drop_height_m(block: Block, others: Sequence[Block]) -> float:
 
     Zero when it touches or overlaps what is below it already.
     """
-    box = _box_m(block)
+    box = bounds_m(block)
     clearance = max(float(box[0, 2]), 0.0)
     for other in others:
         reach = box.copy()
         reach[0, 2] -= clearance
-        if not boxes_near(_box_m(other), reach, 0.0):
+        if not boxes_near(bounds_m(other), reach, 0.0):
             continue
-        for _, _, axes in _piece_pairs(other, block):
+        for _, _, axes in piece_pairs(other, block):
             fall = drop_m(axes)
             # The block starts clear of the other, or overlaps it.
             if fall is not None and fall < clearance and (fall >= 0 or axes.gap_m < 0):
@@ -195,11 +183,11 @@ def support_graph(blocks: Sequence[Block]) -> dict[int, frozenset[int]]:
     """
     rests_on: dict[int, set[int]] = {block.order: set() for block in blocks}
     for block in blocks:
-        if abs(float(_box_m(block)[0, 2])) <= CONTACT_TOLERANCE_M:
+        if abs(float(bounds_m(block)[0, 2])) <= CONTACT_TOLERANCE_M:
             rests_on[block.order].add(GROUND)
     on_rims: dict[int, set[int]] = {block.order: set() for block in blocks}
     for first, second in _near_pairs(blocks, CONTACT_TOLERANCE_M):
-        for one, other, axes in _piece_pairs(first, second):
+        for one, other, axes in piece_pairs(first, second):
             rise, is_rim = _contact_rise(one, other, axes)
             carried = on_rims if is_rim else rests_on
             if rise > 0:
@@ -212,13 +200,13 @@ def support_graph(blocks: Sequence[Block]) -> dict[int, frozenset[int]]:
 def _near_pairs(blocks: Sequence[Block], reach_m: float) -> Iterator[tuple[Block, Block]]:
     """Pairs whose boxes come within `reach_m` of one another."""
     pairs = combinations(blocks, 2)
-    return ((a, b) for a, b in pairs if boxes_near(_box_m(a), _box_m(b), reach_m))
+    return ((a, b) for a, b in pairs if boxes_near(bounds_m(a), bounds_m(b), reach_m))
 
 
-def _piece_pairs(first: Block, second: Block) -> Iterator[tuple[ConvexPiece, ConvexPiece, Axes]]:
-    for one in pieces_of(first):
-        for other in pieces_of(second):
-            yield one, other, separating_axes(one, other)
+def piece_pairs(first: Block, second: Block) -> Iterator[tuple[ConvexPiece, ConvexPiece, Axes]]:
+    """Pairs of pieces of two blocks, with what can separate each."""
+    for one, other in product(pieces_of(first), pieces_of(second)):
+        yield one, other, separating_axes(one, other)
 
 
 def _contact_rise(first: ConvexPiece, second: ConvexPiece, axes: Axes) -> tuple[float, bool]:
@@ -349,17 +337,13 @@ def _depth_inside(point: Floats, polygon: Floats) -> float:
 
 VOXEL_M = 0.005
 _SIDE = 4
-"""Points along each side of a voxel: their middles alone would take a block that lies 1 mm lower
-for one that lies where it was, or lower by a whole layer.
-"""
+"""Points along each side of a voxel: their middles alone would not see a block that lies lower."""
 _POINTS = _SIDE**3
 _POINT_M = VOXEL_M / _SIDE
 _SHIFT_M = _POINT_M / 2
 """Faces of built structures lie on multiples of 1.25 mm, and no point near one."""
 _SKIN_M = 0.0003
-"""A point so near to a block counts as in it: slopes run through some, and what rests has shifted
-by a tenth of a millimeter.
-"""
+"""A point so near to a block counts as in it: what rests has shifted by a tenth of a millimeter."""
 _SPAN = 1 << 20
 
 Voxels = tuple[NDArray[np.int64], NDArray[np.uint8]]

@@ -3,7 +3,7 @@
 Two facts save time and change no verdict. Blocks that nothing brings near one another cannot
 disturb one another, so they are tried group by group (`groups`); what stands elsewhere would only
 change the order in which an engine goes through contacts. And a group that has been quiet for a
-while is at rest (`Rest`), for an unsupported load of .2 % of a block's weight would show.
+while is at rest (`moments`), for an unsupported load of .2 % of a block's weight would show.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +25,7 @@ from phyblock.sim.contact import (
     bounds_m,
     boxes_near,
     drop_height_m,
-    pieces_of,
-    separating_axes,
+    piece_pairs,
 )
 from phyblock.sim.engine import Physics, PhysicsEngine, Pose, World, physics_engine
 from phyblock.types import StepEnd
@@ -48,56 +46,43 @@ ONE_SETTING = Trial(physics=DEFAULT_TRIAL.physics[:1])
 """A trial that costs half as much as the default and decides nothing that a score rests on."""
 
 
-@dataclass(frozen=True)
-class Rest:
-    """Blocks are at rest when no corner was faster than `speed_m_s` [m/s] for `quiet_s` [s].
+REST_SPEED_M_S = 0.005
+"""Blocks are at rest when no corner was faster for a while [m/s].
 
-    Speeds are read every `every_s` [s]. 5 mm/s lies above the jitter of resting contacts (up to
-    4 mm/s) and far below the speed of a block that has begun to tip.
-    """
-
-    speed_m_s: float = 0.005
-    quiet_s: float = 0.25
-    every_s: float = 0.05
-
-
-DEFAULT_REST = Rest()
+It lies above the jitter of resting contacts (up to 4 mm/s) and far below the speed of a block that
+has begun to tip.
+"""
+QUIET_S = 0.25
+"""Time for which blocks must not be faster to be at rest [s]."""
+_EVERY_S = 0.05
 REACH_M = 0.012
 """Groups this far apart stay apart while no block passes the limits of a trial."""
 _COLLAPSE_S = 3.0
 """Time that fallen blocks are given to come to rest [s]."""
 
 
-class Movement(NamedTuple):
-    """Effect of a trial at one of its settings: the largest movement, and who passed a limit."""
-
-    moved_m: float
-    turned_deg: float
-    fallen: tuple[int, ...]
-
-
 @dataclass(frozen=True)
 class Stability:
-    """Result of a trial over all its settings.
+    """Result of a trial, at one of its settings or over all of them.
 
     `fallen` are the orders of blocks that passed a limit under any setting; `moved_m` [m] and
     `turned_deg` [degrees] the largest movement of any block. `agreed` is true where the settings
     name the same blocks.
     """
 
-    fallen: tuple[int, ...]
-    moved_m: float
-    turned_deg: float
-    agreed: bool
+    fallen: tuple[int, ...] = ()
+    moved_m: float = 0.0
+    turned_deg: float = 0.0
+    agreed: bool = True
 
     @classmethod
-    def of(cls, movements: Sequence[Movement]) -> Stability:
-        """Combine the movements under each setting."""
+    def of(cls, parts: Sequence[Stability]) -> Stability:
+        """Combine results under each setting, or of each group."""
         return cls(
-            fallen=tuple(sorted({order for one in movements for order in one.fallen})),
-            moved_m=max((one.moved_m for one in movements), default=0.0),
-            turned_deg=max((one.turned_deg for one in movements), default=0.0),
-            agreed=len({one.fallen for one in movements}) <= 1,
+            fallen=tuple(sorted({order for one in parts for order in one.fallen})),
+            moved_m=max((one.moved_m for one in parts), default=0.0),
+            turned_deg=max((one.turned_deg for one in parts), default=0.0),
+            agreed=len({one.fallen for one in parts}) <= 1,
         )
 
     @property
@@ -107,40 +92,35 @@ class Stability:
 
 
 def check(
-    blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL, rest: Rest | None = None
+    blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL, quiet_s: float | None = None
 ) -> Stability:
     """Let blocks go at their goal poses and see which of them stay.
 
-    With `rest`, each group is let go alone and watched until it is at rest; without, all blocks
-    are watched together for the whole time.
+    With `quiet_s` [s], each group is let go alone and watched until it is at rest for so long;
+    without, all blocks are watched together for the whole time.
     """
-    movements = []
+    settings = []
     for physics in trial.physics:
         with World(physics) as world:
-            parts = (tuple(blocks),) if rest is None else groups(blocks)
-            tried = [_tried(world, group, trial, rest) for group in parts]
-        fallen = tuple(sorted(order for one in tried for order in one.fallen))
-        moved_m = max((one.moved_m for one in tried), default=0.0)
-        turned_deg = max((one.turned_deg for one in tried), default=0.0)
-        movements.append(Movement(moved_m, turned_deg, fallen))
-    return Stability.of(movements)
+            parts = (tuple(blocks),) if quiet_s is None else groups(blocks)
+            settings.append(Stability.of([_tried(world, one, trial, quiet_s) for one in parts]))
+    return Stability.of(settings)
 
 
-def check_steps(
-    blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL, rest: Rest = DEFAULT_REST
-) -> tuple[Stability, ...]:
+def check_steps(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> tuple[Stability, ...]:
     """Stability after each step when blocks are placed in the order given.
 
     Only the group of the block just placed is tried, every block at its goal pose; the other
     groups were tried at earlier steps.
     """
-    by_step: list[list[Movement]] = [[] for _ in blocks]
+    near = [
+        next(g for g in groups(blocks[:n]) if blocks[n - 1] in g) for n in range(1, len(blocks) + 1)
+    ]
+    settings = []
     for physics in trial.physics:
         with World(physics) as world:
-            for count, block in enumerate(blocks, 1):
-                group = next(group for group in groups(blocks[:count]) if block in group)
-                by_step[count - 1].append(_tried(world, group, trial, rest))
-    return tuple(Stability.of(movements) for movements in by_step)
+            settings.append([_tried(world, group, trial, QUIET_S) for group in near])
+    return tuple(map(Stability.of, zip(*settings, strict=True)))
 
 
 def groups(blocks: Sequence[Block], reach_m: float = REACH_M) -> tuple[tuple[Block, ...], ...]:
@@ -162,29 +142,38 @@ def groups(blocks: Sequence[Block], reach_m: float = REACH_M) -> tuple[tuple[Blo
     return tuple(touching)
 
 
-def movement(blocks: Sequence[Block], poses: Mapping[int, Pose], trial: Trial) -> Movement:
+def movement(blocks: Sequence[Block], poses: Mapping[int, Pose], trial: Trial) -> Stability:
     """Distance of blocks from their goal poses, and the orders of those past a limit."""
     moved = {b.order: poses[b.order].distance_m(Pose.goal(b)) for b in blocks}
     turned = {b.order: poses[b.order].angle_deg(Pose.goal(b)) for b in blocks}
     fallen = (o for o in moved if moved[o] > trial.limit_m or turned[o] > trial.limit_deg)
-    return Movement(
-        max(moved.values(), default=0.0), max(turned.values(), default=0.0), tuple(sorted(fallen))
-    )
+    most_m, most_deg = (max(one.values(), default=0.0) for one in (moved, turned))
+    return Stability(tuple(sorted(fallen)), most_m, most_deg)
 
 
-def wait(world: World, limit_s: float, rest: Rest = DEFAULT_REST) -> bool:
-    """Simulate until all has been quiet for a while; True if that was within `limit_s` [s]."""
-    return any(moments(world, limit_s, rest))
+def wait(world: World, limit_s: float, quiet_s: float = QUIET_S) -> bool:
+    """Simulate until all is at rest; True if that was within `limit_s` [s]."""
+    return any(moments(world, limit_s, quiet_s))
 
 
-def moments(world: World, limit_s: float, rest: Rest = DEFAULT_REST) -> Iterator[bool]:
+def moments(world: World, limit_s: float, quiet_s: float = QUIET_S) -> Iterator[bool]:
     """Simulate moment by moment up to `limit_s` [s]; yields True once all is at rest."""
-    every_s = max(rest.every_s, world.physics.time_step_s)
-    quiet_s = 0.0
+    every_s = max(_EVERY_S, world.physics.time_step_s)
+    since_s = 0.0
     for _ in range(round(limit_s / every_s)):
         world.step(every_s)
-        quiet_s = quiet_s + every_s if world.fastest_m_s() < rest.speed_m_s else 0.0
-        yield quiet_s >= rest.quiet_s - every_s / 2
+        since_s = since_s + every_s if world.fastest_m_s() < REST_SPEED_M_S else 0.0
+        yield since_s >= quiet_s - every_s / 2
+
+
+def _tried(world: World, group: Sequence[Block], trial: Trial, quiet_s: float | None) -> Stability:
+    """Movement of a group, alone in the world for this trial."""
+    with _placed(world, group):
+        if quiet_s is None:
+            world.step(trial.duration_s)
+        else:
+            wait(world, trial.duration_s, quiet_s)
+        return movement(group, world.poses(), trial)
 
 
 @contextlib.contextmanager
@@ -196,16 +185,6 @@ def _placed(world: World, blocks: Sequence[Block]) -> Iterator[None]:
     finally:
         for block in reversed(blocks):
             world.remove(block.order)
-
-
-def _tried(world: World, group: Sequence[Block], trial: Trial, rest: Rest | None) -> Movement:
-    """Movement of a group, alone in the world for this trial."""
-    with _placed(world, group):
-        if rest is None:
-            world.step(trial.duration_s)
-        else:
-            wait(world, trial.duration_s, rest)
-        return movement(group, world.poses(), trial)
 
 
 _KEPT = 65_536
@@ -284,7 +263,7 @@ class Site:
         for physics in self.trial.physics:
             if physics not in self._worlds:
                 self._worlds[physics] = self._stack.enter_context(World(physics, self._engine))
-            if _tried(self._worlds[physics], blocks, self.trial, DEFAULT_REST).fallen:
+            if _tried(self._worlds[physics], blocks, self.trial, QUIET_S).fallen:
                 return False
         return True
 
@@ -445,23 +424,17 @@ class Executor:
         if FIT_TOLERANCE_M < gap_m <= most_m:
             x, y, z = free.position_m
             free = replace(free, position_m=(x, y, z - gap_m))
-        after = self._let_go(free)
-        moved = {
-            one.order: (
-                Pose.goal(one).distance_m(after[one.order]) * _CM,
-                Pose.goal(one).angle_deg(after[one.order]),
-            )
-            for one in (*others, block)
-            if one.order in after
-        }
-        fallen = {
-            order
-            for order, (moved_cm, turned_deg) in moved.items()
-            if not (moved_cm <= self._limits.stand_cm and turned_deg <= self._limits.stand_deg)
-        }
-        knocked = tuple(other.order for other in others if other.order in fallen)
+        after, stand = self._let_go(free), self._limits
+        moved, fallen = (0.0, 0.0), []
+        for one in (*others, block):
+            if one.order in after:
+                goal, now = Pose.goal(one), after[one.order]
+                moved = goal.distance_m(now) * _CM, goal.angle_deg(now)
+                if not (moved[0] <= stand.stand_cm and moved[1] <= stand.stand_deg):
+                    fallen.append(one.order)
+        knocked = tuple(order for order in fallen if order != block.order)
         end: StepEnd = "knocks_over" if knocked else "falls" if fallen else "stands"
-        numbers = (*moved[block.order], gap_m * _CM, given_m * _CM)
+        numbers = (*moved, gap_m * _CM, given_m * _CM)
         moved_cm, turned_deg, gap, given = (round(number, _DIGITS) + 0.0 for number in numbers)
         return ExecutedStep(end, moved_cm, turned_deg, gap, given, knocked)
 
@@ -535,12 +508,9 @@ def _way_out(block: Block, others: Sequence[Block]) -> NDArray[np.float64]:
     for other in others:
         if not boxes_near(bounds_m(other), box, 0.0):
             continue
-        for theirs in pieces_of(other):
-            for mine in pieces_of(block):
-                axes = separating_axes(theirs, mine)
-                best = int(axes.gaps_m.argmax())
-                if axes.gaps_m[best] < 0:
-                    way = -axes.gaps_m[best] * axes.directions[best]
-                    if np.linalg.norm(way) > np.linalg.norm(deepest):
-                        deepest = way
+        for _, _, axes in piece_pairs(other, block):
+            best = int(axes.gaps_m.argmax())
+            way = -min(axes.gaps_m[best], 0.0) * axes.directions[best]
+            if np.linalg.norm(way) > np.linalg.norm(deepest):
+                deepest = way
     return deepest

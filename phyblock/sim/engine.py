@@ -36,7 +36,7 @@ from phyblock.domain.blocks import (
     quat_xyzw_to_matrix,
 )
 from phyblock.domain.scene import Block
-from phyblock.errors import InputError, Problem, SimulationError
+from phyblock.errors import InputError, Problem
 
 Vector = tuple[float, float, float]
 """x, y and z in the world."""
@@ -166,37 +166,27 @@ REFERENCE_ENGINE = "pybullet"
 
 
 class KnownEngine(NamedTuple):
-    """Module and class of an engine, its library, its distribution, and how to get that."""
+    """The class of an engine in the module of its name, its distribution, and how to get that."""
 
-    module: str
     factory: str
-    library: str
     distribution: str
     hint: str
 
 
 ENGINES: Mapping[str, KnownEngine] = {
     REFERENCE_ENGINE: KnownEngine(
-        "phyblock.sim.pybullet",
-        "BulletEngine",
-        "pybullet",
-        "pybullet",
-        "PyBullet has wheels for Python 3.11 on Linux, x86-64",
+        "BulletEngine", "pybullet", "PyBullet has wheels for Python 3.11 on Linux, x86-64"
     ),
     "mujoco": KnownEngine(
-        "phyblock.sim.mujoco",
-        "MujocoEngine",
-        "mujoco",
-        "mujoco-core",
-        "pip install 'phyblock[mujoco]', for Python 3.11 and newer",
+        "MujocoEngine", "mujoco-core", "pip install 'phyblock[mujoco]', for Python 3.11 and newer"
     ),
 }
-"""The physics engines; the first that is installed is the usual one."""
+"""The physics engines by the names of their libraries; the first installed is the usual one."""
 
 
 def installed_engines() -> tuple[str, ...]:
     """Names of the engines whose libraries are installed; nothing is imported."""
-    return tuple(name for name, one in ENGINES.items() if find_spec(one.library) is not None)
+    return tuple(name for name in ENGINES if find_spec(name) is not None)
 
 
 def physics_engine() -> PhysicsEngine:
@@ -206,20 +196,19 @@ def physics_engine() -> PhysicsEngine:
     """
     usual = next(iter(installed_engines()), REFERENCE_ENGINE)
     name = os.environ.get(PHYSICS_VARIABLE, usual)
-    known = ENGINES.get(name)
-    if known is None:
+    if name not in ENGINES:
         allowed = ", ".join(ENGINES)
         raise InputError(Problem(PHYSICS_VARIABLE, "is not known", found=name, allowed=allowed))
-    if find_spec(known.library) is None:
-        message = "is not installed"
-        raise InputError(Problem(PHYSICS_VARIABLE, message, found=name, hint=known.hint))
-    return _made(known)
+    if name not in installed_engines():
+        hint = ENGINES[name].hint
+        raise InputError(Problem(PHYSICS_VARIABLE, "is not installed", found=name, hint=hint))
+    return _made(name)
 
 
 @functools.cache
-def _made(known: KnownEngine) -> PhysicsEngine:
-    module = importlib.import_module(known.module)
-    return cast(PhysicsEngine, getattr(module, known.factory)())
+def _made(name: str) -> PhysicsEngine:
+    module = importlib.import_module(f"phyblock.sim.{name}")
+    return cast(PhysicsEngine, getattr(module, ENGINES[name].factory)())
 
 
 def described_engine() -> str:
@@ -241,56 +230,48 @@ class World:
     """Blocks on the ground in a simulation of their own; a context manager.
 
     Blocks are named by their order. The same calls on the same machine give bitwise the same
-    poses. `engine` is the chosen one unless another is given. Every method raises SimulationError
-    when the world is not open, or a block that it names is not there.
+    poses. `engine` is the chosen one unless another is given.
     """
 
     def __init__(self, physics: Physics | None = None, engine: PhysicsEngine | None = None) -> None:
         self.physics = physics or Physics()
         self._engine = engine or physics_engine()
         self._stack = contextlib.ExitStack()
-        self._opened: Simulation | None = None
         self._blocks: dict[int, Block] = {}
 
     def __enter__(self) -> World:
-        self._opened = self._stack.enter_context(self._engine.open(self.physics))
+        self._simulation = self._stack.enter_context(self._engine.open(self.physics))
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._opened = None
         self._blocks.clear()
         self._stack.close()
 
     def place(self, *blocks: Block) -> None:
-        """Put blocks at their goal poses, at rest; SimulationError if an order is taken."""
+        """Put blocks at their goal poses, at rest."""
         for block in blocks:
-            simulation = self._simulation()
-            if block.order in self._blocks:
-                raise SimulationError(f"block {block.order} is already in the world")
-            simulation.add(block.order, block.type, Pose.goal(block))
+            self._simulation.add(block.order, block.type, Pose.goal(block))
             self._blocks[block.order] = block
 
     def remove(self, order: int) -> None:
         """Take a block out."""
-        self._simulation(order).remove(order)
+        self._simulation.remove(order)
         del self._blocks[order]
 
     def step(self, duration_s: float) -> None:
         """Simulate for `duration_s` [s], rounded to whole time steps."""
-        self._simulation().step(round(duration_s / self.physics.time_step_s))
+        self._simulation.step(round(duration_s / self.physics.time_step_s))
 
     def drive(self, order: int, velocity_m_s: tuple[float, float]) -> None:
         """Give a block this velocity in x and y; how it rises and turns is left as it is."""
-        simulation = self._simulation(order)
-        linear, angular = simulation.velocity(order)
-        simulation.set_velocity(order, Velocity((*velocity_m_s, linear[2]), angular))
+        linear, angular = self._simulation.velocity(order)
+        self._simulation.set_velocity(order, Velocity((*velocity_m_s, linear[2]), angular))
 
     def fastest_m_s(self) -> float:
         """Upper bound of the speed of the fastest corner [m/s]; 0 in an empty world."""
-        simulation = self._simulation()
         fastest = 0.0
         for order, block in self._blocks.items():
-            shape, velocity = SHAPES[block.type], simulation.velocity(order)
+            shape, velocity = SHAPES[block.type], self._simulation.velocity(order)
             reach_m = math.dist(shape.low_m, shape.high_m)
             spin = math.hypot(*velocity.angular_rad_s) * reach_m
             fastest = max(fastest, math.hypot(*velocity.linear_m_s) + spin)
@@ -298,15 +279,8 @@ class World:
 
     def pose(self, order: int) -> Pose:
         """Return the pose of a block now."""
-        return self._simulation(order).pose(order)
+        return self._simulation.pose(order)
 
     def poses(self) -> dict[int, Pose]:
         """Return the poses of all blocks now, by order."""
         return {order: self.pose(order) for order in self._blocks}
-
-    def _simulation(self, order: int | None = None) -> Simulation:
-        if self._opened is None:
-            raise SimulationError("the world is not open: use it in a with statement")
-        if order is not None and order not in self._blocks:
-            raise SimulationError(f"block {order} is not in the world")
-        return self._opened

@@ -50,9 +50,9 @@ class MujocoEngine:
             return {"mujoco": importlib.metadata.version("mujoco")}
 
     @contextlib.contextmanager
-    def open(self, physics: Physics) -> Iterator[MujocoSimulation]:
+    def open(self, physics: Physics) -> Iterator[_Simulation]:
         """Open a floor without blocks."""
-        yield MujocoSimulation(_loaded(), physics)
+        yield _Simulation(_loaded(), physics)
 
 
 @functools.cache
@@ -91,7 +91,7 @@ class _Body:
         return center
 
 
-class MujocoSimulation:
+class _Simulation:
     """Blocks on a plane, as `Simulation`.
 
     A model in MuJoCo holds the blocks that it was made with, so another is begun when a block came
@@ -99,28 +99,21 @@ class MujocoSimulation:
     """
 
     def __init__(self, mujoco: ModuleType, physics: Physics) -> None:
-        self._mujoco = mujoco
-        self._physics = physics
+        self._mujoco, self._physics = mujoco, physics
         self._bodies: dict[int, _Body] = {}
         self._model: Any = None
         self._data: Any = None
 
     def add(self, number: int, block_type: BlockType, pose: Pose) -> None:
-        """Put a block at a pose, at rest."""
         self._interrupt()
         place = np.concatenate([pose.position_m, np.roll(pose.quat_xyzw, 1)])
         self._bodies[number] = _Body(block_type, place, np.zeros(6))
 
     def remove(self, number: int) -> None:
-        """Take a block out."""
         self._interrupt()
         del self._bodies[number]
 
     def step(self, n: int) -> None:
-        """Simulate `n` time steps.
-
-        Raises SimulationError when MuJoCo gives up.
-        """
         if n < 1:
             return
         self._begin()
@@ -129,19 +122,16 @@ class MujocoSimulation:
             raise SimulationError("MuJoCo found no way on: forces or contacts beyond all bounds")
 
     def pose(self, number: int) -> Pose:
-        """Return the pose of a block now."""
         place = self._bodies[number].place
         return Pose(place[:3].copy(), np.roll(place[3:], -1))
 
     def velocity(self, number: int) -> Velocity:
-        """Return the velocity of a block now."""
         body = self._bodies[number]
         spin = body.rotation @ body.motion[3:]
         linear = body.motion[:3] + np.cross(spin, body.center_m)
         return Velocity(_vector(linear), _vector(spin))
 
     def set_velocity(self, number: int, velocity: Velocity) -> None:
-        """Make a block move like this from now on."""
         body, spin = self._bodies[number], np.array(velocity.angular_rad_s)
         body.motion[:3] = velocity.linear_m_s - np.cross(spin, body.center_m)
         body.motion[3:] = body.rotation.T @ spin

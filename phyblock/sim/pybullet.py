@@ -17,7 +17,7 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
-from typing import NamedTuple, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,14 +41,14 @@ class BulletEngine:
         return {"pybullet": importlib.metadata.version("pybullet")}
 
     @contextlib.contextmanager
-    def open(self, physics: Physics) -> Iterator[BulletSimulation]:
+    def open(self, physics: Physics) -> Iterator[_Simulation]:
         """Open a floor without blocks; SimulationError when too many are open."""
         bullet = _loaded()
         client = bullet.connect(bullet.DIRECT)
         if client < 0:
             raise SimulationError("PyBullet gave no client: too many are open in this process")
         try:
-            yield BulletSimulation(bullet, client, physics)
+            yield _Simulation(bullet, client, physics)
         finally:
             bullet.disconnect(client)
 
@@ -68,22 +68,14 @@ def _loaded() -> ModuleType:
     return cast(ModuleType, pybullet)
 
 
-class _Body(NamedTuple):
-    """A block in the client: its number there, and its center of mass in its own frame [m]."""
-
-    id: int
-    center_m: NDArray[np.float64]
-
-
-class BulletSimulation:
+class _Simulation:
     """Blocks on a plane, as `Simulation`; Bullet itself knows centers of mass only."""
 
     def __init__(self, bullet: ModuleType, client: int, physics: Physics) -> None:
-        self._bullet = bullet
-        self._client = client
-        self._physics = physics
+        self._bullet, self._client, self._physics = bullet, client, physics
         self._shapes: dict[BlockType, int] = {}
-        self._bodies: dict[int, _Body] = {}
+        self._bodies: dict[int, tuple[int, NDArray[np.float64]]] = {}
+        """Number of each block in the client, and its center of mass in its own frame [m]."""
         bullet.setGravity(*physics.gravity_m_s2, physicsClientId=client)
         bullet.setPhysicsEngineParameter(
             fixedTimeStep=physics.time_step_s,
@@ -95,7 +87,6 @@ class BulletSimulation:
         self._set_friction(bullet.createMultiBody(0, plane, physicsClientId=client))
 
     def add(self, number: int, block_type: BlockType, pose: Pose) -> None:
-        """Put a block at a pose, at rest."""
         if block_type not in self._shapes:
             self._shapes[block_type] = self._shape(block_type)
         mass_kg = self._physics.mass_kg(block_type)
@@ -114,39 +105,28 @@ class BulletSimulation:
         self._bullet.resetBasePositionAndOrientation(
             body, center_m.tolist(), pose.quat_xyzw.tolist(), physicsClientId=self._client
         )
-        self._bodies[number] = _Body(int(body), offset_m)
+        self._bodies[number] = (int(body), offset_m)
 
     def remove(self, number: int) -> None:
-        """Take a block out."""
-        self._bullet.removeBody(self._bodies.pop(number).id, physicsClientId=self._client)
+        self._bullet.removeBody(self._bodies.pop(number)[0], physicsClientId=self._client)
 
     def step(self, n: int) -> None:
-        """Simulate `n` time steps."""
         for _ in range(n):
             self._bullet.stepSimulation(physicsClientId=self._client)
 
     def pose(self, number: int) -> Pose:
-        """Return the pose of a block now."""
-        body = self._bodies[number]
-        center_m, quat = self._bullet.getBasePositionAndOrientation(
-            body.id, physicsClientId=self._client
-        )
-        quat_xyzw = np.array(quat)
-        return Pose(np.array(center_m) - quat_xyzw_to_matrix(quat_xyzw) @ body.center_m, quat_xyzw)
+        body, offset_m = self._bodies[number]
+        found = self._bullet.getBasePositionAndOrientation(body, physicsClientId=self._client)
+        center_m, quat_xyzw = map(np.array, found)
+        return Pose(center_m - quat_xyzw_to_matrix(quat_xyzw) @ offset_m, quat_xyzw)
 
     def velocity(self, number: int) -> Velocity:
-        """Return the velocity of a block now."""
-        body = self._bodies[number].id
+        body, _ = self._bodies[number]
         return Velocity(*self._bullet.getBaseVelocity(body, physicsClientId=self._client))
 
     def set_velocity(self, number: int, velocity: Velocity) -> None:
-        """Make a block move like this from now on."""
-        self._bullet.resetBaseVelocity(
-            self._bodies[number].id,
-            velocity.linear_m_s,
-            velocity.angular_rad_s,
-            physicsClientId=self._client,
-        )
+        body, _ = self._bodies[number]
+        self._bullet.resetBaseVelocity(body, *velocity, physicsClientId=self._client)
 
     def _set_friction(self, body: int) -> None:
         self._bullet.changeDynamics(
@@ -168,11 +148,10 @@ class BulletSimulation:
         """
         if SHAPES[block_type].is_box:
             half_m = list(SHAPES[block_type].high_m)
-            return int(
-                self._bullet.createCollisionShape(
-                    self._bullet.GEOM_BOX, halfExtents=half_m, physicsClientId=self._client
-                )
+            shape = self._bullet.createCollisionShape(
+                self._bullet.GEOM_BOX, halfExtents=half_m, physicsClientId=self._client
             )
+            return int(shape)
         center = np.array(SHAPES[block_type].center_of_mass_m)
         lines: list[str] = []
         first = 1

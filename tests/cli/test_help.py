@@ -15,7 +15,7 @@ from phyblock.sim.engine import ENGINES
 
 VERBS = tuple(group.list_commands(None))  # type: ignore[arg-type]
 CALLS = re.compile(rf"\bphyblock ((?:{'|'.join(VERBS)})\b[^\n`;|&>\"#]*)")
-LIBRARIES = (engine.library for engine in ENGINES.values())
+LIBRARIES = tuple(ENGINES)
 HEAVY = ("litellm", *LIBRARIES, "pandas", "aiohttp", "matplotlib", "phyblock.making")
 SCRIPT = """
 import atexit, sys
