@@ -116,7 +116,7 @@ def _serve(
     from phyblock.results.load import load_run
 
     for other in beside:
-        load_run(other, texts=False)
+        load_run(other)
 
     def begun() -> None:
         print_path(console, f"Open {server.address}")

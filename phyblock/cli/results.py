@@ -68,7 +68,7 @@ def _print_tables(folder: Path, names: Sequence[str], form: str, *, is_paper: bo
     from phyblock.results.tables import make_tables, table_names
     from phyblock.results.text import to_latex, to_markdown
 
-    run = load_run(folder, texts=False)
+    run = load_run(folder)
     if is_paper:
         made = {f"paper{n}": beside_paper(run, n) for n in PAPER_TABLES}
         tables = {name: table for name, table in made.items() if table is not None}
@@ -149,11 +149,11 @@ def compare(
     from phyblock.results.load import load_run
 
     names = split_names(models)
-    first = load_run(run, texts=False)
+    first = load_run(run)
     if other is None:
         comparison = compare_models(first, names, track, measure)
     else:
-        second = load_run(other, texts=False)
+        second = load_run(other)
         comparison = compare_runs(first, second, names, track, measure)
     console = make_console()
     print_table(console, compare_view(comparison))
@@ -209,7 +209,7 @@ def figures(
         COLUMN_IN,
         WIDTH_IN,
         Look,
-        figure_titles,
+        figures_of,
         write_paper_figures,
     )
     from phyblock.results.load import load_run, of_models
@@ -223,8 +223,8 @@ def figures(
         raise click.BadParameter(
             f"{width!r} is no width (allowed: {allowed})", param_hint="--width"
         )
-    loaded = of_models(load_run(run, texts=False), split_names(models))
-    known = figure_titles(loaded)
+    loaded = of_models(load_run(run), split_names(models))
+    known = figures_of(loaded)
     if unknown := [name for name in names if name not in known]:
         found, allowed = ", ".join(unknown), ", ".join(known)
         raise SpecError(Problem(str(run), "has no such figure", "--only", found, allowed))
@@ -298,7 +298,7 @@ def export(
     if (run is None) == (questions is None):
         raise click.UsageError("Name the folder of a run, or --questions.")
     if run is not None:
-        files = export_run(load_run(run, texts=False), form, out)
+        files = export_run(load_run(run), form, out)
     else:
         assert questions is not None
         if out is None:

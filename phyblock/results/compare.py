@@ -1,8 +1,7 @@
-"""Models compared on the same samples: differences, how sure they are, and ranks."""
+"""Models compared on the same samples: differences, ranks, and what varied presentation changes."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -11,16 +10,17 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
+from phyblock.config.suite import REPEAT, Variant, VarySpec
 from phyblock.errors import Problem, SpecError
 from phyblock.files import OutFolder
-from phyblock.records.manifest import ManifestDataset, ManifestQuestions
 from phyblock.results.estimates import (
-    counted_samples,
+    Rows,
+    base_scenes,
+    counted_rows,
     headline_columns,
-    headline_rows,
     main_measure,
-    parents_of,
     pooled_in,
     track_measures,
     value_of_cells,
@@ -36,22 +36,37 @@ from phyblock.results.text import (
     to_csv,
     to_latex,
     to_markdown,
+    track_column,
+    track_text,
+    with_interval,
 )
-from phyblock.scoring.counts import Floats, Metric
+from phyblock.scoring.counts import Floats
 from phyblock.scoring.statistics import (
     CONFIDENCE,
+    NO_COMPONENT,
     POWER,
     Clusters,
+    Component,
     bounded,
     detectable,
     holm,
+    interaction,
     jackknife,
     least_p,
     rank_ranges,
+    shift,
+    spread_of_items,
+    within,
 )
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of, kinds
-from phyblock.tracks.measures import CELL, Cell, Measure, in_unit
+from phyblock.tracks.measures import SCORED_BY, Cell, Measure, in_unit
+
+_LEVEL = 1 - CONFIDENCE
+_KEYS = ["scene", "item", "seed", "variant"]
+_FLIPPED = ["a", "b", *_KEYS, "right", "value_a", "value_b"]
+_AT_ONCE = 100
+"""Pairs that are estimated together, which bounds memory."""
 
 
 def check_alike(run: Run, first: Run, cells: Sequence[str], track: str, measure: Measure) -> None:
@@ -60,24 +75,27 @@ def check_alike(run: Run, first: Run, cells: Sequence[str], track: str, measure:
     The track says what must agree in how the two were asked and scored; scenes of a name must be
     the same.
     """
-    where = str(run.path)
-    for field in ("dataset", "questions"):
+
+    def differs(message: str, field: str, found: str, wanted: str = "", hint: str = "") -> None:
+        message = f"{message} {first.path}"
+        raise SpecError(Problem(str(run.path), message, field, found, wanted, hint))
+
+    sets = [(one.manifest.dataset, one.manifest.questions) for one in (run, first)]
+    for field, mine, other in zip(("dataset", "questions"), *sets, strict=True):
         # Scenes and questions of two versions of a set may share a name and nothing else.
-        found, wanted = (getattr(one.manifest, field) for one in (run, first))
-        if found is None or wanted is None or _name(found) != _name(wanted):
+        if mine is None or other is None or mine.version == other.version:
             continue
-        if found.version != wanted.version:
-            message = f"is of another version of {_name(found)} than {first.path}"
-            versions = str(found.version), str(wanted.version)
-            hint = "run the suite again on the newer version"
-            raise SpecError(Problem(where, message, f"{field}.version", *versions, hint))
+        names = [getattr(one, "name", "") or Path(one.root).name for one in (mine, other)]
+        if names[0] == names[1]:
+            hint, versions = "run the suite again on the newer version", (mine, other)
+            said, wanted = (str(one.version) for one in versions)
+            differs(f"is of another version of {names[0]} than", f"{field}.version", said, wanted,
+                    hint)  # fmt: skip
     vary, wanted_vary = (one.design.suite.vary for one in (run, first))
     if vary != wanted_vary:
-        # Values of other factors mean other things.
-        message = f"asks in other ways than {first.path}"
-        said, allowed = (", ".join(one.factors) or "nothing" for one in (vary, wanted_vary))
+        said, wanted = (", ".join(one.factors) or "nothing" for one in (vary, wanted_vary))
         hint = "compare runs that vary the same, in the same order"
-        raise SpecError(Problem(where, message, "vary", said, allowed, hint))
+        differs("asks in other ways than", "vary", said, wanted, hint)
     if (check := kind_of(track).report().check_alike) is not None:
         check(run, first, cells, measure)
     blocks = [
@@ -85,16 +103,8 @@ def check_alike(run: Run, first: Run, cells: Sequence[str], track: str, measure:
     ]
     both = pd.concat(blocks, axis=1, join="inner", keys=["first", "other"])
     if len(differ := both[both["first"] != both["other"]]):
-        message = f"is of other data than {first.path}"
-        blocks_of = f"other blocks in {counted(len(differ), 'scene')}, the first {differ.index[0]}"
-        raise SpecError(Problem(where, message, "scenes", blocks_of))
-
-
-def _name(data: ManifestDataset | ManifestQuestions) -> str:
-    return data.name if isinstance(data, ManifestDataset) else Path(data.root).name
-
-
-_KEYS = ["scene", "item", "seed", "variant"]
+        said = f"other blocks in {counted(len(differ), 'scene')}, the first {differ.index[0]}"
+        differs("is of other data than", "scenes", said)
 
 
 @dataclass(frozen=True)
@@ -104,6 +114,33 @@ class Part:
     name: str
     cell: str
     criterion: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """A model of a run, under the name that a comparison gives it."""
+
+    label: str
+    model: str
+    run: Run
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Counts of the samples that several sides have in a part of a track.
+
+    `keys` has a row for each scene, item, seed and variant, ascending; `cell` is its pooled cell,
+    and `counts`, (sides, keys, columns), NaN where a side has no such sample.
+    """
+
+    keys: pd.DataFrame
+    cell: NDArray[np.intp]
+    counts: Floats
+
+    @property
+    def has(self) -> NDArray[np.bool_]:
+        """True where a side has a sample, (sides, keys)."""
+        return ~np.isnan(self.counts[:, :, 0])
 
 
 @dataclass(frozen=True)
@@ -126,78 +163,68 @@ class Comparable:
         members = pooled_in(cell, self.cells)
         return tuple(cell.name for cell in self.cells if cell.name in members)
 
-    def samples(self, run: Run, part: Part, design: Design) -> dict[str, pd.DataFrame]:
-        """Counts of a part by model, by scene, item, seed and variant, with its pooled cell."""
-        pooled = self.pooled(part)
-        rows = counted_samples(replace(run, design=design), self.track, self.measure.counted)
-        rows = headline_rows(rows[rows[CELL].isin(pooled)], design)
-        if part.criterion:
-            rows = rows[rows["criterion"] == part.criterion]
-        heard = rows.groupby(["model", CELL])["replied"].transform("any")
-        rows = rows[heard.astype(bool)]
-        place = {name: number for number, name in enumerate(pooled)}
-        indexed = rows.assign(pooled_cell=rows[CELL].map(place)).set_index(_KEYS)
-        columns = ["pooled_cell", *self.measure.counted.columns]
-        return {str(model): mine[columns] for model, mine in indexed.groupby("model", sort=False)}
+    def samples(self, sides: Sequence[Side], part: Part, design: Design) -> Samples:
+        """Return the samples of sides in the headline setting and matcher of a design."""
+        runs = list({id(side.run): side.run for side in sides}.values())
+        found, counts = [], []
+        for n, run in enumerate(runs):
+            rows = counted_rows(replace(run, design=design), self.track, self.measure.counted)
+            table, own = self._chosen(rows, part, design)
+            found.append(table.assign(run=n))
+            counts.append(own)
+        table, numbers = pd.concat(found, ignore_index=True), np.concatenate(counts)
+        key = table.groupby(_KEYS, sort=True).ngroup().to_numpy()
+        _, first = np.unique(key, return_index=True)
+        all_counts = np.full((len(sides), len(first), numbers.shape[1]), np.nan)
+        for n, side in enumerate(sides):
+            place = next(place for place, run in enumerate(runs) if run is side.run)
+            mine = ((table["run"] == place) & (table["model"] == side.model)).to_numpy()
+            all_counts[n, key[mine]] = numbers[mine]
+        keys = table.loc[first, _KEYS].reset_index(drop=True)
+        return Samples(keys, table["cell"].to_numpy(np.intp)[first], all_counts)
+
+    def _chosen(self, rows: Rows, part: Part, design: Design) -> tuple[pd.DataFrame, Floats]:
+        """Rows of a part with the number of their pooled cell, and their counts.
+
+        Those of models that said nothing at all in a cell are left out.
+        """
+        masks = np.stack([rows.cells[name] for name in self.pooled(part)])
+        wanted = dict(zip(SCORED_BY, (design.setting, design.matcher, part.criterion), strict=True))
+        used = masks.any(axis=0)
+        for name, value in wanted.items():
+            if value:
+                used &= rows.about[name].isin(["", value]).to_numpy()
+        about = rows.about[used]
+        records = rows.run.records.iloc[about["place"]]
+        table = records[["model", "scene", "seed", "variant"]].reset_index(drop=True)
+        cell = masks[:, used].argmax(axis=0)
+        table = table.assign(item=about["item"].to_numpy(), cell=cell, heard=rows.replied[used])
+        heard = table.groupby(["model", "cell"])["heard"].transform("any").to_numpy(bool)
+        return table[heard], rows.counts[used][heard]
 
     def values(self, run: Run, part: Part, design: Design) -> Iterator[tuple[str, pd.Series]]:
         """Return the value of each sample in the measure's unit, by model; by scene, item, seed and
         variant, without samples that have no value.
         """
-        each = self.each(part)
-        for model, samples in self.samples(run, part, design).items():
-            worth = self.measure.scale * each(self.counts_of(samples, part))
-            yield model, pd.Series(worth, index=samples.index.set_names(_KEYS)).dropna()
+        sides = [Side(name, name, run) for name in run.design.model_names]
+        samples = self.samples(sides, part, design)
+        index = pd.MultiIndex.from_frame(samples.keys)
+        for side, counts, has in zip(sides, samples.counts, samples.has, strict=True):
+            if has.any():
+                worth = self.measure.scale * self.measure.value(counts)
+                yield side.model, pd.Series(worth, index=index)[has].dropna()
 
-    def counts(self, both: pd.DataFrame, part: Part) -> Floats:
-        """Counts of paired samples, flat over pooled cells: (samples, 2, pooled x (columns + 1)).
+    def of_sums(self, part: Part, totals: Floats) -> Callable[[Floats], Floats]:
+        """Return the value of sums of counts (..., pooled, columns and number of samples).
 
-        Behind the columns of each pooled cell stands how many samples it has.
+        Means are over the pooled cells of which `totals` have samples.
         """
-        return np.stack([self.counts_of(pd.DataFrame(both[name]), part) for name in "ab"], axis=1)
-
-    def counts_of(self, samples: pd.DataFrame, part: Part) -> Floats:
-        """Counts of samples of one model, in the form of `counts` without its second axis."""
-        columns = list(self.measure.counted.columns)
-        counts = np.zeros((len(samples), len(self.pooled(part)), len(columns) + 1))
-        rows, pooled_cell = np.arange(len(samples)), samples["pooled_cell"].to_numpy(np.intp)
-        counts[rows, pooled_cell, :-1] = samples[columns].to_numpy(np.float64)
-        counts[rows, pooled_cell, -1] = 1
-        return counts.reshape(len(samples), -1)
-
-    def n_counts(self, part: Part) -> int:
-        """Length of the last axis of `counts`."""
-        return len(self.pooled(part)) * (len(self.measure.counted.columns) + 1)
-
-    def each(self, part: Part) -> Metric:
-        """Return the value of one sample."""
-        unflat = self._unflat(part)
-        return lambda sums: self.measure.value(unflat(sums)[..., :-1].sum(axis=-2))
-
-    def whole(self, part: Part, totals: Floats) -> Metric:
-        """Return the values of sums; means are over the pooled cells of which `totals` have
-        samples.
-        """
-        unflat, pooled = self._unflat(part), self.pooled(part)
-        values = value_of_cells(self.measure, self.cells_of(part), pooled)
-        asked = unflat(totals)[..., -1] > 0
-
-        def metric(sums: Floats) -> Floats:
-            # Sums without a pooled cell that was asked have no value.
-            return np.asarray(values(unflat(sums)[..., :-1], asked)[..., -1])
-
-        return metric
-
-    def cells_of(self, part: Part) -> tuple[Cell, ...]:
-        """The cells below a part, and its own as the last."""
         reached = {part.cell}
         for cell in reversed(self.cells):
             reached |= set(cell.of) if cell.name in reached else set()
-        return tuple(cell for cell in self.cells if cell.name in reached)
-
-    def _unflat(self, part: Part) -> Callable[[Floats], Floats]:
-        shape = (len(self.pooled(part)), len(self.measure.counted.columns) + 1)
-        return lambda sums: np.asarray(sums.reshape(*sums.shape[:-1], *shape))
+        cells = [cell for cell in self.cells if cell.name in reached]
+        values = value_of_cells(self.measure, cells, self.pooled(part))
+        return lambda sums: values(sums[..., :-1], totals[..., -1] > 0)[..., -1]
 
 
 def comparable(run: Run, track: str, measure: str = "") -> Comparable:
@@ -210,29 +237,19 @@ def comparable(run: Run, track: str, measure: str = "") -> Comparable:
         message, allowed = "has no such measure", ", ".join(known)
         raise SpecError(Problem(f"track {track}", message, "--measure", measure, allowed))
     chosen = known[measure] if measure else main_measure(run, track)
-    report = kind_of(track).report()
+    report, columns = kind_of(track).report(), headline_columns(run, track)
     cells = report.cells(run)
-    shown = report.headline(run) if report.headline is not None else ()
-    criteria = [s.criterion for s in shown if s.measure == chosen.name and s.criterion]
+    criteria = [s.criterion for s in columns if s.measure == chosen.name and s.criterion]
     # A part of a mean that is pooled itself is too small to be compared alone.
-    parts = [
-        Part(cell.name, cell.name)
-        for cell in cells
-        if cell.of or not any(cell.name in other.of for other in cells)
+    names = [
+        cell.name for cell in cells if cell.of or not any(cell.name in other.of for other in cells)
     ]
+    parts = [Part(name, name) for name in names]
     if criteria:
-        parts = [
-            Part(criterion, part.cell, criterion)
-            for part in parts
-            for criterion in reversed(criteria)
-        ]
-    is_headline = chosen.name in {column.measure for column in headline_columns(run, track)}
-    notes = report.notes(run) if is_headline else ()
+        parts = [Part(one, name, one) for name in names for one in reversed(criteria)]
+    notes = report.notes(run) if chosen.name in {column.measure for column in columns} else ()
     how = " ".join((f"{chosen.heading}: {chosen.meaning}.", *notes, "Samples that both have."))
     return Comparable(track, chosen, cells, tuple(parts), how)
-
-
-_LEVEL = 1 - CONFIDENCE
 
 
 def with_verdicts(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:
@@ -271,12 +288,10 @@ def ranks(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:
     """
     whole = table[table["part"] == table["part"].iloc[-1]] if len(table) else table
     names = list(dict.fromkeys([*whole["a"], *whole["b"]]))
-    columns = ["model", "value", "best", "worst"]
-    n = len(names)
+    n, columns = len(names), ["model", "value", "best", "worst"]
     if len(whole) != n * (n - 1) // 2 or whole["p"].isna().any():
         return pd.DataFrame(columns=columns)
-    is_better = np.zeros((n, n), dtype=bool)
-    values: dict[str, float] = {}
+    is_better, values = np.zeros((n, n), dtype=bool), dict.fromkeys(names, np.nan)
     for row in whole.to_dict("records"):
         a, b = names.index(row["a"]), names.index(row["b"])
         a_is_better = (row["difference"] > 0) == (measure.better == "higher")
@@ -284,23 +299,10 @@ def ranks(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:
         values |= {row["a"]: row["value_a"], row["b"]: row["value_b"]}
     ranges = rank_ranges(is_better)
     rows = [(name, values[name], *ranges[place]) for place, name in enumerate(names)]
-    table = pd.DataFrame(rows, columns=columns)
     is_ascending = measure.better == "lower"
-    return table.sort_values("value", ascending=is_ascending, ignore_index=True, kind="stable")
-
-
-_FLIPPED = ["a", "b", "scene", "item", "seed", "variant", "right", "value_a", "value_b"]
-_AT_ONCE = 100
-"""Pairs that are estimated together, which bounds memory."""
-
-
-@dataclass(frozen=True, eq=False)
-class Side:
-    """A model of a run, under the name that a comparison gives it."""
-
-    label: str
-    model: str
-    run: Run
+    return pd.DataFrame(rows, columns=columns).sort_values(
+        "value", ascending=is_ascending, ignore_index=True, kind="stable"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -352,22 +354,25 @@ def compare_runs(
     """Each model that both runs have; or, with two `models`, one of the first and one of the other.
 
     In every part where that is one pair, else as a whole; `track` and `measure` as for
-    `compare_models`. Raises
-    SpecError for names that are not there.
+    `compare_models`. Raises SpecError for names that are not there.
     """
+    where = f"{first.path}, {second.path}"
     if len(models) == 2:
         names = [(*checked_models(first, models[:1]), *checked_models(second, models[1:]))]
     else:
         shared = [name for name in first.design.model_names if name in second.design.model_names]
         if unknown := [name for name in models if name not in shared]:
             allowed = ", ".join(shared) or "none is in both"
-            message = f"are not both runs of {', '.join(unknown)}"
-            raise SpecError(Problem(f"{first.path}, {second.path}", message, allowed=allowed))
+            raise SpecError(
+                Problem(where, f"are not both runs of {', '.join(unknown)}", allowed=allowed)
+            )
         names = [(name, name) for name in models or shared]
     if not names:
-        message, hint = "have no model in common", "name one of each: --models A,B"
-        raise SpecError(Problem(f"{first.path}, {second.path}", message, hint=hint))
-    tags = _tags(first, second)
+        hint = "name one of each: --models A,B"
+        raise SpecError(Problem(where, "have no model in common", hint=hint))
+    folders = first.path.resolve().name, second.path.resolve().name
+    tags = folders if folders[0] != folders[1] else (str(first.path), str(second.path))
+    tags = tags if tags[0] != tags[1] else ("first", "second")
     pairs = [
         (Side(f"{a} ({tags[0]})", a, first), Side(f"{b} ({tags[1]})", b, second)) for a, b in names
     ]
@@ -386,13 +391,6 @@ def _shared_track(runs: Sequence[Run], wanted: str) -> str:
     return wanted or shared[0]
 
 
-def _tags(first: Run, second: Run) -> tuple[str, str]:
-    """Return two labels that tell runs apart: folders' names, else paths, else their order."""
-    names = first.path.resolve().name, second.path.resolve().name
-    paths = str(first.path), str(second.path)
-    return next((pair for pair in (names, paths) if pair[0] != pair[1]), ("first", "second"))
-
-
 def compare(
     pairs: Sequence[tuple[Side, Side]], parts: Sequence[Part], what: Comparable
 ) -> Comparison:
@@ -403,42 +401,41 @@ def compare(
     scene of the same name.
     """
     design = pairs[0][0].run.design
-    sides = {side.label: side for pair in pairs for side in pair}
-    runs = list({id(side.run): side.run for side in sides.values()}.values())
+    sides = list({side.label: side for pair in pairs for side in pair}.values())
+    place = {side.label: n for n, side in enumerate(sides)}
+    runs = list({id(side.run): side.run for side in sides}.values())
     for run in runs[1:]:
         check_alike(run, runs[0], [part.cell for part in parts], what.track, what.measure)
-    parents = pd.concat([parents_of(run) for run in runs]).groupby(level=0).first()
-    labels = [(a.label, b.label) for a, b in pairs]
+    parents = {scene: found for run in runs for scene, found in base_scenes(run).items()}
+    labels = pd.DataFrame([(a.label, b.label) for a, b in pairs], columns=["a", "b"])
+    numbers = np.array([(place[a.label], place[b.label]) for a, b in pairs])
     tables: list[pd.DataFrame] = []
-    flips: list[pd.DataFrame] = []
+    flipped = pd.DataFrame(columns=_FLIPPED)
     for part in parts:
-        of_run = {id(run): what.samples(run, part, design) for run in runs}
-        samples = {name: of_run[id(side.run)].get(side.model) for name, side in sides.items()}
-        counted = [_paired(samples[a], samples[b], what, part) for a, b in labels]
-        tables.append(_differences(labels, counted, parents, part, what))
+        samples = what.samples(sides, part, design)
+        batches = [
+            _differences(samples, numbers[start : start + _AT_ONCE], parents, part, what)
+            for start in range(0, len(pairs), _AT_ONCE)
+        ]
+        found = pd.concat(batches, ignore_index=True)
+        tables.append(pd.concat([labels.assign(part=part.name), found], axis=1))
         if part == parts[-1]:
             flips = [
-                _flipped(*pair, one, what, part) for pair, one in zip(labels, counted, strict=True)
+                _flips(samples, of_pair, (a.label, b.label), what)
+                for of_pair, (a, b) in zip(numbers, pairs, strict=True)
             ]
+            if flips := [flip for flip in flips if len(flip)]:
+                flipped = pd.concat(flips, ignore_index=True)[_FLIPPED]
     table = with_verdicts(pd.concat(tables, ignore_index=True), what.measure)
-    # Some versions of pandas warn of an empty frame among others.
-    flips = [flip for flip in flips if len(flip)] or [pd.DataFrame(columns=_FLIPPED)]
-    flipped = pd.concat(flips)[_FLIPPED]
-    return Comparison(
-        table,
-        flipped.reset_index(drop=True),
-        ranks(table, what.measure),
-        what.measure.heading,
-        what.measure.unit,
-        " ".join([what.how, *_asked(runs, what.track)]),
-    )
+    measure, how = what.measure, " ".join([what.how, *_asked(runs, what.track)])
+    rows = ranks(table, measure)
+    return Comparison(table, flipped, rows, measure.heading, measure.unit, how)
 
 
 def _asked(runs: Sequence[Run], track: str) -> Iterator[str]:
     """Return what is unusual about how each run asked and read, where there is anything."""
     for run in runs:
-        words = (*kind_of(track).report().showing(run), *run.varied_words)
-        if words:
+        if words := (*kind_of(track).report().showing(run), *run.varied_words):
             yield f"Run {run.path.name}: {', '.join(words)}."
     readers = {run.path.name: run.manifest.versions.get("readers", "1") for run in runs}
     if len(set(readers.values())) > 1:
@@ -446,151 +443,104 @@ def _asked(runs: Sequence[Run], track: str) -> Iterator[str]:
         yield f"Replies were read: {names}; phyblock score reads a run with those of this version."
 
 
-@dataclass(frozen=True, eq=False)
-class _Paired:
-    """Samples that two sides both have: a row each in `keys`, and (samples, 2, counts)."""
-
-    keys: pd.DataFrame
-    counts: Floats
-
-
-def _paired(
-    a: pd.DataFrame | None, b: pd.DataFrame | None, what: Comparable, part: Part
-) -> _Paired | None:
-    """None where a side has no sample."""
-    if a is None or b is None:
-        return None
-    both = pd.concat([a, b], axis=1, join="inner", keys=["a", "b"])
-    return _Paired(both.index.to_frame(index=False), what.counts(both, part)) if len(both) else None
-
-
 def _differences(
-    labels: Sequence[tuple[str, str]],
-    paired: Sequence[_Paired | None],
-    parents: pd.Series[Any],
+    samples: Samples,
+    pairs: NDArray[np.intp],
+    parents: Mapping[str, tuple[str, ...]],
     part: Part,
     what: Comparable,
 ) -> pd.DataFrame:
-    """Rows of `Comparison.table` but for corrected p values and verdicts."""
-    scenes = sorted({scene for one in paired if one for scene in one.keys["scene"]})
-    place = {scene: n for n, scene in enumerate(scenes)}
-    clusters = Clusters.of([tuple(parents[scene]) or (scene,) for scene in scenes])
-    batches = [
-        _estimated(paired[start : start + _AT_ONCE], place, clusters, what, part)
-        for start in range(0, len(paired), _AT_ONCE)
-    ]
-    keys = pd.DataFrame(list(labels), columns=["a", "b"]).assign(part=part.name)
-    return pd.concat([keys, pd.concat(batches, ignore_index=True)], axis=1)
-
-
-def _estimated(
-    paired: Sequence[_Paired | None],
-    place: Mapping[str, int],
-    clusters: Clusters,
-    what: Comparable,
-    part: Part,
-) -> pd.DataFrame:
-    counts = np.zeros((len(place), len(paired), 2, what.n_counts(part)))
-    seen = np.zeros((len(place), len(paired)), dtype=bool)
-    for n, one in enumerate(paired):
-        if one:
-            rows = [place[scene] for scene in one.keys["scene"]]
-            np.add.at(counts[:, n], rows, one.counts)
-            seen[rows, n] = True
-    totals = counts.sum(axis=0)
-    whole = what.whole(part, totals)
+    """Rows of `Comparison.table` for pairs of sides, but for names, corrected p and verdicts."""
+    scene, scenes = pd.factorize(samples.keys["scene"], sort=True)
+    shape = (len(scenes), len(what.pooled(part)), samples.counts.shape[-1] + 1)
+    sums = np.zeros((shape[0], len(pairs), 2, *shape[1:]))
+    seen = np.zeros((shape[0], len(pairs)), dtype=bool)
+    tallies = []
+    for n, pair in enumerate(pairs):
+        both = samples.has[pair].all(axis=0)
+        counts = samples.counts[pair][:, both]
+        for side in range(2):
+            at = (scene[both], samples.cell[both])
+            ones = np.ones((len(at[0]), 1))
+            np.add.at(sums[:, n, side], at, np.concatenate([counts[side], ones], axis=1))
+        seen[scene[both], n] = True
+        # A plan without a step for a goal without a block would have no F1; there is none.
+        a, b = np.nan_to_num(what.measure.value(counts))
+        sign = np.sign(a - b) * (1 if what.measure.better == "higher" else -1)
+        tallies.append([(sign > 0).sum(), (sign < 0).sum(), (sign == 0).sum(), len(sign)])
+    used = seen.any(axis=1)
+    sums, seen = sums[used], seen[used]
+    clusters = Clusters.of([parents[name] for name in np.asarray(scenes)[used]])
+    totals = sums.sum(axis=0)
+    whole = what.of_sums(part, totals)
     sizes = clusters.behind(seen)
-    estimate = jackknife(counts, clusters, lambda sums: _difference(whole(sums)), n_clusters=sizes)
-    estimate = bounded(estimate, what.measure.most_apart / what.measure.scale)
     values = whole(totals)
-    numbers = {"value_a": values[:, 0], "value_b": values[:, 1], "difference": estimate.value}
-    numbers |= {"se": estimate.se, "lo": estimate.lo, "hi": estimate.hi}
-    table = pd.DataFrame({name: what.measure.scale * value for name, value in numbers.items()})
-    tallies = pd.DataFrame([_tally(one, what, part) for one in paired])
-    more = {"n_scenes": seen.sum(axis=0), "n_clusters": sizes}
-    return pd.concat([table.assign(p=estimate.p), tallies], axis=1).assign(**more)
+    estimate = jackknife(
+        sums, clusters, lambda one: whole(one)[..., 0] - whole(one)[..., 1], n_clusters=sizes
+    )
+    scale = what.measure.scale
+    estimate = bounded(estimate, what.measure.most_apart / scale)
+    table = pd.DataFrame(
+        {
+            **{"value_a": scale * values[:, 0], "value_b": scale * values[:, 1]},
+            **{"difference": scale * estimate.value, "se": scale * estimate.se},
+            **{"lo": scale * estimate.lo, "hi": scale * estimate.hi, "p": estimate.p},
+        }
+    )
+    table[["better", "worse", "same", "n_samples"]] = tallies
+    return table.assign(n_scenes=seen.sum(axis=0), n_clusters=sizes)
 
 
-def _difference(values: Floats) -> Floats:
-    return np.asarray(values[..., 0] - values[..., 1])
-
-
-def _tally(one: _Paired | None, what: Comparable, part: Part) -> dict[str, int]:
-    """On how many samples the first side is better, worse, the same, and how many there are."""
-    # A plan without a step for a goal without a block would have no F1; there is none.
-    sign = np.sign(np.nan_to_num(_difference(what.each(part)(one.counts)))) if one else np.zeros(0)
-    sign = sign if what.measure.better == "higher" else -sign
-    counts = {"better": int((sign == 1).sum()), "worse": int((sign == -1).sum())}
-    return {**counts, "same": int((sign == 0).sum()), "n_samples": len(sign)}
-
-
-def _flipped(a: str, b: str, one: _Paired | None, what: Comparable, part: Part) -> pd.DataFrame:
-    if one is None:
-        return pd.DataFrame(columns=_FLIPPED)
-    values = what.measure.scale * np.nan_to_num(what.each(part)(one.counts))
-    table = one.keys.assign(a=a, b=b, value_a=values[:, 0], value_b=values[:, 1])
-    right = values == what.measure.best
-    table["right"] = np.where(right[:, 0], a, b)
-    rows = table.loc[right[:, 0] != right[:, 1], _FLIPPED]
-    return rows.sort_values(["right", "scene", "item", "seed", "variant"])
+def _flips(
+    samples: Samples, pair: NDArray[np.intp], names: tuple[str, str], what: Comparable
+) -> pd.DataFrame:
+    """Samples that one of two sides alone got wholly right."""
+    both = samples.has[pair].all(axis=0)
+    a, b = what.measure.scale * np.nan_to_num(what.measure.value(samples.counts[pair][:, both]))
+    table = samples.keys[both].assign(a=names[0], b=names[1], value_a=a, value_b=b)
+    table["right"] = np.where(a == what.measure.best, *names)
+    rows = table.loc[(a == what.measure.best) != (b == what.measure.best), _FLIPPED]
+    return rows.sort_values(["right", *_KEYS])
 
 
 def compare_view(found: Comparison) -> TextTable:
     """A row a pair and part; the part is left out where there is but one."""
     table = found.table
-    one_part = table["part"].nunique() == 1
-    columns = [
-        Column("A", is_text=True),
-        Column("B", is_text=True),
-        *([] if one_part else [Column("Part", is_text=True)]),
-        *(
-            Column(name, in_unit(found.name, found.unit))
-            for name in ("A", "B", "A - B", "95 % CI", "finds")
-        ),
-        Column("p (Holm)"),
-        Column("Verdict", is_text=True),
-        *(Column(name, "Samples") for name in ("A better", "B better", "same")),
-    ]
-    rows = []
-    previous: tuple[str, str] = ("", "")
+    parts = table["part"].nunique() > 1
+    group = in_unit(found.name, found.unit)
+    columns = [Column("A", is_text=True), Column("B", is_text=True)]
+    columns += [Column("Part", is_text=True)] if parts else []
+    columns += [Column(name, group) for name in ("A", "B", "A - B", "95 % CI", "finds")]
+    columns += [Column("p (Holm)"), Column("Verdict", is_text=True)]
+    columns += [Column(name, "Samples") for name in ("A better", "B better", "same")]
+    rows, previous = [], ("", "")
     for row in table.to_dict("records"):
         pair = (row["a"], row["b"])
-        rows.append(
-            (
-                *(pair if pair != previous else ("", "")),
-                *([] if one_part else [level_name(row["part"].replace("_", " "))]),
-                number(row["value_a"]),
-                number(row["value_b"]),
-                number(row["difference"], signed=True),
-                between(row["lo"], row["hi"], signed=True),
-                number(row["detectable_holm"]),
-                p_text(row["p_holm"]),
-                row["verdict"],
-                *(str(row[name]) for name in ("better", "worse", "same")),
-            )
-        )
+        texts = [*(pair if pair != previous else ("", ""))]
+        texts += [level_name(row["part"].replace("_", " "))] if parts else []
+        texts += [number(row["value_a"]), number(row["value_b"])]
+        texts += [number(row["difference"], signed=True)]
+        texts += [between(row["lo"], row["hi"], signed=True), number(row["detectable_holm"])]
+        texts += [p_text(row["p_holm"]), row["verdict"]]
+        rows.append((*texts, *(str(row[name]) for name in ("better", "worse", "same"))))
         previous = pair
-    return TextTable(
-        "Models compared on the same samples", tuple(columns), tuple(rows), _notes(found)
-    )
+    title = "Models compared on the same samples"
+    return TextTable(title, tuple(columns), tuple(rows), _notes(found))
 
 
 def _notes(found: Comparison) -> tuple[str, ...]:
-    table = found.table
-    most = max(table.to_dict("records"), key=lambda row: row["n_scenes"], default=None)
-    notes = [found.how]
-    if most is not None:
-        notes.append(
+    table, notes = found.table, [found.how]
+    if len(table):
+        most = table.to_dict("records")[int(table["n_scenes"].argmax())]
+        single = table["detectable"].dropna().median()
+        median = "" if pd.isna(single) else f"; a single test, in the median, {number(single)}"
+        notes += [
             f"{counted(most['n_samples'], 'sample')} of {counted(most['n_scenes'], 'scene')} from "
             f"{counted(most['n_clusters'], 'base scene')}; scenes that share one are not taken as "
-            "independent."
-        )
-        single = table["detectable"].dropna().median()
-        median = "" if math.isnan(single) else f"; a single test, in the median, {number(single)}"
-        notes.append(
+            "independent.",
             f"“finds”: the difference that this comparison would find in {POWER:.0%} of cases"
-            f"{median}; {NO_VALUE}: none that is possible, or no sample differs."
-        )
+            f"{median}; {NO_VALUE}: none that is possible, or no sample differs.",
+        ]
     notes.append(
         f"p values are corrected for {table['p'].notna().sum()} comparisons (Holm); “cannot tell” "
         "stands where p is 0.05 or more."
@@ -598,22 +548,22 @@ def _notes(found: Comparison) -> tuple[str, ...]:
     return tuple(notes)
 
 
+def rank_text(row: Mapping[Any, Any]) -> str:
+    """Return the ranks that a model may have: `2`, or `1 to 3`."""
+    return " to ".join(str(n) for n in sorted({row["best"], row["worst"]}))
+
+
 def ranks_view(found: Comparison) -> TextTable:
     """The rank that each model may have, out of `Comparison.ranks`, the best first."""
     rows = [
-        (
-            row["model"],
-            number(row["value"]),
-            " to ".join(str(n) for n in sorted({row["best"], row["worst"]})),
-        )
+        (row["model"], number(row["value"]), rank_text(row))
         for row in found.ranks.to_dict("records")
     ]
-    return TextTable(
-        "Ranks that each model may have",
-        (Column("Model", is_text=True), Column(in_unit(found.name, found.unit)), Column("Rank")),
-        tuple(rows),
-        ("All ranges hold at once with 95 % confidence, by the comparisons above.",),
-    )
+    columns = (
+        Column("Model", is_text=True), Column(in_unit(found.name, found.unit)), Column("Rank"),
+    )  # fmt: skip
+    note = "All ranges hold at once with 95 % confidence, by the comparisons above."
+    return TextTable("Ranks that each model may have", columns, tuple(rows), (note,))
 
 
 def p_text(p: float) -> str:
@@ -629,11 +579,10 @@ def flipped_lines(found: Comparison) -> tuple[str, ...]:
     several = found.flipped["seed"].nunique() > 1
     for (a, b), flips in found.flipped.groupby(["a", "b"], sort=False):
         for side, other in ((a, b), (b, a)):
-            rows = flips[flips["right"] == side]
             names = []
-            for row in rows.to_dict("records"):
-                how = (f"seed {row['seed']}" if several else "", row["variant"])
-                told = ", ".join(filter(None, how))
+            for row in flips[flips["right"] == side].to_dict("records"):
+                how = filter(None, (f"seed {row['seed']}" if several else "", row["variant"]))
+                told = ", ".join(how)
                 names.append(f"{row['item']} ({told})" if told else str(row["item"]))
             if names:
                 lines.append(
@@ -648,11 +597,148 @@ def write_comparison(found: Comparison, folder: Path) -> tuple[Path, ...]:
     Raises StoreError where they cannot be written.
     """
     view = compare_view(found)
-    texts: dict[str, bytes | str] = {
-        "comparison.csv": to_csv(found.table, "%.6f"),
-        "comparison.md": to_markdown(view),
-        "comparison.tex": to_latex(view, "phyblock-comparison"),
-        "flipped.csv": to_csv(found.flipped, "%.2f"),
-        "ranks.csv": to_csv(found.ranks, "%.6f"),
-    }
-    return OutFolder(folder).write(texts)
+    return OutFolder(folder).write(
+        {
+            "comparison.csv": to_csv(found.table, "%.6f"),
+            "comparison.md": to_markdown(view),
+            "comparison.tex": to_latex(view, "phyblock-comparison"),
+            "flipped.csv": to_csv(found.flipped, "%.2f"),
+            "ranks.csv": to_csv(found.ranks, "%.6f"),
+        }
+    )
+
+
+ITEMS = "items"
+"""The row of what differs from item to item, to hold factors against."""
+_COLUMNS = (
+    *("track", "model", "factor", "levels"),
+    *(f"{name}{end}" for name in ("shift", "single") for end in ("", "_lo", "_hi")),
+    *("n_items", "n_clusters"),
+)
+
+
+def sensitivity_frame(run: Run) -> pd.DataFrame:
+    """One row a track, model and factor: how far it moves scores, in the measure's unit.
+
+    `shift` is the standard deviation of the means of the `levels` of a factor, `single` that of the
+    scores of single items over levels beyond the shift; of repeats, that of one question asked
+    again; in the row `items`, that between items. `*_lo` and `*_hi` bound 95 % intervals over the
+    `n_clusters` base scenes of the `n_items` items that the model has in every way of asking.
+    See `phyblock.scoring.statistics`. Empty where the run varies nothing.
+    """
+    rows: list[dict[str, Any]] = []
+    vary = run.design.suite.vary
+    for track in run.design.suite.tracks if vary.factors else ():
+        what = comparable(run, track)
+        for model, scores, clusters in _scores(run, what):
+            for factor in (*vary.factors, ITEMS):
+                levels = len(scores) if factor == ITEMS else len(vary.names(factor))
+                row = {"track": track, "model": model, "factor": factor, "levels": levels}
+                parts = _components(vary, factor, scores, clusters)
+                for name, part in zip(("shift", "single"), parts, strict=True):
+                    scale = what.measure.scale
+                    row |= {name: scale * part.sd, f"{name}_lo": scale * part.lo}
+                    row[f"{name}_hi"] = np.minimum(scale * part.hi, what.measure.most_apart)
+                rows.append(row | {"n_items": len(scores), "n_clusters": clusters.size})
+    return pd.DataFrame(rows, columns=list(_COLUMNS))
+
+
+def _scores(run: Run, what: Comparable) -> Iterator[tuple[str, Floats, Clusters]]:
+    """Yield each model with its scores by the main measure, (items, seeds, variants), and the base
+    scenes of these items: those that it has in every way of asking. Models may have different ones.
+    """
+    suite, parents = run.design.suite, base_scenes(run)
+    sides = [Side(name, name, run) for name in run.design.model_names]
+    samples = what.samples(sides, what.parts[-1], run.design)
+    ways = [(seed, one.key) for seed in suite.seeds for one in suite.vary.variants]
+    index = pd.MultiIndex.from_frame(samples.keys)
+    for side, counts, has in zip(sides, samples.counts, samples.has, strict=True):
+        sizes = samples.keys[has].groupby(["scene", "item"]).size()
+        names = sorted(sizes.index[sizes == len(ways)])
+        if names:
+            wanted = pd.MultiIndex.from_tuples([(*name, *way) for name in names for way in ways])
+            values = np.nan_to_num(what.measure.value(counts[index.get_indexer(wanted)]))
+            scores = values.reshape(len(names), len(suite.seeds), suite.vary.n_variants)
+            yield side.model, scores, Clusters.of([parents[scene] for scene, _ in names])
+
+
+def _components(
+    vary: VarySpec, factor: str, scores: Floats, clusters: Clusters
+) -> tuple[Component, Component]:
+    """The shift of a factor, and what it does to single items."""
+    if factor == ITEMS:
+        return NO_COMPONENT, spread_of_items(scores, clusters)
+    # (items, levels, blocks with each seed, repeats)
+    of_levels = np.moveaxis(scores[:, :, _places(vary, factor)], 1, 3)
+    of_levels = of_levels.reshape(*of_levels.shape[:2], -1, of_levels.shape[-1])
+    if factor == REPEAT:
+        return NO_COMPONENT, within(np.moveaxis(of_levels[..., 0], 1, 2), clusters)
+    # Repeats tell noise apart where nothing else was varied.
+    cells = of_levels.mean(axis=3) if of_levels.shape[2] > 1 else of_levels[:, :, 0]
+    return shift(cells, clusters), interaction(cells, clusters)
+
+
+def _places(vary: VarySpec, factor: str) -> NDArray[np.intp]:
+    """Numbers of the variants in which a factor has all its levels while all else stays, of shape
+    (levels, blocks, repeats).
+    """
+    levels, repeats = vary.names(factor), vary.names(REPEAT) or ("1",)
+    places: dict[Variant, dict[tuple[str, str], int]] = {}
+    for place, variant in enumerate(vary.variants):
+        here = dict(variant.levels)
+        level = here.pop(factor, levels[0])
+        again = level if factor == REPEAT else here.pop(REPEAT, "1")
+        places.setdefault(Variant(tuple(here.items())), {})[level, again] = place
+    # Of repeats each level is one: all others stand beside it as blocks.
+    pairs = [[(n, again) for again in ((n,) if factor == REPEAT else repeats)] for n in levels]
+    every = {pair for row in pairs for pair in row}
+    whole = [found for found in places.values() if every <= set(found)]
+    numbers = [[[found[pair] for pair in row] for found in whole] for row in pairs]
+    return np.array(numbers, dtype=np.intp)
+
+
+def factor_name(factor: str) -> str:
+    """Return the name of a factor for people."""
+    names = {REPEAT: "asked again", ITEMS: "between items"}
+    return names.get(factor, factor.replace("_", " "))
+
+
+def sensitivity_view(table: pd.DataFrame, run: Run) -> TextTable:
+    """Standard deviations with intervals out of `sensitivity_frame`, a row a model and factor."""
+    tracks = run.design.suite.tracks
+    rows = [
+        (
+            *(row["model"], *track_text(row["track"], tracks), factor_name(row["factor"])),
+            *(*with_interval(row, "shift"), *with_interval(row, "single")),
+        )
+        for row in table.to_dict("records")
+    ]
+    pairs = [
+        Column(n, head) for head in ("Shift of all", "Single items") for n in ("SD", "95 % CI")
+    ]
+    notes = [
+        f"{kind_of(str(track)).title}: {comparable(run, str(track)).measure.heading_in_unit}, "
+        f"{sizes_text(group)}."
+        for track, group in table.groupby("track", sort=False)
+    ]
+    notes.append(
+        "Shift: standard deviation of the means of a factor's levels. Single items: of one item's "
+        "score over levels, beyond the shift and noise; asked again: of one question repeated."
+    )
+    if table.loc[~table["factor"].isin([REPEAT, ITEMS]), "single"].isna().any():
+        notes.append("One factor alone without repeats cannot be told from noise in single items.")
+    columns = (
+        *(Column("Model", is_text=True), *track_column(tracks), Column("Factor", is_text=True)),
+        *pairs,
+    )
+    title = f"What the way of asking changes{run.design.of_suite}"
+    return TextTable(title, columns, tuple(rows), tuple(notes))
+
+
+def sizes_text(table: pd.DataFrame) -> str:
+    """Return how many items, of how many base scenes, are behind rows of `sensitivity_frame`: from
+    the model that has fewest to the one that has most.
+    """
+    ends = [(int(table[name].min()), int(table[name].max())) for name in ("n_items", "n_clusters")]
+    items, scenes = (f"{a}" if a == b else f"{a} to {b}" for a, b in ends)
+    return f"{items} items of {scenes} base scenes"

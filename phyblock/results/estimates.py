@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -28,99 +27,106 @@ from phyblock.tracks.measures import (
     Measure,
     SampleCounts,
 )
+from phyblock.types import WITHOUT_REPLY
+
+ESTIMATE_COLUMNS = (
+    *("measure", "model", *SCORED_BY, CELL, "n", "value", "seeds", "mean", "sd", "least", "most"),
+    *("lo", "hi", "se", "n_scenes", "n_clusters"),
+)
 
 
 @dataclass(frozen=True, eq=False)
-class Grouping:
-    """A column of few values: `values` are sorted, `codes` are places among them."""
+class Rows:
+    """Counts of samples, a row a sample and way of counting it.
 
-    codes: NDArray[np.intp]
-    values: list[Any]
-
-
-def grouped(table: pd.DataFrame, by: str | Sequence[str]) -> Grouping:
-    """Rows by their values in a column, or in several, whose values together are tuples."""
-    if isinstance(by, str):
-        codes, known = pd.factorize(table[by].to_numpy(), sort=True)
-        return Grouping(codes, list(known))
-    columns = [grouped(table, name) for name in by]
-    shape = tuple(len(column.values) for column in columns)
-    flat = np.ravel_multi_index([column.codes for column in columns], shape)
-    numbers, codes = np.unique(flat, return_inverse=True)
-    places = zip(*np.unravel_index(numbers, shape), strict=True)
-    values = [tuple(c.values[at] for c, at in zip(columns, place, strict=True)) for place in places]
-    return Grouping(codes.reshape(-1), values)
-
-
-def summed(
-    table: pd.DataFrame, columns: Sequence[str], groupings: Sequence[Grouping]
-) -> tuple[Floats, NDArray[np.intp]]:
-    """Sums of columns over rows by all groupings, shape (*groupings, columns), and the number of
-    rows, (*groupings); a missing value counts as nothing.
+    `counts` has shape (rows, columns of the counts). `about` has, by row, the place of its record
+    among the records of the run, its item, and the columns of `SCORED_BY`. `cells` says by pooled
+    cell which rows are in it; a row may be in several.
     """
-    shape = tuple(len(grouping.values) for grouping in groupings)
-    size = int(np.prod(shape))
-    if not size:
-        return np.zeros((*shape, len(columns))), np.zeros(shape, dtype=np.intp)
-    flat = np.ravel_multi_index([grouping.codes for grouping in groupings], shape)
-    values = [table[name].to_numpy(np.float64, na_value=np.nan) for name in columns]
-    sums = [_sums(flat, np.nan_to_num(value), size) for value in values]
-    rows = np.bincount(flat, minlength=size).reshape(shape)
-    return np.stack(sums, axis=-1).reshape(*shape, len(columns)), rows
+
+    run: Run
+    about: pd.DataFrame
+    counts: Floats
+    cells: Mapping[str, NDArray[np.bool_]]
+
+    def codes(self, *names: str) -> tuple[NDArray[np.intp], list[tuple[str, ...]]]:
+        """Return the number of each row's values in these columns among `values`, sorted."""
+        codes = np.zeros(len(self.about), dtype=np.intp)
+        values: list[tuple[str, ...]] = [()]
+        for name in names:
+            is_own = name in SCORED_BY
+            column = (self.about if is_own else self.run.records)[name].astype("category")
+            own = column.cat.codes.to_numpy(np.intp)
+            own = own if is_own else own[self.about["place"].to_numpy()]
+            known = list(column.cat.categories)
+            numbers, codes = np.unique(codes * len(known) + own, return_inverse=True)
+            codes = codes.reshape(-1)
+            values = [(*values[n // len(known)], known[n % len(known)]) for n in numbers]
+        return codes, values
+
+    @property
+    def replied(self) -> NDArray[np.bool_]:
+        """True for rows of samples on which the model said anything; a refusal does."""
+        outcomes = self.run.records["outcome"].isin(WITHOUT_REPLY).to_numpy()
+        return np.asarray(~outcomes[self.about["place"].to_numpy()])
 
 
-def _sums(places: NDArray[np.intp], values: Floats, size: int) -> Floats:
-    """Sums of values by their place, below `size`, whatever their order."""
-    if (values == np.rint(values)).all():
-        return np.bincount(places, values, size).astype(np.float64)
-    order = np.argsort(places, kind="stable")
-    ends = np.searchsorted(places[order], np.arange(size + 1))
-    parts = values[order].tolist()
-    sums = [math.fsum(parts[first:last]) for first, last in pairwise(ends.tolist())]
-    return np.array(sums, dtype=np.float64)
+def counted_rows(run: Run, track: str, counted: SampleCounts) -> Rows:
+    """Return the counts of a track's samples that measures are made from; see `SampleCounts`.
+
+    Raises StoreError for stored counts of another number than the measure has now.
+    """
+    table = counted.frame(run) if counted.frame is not None else _stored(run, track, counted)
+    places = run.records.index.get_indexer(pd.Index(table["row"]))
+    items = table["item"] if "item" in table else run.records["item"].to_numpy()[places]
+    ways = {name: np.asarray(table[name]) if name in table else "" for name in SCORED_BY}
+    about = pd.DataFrame({"place": places, "item": np.asarray(items), **ways})
+    counts = table[list(counted.columns)].to_numpy(np.float64)
+    everything = np.ones(len(table), dtype=bool)
+    cells = {cell.name: everything for cell in counted.cells}
+    return Rows(
+        run, about, np.nan_to_num(counts), cells or kind_of(track).report().in_cells(table, run)
+    )
 
 
-def base_scenes(parents: pd.Series[Any], scenes: Sequence[str]) -> list[tuple[str, ...]]:
+def _stored(run: Run, track: str, counted: SampleCounts) -> pd.DataFrame:
+    """Counts that records hold."""
+    none: NDArray[np.intp] = np.zeros(0, dtype=np.intp)
+    rows, lengths, numbers = run.counts.get(counted.name, (none, none, np.zeros(0)))
+    starts, width = np.cumsum(lengths) - lengths, len(counted.columns)
+    kept = np.isin(rows, run.counted(track).index) & (lengths > 0)
+    rows, starts, lengths = rows[kept], starts[kept], lengths[kept]
+    for length in np.unique(lengths):
+        check_numbers(counted, int(length), str(run.path / RECORDS))
+    counts = numbers[starts[:, None] + np.arange(width)]
+    table = pd.DataFrame(counts, columns=list(counted.columns)).assign(row=rows)
+    return table.sort_values("row", kind="stable", ignore_index=True)
+
+
+def check_numbers(counted: SampleCounts, found: int, where: str) -> None:
+    """Raise StoreError where a record has not as many numbers as the counts have columns."""
+    if found != len(counted.columns):
+        message, hint = "was counted in another way", "phyblock score counts anew"
+        numbers, allowed = f"{found} numbers", ", ".join(counted.columns)
+        raise StoreError(Problem(where, message, f"counts.{counted.name}", numbers, allowed, hint))
+
+
+def base_scenes(run: Run) -> dict[str, tuple[str, ...]]:
     """Return the base scenes of each scene, itself where it has no others."""
-    return [tuple(parents[scene]) or (scene,) for scene in scenes]
-
-
-def parents_of(run: Run) -> pd.Series[Any]:
-    """Base scenes by scene."""
-    return run.records.drop_duplicates("scene").set_index("scene")["parents"]
-
-
-_GROUP = ("model", *SCORED_BY)
-ESTIMATE_COLUMNS = (
-    "measure",
-    "model",
-    *SCORED_BY,
-    CELL,
-    "n",
-    "value",
-    "seeds",
-    "mean",
-    "sd",
-    "least",
-    "most",
-    "lo",
-    "hi",
-    "se",
-    "n_scenes",
-    "n_clusters",
-)
-"""Columns of `estimate_frame`."""
+    first = run.records.drop_duplicates("scene")
+    return {
+        scene: tuple(parents) or (scene,)
+        for scene, parents in zip(first["scene"], first["parents"], strict=True)
+    }
 
 
 def estimate_frame(
     run: Run,
     measures: Sequence[Measure],
     cells: Sequence[Cell],
-    counts_of: Callable[[SampleCounts], pd.DataFrame],
+    rows_of: Callable[[SampleCounts], Rows],
 ) -> pd.DataFrame:
     """One row a measure, model, way of counting and cell, in `ESTIMATE_COLUMNS`.
-
-    `counts_of` gives the counts of a family of measures, as `SampleCounts` says.
 
     `value` is of the counts of all `n` samples, summed over scenes and seeds, in the measure's own
     unit; `mean`, `sd` (ddof = 1), `least` and `most` are over the values of the `seeds` single
@@ -128,42 +134,28 @@ def estimate_frame(
     `n_clusters` base scenes that the `n_scenes` scenes were made from; a scene's seeds stay
     together. Where a model said nothing at all in a cell, nothing was measured: NaN.
     """
-    rows: list[tuple[object, ...]] = []
+    found: list[tuple[object, ...]] = []
     families: dict[str, list[Measure]] = {}
     for measure in measures:
         families.setdefault(measure.counted.name, []).append(measure)
-    parents = parents_of(run)
+    parents = base_scenes(run)
     for family in families.values():
-        counted = family[0].counted
-        own = counted.cells or cells
-        pool = _Pool.of(counts_of(counted), counted.columns, own, parents)
-        for group in _joined(own):
-            rows += _rows_of(pool.only(group), family, group)
-    return pd.DataFrame(rows, columns=list(ESTIMATE_COLUMNS))
-
-
-def _joined(cells: Sequence[Cell]) -> Iterator[list[Cell]]:
-    """Cells that means join, together: they are estimated at once; all others alone."""
-    groups: list[list[Cell]] = []
-    for cell in cells:
-        linked = [
-            group
-            for group in groups
-            if any(other.name in cell.of or cell.name in other.of for other in group)
-        ]
-        groups = [group for group in groups if group not in linked]
-        groups.append([*(other for group in linked for other in group), cell])
-    yield from groups
+        rows, own = rows_of(family[0].counted), family[0].counted.cells or cells
+        # Cells that means join are estimated together.
+        joined = [own] if any(cell.of for cell in own) else [[cell] for cell in own]
+        for together in joined:
+            found += _estimates(_Pool.of(rows, together, parents), family, together)
+    return pd.DataFrame(found, columns=list(ESTIMATE_COLUMNS))
 
 
 @dataclass(frozen=True, eq=False)
 class _Pool:
-    """Counts by model and way of counting (`groups`), and by cell (`pooled`).
+    """Sums of counts by model and way of counting (`groups`), and by cell (`pooled`).
 
     `counts` has shape (scenes, groups, pooled, columns) and is summed over seeds; `rows`, (scenes,
     groups, pooled), says of how many rows. `of_seeds`, (seeds, groups, pooled, columns), is summed
     over scenes, NaN where a seed has no row. Where a model said nothing at all, (groups, pooled),
-    it is `silent`. `parents` are the base scenes of each scene.
+    it is `silent`.
     """
 
     groups: list[tuple[str, ...]]
@@ -172,46 +164,45 @@ class _Pool:
     rows: NDArray[np.intp]
     of_seeds: Floats
     silent: NDArray[np.bool_]
-    parents: list[tuple[str, ...]]
+    clusters: Clusters
 
     @classmethod
-    def of(
-        cls,
-        table: pd.DataFrame,
-        columns: Sequence[str],
-        cells: Sequence[Cell],
-        parents: pd.Series[Any],
-    ) -> _Pool:
-        """Rows as `SampleCounts` has them, of cells that are no means of others."""
+    def of(cls, rows: Rows, cells: Sequence[Cell], parents: Mapping[str, tuple[str, ...]]) -> _Pool:
+        """Pool rows in those of the cells that are no means of others."""
         pooled = [cell.name for cell in cells if not cell.of]
-        places = pd.Index(pooled).get_indexer(pd.Index(table[CELL]))
-        table, places = table[places >= 0], places[places >= 0]
-        groups, cell = grouped(table, _GROUP), Grouping(places, pooled)
-        scenes, seeds = grouped(table, "scene"), grouped(table, "seed")
-        counts, rows = summed(table, columns, (scenes, groups, cell))
-        of_seeds, seed_rows = summed(table, columns, (seeds, groups, cell))
-        of_seeds[seed_rows == 0] = np.nan
-        model = grouped(table, "model")
-        replies = summed(table, ["replied"], (model, cell))[0][..., 0]
-        silent = replies[[model.values.index(group[0]) for group in groups.values]] == 0
-        origins = base_scenes(parents, scenes.values)
-        return cls(groups.values, pooled, counts, rows, of_seeds, silent, origins)
+        masks = [rows.cells[name] for name in pooled]
+        used = np.logical_or.reduce(masks)
+        rows = Rows(rows.run, pd.DataFrame(rows.about[used]), rows.counts[used], {})
+        masks = [mask[used] for mask in masks]
+        group, groups = rows.codes("model", *SCORED_BY)
+        model, models = rows.codes("model")
+        scene, scenes = rows.codes("scene")
+        seed, seeds = rows.codes("seed")
+        counts, n_rows = _summed(rows.counts, masks, (scene, group), (len(scenes), len(groups)))
+        of_seeds, in_seed = _summed(rows.counts, masks, (seed, group), (len(seeds), len(groups)))
+        of_seeds[in_seed == 0] = np.nan
+        heard = _summed(rows.replied[:, None] * 1.0, masks, (model,), (len(models),))[0][..., 0]
+        silent = heard[[models.index(one[:1]) for one in groups]] == 0
+        clusters = Clusters.of([parents[name] for (name,) in scenes])
+        return cls(groups, pooled, counts, n_rows, of_seeds, silent, clusters)
 
-    def only(self, cells: Sequence[Cell]) -> _Pool:
-        """The part of these cells, with the groups, scenes and seeds that have rows in them."""
-        names = [cell.name for cell in cells if not cell.of]
-        kept = np.array([self.pooled.index(name) for name in names], dtype=np.intp)
-        there = self.rows[:, :, kept] > 0
-        scenes, groups = (np.flatnonzero(there.any(axis=axis)) for axis in ((1, 2), (0, 2)))
-        return _Pool(
-            [self.groups[group] for group in groups],
-            names,
-            self.counts[np.ix_(scenes, groups, kept)],
-            self.rows[np.ix_(scenes, groups, kept)],
-            self.of_seeds[:, groups][:, :, kept],
-            self.silent[np.ix_(groups, kept)],
-            [self.parents[scene] for scene in scenes],
-        )
+
+def _summed(
+    values: NDArray[Any],
+    masks: Sequence[NDArray[np.bool_]],
+    codes: Sequence[NDArray[np.intp]],
+    shape: tuple[int, ...],
+) -> tuple[Floats, NDArray[np.intp]]:
+    """Sums of values by codes and masks, (*shape, masks, columns), and of how many rows."""
+    size = int(np.prod(shape))
+    sums = np.zeros((size, len(masks), values.shape[1]))
+    rows = np.zeros((size, len(masks)), dtype=np.intp)
+    flat = np.ravel_multi_index(tuple(codes), shape) if size else np.zeros(0, dtype=np.intp)
+    for place, mask in enumerate(masks):
+        rows[:, place] = np.bincount(flat[mask], minlength=size)
+        for column in range(values.shape[1]):
+            sums[:, place, column] = np.bincount(flat[mask], values[mask, column], size)
+    return sums.reshape(*shape, *sums.shape[1:]), rows.reshape(*shape, len(masks))
 
 
 def value_of_cells(
@@ -239,51 +230,41 @@ def value_of_cells(
     return values
 
 
-def _rows_of(
+def _estimates(
     pool: _Pool, measures: Sequence[Measure], cells: Sequence[Cell]
 ) -> Iterator[tuple[object, ...]]:
     """Estimates of measures with the same counts, in cells that are estimated together."""
     if not pool.groups:
         return
-    clusters, present = Clusters.of(pool.parents), pool.rows > 0
-    behind, fewest = _clusters_of_cells(clusters, present, pool.pooled, cells)
-    # A part of a single base scene leaves a mean without an interval.
-    usable = np.where(fewest < 2, fewest, behind)
+    present, clusters = pool.rows > 0, pool.clusters
+    members = np.array([[n in pooled_in(cell, cells) for n in pool.pooled] for cell in cells])
+    by_cell = clusters.behind(present.reshape(len(present), -1)).reshape(present.shape[1:])
+    each = [np.any(present[:, :, own], axis=-1) for own in members]
+    behind = np.stack([clusters.behind(one) for one in each], axis=-1)
+    fewest = np.stack([by_cell[:, own].min(axis=-1) for own in members], axis=-1)
 
     def all_values(sums: Floats) -> Floats:
         # Where a model said nothing, empty plans have counts, and nothing was measured.
         heard = np.where(pool.silent[..., None], np.nan, sums)
-        each = [value_of_cells(measure, cells, pool.pooled)(heard) for measure in measures]
-        return np.stack(each, axis=-1)
+        values = [value_of_cells(measure, cells, pool.pooled)(heard) for measure in measures]
+        return np.stack(values, axis=-1)
 
-    estimate = jackknife(
-        pool.counts,
-        clusters,
-        all_values,
-        n_clusters=np.repeat(usable[:, :, None], len(measures), axis=-1),
-    )
+    # A part of a single base scene leaves a mean without an interval.
+    usable = np.where(fewest < 2, fewest, behind)[:, :, None]
+    usable = np.repeat(usable, len(measures), axis=-1)
+    estimate = jackknife(pool.counts, clusters, all_values, n_clusters=usable)
     within = in_range(estimate, [measure.end_of_range for measure in measures])
     spread = _over_seeds(all_values(pool.of_seeds))
-    members = np.array([[n in pooled_in(cell, cells) for n in pool.pooled] for cell in cells])
-    scenes = np.any(present[:, :, None, :] & members, axis=-1).sum(axis=0)
+    scenes = np.stack([one.sum(axis=0) for one in each], axis=-1)
     samples = pool.rows.sum(axis=0) @ members.T
-    for g, group in enumerate(pool.groups):
-        for c, cell in enumerate(cells):
-            for m, measure in enumerate(measures):
-                at = (g, c, m)
-                yield (
-                    measure.name,
-                    *group,
-                    cell.name,
-                    int(samples[g, c]),
-                    estimate.value[at],
-                    *(values[at] for values in spread),
-                    within.lo[at],
-                    within.hi[at],
-                    estimate.se[at],
-                    int(scenes[g, c]),
-                    int(behind[g, c]),
-                )
+    for at in np.ndindex(estimate.value.shape):
+        g, c, m = at
+        yield (
+            *(measures[m].name, *pool.groups[g], cells[c].name, int(samples[g, c])),
+            *(estimate.value[at], *(values[at] for values in spread)),
+            *(within.lo[at], within.hi[at], estimate.se[at]),
+            *(int(scenes[g, c]), int(behind[g, c])),
+        )
 
 
 def _over_seeds(each: Floats) -> tuple[NDArray[np.intp], Floats, Floats, Floats, Floats]:
@@ -294,29 +275,15 @@ def _over_seeds(each: Floats) -> tuple[NDArray[np.intp], Floats, Floats, Floats,
         mean = np.where(known, each, 0).sum(axis=0) / np.where(count, count, np.nan)
         square = np.where(known, (each - mean) ** 2, 0).sum(axis=0)
         sd = np.sqrt(square / np.where(count > 1, count - 1, np.nan))
-    ends = (np.fmin.reduce(each), np.fmax.reduce(each))
-    return count, mean, sd, *ends
+    return count, mean, sd, np.fmin.reduce(each), np.fmax.reduce(each)
 
 
 def pooled_in(cell: Cell, cells: Sequence[Cell]) -> frozenset[str]:
     """The pooled cells that a cell is made of."""
     if not cell.of:
         return frozenset([cell.name])
-    by_name: Mapping[str, Cell] = {other.name: other for other in cells}
+    by_name = {other.name: other for other in cells}
     return frozenset().union(*(pooled_in(by_name[name], cells) for name in cell.of))
-
-
-def _clusters_of_cells(
-    clusters: Clusters, present: NDArray[np.bool_], pooled: Sequence[str], cells: Sequence[Cell]
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Base scenes behind each group and cell, and the fewest that are behind a part of it."""
-    by_cell = clusters.behind(present.reshape(len(present), -1)).reshape(present.shape[1:])
-    behind, fewest = [], []
-    for cell in cells:
-        members = [name in pooled_in(cell, cells) for name in pooled]
-        behind.append(clusters.behind(np.any(present[:, :, members], axis=-1)))
-        fewest.append(by_cell[:, members].min(axis=-1))
-    return np.stack(behind, axis=-1), np.stack(fewest, axis=-1)
 
 
 def track_measures(track: str) -> tuple[Measure, ...]:
@@ -325,47 +292,21 @@ def track_measures(track: str) -> tuple[Measure, ...]:
     Raises ValueError where two measures, or two sorts of counts, have one name.
     """
     measures = (*kind_of(track).report().measures, *added_measures(track))
-    counts = {measure.counted for measure in measures}
-    for named in (measures, counts):
+    for named in (measures, {measure.counted for measure in measures}):
         names = [one.name for one in named]
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise ValueError(f"two measures or counts of {track} are called {', '.join(twice)}")
     return measures
 
 
-def numbers_of(
-    counted: SampleCounts, counts: Mapping[str, Sequence[float]] | None, where: str
-) -> Sequence[float] | None:
-    """Return what a record at `where` holds of these counts; None where they are lacking, () for
-    none.
-
-    Raises StoreError for another number of them than the measure has now.
-    """
-    numbers = (counts or {}).get(counted.name)
-    if numbers and len(numbers) != len(counted.columns):
-        found, allowed = f"{len(numbers)} numbers", ", ".join(counted.columns)
-        message, hint = "was counted in another way", "phyblock score counts anew"
-        raise StoreError(Problem(where, message, f"counts.{counted.name}", found, allowed, hint))
-    return numbers
-
-
-def stored_counts(track: str) -> tuple[SampleCounts, ...]:
-    """Return the counts of each sample that measures of a track need as it is judged."""
-    counted = {measure.counted.name: measure.counted for measure in track_measures(track)}
-    return tuple(one for one in counted.values() if one.sample is not None)
-
-
 def track_estimates(run: Run, track: str) -> pd.DataFrame:
     """See `estimate_frame`; the same frame whenever it is asked for, not to be changed."""
-    key = f"estimates of {track}"
-    if key not in run.made:
-        run.made[key] = estimate_frame(
-            run,
-            track_measures(track),
-            kind_of(track).report().cells(run),
-            lambda counted: counted_samples(run, track, counted),
+    if track not in run.made:
+        measures, cells = track_measures(track), kind_of(track).report().cells(run)
+        run.made[track] = estimate_frame(
+            run, measures, cells, lambda counted: counted_rows(run, track, counted)
         )
-    return run.made[key]
+    return run.made[track]
 
 
 def all_estimates(run: Run) -> pd.DataFrame:
@@ -376,41 +317,18 @@ def all_estimates(run: Run) -> pd.DataFrame:
     return pd.concat(known, ignore_index=True)[columns] if known else pd.DataFrame(columns=columns)
 
 
-def counted_samples(run: Run, track: str, counted: SampleCounts) -> pd.DataFrame:
-    """The counts of samples that measures of a track are made from; see `SampleCounts`."""
-    if counted.frame is not None:
-        return counted.frame(run)
-    records = run.records
-    left_out = records["outcome"].isin(run.design.outcomes_left_out)
-    rows = records[(records["track"] == track) & ~left_out]
-    where = str(run.path / RECORDS)
-    of_rows = [numbers_of(counted, counts, where) for counts in rows["counts"]]
-    rows = rows[np.array([bool(numbers) for numbers in of_rows], dtype=bool)]
-    numbers = pd.DataFrame(
-        [list(numbers) for numbers in of_rows if numbers],
-        columns=list(counted.columns),
-        index=rows.index,
-        dtype="float64",
-    )
-    kept = rows[["sample", "model", "scene", "seed", "variant", "item"]].assign(
-        **dict.fromkeys(SCORED_BY, ""), replied=run.replied(rows)
-    )
-    return kind_of(track).report().in_cells(pd.concat([kept, numbers], axis=1), run)
-
-
 def headline_columns(run: Run, track: str) -> tuple[HeadlineColumn, ...]:
     """The columns of a track's headline: those it chooses, else its first measure in every cell."""
     report = kind_of(track).report()
     if report.headline is not None:
         return report.headline(run)
-    (first, *_) = report.measures
+    first = report.measures[0]
     return tuple(HeadlineColumn(first.name, cell.name, cell.heading) for cell in report.cells(run))
 
 
 def main_column(run: Run, track: str) -> HeadlineColumn:
     """The column that models are ranked by: the one headed as the track says, else the last."""
-    columns = headline_columns(run, track)
-    main = kind_of(track).report().main
+    columns, main = headline_columns(run, track), kind_of(track).report().main
     return next((column for column in columns if column.heading == main), columns[-1])
 
 
@@ -443,12 +361,6 @@ def headline_rows(estimates: pd.DataFrame, design: Design) -> pd.DataFrame:
     ]
 
 
-def rows_of(rows: pd.DataFrame, column: HeadlineColumn) -> pd.DataFrame:
-    """The rows of a frame of estimates that stand in a headline column."""
-    mine = rows[(rows["measure"] == column.measure) & (rows[CELL] == column.cell)]
-    return mine[mine["criterion"] == column.criterion] if column.criterion else mine
-
-
 def headline_of(run: Run, track: str, design: Design | None = None) -> dict[tuple[str, str], Value]:
     """Return the values of a track's headline by model and heading, in the headline setting of
     the run or of another `design`.
@@ -457,11 +369,27 @@ def headline_of(run: Run, track: str, design: Design | None = None) -> dict[tupl
     rows = headline_rows(track_estimates(run, track), design or run.design)
     values = {}
     for column in headline_columns(run, track):
-        for row in rows_of(rows, column).to_dict("records"):
-            names = ("value", "mean", "sd", "lo", "hi")
-            numbers = (scale[column.measure] * float(row[name]) for name in names)
-            values[str(row["model"]), column.heading] = Value(*numbers)
+        mine = rows[(rows["measure"] == column.measure) & (rows[CELL] == column.cell)]
+        for row in mine.to_dict("records"):
+            if column.criterion in ("", row["criterion"]):
+                names = ("value", "mean", "sd", "lo", "hi")
+                numbers = (scale[column.measure] * float(row[name]) for name in names)
+                values[str(row["model"]), column.heading] = Value(*numbers)
     return values
+
+
+def main_values(run: Run, track: str, *, ranked: bool = False) -> dict[str, Value]:
+    """Return the main value of each model that has one; with `ranked`, the best first."""
+    main = main_column(run, track).heading
+    values = {
+        model: value
+        for (model, heading), value in headline_of(run, track).items()
+        if heading == main and not math.isnan(value.value)
+    }
+    if not ranked:
+        return values
+    sign = -1 if main_measure(run, track).better == "higher" else 1
+    return dict(sorted(values.items(), key=lambda item: (sign * item[1].value, item[0])))
 
 
 @dataclass(frozen=True)
@@ -471,34 +399,27 @@ class Floor:
     name: str
     value: float
 
-    def is_below(self, value: Value, better: Better) -> bool | None:
-        """True if the interval of a value lies wholly on the better side; None without interval."""
-        if math.isnan(value.lo) or math.isnan(value.hi):
-            return None
+    def is_below(self, value: Value, better: Better) -> bool:
+        """True if the interval of a value lies wholly on the better side."""
         return value.lo > self.value if better == "higher" else value.hi < self.value
-
-
-def blind_baselines(run: Run, track: str) -> set[str]:
-    """Return the models of a run that are baselines of a track which never see the goal."""
-    named = {floor for measure in track_measures(track) for floor in measure.floors}
-    return named & {model.name for model in run.manifest.models if model.is_baseline}
 
 
 def headline_floors(run: Run, track: str) -> dict[str, Floor]:
     """Return the strongest blind baseline, or uniform guessing, of each headline column that has
     one, by heading.
     """
-    values, blind = headline_of(run, track), blind_baselines(run, track)
-    measures = {measure.name: measure for measure in track_measures(track)}
+    values, measures = headline_of(run, track), {one.name: one for one in track_measures(track)}
+    blind = run.design.baselines & {name for one in measures.values() for name in one.floors}
     found: dict[str, Floor] = {}
     for column in headline_columns(run, track):
         measure = measures[column.measure]
+        mine = {model: value for (model, of), value in values.items() if of == column.heading}
         known = [
             Floor(model, value.value)
-            for (model, heading), value in values.items()
-            if heading == column.heading and model in blind and not math.isnan(value.value)
+            for model, value in mine.items()
+            if model in blind and not math.isnan(value.value)
         ]
-        if measure.chance is not None and any(head == column.heading for _, head in values):
+        if measure.chance is not None and mine:
             known.append(Floor("chance", measure.scale * measure.chance(run, column.cell)))
         if known:
             best = max if measure.better == "higher" else min

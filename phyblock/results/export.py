@@ -21,7 +21,7 @@ from phyblock.models.request import Image
 from phyblock.records.files import read_prompts, read_records, record_types
 from phyblock.records.record import PictureMark, PromptMessage, Record
 from phyblock.resources import needs
-from phyblock.results.estimates import numbers_of, stored_counts
+from phyblock.results.estimates import check_numbers, track_measures
 from phyblock.results.load import TOKENS, Run
 from phyblock.results.text import to_csv
 from phyblock.sim.pictures import PictureStyle
@@ -50,14 +50,8 @@ _TYPES_OF_COUNTS = {"tp_": "Int64", "fp_": "Int64", "fn_": "Int64", "count_": "F
 """Types of columns by the beginning of their names."""
 
 
-def export_rows(run: Run) -> Iterator[dict[str, Any]]:
-    """One row a sample: what was asked, of whom, the reply, what was read, and the counts.
-
-    Counts are `tp_<setting>`, `fp_<setting>`, `fn_<setting>` of the headline matcher, all levels
-    by the `aov` criterion (of episodes: over placed blocks); `count_<name>_<column>` are those of
-    other measures. Every row has the same columns;
-    what a track does not have is None. `levels`, `parents` and `plan` are lists.
-    """
+def _rows(run: Run) -> Iterator[dict[str, Any]]:
+    """The rows of `export_frame`."""
     prompts, suite = read_prompts(run.path), run.design.suite
     order = {name: place for place, name in enumerate(run.design.model_names)}
     newest = sorted(
@@ -117,17 +111,25 @@ def _counts(run: Run, record: Record) -> dict[str, float | None]:
             for name in ("tp", "fp", "fn"):
                 found[f"{name}_{score.setting.lower()}"] = getattr(score, name)
     for track in run.design.suite.tracks:
-        for counted in stored_counts(track):
-            names = [f"count_{counted.name}_{column}" for column in counted.columns]
-            mine = record.counts if record.track == track else {}
-            numbers = numbers_of(counted, mine, record.sample)
-            found |= dict(zip(names, numbers, strict=True)) if numbers else dict.fromkeys(names)
+        for counted in {measure.counted: None for measure in track_measures(track)}:
+            if counted.sample is not None:
+                names = [f"count_{counted.name}_{column}" for column in counted.columns]
+                numbers = record.counts.get(counted.name, ()) if record.track == track else ()
+                if numbers:
+                    check_numbers(counted, len(numbers), record.sample)
+                found |= dict(zip(names, numbers or [None] * len(names), strict=True))
     return found
 
 
 def export_frame(run: Run) -> pd.DataFrame:
-    """`export_rows` as a frame whose columns have the same types whatever the rows are."""
-    rows, known = list(export_rows(run)), _TYPES | _track_columns()
+    """Return one row a sample: what was asked, of whom, the reply, what was read, and the counts.
+
+    Counts are `tp_<setting>`, `fp_<setting>`, `fn_<setting>` of the headline matcher, all levels
+    by the `aov` criterion (of episodes: over placed blocks); `count_<name>_<column>` are those of
+    other measures. Columns have the same types whatever the rows are; what a track does not have
+    is missing. `levels`, `parents` and `plan` are lists.
+    """
+    rows, known = list(_rows(run)), _TYPES | _track_columns()
     data = {}
     for name in rows[0] if rows else ():
         counts = (kind for begin, kind in _TYPES_OF_COUNTS.items() if name.startswith(begin))

@@ -5,19 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 from phyblock.results.estimates import headline_rows, pooled_in, track_estimates
 from phyblock.results.load import OVERALL, Run
-from phyblock.results.text import Column, TextTable, number
+from phyblock.results.text import Column, Table, TextTable, number
 from phyblock.tracks.base import kind_of
 from phyblock.tracks.measures import CELL
-
-if TYPE_CHECKING:
-    from phyblock.results.tables import Table
 
 _SETTING = "A"
 """The setting of every number in Table 1."""
@@ -34,9 +30,9 @@ class _Published:
 
     track: str
     columns: Mapping[str, tuple[str, str, str]]
-    criterion: str
-    digits: int
     note: str
+    criterion: str = ""
+    digits: int = 1
 
 
 _TABLES = {
@@ -47,32 +43,26 @@ _TABLES = {
             "recall": ("recall", "value", "Rec"),
             "f1": ("f1", "value", "F1"),
         },
-        "",
-        1,
         "Ours: setting A, micro averages. Published: micro averages of one run.",
     ),
     2: _Published(
         "vqa",
         {"accuracy": ("accuracy", "value", "Accuracy")},
-        "",
-        1,
         "Averages are unweighted means. The questions are our own: the paper's are not published.",
     ),
     3: _Published(
         "step_planning",
         {"recall": ("recall", "value", "Rec")},
-        "placed",
-        1,
         "Of the published numbers, of the paper's own scenes, recall alone stands beside ours: it "
         "is of the goal's blocks, whatever was tried. Precision depends on which wrong blocks a "
         "simulator lets stand, which the paper does not say.",
+        "placed",
     ),
     5: _Published(
         "full_planning",
         {"f1_mean": ("f1", "mean", "F1 mean"), "f1_sd": ("f1", "sd", "F1 sd")},
-        "",
-        2,
         "Both: means over single seeds, sd with ddof = 1; all other tables pool the seeds.",
+        digits=2,
     ),
 }
 PAPER_TABLES = tuple(_TABLES)
@@ -116,9 +106,8 @@ def published_frame(run: Run, table: int) -> pd.DataFrame:
     found["ours"] = found["ours"].astype("float64")
     found["difference"] = found["ours"] - found["published"]
     found["n"] = found["n"].astype("float64").fillna(0).astype("int64")
-    return found[
-        ["model", "published_name", CELL, "metric", "published", "ours", "difference", "n"]
-    ]
+    columns = ["model", "published_name", CELL, "metric", "published", "ours", "difference", "n"]
+    return found[columns]
 
 
 def is_as_published(run: Run) -> bool:
@@ -134,12 +123,12 @@ def is_as_published(run: Run) -> bool:
 
 def _ours(run: Run, table: int) -> pd.DataFrame:
     paper, design = _TABLES[table], run.design
-    found = headline_rows(track_estimates(run, paper.track), design)
+    estimates = track_estimates(run, paper.track)
+    found = headline_rows(estimates, design)
     if table == 1:
         matcher = "paper" if "paper" in design.suite.scoring.matchers else design.matcher
-        found = track_estimates(run, paper.track)
-        setting = _SETTING if _SETTING in design.suite.settings else None
-        found = found[(found["setting"] == setting) & found["matcher"].isin(["", matcher])]
+        is_a = estimates["setting"] == (_SETTING if _SETTING in design.suite.settings else None)
+        found = estimates[is_a & estimates["matcher"].isin(["", matcher])]
         if not set(design.suite.levels) >= _OVERALL_LEVELS:
             found = found[found[CELL] != OVERALL]
     if paper.criterion:
@@ -163,8 +152,6 @@ def _ours(run: Run, table: int) -> pd.DataFrame:
 
 def beside_paper(run: Run, table: int) -> Table | None:
     """Return our numbers beside a table of the paper; None where it has no model of the run."""
-    from phyblock.results.tables import Table
-
     frame, paper = published_frame(run, table), _TABLES[table]
     if not len(frame):
         return None
@@ -175,24 +162,20 @@ def beside_paper(run: Run, table: int) -> Table | None:
     for model, name in dict(zip(frame["model"], frame["published_name"], strict=True)).items():
         label = model if model == name else f"{model} ({name})"
         for place, (metric, (_, _, heading)) in enumerate(paper.columns.items()):
-            texts = [label if place == 0 else "", heading]
-            for cell in cells:
-                row = known.get((model, metric, cell), {})
-                for kind, digits in kinds.values():
-                    value = float(row.get(kind, np.nan))
-                    texts.append(number(value, digits, signed=kind == "difference"))
-            rows.append(tuple(texts))
-    compared = frame.dropna(subset=["difference"])
+            found = [known.get((model, metric, cell), {}) for cell in cells]
+            texts = [
+                number(float(row.get(kind, np.nan)), digits, signed=kind == "difference")
+                for row in found
+                for kind, digits in kinds.values()
+            ]
+            rows.append((label if place == 0 else "", heading, *texts))
+    compared = frame["difference"].dropna()
     notes = [paper.note]
     if len(compared):
-        largest = number(compared["difference"].abs().max(), 3)
+        largest = number(compared.abs().max(), 3)
         notes.insert(0, f"Largest absolute difference of {len(compared)} cells: {largest}.")
     headings = {cell.name: cell.heading for cell in kind_of(paper.track).report().cells(run)}
     columns = (Column(kind, headings.get(cell, cell)) for cell in cells for kind in kinds)
-    view = TextTable(
-        f"Our numbers beside the paper's Table {table}{run.design.of_suite} (%)",
-        (Column("Model", is_text=True), Column("", is_text=True), *columns),
-        tuple(rows),
-        tuple(notes),
-    )
-    return Table(frame, view)
+    head = (Column("Model", is_text=True), Column("", is_text=True), *columns)
+    caption = f"Our numbers beside the paper's Table {table}{run.design.of_suite} (%)"
+    return Table(frame, TextTable(caption, head, tuple(rows), tuple(notes)))

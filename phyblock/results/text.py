@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -41,14 +41,10 @@ class TextTable:
 
     def __post_init__(self) -> None:
         columns = (Column(one_line(c.name), one_line(c.group), c.is_text) for c in self.columns)
-        plain = {
-            "caption": one_line(self.caption),
-            "columns": tuple(columns),
-            "rows": tuple(tuple(map(one_line, row)) for row in self.rows),
-            "notes": tuple(map(one_line, self.notes)),
-        }
-        for name, value in plain.items():
-            object.__setattr__(self, name, value)
+        object.__setattr__(self, "caption", one_line(self.caption))
+        object.__setattr__(self, "columns", tuple(columns))
+        object.__setattr__(self, "rows", tuple(tuple(map(one_line, row)) for row in self.rows))
+        object.__setattr__(self, "notes", tuple(map(one_line, self.notes)))
 
     def without(self, names: Collection[str]) -> TextTable:
         """The table but for the columns of these names."""
@@ -60,6 +56,14 @@ class TextTable:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A table of a run: its numbers, and how people read it."""
+
+    frame: pd.DataFrame
+    view: TextTable
+
+
 def number(value: float, digits: int = 1, *, signed: bool = False) -> str:
     """A number with `digits` decimals, `NO_VALUE` for NaN."""
     if math.isnan(value):
@@ -67,11 +71,6 @@ def number(value: float, digits: int = 1, *, signed: bool = False) -> str:
     # Adding 0.0 turns a rounded -0.0 into 0.0.
     rounded = round(float(value), digits) + 0.0
     return f"{rounded:{'+' if signed and rounded else ''}.{digits}f}"
-
-
-def spread(mean: float, sd: float) -> str:
-    """`47.1 ± 1.2`; the mean alone where there is no standard deviation."""
-    return number(mean) if math.isnan(sd) else f"{number(mean)} ± {number(sd)}"
 
 
 def between(lo: float, hi: float, *, signed: bool = False) -> str:
@@ -128,24 +127,20 @@ def to_markdown(table: TextTable) -> str:
     Group headings join the column names, because Markdown has one heading row.
     """
     head = tuple(f"{column.group} {column.name}".strip() for column in table.columns)
-    grid = [tuple(_escape(cell) for cell in row) for row in (head, *table.rows)]
+    grid = [[text.translate(_ESCAPES) for text in row] for row in (head, *table.rows)]
     widths = [max(3, *(len(row[place]) for row in grid)) for place in range(len(head))]
-    rule = (
-        "-" * width if column.is_text else "-" * (width - 1) + ":"
-        for column, width in zip(table.columns, widths, strict=True)
-    )
+    is_text = [column.is_text for column in table.columns]
+    rule = [
+        "-" * w if text else "-" * (w - 1) + ":" for w, text in zip(widths, is_text, strict=True)
+    ]
     lines = []
-    for row in (grid[0], tuple(rule), *grid[1:]):
-        shapes = zip(row, table.columns, widths, strict=True)
-        cells = (cell.ljust(w) if column.is_text else cell.rjust(w) for cell, column, w in shapes)
+    for row in (grid[0], rule, *grid[1:]):
+        shapes = zip(row, widths, is_text, strict=True)
+        cells = (cell.ljust(w) if text else cell.rjust(w) for cell, w, text in shapes)
         lines.append(f"| {' | '.join(cells)} |")
-    notes = [f"- {_escape(note)}" for note in table.notes]
-    parts = [f"**{_escape(table.caption)}**", "\n".join(lines), "\n".join(notes)]
+    notes = [f"- {note.translate(_ESCAPES)}" for note in table.notes]
+    parts = [f"**{table.caption.translate(_ESCAPES)}**", "\n".join(lines), "\n".join(notes)]
     return "\n\n".join(part for part in parts if part) + "\n"
-
-
-def _escape(text: str) -> str:
-    return text.translate(_ESCAPES)
 
 
 _ESCAPES_LATEX = str.maketrans(
@@ -191,14 +186,24 @@ def to_latex(table: TextTable, label: str) -> str:
 
     `label` follows `tab:`. Needs booktabs and graphicx, and says so in its first line.
     """
+    groups, rules, start, rows = [], "", 1, []
+    for group, members in itertools.groupby(table.columns, key=lambda column: column.group):
+        end = start + len(list(members)) - 1
+        groups += (
+            [rf"\multicolumn{{{end - start + 1}}}{{c}}{{{escape(group)}}}"]
+            if group
+            else ([""] * (end - start + 1))
+        )
+        rules += rf"\cmidrule(lr){{{start}-{end}}}" if group else ""
+        start = end + 1
+    if rules:
+        rows += [" & ".join(groups) + r" \\", rules]
     names = [
-        escape(column.name)
-        if column.is_text
-        else rf"\multicolumn{{1}}{{c}}{{{escape(column.name)}}}"
-        for column in table.columns
+        escape(one.name) if one.is_text else rf"\multicolumn{{1}}{{c}}{{{escape(one.name)}}}"
+        for one in table.columns
     ]
-    rows = [*_group_rows(table.columns), _latex_row(names), r"\midrule"]
-    rows += [_latex_row(map(escape, row)) for row in table.rows]
+    rows += [" & ".join(names) + r" \\", r"\midrule"]
+    rows += [" & ".join(map(escape, row)) + r" \\" for row in table.rows]
     notes = "".join(rf"\par {escape(note)}" + "\n" for note in table.notes)
     return _FLOAT.format(
         caption=escape(table.caption),
@@ -212,21 +217,3 @@ def to_latex(table: TextTable, label: str) -> str:
 def escape(text: str) -> str:
     """Text as LaTeX prints it literally."""
     return _LIGATURE.sub("-{}", text.translate(_ESCAPES_LATEX))
-
-
-def _group_rows(columns: tuple[Column, ...]) -> list[str]:
-    """The headings of groups, and rules under them; [] where there are none."""
-    cells, rules, start = [], "", 1
-    for group, members in itertools.groupby(columns, key=lambda column: column.group):
-        width = len(list(members))
-        if group:
-            cells.append(rf"\multicolumn{{{width}}}{{c}}{{{escape(group)}}}")
-            rules += rf"\cmidrule(lr){{{start}-{start + width - 1}}}"
-        else:
-            cells += [""] * width
-        start += width
-    return [_latex_row(cells), rules] if rules else []
-
-
-def _latex_row(cells: Iterable[str]) -> str:
-    return " & ".join(cells) + r" \\"

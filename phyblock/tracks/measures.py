@@ -9,6 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from phyblock.scoring.counts import Floats, mean_of, ratio_of
 from phyblock.scoring.plan import ERROR_TYPES
@@ -54,12 +55,12 @@ class Cell:
 class SampleCounts:
     """Counts of samples, from which one or several measures are made.
 
-    `frame` makes them out of a run: a row a sample, way of counting it and cell that it is pooled
-    in, with the columns `model`, `scene`, `item`, `seed`, `variant`, those of `SCORED_BY`, `CELL`,
-    `replied` (whether the model said anything), and one of each name in `columns`. Samples that the
-    run leaves out have no row. Instead of it, `sample` counts one sample when its reply is judged:
-    it is given the item that was asked about and the track's judgement of the reply (or the episode
-    that was played), and its numbers, one of each name in `columns`, are kept in the record. Where
+    `frame` makes them out of a run: a row a sample and way of counting it, with the columns `row`
+    (of the sample's record), those of `SCORED_BY` where they tell ways apart, and one of each name
+    in `columns`. Samples that the run leaves out have no row. Instead of it, `sample` counts one
+    sample when its reply is judged: it is given the item that was asked about and the track's
+    judgement of the reply (or the episode that was played), and its numbers, one of each name in
+    `columns`, are kept in the record. Where
     it returns None, the sample is not counted. `cells` are its own where they are not the track's.
     """
 
@@ -256,29 +257,23 @@ WHOLE = Cell("overall", "Overall")
 """The one cell of a track that has no parts."""
 
 
-def _in_whole(rows: pd.DataFrame, _: Run) -> pd.DataFrame:
+def _in_whole(rows: pd.DataFrame, _: Run) -> Mapping[str, NDArray[np.bool_]]:
     """All samples in one cell."""
-    return rows.assign(**{CELL: WHOLE.name})
-
-
-def _no_references(_: Run) -> Mapping[str, Mapping[str, float]]:
-    return {}
+    return {WHOLE.name: np.ones(len(rows), dtype=bool)}
 
 
 @dataclass(frozen=True)
 class TrackReport:
     """The measures of a track, and what is shown of them.
 
-    `cells` are those of a run, the last of which stands for all; `in_cells` repeats rows of samples
-    for each cell that they are pooled in, which it names in the column `CELL`. `headline` chooses
+    `cells` are those of a run, the last of which stands for all; `in_cells` says by
+    pooled cell which rows of counts are in it. `headline` chooses
     the columns of the headline table, the first measure in every cell where it is left out; the
     column headed `main`, else the last, is the one that models are ranked by. `notes` say how its
-    values are counted. `references` are rows to hold models against, by name, with values [%] by
-    heading, and `reference_note` says what they are; `published` is what the paper prints of `main`
-    for models of the run. `short` is the name of the column that stands for the track in a summary.
+    values are counted. `short` is the name of the column that stands for the track in a summary.
 
-    `check_alike` raises
-    SpecError where the first run cannot be compared with the second in these cells by a measure.
+    `check_alike` raises SpecError where the first run cannot be compared with the second in these
+    cells by a measure.
     `part_names` say what `Record.part` stands for. `items` opens, for the page of a run, what was
     asked about where that is more than scenes; it raises DataError where that is not what the run
     was made on.
@@ -289,14 +284,11 @@ class TrackReport:
 
     measures: tuple[Measure, ...]
     cells: Callable[[Run], tuple[Cell, ...]] = lambda _: (WHOLE,)
-    in_cells: Callable[[pd.DataFrame, Run], pd.DataFrame] = _in_whole
+    in_cells: Callable[[pd.DataFrame, Run], Mapping[str, NDArray[np.bool_]]] = _in_whole
     headline: Callable[[Run], tuple[HeadlineColumn, ...]] | None = None
     main: str = ""
     short: str = ""
-    published: Callable[[Run], Mapping[str, float]] = lambda _: {}
-    references: Callable[[Run], Mapping[str, Mapping[str, float]]] = _no_references
     notes: Callable[[Run], Sequence[str]] = lambda _: ()
-    reference_note: str = ""
     check_alike: Callable[[Run, Run, Sequence[str], Measure], None] | None = None
     part_names: Mapping[str, str] = field(default_factory=dict)
     items: Callable[[Run, Dataset], PageItems] | None = None

@@ -17,8 +17,6 @@ from phyblock.text import counted
 from phyblock.tracks.base import ENGINE
 from phyblock.tracks.full_planning import POSE_MEASURES
 from phyblock.tracks.measures import (
-    CELL,
-    SCORED_BY,
     WHOLE,
     EpisodeView,
     HeadlineColumn,
@@ -70,23 +68,19 @@ OUTCOME_NAMES = {
 
 
 def _moves(run: Run) -> pd.DataFrame:
-    rows = run.counted(run.scores, NAME)
-    return rows.assign(item=rows["scene"], **{CELL: WHOLE.name})
+    return run.scored(NAME)
 
 
 def _episodes(run: Run) -> pd.DataFrame:
     """A row an episode: its ending, its steps by outcome, and what it took to complete a goal."""
-    rows = run.counted(run.records, NAME)
+    rows = run.counted(NAME)
     taken = [Counter(one if one in STEP_OUTCOMES else "unread" for one in outcomes)
              for outcomes in rows["outcomes"]]  # fmt: skip
     steps = rows["outcomes"].map(len).astype("int64")
     whole = (rows["ending"] == "completed").astype("int64")
     about: dict[str, Any] = {
-        **dict.fromkeys(SCORED_BY, ""),
-        CELL: WHOLE.name,
-        "item": rows["scene"],
+        f"ended_{name}": (rows["ending"] == name).astype("int64") for name in ENDINGS
     }
-    about |= {f"ended_{name}": (rows["ending"] == name).astype("int64") for name in ENDINGS}
     about |= {f"step_{name}": [counts[name] for counts in taken] for name in STEP_OUTCOMES}
     about |= {"completed": whole, "episodes": 1, "steps": steps, "finishing": whole * steps}
     return rows.assign(**about, fewest=whole * rows["n_blocks"].astype("int64"))

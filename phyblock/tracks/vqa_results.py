@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from phyblock.domain import CATEGORIES, LETTERS, SUBTASK_NAMES, SUBTASKS
 from phyblock.errors import DataError, Problem, SpecError
@@ -12,8 +15,6 @@ from phyblock.records.manifest import MANIFEST
 from phyblock.scoring.counts import chance, ratio_of
 from phyblock.stable import plain_sum
 from phyblock.tracks.measures import (
-    CELL,
-    SCORED_BY,
     WHOLE,
     Cell,
     HeadlineColumn,
@@ -31,6 +32,7 @@ from phyblock.tracks.questions import (
     VqaSpec,
     open_questions,
 )
+from phyblock.types import WITHOUT_REPLY
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,9 +80,9 @@ def _run_cells(run: Run) -> tuple[Cell, ...]:
     return _cells(asked or set(run.records["subtask"].dropna()))
 
 
-def _in_cells(rows: pd.DataFrame, run: Run) -> pd.DataFrame:
-    subtasks = run.records.set_index("sample")["subtask"]
-    return rows.assign(**{CELL: rows["sample"].map(subtasks)})
+def _in_cells(rows: pd.DataFrame, run: Run) -> Mapping[str, NDArray[np.bool_]]:
+    asked = run.records.loc[rows["row"], "subtask"].to_numpy()
+    return {cell.name: asked == cell.name for cell in _run_cells(run) if not cell.of}
 
 
 def _answers(run: Run) -> pd.DataFrame:
@@ -94,27 +96,27 @@ def _answers(run: Run) -> pd.DataFrame:
         for name, (kind, letter) in _LETTER_COUNTS.items()
     }
     correct = rows["given"].eq(rows["right"]).fillna(False).astype("int64")
-    about: dict[str, Any] = dict.fromkeys(SCORED_BY, "")
-    about |= {CELL: rows["subtask"], "item": rows["question"]}
-    return rows.assign(**about, **letters, replied=run.replied(rows), correct=correct, n=1)
+    return rows.assign(**letters, row=rows.index, correct=correct, n=1)
 
 
 def _questions(run: Run) -> pd.DataFrame:
     """A row a question; with rotations it is right only if each of them is."""
-    keys = ["model", CELL, "scene", "question", "seed", "variant"]
-    counts = {"correct": "sum", "replied": "any"}
-    asked = _answers(run).groupby(keys, sort=True).agg(counts).reset_index()
-    replied = asked.groupby(["model", CELL])["replied"].transform("any").astype(bool)
-    asked = asked[replied]
-    correct = (asked["correct"] == _spec(run).rotations).astype("int64")
-    about: dict[str, Any] = dict.fromkeys(SCORED_BY, "")
-    return asked.assign(**about, item=asked["question"], replied=True, n=1, correct=correct)
+    asked = _answers(run)
+    replied = ~asked["outcome"].isin(WITHOUT_REPLY)
+    parts = [asked["model"], asked["subtask"]]
+    asked = asked[replied.groupby(parts).transform("any").astype(bool)]
+    # The row of a question is that of a rotation with a reply, where one has it.
+    asked = asked.loc[replied[asked.index].sort_values(ascending=False, kind="stable").index]
+    keys = ["model", "subtask", "scene", "question", "seed", "variant"]
+    rows = asked.groupby(keys, sort=True).agg({"row": "first", "correct": "sum"}).reset_index()
+    rows["item"] = rows["question"]
+    return rows.assign(n=1, correct=(rows["correct"] == _spec(run).rotations).astype("int64"))
 
 
 def _lettered(run: Run) -> pd.DataFrame:
     """Answers with one right letter, which ordering has not."""
     rows = _answers(run)
-    return rows[rows["right"].str.len() == 1].assign(**{CELL: WHOLE.name})
+    return rows[rows["right"].str.len() == 1]
 
 
 def guessing(run: Run, cell: str) -> float:

@@ -248,9 +248,9 @@ def open_runs(paths: Sequence[Path], data: Sequence[Path], kept: ExitStack) -> t
             verified = kept.enter_context(opened_bundle(path, data))
             unverified = verified.unverified
             with named(verified.folder, where):
-                run = load_run(verified.folder, texts=False)
+                run = load_run(verified.folder)
         else:
-            run = load_run(path, texts=False)
+            run = load_run(path)
         identity = run.manifest.identity
         if identity in seen:
             message = f"is the same run as {seen[identity]}"

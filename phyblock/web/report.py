@@ -17,18 +17,11 @@ import pandas as pd
 from phyblock.files import OutFolder, digest_of_file, writing
 from phyblock.records.files import PROMPTS, RECORDS, STOPPED, read_stopped
 from phyblock.records.manifest import MANIFEST
-from phyblock.results.compare import compare_models
-from phyblock.results.estimates import (
-    Value,
-    headline_columns,
-    headline_floors,
-    headline_of,
-    main_column,
-    main_measure,
-)
+from phyblock.results.compare import compare_models, rank_text
+from phyblock.results.estimates import headline_floors, headline_of, main_measure, main_values
 from phyblock.results.load import Run
-from phyblock.results.tables import TablesWritten, coverage_frame, table_files
-from phyblock.results.text import NO_VALUE, captioned, number, spread
+from phyblock.results.tables import TablesWritten, coverage_frame, shown_columns, table_files
+from phyblock.results.text import NO_VALUE, captioned, number
 from phyblock.tracks.base import kind_of
 from phyblock.types import WITHOUT_REPLY
 from phyblock.web.pack import (
@@ -65,7 +58,6 @@ _NOT_SHOWN = ("table1",)
 _MOST_NAMED = 6
 _MOST_CHARACTERS = 160
 _INTERVAL = "Below the first value stands its 95 % interval, from leaving out each base scene."
-_SEEDS = "Values pool {} seeds, whose mean ± standard deviation stands there as well."
 _RANKS = (
     "Rank: the places that a model may have, by paired tests of all models with Holm's correction."
 )
@@ -105,8 +97,7 @@ class Row:
 @dataclass(frozen=True)
 class Headline:
     """A headline table, whose first column is what models are ranked by: models, baselines,
-    values for scale. Where it `has_strips`, as a share has, they draw it from 0 to 100 %, with
-    `references` marked in each.
+    values for scale. Where it `has_strips`, as a share has, they draw it from 0 to 100 %.
     """
 
     track: str
@@ -115,7 +106,6 @@ class Headline:
     rows: tuple[Row, ...]
     notes: tuple[str, ...]
     has_strips: bool
-    references: Mapping[str, float]
 
     @property
     def ranked(self) -> bool:
@@ -129,85 +119,59 @@ def headlines(run: Run) -> list[Headline]:
 
 
 def _headline(run: Run, track: str) -> Headline:
+    """Return the headline table of a track."""
     kind, report, measure = kind_of(track), kind_of(track).report(), main_measure(run, track)
-    main = main_column(run, track).heading
-    columns = sorted(headline_columns(run, track), key=lambda column: column.heading != main)
+    columns = shown_columns(run, track)
     headings = tuple(column.heading for column in columns)
-    values, references = headline_of(run, track), report.references(run)
+    values, floors = headline_of(run, track), headline_floors(run, track)
     ranks, lacking = rank_texts(run, track), shortfalls(run, track)
-    rules = {model.name for model in run.manifest.models if model.is_baseline}
+    order = dict.fromkeys((*main_values(run, track, ranked=True), *run.design.model_names))
     rows = []
-    for name in run.design.model_names:
+    for name in sorted(order, key=lambda name: name in run.design.baselines):
         of_model = urlencode({"model": name})
-        queries = [f"{samples_query(run, track, column.cell)}&{of_model}" for column in columns]
-        found = [values.get((name, heading)) for heading in headings]
-        cells = tuple(map(_cell, found, queries, (True, *[False] * len(columns))))
-        strip, first = None, found[0]
+        cells = []
+        for column in columns:
+            value = values.get((name, column.heading))
+            query = f"{samples_query(run, track, column.cell)}&{of_model}"
+            if value is None or math.isnan(value.value):
+                cells.append(Cell(NO_VALUE, query=query))
+                continue
+            below: tuple[str, ...] = ()
+            if column is columns[0] and not math.isnan(value.lo):
+                below = (f"{number(value.lo)} to {number(value.hi)}",)
+            cells.append(Cell(number(value.value), value.value, below, query))
+        strip, first = None, values.get((name, headings[0]))
         if first and not math.isnan(first.value) and measure.is_share:
-            ends = (first.value, first.value) if math.isnan(first.lo) else (first.lo, first.hi)
-            strip = (first.value, *ends)
-        told = ranks.get(name, ""), lacking.get(name, "")
+            strip = (first.value, first.value, first.value)
+            strip = strip if math.isnan(first.lo) else (first.value, first.lo, first.hi)
+        of_kind: Any = "baseline" if name in run.design.baselines else "model"
         query = f"{urlencode({'track': track})}&{of_model}"
-        rows.append(Row(name, "baseline" if name in rules else "model", cells, strip, *told, query))
-    sign = 1 if measure.better == "lower" else -1
-    rows.sort(
-        key=lambda row: (
-            row.kind != "model",
-            row.cells[0].value is None,
-            sign * (row.cells[0].value or 0.0),
-        )
-    )
+        told = ranks.get(name, ""), lacking.get(name, "")
+        rows.append(Row(name, of_kind, tuple(cells), strip, *told, query))
     # Floors that are baselines have rows already.
-    floors = headline_floors(run, track)
     names = dict.fromkeys(floor.name for floor in floors.values())
-    scales = {f"Floor: {', '.join(names)}": {h: floor.value for h, floor in floors.items()}}
-    is_new = not names.keys() <= {row.name for row in rows}
-    for name, numbers in {**(scales if is_new else {}), **references}.items():
-        given = (numbers.get(heading) for heading in headings)
-        plain = (Cell("") if value is None else Cell(number(value), value) for value in given)
-        rows.append(Row(name, "reference", tuple(plain)))
+    if not names.keys() <= {row.name for row in rows}:
+        known = [floors.get(heading) for heading in headings]
+        plain = [Cell(number(one.value), one.value) if one else Cell("") for one in known]
+        rows.append(Row(f"Floor: {', '.join(names)}", "reference", tuple(plain)))
     seeds = len(run.design.suite.seeds)
     notes = [
         *report.notes(run),
-        *([report.reference_note] if report.reference_note else []),
         *([_RANKS] if ranks else []),
         *([_INTERVAL] if any(row.cells[0].below for row in rows) else []),
-        *([_SEEDS.format(seeds)] if seeds > 1 else []),
+        *([f"Values pool {seeds} seeds."] if seeds > 1 else []),
     ]
-    marks = {
-        name.partition(" ")[0].rstrip(","): numbers[main]
-        for name, numbers in references.items()
-        if main in numbers
-    }
     title = captioned(kind.title, (*report.showing(run), *run.varied_words))
-    note = (" ".join(notes),)
-    return Headline(track, title, headings, tuple(rows), note, measure.is_share, marks)
-
-
-def _cell(value: Value | None, query: str, is_main: bool) -> Cell:
-    if value is None or math.isnan(value.value):
-        return Cell(NO_VALUE, query=query)
-    below = []
-    if is_main and not math.isnan(value.lo):
-        below.append(f"{number(value.lo)} to {number(value.hi)}")
-    if is_main and not math.isnan(value.sd):
-        below.append(f"seeds {spread(value.mean, value.sd)}")
-    return Cell(number(value.value), value.value, tuple(below), query)
+    return Headline(track, title, headings, tuple(rows), (" ".join(notes),), measure.is_share)
 
 
 def rank_texts(run: Run, track: str) -> dict[str, str]:
     """Return the place that each model may have by its main value; {} where there are not two."""
-    main, values = main_column(run, track).heading, headline_of(run, track)
-    rules = {model.name for model in run.manifest.models if model.is_baseline}
-    known = {name for (name, of), one in values.items() if of == main and not math.isnan(one.value)}
-    models = [name for name in run.design.model_names if name in known - rules]
+    models = [name for name in main_values(run, track) if name not in run.design.baselines]
     if len(models) < 2:
         return {}
     rows = compare_models(run, models, track).ranks.to_dict("records")
-    return {
-        str(row["model"]): " to ".join(str(n) for n in sorted({row["best"], row["worst"]}))
-        for row in rows
-    }
+    return {str(row["model"]): rank_text(row) for row in rows}
 
 
 def samples_query(run: Run, track: str, cell: str) -> str:
@@ -373,9 +337,9 @@ def _write_data(run: Run, sources: Sources, out: OutFolder, new: Path, build: st
 def _page(written: TablesWritten, build: str) -> str:
     """Return the HTML of the report; every text is escaped, and only our own scripts may run."""
     run = written.run
-    manifest, design, table = run.manifest, run.design, coverage_frame(run)
-    answered = int(table["recorded"].sum() - table[list(WITHOUT_REPLY)].sum().sum())
-    expected = int(table["expected"].sum())
+    manifest, design, coverage = run.manifest, run.design, coverage_frame(run)
+    answered = int(coverage["recorded"].sum() - coverage[list(WITHOUT_REPLY)].sum().sum())
+    expected = int(coverage["expected"].sum())
     facts = {
         "Data": manifest.dataset.name if manifest.dataset else "",
         "Scenes": f"{design.scenes:,}",
@@ -400,8 +364,8 @@ def _page(written: TablesWritten, build: str) -> str:
         models=frozenset(design.model_names),
         headlines=headlines(run),
         tables=[
-            (view, [(name, len([*columns])) for name, columns in spans(view.columns)])
-            for name, view in written.views.items()
+            (table.view, [(name, len([*columns])) for name, columns in spans(table.view.columns)])
+            for name, table in written.tables.items()
             if name not in _NOT_SHOWN
         ],
         folder=f"{_FOLDER}/{build}",

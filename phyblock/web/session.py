@@ -415,8 +415,8 @@ def outcomes(folder: Path, person: str, beside: Sequence[Path]) -> dict[str, Any
 
     `beside` are folders of other runs; of one that cannot be compared a note says why.
     """
-    run = load_run(folder, texts=False)
-    others = [load_run(path, texts=False) for path in beside]
+    run = load_run(folder)
+    others = [load_run(path) for path in beside]
     records, notes, tracks = list(read_records(folder)), [], []
     for track in run.design.suite.tracks:
         kind, what = kind_of(track), comparable(run, track)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -142,7 +143,7 @@ def test_two_runs_are_compared_by_the_models_they_share_or_by_two_named() -> Non
         [*plans("alpha", {"000": 1, "001": 1}), *plans("beta", {"000": 4, "001": 4})],
         manifest(seeds=[0]),
     )
-    second = Run(Path("other"), second.manifest, second.design, second.records, second.scores)
+    second = replace(second, path=Path("other"))
     shared = compare_runs(first, second).table.set_index("part")
     assert shared.loc["overall", ["a", "b"]].tolist() == ["alpha (run)", "alpha (other)"]
     assert shared.loc["overall", "difference"] == 50

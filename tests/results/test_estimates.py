@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
-from phyblock.results.estimates import all_estimates, blind_baselines, headline_floors
+from phyblock.results.estimates import all_estimates, headline_floors
 from phyblock.results.load import Run
 from phyblock.scoring.counts import Counts, micro
 from tests.web.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
@@ -271,6 +271,5 @@ def test_the_strongest_blind_baseline_is_the_best_of_those_that_were_run() -> No
          for scene in ("001", "002")],
         facts,
     )  # fmt: skip
-    assert blind_baselines(run, "full_planning") == {"random", "goal-blind"}
     floor = headline_floors(run, "full_planning")["Overall F1"]
     assert (floor.name, floor.value) == ("goal-blind", 50)

@@ -12,7 +12,7 @@ from phyblock.results.figures import (
     COLUMN_IN,
     Look,
     cost,
-    figure_titles,
+    figures_of,
     forest,
     levels,
     shares,
@@ -97,7 +97,7 @@ def test_files_are_the_same_each_time_and_known_beforehand(tmp_path: Path) -> No
         *("levels-full-planning", "errors", "losses", "cost-full-planning", "forest-full-planning"),
     }
     assert {file: file.read_bytes() for file in write_paper_figures(run, (), Look())} == first
-    assert {file.stem for file in first} <= set(figure_titles(run))
+    assert {file.stem for file in first} <= set(figures_of(run))
 
 
 def test_a_paper_gets_each_figure_in_three_formats_with_a_caption(tmp_path: Path) -> None:

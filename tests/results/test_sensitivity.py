@@ -9,10 +9,14 @@ import pandas as pd
 import pytest
 
 from phyblock.config.suite import VarySpec
-from phyblock.results.compare import compare_models, flipped_lines
+from phyblock.results.compare import (
+    compare_models,
+    flipped_lines,
+    sensitivity_frame,
+    sensitivity_view,
+)
 from phyblock.results.figures import sensitivity
 from phyblock.results.load import Run
-from phyblock.results.sensitivity import sensitivity_frame, sensitivity_view
 from phyblock.results.text import number
 from tests.web.factory import manifest, record, run_of, score
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.results.text import NO_VALUE, Column, TextTable, number, spread, to_latex, to_markdown
+from phyblock.results.text import NO_VALUE, Column, TextTable, number, to_latex, to_markdown
 
 TABLE = TextTable(
     "Precision & recall (%)",
@@ -68,9 +68,6 @@ def test_markdown_rows_have_as_many_cells_as_the_table_has_columns(
         (number(-0.004, 2, signed=True), "0.00"),
         (number(0.06, 2, signed=True), "+0.06"),
         (number(-1, 1, signed=True), "-1.0"),
-        (spread(47.06, 1.25), "47.1 ± 1.2"),
-        (spread(47.06, float("nan")), "47.1"),
-        (spread(float("nan"), float("nan")), NO_VALUE),
     ],
 )
 def test_numbers_as_they_are_shown(shown: str, text: str) -> None:

@@ -66,7 +66,7 @@ def test_runs_in_two_engines_are_scored_anywhere_and_never_compared(
 
     scored = rescore(usual, None, None, None)
     assert (scored / "records.jsonl").read_text() == (usual / "records.jsonl").read_text()
-    runs = [load_run(out, texts=False) for out in (usual, other)]
+    runs = [load_run(out) for out in (usual, other)]
     with pytest.raises(SpecError, match="in another physics engine"):
         compare_runs(*runs, ())
 

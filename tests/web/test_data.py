@@ -177,7 +177,7 @@ def test_scenes_are_drawn_from_where_they_are_and_from_no_other_data(
 
 
 def test_headlines_say_what_tables_say(made: Workspace) -> None:
-    run = load_run(made.out, texts=False)
+    run = load_run(made.out)
     for table in headlines(run):
         values = headline_of(run, table.track)
         rows = [row for row in table.rows if row.kind != "reference"]
