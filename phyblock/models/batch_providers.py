@@ -10,17 +10,16 @@ references of batches and of files (resumable uploads); google.rpc.Code.
 
 from __future__ import annotations
 
-import contextlib
 import json
 from abc import ABC, abstractmethod
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, ClassVar, Literal, TypeVar
 from urllib.parse import urlsplit
 
 from phyblock.config.models import ModelConfig, host_of
-from phyblock.errors import ModelError, RetryableError, UnavailableError
+from phyblock.errors import ModelError, UnavailableError
 from phyblock.files import load_json
 from phyblock.models.client import OPENAI_API_BASE, Answer, HttpClient, error_of, malformed, shown
 from phyblock.models.keys import api_key, hidden, secrets_of
@@ -65,6 +64,8 @@ class BatchProvider(ABC):
     most_requests = 50_000
     most_bytes = 100 * 1000**2
     headers: ClassVar[Mapping[str, str]]
+    after = "after"
+    """Parameter of the list's pages."""
 
     def __init__(self, config: ModelConfig, base: str, url: str, first_page: str) -> None:
         self._config = config
@@ -121,33 +122,28 @@ class BatchProvider(ABC):
     def _read_status(self, batch: Any) -> BatchStatus:
         """Read what the provider says of a batch; raises one of UNREADABLE."""
 
-    def _read_page(self, page: Any, after: str = "after") -> tuple[Sequence[BatchStatus], str]:
+    def _read_page(self, page: Any) -> tuple[Sequence[BatchStatus], str]:
         """Return the batches on a page of the list, and the address of the next one or ""."""
         batches = [self._read_status(batch) for batch in page["data"]]
         more = page.get("has_more") and batches
-        return batches, f"{self._first_page}&{after}={batches[-1].id}" if more else ""
+        return batches, f"{self._first_page}&{self.after}={batches[-1].id}" if more else ""
 
     async def _call(
-        self,
-        read: Callable[[Any], T],
-        url: str,
-        body: Any = None,
-        headers: Mapping[str, str] | None = None,
+        self, read: Callable[[Any], T], url: str, body: Any = None, **options: Any
     ) -> T:
         """Send an object as JSON, or bytes as they are; read the object that is answered."""
         http = self._transfers if isinstance(body, bytes) else self._calls
         data = body if body is None or isinstance(body, bytes) else json.dumps(body).encode()
-        answer = await self._send(http, url, data, headers)
-        with self._masked():
-            try:
-                found: Any = load_json(answer.body)
-                # A batch that failed holds its error beside its name.
-                if found.get("error") and not found.keys() & {"id", "name"}:
-                    raise error_of(answer)
-                return read(found)
-            except UNREADABLE as error:
-                why = f"{type(error).__name__}: {error}"
-                raise malformed(answer.status, why) from None
+        answer = await self._send(http, url, data, **options)
+        try:
+            found: Any = load_json(answer.body)
+            # A batch that failed holds its error beside its name.
+            if found.get("error") and not found.keys() & {"id", "name"}:
+                raise self._masked(error_of(answer), **options)
+            return read(found)
+        except UNREADABLE as error:
+            why = f"{type(error).__name__}: {error}"
+            raise self._masked(malformed(answer.status, why), **options) from None
 
     async def _send(
         self,
@@ -155,8 +151,11 @@ class BatchProvider(ABC):
         url: str,
         body: bytes | None = None,
         headers: Mapping[str, str] | None = None,
+        *,
+        begins: bool = True,
     ) -> Answer:
-        with self._masked():
+        """Send once; what does not begin a batch was not sent, whatever failed."""
+        try:
             if urlsplit(url)[:2] != urlsplit(self._base)[:2]:
                 why = f"nothing is sent to {host_of(url)}, which is not the model's server"
                 raise UnavailableError(why, sent="no")
@@ -168,16 +167,13 @@ class BatchProvider(ABC):
             if answer.fault or not answer.is_success:
                 raise error_of(answer)
             return answer
-
-    @contextlib.contextmanager
-    def _masked(self, *, begins: bool = True) -> Iterator[None]:
-        """Take keys out of errors; what does not begin a batch was not sent, whatever failed."""
-        try:
-            yield
         except ModelError as error:
-            error.args = (self.shown(str(error)),)
-            error.sent = error.sent if begins else "no"
-            raise
+            raise self._masked(error, begins=begins) from None
+
+    def _masked(self, error: ModelError, *, begins: bool = True, **_: Any) -> ModelError:
+        error.args = (self.shown(str(error)),)
+        error.sent = error.sent if begins else "no"
+        return error
 
 
 class _OpenAI(BatchProvider):
@@ -205,8 +201,8 @@ class _OpenAI(BatchProvider):
         )
         data = b"".join((start.encode(), b"\n".join(lines), f"\r\n--{token}--\r\n".encode()))
         form = {"Content-Type": f"multipart/form-data; boundary={token}"}
-        with self._masked(begins=False):
-            file = await self._call(lambda made: str(made["id"]), f"{self._base}/files", data, form)
+        url = f"{self._base}/files"
+        file = await self._call(lambda f: str(f["id"]), url, data, headers=form, begins=False)
         body = {
             "input_file_id": file,
             "endpoint": "/v1/chat/completions",
@@ -220,12 +216,11 @@ class _OpenAI(BatchProvider):
         if isinstance(response.get("body"), Mapping):
             return line["custom_id"], _answer(int(response["status_code"]), response["body"])
         if error.get("code") in ("batch_expired", "batch_cancelled"):
-            return line["custom_id"], _words(error["code"], error)
+            return line["custom_id"], str(error["code"])
         return line["custom_id"], _answer(500, {"error": error})
 
     def _read_status(self, batch: Any) -> BatchStatus:
         word, counts = batch["status"], batch.get("request_counts") or {}
-        total, done, failed = (_count(counts.get(n)) for n in ("total", "completed", "failed"))
         files = [batch[name] for name in ("output_file_id", "error_file_id") if batch.get(name)]
         # Taken for empty, a batch whose files are not there yet would be asked again.
         ends = {"expired": "ended", "cancelled": "cancelled", "failed": "refused"}
@@ -233,9 +228,9 @@ class _OpenAI(BatchProvider):
         return BatchStatus(
             _name(batch["id"]),
             state,
-            _words(word, *((batch.get("errors") or {}).get("data") or ()), n=(total, done, failed)),
+            _words(word, counts.get("completed"), (batch.get("errors") or {}).get("data")),
             (batch.get("metadata") or {}).get("phyblock"),
-            total,
+            _count(counts.get("total")),
             _count(batch.get("created_at")),
             tuple(f"{self._base}/files/{file}/content" for file in files),
         )
@@ -249,12 +244,12 @@ class _Anthropic(BatchProvider):
     """
 
     headers: ClassVar[Mapping[str, str]] = {"anthropic-version": "2023-06-01", "x-api-key": "{key}"}
+    after = "after_id"
 
     def __init__(self, config: ModelConfig) -> None:
         base = (config.api_base or "https://api.anthropic.com").rstrip("/")
         # As litellm takes an address, with or without the path of the messages.
-        for end in ("/messages", "/v1"):
-            base = base.removesuffix(end)
+        base = base.removesuffix("/messages").removesuffix("/v1")
         url = f"{base}/v1/messages/batches"
         super().__init__(config, base, url, f"{url}?limit=100")
         self._betas: set[str] = set()
@@ -268,7 +263,7 @@ class _Anthropic(BatchProvider):
     async def create(self, token: str, lines: Sequence[bytes]) -> BatchStatus:  # noqa: ARG002
         betas = {"anthropic-beta": ",".join(sorted(self._betas))} if self._betas else {}
         data = b"".join((b'{"requests":[', b",".join(lines), b"]}"))
-        return await self._call(self._read_status, self._url, data, betas)
+        return await self._call(self._read_status, self._url, data, headers=betas)
 
     def read(self, line: Any) -> tuple[str, Answer | str]:
         result = line["result"]
@@ -282,24 +277,19 @@ class _Anthropic(BatchProvider):
         return line["custom_id"], _answer(status, {"type": "error", "error": error})
 
     def _read_status(self, batch: Any) -> BatchStatus:
-        word = batch["processing_status"]
-        counts = {name: int(number or 0) for name, number in batch["request_counts"].items()}
-        failed = sum(counts.get(name, 0) for name in ("errored", "expired", "canceled"))
-        total, done, has_ended = sum(counts.values()), counts.get("succeeded", 0), word == "ended"
-        end: Any = "cancelled" if counts.get("canceled") else "ended"
+        word, counts = batch["processing_status"], batch["request_counts"]
+        state: Any = "cancelled" if counts.get("canceled") else "ended"
+        has_ended = word == "ended"
         return BatchStatus(
             _name(batch["id"]),
-            end if has_ended else "running",
-            _words(word, n=(total, done, failed)),
+            state if has_ended else "running",
+            _words(word, counts.get("succeeded")),
             None,
-            total,
+            sum(int(number or 0) for number in counts.values()),
             _unix_s(batch.get("created_at")),
             # Not `results_url`, which behind a gateway is the provider's own and out of reach.
             (f"{self._url}/{batch['id']}/results",) if has_ended else (),
         )
-
-    def _read_page(self, page: Any, after: str = "after_id") -> tuple[Sequence[BatchStatus], str]:
-        return super()._read_page(page, after)
 
 
 class _Gemini(BatchProvider):
@@ -326,15 +316,15 @@ class _Gemini(BatchProvider):
             "X-Goog-Upload-Header-Content-Length": str(len(data)),
             "X-Goog-Upload-Header-Content-Type": "application/jsonl",
         }
-        sent = {"X-Goog-Upload-Offset": "0", "X-Goog-Upload-Command": "upload, finalize"}
         named = json.dumps({"file": {"display_name": token}}).encode()
-        with self._masked(begins=False):
-            url = f"{self._base}/upload/v1beta/files"
-            answer = await self._send(self._calls, url, named, announced)
-            told = {name.lower(): value for name, value in answer.headers.items()}
-            if not (url := told.get("x-goog-upload-url", "")):
-                raise RetryableError("no address for an upload was answered", status=answer.status)
-            file = await self._call(lambda made: str(made["file"]["name"]), url, data, sent)
+        url = f"{self._base}/upload/v1beta/files"
+        answer = await self._send(self._calls, url, named, announced, begins=False)
+        told = {name.lower(): value for name, value in answer.headers.items()}
+        url = told.get("x-goog-upload-url", "")
+        sent = {"X-Goog-Upload-Offset": "0", "X-Goog-Upload-Command": "upload, finalize"}
+        file = await self._call(
+            lambda made: str(made["file"]["name"]), url, data, headers=sent, begins=False
+        )
         batch = {"display_name": token, "input_config": {"file_name": file}}
         url = f"{self._url}/models/{self._config.provider_model}:batchGenerateContent"
         return await self._call(self._read_status, url, {"batch": batch})
@@ -344,8 +334,8 @@ class _Gemini(BatchProvider):
             return line["key"], _answer(200, line["response"])
         error = line.get("error") or {}
         code = int(error.get("code") or 13)
-        if code == 1:  # cancelled
-            return line["key"], _words("cancelled", error)
+        if code == 1:
+            return line["key"], "cancelled"
         status = _GOOGLE_STATUSES.get(code, 500) if code < 100 else code
         return line["key"], _answer(status, {"error": {**error, "code": status}})
 
@@ -353,28 +343,25 @@ class _Gemini(BatchProvider):
         facts = batch.get("metadata") or {}
         # BATCH_STATE_... or JOB_STATE_..., by version.
         word = (facts.get("state") or "").rpartition("STATE_")[2].lower()
-        ends = dict.fromkeys(("succeeded", "expired"), "ended")
-        ends |= {"failed": "refused", "cancelled": "cancelled"}
-        state: Any = ends.get(word, "running")
+        ends = {"succeeded": "ended", "expired": "ended", "cancelled": "cancelled"}
+        state: Any = {**ends, "failed": "refused"}.get(word, "running")
         stats = facts.get("batchStats") or {}
-        names = ("requestCount", "successfulRequestCount", "failedRequestCount")
-        total, done, failed = (_count(stats.get(name)) for name in names)
-        output = batch.get("response") or facts.get("output") or {}
-        file = output.get("responsesFile")
+        file = (batch.get("response") or facts.get("output") or {}).get("responsesFile")
+        error = batch.get("error")
         return BatchStatus(
             _name(batch["name"]),
             state,
-            _words(word or "begun", batch.get("error"), n=(total, done, failed)),
+            _words(word or "begun", stats.get("successfulRequestCount"), [error] if error else ()),
             facts.get("displayName") or None,
-            total,
+            _count(stats.get("requestCount")),
             _unix_s(facts.get("createTime")),
             (f"{self._base}/download/v1beta/{file}:download?alt=media",) if file else (),
         )
 
-    def _read_page(self, page: Any, after: str = "pageToken") -> tuple[Sequence[BatchStatus], str]:
+    def _read_page(self, page: Any) -> tuple[Sequence[BatchStatus], str]:
         token = page.get("nextPageToken")
         batches = [self._read_status(batch) for batch in page.get("operations") or ()]
-        return batches, f"{self._first_page}&{after}={token}" if token else ""
+        return batches, f"{self._first_page}&pageToken={token}" if token else ""
 
 
 PROVIDERS: Mapping[str, Callable[[ModelConfig], BatchProvider]] = {
@@ -421,10 +408,7 @@ def _unix_s(time: str | None) -> float | None:
     return None if time is None else datetime.fromisoformat(time).timestamp()
 
 
-def _words(state: str, *errors: Any, n: tuple[int | None, ...] = (None, None, None)) -> str:
-    """Return state, numbers (of all, answered and failed requests) and errors in words."""
-    total, done, failed = n
-    counts = f", {done or 0:,} of {total:,} answered" if total else ""
-    bad = f", {failed:,} failed" if total and failed else ""
-    said = [str(e[key]) for e in errors if e for key in ("code", "message") if e.get(key)]
-    return f"{state}{counts}{bad}{': ' if said else ''}{' '.join(said)}"
+def _words(state: str, answered: Any = None, errors: Sequence[Any] | None = None) -> str:
+    """Return state, number of answered requests and errors in words."""
+    said = "; ".join(f"{error.get('code')} {error.get('message')}" for error in errors or ())
+    return f"{state}, {answered or 0} answered{': ' if said else ''}{said}"

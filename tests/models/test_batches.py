@@ -8,7 +8,6 @@ import itertools
 import json
 from collections.abc import Sequence
 from dataclasses import replace
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +27,6 @@ from phyblock.models import (
     Reply,
     ReplyCache,
     Request,
-    reply_key,
-    today,
 )
 from phyblock.models.batch import (
     Batch,
@@ -154,18 +151,6 @@ def test_each_line_that_fails_is_asked_again_or_ends_as_a_call_would(
     assert len(server.made[1].requests) == 5
 
 
-def test_only_what_failed_in_a_batch_that_has_ended_is_left_to_ask(route: str, disk: Disk) -> None:
-    requests = requests_of(2)
-    faults = BatchFaults(lines={0: {1: "500"}}, calls={"create": ("", "400")})
-    with Running(SERVERS[route](batch=faults)) as running:
-        config = config_at(route, running.url)
-        answered, failed = run_command(config, disk, requests)
-    assert isinstance(answered, Reply)
-    assert isinstance(failed, UnavailableError)
-    waiting = waiting_keys(config, disk.lines, disk.folder)
-    assert waiting == {reply_key(config, requests[0])}
-
-
 def test_what_expired_is_asked_again_and_what_was_answered_is_not(route: str, disk: Disk) -> None:
     # Of a batch that expired Gemini has no results at all.
     places = range(4) if route == "gemini" else (0, 2)
@@ -259,20 +244,6 @@ def test_a_wrong_key_stops_the_model_and_is_written_nowhere(route: str, disk: Di
     assert not server.made
 
 
-def test_a_key_in_an_answer_is_not_kept(disk: Disk) -> None:
-    class Echoing(OpenAIBatches):
-        def line(self, custom_id: str, seen: Any, ending: str) -> dict[str, Any]:
-            line = super().line(custom_id, seen, ending)
-            line["response"]["body"]["choices"][0]["message"]["content"] = f"Step1 {KEY}"
-            return line
-
-    with Running(Echoing()) as running:
-        ended = run_command(config_at("direct", running.url), disk, requests_of(1))
-    assert texts(ended) == ["Step1 [key]"]
-    kept = b"".join(path.read_bytes() for path in disk.folder.rglob("*") if path.is_file())
-    assert KEY.encode() not in kept
-
-
 def test_what_does_not_fit_goes_out_in_further_batches(
     route: str, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -331,22 +302,6 @@ def test_what_is_in_the_cache_is_not_asked_and_answers_go_there(route: str, tmp_
     assert [one.cost_usd for one in ended if isinstance(one, Reply)] == [
         first.cost_usd, single.cost_usd,
     ]  # fmt: skip
-
-
-def test_a_name_that_the_provider_forgets_is_found_by_what_was_answered(disk: Disk) -> None:
-    class Forgetful(OpenAIBatches):
-        forgets_names = True
-
-    with Running(Forgetful(batch=BatchFaults(calls={"create": ("", "", "done-reset")}))) as running:
-        config, server = config_at("direct", running.url), running.server
-        assert isinstance(server, OpenAIBatches)
-        for n in range(2):
-            # Of others, as large and as new.
-            assert len(texts(run_command(config, Disk(disk.folder / str(n)), requests_of(2)))) == 2
-        server.asked.clear()
-        requests = [make_request(f"{n:03d}", seed=5) for n in range(2)]
-        assert len(texts(run_command(config, disk, requests))) == 2
-        assert once(server, 2)
 
 
 # What a kill cuts off in litellm is closed when it is collected.
@@ -517,22 +472,6 @@ def test_bodies_stand_in_lines_as_they_are(fields: dict[str, Any], name: str, bo
     line = _joined(fields, name, json.dumps(body).encode())
     assert json.loads(line) == {**fields, name: body}
     assert b"\n" not in line
-
-
-def test_an_answer_costs_what_the_day_of_its_sending_asked_for(disk: Disk) -> None:
-    dearer = {"input": 9000, "output": 9000, "batch": {"input": 4500, "output": 4500}}
-    price = [PRICE, {"from": today().isoformat(), **dearer}]
-    with Running(OpenAIBatches(batch=BatchFaults(calls={"results": ("400",)}))) as running:
-        config = with_fields(config_at("direct", running.url), price=price)
-        (stopped,) = run_command(config, disk, requests_of(1))
-        assert isinstance(stopped, UnavailableError)
-        assert disk.lines[0].most_usd
-        sent = datetime.now(UTC) - timedelta(days=1)
-        time = sent.strftime("%Y-%m-%dT%H:%M:%SZ")
-        disk.lines = [line.model_copy(update={"time": time}) for line in disk.lines]
-        (reply,) = run_command(config, disk, requests_of(1))
-    assert isinstance(reply, Reply)
-    assert reply.cost_usd == pytest.approx((1000 + 40) * 500 / 1e6)
 
 
 def test_headers_that_requests_need_go_with_their_batch(disk: Disk) -> None:

@@ -183,23 +183,6 @@ def test_a_reply_comes_back_whole_and_marked(tmp_path: Path) -> None:
         assert cache.get("k") == expected
 
 
-def test_stats_count_and_clear_drops(tmp_path: Path) -> None:
-    with ReplyCache(tmp_path / "c.sqlite") as cache:
-        empty = cache.stats()
-        assert (empty.replies, empty.by_model, empty.oldest_s) == (0, {}, None)
-        for key in "abc":
-            cache.put(key, "openai/m", REPLY)
-        cache.put("d", "gemini/n", REPLY)
-        stats = cache.stats()
-        assert stats.replies == 4
-        assert stats.by_model == {"gemini/n": 1, "openai/m": 3}
-        assert stats.size_bytes > 0
-        assert cache.clear("openai/m") == 3
-        assert "d" in cache
-        assert cache.clear() == 1
-        assert cache.stats().replies == 0
-
-
 @pytest.mark.parametrize(
     "content", [b"this is not a database at all, but long enough to look at" * 40, b"SQLite"]
 )

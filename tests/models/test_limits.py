@@ -90,22 +90,6 @@ def test_no_window_of_a_minute_has_more_starts_or_tokens_than_allowed(
     assert tokens <= tpm
 
 
-def test_a_full_minute_is_used() -> None:
-    async def main() -> list[float]:
-        time = FakeTime()
-        limits = Limits(10, asyncio.Semaphore(10), rpm=3, clock=time.clock)
-        starts: list[float] = []
-
-        async def call() -> None:
-            async with limits.slot(1):
-                starts.append(time.now_s)
-
-        await time.run_until_done(*(asyncio.create_task(call()) for _ in range(7)))
-        return starts
-
-    assert run(main) == [0, 0, 0, 60, 60, 60, 120]
-
-
 def starts_of(tpm: int, *calls: tuple[int, int]) -> list[float]:
     """When calls start that were estimated at the first number of tokens and took the second."""
 
@@ -190,20 +174,3 @@ def test_limits_survive_those_that_give_up(plans: list[tuple[int, bool]], width:
             await asyncio.wait_for(overall.acquire(), 1)
 
     run(main)
-
-
-def test_nothing_starts_while_every_server_rests() -> None:
-    async def main() -> list[float]:
-        time = FakeTime()
-        rests = iter([7.5, 6.5, 5.5, 4.5, 3.5, 2.5, 1.5, 0.5])
-        limits = Limits(2, asyncio.Semaphore(2), rest_s=lambda: next(rests, 0.0), clock=time.clock)
-        starts: list[float] = []
-
-        async def call() -> None:
-            async with limits.slot(0):
-                starts.append(time.now_s)
-
-        await time.run_until_done(*(asyncio.create_task(call()) for _ in range(2)))
-        return starts
-
-    assert run(main) == [7.5, 7.5]

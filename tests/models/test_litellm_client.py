@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import os
 import socket
@@ -238,38 +237,3 @@ def test_the_first_call_imports_litellm_quietly_and_reads_no_key_file(tmp_path: 
     assert done.stdout == "1000\nTrue None\nFalse False None\n"
     assert done.stderr == ""
     assert [seen.key for seen in running.server.seen] == ["no-key"]
-
-
-@pytest.mark.parametrize("extra", [{"tools": 5}, {"logit_bias": "yes"}, {"stop": {"a": 1}}])
-def test_arguments_that_litellm_chokes_on_end_a_call_and_no_run(extra: dict[str, object]) -> None:
-    with Running(OpenAIChat()) as running:
-        config = ROUTES["openai"].config(running.url)
-        request = replace(TEXT, params=extra)
-        (answer,) = ask(make_model(config, policy=RetryPolicy(1, 0.0)), request)
-    assert isinstance(answer, ModelError | Reply), answer
-
-
-def test_calls_of_the_caller_and_of_ours_do_not_meet(monkeypatch: pytest.MonkeyPatch) -> None:
-    """litellm's own calls in the same task go past our client and are as they were."""
-
-    async def both() -> tuple[Any, Any]:
-        import litellm
-
-        ours = make_model(ROUTES["openai"].config(running.url))
-        message = {"role": "user", "content": "?"}
-
-        async def theirs() -> Any:
-            return await litellm.acompletion(
-                "openai/m", [message], api_base=f"{running.url}/v1", api_key="sk-another-key"
-            )
-
-        found = await asyncio.gather(theirs(), ours.ask(make_request()), theirs())
-        await ours.aclose()
-        return found[0], found[2]
-
-    monkeypatch.setenv("NO_PROXY", "*")
-    with Running(OpenAIChat()) as running:
-        first, second = asyncio.run(both())
-    assert first.choices[0].message.content == second.choices[0].message.content
-    keys = sorted(seen.key for seen in running.server.seen)
-    assert keys == [*["sk-another-key"] * 2, "sk-not-a-real-key-1234"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 import re
-from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,11 +14,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.config.models import ModelConfig
-from phyblock.domain import Candidate, CandidateSet, Plan
-from phyblock.errors import DataError, RefusedError, SampleError, SpecError, StoreError
+from phyblock.domain import Candidate, CandidateSet
+from phyblock.errors import DataError, RefusedError, SampleError, SpecError
 from phyblock.models import Model, Reply, Request, Usage, build_model
 from phyblock.models.replay import read_raw_reply
-from phyblock.text import well_formed
 from phyblock.tracks.full_planning import PLAN_RULES, PlanSubject
 from tests.models.factory import CANDIDATES, SCENE, make_request
 from tests.records.damage import plan_record
@@ -119,19 +117,6 @@ def test_a_recorded_error_is_raised_again(
     with pytest.raises(error, match="no") as caught:
         answer(replay(tmp_path), "007", 1)
     assert caught.value.status == 400
-
-
-@pytest.mark.parametrize("line", ["{", "[]", '{"model": "m"}', "7"])
-def test_a_broken_record_is_an_error_at_its_line(tmp_path: Path, line: str) -> None:
-    (tmp_path / "records.jsonl").write_text(record("m", "007", 1) + line + "\n")
-    with pytest.raises(StoreError, match=r"records\.jsonl:2(:\d+)?: (\w+: )?is not a record"):
-        replay(tmp_path)
-
-
-def test_the_official_recordings_answer_for_their_scenes(official_checkout: Path) -> None:
-    model = replay(official_checkout / "outputs" / "claude-3-7-thinking")
-    replies = [answer(model, f"{number:03}") for number in range(400)]
-    assert sum(reply is not None for reply in replies) == 390
 
 
 def choice(message: object, finish: str = "stop") -> dict[str, object]:
@@ -300,13 +285,6 @@ def test_any_document_is_read_or_refused_with_a_data_error(raw: object) -> None:
         text.encode()
 
 
-@given(texts)
-def test_only_characters_that_no_file_can_hold_are_replaced(text: str) -> None:
-    read = read_raw_reply({**choice({"content": f"{text}\ud800"}), "model": f"\udfff{text}"}, "x")
-    for kept in (read.text, read.provider_model):
-        assert kept.replace("\ufffd", "") == well_formed(text).replace("\ufffd", "")
-
-
 @pytest.mark.parametrize(
     ("model", "replies"),
     [
@@ -347,35 +325,6 @@ def steps(name: str, request: Request) -> list[int]:
     read = [re.fullmatch(r"Step(\d+): Move block with index (\d+)", line) for line in lines]
     assert [int(match[1]) for match in read if match] == list(range(1, len(lines) + 1))
     return [int(match[2]) for match in read if match]
-
-
-@given(keys, seeds)
-def test_random_draws_four_candidates(key: str, seed: int) -> None:
-    drawn = steps("random", make_request(key, seed))
-    assert len(drawn) == 4
-    assert all(1 <= index <= len(CANDIDATES) for index in drawn)
-
-
-@given(keys)
-def test_all_candidates_names_each_once(key: str) -> None:
-    assert steps("all-candidates", make_request(key)) == [1, 2, 3, 4, 5]
-
-
-@given(keys, seeds, st.lists(st.integers(1, 5), min_size=1).map(tuple))
-def test_goal_blind_says_what_was_learned(key: str, seed: int, plan: tuple[int, ...]) -> None:
-    subject = PlanSubject(SCENE, CANDIDATES, lambda: Plan(plan))
-    assert steps("goal-blind", replace(make_request(key, seed), subject=subject)) == list(plan)
-
-
-@given(keys, seeds)
-def test_first_pose_names_the_right_kinds_each_in_the_pose_listed_first(
-    key: str, seed: int
-) -> None:
-    subject = PlanSubject(SCENE, CANDIDATES)
-    named = steps("first-pose", replace(make_request(key, seed), subject=subject))
-    assert Counter(CANDIDATES[n].kind for n in named) == Counter(b.kind for b in SCENE.blocks)
-    for n in named:
-        assert all(CANDIDATES[other].kind != CANDIDATES[n].kind for other in range(1, n))
 
 
 @given(keys, seeds)
