@@ -459,18 +459,17 @@ def counted(reply: Reply, expected: Estimate) -> Reply:
         is_count = isinstance(count, int) and not isinstance(count, bool)
         return count if is_count and least <= (count or 0) <= most else None
 
-    usage, longest = reply.usage, expected.most_completion_tokens
-    prompt = plausible(usage.prompt_tokens, 1, expected.prompt_tokens)
-    cached = plausible(usage.cached_tokens, 0, expected.prompt_tokens)
-    written = plausible(usage.cache_write_tokens, 0, expected.prompt_tokens)
+    usage, asked, longest = reply.usage, expected.prompt_tokens, expected.most_completion_tokens
+    says, thinks = bool(reply.text or reply.reasoning), bool(reply.reasoning)
+    prompt = plausible(usage.prompt_tokens, 1, asked)
+    cached = plausible(usage.cached_tokens, 0, asked)
+    written = plausible(usage.cache_write_tokens, 0, asked)
     if (cached or 0) + (written or 0) > (prompt or 0):
         cached = written = None
     known = Usage(
         prompt_tokens=prompt,
-        completion_tokens=plausible(
-            usage.completion_tokens, int(bool(reply.text or reply.reasoning)), longest
-        ),
-        reasoning_tokens=plausible(usage.reasoning_tokens, int(bool(reply.reasoning)), longest),
+        completion_tokens=plausible(usage.completion_tokens, int(says), longest),
+        reasoning_tokens=plausible(usage.reasoning_tokens, int(thinks), longest),
         cached_tokens=cached,
         cache_write_tokens=written,
     )
@@ -516,11 +515,9 @@ def picture_tokens(model_id: str, image: Image, detail: ImageDetail | None = Non
     GPT-4o does; a budget learns what a provider really counts.
     """
     name = model_id.rpartition("/")[2].lower()
-    for pattern, usual, details in _PICTURE_RULES:
-        if re.search(rf"(^|\.){pattern}", name):
-            count = details.get(detail or "auto", usual)
-            return math.ceil(count(image.width_px, image.height_px))
-    raise AssertionError("the last rule matches every name")
+    rules = (rule for rule in _PICTURE_RULES if re.search(rf"(^|\.){rule[0]}", name))
+    _, usual, details = next(rules)
+    return math.ceil(details.get(detail or "auto", usual)(image.width_px, image.height_px))
 
 
 def _fixed(tokens: int) -> _Count:
@@ -531,9 +528,9 @@ def _squares(side_px: int, width: float, height: float) -> int:
     return math.ceil(width / side_px) * math.ceil(height / side_px)
 
 
-def _framed(side_px: int, extra: int) -> _Count:
-    """Square patches, and some tokens that frame them."""
-    return lambda width, height: _squares(side_px, width, height) + extra
+def _framed(side_px: int) -> _Count:
+    """Square patches, and two tokens that frame them."""
+    return lambda width, height: _squares(side_px, width, height) + 2
 
 
 def _tiles(whole: int, tile: int) -> _Count:
@@ -564,13 +561,13 @@ def _patches(factor: float, most: int, longest_px: int = 2048) -> _Count:
     return count
 
 
-def _shrunk(side_px: int, longest_px: int, most: int) -> _Count:
-    """Square patches of a picture that is scaled down until it fits both bounds."""
+def _shrunk(longest_px: int, most: int) -> _Count:
+    """Square patches of 28 pixels of a picture that is scaled down until it fits both bounds."""
 
     def count(width: float, height: float) -> float:
         scale = min(1.0, longest_px / max(width, height))
-        scale = min(scale, math.sqrt(most * side_px**2 / (width * height)))
-        return min(_squares(side_px, width * scale, height * scale), most)
+        scale = min(scale, math.sqrt(most * 28**2 / (width * height)))
+        return min(_squares(28, width * scale, height * scale), most)
 
     return count
 
@@ -603,13 +600,13 @@ _PICTURE_RULES: tuple[tuple[str, _Count, Mapping[str, _Count]], ...] = (
     (r"gpt-5\.5", _ORIGINAL, {"low": _SMALL, "high": _HIGH}),
     (r"gpt-([6-9]|5\.\d)", _WHOLE, {"low": _SMALL, "high": _HIGH}),
     (r"o[13]($|-)", _tiles(75, 150), {"low": _fixed(75)}),
-    (r"claude-(opus-4-[7-9]|[a-z]+-([5-9]|\d\d))", _shrunk(28, 2576, 4784), {}),
-    (r"claude", _shrunk(28, 1568, 1568), {}),
+    (r"claude-(opus-4-[7-9]|[a-z]+-([5-9]|\d\d))", _shrunk(2576, 4784), {}),
+    (r"claude", _shrunk(1568, 1568), {}),
     (r"gemini-([12]|exp)", _crops, {"low": _fixed(64), "medium": _fixed(256)}),
     (r"gemini", _fixed(1120), _GEMINI),
     (r"grok", _grok, {}),
-    (r"qwen2(\.5)?-vl", _framed(28, 2), {}),
-    (r"qwen3", _framed(32, 2), {}),
+    (r"qwen2(\.5)?-vl", _framed(28), {}),
+    (r"qwen3", _framed(32), {}),
     (r"", _tiles(85, 170), {"low": _fixed(85)}),
 )
 """Count of a picture, and in a detail where that differs, by the beginning of a model's name, or

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import base64
 import functools
+import itertools
 import json
 import secrets
 from collections.abc import Callable, Mapping
@@ -148,35 +149,29 @@ class GatheringModel(Model, Protocol):
         """Send what was gathered."""
 
 
-def mime_type(image: Image) -> str:
-    """Return the MIME type by the bytes themselves: providers refuse a label that they do not bear
-    out.
+def data_uri(image: Image) -> str:
+    """Return the picture as a `data:` URI, its type by the bytes themselves: providers refuse a
+    label that they do not bear out.
 
     Raises DataError when the picture is none of PNG, JPEG, GIF and WebP.
     """
-    for magic, name in _MAGIC:
-        if image.data.startswith(magic):
-            return name
+    mime = next((name for magic, name in _MAGIC if image.data.startswith(magic)), "")
     if image.data[:4] == b"RIFF" and image.data[8:12] == b"WEBP":
-        return "image/webp"
-    where = f"picture {image.label!r}"
-    found = repr(image.data[:8])
-    raise DataError(Problem(where, "is no picture", "", found, "PNG, JPEG, GIF or WebP"))
+        mime = "image/webp"
+    if not mime:
+        where, found = f"picture {image.label!r}", repr(image.data[:8])
+        raise DataError(Problem(where, "is no picture", "", found, "PNG, JPEG, GIF or WebP"))
+    return f"data:{mime};base64,{base64.b64encode(image.data).decode('ascii')}"
 
 
-def data_uri(image: Image) -> str:
-    """Return the picture as a `data:` URI."""
-    return f"data:{mime_type(image)};base64,{base64.b64encode(image.data).decode('ascii')}"
-
-
-def wire_messages(
-    messages: tuple[Message, ...], detail: ImageDetail | None
-) -> list[dict[str, Any]]:
-    """Return chat messages, texts and pictures in the order given; a lone text is a plain string.
-
-    `detail` is how closely pictures are looked at; None leaves it to the provider.
+def wire_params(config: ModelConfig, request: Request) -> dict[str, Any]:
+    """Return what to send beside the messages: the request's sampling parameters, overridden by
+    the model's, and the format of the answer where the model takes one; None is not sent.
     """
-    return _messages(messages, data_uri, detail)
+    merged = {**request.params, **config.params}
+    if config.sends_format and request.response_format is not None:
+        merged["response_format"] = request.response_format
+    return {name: value for name, value in merged.items() if value is not None}
 
 
 def json_body(
@@ -190,27 +185,21 @@ def json_body(
         return mark
 
     mark = secrets.token_hex(16)
-    body = {**fields, "messages": _messages(messages, placeholder, detail)}
+    body = {**fields, "messages": wire_messages(messages, detail, placeholder)}
     first, *others = json.dumps(body, allow_nan=False).encode().split(mark.encode())
-    pieces = [first]
-    for picture, piece in zip(pictures, others, strict=True):
-        pieces += [picture, piece]
-    return b"".join(pieces)
+    return b"".join((first, *itertools.chain(*zip(pictures, others, strict=True))))
 
 
-def wire_params(config: ModelConfig, request: Request) -> dict[str, Any]:
-    """Return what to send beside the messages: the request's sampling parameters, overridden by
-    the model's, and the format of the answer where the model takes one; None is not sent.
-    """
-    merged = {**request.params, **config.params}
-    if config.sends_format and request.response_format is not None:
-        merged["response_format"] = request.response_format
-    return {name: value for name, value in merged.items() if value is not None}
-
-
-def _messages(
-    messages: tuple[Message, ...], url_of: Callable[[Image], str], detail: ImageDetail | None
+def wire_messages(
+    messages: tuple[Message, ...],
+    detail: ImageDetail | None,
+    url_of: Callable[[Image], str] = data_uri,
 ) -> list[dict[str, Any]]:
+    """Return chat messages, texts and pictures in the order given; a lone text is a plain string.
+
+    `detail` is how closely pictures are looked at; None leaves it to the provider.
+    """
+
     def part(part: str | Image) -> dict[str, Any]:
         if isinstance(part, str):
             return {"type": "text", "text": part}

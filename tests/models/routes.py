@@ -12,6 +12,7 @@ from tests.servers.gemini_generate import GeminiGenerate
 from tests.servers.openai_chat import OpenAIChat
 
 KEY_VARIABLE = "PHYBLOCK_TEST_KEY"
+KEY = "sk-not-a-real-key-1234"
 
 
 @dataclass(frozen=True)

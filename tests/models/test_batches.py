@@ -16,18 +16,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.config.models import ModelConfig
-from phyblock.errors import (
-    BudgetReachedError,
-    SampleError,
-    UnavailableError,
-)
-from phyblock.models import (
-    Budget,
-    ModelEvent,
-    Reply,
-    ReplyCache,
-    Request,
-)
+from phyblock.errors import BudgetReachedError, SampleError, UnavailableError
+from phyblock.models import Budget, ModelEvent, Reply, ReplyCache, Request
 from phyblock.models.batch import (
     Batch,
     BatchFiles,
@@ -41,7 +31,7 @@ from phyblock.models.batch_providers import PROVIDERS, UNREADABLE, _joined
 from phyblock.records.record import BatchLine
 from tests.models.batching import Disk, Killing, command, run_command
 from tests.models.factory import QUICK, ask, make_model, make_request, with_fields
-from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.models.routes import KEY, ROUTES
 from tests.servers.batches import (
     AnthropicBatches,
     BatchFaults,
@@ -52,7 +42,6 @@ from tests.servers.batches import (
 )
 from tests.servers.chassis import Running
 
-KEY = "sk-not-a-real-key-1234"
 SERVERS: dict[str, type[BatchServer]] = {
     "direct": OpenAIBatches,
     "anthropic": AnthropicBatches,
@@ -60,11 +49,6 @@ SERVERS: dict[str, type[BatchServer]] = {
 }
 PROTOCOLS = list(SERVERS)
 PRICE = {"input": 1000, "output": 1000, "batch": {"input": 500, "output": 500}}
-
-
-@pytest.fixture(autouse=True)
-def _key(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(KEY_VARIABLE, KEY)
 
 
 @pytest.fixture(params=PROTOCOLS)

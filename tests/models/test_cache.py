@@ -7,9 +7,9 @@ import signal
 import sqlite3
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -17,17 +17,9 @@ from hypothesis import strategies as st
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import StoreError
-from phyblock.models import (
-    Image,
-    Message,
-    Reply,
-    ReplyCache,
-    Request,
-    Usage,
-    reply_key,
-)
+from phyblock.models import Image, Message, Reply, ReplyCache, Request, Usage, reply_key
 from tests.models.factory import ask, make_model, make_request, with_fields
-from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.models.routes import ROUTES
 from tests.servers.chassis import Faults, Running
 
 CONFIG = ModelConfig(name="m", id="openai/m", api_base="http://localhost:1/v1")
@@ -42,38 +34,22 @@ values = st.none() | st.integers() | st.floats(allow_nan=False, allow_infinity=F
 params = st.dictionaries(st.text(min_size=1), values, max_size=4)
 texts = st.text(max_size=20)
 images = st.binary(max_size=20).map(lambda data: Image(data, "goal", 8, 8))
-messages = st.lists(
-    st.builds(
-        Message,
-        st.sampled_from(["system", "user", "assistant"]),
-        st.lists(texts | images, max_size=4).map(tuple),
-    ),
-    max_size=3,
-).map(tuple)
+roles = st.sampled_from(["system", "user", "assistant"])
+parts = st.lists(texts | images, max_size=4).map(tuple)
+messages = st.lists(st.builds(Message, roles, parts), max_size=3).map(tuple)
 requests = st.builds(
-    lambda seed, content, given_params, version: Request(
-        "000", seed, content, given_params, version, make_request().subject
-    ),
-    st.integers(),
-    messages,
-    params,
-    texts,
+    Request, st.just("000"), st.integers(), messages, params, texts, st.just(make_request().subject)
 )
-configs = st.builds(
-    lambda model_id, base, sends, revision, detail: ModelConfig(
-        name="m",
-        id=f"openai/{model_id}",
-        api_base=base,
-        seed=sends,
-        revision=revision,
-        image_detail=detail,
-    ),
-    st.from_regex(r"[^ ]+", fullmatch=True),
-    st.none() | st.sampled_from(["http://a/v1", "http://b/v1"]),
-    st.sampled_from(["auto", "never"]),
-    st.sampled_from([None, "step 2000"]),
-    st.sampled_from([None, "low"]),
-)
+configs = st.fixed_dictionaries(
+    {
+        "name": st.just("m"),
+        "id": st.from_regex(r"[^ ]+", fullmatch=True).map("openai/{}".format),
+        "api_base": st.sampled_from([None, "http://a/v1", "http://b/v1"]),
+        "seed": st.sampled_from(["auto", "never"]),
+        "revision": st.sampled_from([None, "step 2000"]),
+        "image_detail": st.sampled_from([None, "low"]),
+    }
+).map(ModelConfig.model_validate)
 
 
 def what_decides(config: ModelConfig, request: Request) -> object:
@@ -101,56 +77,37 @@ def test_keys_are_equal_when_all_that_decides_is_equal(
 
 
 @pytest.mark.parametrize(
-    "change",
+    "fields",
     [
-        lambda c, r: (with_fields(c, name="other"), r),
-        lambda c, r: (with_fields(c, transport="litellm", max_concurrency=1, rpm=5, tpm=7), r),
-        lambda c, r: (
-            with_fields(c, price={"input": 1, "output": 2}, timeout_s=1.0, api_key_env="KEY"),
-            r,
-        ),
-        lambda c, r: (with_fields(c, api_base="http://node17:2/v1"), r),
-        lambda c, r: (c, replace(r, key="002")),
-        lambda c, r: (with_fields(c, **{"temperature": 0.5}), r),
+        {"name": "other"},
+        {"transport": "litellm", "max_concurrency": 1, "rpm": 5, "tpm": 7},
+        {"price": {"input": 1, "output": 2}, "timeout_s": 1.0, "api_key_env": "KEY"},
+        {"api_base": "http://node17:2/v1"},
+        {"temperature": 0.5},
     ],
 )
-def test_what_does_not_change_a_reply_does_not_change_the_key(
-    change: Callable[[ModelConfig, Request], tuple[ModelConfig, Request]],
-) -> None:
-    assert reply_key(*change(CONFIG, make_request())) == reply_key(CONFIG, make_request())
+def test_what_does_not_change_a_reply_does_not_change_the_key(fields: dict[str, Any]) -> None:
+    asked = replace(make_request(), key="another")
+    assert reply_key(with_fields(CONFIG, **fields), asked) == reply_key(CONFIG, make_request())
 
 
-KEPT = {
-    "da26e80f60ba671d212c7498da47fbd0dbd71c1b46732c6d2c148c278a893d61": {
-        "id": "openai/gpt-4o-2024-08-06"
-    },
-    "67e5b54ebfc56b69c085c8a2f534e8e41f06d4198f75d935380be11b5d94f33c": {
-        "id": "hosted_vllm/m",
-        "api_base": "http://h:1/v1",
-    },
-    "96c5a4f440a6e0000195db8b63f7ba8df6d180e545ac34fd9cedd774e66affad": {
-        "id": "hosted_vllm/m",
-        "api_base": ("http://h:1/v1", "http://h:2/v1"),
-        "revision": "step 2000",
-    },
-    "37622ac0a811a5a9c762ad4abde879776ce5fb7f9fa0419725ae62918fd86304": {
-        "id": "anthropic/claude-3-7-sonnet-20250219",
-        "response_format": "always",
-    },
-    "a14f0001e429abe0ab22df5f60f26e7625f8c676caacaac73ead6ee7fab022fa": {
-        "id": "gemini/gemini-2.5-flash",
-        "image_detail": "high",
-    },
-    "858731d24454896fd8c6c23fc69ac216ffa891f422523cb42357a672a0c63f56": {
-        "id": "xai/grok-4",
-        "seed": "never",
-    },
-    "6cdce32307d28e532ff4d6270a52656f96ced41d5c7fcfb535532a19f9eb9dda": {
-        "id": "openai/o4-mini",
-        "reasoning_effort": "high",
-        "extra_body": {"top_k": 1},
-    },
-}
+ADDRESSES = ("http://h:1/v1", "http://h:2/v1")
+KEPT: dict[str, dict[str, Any]] = {
+    "da26e80f60ba671d212c7498da47fbd0dbd71c1b46732c6d2c148c278a893d61":
+        {"id": "openai/gpt-4o-2024-08-06"},
+    "67e5b54ebfc56b69c085c8a2f534e8e41f06d4198f75d935380be11b5d94f33c":
+        {"id": "hosted_vllm/m", "api_base": ADDRESSES[0]},
+    "96c5a4f440a6e0000195db8b63f7ba8df6d180e545ac34fd9cedd774e66affad":
+        {"id": "hosted_vllm/m", "api_base": ADDRESSES, "revision": "step 2000"},
+    "37622ac0a811a5a9c762ad4abde879776ce5fb7f9fa0419725ae62918fd86304":
+        {"id": "anthropic/claude-3-7-sonnet-20250219", "response_format": "always"},
+    "a14f0001e429abe0ab22df5f60f26e7625f8c676caacaac73ead6ee7fab022fa":
+        {"id": "gemini/gemini-2.5-flash", "image_detail": "high"},
+    "858731d24454896fd8c6c23fc69ac216ffa891f422523cb42357a672a0c63f56":
+        {"id": "xai/grok-4", "seed": "never"},
+    "6cdce32307d28e532ff4d6270a52656f96ced41d5c7fcfb535532a19f9eb9dda":
+        {"id": "openai/o4-mini", "reasoning_effort": "high", "extra_body": {"top_k": 1}},
+}  # fmt: skip
 """Keys as the first caches have them, by the models that they are of."""
 
 
@@ -273,10 +230,7 @@ def test_what_was_kept_survives_a_kill(tmp_path: Path) -> None:
         assert cache.put("after", "openai/m", REPLY)
 
 
-def test_what_two_samples_ask_at_the_same_time_is_asked_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+def test_what_two_samples_ask_at_the_same_time_is_asked_once(tmp_path: Path) -> None:
     server = ROUTES["direct"].server(Faults(latency_s=0.05))
     with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
         config = ROUTES["direct"].config(running.url)

@@ -15,12 +15,14 @@ from phyblock.config.models import ModelConfig
 from phyblock.errors import UnavailableError
 from phyblock.models import api_key_status
 from phyblock.models.keys import KeyStatus, api_key, hidden, secrets_of
+from tests.models.routes import KEY_VARIABLE
 
 
 @pytest.fixture(autouse=True)
 def _no_keys(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("OPENAI", "ANTHROPIC", "GEMINI", "GOOGLE", "DASHSCOPE", "HOSTED_VLLM", "MINE"):
         monkeypatch.delenv(f"{name}_API_KEY", raising=False)
+    monkeypatch.delenv(KEY_VARIABLE)
 
 
 def config(model_id: str, **fields: object) -> ModelConfig:

@@ -20,7 +20,7 @@ from phyblock.errors import (
 from phyblock.models import Budget, Reply, ReplyCache, RetryPolicy, reply_key
 from phyblock.models.limits import Clock
 from tests.models.factory import make_model, make_request, run
-from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.models.routes import ROUTES
 from tests.servers.chassis import Faults, Running
 
 
@@ -123,12 +123,6 @@ def test_waits_keep_to_retry_after_and_to_their_bounds(wishes: list[float | None
         assert floor <= wait <= floor + min(60.0, 0.5 * 2**number)
 
 
-@pytest.fixture
-def _key(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
-
-
-@pytest.mark.usefixtures("_key")
 @pytest.mark.parametrize("route", ["direct", "openai"])
 @pytest.mark.parametrize("cancels", [1, 2])
 def test_a_request_under_way_is_answered_and_a_second_cancellation_gives_it_up(
@@ -164,7 +158,6 @@ def test_a_request_under_way_is_answered_and_a_second_cancellation_gives_it_up(
     assert budget.holds == 0
 
 
-@pytest.mark.usefixtures("_key")
 @pytest.mark.parametrize("where", ["slot", "minute", "budget", "retry", "rest"])
 def test_whatever_is_waited_for_a_cancellation_ends_the_wait_and_nothing_is_sent(
     where: str,
@@ -200,7 +193,6 @@ def test_whatever_is_waited_for_a_cancellation_ends_the_wait_and_nothing_is_sent
     assert server.requests == 1
 
 
-@pytest.mark.usefixtures("_key")
 def test_a_bug_of_ours_is_neither_sent_again_nor_charged(monkeypatch: pytest.MonkeyPatch) -> None:
     from phyblock.models.client import HttpClient
 

@@ -22,18 +22,13 @@ from phyblock.models.limits import Limits
 from phyblock.models.model import ChatModel
 from phyblock.models.servers import FAILURES_TO_REST, Server, Servers
 from tests.models.factory import ask, make_model, make_request, run, with_fields
-from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.models.routes import ROUTES
 from tests.models.test_limits import FakeTime
 from tests.servers.chassis import Faults, Running, kill, start
 from tests.servers.openai_chat import OpenAIChat
 
 REFUSED = UnreachableError("connection refused")
 LOST = RetryableError("connection refused", sent="lost")
-
-
-@pytest.fixture(autouse=True)
-def _key(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
 
 
 class Outage:

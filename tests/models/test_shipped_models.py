@@ -16,7 +16,7 @@ from phyblock.models.costs import map_entry
 from phyblock.models.keys import KEYLESS
 from phyblock.run.plan import to_config
 from tests.models.factory import make_model, make_request, reply_of
-from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.models.routes import ROUTES
 from tests.servers.chassis import Running
 
 AS_OF = date(2026, 11, 22)
@@ -80,10 +80,7 @@ def test_what_thinks_has_room_for_it() -> None:
 
 
 @pytest.mark.parametrize("name", of_group("frontier"))
-def test_each_is_asked_through_litellm_with_what_it_takes(
-    monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+def test_each_is_asked_through_litellm_with_what_it_takes(name: str) -> None:
     shipped = config(name, MODELS[name])
     route = ROUTES.get(shipped.provider, ROUTES["openai"])
     server = route.server()

@@ -20,14 +20,9 @@ from phyblock.parsing.plan import parse_plan, plan_form
 from phyblock.run.plan import to_config
 from phyblock.types import ImageDetail
 from tests.models.factory import JPEG, PNG, make_model, make_request, picture, reply_of
-from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.models.routes import ROUTES
 from tests.servers.chassis import Running, Seen
 from tests.servers.openai_chat import OpenAIChat
-
-
-@pytest.fixture(autouse=True)
-def _key(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
 
 
 def arrived_with(route: str, *, pictures: tuple[bytes, bytes], **params: object) -> Seen:
@@ -249,3 +244,22 @@ def test_litellm_hands_every_schema_on(form: Any) -> None:
     assert form.key in json.dumps(gemini["response_json_schema"])
     claude = arrived("anthropic", request, response_format="always").params
     assert claude["tools"][0]["input_schema"]["properties"] == form.schema["properties"]
+
+
+@pytest.mark.parametrize(
+    ("model_id", "api_base", "transport", "is_direct"),
+    [
+        ("openai/m", "http://x/v1", "auto", True),
+        ("hosted_vllm/m", "http://x/v1", "auto", True),
+        ("openai/m", None, "auto", False),
+        ("openai/o1", "http://x/v1", "auto", False),
+        ("anthropic/c", "http://x", "auto", False),
+        ("anthropic/c", "http://x", "direct", True),
+        ("openai/m", "http://x/v1", "litellm", False),
+    ],
+)
+def test_the_transport_is_chosen_by_rule(
+    model_id: str, api_base: str | None, transport: Any, is_direct: bool
+) -> None:
+    config = ModelConfig(name="m", id=model_id, api_base=api_base, transport=transport)  # type: ignore[call-arg]
+    assert config.is_direct == is_direct

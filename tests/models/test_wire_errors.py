@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
-import traceback
 from dataclasses import replace
 from typing import Any
 
@@ -13,13 +11,12 @@ from aiohttp import web
 
 from phyblock.errors import RefusedError, RetryableError, SampleError, UnavailableError
 from phyblock.models import ModelEvent, Reply
-from phyblock.models.client import Answer, error_of, read_json, shown
+from phyblock.models.client import shown
 from tests.models.factory import QUICK, ask, make_model, make_request, run
-from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.models.routes import KEY, ROUTES
 from tests.servers.chassis import Faults, LocalServer, Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 
-KEY = "sk-not-a-real-key-1234"
 OPENAI = ("direct", "openai", "vllm")
 ENDS: dict[str, tuple[type, int, tuple[str, ...]]] = {
     **dict.fromkeys(
@@ -34,11 +31,6 @@ ENDS: dict[str, tuple[type, int, tuple[str, ...]]] = {
 }
 """By mode: the outcome, requests of three questions (of one that is retried), and the routes."""
 CELLS = [(route, mode) for mode, (_, _, routes) in ENDS.items() for route in routes]
-
-
-@pytest.fixture(autouse=True)
-def _key(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(KEY_VARIABLE, KEY)
 
 
 def answers_of(
@@ -141,32 +133,6 @@ def test_a_server_that_never_answers_is_a_timeout(route: str) -> None:
     assert isinstance(answer, RetryableError)
     assert answer.status is None
     assert server.requests == policy.attempts
-
-
-@pytest.mark.parametrize("route", ROUTES)
-def test_a_key_arrives_but_stands_in_no_text(route: str) -> None:
-    (answer,), server, events = answers_of(route, Faults(mode="echo-key"), 1)
-    assert server.seen[0].key == KEY
-    assert isinstance(answer, UnavailableError)
-    assert "[key]" in str(answer) or "REDACTED" in str(answer)
-    told = traceback.format_exception(type(answer), answer, answer.__traceback__)
-    assert KEY not in "".join(told) + repr(answer) + repr(events)
-
-
-@pytest.mark.parametrize("words", ["Server is pinned to '/models/a'; requested 'b'.",
-                                   "Unexpected fields in the request: {'top_k'}"])  # fmt: skip
-def test_a_server_that_would_say_it_to_every_request_is_asked_no_more(words: str) -> None:
-    """As `transformers serve` says it: its other requests would fare no better."""
-    answer = Answer(400, {}, json.dumps({"detail": words}).encode())
-    assert isinstance(error_of(answer), UnavailableError)
-
-
-@pytest.mark.parametrize("code", [429, "429", 502, "529"])
-def test_what_passes_and_is_told_with_a_success_is_what_its_code_says(code: object) -> None:
-    body = json.dumps({"error": {"message": "slow down", "code": code}}).encode()
-    with pytest.raises(RetryableError, match="slow down") as told:
-        read_json(Answer(200, {"Retry-After": "7"}, body))
-    assert (told.value.status, told.value.retry_after_s) == (int(str(code)), 7)
 
 
 def test_keys_leave_an_error_before_it_is_cut() -> None:

@@ -16,12 +16,11 @@ from phyblock.errors import (
 )
 from phyblock.models import Reply, RetryPolicy
 from tests.models.factory import ask, make_model, make_request
-from tests.models.routes import KEY_VARIABLE, ROUTES, Route
+from tests.models.routes import KEY, ROUTES, Route
 from tests.servers.chassis import Faults, LocalServer, Running
 from tests.servers.faults import WIRE_FAULTS
 from tests.servers.openai_chat import OpenAIChat
 
-KEY = "sk-not-a-real-key-1234"
 ENDINGS = {
     "reply": Reply,
     "retryable": RetryableError,
@@ -47,7 +46,6 @@ Answers = dict[str, Reply | ModelError]
 
 @pytest.fixture(autouse=True)
 def _environment(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(KEY_VARIABLE, KEY)
     monkeypatch.setenv("NO_PROXY", "*")
 
 
