@@ -13,7 +13,7 @@ import json
 import os
 import re
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from importlib.resources import files
@@ -279,10 +279,12 @@ def pack_samples(
     pack: Pack,
     prompts: Pack,
     pictures: Mapping[str, str],
+    see: Callable[[Record, int], None],
 ) -> None:
     """Pack the newest record of every sample and the prompts as sent, and add it to the index.
 
-    `pictures` are addresses of pictures as seen from the page, by the digest of their bytes.
+    `pictures` are addresses of pictures as seen from the page, by the digest of their bytes. `see`
+    is called with every record and its number.
     """
     sent_as = {
         line.sha256: prompts.add([message.fields() for message in line.messages])
@@ -309,7 +311,7 @@ def pack_samples(
         if record.asked_turns:
             turns = record.asked_turns
             entry["turns"] = [{**turn.fields(), "prompt": sent(turn.prompt)} for turn in turns]
-        pack.add(entry)
+        see(record, pack.add(entry))
 
 
 def pack_scenes(scenes: Iterable[str], sources: Sequence[Sources], pack: Pack) -> bool:

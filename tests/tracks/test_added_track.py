@@ -25,9 +25,8 @@ from phyblock.results.load import Run, load_run
 from phyblock.scoring.counts import mean_of, ratio_of
 from phyblock.tracks import SceneTrack, SingleTrack
 from phyblock.tracks.measures import WHOLE, HeadlineColumn, Measure, SampleCounts, TrackReport
-from phyblock.web.leaderboard import SiteRun, all_values, board_of, entries_of, values_of
+from phyblock.web.board import SiteRun, all_values, board_of, entries_of, values_of
 from phyblock.web.pack import Sources
-from phyblock.web.report import headlines
 from tests.servers.chassis import Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
@@ -163,9 +162,9 @@ def test_the_leading_measure_leads_everywhere(run: Run) -> None:
         show(kind)
         assert comparable(run, "counting").measure == leading
         assert compare_models(run).name == leading.heading
-        assert [table.columns[0] for table in headlines(run)] == [
-            main_column(run, "counting").heading
-        ]
+        one = (SiteRun("run", run, Sources()),)
+        (track,) = board_of(one, entries_of(one), all_values(one))["tracks"]
+        assert track["main"] == main_column(run, "counting").heading
         worth = values_of(run, "counting").samples["oracle"].values()
         assert set(worth) == {leading.best}
 

@@ -102,26 +102,25 @@ CONTRAST = """() => {
 """Texts that stand out too little from what is behind them, with their ratio (WCAG AA: 4.5)."""
 
 
-def test_results_stand_in_the_page_before_anything_is_loaded(visit: ReportVisit) -> None:
+def test_results_say_what_was_found_and_lead_to_samples(visit: ReportVisit) -> None:
     page = visit.open()
     assert page.inner_text("h1") == "trial"
-    assert {"Full planning", "VQA"} <= set(page.locator(".headline h2").all_inner_texts())
-    assert not any("/report/" in url for url in visit.requests)
+    titles = page.locator("[data-view=results] h2").all_inner_texts()
+    assert {"Full planning", "VQA", "Step planning", "All tables"} <= set(titles)
     page.get_by_text("Coverage, suite trial").click()
     assert page.get_by_text("Expected").first.is_visible()
-    page.get_by_role("button", name="Level 3").first.click()
-    assert page.locator(".headline th[aria-sort=descending]").inner_text().startswith("Level 3")
-    assert visit.hash == "results?sort=full_planning.4.down"
-    for track, place, words, count in (
-        ("Full planning", 4, "track=full_planning&level=3&model=oracle", 4),
-        ("VQA", 2, "track=vqa&subtask=object_property&model=oracle", 4),
-    ):
-        headline = visit.open().locator(".headline", has_text=track)
-        links = headline.locator("tbody tr", has_text="oracle").first.get_by_role("link")
-        # The first of a row is its name.
-        assert links.nth(place).get_attribute("href") == f"#samples?{words}"
-        visit.open(f"samples?{words}")
-        assert visit.count() == f"{count} samples"
+    plans = page.locator("#ranking-full_planning")
+    assert plans.locator(".bars tbody th").first.inner_text() == "oracle"
+    plans.locator(".more summary").click()
+    plans.get_by_role("button", name="Level 3").first.click()
+    assert plans.locator(".board th[aria-sort=descending]").first.inner_text().startswith("Level 3")
+    plans.locator(".stack a[title^='random, Shape']").click()
+    page.wait_for_selector("#list [role=option]")
+    assert "error=shape_not_in_gt" in visit.hash
+    assert page.input_value("#filter-model") == "random"
+    visit.open("results")
+    page.locator("#ranking-vqa .bars a", has_text="oracle").first.click()
+    assert visit.count() == "12 samples"
 
 
 def test_filters_and_search_narrow_the_list_and_stand_in_the_address(visit: ReportVisit) -> None:
@@ -338,12 +337,12 @@ def test_a_run_in_trouble_says_so_first(
     trouble: ReportVisit, visiting: Visiting, tmp_path: Path
 ) -> None:
     page = trouble.open()
-    caution = page.inner_text(".caution")
+    caution = page.text_content(".caution") or ""
     assert "This run is not finished:" in caution
     assert "locked, Full planning: 0 of 2 answered: HTTP 401: Incorrect API key" in caution
     assert "A limit was set: 2 scenes of Full planning, 2 episodes of Step planning" in caution
     assert page.inner_text(".lead") == "The whole suite: The 400 scenes."
-    page.locator(".headline a", has_text="locked").first.click()
+    page.locator("#ranking-full_planning .bars a", has_text="locked").first.click()
     expect(page.locator("#list-status")).to_contain_text("no sample of locked here: 0 of 2")
     folder = write_run(tmp_path / "run", [], manifest())
     empty = visiting(write_report(write_tables(folder)))

@@ -45,7 +45,7 @@
   /** What is seen, as an address. */
   function seen() {
     const view = root.dataset.shown;
-    if (view === "results") return Address.text(view, Results.asked());
+    if (view === "results") return Address.text(view);
     if (view === "matrix") return Address.text(view, Matrix.asked());
     const sample = List.chosen >= 0 ? Data.sample(List.chosen) : null;
     return Address.text(view, {
@@ -136,7 +136,6 @@
     await view(known ? name : "results");
     const unknown = known || name === "content" ? [] : [`view “${name}”`];
     if (name === "matrix") unknown.push(...Matrix.restore(words));
-    if (root.dataset.shown === "results") Results.restore(words);
     if (name === "samples") unknown.push(...goToSamples(words));
     warn(unknown);
   }
@@ -219,6 +218,7 @@
   startTheme();
   startPrint();
   Results.start();
+  open().then(Results.fill).catch(() => null);
   Address.start(seen);
   Detail.onTold(Address.soon);
   document.querySelector(".skip").addEventListener("click", skip);
