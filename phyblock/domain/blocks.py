@@ -137,9 +137,9 @@ class Shape:
     about the body z axis, and `flips` is true where half turns about axes in the x-y plane map the
     block to itself; every block is its own mirror image in x = 0. `kit_colors` are its colors in
     the official kit, the first the one that designs use. `poses` are the orientations that designs
-    use, by name, the first by default. `word` is the paper's (appendix A.4); `exact` names the type
-    where others share that word. `mistaken_for` are types that a viewer may take a half-hidden one
-    for. `drawn` is a finer profile for pictures of round blocks.
+    use, by name, the first by default. `word` is the paper's (appendix A.4). `mistaken_for` are
+    types that a viewer may take a half-hidden one for. `drawn` is a finer profile for pictures of
+    round blocks.
     """
 
     profile: Profile
@@ -150,7 +150,6 @@ class Shape:
     kit_colors: tuple[Color, ...]
     poses: Mapping[str, Euler]
     word: str
-    exact: str = ""
     mistaken_for: tuple[BlockType, ...] = ()
     drawn: Profile | None = None
     low_m: tuple[float, float, float] = field(init=False)
@@ -256,7 +255,6 @@ SHAPES: dict[BlockType, Shape] = {
         flips=True,
         kit_colors=("blue",),
         word="rectangular prism",
-        exact="short rectangular prism",
         mistaken_for=("cube",),
         poses={**_turns("flat"), **_EDGE},
     ),
@@ -268,7 +266,6 @@ SHAPES: dict[BlockType, Shape] = {
         flips=True,
         kit_colors=("green",),
         word="rectangular prism",
-        exact="medium rectangular prism",
         poses=_SLAB,
     ),
     "cuboid3": Shape(
@@ -279,7 +276,6 @@ SHAPES: dict[BlockType, Shape] = {
         flips=True,
         kit_colors=("yellow",),
         word="rectangular prism",
-        exact="long rectangular prism",
         poses=_SLAB,
     ),
     "cylinder": Shape(

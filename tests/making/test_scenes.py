@@ -91,7 +91,7 @@ def test_every_theme_varies(name: str) -> None:
     for seed in range(10):
         draft = Draft(np.random.default_rng(seed))
         theme(draft)
-        assert [block.order for block in draft.blocks] == list(range(1, len(draft) + 1))
+        assert [block.order for block in draft.blocks] == list(range(1, len(draft.blocks) + 1))
         assert {block.kind for block in draft.blocks} <= set(KIT_PALETTE)
         forms.add(canonical_form(draft.blocks))
     assert len(forms) >= 4

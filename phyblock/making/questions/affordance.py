@@ -25,24 +25,8 @@ from phyblock.domain.blocks import (
 )
 from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.base import (
-    WRONG,
-    Draft,
-    Maker,
-    UnfairError,
-    are_seen,
-    draft,
-    drawn_view,
-    four_alike,
-    only_index,
-    orders_of,
-    pick,
-    picture_of,
-    require_seen,
-    shows_solid,
-    shuffled,
-    slots_of,
-)
+from phyblock.making.questions import base
+from phyblock.making.questions.base import UnfairError
 from phyblock.making.questions.structures import (
     group_of,
     lowered,
@@ -84,13 +68,13 @@ _OFF_CENTER, _ROW = 0, 4
 _SAME_HEIGHT_M, _CLEARLY_HIGHER_M = 0.001, 0.01
 
 
-class AffordanceMaker(Maker):
+class AffordanceMaker(base.Maker):
     """Kind: `ad-place`."""
 
     subtask: Subtask = "AD"
     scenes_tried = 160
 
-    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[base.Draft]:
         """One draft: a block in a pose drawn, one place where it stays, and three where not."""
         for _ in range(_STRUCTURES_TRIED):
             plain = _pictured(scene, rng)
@@ -99,11 +83,11 @@ class AffordanceMaker(Maker):
             tops = visible_tops(plain, seen(plain), _STEP_PX, _FLAT_RISE)
             for _ in range(_BLOCKS_TRIED):
                 block = _drawn_block(plain, rng)
-                places = _alike_places(plain, block, shuffled(rng, tops), rng)
+                places = _alike_places(plain, block, base.shuffled(rng, tops), rng)
                 if places:
                     alone = QuestionPicture(BLOCK_LABEL, (block,), plain.view_deg)
                     marks = [Mark("A", top.position_m) for top in places]
-                    made = draft(
+                    made = base.draft(
                         *(scene, rng, "ad-place", marks, [plain, alone], {"size": _size(block)}),
                         value=_sort_of(plain, places),
                         block=block.type,
@@ -114,14 +98,14 @@ class AffordanceMaker(Maker):
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """By statics and simulation of the block at every place, and by statics all round it."""
-        slots = slots_of(question)
-        shown, alone = picture_of(question, "scene"), picture_of(question, BLOCK_LABEL)
+        slots = base.slots_of(question)
+        shown, alone = base.picture_of(question, "scene"), base.picture_of(question, BLOCK_LABEL)
         if len(alone.blocks) != 1:
             raise UnfairError("the second picture is not of one block")
         block = alone.blocks[0]
-        if slots.get("size") != _size(block) or not shows_solid(block, alone.view_deg):
+        if slots.get("size") != _size(block) or not base.shows_solid(block, alone.view_deg):
             raise UnfairError("the block is not as large as told, or does not show its shape")
-        require_seen(shown, orders_of(shown.blocks), _ALL_SEEN)
+        base.require_seen(shown, base.orders_of(shown.blocks), _ALL_SEEN)
         shot, stays = seen(replace(shown, marks=())), []
         for letter in LETTERS:
             places = [mark.position_m for mark in shown.marks if mark.letter == letter]
@@ -132,7 +116,7 @@ class AffordanceMaker(Maker):
             if found is None:
                 raise UnfairError(f"it is not sure whether the block stays at place {letter}")
             stays.append(found)
-        return only_index(stays)
+        return base.only_index(stays)
 
 
 def _pictured(scene: Scene, rng: np.random.Generator) -> QuestionPicture | None:
@@ -141,20 +125,22 @@ def _pictured(scene: Scene, rng: np.random.Generator) -> QuestionPicture | None:
     None where it does not surely stand, or none of a few views shows it so.
     """
     blocks = (with_annex(scene, rng) if rng.random() < _ANNEXED else None) or scene.blocks
-    views = [drawn_view(rng) for _ in range(_VIEWS_TRIED)]
+    views = [base.drawn_view(rng) for _ in range(_VIEWS_TRIED)]
     if not all(map(surely_stands, groups(blocks))):
         return None
     pictures = (QuestionPicture("scene", blocks, view) for view in views)
-    return next((one for one in pictures if are_seen(one, orders_of(blocks), _ALL_SEEN)), None)
+    return next(
+        (one for one in pictures if base.are_seen(one, base.orders_of(blocks), _ALL_SEEN)), None
+    )
 
 
 def _drawn_block(plain: QuestionPicture, rng: np.random.Generator) -> Block:
     """A block to put down, in a pose whose shape the picture's view shows."""
     order = max(block.order for block in plain.blocks) + 1
     while True:
-        block_type, euler = pick(rng, _balanced_poses())
-        block = Block(order, block_type, pick(rng, COLORS), (0.0, 0.0, 0.0), euler, (), 1)
-        if shows_solid(block, plain.view_deg):
+        block_type, euler = base.pick(rng, _balanced_poses())
+        block = Block(order, block_type, base.pick(rng, COLORS), (0.0, 0.0, 0.0), euler, (), 1)
+        if base.shows_solid(block, plain.view_deg):
             return block
 
 
@@ -198,7 +184,7 @@ def _alike_places(
     unlike = np.linalg.norm(pixels[:, None] - pixels, axis=2)
     is_sure: dict[int, bool] = {}
     for _ in range(_FOURS_TRIED):
-        four = four_alike(measures, apart, rng, rights=len(staying), unlike=unlike).chosen
+        four = base.four_alike(measures, apart, rng, rights=len(staying), unlike=unlike).chosen
         for place, i in enumerate(four):
             if i not in is_sure:
                 is_sure[i] = stays_at(plain, block, together[i].position_m) is (place == 0)
@@ -240,7 +226,7 @@ def _by_statics(
     if not sorts[True, True]:
         return [], []
     wrong = [*sure(True, False, _MOST_FALLING), *sure(False, False, _MOST_HINDERED)]
-    return (sure(True, True, _MOST_STAYING) if len(wrong) >= WRONG else []), wrong
+    return (sure(True, True, _MOST_STAYING) if len(wrong) >= base.WRONG else []), wrong
 
 
 def _looks_of(plain: QuestionPicture, top: Top) -> tuple[float, ...]:

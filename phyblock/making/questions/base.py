@@ -185,30 +185,20 @@ def fill_template(template: str, slots: Slots) -> str:
 
 
 def slots_of(question: Question) -> Slots:
-    """The slots of a question's text; UnfairError unless they fill its wording to that text.
-
-    In a text whose wording is not known, each slot must stand.
-    """
+    """The slots of a question's text; UnfairError unless they fill its wording to that text."""
     slots = question.evidence.get("slots", {})
     try:
-        template = WORDINGS.get(question.wording)
-        if template is not None:
-            held = fill_template(template, slots) == question.text
-        else:
-            held = all(str(slot).lower() in question.text.lower() for slot in slots.values())
+        is_filled = fill_template(WORDINGS[question.wording], slots) == question.text
     except KeyError:
-        held = False
-    if not held:
+        is_filled = False
+    if not is_filled:
         raise UnfairError("the text is not its wording with the slots of the evidence")
     return {name: str(slot) for name, slot in slots.items()}
 
 
 def index_of(question: Question, right: str) -> tuple[int, ...]:
     """The place of the right option; UnfairError unless exactly one option says so."""
-    places = [i for i, option in enumerate(question.options) if option == right]
-    if len(places) != 1:
-        raise UnfairError(f"the right answer {right!r} is {len(places)} of the options")
-    return (places[0],)
+    return only_index([option == right for option in question.options])
 
 
 def only_index(right: Sequence[bool]) -> tuple[int]:
@@ -501,6 +491,25 @@ def marked_order(picture: QuestionPicture, letter: str) -> int:
             if order is not None:
                 return order
     raise UnfairError(f"no block is marked {letter}")
+
+
+def highlighted(
+    picture: QuestionPicture, blocks: Sequence[Block], slots: Slots, taken: int | None = None
+) -> frozenset[int]:
+    """Return orders of the blocks of the slots' `color`; all others are of their `other` color.
+
+    The block that is `taken` is of a color of its own. UnfairError when a picture shows another
+    structure or other colors.
+    """
+    color_of = {block.order: block.color for block in picture.blocks}
+    if taken is not None and color_of.pop(taken, "") != slots["taken"]:
+        raise UnfairError(f"picture {picture.label} does not show what is taken away")
+    if not {slots["color"], slots["other"]}.issuperset(color_of.values()):
+        raise UnfairError(f"picture {picture.label} shows other colors than the text names")
+    mine, given = ({b.order: replace(b, color="red") for b in s} for s in (picture.blocks, blocks))
+    if mine != given:
+        raise UnfairError(f"picture {picture.label} does not show the whole structure")
+    return frozenset(order for order, color in color_of.items() if color == slots["color"])
 
 
 class Four(NamedTuple):

@@ -16,7 +16,6 @@ import functools
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,39 +23,19 @@ from numpy.typing import NDArray
 from phyblock.domain.blocks import Color
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
+from phyblock.making.questions import base
 from phyblock.making.questions.base import (
     COUNTED,
-    LEAST_PIXELS,
-    MOST_OFF,
-    NAMED,
     TAKEN,
-    WORDS,
-    WRONG,
     Draft,
-    Floats,
-    Maker,
-    Slots,
     UnfairError,
     are_seen,
     are_told_apart,
     center_m,
     draft,
-    drawn_view,
-    four_alike,
-    marked_order,
-    of_kind,
     only_index,
-    option_pictures,
-    orders_of,
     pick,
-    picture_of,
-    ranks_among,
-    require_seen,
-    right_first,
-    same_blocks,
-    shares,
     shuffled,
-    slots_of,
 )
 from phyblock.making.questions.structures import (
     group_of,
@@ -96,12 +75,11 @@ from phyblock.sim.question_pictures import (
 
 Lot = frozenset[int]
 """Orders of blocks that move."""
-OUTCOME_TEXTS: tuple[str, ...] = tuple(WORDS["outcomes_of_removal"])
+OUTCOME_TEXTS: tuple[str, ...] = tuple(base.WORDS["outcomes_of_removal"])
 """Outcomes of a removal, by the number of other blocks that do not stay; all are offered."""
 _ALL_SEEN = 0.12
 _STRUCTURES_TRIED, _VIEWS_TRIED, _REMOVALS_TRIED = 6, 3, 6
-_Sort = tuple[bool, bool]
-_SORTS: tuple[_Sort, ...] = ((False, False), (False, True), (True, False), (True, True))
+_SORTS = ([False, False], [False, True], [True, False], [True, True])
 """True where what rests on the block goes with it, and where what rests on nothing else does."""
 _SHARES = (0.35, 0.25, 0.25, 0.15)
 """Shares of removals of each sort that are looked for: each rule is right in four cases of ten."""
@@ -121,26 +99,7 @@ _COLORS: tuple[tuple[Color, Color, Color], ...] = (
 """The colors of what moves, of what stays, and of the block that is taken away."""
 
 
-class _Case(NamedTuple):
-    """A removal: what is shown, the block that goes, and whether anything falls.
-
-    `resting` are the blocks that rest on it, directly or not, `only` those that rest on nothing
-    else. Whether anything falls is what statics alone say; a simulation decides.
-    """
-
-    blocks: tuple[Block, ...]
-    order: int
-    resting: Lot
-    only: Lot
-    falls: bool
-
-    @property
-    def sort(self) -> _Sort:
-        """True or False for each rule: all that rests on the block goes with it; or on it alone."""
-        return (bool(self.resting) is self.falls, bool(self.only) is self.falls)
-
-
-class CounterfactualMaker(Maker):
+class CounterfactualMaker(base.Maker):
     """Kinds: `cf-count` (texts) and `cf-color` (what moves, by colors)."""
 
     subtask: Subtask = "CF"
@@ -149,24 +108,41 @@ class CounterfactualMaker(Maker):
         """Drafts about removals from the scene, or from a part of it with an annex."""
         sort = _SORTS[int(rng.choice(len(_SORTS), p=_SHARES))]
         is_colored = bool(rng.random() < _COLORED)
+        known = base.orders_of(scene.blocks)
         for number in range(_STRUCTURES_TRIED):
-            blocks = scene.blocks if number == 0 else with_annex(scene, rng)
-            for case in _cases(scene, blocks, sort, rng) if blocks else ():
-                yield from _drafts_of(scene, case, is_colored, rng)
+            blocks = (scene.blocks if number == 0 else with_annex(scene, rng)) or ()
+            added = [block for block in blocks if block.order not in known]
+            for block in shuffled(rng, added or blocks)[:_REMOVALS_TRIED]:
+                group = group_of(blocks, block.order)
+                left = [one for one in group if one.order != block.order]
+                naive = [resting_on(group, block.order, only=only) for only in (False, True)]
+                # What statics alone say; a simulation decides.
+                falls = not is_balanced(left)
+                if left and [bool(lot) is falls for lot in naive] == sort:
+                    plain = _pictured(blocks, block.order, rng)
+                    outcome = plain and _sure_removal(blocks, block.order)
+                    if plain and outcome and [set(outcome.moved) == lot for lot in naive] == sort:
+                        made = _removal(scene, plain, block.order, outcome, is_colored, rng)
+                        facts = {"removed": block.order, "moved": list(outcome.moved)}
+                        for one in made:
+                            evidence = {**one.evidence, **facts, "resting": sorted(naive[0])}
+                            yield replace(one, evidence=evidence)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """By simulating the removal again."""
-        slots = slots_of(question)
-        kind, shown = of_kind(question), picture_of(question, "scene")
-        order = marked_order(shown, TAKEN)
+        slots = base.slots_of(question)
+        kind, shown = base.of_kind(question), base.picture_of(question, "scene")
+        order = base.marked_order(shown, TAKEN)
         outcome = _sure_removal(shown.blocks, order)
         if outcome is None:
             raise UnfairError(f"it is not sure what follows without block {order}")
-        require_seen(shown, (order,), NAMED)
+        base.require_seen(shown, (order,), base.NAMED)
         if kind == "cf-count":
-            right = _outcome_text(outcome)
-            return only_index([option == right for option in question.options])
-        told = [_colored_orders(one, shown, order, slots) for one in option_pictures(question)]
+            return base.index_of(question, _outcome_text(outcome))
+        told = [
+            base.highlighted(one, shown.blocks, slots, taken=order)
+            for one in base.option_pictures(question)
+        ]
         return only_index([one == set(outcome.moved) for one in told])
 
 
@@ -174,63 +150,46 @@ def _outcome_text(outcome: Outcome) -> str:
     return OUTCOME_TEXTS[min(len(outcome.moved), len(OUTCOME_TEXTS) - 1)]
 
 
-def _cases(
-    scene: Scene, blocks: tuple[Block, ...], sort: _Sort, rng: np.random.Generator
-) -> Iterator[_Case]:
-    """Removals of the sort wanted, as far as statics tell; from an annex where there is one."""
-    known = {block.order for block in scene.blocks}
-    added = [block for block in blocks if block.order not in known]
-    for block in shuffled(rng, added or blocks)[:_REMOVALS_TRIED]:
-        group = group_of(blocks, block.order)
-        left = [one for one in group if one.order != block.order]
-        resting = resting_on(group, block.order)
-        only = resting_on(group, block.order, only=True)
-        case = _Case(blocks, block.order, resting, only, not is_balanced(left))
-        if left and case.sort == sort:
-            yield case
+def _pictured(
+    blocks: tuple[Block, ...], order: int, rng: np.random.Generator
+) -> QuestionPicture | None:
+    """The blocks from a view that shows them all, with the one that goes marked."""
+    for _ in range(_VIEWS_TRIED):
+        plain = QuestionPicture("scene", blocks, base.drawn_view(rng))
+        mark = block_mark(plain, seen(plain), order, TAKEN)
+        is_named = mark and are_seen(plain, (order,), base.NAMED)
+        if mark and is_named and are_seen(plain, base.orders_of(blocks), _ALL_SEEN):
+            return replace(plain, marks=(mark,))
+    return None
 
 
-def _drafts_of(
-    scene: Scene, case: _Case, is_colored: bool, rng: np.random.Generator
+def _removal(
+    scene: Scene,
+    shown: QuestionPicture,
+    order: int,
+    outcome: Outcome,
+    is_colored: bool,
+    rng: np.random.Generator,
 ) -> Iterator[Draft]:
     """At most one draft about a removal: who moves, by colors, or how many."""
-    for _ in range(_VIEWS_TRIED):
-        plain = QuestionPicture("scene", case.blocks, drawn_view(rng))
-        mark = block_mark(plain, seen(plain), case.order, TAKEN)
-        orders = orders_of(case.blocks)
-        if mark and are_seen(plain, (case.order,), NAMED) and are_seen(plain, orders, _ALL_SEEN):
-            break
-    else:
-        return
-    outcome = _sure_removal(case.blocks, case.order)
-    if outcome is None:
-        return
     moved = frozenset(outcome.moved)
-    if case.sort != (moved == case.resting, moved == case.only):
-        return
     # That none moves is found more often than it is asked.
     is_rare = not moved and rng.random() > _STAYS_ASKED
-    if is_rare or not are_seen(plain, moved, COUNTED):
+    if is_rare or not are_seen(shown, moved, COUNTED):
         return
-    facts: dict[str, Any] = {
-        "removed": case.order,
-        "moved": list(outcome.moved),
-        "resting": sorted(case.resting),
-    }
-    shown = [replace(plain, marks=(mark,))]
     if is_colored:
-        options, slots, value = _colored_options(plain, case.order, moved, rng)
+        plain = replace(shown, marks=())
+        options, slots, value = _colored_options(plain, order, moved, rng)
         if options:
-            yield draft(scene, rng, "cf-color", options, shown, slots, value=value, **facts)
+            yield draft(scene, rng, "cf-color", options, [shown], slots, value=value)
         return
-    right, *others = right_first(_outcome_text(outcome), OUTCOME_TEXTS)
-    texts = [right, *shuffled(rng, others)]
-    yield draft(scene, rng, "cf-count", texts, shown, {}, **facts)
+    right, *others = base.right_first(_outcome_text(outcome), OUTCOME_TEXTS)
+    yield draft(scene, rng, "cf-count", [right, *shuffled(rng, others)], [shown], {})
 
 
 def _colored_options(
     plain: QuestionPicture, taken: int, moved: Lot, rng: np.random.Generator
-) -> tuple[list[QuestionPicture], Slots, str]:
+) -> tuple[list[QuestionPicture], base.Slots, str]:
     """Four pictures, the right one first, and the slots of the text; none where they are too few.
 
     The last tells if the right one has more colored than most, and lower. `plain` has no marks;
@@ -239,10 +198,10 @@ def _colored_options(
     lots = [moved, *_other_lots(plain, taken, moved, rng)]
     shot = seen(plain)
     counts = np.bincount(shot.block[shot.block >= 0], minlength=len(plain.blocks))
-    pixels = dict(zip(orders_of(plain.blocks), counts, strict=True))
+    pixels = dict(zip(base.orders_of(plain.blocks), counts, strict=True))
     unlike = np.array([[sum(pixels[o] for o in a ^ b) for b in lots] for a in lots], dtype=float)
     measures = np.array([_looks_of_lot(plain, shot, taken, lot) for lot in lots])
-    four = four_alike(measures, unlike >= LEAST_PIXELS, rng, unlike=unlike)
+    four = base.four_alike(measures, unlike >= base.LEAST_PIXELS, rng, unlike=unlike)
     colors = pick(rng, _COLORS)
 
     def colored(lot: Lot) -> QuestionPicture:
@@ -256,28 +215,11 @@ def _colored_options(
     return options, slots, four.halves(_LOT_AREA, _LOT_ROW)
 
 
-def _colored_orders(
-    picture: QuestionPicture, shown: QuestionPicture, taken: int, slots: Slots
-) -> Lot:
-    """Orders of the blocks that a picture says move; UnfairError when it says something else."""
-    start, same = (
-        {block.order: replace(block, color="red") for block in one.blocks}
-        for one in (shown, picture)
-    )
-    color_of = {block.order: block.color for block in picture.blocks}
-    rest = {color for order, color in color_of.items() if order != taken}
-    if start != same or color_of.get(taken) != slots["taken"]:
-        raise UnfairError(f"picture {picture.label} does not show the same structure")
-    if not rest <= {slots["color"], slots["other"]}:
-        raise UnfairError(f"picture {picture.label} shows other colors than the text names")
-    return frozenset(order for order, color in color_of.items() if color == slots["color"])
-
-
 def _other_lots(
     plain: QuestionPicture, taken: int, moved: Lot, rng: np.random.Generator
 ) -> list[Lot]:
     """Lots that could move together and do not: some blocks, with all that rests on them."""
-    share = shares(plain)
+    share = base.shares(plain)
     left = [block for block in plain.blocks if block.order != taken]
     single = [frozenset({b.order}) | resting_on(left, b.order) for b in left]
     found = {frozenset[int]()}
@@ -356,7 +298,7 @@ _PUSHED = 0.55
 """Share of drafts for which a push is sought, which fewer scenes allow than a next step."""
 
 
-class PredictiveMaker(Maker):
+class PredictiveMaker(base.Maker):
     """Kinds: `pd-next` (the next step) and `pd-push` (the settled scene after a push)."""
 
     subtask: Subtask = "PD"
@@ -368,11 +310,11 @@ class PredictiveMaker(Maker):
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """By statics and simulation."""
-        slots = slots_of(question)
-        shown, options = picture_of(question, "scene"), option_pictures(question)
-        if of_kind(question) == "pd-next":
+        slots = base.slots_of(question)
+        shown, options = base.picture_of(question, "scene"), base.option_pictures(question)
+        if base.of_kind(question) == "pd-next":
             return only_index([_can_follow(shown, one) for one in options])
-        push = _meant_push(shown, marked_order(shown, TAKEN), slots["direction"])
+        push = _meant_push(shown, base.marked_order(shown, TAKEN), slots["direction"])
         outcome = _sure_push(shown.blocks, push)
         if outcome is None:
             raise UnfairError("it is not sure what follows the push")
@@ -428,7 +370,7 @@ def _next_drafts(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         if not stage:
             return
         low, high = _ELEVATIONS_DEG
-        view = (drawn_view(rng)[0], float(rng.integers(low, high + 1)))
+        view = (base.drawn_view(rng)[0], float(rng.integers(low, high + 1)))
         shown = QuestionPicture("scene", stage, view, framed=_with_room(stage, _ABOVE_M))
         staying, falling = _places(shown, block, rng)
         if len(falling) < _ENOUGH:
@@ -455,7 +397,7 @@ def _can_follow(shown: QuestionPicture, option: QuestionPicture) -> bool:
     placed = {block.order for block in shown.blocks}
     added = [block for block in option.blocks if block.order not in placed]
     kept = [block for block in option.blocks if block.order in placed]
-    if len(added) != 1 or not same_blocks(kept, shown.blocks):
+    if len(added) != 1 or not base.same_blocks(kept, shown.blocks):
         raise UnfairError(f"picture {option.label} does not add one block")
     stays = _stays(kept, added[0])
     if stays is None:
@@ -535,7 +477,9 @@ def _alike_wrong(
     for (i, one), (j, other) in itertools.combinations(enumerate(together), 2):
         # A picture like the first one is none that could be chosen.
         is_worth_it = i == 0 or (apart[0, i] and apart[0, j])
-        apart[i, j] = apart[j, i] = is_worth_it and differing_pixels(one, other) >= LEAST_PIXELS
+        apart[i, j] = apart[j, i] = (
+            is_worth_it and differing_pixels(one, other) >= base.LEAST_PIXELS
+        )
         if (i, j) == (0, 1) and not apart[i, j]:
             return []
     measures = np.array([_looks(start, shot) for shot in shots])
@@ -544,21 +488,24 @@ def _alike_wrong(
 
 
 def ranked_as_drawn(
-    measures: Floats, apart: NDArray[np.bool_], rng: np.random.Generator, held: Mapping[int, int]
+    measures: base.Floats,
+    apart: NDArray[np.bool_],
+    rng: np.random.Generator,
+    held: Mapping[int, int],
 ) -> tuple[int, ...]:
     """Three rows after the first, all apart, among which the first has about the ranks drawn.
 
     `measures` has shape (n, k), `apart` (n, n). `held` gives ranks that hold exactly for some of
     the k measures. Empty where no three come near enough.
     """
-    wanted = np.array(rng.integers(WRONG + 1, size=measures.shape[1]), dtype=np.int64)
+    wanted = np.array(rng.integers(base.WRONG + 1, size=measures.shape[1]), dtype=np.int64)
     fixed = sorted(held)
     for one in fixed:
         wanted[one] = held[one]
-    best: tuple[float, tuple[int, ...]] = (MOST_OFF, ())
-    for chosen in itertools.combinations(range(1, len(measures)), WRONG):
+    best: tuple[float, tuple[int, ...]] = (base.MOST_OFF, ())
+    for chosen in itertools.combinations(range(1, len(measures)), base.WRONG):
         if all(apart[a, b] for a, b in itertools.combinations((0, *chosen), 2)):
-            off = np.abs(ranks_among(measures, 0, np.array([chosen]))[0] - wanted)
+            off = np.abs(base.ranks_among(measures, 0, np.array([chosen]))[0] - wanted)
             if (off[fixed] <= _HELD_OFF).all():
                 best = min(best, (float(off.mean()), chosen))
     return best[1]
@@ -593,7 +540,7 @@ _BLOCKS_TRIED, _PUSHES_TRIED = 3, 9
 _OPTIONS = 4
 _FRONTS_DEG = (0.0, 90.0, 180.0, 270.0)
 _ELEVATIONS_DEG_PUSHES = (20, 32)
-_DIRECTIONS: Mapping[str, int] = WORDS["directions"]
+_DIRECTIONS: Mapping[str, int] = base.WORDS["directions"]
 _LEAST_SHOWN_PUSHES = 60
 _TOUCH_M, _ALONG_M, _REACH_M = 0.002, 0.01, 0.12
 _LEVEL_M, _DOWN_M = 0.004, 0.008

@@ -26,8 +26,7 @@ from phyblock.making.questions.base import (
 )
 from phyblock.sim.contact import bounds_m
 
-Feature = Literal["color", "type", "size", "layer", "side", "support"]
-"""Features of an expression; `size` tells rectangular prisms apart by their length."""
+Feature = Literal["color", "type", "layer", "side", "support"]
 _ORDER = ("cube", "rectangular prism", "triangular prism", "half cylinder", "cylinder", "arch")
 """The paper's six words (appendix A.4); those of further shapes come behind."""
 SHAPE_WORDS: dict[str, tuple[BlockType, ...]] = {
@@ -35,10 +34,7 @@ SHAPE_WORDS: dict[str, tuple[BlockType, ...]] = {
     for word in dict.fromkeys((*_ORDER, *(shape.word for shape in SHAPES.values())))
 }
 """The types that each word names."""
-_SIZED: dict[str, tuple[BlockType, ...]] = {
-    shape.exact: (one,) for one, shape in SHAPES.items() if shape.exact
-}
-_NOUNS = {**SHAPE_WORDS, **_SIZED, "block": sum(SHAPE_WORDS.values(), ())}
+_NOUNS = {**SHAPE_WORDS, "block": sum(SHAPE_WORDS.values(), ())}
 _SIDES = ("leftmost", "rightmost", "topmost")
 _TOP_GAP_M = 0.02
 _NAMES_DRAWN_FROM = 3
@@ -124,10 +120,10 @@ def _fits(block: Block, words: _Words, loosely: bool, picture: QuestionPicture) 
 
 def resolve_one(text: str, picture: QuestionPicture) -> Block:
     """The one block that an expression fits, even loosely; UnfairError otherwise."""
-    orders, loose = resolve(text, picture), resolve(text, picture, loosely=True)
+    orders = resolve(text, picture)
     if len(orders) != 1:
         raise UnfairError(f"{text!r} fits {len(orders)} blocks")
-    if loose != orders:
+    if resolve(text, picture, loosely=True) != orders:
         raise UnfairError(f"{text!r} may be taken for another block")
     return next(block for block in picture.blocks if block.order == orders[0])
 
@@ -162,11 +158,7 @@ def _expressions(
 ) -> Iterator[_Words]:
     """All that is true of a block, the simple before the long."""
     colors = [block.color, None] if "color" in features else [None]
-    nouns = ["block"]
-    if "type" in features:
-        nouns.append(shape_word(block.type))
-    if "size" in features:
-        nouns += [noun for noun, types in _SIZED.items() if block.type in types]
+    nouns = ["block", shape_word(block.type)] if "type" in features else ["block"]
     simple = [_Words(noun, color) for noun in nouns for color in colors]
     yield from sorted(simple, key=lambda one: len(one.text.split()))
     for one in simple:

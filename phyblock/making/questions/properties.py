@@ -17,33 +17,25 @@ import numpy as np
 from phyblock.domain.blocks import BLOCK_TYPES, COLORS, SHAPES
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
+from phyblock.making.questions import base
 from phyblock.making.questions.base import (
     COUNTED,
     NAMED,
     STUDIED,
-    WORDS,
     Draft,
     Slots,
     StaticMaker,
     UnfairError,
     View,
-    are_seen,
     draft,
     goal_picture,
     index_of,
     orders_of,
     pick,
-    recolored,
     require_seen,
     require_shapes_seen,
-    right_first,
     seen_blocks,
-    shares,
-    shows_profile,
     shuffled,
-    stem_of,
-    window,
-    with_own_colors,
 )
 from phyblock.making.questions.names import (
     SHAPE_WORDS,
@@ -78,7 +70,7 @@ class PropertyMaker(StaticMaker):
         for one in shuffled(rng, seen_blocks(goal_picture(scene, view), self._least)):
             if self._doubt(one, scene.blocks, view):
                 continue
-            shown = recolored(scene, rng)
+            shown = base.recolored(scene, rng)
             picture = goal_picture(shown, view)
             block = next(b for b in shown.blocks if b.order == one.order)
             name = drawn_name(rng, block, picture, self._features)
@@ -103,7 +95,7 @@ class PropertyMaker(StaticMaker):
         """The reason why a view does not tell a block's shape; empty where it does."""
         if not self._is_shape:
             return ""
-        if not shows_profile(block, view):
+        if not base.shows_profile(block, view):
             return "is seen from a side that does not tell its shape"
         is_standing = block.type == "semi_cylinder" and _height_m(block) > _LYING_M
         if is_standing and any(block.order in other.depend for other in blocks):
@@ -170,9 +162,9 @@ def _one_of_four(
 ) -> Draft:
     comparison = pick(rng, list(_COMPARISONS))
     right = _extreme(chosen, comparison)
-    shown = with_own_colors(scene, orders_of(chosen), rng)
+    shown = base.with_own_colors(scene, orders_of(chosen), rng)
     colors = {block.order: block.color for block in shown.blocks}
-    options = [f"the {colors[b.order]} block" for b in right_first(right, chosen)]
+    options = [f"the {colors[b.order]} block" for b in base.right_first(right, chosen)]
     stem, measure, _ = _COMPARISONS[comparison]
     sizes = {str(block.order): round(measure(block), 6) for block in chosen}
     slots, pictures = {"comparison": comparison}, [goal_picture(shown, view)]
@@ -183,12 +175,15 @@ def _times_as_tall(
     view: View, scene: Scene, pair: Sequence[Block], rng: np.random.Generator
 ) -> Draft:
     right = _times(*pair)
-    words = list(WORDS["times_as_tall"])
+    words = list(base.WORDS["times_as_tall"])
     start = pick(rng, [i for i in (0, 1) if right in words[i : i + 4]])
-    shown = with_own_colors(scene, orders_of(pair), rng)
+    shown = base.with_own_colors(scene, orders_of(pair), rng)
     colors = {block.order: block.color for block in shown.blocks}
     one, other = (f"{colors[block.order]} block" for block in pair)
-    options, slots = right_first(right, words[start : start + 4]), {"block": one, "other": other}
+    options, slots = (
+        base.right_first(right, words[start : start + 4]),
+        {"block": one, "other": other},
+    )
     heights = {str(block.order): round(_height_m(block), 6) for block in pair}
     pictures = [goal_picture(shown, view)]
     return draft(shown, rng, "si-times", options, pictures, slots, kind="times", measures=heights)
@@ -209,7 +204,7 @@ def _extreme(blocks: Sequence[Block], comparison: str) -> Block:
 def _times(one: Block, other: Block) -> str:
     """The words for how many times as tall one block is as another; UnfairError for others."""
     ratio = _height_m(one) / _height_m(other)
-    for word, known in WORDS["times_as_tall"].items():
+    for word, known in base.WORDS["times_as_tall"].items():
         if abs(ratio - known) < _EXACT:
             return str(word)
     raise UnfairError(f"is {ratio:.2f} times as tall, which no option says")
@@ -234,7 +229,7 @@ class NumberMaker(StaticMaker):
     def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Of all that can be counted in a scene whose blocks all show enough."""
         picture = goal_picture(scene, view)
-        if not are_seen(picture, orders_of(scene.blocks), COUNTED):
+        if not base.are_seen(picture, orders_of(scene.blocks), COUNTED):
             return
         colors = [color for color in COLORS if any(b.color == color for b in scene.blocks)]
         kinds = [(f"{color} blocks", "color") for color in colors]
@@ -246,7 +241,7 @@ class NumberMaker(StaticMaker):
             pass  # Colors can be counted where shapes cannot.
         for what, kind in shuffled(rng, kinds):
             counted = orders_of(_fitting(what, scene.blocks))
-            if options := window(rng, range(1, _MOST), len(counted)):
+            if options := base.window(rng, range(1, _MOST), len(counted)):
                 slots = {"what": what}
                 yield draft(scene, rng, "nu", options, [picture], slots, kind=kind, counted=counted)
 
@@ -305,7 +300,7 @@ def sure_blocks(picture: QuestionPicture) -> int:
     alone: without it, that block would float. UnfairError where more are hidden, or nothing tells
     of it.
     """
-    seen = shares(picture)
+    seen = base.shares(picture)
     hidden = [order for order, share in seen.items() if share < COUNTED]
     if len(hidden) > 1:
         raise UnfairError("several blocks are hidden")
@@ -431,7 +426,7 @@ class TallyMaker(StaticMaker):
 
     def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """One way of counting after another, as far as the picture allows it."""
-        colored = recolored(scene, rng)
+        colored = base.recolored(scene, rng)
         for stem in shuffled(rng, self._stems):
             tally = TALLIES[stem]
             shown = colored if tally.is_recolored else scene
@@ -444,7 +439,7 @@ class TallyMaker(StaticMaker):
                 right = tally.count(picture, slots)
             except UnfairError:
                 continue
-            options = window(rng, tally.values, right)
+            options = base.window(rng, tally.values, right)
             if not options:
                 continue
             kind = stem
@@ -457,7 +452,7 @@ class TallyMaker(StaticMaker):
 
     def answer(self, question: Question, picture: QuestionPicture, slots: Slots) -> tuple[int, ...]:
         """Count again."""
-        stem = stem_of(question.wording)
+        stem = base.stem_of(question.wording)
         if stem not in self._stems:
             raise UnfairError(f"the wording {question.wording!r} counts nothing")
         return index_of(question, str(TALLIES[stem].count(picture, slots)))

@@ -27,29 +27,16 @@ from phyblock.domain.blocks import COLORS, Color
 from phyblock.domain.question import Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import Symmetry, turned_form
+from phyblock.making.questions import base
 from phyblock.making.questions.base import (
-    COUNTED,
-    WORDS,
     Draft,
-    Maker,
     UnfairError,
     View,
-    are_seen,
     are_told_apart,
     draft,
     drawn_view,
-    of_kind,
-    only_index,
-    option_pictures,
-    orders_of,
     pick,
-    picture_of,
-    recolored,
-    require_seen,
-    right_first,
-    same_blocks,
     shuffled,
-    slots_of,
 )
 from phyblock.making.questions.structures import group_of
 from phyblock.making.scenes.sketch import transformed
@@ -62,7 +49,7 @@ from phyblock.sim.question_pictures import least_difference, seen, shown_pixels
 _FRONTS_DEG = (0.0, 90.0, 180.0, 270.0)
 """Straight on: a mirror image of a slanted view can be a true view of the same side."""
 _FRONT_ELEVATION_DEG = 22.0
-_SIDES: dict[str, float] = WORDS["sides_seen"]
+_SIDES: dict[str, float] = base.WORDS["sides_seen"]
 _LEAST_TURN_DEG = 60
 _FAMILIES_TRIED = 8
 _LEAST_SHOWN = 100
@@ -100,7 +87,7 @@ class _Structure:
         return QuestionPicture("scene", self.blocks, (azimuth, view[1]))
 
 
-class ViewpointMaker(Maker):
+class ViewpointMaker(base.Maker):
     """Kinds: `vp-match`, a structure from anywhere; `vp-side`, what is seen from a side named."""
 
     subtask: Subtask = "VP"
@@ -109,7 +96,7 @@ class ViewpointMaker(Maker):
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """One draft of each kind at most."""
-        scene, view = recolored(scene, rng), drawn_view(rng)
+        scene, view = base.recolored(scene, rng), drawn_view(rng)
         turn = float(rng.integers(_LEAST_TURN_DEG, 361 - _LEAST_TURN_DEG))
         yield from _match(scene, rng, "vp-match", view, (view[0] + turn, drawn_view(rng)[1]), "")
         side = pick(rng, tuple(_SIDES))
@@ -121,17 +108,17 @@ class ViewpointMaker(Maker):
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """By the blocks in the pictures, whichever side they are seen from."""
-        slots = slots_of(question)
-        shown, options = picture_of(question, "scene"), option_pictures(question)
-        if of_kind(question) == "vp-side":
+        slots = base.slots_of(question)
+        shown, options = base.picture_of(question, "scene"), base.option_pictures(question)
+        if base.of_kind(question) == "vp-side":
             if shown.view_deg[0] not in _FRONTS_DEG:
                 raise UnfairError("the first picture is not straight from the front")
             azimuth = _from_side(shown.view_deg, slots["side_words"])[0]
             right = [(option.view_deg[0] - azimuth) % 360 == 0 for option in options]
-            alike = [same_blocks(shown.blocks, option.blocks) for option in options]
-            return only_index([a and b for a, b in zip(right, alike, strict=True)])
+            alike = [base.same_blocks(shown.blocks, option.blocks) for option in options]
+            return base.only_index([a and b for a, b in zip(right, alike, strict=True)])
         form = turned_form(shown.blocks)
-        return only_index([turned_form(option.blocks) == form for option in options])
+        return base.only_index([turned_form(option.blocks) == form for option in options])
 
 
 def _from_side(front: View, side: str) -> View:
@@ -149,7 +136,7 @@ def _match(
         shown, options = ([one.seen_from(view) for one in family] for view in (first, second))
         if are_told_apart(shown) and are_told_apart(options) and _differ_at_a_glance(options):
             right = int(rng.integers(len(family)))
-            dealt = [options[i] for i in right_first(right, range(len(family)))]
+            dealt = [options[i] for i in base.right_first(right, range(len(family)))]
             pictures, slots = [shown[right]], {"side_words": side} if side else {}
             value = side or changes
             yield draft(scene, rng, stem, dealt, pictures, slots, value=value, changes=changes)
@@ -298,7 +285,7 @@ _PAIRS: tuple[tuple[Color, Color], ...] = (
 Stages = tuple[frozenset[int], ...]
 
 
-class OrderingMaker(Maker):
+class OrderingMaker(base.Maker):
     """Kinds: `or-build` and `or-apart`."""
 
     subtask: Subtask = "OR"
@@ -310,22 +297,22 @@ class OrderingMaker(Maker):
             return
         for _ in range(_VIEWS_TRIED):
             plain = QuestionPicture("scene", scene.blocks, drawn_view(rng), framed=scene.blocks)
-            if are_seen(plain, orders_of(scene.blocks), COUNTED):
+            if base.are_seen(plain, base.orders_of(scene.blocks), base.COUNTED):
                 yield from _draft_from(scene, plain, rng)
                 return
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """By the stages that hold blocks resting on those of others: one order must follow."""
-        slots, scene = slots_of(question), question.scene
-        options = option_pictures(question)
-        stages = tuple(_stage_in(scene, option, slots) for option in options)
+        slots, scene = base.slots_of(question), question.scene
+        options = base.option_pictures(question)
+        stages = tuple(base.highlighted(one, scene.blocks, slots) for one in options)
         if sorted(itertools.chain(*stages)) != sorted(b.order for b in scene.blocks):
             raise UnfairError("the stages do not hold every block once")
-        require_seen(options[0], orders_of(scene.blocks), COUNTED)
+        base.require_seen(options[0], base.orders_of(scene.blocks), base.COUNTED)
         order = _only_order(scene, stages)
         if order is None:
             raise UnfairError("what rests on what leaves more than one order, or none")
-        return order if of_kind(question) == "or-build" else order[::-1]
+        return order if base.of_kind(question) == "or-build" else order[::-1]
 
 
 def _draft_from(scene: Scene, plain: QuestionPicture, rng: np.random.Generator) -> Iterator[Draft]:
@@ -375,17 +362,6 @@ def _only_order(scene: Scene, stages: Stages) -> tuple[int, ...] | None:
         if all(order.index(early) < order.index(late) for early, late in before)
     ]
     return fitting[0] if len(fitting) == 1 else None
-
-
-def _stage_in(scene: Scene, option: QuestionPicture, slots: Mapping[str, str]) -> frozenset[int]:
-    """Orders of the blocks that a picture highlights; UnfairError when it shows another scene."""
-    goal = {block.order: block for block in scene.blocks}
-    if any(block.color not in (slots["color"], slots["other"]) for block in option.blocks):
-        raise UnfairError(f"picture {option.label} shows other colors than the text names")
-    plain = [replace(b, color=goal[b.order].color) for b in option.blocks if b.order in goal]
-    if len(option.blocks) != len(scene) or not same_blocks(plain, scene.blocks):
-        raise UnfairError(f"picture {option.label} does not show the whole structure")
-    return frozenset(b.order for b in option.blocks if b.color == slots["color"])
 
 
 def _is_sorted_by_eye(plain: QuestionPicture, stages: Stages) -> bool:

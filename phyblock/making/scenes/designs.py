@@ -476,27 +476,27 @@ def _framed(d: Draft) -> None:
     """A building between two towers that mirror one another."""
     side = _part(d, "tower", "monument", "balance", "pyramid")
     middle = _part(d, "house", "gate", "arcade", "court")
-    d.take(beside([side, middle, transformed(side, _ACROSS)], d.pick((0.0, 0.0, 1.0))))
+    d.blocks += beside([side, middle, transformed(side, _ACROSS)], d.pick((0.0, 0.0, 1.0)))
 
 
 def _avenue(d: Draft) -> None:
     """A structure, its mirror image, and something between them."""
     side = _part(d, "bridge", "stair", "house", "gate")
     middle = _part(d, "fountain", "tree", "monument")
-    d.take(beside([side, middle, transformed(side, _ACROSS)], d.pick((1.0, 2.0))))
+    d.blocks += beside([side, middle, transformed(side, _ACROSS)], d.pick((1.0, 2.0)))
 
 
 def _street(d: Draft) -> None:
     """A building with a scene before its door."""
     building = _part(d, "house", "arcade", "court", "tower")
     second = _part(d, "animal", "car", "figure", "tree", "table")
-    d.take(beside([building, second], d.pick((1.0, 2.0))))
+    d.blocks += beside([building, second], d.pick((1.0, 2.0)))
 
 
 def _train(d: Draft) -> None:
     """Two or three cars in a row."""
     cars = [_part(d, "car") for _ in range(d.pick((2, 2, 3)))]
-    d.take(beside(cars, 1.0))
+    d.blocks += beside(cars, 1.0)
 
 
 COMPOSITIONS: dict[str, Theme] = {

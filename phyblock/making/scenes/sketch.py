@@ -6,6 +6,7 @@ from what it lands on; so a design holds no heights, no overlap and no gap.
 
 from __future__ import annotations
 
+import copy
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -95,11 +96,17 @@ class Sketch:
 
 
 def make_scene(name: str, levels: tuple[int, ...], blocks: list[Block]) -> Scene:
-    """The scene that blocks make, moved so that the middle of its ground plan is the origin.
+    """Return the scene that blocks make, the middle of its ground plan moved to the origin.
 
     Raises CycleError as `scene_of`.
     """
-    return scene_of(name, levels, _centered(blocks))
+    middle_x, middle_y, _ = whole_bounds_m(blocks).mean(axis=0).tolist()
+    centered = []
+    for block in blocks:
+        x, y, z = block.position_m
+        place = (round(x - middle_x, 6) + 0.0, round(y - middle_y, 6) + 0.0, z)
+        centered.append(replace(block, position_m=place))
+    return scene_of(name, levels, centered)
 
 
 def scene_of(
@@ -119,22 +126,6 @@ def scene_of(
     return Scene(name, levels, finished, parents or (name,))
 
 
-def _centered(blocks: list[Block]) -> list[Block]:
-    low, high = whole_bounds_m(blocks)
-    middle = (low + high) / 2
-    return [
-        replace(
-            block,
-            position_m=(
-                round(block.position_m[0] - float(middle[0]), 6) + 0.0,
-                round(block.position_m[1] - float(middle[1]), 6) + 0.0,
-                block.position_m[2],
-            ),
-        )
-        for block in blocks
-    ]
-
-
 Palette = Literal["kit", "full"]
 """The pairs of type and color of the official kit, or all that there are."""
 PALETTES: dict[Palette, tuple[tuple[BlockType, Color], ...]] = {
@@ -145,16 +136,16 @@ PALETTES: dict[Palette, tuple[tuple[BlockType, Color], ...]] = {
 T = TypeVar("T")
 
 
-class Draft:
-    """The sketch, random source and colors that the rules of the grammar draw on.
+class Draft(Sketch):
+    """A sketch with the random source and the colors that the rules of the grammar draw on.
 
     A cube comes in one of two tones of the structure, 0 or 1, so that a storey has one color; any
     other type has one color a structure, the kit's own with the palette `kit`.
     """
 
     def __init__(self, rng: np.random.Generator, palette: Palette = "kit") -> None:
+        super().__init__()
         self.rng = rng
-        self.sketch = Sketch()
         order = rng.permutation(len(COLORS))
         self._tones: tuple[Color, ...] = tuple(COLORS[i] for i in order[:2])
         self._colors = {block_type: shape.kit_colors[0] for block_type, shape in SHAPES.items()}
@@ -162,24 +153,11 @@ class Draft:
             drawn = rng.integers(len(COLORS), size=len(BLOCK_TYPES))
             self._colors = {t: COLORS[int(i)] for t, i in zip(BLOCK_TYPES, drawn, strict=True)}
 
-    @property
-    def blocks(self) -> list[Block]:
-        """All that was put down so far."""
-        return self.sketch.blocks
-
-    def __len__(self) -> int:
-        return len(self.sketch.blocks)
-
     def fresh(self) -> Draft:
-        """An empty draft with the same colors and the same random source."""
-        other = Draft.__new__(Draft)
-        other.rng, other.sketch = self.rng, Sketch()
-        other._tones, other._colors = self._tones, self._colors
+        """Return an empty draft with the same colors and the same random source."""
+        other = copy.copy(self)
+        other.blocks = []
         return other
-
-    def take(self, blocks: Sequence[Block]) -> None:
-        """Add blocks that were drawn elsewhere, numbered to go on from here."""
-        self.sketch.blocks += blocks
 
     def pick(self, options: Sequence[T]) -> T:
         """One of the options, all alike."""
@@ -207,19 +185,18 @@ class Draft:
                 kind = "roof" if block_type == "triangle" else "dome"
                 pose = self.pick((kind, f"{kind}-turned"))
             raised = sum(int(word) for word in words if word[0] == "+")
-            color = self._color(block_type, tone + raised)  # type: ignore[arg-type]
+            color = self._colors[block_type]  # type: ignore[index]
+            if block_type == "cube":
+                color = self._tones[(tone + raised) % 2]
             for sign in (-1, 1) if is_pair else (1,):
                 sided = f"{pose}{'-+'[sign > 0]}y" if pose in ("ramp", "round") else pose
-                self.sketch.put(block_type, sign * float(y), float(x or 0), sided, color)  # type: ignore[arg-type]
+                self.put(block_type, sign * float(y), float(x or 0), sided, color)  # type: ignore[arg-type]
 
     def any_of(self, *texts: str, tone: int = 0) -> str:
         """Build one of the texts, all alike, and return it."""
         text = self.pick(texts)
         self.build(text, tone)
         return text
-
-    def _color(self, block_type: BlockType, tone: int) -> Color:
-        return self._tones[tone % 2] if block_type == "cube" else self._colors[block_type]
 
 
 Theme = Callable[[Draft], None]
