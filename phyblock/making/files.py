@@ -13,12 +13,9 @@ from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
 from phyblock.domain.scene import CandidateSet, Scene
 from phyblock.errors import Problem
 from phyblock.files import atomic_write, check_free, make_folder, read_text, writing
-from phyblock.making.checks import FINISHED_QUIET_S, LEVEL_LIMITS
+from phyblock.making.checks import LEVEL_LIMITS
 from phyblock.making.scenes.sketch import PALETTES, Palette
-from phyblock.sim.contact import FIT_TOLERANCE_M
-from phyblock.sim.dynamics import DEFAULT_TRIAL, QUIET_S, REST_SPEED_M_S
 from phyblock.sim.engine import other_engine
-from phyblock.sim.pictures import LEAST_SHARE, LEAST_SHOWN
 from phyblock.stable import hex_digest
 
 SUMS_FILE = "SHA256SUMS"
@@ -103,10 +100,6 @@ def scene_card(name: str, tasks: _Tasks, command: str, palette: Palette) -> str:
             by_level.setdefault(level, []).append(scene)
     levels = dict(sorted(by_level.items()))
     base, sizes = sum(_is_base(scene) for scene, _ in tasks), {len(offered) for _, offered in tasks}
-    settings = " and at ".join(
-        f"1/{round(1 / physics.time_step_s)} s ({physics.iterations} solver iterations)"
-        for physics in DEFAULT_TRIAL.physics
-    )
     owner = {"kit": "the official kit's", "full": "all"}[palette]
     limits = (
         f"    level {level}: {one.least_blocks} to {one.most_blocks} blocks, "
@@ -125,16 +118,6 @@ def scene_card(name: str, tasks: _Tasks, command: str, palette: Palette) -> str:
         command=command,
         simulators=f", by {engine}" if (engine := other_engine()) else "",
         palette=f"{owner} {len(PALETTES[palette])} pairs of type and color",
-        fit_mm=FIT_TOLERANCE_M * 1000,
-        duration=DEFAULT_TRIAL.duration_s,
-        settings=settings,
-        limit_mm=DEFAULT_TRIAL.limit_m * 1000,
-        limit_deg=DEFAULT_TRIAL.limit_deg,
-        speed=REST_SPEED_M_S * 1000,
-        finished_quiet=FINISHED_QUIET_S,
-        quiet=QUIET_S,
-        pixels=LEAST_SHARE * 512**2,
-        shown=LEAST_SHOWN,
         version=SCENE_SET_VERSION,
         limits="\n".join(limits),
         heads=" | ".join(f"{quantity}, mean | most" for quantity in _QUANTITIES),
@@ -147,8 +130,7 @@ def scene_card(name: str, tasks: _Tasks, command: str, palette: Palette) -> str:
 
 def completed_card(name: str, count: int, command: str) -> str:
     """Return the Markdown card of scenes that were given by their positions."""
-    fit_mm = FIT_TOLERANCE_M * 1000
-    text = _card("completed", name=name, count=count, command=command, fit_mm=fit_mm)
+    text = _card("completed", name=name, count=count, command=command)
     return text + _card("scenes_file")
 
 

@@ -120,10 +120,7 @@ class AffordanceMaker(base.Maker):
 
 
 def _pictured(scene: Scene, rng: np.random.Generator) -> QuestionPicture | None:
-    """The scene, or a part of it with an annex, from where every block shows enough to be counted.
-
-    None where it does not surely stand, or none of a few views shows it so.
-    """
+    """The scene, or a part of it with an annex, from where every block shows; None if unsure."""
     blocks = (with_annex(scene, rng) if rng.random() < _ANNEXED else None) or scene.blocks
     views = [base.drawn_view(rng) for _ in range(_VIEWS_TRIED)]
     if not all(map(surely_stands, groups(blocks))):
@@ -146,10 +143,7 @@ def _drawn_block(plain: QuestionPicture, rng: np.random.Generator) -> Block:
 
 @functools.cache
 def _balanced_poses() -> list[tuple[BlockType, Euler]]:
-    """Poses that stand, with the center of mass under the middle of what is seen from above.
-
-    Of others, such as a wedge, nobody could say what "its middle" is; a lying cylinder rolls.
-    """
+    """Poses that stand, with the center of mass under the middle of what is seen from above."""
     poses = []
     for block_type in BLOCK_TYPES:
         for euler in POSES[block_type].values():
@@ -230,10 +224,7 @@ def _by_statics(
 
 
 def _looks_of(plain: QuestionPicture, top: Top) -> tuple[float, ...]:
-    """Measures of a place: its distance from the middle of its block, room, height, distance out.
-
-    In the world and in the picture, with how much of its block shows.
-    """
+    """Measures of a place, in the world and in the picture, by which it might stand out."""
     shot = seen(plain)
     row, column = mark_pixel(plain, top.position_m)
     under = shot.block == shot.block[row, column]
@@ -254,11 +245,7 @@ def _looks_of(plain: QuestionPicture, top: Top) -> tuple[float, ...]:
 
 
 def _sort_of(plain: QuestionPicture, places: Sequence[Top]) -> str:
-    """By how many of the wrong places the right one, which is first, is outdone in three ways.
-
-    How many are nearer to the middle of their block, how many higher up in the picture, and how
-    many nearer to the others: by these the right one of any four would stand out.
-    """
+    """By how many of the wrong places the right one, which is first, is outdone in three ways."""
     looks = np.array([_looks_of(plain, top) for top in places])
     pixels = np.array([mark_pixel(plain, top.position_m) for top in places], dtype=np.float64)
     far = np.linalg.norm(pixels[:, None] - pixels, axis=2).sum(axis=1)

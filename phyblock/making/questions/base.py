@@ -54,8 +54,8 @@ def add_wordings(stem: str, texts: Sequence[str]) -> None:
     WORDINGS.update({f"{stem}-{number}": text for number, text in enumerate(texts, 1)})
 
 
-for _stem, _texts in _TEXTS.items():
-    add_wordings(_stem, _texts)
+for _stem in _TEXTS:
+    add_wordings(_stem, _TEXTS[_stem])
 
 
 class UnfairError(PhyblockError):
@@ -215,10 +215,7 @@ def right_first(right: T, options: Sequence[T]) -> list[T]:
 
 
 def window(rng: np.random.Generator, values: Sequence[int], right: int) -> list[str]:
-    """Four neighbors among the allowed values, the right one first, its place drawn evenly.
-
-    None where it is not allowed, or the place drawn does not exist.
-    """
+    """Four neighbors among the allowed values, the right one first; none where none are drawn."""
     if right not in values:
         return []
     start = values.index(right) - int(rng.integers(4))
@@ -266,9 +263,8 @@ def orders_of(blocks: Sequence[Block]) -> list[int]:
 
 def recolored(scene: Scene, rng: np.random.Generator) -> Scene:
     """The scene with a color drawn for every block, so that color tells no shape."""
-    colors = [COLORS[int(i)] for i in rng.integers(len(COLORS), size=len(scene))]
-    blocks = (replace(b, color=c) for b, c in zip(scene.blocks, colors, strict=True))
-    return replace(scene, blocks=tuple(blocks))
+    drawn = zip(scene.blocks, rng.integers(len(COLORS), size=len(scene)), strict=True)
+    return replace(scene, blocks=tuple(replace(block, color=COLORS[i]) for block, i in drawn))
 
 
 def with_own_colors(scene: Scene, orders: Sequence[int], rng: np.random.Generator) -> Scene:

@@ -190,11 +190,7 @@ def _removal(
 def _colored_options(
     plain: QuestionPicture, taken: int, moved: Lot, rng: np.random.Generator
 ) -> tuple[list[QuestionPicture], base.Slots, str]:
-    """Four pictures, the right one first, and the slots of the text; none where they are too few.
-
-    The last tells if the right one has more colored than most, and lower. `plain` has no marks;
-    `moved` are the orders of the blocks that move when `taken` is gone.
-    """
+    """Four pictures, if any, the right one first, the slots of the text, and the sort of answer."""
     lots = [moved, *_other_lots(plain, taken, moved, rng)]
     shot = seen(plain)
     counts = np.bincount(shot.block[shot.block >= 0], minlength=len(plain.blocks))
@@ -232,10 +228,7 @@ def _other_lots(
 
 
 def _looks_of_lot(plain: QuestionPicture, shot: Shot, taken: int, lot: Lot) -> tuple[float, ...]:
-    """Area, place, height and distance from the block taken of what is colored, and its naivety.
-
-    A lot of no blocks is where the block is that is taken.
-    """
+    """Area, place, height and distance from the block taken of what is colored, and its naivety."""
     block_of = {block.order: block for block in plain.blocks}
     about = sorted(lot or {taken})
     shown = np.isin(shot.block, [i for i, b in enumerate(plain.blocks) if b.order in about])
@@ -412,10 +405,7 @@ def _stays(stage: Sequence[Block], put: Block) -> bool | None:
 
 
 def _stage(scene: Scene, rng: np.random.Generator) -> tuple[tuple[Block, ...], Block]:
-    """The blocks placed so far, none where there are too few, and one more of the scene's.
-
-    Half of the stages have an annex, whose planks tip where a block is put on them wrongly.
-    """
+    """The blocks placed so far, none where there are too few, and one more of the scene's."""
     order = scene.graph.random_order(rng)
     annexed = with_annex(scene, rng) if rng.random() < _ANNEXED else None
     if annexed and all(map(surely_stands, groups(annexed))):
@@ -464,10 +454,7 @@ def _alike_wrong(
     rng: np.random.Generator,
     held: Mapping[int, int],
 ) -> list[QuestionPicture]:
-    """Three of the pool, told apart from one another and the rest, or none.
-
-    `held` gives ranks that hold exactly, by measure.
-    """
+    """Three of the pool, told apart from one another and the rest, or none."""
     whole = [one for one in (right, *pool) if is_inside(one)][: 1 + _MOST_POOL]
     if not whole or whole[0] is not right:
         return []
@@ -512,11 +499,7 @@ def ranked_as_drawn(
 
 
 def _looks(first: Shot, shot: Shot) -> tuple[float, ...]:
-    """Eight measures of a picture, most of them shares of its side or of what is colored.
-
-    What is colored: how much, its middle across and down, its width and its top. What changed
-    against the first picture: how much, and its middle across and down.
-    """
+    """Eight measures of a picture, most of them shares of its side or of what is colored."""
     rows, columns = np.nonzero(shot.block >= 0)
     side, area = len(shot.block), max(int((first.block >= 0).sum()), 1)
     changed_rows, changed_columns = np.nonzero(changed_pixels(first, shot))
@@ -601,11 +584,7 @@ def _sure_push(blocks: Sequence[Block], push: Push) -> Outcome | None:
 
 
 def _story(blocks: Sequence[Block], picture: QuestionPicture, push: Push) -> tuple[object, ...]:
-    """Orders of blocks gone, moved, come down, and gone the way of the push, to compare scenes by.
-
-    UnfairError when the picture shows other blocks, or it is hard to tell of one whether it moved
-    or came down.
-    """
+    """Orders of blocks gone, moved, come down, and gone the way pushed; UnfairError if unsure."""
     goal, label = {block.order: block for block in blocks}, picture.label
     moved, down, along = [], [], []
     for block in picture.blocks:
@@ -637,11 +616,7 @@ def _pushes(plain: QuestionPicture, order: int, rng: np.random.Generator) -> lis
 def _told_apart(
     plain: QuestionPicture, pushes: Sequence[_Pushed]
 ) -> list[tuple[_Pushed, QuestionPicture]]:
-    """The first four pushes of which each leads to a picture that tells a story of its own.
-
-    Settings are compared for the one that is asked about alone; one will do to look for others.
-    Blocks that stand far away are left alone.
-    """
+    """The first four pushes of which each leads to a picture that tells a story of its own."""
     found: list[tuple[_Pushed, QuestionPicture]] = []
     stories: set[object] = set()
     first = pushes[0][0]

@@ -361,13 +361,9 @@ def _values_cm(rule: str, one: Block, other: Block, picture: QuestionPicture) ->
 def _four_values(
     rule: str, found: Collection[Values], rng: np.random.Generator
 ) -> Sequence[Values]:
-    """Four values, the right one first; none where no four stand together.
-
-    All four are true of something in the picture, and which one is asked for is drawn, so that a
-    length that is frequent is not right more often than the others beside it. Where no scene has
-    four, as of `_FEW_A_SCENE`, one that is true stands beside others, and chance drops most of
-    these (`keeping_odds`).
-    """
+    """Four values, the right one first; none where no four stand together."""
+    # All four are true of something in the picture and the one asked for is drawn, so that a
+    # frequent length is not right more often. Where no scene has four, `keeping_odds` sees to it.
     fours = _squares(found) if rule == "place" else _ladders()
     whole = [four for four in fours if set(four) <= set(found)]
     if whole:
@@ -573,10 +569,7 @@ def put_beside(block: Block, blocks: Sequence[Block], rng: np.random.Generator) 
 
 
 class _Rule(NamedTuple):
-    """One way to tell the turn of a block, compared with another of its type.
-
-    `phrases` are those of the options that are true of the two.
-    """
+    """One way to tell the turn of a block, compared with another of its type."""
 
     stem: str
     kind: str
@@ -647,10 +640,7 @@ class RotationMaker(StaticMaker):
 def _about_some_axis(
     view: View, scene: Scene, other: Block, rng: np.random.Generator
 ) -> Iterator[Draft]:
-    """A loose block beside the structure that lies as `other` would after a turn drawn.
-
-    None where some turn cannot be told from another, which would tell what is asked.
-    """
+    """A loose block beside the structure that lies as `other` would after a turn drawn."""
     try:
         images = [(one, axis_turns(one, other)) for one in tipped_over(other)]
     except UnfairError:

@@ -226,10 +226,7 @@ def _table(texts: Sequence[Texts], names: dict[str, int], grows: bool) -> _Table
 
 
 def _features(one: Texts) -> Iterator[Mapping[str, float]]:
-    """Of each option, as they are and for its kind, with the others it stands beside.
-
-    Of looks, how far each measure is from the mean of the options, in standard deviations.
-    """
+    """Of each option, as they are and for its kind, with the others it stands beside."""
     if one.looks:
         values = np.array(one.looks)
         spread = values.std(axis=0)

@@ -141,11 +141,7 @@ def _drawn(scene: Scene, top: Block, rng: np.random.Generator) -> list[Block]:
 
 
 def _planned(half_m: float, rng: np.random.Generator) -> _Plan | None:
-    """A plan whose balance hangs on something, for a top of that half width along the plank.
-
-    Plank and weights bear themselves; the plank reaches as far as a column that props its end, or
-    would tip without one of the weights.
-    """
+    """A plan whose balance hangs on something, for a top of that half width along the plank."""
     is_propped = rng.random() < _PROPPED
     for _ in range(_PLANS_TRIED):
         plank, length_m = pick(rng, _PLANKS)

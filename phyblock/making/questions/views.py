@@ -207,10 +207,7 @@ def _differ_at_a_glance(options: Sequence[QuestionPicture]) -> bool:
 
 
 def _hits(family: Sequence[_Structure], first: View, second: View) -> float:
-    """Number of structures that the nearest histogram of colors finds again; ties count in part.
-
-    By two ways to measure, the sum of differences and of their squares; 0 where they disagree.
-    """
+    """Number of structures that the nearest histogram of colors finds again; ties count in part."""
     shown, options = (np.array([_histogram(s, view) for s in family]) for view in (first, second))
     apart = shown[:, None, :] - options[None, :, :]
     found = []
@@ -365,10 +362,7 @@ def _only_order(scene: Scene, stages: Stages) -> tuple[int, ...] | None:
 
 
 def _is_sorted_by_eye(plain: QuestionPicture, stages: Stages) -> bool:
-    """True if size or height of what is highlighted, either way round, gives the order.
-
-    By numbers of blocks and pixels, and by heights in the world and in the picture.
-    """
+    """True if size or height of what is highlighted, either way round, gives the order."""
     shown, looks = seen(plain).block, []
     for stage in stages:
         blocks = [(i, b.position_m[2]) for i, b in enumerate(plain.blocks) if b.order in stage]

@@ -253,10 +253,7 @@ class _Maker:
     def _accepted(
         self, wanted: int, request: Callable[[int], Request], first: int
     ) -> Iterator[tuple[Request, Scene]]:
-        """The first `wanted` candidates that are sound and new, in the order of their numbers.
-
-        Fewer when candidate after candidate brings nothing new.
-        """
+        """The first `wanted` candidates that are sound and new, in the order of their numbers."""
         number, taken, last = first, 0, first
         while taken < wanted and number - last <= _PATIENCE:
             size = min(_LARGEST_ROUND, max(8, math.ceil((wanted - taken) * 1.3)))
