@@ -73,7 +73,7 @@ class Finding:
 
 
 FINISHED_QUIET_S = 0.5
-"""Time at rest after which the generator ends the trial of a finished structure [s]; `cards/` tell of it."""
+"""Time at rest after which a trial of a finished structure ends [s]; `cards/` tell of it."""
 STEP_TRIAL = replace(DEFAULT_TRIAL, physics=DEFAULT_TRIAL.physics[:1])
 """Every step is tried at the first of the two time steps, for two seconds or until at rest."""
 
