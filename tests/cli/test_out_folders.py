@@ -260,13 +260,13 @@ def test_init_writes_through_no_link(tmp_path: Path) -> None:
 def test_a_data_set_is_made_over_no_sums_of_another(tmp_path: Path, verb: str) -> None:
     put(tmp_path / "SHA256SUMS")
     with pytest.raises(StoreError, match="SHA256SUMS: is already there"):
-        call(verb, "generate", "--jobs", "1", "--replace", "--out", tmp_path)
+        call(verb, "generate", "--jobs", "1", "--out", tmp_path)
     assert files(tmp_path) == {"SHA256SUMS": b"mine"}
 
 
 def test_pictures_are_drawn_over_none_of_another(suite: Workspace) -> None:
     name = "t1-oblique-checkerboard.png"
-    words = ("scenes", "render", suite.root / "data", "t1", "--size", "128", "--out")
+    words = ("scenes", "render", suite.root / "data", "t1", "--out")
     for _ in range(2):
         call(*words, suite.root / "pictures")
     put(suite.root / "theirs" / name)
