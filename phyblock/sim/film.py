@@ -22,7 +22,6 @@ from phyblock.sim.pictures import (
     Lookout,
     PictureStyle,
     candidates_grid,
-    drawn,
     goal_camera,
     picture,
 )
@@ -46,7 +45,7 @@ def step_images(scene: Scene, style: PictureStyle) -> list[Image.Image]:
     Raises DataError when the stored order places a block before one that it depends on, or when
     there is no block.
     """
-    camera, blocks = goal_camera(scene, style), drawn(scene.blocks)
+    camera, blocks = goal_camera(scene, style), scene.blocks
     if not scene.graph.is_valid(range(len(scene))):
         message = "places a block before one that it depends on"
         raise DataError(Problem(scene.id, message, "order of blocks"))

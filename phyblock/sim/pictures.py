@@ -57,26 +57,10 @@ _LIGHT_ELEVATION_DEG = 46.0
 Pixel = TypeVar("Pixel", np.uint8, np.float32)
 
 
-@dataclass(frozen=True)
-class DrawnBlock:
-    """A block as pictures need it: `position_m` is its body frame's origin [m]."""
-
-    type: BlockType
-    color: Color
-    position_m: tuple[float, float, float]
-    euler_deg: Euler
-
-    @property
-    def vertices_m(self) -> NDArray[np.float64]:
-        """World corners of what is drawn, shape (n, 3) [m]."""
-        vertices: NDArray[np.float64] = _turned_m(self.type, self.euler_deg) + self.position_m
-        return vertices
-
-    @property
-    def triangles_m(self) -> NDArray[np.float64]:
-        """World corners of the triangles that are drawn, shape (m, 3, 3) [m]."""
-        triangles: NDArray[np.float64] = self.vertices_m[drawn_mesh(self.type).triangles]
-        return triangles
+def drawn_m(block: Block) -> NDArray[np.float64]:
+    """World corners of what is drawn of a block, shape (n, 3) [m]."""
+    vertices: NDArray[np.float64] = _turned_m(block.type, block.euler_deg) + block.position_m
+    return vertices
 
 
 @functools.lru_cache(maxsize=1024)
@@ -86,19 +70,19 @@ def _turned_m(block_type: BlockType, euler_deg: Euler) -> NDArray[np.float64]:
     return turned(drawn_mesh(block_type).vertices_m, matrix)
 
 
-def drawn(blocks: Iterable[Block]) -> list[DrawnBlock]:
-    """Blocks where they are, as they are drawn."""
-    return [DrawnBlock(b.type, b.color, b.position_m, b.euler_deg) for b in blocks]
+def looks(blocks: Iterable[Block]) -> list[tuple[object, ...]]:
+    """All of blocks that pictures of them depend on."""
+    return [(b.type, b.color, b.position_m, b.euler_deg) for b in blocks]
 
 
-def on_the_floor(block_type: BlockType, color: Color, euler_deg: Euler) -> DrawnBlock:
+def on_the_floor(block_type: BlockType, color: Color, euler_deg: Euler) -> Block:
     """A single block in its orientation, its lowest point on the floor."""
-    lifted = DrawnBlock(block_type, color, (0.0, 0.0, 0.0), euler_deg)
-    return replace(lifted, position_m=(0.0, 0.0, -float(lifted.vertices_m[:, 2].min())))
+    low_m = float(_turned_m(block_type, euler_deg)[:, 2].min())
+    return Block(1, block_type, color, (0.0, 0.0, -low_m), euler_deg, (), 1)
 
 
 def picture(
-    blocks: Sequence[DrawnBlock],
+    blocks: Sequence[Block],
     camera: Camera,
     background: Background,
     size_px: int,
@@ -135,24 +119,24 @@ class Shot:
     block: NDArray[np.int64]
 
 
-def shoot(blocks: Sequence[DrawnBlock], camera: Camera, size_px: int) -> Shot:
+def shoot(blocks: Sequence[Block], camera: Camera, size_px: int) -> Shot:
     """Draw blocks alone, with no floor, at exactly `size_px` and unsmoothed."""
     raster = _raster(blocks, camera, size_px)
     return Shot(draw_outlines(raster.rgb, raster, None), raster.prop)
 
 
-def segments(blocks: Sequence[DrawnBlock], camera: Camera, size_px: int) -> NDArray[np.int64]:
+def segments(blocks: Sequence[Block], camera: Camera, size_px: int) -> NDArray[np.int64]:
     """The 0-based number of the block seen in each pixel, shape (size, size), -1 for none."""
     light = Light(np.array([0.0, 0.0, 1.0]), 1.0, 0.0)
     return draw(props_of(blocks), camera, light, size_px).prop
 
 
-def _raster(blocks: Sequence[DrawnBlock], camera: Camera, size_px: int) -> Raster:
+def _raster(blocks: Sequence[Block], camera: Camera, size_px: int) -> Raster:
     light = Light(light_direction(camera), _AMBIENT, _DIFFUSE)
     return draw(props_of(blocks), camera, light, size_px)
 
 
-def props_of(blocks: Sequence[DrawnBlock]) -> list[Prop]:
+def props_of(blocks: Sequence[Block]) -> list[Prop]:
     """Blocks as the rasterizer takes them."""
     return [
         Prop(
@@ -270,7 +254,7 @@ class PictureStyle:
 def goal_png(scene: Scene, style: PictureStyle) -> bytes:
     """PNG of the finished structure, square, framed so that no block is cut off."""
     camera = goal_camera(scene, style)
-    return to_png(picture(drawn(scene.blocks), camera, style.background, style.size_px))
+    return to_png(picture(scene.blocks, camera, style.background, style.size_px))
 
 
 def candidates_png(candidates: CandidateSet, style: PictureStyle) -> bytes:
@@ -308,8 +292,7 @@ def to_png(image: Image.Image) -> bytes:
 
 def goal_key(scene: Scene, style: PictureStyle) -> str:
     """SHA-256 [hex] of all that the goal picture depends on; the scene's id is not part of it."""
-    content = [(b.type, b.color, b.position_m, b.euler_deg) for b in scene.blocks]
-    return picture_key("goal", style, content)
+    return picture_key("goal", style, looks(scene.blocks))
 
 
 def candidates_key(candidates: CandidateSet, style: PictureStyle) -> str:
@@ -337,7 +320,7 @@ def pixel_versions() -> dict[str, str]:
 
 def goal_camera(scene: Scene, style: PictureStyle) -> Camera:
     """The camera of the goal picture; raises DataError for a scene without blocks."""
-    return camera_for(drawn(scene.blocks), style, scene.id)
+    return camera_for(scene.blocks, style, scene.id)
 
 
 def goal_style(scene: Scene, style: PictureStyle) -> PictureStyle:
@@ -355,10 +338,10 @@ def goal_style(scene: Scene, style: PictureStyle) -> PictureStyle:
 
 
 def camera_for(
-    blocks: Sequence[DrawnBlock],
+    blocks: Sequence[Block],
     style: PictureStyle,
     where: str,
-    shown: Sequence[DrawnBlock] = (),
+    shown: Sequence[Block] = (),
 ) -> Camera:
     """The camera that frames blocks as a goal; DataError, at `where`, when there are none.
 
@@ -366,36 +349,30 @@ def camera_for(
     """
     if not blocks:
         raise DataError(Problem(where=where, field="blocks", message="there is none to draw"))
-    points = np.vstack([block.vertices_m for block in blocks])
-    drawn_m = np.vstack([block.vertices_m for block in shown]) if shown else None
-    return frame(points, style.axes, _GOAL_WINDOW, _GOAL_MIN_DISTANCE_M, drawn_m)
+    points, more = (np.vstack([drawn_m(b) for b in some]) for some in (blocks, shown or blocks))
+    return frame(points, style.axes, _GOAL_WINDOW, _GOAL_MIN_DISTANCE_M, more if shown else None)
 
 
 class Lookout:
     """The camera of a scene's goal, from which other blocks are drawn quickly."""
 
     def __init__(self, scene: Scene, style: PictureStyle) -> None:
-        self._goal, self._style = drawn(scene.blocks), style
-        camera = self._camera(self._goal)
+        self._goal, self._style, camera = scene.blocks, style, goal_camera(scene, style)
         self._eye_m = camera.eye_m
         self._ground = empty_ground(style.background, camera, style.size_px)
 
     def image(self, blocks: Sequence[Block]) -> Image.Image:
         """The blocks on the ground, an RGB image of the style's size."""
-        shown, style = drawn(blocks), self._style
-        camera = self._camera(shown)
+        style = self._style
+        camera = camera_for(self._goal, style, "current", blocks)
         # Blocks that fell towards the camera may have pushed it back.
-        is_known = np.array_equal(camera.eye_m, self._eye_m)
-        ground = self._ground if is_known else None
-        return picture(shown, camera, style.background, style.size_px, ground)
-
-    def _camera(self, shown: Sequence[DrawnBlock]) -> Camera:
-        return camera_for(self._goal, self._style, "current", shown)
+        ground = self._ground if np.array_equal(camera.eye_m, self._eye_m) else None
+        return picture(blocks, camera, style.background, style.size_px, ground)
 
 
 def candidates_grid(
     candidates: CandidateSet, style: PictureStyle
-) -> tuple[Image.Image, list[DrawnBlock], float | None]:
+) -> tuple[Image.Image, list[Block], float | None]:
     """Candidates in a 4 by 4 grid from the top left, numbered from 1; with the blocks drawn.
 
     The number is their common distance from the camera [m], None where each fills its cell.
@@ -437,16 +414,14 @@ def _write_number(cell: Image.Image, number: int, background: Background) -> Non
 
 @functools.lru_cache(maxsize=512)
 def thumbnail(
-    block: DrawnBlock, style: PictureStyle, cell_px: int, distance_m: float | None
+    block: Block, style: PictureStyle, cell_px: int, distance_m: float | None
 ) -> Image.Image:
     """One cell of the grid of candidates, before its number; shared: do not draw on it."""
     camera = candidate_camera(block, style, distance_m)
     return picture([block], camera, style.background, cell_px)
 
 
-def candidate_camera(
-    block: DrawnBlock, style: PictureStyle, distance_m: float | None = None
-) -> Camera:
+def candidate_camera(block: Block, style: PictureStyle, distance_m: float | None = None) -> Camera:
     """The camera of one cell, `distance_m` from the middle of the block [m].
 
     Without a distance the block fills the cell above the number's strip.
@@ -454,10 +429,10 @@ def candidate_camera(
     if distance_m is None:
         return close_camera(block, style, _CELL_WINDOW)
     nearest_m = distance_m - _half_depth_m(block, style)
-    return frame(block.vertices_m, style.axes, _CELL_WINDOW, nearest_m)
+    return frame(drawn_m(block), style.axes, _CELL_WINDOW, nearest_m)
 
 
-def close_camera(block: DrawnBlock, style: PictureStyle, window: Window) -> Camera:
+def close_camera(block: Block, style: PictureStyle, window: Window) -> Camera:
     """The camera of a block by itself, which fills a like share of the window whatever its type.
 
     Longer ones fill a little more (fourth root of the diagonal), so that a picture still tells
@@ -465,24 +440,24 @@ def close_camera(block: DrawnBlock, style: PictureStyle, window: Window) -> Came
     """
     shape = SHAPES[block.type]
     share = math.dist(shape.low_m, shape.high_m) / _LARGEST_DIAGONAL_M
-    return frame(block.vertices_m, style.axes, window.scaled(share**_SIZE_CUE))
+    return frame(drawn_m(block), style.axes, window.scaled(share**_SIZE_CUE))
 
 
-def common_distance_m(blocks: Iterable[DrawnBlock], style: PictureStyle) -> float:
+def common_distance_m(blocks: Iterable[Block], style: PictureStyle) -> float:
     """The least distance from the middle of each block [m] from which all fit their cells.
 
     Blocks at one distance are drawn at one scale.
     """
     axes, needed = style.axes, [0.0]
     for block in blocks:
-        closest = frame(block.vertices_m, axes, _CELL_WINDOW)
-        nearest_m = float(dot(block.vertices_m - closest.eye_m, axes[2]).min())
+        closest = frame(drawn_m(block), axes, _CELL_WINDOW)
+        nearest_m = float(dot(drawn_m(block) - closest.eye_m, axes[2]).min())
         needed.append(nearest_m + _half_depth_m(block, style))
     return max(needed)
 
 
-def _half_depth_m(block: DrawnBlock, style: PictureStyle) -> float:
-    return float(np.ptp(dot(block.vertices_m, style.axes[2]))) / 2
+def _half_depth_m(block: Block, style: PictureStyle) -> float:
+    return float(np.ptp(dot(drawn_m(block), style.axes[2]))) / 2
 
 
 LEAST_SHARE = 12 / 256**2
@@ -501,7 +476,7 @@ def visible_shares(scene: Scene, style: PictureStyle) -> dict[int, float]:
     Its pixels are those that it covers when it is drawn alone by the same camera. Raises
     DataError for a scene without blocks.
     """
-    camera, blocks = goal_camera(scene, style), drawn(scene.blocks)
+    camera, blocks = goal_camera(scene, style), scene.blocks
     together = segments(blocks, camera, style.size_px)
     shares = {}
     for vertex, (block, one) in enumerate(zip(scene.blocks, blocks, strict=True)):
@@ -512,7 +487,7 @@ def visible_shares(scene: Scene, style: PictureStyle) -> dict[int, float]:
 
 def hidden_blocks(scene: Scene) -> tuple[int, ...]:
     """Orders of the blocks that show less than `LEAST_SHARE` in the default goal picture."""
-    seen = segments(drawn(scene.blocks), goal_camera(scene, PictureStyle()), _SEEN_PX)
+    seen = segments(scene.blocks, goal_camera(scene, PictureStyle()), _SEEN_PX)
     counts = np.bincount(seen[seen >= 0], minlength=len(scene))
     least = LEAST_SHARE * _SEEN_PX**2
     return tuple(b.order for b, n in zip(scene.blocks, counts, strict=True) if n < least)

@@ -13,7 +13,7 @@ import functools
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import astuple, replace
+from dataclasses import replace
 from itertools import combinations, product
 from typing import NamedTuple
 
@@ -26,15 +26,16 @@ from phyblock.domain.scene import Block, Scene
 from phyblock.files import decode_picture
 from phyblock.sim.backgrounds import DARK_INK, LIGHT_INK
 from phyblock.sim.camera import Camera, Window
+from phyblock.sim.geometry import drawn_mesh
 from phyblock.sim.pictures import (
     RENDER_VERSION,
-    DrawnBlock,
     PictureStyle,
     Shot,
     camera_for,
     close_camera,
-    drawn,
+    drawn_m,
     gap_px,
+    looks,
     on_the_floor,
     picture,
     pixel_versions,
@@ -101,15 +102,15 @@ def question_camera(recipe: QuestionPicture, style: PictureStyle) -> Camera:
     shown = drawn_blocks(recipe)
     if _is_alone(recipe):
         return close_camera(shown[0], seen_from, _BLOCK_WINDOW)
-    return camera_for(drawn(recipe.framed) or shown, seen_from, recipe.label, shown)
+    return camera_for(recipe.framed or shown, seen_from, recipe.label, shown)
 
 
-def drawn_blocks(recipe: QuestionPicture) -> list[DrawnBlock]:
+def drawn_blocks(recipe: QuestionPicture) -> Sequence[Block]:
     """The blocks as they are drawn; one shown by itself (label `block`) lies on the floor."""
-    blocks = drawn(recipe.blocks)
     if _is_alone(recipe):
-        return [on_the_floor(blocks[0].type, blocks[0].color, blocks[0].euler_deg)]
-    return blocks
+        only = recipe.blocks[0]
+        return [on_the_floor(only.type, only.color, only.euler_deg)]
+    return recipe.blocks
 
 
 def _is_alone(recipe: QuestionPicture) -> bool:
@@ -134,8 +135,8 @@ def question_key(recipe: QuestionPicture, style: PictureStyle) -> str:
         "style": [style.size_px, recipe.background or style.background],
         "view": list(recipe.view_deg),
         "alone": _is_alone(recipe),
-        "blocks": [astuple(block) for block in drawn_blocks(recipe)],
-        "framed": [astuple(block) for block in drawn(recipe.framed)],
+        "blocks": looks(drawn_blocks(recipe)),
+        "framed": looks(recipe.framed),
         "marks": [[mark.letter, *mark.position_m] for mark in recipe.marks],
     }
     return hex_digest(json.dumps(parts, sort_keys=True, allow_nan=False))
@@ -327,7 +328,7 @@ def shown_pixels(recipe: QuestionPicture, shot: Shot) -> dict[int, int]:
 
 def is_inside(recipe: QuestionPicture) -> bool:
     """True if no block or mark comes near the picture's edge."""
-    points = [block.vertices_m for block in drawn_blocks(recipe)]
+    points = [drawn_m(block) for block in drawn_blocks(recipe)]
     points += [np.array([mark.position_m]) for mark in recipe.marks]
     return bool(np.abs(_camera(recipe).project(np.vstack(points))).max() < _EDGE)
 
@@ -396,7 +397,7 @@ def is_apart(
     return bool(apart.min(initial=np.inf) >= least_px)
 
 
-def _hit(block: DrawnBlock, camera: Camera, pixel: tuple[int, int]) -> Top | None:
+def _hit(block: Block, camera: Camera, pixel: tuple[int, int]) -> Top | None:
     """Return where the ray through a pixel meets the block first (Moeller-Trumbore); None if it
     misses.
     """
@@ -404,7 +405,7 @@ def _hit(block: DrawnBlock, camera: Camera, pixel: tuple[int, int]) -> Top | Non
     across = ((pixel[1] + 0.5) / SEEN_PX * 2 - 1) * half
     up = (1 - (pixel[0] + 0.5) / SEEN_PX * 2) * half
     ray = camera.axes[0] * across + camera.axes[1] * up + camera.axes[2]
-    corners = block.triangles_m
+    corners = drawn_m(block)[drawn_mesh(block.type).triangles]
     one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     crossed = np.cross(ray, two)
     scale = np.einsum("ij,ij->i", one, crossed)

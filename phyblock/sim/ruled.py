@@ -23,12 +23,12 @@ from phyblock.sim.pictures import (
     GRID_COLUMNS,
     LARGEST_PX,
     SUPERSAMPLE,
-    DrawnBlock,
     PictureStyle,
     candidate_camera,
     candidates_grid,
-    drawn,
+    drawn_m,
     empty_ground,
+    looks,
     picture,
     picture_key,
     to_png,
@@ -65,7 +65,7 @@ def ruled_png(scene: Scene, style: PictureStyle) -> bytes:
 
 def ruled_key(scene: Scene, style: PictureStyle) -> str:
     """SHA-256 [hex] of all that the picture depends on."""
-    content = [RULED_VERSION, *(list(astuple(block)) for block in drawn(scene.blocks))]
+    content = [RULED_VERSION, *looks(scene.blocks)]
     return picture_key("ruled goal", style, content)
 
 
@@ -73,7 +73,7 @@ class RuledFloor:
     """The ruled floor of a scene, which must have a block: draws blocks seen as its goal is."""
 
     def __init__(self, scene: Scene, style: PictureStyle) -> None:
-        blocks = drawn(scene.blocks)
+        blocks = scene.blocks
         field = _field(blocks, style)
         self._camera, self._style = _camera(blocks, field, style), style
         ground = empty_ground(style.background, self._camera, style.size_px)
@@ -97,7 +97,7 @@ class RuledFloor:
     def image(self, blocks: Sequence[Block]) -> Image.Image:
         """The blocks on the floor, an RGB image of the style's size."""
         style = self._style
-        return picture(drawn(blocks), self._camera, style.background, style.size_px, self._ground)
+        return picture(blocks, self._camera, style.background, style.size_px, self._ground)
 
 
 @dataclass(frozen=True)
@@ -124,8 +124,8 @@ class _Field:
         return near + math.copysign(by, near - far)
 
 
-def _field(blocks: Sequence[DrawnBlock], style: PictureStyle) -> _Field:
-    points = np.vstack([block.vertices_m for block in blocks]) * _CM
+def _field(blocks: Sequence[Block], style: PictureStyle) -> _Field:
+    points = np.vstack([drawn_m(block) for block in blocks]) * _CM
     low, high = rounded(points.min(axis=0)), rounded(points.max(axis=0))
     x, y = (
         (
@@ -142,13 +142,13 @@ def _field(blocks: Sequence[DrawnBlock], style: PictureStyle) -> _Field:
     return _Field(x, y, top, near_x, near_y)
 
 
-def _camera(blocks: Sequence[DrawnBlock], field: _Field, style: PictureStyle) -> Camera:
+def _camera(blocks: Sequence[Block], field: _Field, style: PictureStyle) -> Camera:
     wide_x, wide_y = field.beyond(0, _NAME_CM + 1), field.beyond(1, _NAME_CM + 1)
     marks = [(x, y, 0.0) for x in (*field.x, wide_x) for y in (*field.y, wide_y)]
     if _has_pole(style):
         marks.append((field.far_x, field.far_y, field.z + 2.0))
     corners = np.array(marks, dtype=np.float64) / _CM
-    points = np.vstack([*(block.vertices_m for block in blocks), corners])
+    points = np.vstack([*(drawn_m(block) for block in blocks), corners])
     return frame(points, style.axes, _WINDOW, _LEAST_DISTANCE_M)
 
 
@@ -254,9 +254,9 @@ def kit_key(candidates: CandidateSet, style: PictureStyle) -> str:
     return picture_key("kit", style, [KIT_VERSION, style.candidate_scale, *content])
 
 
-def box_cm(block: DrawnBlock) -> NDArray[np.float64]:
+def box_cm(block: Block) -> NDArray[np.float64]:
     """Low and high corner of the smallest box round a block as it is drawn, shape (2, 3) [cm]."""
-    points = block.vertices_m * _CM
+    points = drawn_m(block) * _CM
     return np.stack([points.min(axis=0), points.max(axis=0)])
 
 

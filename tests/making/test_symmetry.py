@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from phyblock.domain import BLOCK_TYPES, SHAPES, Block
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, canonical_form
 from phyblock.making.scenes.sketch import POSES, transformed
-from phyblock.sim.pictures import DrawnBlock
+from phyblock.sim.pictures import drawn_m
 from tests.designs.scenes import designed_scenes
 
 SCENES = designed_scenes()
@@ -28,8 +28,7 @@ def block_at(kind, euler) -> Block:
 
 
 def corners(block: Block) -> np.ndarray:
-    drawn = DrawnBlock(block.type, block.color, block.position_m, block.euler_deg)
-    return drawn.vertices_m
+    return drawn_m(block)
 
 
 def apart_m(first: np.ndarray, second: np.ndarray) -> float:

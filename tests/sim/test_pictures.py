@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
 from phyblock.data import read_builtin, read_questions
-from phyblock.domain import BLOCK_TYPES, KIT_PALETTE, Candidate, CandidateSet, Color, Scene
+from phyblock.domain import BLOCK_TYPES, KIT_PALETTE, Block, Candidate, CandidateSet, Color, Scene
 from phyblock.domain.question import Mark, QuestionPicture
 from phyblock.errors import DataError
 from phyblock.making.scenes.candidates import make_candidates
@@ -39,14 +39,13 @@ from phyblock.sim.film import (
 from phyblock.sim.pictures import (
     COLOR_RGB,
     LABEL_STRIP,
-    DrawnBlock,
     PictureStyle,
     camera_for,
     candidate_camera,
     candidates_key,
     candidates_png,
     common_distance_m,
-    drawn,
+    drawn_m,
     goal_camera,
     goal_key,
     goal_png,
@@ -101,7 +100,7 @@ def pixels(png: bytes) -> NDArray[np.int64]:
 
 
 def projected(scene: Scene, style: PictureStyle) -> NDArray[np.float64]:
-    corners = np.vstack([block.vertices_m for block in drawn(scene.blocks)])
+    corners = np.vstack([drawn_m(block) for block in scene.blocks])
     return goal_camera(scene, style).project(corners)
 
 
@@ -142,14 +141,14 @@ def test_framing_keeps_every_point_in_the_window_and_comes_as_close_as_it_may(
 @pytest.mark.parametrize("view", sorted(VIEWS))
 def test_the_renderer_draws_where_the_camera_says(view: str) -> None:
     camera = goal_camera(scene := designed_scene("l2-rocket"), PictureStyle.from_view(view))
-    rows, columns = np.nonzero(shoot(drawn(scene.blocks), camera, 512).block >= 0)
-    places = np.vstack([camera.to_pixels(one.vertices_m, 512) for one in drawn(scene.blocks)])
+    rows, columns = np.nonzero(shoot(scene.blocks, camera, 512).block >= 0)
+    places = np.vstack([camera.to_pixels(drawn_m(one), 512) for one in scene.blocks])
     found = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
     assert_allclose(found, [*places.min(axis=0), *places.max(axis=0)], atol=3.0)
 
 
-def lies_between_planes(blocks: Sequence[DrawnBlock], camera: Camera) -> bool:
-    points = np.vstack([one.vertices_m for one in blocks])
+def lies_between_planes(blocks: Sequence[Block], camera: Camera) -> bool:
+    points = np.vstack([drawn_m(one) for one in blocks])
     depths = (points - camera.eye_m) @ camera.axes[2]
     return bool(0 < camera.near_m < depths.min() and depths.max() < camera.far_m)
 
@@ -159,7 +158,7 @@ def test_no_built_in_picture_is_cut_open_and_blocks_of_wide_goals_are_large(ever
     for task in BUILT_IN.tasks[::every]:
         style = goal_style(task.scene, STYLE)
         camera = goal_camera(task.scene, style)
-        assert lies_between_planes(drawn(task.scene.blocks), camera)
+        assert lies_between_planes(task.scene.blocks, camera)
         places = np.array([one.position_m for one in task.scene.blocks])
         farthest_m = ((places - camera.eye_m) @ camera.axes[2]).max()
         assert 0.05 / camera.width_m(farthest_m) * style.size_px >= 0.08 * STYLE.size_px
@@ -179,9 +178,9 @@ def test_all_candidates_of_a_grid_have_one_scale_and_the_largest_fills_its_cell(
     fullest = []
     for one in blocks:
         camera = candidate_camera(one, style, distance_m)
-        depths = (one.vertices_m - camera.eye_m) @ camera.axes[2]
+        depths = (drawn_m(one) - camera.eye_m) @ camera.axes[2]
         assert (depths.min() + depths.max()) / 2 == pytest.approx(distance_m)
-        shown = camera.project(one.vertices_m)
+        shown = camera.project(drawn_m(one))
         assert np.abs(shown).max() < 0.87
         fullest.append(max(np.ptp(shown, axis=0) / [1.72, 1.40]))
     assert max(fullest) == pytest.approx(1.0, abs=1e-6)
@@ -295,7 +294,7 @@ def test_no_picture_is_cut_off_or_open_whatever_it_frames(
 ) -> None:
     """Not even where blocks lie behind the place from which those in the frame are seen best."""
     style = PictureStyle(azimuth_deg=azimuth, elevation_deg=elevation)
-    corners = np.vstack([one.vertices_m for one in drawn(blocks)])
+    corners = np.vstack([drawn_m(one) for one in blocks])
     assert np.abs(goal_camera(scene_of(blocks), style).project(corners)).max() <= 1 - MARGIN + 1e-9
     assert is_inside(QuestionPicture("s", tuple(blocks), (azimuth, elevation)))
     recipe = QuestionPicture(
@@ -352,14 +351,14 @@ def test_a_state_is_seen_as_the_goal_is_and_changes_where_a_block_comes() -> Non
 def test_all_that_is_ruled_and_written_is_in_the_picture(
     places: list[tuple[float, float, float]], azimuth_deg: float, elevation_deg: float
 ) -> None:
-    blocks = drawn([block(n, "cube", place) for n, place in enumerate(places, 1)])
+    blocks = [block(n, "cube", place) for n, place in enumerate(places, 1)]
     style = replace(SMALL, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
     field = ruled._field(blocks, style)
     camera = ruled._camera(blocks, field, style)
     beyond = [(*field.x, field.beyond(0, 5)), (*field.y, field.beyond(1, 5)), (0.0,)]
     ends = np.array([*itertools.product(*beyond)])
     assert np.abs(camera.project(ends / 100)).max() <= 1
-    points = np.vstack([one.vertices_m for one in blocks]) * 100
+    points = np.vstack([drawn_m(one) for one in blocks]) * 100
     for axis, (low, high) in enumerate((field.x, field.y)):
         assert low % 5 == high % 5 == 0
         assert low <= points[:, axis].min() - 3 + 1e-6

@@ -21,10 +21,10 @@ from phyblock.errors import PhyblockError
 from phyblock.sim.camera import view_axes
 from phyblock.sim.contact import bounds_m
 from phyblock.sim.engine import Pose
+from phyblock.sim.geometry import drawn_mesh
 from phyblock.sim.pictures import (
-    DrawnBlock,
     PictureStyle,
-    drawn,
+    drawn_m,
     goal_camera,
     shoot,
     visible_shares,
@@ -341,10 +341,10 @@ def _extents(
 ) -> tuple[Mapping[int, float], Mapping[int, tuple[float, float]]]:
     """Share of the picture, and left and right end across it (-1 to 1), of blocks by order."""
     style = PictureStyle(_SIZE_PX, "checkerboard", *view)
-    camera, solids = goal_camera(Scene("", (1,), blocks, ()), style), drawn(blocks)
-    pixels = shoot(solids, camera, _SIZE_PX).block
+    camera = goal_camera(Scene("", (1,), blocks, ()), style)
+    pixels = shoot(blocks, camera, _SIZE_PX).block
     counts = np.bincount(pixels[pixels >= 0], minlength=len(blocks)) / _SIZE_PX**2
-    across = [camera.project(one.vertices_m)[:, 0] for one in solids]
+    across = [camera.project(drawn_m(one))[:, 0] for one in blocks]
     ends = [(float(one.min()), float(one.max())) for one in across]
     orders = orders_of(blocks)
     return dict(zip(orders, counts.tolist(), strict=True)), dict(zip(orders, ends, strict=True))
@@ -408,7 +408,7 @@ def shows_profile(block: Block, view: View) -> bool:
 def shows_solid(block: Block, view: View) -> bool:
     """True if a view shows its profile, and no one face is nearly all that shows of the block."""
     along = view_axes(*view)[2]
-    corners = DrawnBlock(block.type, block.color, block.position_m, block.euler_deg).triangles_m
+    corners = drawn_m(block)[drawn_mesh(block.type).triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     shown = np.maximum(-normals @ along, 0.0)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
