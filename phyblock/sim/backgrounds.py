@@ -62,8 +62,7 @@ def _wood(pale: tuple[int, int, int], deep: tuple[int, int, int], seed: int) -> 
     edge = np.minimum(np.arange(_SIZE) % width, width - np.arange(_SIZE) % width)
     joint = np.clip(1 - edge / _JOINT_PX, 0, 1)[:, None]
     colors = np.array(pale) + depth[..., None] * (np.array(deep) - np.array(pale))
-    wood: Colors = colors * (1 - 0.55 * joint[..., None])
-    return wood
+    return colors * (1 - 0.55 * joint[..., None])
 
 
 def _concrete() -> Colors:
@@ -71,8 +70,7 @@ def _concrete() -> Colors:
     clouds, grain = _noise(31, 1.6, 120.0), _noise(32, 0.3, 1000.0)
     pores = np.maximum(_noise(33, 0.0, 160.0) - 2.7, 0.0)
     light = 158 + 7.5 * clouds + 4.5 * grain - 46 * np.minimum(pores, 1.0)
-    concrete: Colors = light[..., None] * np.array([1.0, 0.995, 0.975])
-    return concrete
+    return light[..., None] * np.array([1.0, 0.995, 0.975])
 
 
 def _lawn() -> Colors:
@@ -85,8 +83,7 @@ def _lawn() -> Colors:
     light = np.clip(0.36 * (blades - 1.2) + 0.07 * patches, -1, 1)[..., None]
     dry = (0.5 + 0.5 * np.tanh(0.8 * _noise(43, 1.4, 60.0)))[..., None]
     green = np.array([70, 104, 42]) + light * np.array([46, 60, 28])
-    lawn: Colors = green + dry * np.array([9, 2, -3])
-    return lawn
+    return green + dry * np.array([9, 2, -3])
 
 
 def _noise(
@@ -96,11 +93,7 @@ def _noise(
     stretch: tuple[float, float] = (1.0, 1.0),
     turn_rad: float = 0.0,
 ) -> Grid:
-    """Seamless noise of mean 0 and deviation 1, shape (size, size).
-
-    Its amplitude falls with frequency to the power `slope`, and is gone above `finest` waves a
-    period; `stretch` draws it out along x and y, which are turned by `turn_rad`.
-    """
+    """Seamless noise of mean 0 and deviation 1, shape (size, size)."""
     white = _hashed(seed, _SIZE * _SIZE).reshape(_SIZE, _SIZE) - 0.5
     rows = np.fft.fftfreq(_SIZE, 1 / _SIZE)[:, None]
     columns = np.fft.rfftfreq(_SIZE, 1 / _SIZE)[None, :]
@@ -110,8 +103,7 @@ def _noise(
     gain = np.maximum(waves, 1.0) ** -slope * np.exp(-((waves / finest) ** 2))
     gain[0, 0] = 0.0
     noise = np.fft.irfft2(np.fft.rfft2(white) * gain, s=(_SIZE, _SIZE))
-    scaled: Grid = (noise / noise.std()).astype(np.float32)
-    return scaled
+    return (noise / noise.std()).astype(np.float32)
 
 
 def _hashed(seed: int, count: int) -> NDArray[np.float64]:
@@ -122,8 +114,7 @@ def _hashed(seed: int, count: int) -> NDArray[np.float64]:
         mixed ^= mixed >> np.uint64(shift)
         mixed *= np.uint64(factor)
     mixed ^= mixed >> np.uint64(31)
-    numbers: NDArray[np.float64] = (mixed >> np.uint64(11)) / float(1 << 53)
-    return numbers
+    return (mixed >> np.uint64(11)) / float(1 << 53)
 
 
 def _white(_camera: Camera, size_px: int) -> NDArray[np.float32]:
@@ -265,5 +256,4 @@ def _bilinear(texture: NDArray[np.uint8], x_m: Grid, y_m: Grid) -> NDArray[np.fl
     column, row, beside, below = (n % size for n in (column, row, column + 1, row + 1))
     upper = texture[row, column] * (1 - right) + texture[row, beside] * right
     lower = texture[below, column] * (1 - right) + texture[below, beside] * right
-    mixed: NDArray[np.float32] = (upper * (1 - down) + lower * down).astype(np.float32)
-    return mixed
+    return (upper * (1 - down) + lower * down).astype(np.float32)

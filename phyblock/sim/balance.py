@@ -151,11 +151,7 @@ def _least_residual(
     bounds: Sequence[tuple[float | None, float | None]] | None = None,
     at_most_zero: Any = None,
 ) -> float:
-    """The least residual of a target, as a sum, by linear programming, which always ends.
-
-    Unknowns are not negative, or within their bounds, and such that the rows of `at_most_zero` are.
-    Raises PhyblockError where it does not end.
-    """
+    """The least residual of a target, as a sum, by linear programming, which always ends."""
     from scipy import sparse
     from scipy.optimize import linprog
 
@@ -199,11 +195,7 @@ def _needs(
 
 
 def _forces(blocks: Sequence[Block], friction: float, margin_m: float = 0.0) -> Floats:
-    """Effect of a unit of force along each edge of each cone on each block, shape (6 n, k).
-
-    With a margin [m] contacts between blocks are narrower by it; the ground has no rim to miss.
-    A contact is who pushes (None: the ground), who is pushed, the corners [m], and the normal.
-    """
+    """Effect of a unit of force along each edge of each cone on each block, shape (6 n, k)."""
     contacts: list[tuple[int | None, int, Floats, Floats]] = [
         (None, i, corners, _UP) for i, b in enumerate(blocks) for corners in _on_floor(b)
     ]

@@ -97,8 +97,7 @@ class Camera:
         steps = ((np.arange(size_px) + 0.5) / size_px * 2 - 1) * self.half_tangent
         right, up, forward = self.axes[:, axis]
         across, down = steps * right + forward, steps * up
-        component: NDArray[np.float32] = np.subtract.outer(-down, -across).astype(np.float32)
-        return component
+        return np.subtract.outer(-down, -across).astype(np.float32)
 
     def width_m(self, depth_m: float) -> float:
         """Width of what the picture shows at a depth [m]."""

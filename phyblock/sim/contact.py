@@ -210,10 +210,7 @@ def piece_pairs(first: Block, second: Block) -> Iterator[tuple[ConvexPiece, Conv
 
 
 def _contact_rise(first: ConvexPiece, second: ConvexPiece, axes: Axes) -> tuple[float, bool]:
-    """Vertical part of the contact normal from first to second, and True where it is a rim's.
-
-    0.0 when neither rests on the other.
-    """
+    """Vertical part of the contact normal from first to second, and True where it is a rim's."""
     if not -_MAX_CONTACT_OVERLAP_M <= axes.gap_m <= CONTACT_TOLERANCE_M:
         return 0.0, False
     rim = 0.0
@@ -259,11 +256,7 @@ def contact_corners_m(
 def _patches(
     first: ConvexPiece, second: ConvexPiece, direction: Floats
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Outlines that the first and the second turn to one another, the part they share, the basis.
-
-    All lie in the plane of the basis: two unit vectors across `direction`, rows of (2, 3),
-    right-handed with it. An outline is a polygon, two points or one.
-    """
+    """Outlines turned to one another, the part they share, and two unit vectors of their plane."""
     helper = np.eye(3)[int(np.argmin(np.abs(direction)))]
     right = cross(direction, helper)
     right /= np.linalg.norm(right)
@@ -304,10 +297,7 @@ def _hull(points: Floats) -> Floats:
 
 
 def _clip(subject: Floats, window: Floats, inset_m: float = 0.0) -> Floats:
-    """The part of a polygon, segment or point inside a convex polygon (Sutherland-Hodgman).
-
-    With an inset [m], the part so far from the polygon's sides, or from the ends of a segment.
-    """
+    """The part of a polygon, segment or point inside a convex polygon (Sutherland-Hodgman)."""
     if len(window) < 3 and not (len(window) == 2 and inset_m):
         return np.empty((0, 2))
     kept = subject

@@ -483,10 +483,7 @@ class Executor:
 def _out_of_others(
     block: Block, others: Sequence[Block], most_m: float
 ) -> tuple[Block | None, float]:
-    """The block moved out of others and of the floor, and the distance [m].
-
-    None in place of the block where that is more than `most_m` [m].
-    """
+    """The block moved out of others and of the floor, and the distance [m]."""
     start = np.array(block.position_m)
     for _ in range(_TRIES):
         way = _way_out(block, others)

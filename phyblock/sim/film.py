@@ -39,44 +39,28 @@ _FRAME = 0.012
 _FRAME_MS, _LAST_FRAME_MS = 900, 2600
 
 
-def step_images(scene: Scene, style: PictureStyle) -> list[Image.Image]:
-    """The structure after each step, in the stored order; the last is the goal picture.
+def assembly_gif(scene: Scene, style: PictureStyle) -> bytes:
+    """The assembly in the stored order as an animated GIF that repeats for ever.
 
-    Raises DataError when the stored order places a block before one that it depends on, or when
-    there is no block.
+    Raises DataError when that order places a block before one that it depends on, or when there is
+    no block.
     """
-    camera, blocks = goal_camera(scene, style), scene.blocks
+    camera = goal_camera(scene, style)
     if not scene.graph.is_valid(range(len(scene))):
         message = "places a block before one that it depends on"
         raise DataError(Problem(scene.id, message, "order of blocks"))
-    counts = range(1, len(blocks) + 1)
-    return [picture(blocks[:n], camera, style.background, style.size_px) for n in counts]
-
-
-def assembly_gif(scene: Scene, style: PictureStyle) -> bytes:
-    """The assembly as an animated GIF that repeats for ever; raises as `step_images`."""
-    images = step_images(scene, style)
+    counts, shown = range(1, len(scene) + 1), (camera, style.background, style.size_px)
+    images = [picture(scene.blocks[:n], *shown) for n in counts]
     return _gif(images, _STEP_MS, _END_MS, images[-1])
 
 
 def _gif(images: Sequence[Image.Image], each_ms: int, last_ms: int, colorful: Image.Image) -> bytes:
-    """Images shown for so long each [ms], over and over.
-
-    The 256 colors are those of `colorful`, once for all images, so that nothing flickers.
-    """
+    """Images shown for so long each [ms], over and over."""
     palette = colorful.quantize(256, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
     images = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in images]
     buffer, times_ms = io.BytesIO(), [each_ms] * (len(images) - 1) + [last_ms]
-    images[0].save(
-        buffer,
-        "GIF",
-        save_all=True,
-        append_images=images[1:],
-        duration=times_ms,
-        loop=0,
-        disposal=1,
-        optimize=False,
-    )
+    more = {"save_all": True, "append_images": images[1:], "loop": 0, "disposal": 1}
+    images[0].save(buffer, "GIF", duration=times_ms, optimize=False, **more)
     return buffer.getvalue()
 
 

@@ -40,8 +40,7 @@ _DIGITS = 12
 def dot(one: Vectors, other: Vectors) -> Vectors:
     """Scalar products along the last axis, which has length 3; the rest broadcasts."""
     terms = [one[..., axis] * other[..., axis] for axis in range(3)]
-    product: Vectors = terms[0] + terms[1] + terms[2]
-    return product
+    return terms[0] + terms[1] + terms[2]
 
 
 def cross(one: Vectors, other: Vectors) -> Vectors:
@@ -58,14 +57,12 @@ def turned(points: Vectors, matrix: Vectors) -> Vectors:
 
 def unit(vectors: Vectors) -> Vectors:
     """Vectors (..., 3) scaled to length 1; none may be zero."""
-    scaled: Vectors = vectors / np.sqrt(dot(vectors, vectors))[..., None]
-    return scaled
+    return vectors / np.sqrt(dot(vectors, vectors))[..., None]
 
 
 def rounded(numbers: Vectors) -> Vectors:
     """Numbers to 12 decimals, where C libraries agree; a zero has no sign."""
-    tidy: Vectors = np.round(numbers, _DIGITS) + 0.0
-    return tidy
+    return np.round(numbers, _DIGITS) + 0.0
 
 
 _SMOOTH_COSINE = math.cos(math.radians(30))
@@ -87,8 +84,7 @@ class Mesh:
     @functools.cached_property
     def corners_m(self) -> NDArray[np.float64]:
         """Corner points of every triangle, shape (m, 3, 3) [m]."""
-        corners: NDArray[np.float64] = self.vertices_m[self.triangles]
-        return corners
+        return self.vertices_m[self.triangles]
 
     @functools.cached_property
     def normals(self) -> NDArray[np.float64]:
@@ -147,8 +143,7 @@ class Mesh:
         second: NDArray[np.float64] = np.einsum("t,tci,tcj->ij", volumes, centered, centered)
         second += np.einsum("t,ti,tj->ij", volumes, sums, sums)
         second /= 20 * self.volume_m3
-        inertia: NDArray[np.float64] = np.trace(second) * np.eye(3) - second
-        return inertia
+        return np.trace(second) * np.eye(3) - second
 
     def _neighbors(self) -> list[tuple[int, int]]:
         """Pairs of triangles that share an edge."""
@@ -163,8 +158,7 @@ class Mesh:
 
     @functools.cached_property
     def _tetrahedra_m3(self) -> NDArray[np.float64]:
-        volumes: NDArray[np.float64] = np.linalg.det(self.corners_m) / 6
-        return volumes
+        return np.linalg.det(self.corners_m) / 6
 
 
 @dataclass(frozen=True, eq=False)

@@ -69,11 +69,7 @@ def _loaded() -> ModuleType:
 
 @dataclass
 class _Body:
-    """A block; `place` (7,) is its position [m] and quaternion w x y z.
-
-    `motion` (6,) is the velocity of its frame's origin in the world [m/s] and its spin in its own
-    frame [rad/s]. Both are views into the data of a simulation that is under way.
-    """
+    """A block; `place` (7,): position [m], quaternion w x y z; `motion` (6,): m/s, own rad/s."""
 
     type: BlockType
     place: Floats
@@ -87,8 +83,7 @@ class _Body:
     @property
     def center_m(self) -> Floats:
         """From its frame's origin to its center of mass, in the world, shape (3,) [m]."""
-        center: Floats = self.rotation @ np.array(SHAPES[self.type].center_of_mass_m)
-        return center
+        return self.rotation @ np.array(SHAPES[self.type].center_of_mass_m)
 
 
 class _Simulation:

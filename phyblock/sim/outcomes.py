@@ -173,11 +173,7 @@ def _push(world: World, push: Push) -> None:
 def _went_alike(
     blocks: Sequence[Block], push: Push, first: Mapping[int, Pose], poses: Mapping[int, Pose]
 ) -> bool:
-    """True if a push ends alike in two settings, and as a person would tell it.
-
-    The same blocks came down; the pushed one, where it only slid, went as far as it was pushed and
-    turned little, and ends near the same place in both.
-    """
+    """True if a push ends alike in two settings, and as a person would tell it."""
     starts = {block.order: Pose.goal(block) for block in blocks}
     if any(_came_down(s, first[o]) != _came_down(s, poses[o]) for o, s in starts.items()):
         return False

@@ -26,7 +26,6 @@ from phyblock.domain.blocks import (
     Color,
     Euler,
     euler_deg_to_matrix,
-    euler_deg_to_quat_xyzw,
 )
 from phyblock.domain.scene import Block, CandidateSet, Scene
 from phyblock.errors import DataError, Problem
@@ -59,8 +58,7 @@ Pixel = TypeVar("Pixel", np.uint8, np.float32)
 
 def drawn_m(block: Block) -> NDArray[np.float64]:
     """World corners of what is drawn of a block, shape (n, 3) [m]."""
-    vertices: NDArray[np.float64] = _turned_m(block.type, block.euler_deg) + block.position_m
-    return vertices
+    return _turned_m(block.type, block.euler_deg) + block.position_m
 
 
 @functools.lru_cache(maxsize=1024)
@@ -138,14 +136,7 @@ def _raster(blocks: Sequence[Block], camera: Camera, size_px: int) -> Raster:
 
 def props_of(blocks: Sequence[Block]) -> list[Prop]:
     """Blocks as the rasterizer takes them."""
-    return [
-        Prop(
-            drawn_mesh(block.type),
-            COLOR_RGB[block.color],
-            Pose(np.array(block.position_m), euler_deg_to_quat_xyzw(block.euler_deg)),
-        )
-        for block in blocks
-    ]
+    return [Prop(drawn_mesh(b.type), COLOR_RGB[b.color], Pose.goal(b)) for b in blocks]
 
 
 def light_direction(camera: Camera) -> NDArray[np.float64]:
@@ -163,9 +154,7 @@ def draw_outlines(
 ) -> NDArray[Pixel]:
     """A picture (size, size, 3) of a raster with lines where faces end.
 
-    On a background, a rim goes round the blocks too, light on dark floors. A line takes a pixel on
-    either side of where a face ends, a rim one more on the floor: scaled down to half the size, it
-    fills a pixel's width wherever it lies.
+    On a background, a rim goes round the blocks too, a pixel wider on the floor.
     """
     lined: NDArray[Pixel] = image.copy()
     lined[_ends(raster.face, raster.prop) & (raster.prop >= 0)] = INK_RGB
@@ -212,8 +201,7 @@ class PictureStyle:
 
     Azimuth 0 looks from +x and 90 from +y; elevation 90 looks straight down [degrees]. Candidates
     share one scale in their grid (`common`), or each fills its cell (`fit`). Raises ValueError for
-    a size under 128 or over 2048, an elevation outside 1..90, an azimuth that is no number, or an
-    unknown background or scale.
+    what is not allowed.
     """
 
     size_px: int = 512
@@ -223,18 +211,16 @@ class PictureStyle:
     candidate_scale: CandidateScale = "common"
 
     def __post_init__(self) -> None:
-        scales = get_args(CandidateScale)
-        size, elevation = self.size_px, self.elevation_deg
-        rules = (
-            ("size_px", SMALLEST_PX <= size <= LARGEST_PX, f"{SMALLEST_PX}..{LARGEST_PX}"),
-            ("background", self.background in BACKGROUNDS, ", ".join(BACKGROUNDS)),
-            ("candidate_scale", self.candidate_scale in scales, ", ".join(scales)),
-            ("elevation_deg", 1 <= elevation <= 90, "1..90"),
-            ("azimuth_deg", math.isfinite(self.azimuth_deg), "any finite number"),
-        )
-        for name, is_allowed, allowed in rules:
-            if not is_allowed:
-                raise ValueError(f"{name} is {getattr(self, name)!r}, allowed {allowed}")
+        ranges = {"size_px": (SMALLEST_PX, LARGEST_PX), "elevation_deg": (1, 90)}
+        for name, (least, most) in {**ranges, "azimuth_deg": (-math.inf, math.inf)}.items():
+            number = getattr(self, name)
+            if not (least <= number <= most and math.isfinite(number)):
+                raise ValueError(f"{name} is {number!r}, allowed {least}..{most}")
+        names = {"background": BACKGROUNDS, "candidate_scale": get_args(CandidateScale)}
+        for name, allowed in names.items():
+            if getattr(self, name) not in allowed:
+                found = getattr(self, name)
+                raise ValueError(f"{name} is {found!r}, allowed {', '.join(allowed)}")
 
     @classmethod
     def from_view(
@@ -324,11 +310,7 @@ def goal_camera(scene: Scene, style: PictureStyle) -> Camera:
 
 
 def goal_style(scene: Scene, style: PictureStyle) -> PictureStyle:
-    """The style, of a larger size where blocks of the goal would come out small.
-
-    A length of 50 mm at the farthest block spans 8 % of the asked side or more, in pixels. Raises
-    DataError for a scene without blocks.
-    """
+    """The style, of a larger size where the farthest block of a goal would come out small."""
     camera = goal_camera(scene, style)
     places = np.array([block.position_m for block in scene.blocks])
     farthest_m = float(dot(places - camera.eye_m, camera.axes[2]).max())
@@ -343,10 +325,7 @@ def camera_for(
     where: str,
     shown: Sequence[Block] = (),
 ) -> Camera:
-    """The camera that frames blocks as a goal; DataError, at `where`, when there are none.
-
-    `shown` are all blocks of the picture, where those are not the ones that it frames.
-    """
+    """The camera that frames blocks, of all that are shown; DataError, at `where`, of none."""
     if not blocks:
         raise DataError(Problem(where=where, field="blocks", message="there is none to draw"))
     points, more = (np.vstack([drawn_m(b) for b in some]) for some in (blocks, shown or blocks))
@@ -373,7 +352,7 @@ class Lookout:
 def candidates_grid(
     candidates: CandidateSet, style: PictureStyle
 ) -> tuple[Image.Image, list[Block], float | None]:
-    """Candidates in a 4 by 4 grid from the top left, numbered from 1; with the blocks drawn.
+    """Candidates in a 4 by 4 grid from the top left, numbered from 1, the blocks as drawn.
 
     The number is their common distance from the camera [m], None where each fills its cell.
     """
@@ -407,9 +386,8 @@ def _write_number(cell: Image.Image, number: int, background: Background) -> Non
     ink = GROUNDS[background].ink
     rim = DARK_INK if ink == LIGHT_INK else LIGHT_INK
     width = round(side * _RIM) if background in TEXTURED else 0
-    ImageDraw.Draw(cell).text(
-        place, str(number), ink, font, anchor="rs", stroke_width=width, stroke_fill=rim
-    )
+    pen = ImageDraw.Draw(cell)
+    pen.text(place, str(number), ink, font, "rs", stroke_width=width, stroke_fill=rim)
 
 
 @functools.lru_cache(maxsize=512)
@@ -422,10 +400,7 @@ def thumbnail(
 
 
 def candidate_camera(block: Block, style: PictureStyle, distance_m: float | None = None) -> Camera:
-    """The camera of one cell, `distance_m` from the middle of the block [m].
-
-    Without a distance the block fills the cell above the number's strip.
-    """
+    """The camera of one cell, so far from the middle of the block [m], or filled by it."""
     if distance_m is None:
         return close_camera(block, style, _CELL_WINDOW)
     nearest_m = distance_m - _half_depth_m(block, style)
@@ -435,8 +410,7 @@ def candidate_camera(block: Block, style: PictureStyle, distance_m: float | None
 def close_camera(block: Block, style: PictureStyle, window: Window) -> Camera:
     """The camera of a block by itself, which fills a like share of the window whatever its type.
 
-    Longer ones fill a little more (fourth root of the diagonal), so that a picture still tells
-    which of two is the larger.
+    Longer ones fill a little more, so that a picture still tells which of two is the larger.
     """
     shape = SHAPES[block.type]
     share = math.dist(shape.low_m, shape.high_m) / _LARGEST_DIAGONAL_M
@@ -444,10 +418,7 @@ def close_camera(block: Block, style: PictureStyle, window: Window) -> Camera:
 
 
 def common_distance_m(blocks: Iterable[Block], style: PictureStyle) -> float:
-    """The least distance from the middle of each block [m] from which all fit their cells.
-
-    Blocks at one distance are drawn at one scale.
-    """
+    """The least distance from the middle of each block [m] from which all fit their cells."""
     axes, needed = style.axes, [0.0]
     for block in blocks:
         closest = frame(drawn_m(block), axes, _CELL_WINDOW)
@@ -461,21 +432,14 @@ def _half_depth_m(block: Block, style: PictureStyle) -> float:
 
 
 LEAST_SHARE = 12 / 256**2
-"""The least share of a goal picture that must show of a block: 48 pixels of 512 by 512.
-
-What cannot be seen cannot be planned.
-"""
+"""The least share of a goal picture that must show of a block: 48 pixels of 512 by 512."""
 LEAST_SHOWN = 0.03
 """The least share of a block's own outline that must show in the goal picture of a scene."""
 _SEEN_PX = 256
 
 
 def visible_shares(scene: Scene, style: PictureStyle) -> dict[int, float]:
-    """For each block's order, the share of its pixels that no other block hides, 0..1.
-
-    Its pixels are those that it covers when it is drawn alone by the same camera. Raises
-    DataError for a scene without blocks.
-    """
+    """For each block's order, the share that shows of the pixels that it covers alone, 0..1."""
     camera, blocks = goal_camera(scene, style), scene.blocks
     together = segments(blocks, camera, style.size_px)
     shares = {}

@@ -140,18 +140,15 @@ class _Simulation:
         )
 
     def _shape(self, block_type: BlockType) -> int:
-        """Make the collision shape of a type about its center of mass.
-
-        Bullet keeps its margin inside a box, so boxes need not be moved inward. Hulls go by an
-        OBJ file of one object each, since PyBullet takes no more than one hull from memory; the
-        faces in it are a mere fan, as Bullet wraps a hull round the corners.
-        """
+        """Make the collision shape of a type about its center of mass."""
         if SHAPES[block_type].is_box:
+            # Bullet keeps its margin inside a box.
             half_m = list(SHAPES[block_type].high_m)
             shape = self._bullet.createCollisionShape(
                 self._bullet.GEOM_BOX, halfExtents=half_m, physicsClientId=self._client
             )
             return int(shape)
+        # PyBullet takes but one hull from memory, and wraps hulls round the corners of a file.
         center = np.array(SHAPES[block_type].center_of_mass_m)
         lines: list[str] = []
         first = 1

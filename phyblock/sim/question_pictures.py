@@ -1,10 +1,8 @@
 """The pictures of questions: a recipe to a PNG, its key, its marks, and what can be told from it.
 
-As with goal pictures, the same recipe and style give the same bytes in every process of one
-machine, and the key names everything that the bytes depend on. A mark is a small target on the
-surface, a line, and a label at its end: white discs with a dark rim and a dark letter read on every
-floor and are unlike any block. Pictures are compared as they are drawn at 256 pixels, before floor
-and smoothing, which add nothing that tells two of them apart.
+The same recipe and style give the same bytes, and the key names all that they depend on. A mark is
+a small target on the surface, a line, and a label at its end, which read on every floor. Pictures
+are compared as they are drawn at 256 pixels, before floor and smoothing.
 """
 
 from __future__ import annotations
@@ -80,23 +78,16 @@ Point = tuple[float, float]
 
 
 def question_png(recipe: QuestionPicture, style: PictureStyle) -> bytes:
-    """PNG of a question's picture, square; its view, and background if any, replace the style's.
-
-    Raises DataError for a recipe with nothing to frame, ValueError for a view that a
-    `PictureStyle` does not allow.
-    """
+    """PNG of a question's picture, square; its view, and background if any, replace the style's."""
     camera = question_camera(recipe, style)
     ground = recipe.background or style.background
     image = picture(drawn_blocks(recipe), camera, ground, style.size_px)
     return to_png(_with_marks(image, recipe.marks, camera))
 
 
+@functools.lru_cache(maxsize=48)
 def question_camera(recipe: QuestionPicture, style: PictureStyle) -> Camera:
-    """The camera of a question's picture; raises as `question_png`.
-
-    A block shown by itself (label `block`) fills a like share of its picture whatever its type,
-    larger ones a little more, as in the pictures of candidates.
-    """
+    """The camera of a question's picture: as a goal's, or of a block by itself as a candidate's."""
     azimuth_deg, elevation_deg = recipe.view_deg
     seen_from = replace(style, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
     shown = drawn_blocks(recipe)
@@ -124,10 +115,7 @@ def state_picture(scene: Scene, blocks: Sequence[Block], style: PictureStyle) ->
 
 
 def question_key(recipe: QuestionPicture, style: PictureStyle) -> str:
-    """SHA-256 [hex] of all that the picture depends on; of the style, not its own view.
-
-    A label counts only where it changes the framing, so that equal pictures share a file.
-    """
+    """SHA-256 [hex] of all that the picture depends on, so that equal pictures share a file."""
     parts = {
         "kind": "question",
         "render_version": [RENDER_VERSION, QUESTION_RENDER_VERSION],
@@ -185,10 +173,7 @@ def _with_marks(image: Image.Image, marks: Sequence[Mark], camera: Camera) -> Im
 
 
 def _label_places(centers: Sequence[Point], radius: float, size_px: int) -> list[Point]:
-    """The labels' centers: each in turn at its best place, until none moves.
-
-    They stand off from their targets, where they cover neither a target nor one another.
-    """
+    """The labels' centers: each in turn at its best place, until none moves."""
 
     def beside(center: Point, angle_deg: float, distance: float) -> Point:
         angle, far = math.radians(angle_deg), distance * radius
@@ -201,10 +186,8 @@ def _label_places(centers: Sequence[Point], radius: float, size_px: int) -> list
             labels = [place for i, place in enumerate(chosen) if i != number]
             targets = [other for i, other in enumerate(centers) if i != number]
             options = []
-            for (far, distance), (index, angle) in product(
-                enumerate(_DISTANCES), enumerate(_ANGLES_DEG)
-            ):
-                place = beside(center, angle, distance)
+            for far, index in product(range(len(_DISTANCES)), range(len(_ANGLES_DEG))):
+                place = beside(center, _ANGLES_DEG[index], _DISTANCES[far])
                 cost = _cost(center, place, labels, targets, radius, size_px)
                 # It costs to be far from the target, or not above it.
                 options.append((cost + (10 * far + index), place))
@@ -287,12 +270,7 @@ class Top(NamedTuple):
 @functools.lru_cache(maxsize=48)
 def seen(recipe: QuestionPicture) -> Shot:
     """The blocks of a picture by its camera, `SEEN_PX` squared, with no floor and no marks."""
-    return shoot(drawn_blocks(recipe), _camera(recipe), SEEN_PX)
-
-
-@functools.lru_cache(maxsize=48)
-def _camera(recipe: QuestionPicture) -> Camera:
-    return question_camera(recipe, _STYLE)
+    return shoot(drawn_blocks(recipe), question_camera(recipe, _STYLE), SEEN_PX)
 
 
 def differing_pixels(one: Shot, other: Shot) -> int:
@@ -303,8 +281,7 @@ def differing_pixels(one: Shot, other: Shot) -> int:
 def changed_pixels(one: Shot, other: Shot) -> NDArray[np.bool_]:
     """The pixels that differ by more than a tenth of the scale in some channel, shape of both."""
     step = np.abs(_colors(one) - _colors(other)) > _VISIBLE_STEP
-    changed: NDArray[np.bool_] = step[..., 0] | step[..., 1] | step[..., 2]
-    return changed
+    return step[..., 0] | step[..., 1] | step[..., 2]
 
 
 @functools.lru_cache(maxsize=48)
@@ -330,15 +307,11 @@ def is_inside(recipe: QuestionPicture) -> bool:
     """True if no block or mark comes near the picture's edge."""
     points = [drawn_m(block) for block in drawn_blocks(recipe)]
     points += [np.array([mark.position_m]) for mark in recipe.marks]
-    return bool(np.abs(_camera(recipe).project(np.vstack(points))).max() < _EDGE)
+    return bool(np.abs(question_camera(recipe, _STYLE).project(np.vstack(points))).max() < _EDGE)
 
 
 def block_mark(recipe: QuestionPicture, shot: Shot, order: int, letter: str) -> Mark | None:
-    """A mark in the middle of what shows of a block; None where less shows than its target needs.
-
-    The place is the point of the block's surface behind the pixel farthest from the edge of what
-    shows; that is four pixels of `SEEN_PX` at the least.
-    """
+    """A mark in the middle of what shows of a block; None where less shows than its target needs."""
     vertex = next(i for i, block in enumerate(recipe.blocks) if block.order == order)
     # The pixels that last longest as the mask is eaten from its edge.
     depth, last, left = 0, shot.block == vertex, shot.block == vertex
@@ -351,17 +324,16 @@ def block_mark(recipe: QuestionPicture, shot: Shot, order: int, letter: str) -> 
     rows, columns = np.nonzero(last)
     middle = np.argmin((rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2)
     pixel = (int(rows[middle]), int(columns[middle]))
-    hit = _hit(drawn_blocks(recipe)[vertex], _camera(recipe), pixel)
+    hit = _hit(drawn_blocks(recipe)[vertex], question_camera(recipe, _STYLE), pixel)
     return None if hit is None else Mark(letter, hit.position_m)
 
 
 def visible_tops(recipe: QuestionPicture, shot: Shot, step_px: int, least_rise: float) -> list[Top]:
-    """Points of the blocks' surfaces that show and face up, behind every `step_px`-th pixel.
+    """Points of surfaces that show, behind every `step_px`-th pixel, `rise` at least so much.
 
-    Facing up means that the unit normal's z is `least_rise` or more; pixels at the edge of what
-    shows of a block are left out.
+    Pixels at the edge of what shows of a block are left out.
     """
-    camera, blocks = _camera(recipe), drawn_blocks(recipe)
+    camera, blocks = question_camera(recipe, _STYLE), drawn_blocks(recipe)
     tops = []
     for row, column in product(range(step_px // 2, SEEN_PX - 2, step_px), repeat=2):
         around = shot.block[max(row - 2, 0) : row + 3, max(column - 2, 0) : column + 3]
@@ -375,7 +347,7 @@ def visible_tops(recipe: QuestionPicture, shot: Shot, step_px: int, least_rise: 
 
 def mark_pixel(recipe: QuestionPicture, position_m: tuple[float, float, float]) -> tuple[int, int]:
     """The pixel (row, column) of `SEEN_PX` at a point of the world, the nearest one inside."""
-    column, row = _camera(recipe).to_pixels(np.array([position_m]), SEEN_PX)[0]
+    column, row = question_camera(recipe, _STYLE).to_pixels(np.array([position_m]), SEEN_PX)[0]
     return int(np.clip(row, 0, SEEN_PX - 1)), int(np.clip(column, 0, SEEN_PX - 1))
 
 
@@ -392,15 +364,13 @@ def is_apart(
 ) -> bool:
     """True if a mark's target is so many pixels of `SEEN_PX` away from all the others'."""
     places = np.array([one.position_m for one in (mark, *others)])
-    pixels = _camera(recipe).to_pixels(places, SEEN_PX)
+    pixels = question_camera(recipe, _STYLE).to_pixels(places, SEEN_PX)
     apart = np.linalg.norm(pixels[1:] - pixels[0], axis=1)
     return bool(apart.min(initial=np.inf) >= least_px)
 
 
 def _hit(block: Block, camera: Camera, pixel: tuple[int, int]) -> Top | None:
-    """Return where the ray through a pixel meets the block first (Moeller-Trumbore); None if it
-    misses.
-    """
+    """Return where the ray through a pixel first meets the block (Moeller-Trumbore), or None."""
     half = camera.half_tangent
     across = ((pixel[1] + 0.5) / SEEN_PX * 2 - 1) * half
     up = (1 - (pixel[0] + 0.5) / SEEN_PX * 2) * half

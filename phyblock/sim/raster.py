@@ -136,11 +136,7 @@ class _Solids:
 
 
 def _solids(props: Sequence[Prop]) -> _Solids:
-    """The triangles of some props, one at least.
-
-    Their order does not depend on that of props, so that of two faces in one place the same one
-    shows.
-    """
+    """The triangles of some props, one at least."""
 
     def name(place: int) -> tuple[object, ...]:
         prop = props[place]
@@ -178,10 +174,7 @@ class _CameraScreen:
         return 1 / max(self.camera.near_m, _LEAST_DEPTH_M)
 
     def linear(self, vectors: Floats) -> Floats:
-        """Scalar product of vectors (n, 3) with the ray through a pixel's center, as (n, 3).
-
-        The three numbers a, b, c stand for a * column + b * row + c; rays have a depth of 1.
-        """
+        """Scalar product of vectors (n, 3) with the ray through a pixel's center, as (n, 3)."""
         right, up, forward = turned(vectors, self.camera.axes).T
         step = 2 * self.camera.half_tangent / self.size_px
         middle = (1 - self.size_px) / 2
@@ -194,10 +187,7 @@ class _CameraScreen:
         return self.linear(triangles.normals / away[:, None])
 
     def corners_px(self, corners_m: Floats) -> tuple[Floats, Ints]:
-        """Triangles (n, 3, 3) [m] on the screen, shape (k, 3, 2), and the owner of each of the k.
-
-        What lies before the nearest depth is cut off, which may leave two of a triangle or none.
-        """
+        """Triangles (n, 3, 3) [m], cut at the least depth, on the screen (k, 3, 2), and their owners."""
         seen = turned(corners_m - self.camera.eye_m, self.camera.axes)
         whole = (seen[..., 2] >= _LEAST_DEPTH_M).all(axis=1)
         owner = np.flatnonzero(whole)
@@ -236,17 +226,13 @@ class _Spans(NamedTuple):
 
 
 def _spans(corners_px: Floats, size_px: int) -> _Spans:
-    """The spans of triangles with corners (n, 3, 2), column and row, on a screen `size_px` wide.
-
-    A pixel belongs to a triangle that holds its center, half a pixel from its edges. The crossing
-    of an edge with a row is computed from the edge's ends alone, in one order, so two triangles
-    that share an edge cover every pixel along it once.
-    """
+    """The spans of triangles with corners (n, 3, 2), column and row, on a screen `size_px` wide."""
 
     def from_center(place: Floats) -> Ints:
         """The first pixel whose center is not before a place, within the screen."""
         return np.ceil(np.clip(place, 0.0, size_px) - 0.5).astype(np.int64)
 
+    # Crossings come from an edge's ends alone, in one order: no pixel along it is in both or none.
     order = np.argsort(corners_px[..., 1], axis=1, kind="stable")
     x, y = np.moveaxis(np.take_along_axis(corners_px, order[..., None], axis=1), -1, 0)
     first, end = (from_center(y[:, i]) for i in (0, 2))
@@ -259,8 +245,7 @@ def _spans(corners_px: Floats, size_px: int) -> _Spans:
         """Crossing of the edge between two corners with a row's center; any for a level edge."""
         rise = y[:, end] - y[:, start]
         slope = (x[:, end] - x[:, start]) / np.where(rise > 0, rise, 1.0)
-        found: Floats = x[:, start] + (center - y[:, start]) * slope
-        return found
+        return x[:, start] + (center - y[:, start]) * slope
 
     long = crossing(0, 2)
     short = np.where(center < y[:, 1], crossing(0, 1), crossing(1, 2))
@@ -272,11 +257,7 @@ def _spans(corners_px: Floats, size_px: int) -> _Spans:
 def _nearest(
     covering: _Spans, planes: Floats, size_px: int, least: float, most: float
 ) -> tuple[NDArray[np.int32], Floats]:
-    """The nearest triangle of each pixel, or `NOTHING`, and its nearness there, (size, size).
-
-    `planes` (n, 3) give the nearness of each triangle as a * column + b * row + c; what lies
-    outside `least`..`most` is left out. Of two that are equally near the later counts.
-    """
+    """The nearest triangle of each pixel, or `NOTHING`, and its nearness there, (size, size)."""
     best = np.full(size_px * size_px, least)
     shown = np.full(size_px * size_px, NOTHING, dtype=np.int32)
     ends = np.cumsum(covering.right - covering.left)
@@ -420,14 +401,10 @@ class _LightMap:
     @property
     def steps(self) -> Floats:
         """Change of `places` for a way of 1 m along x, y and z: rows column, row, height."""
-        steps: Floats = self._axes / np.array([[self._pixel_m], [self._pixel_m], [1.0]])
-        return steps
+        return self._axes / np.array([[self._pixel_m], [self._pixel_m], [1.0]])
 
     def lit(self, column: Floats, row: Floats, height: Floats) -> Floats:
-        """The share of the light that points of a surface get, 0..1, by their places.
-
-        The four pixels round a point count by how near they are to it.
-        """
+        """The share of the light that points of a surface get, 0..1, by their places."""
         column, row = column - 0.5, row - 0.5
         left, top = np.floor(column), np.floor(row)
         pixel = (top * self._size_px + left).astype(np.int64)
@@ -449,10 +426,7 @@ class _LightMap:
         """True for points on the light's side of the face that each pixel shows."""
         a, b, c = self._planes
         shown = self._shown[pixel]
-        before: NDArray[np.bool_] = height + _TOUCHING_M > a[shown] * column + (
-            b[shown] * row + c[shown]
-        )
-        return before
+        return height + _TOUCHING_M > a[shown] * column + (b[shown] * row + c[shown])
 
 
 def _ground_shadow(solid: _Solids, direction: Floats, screen: _CameraScreen) -> NDArray[np.bool_]:
