@@ -1,10 +1,8 @@
 """Backgrounds: the floor behind the blocks, the shadow on it, and the colors drawn over it.
 
-The floor is the plane z = 0, colored by casting a ray through every pixel: no image file, no far
-edge. Wood, concrete and lawn are seamless square textures, made once a process from integer hashes
-and filtered noise. They repeat every two meters, and are kept at every halving of their size, so
-that far ground shows its mean color and never flickers. A background is a row of `GROUNDS` here and
-a name in `phyblock.types.Background`.
+The floor is the plane z = 0, colored by casting a ray through every pixel. Wood, concrete and lawn
+are seamless square textures, made from integer hashes and filtered noise, and kept at every halving
+of their size. A background is a row of `GROUNDS` and a name in `phyblock.types.Background`.
 """
 
 from __future__ import annotations
@@ -147,8 +145,7 @@ class Ground:
     """A background: the share of light that a shadow takes, 0..1, and colors.
 
     `ink` is the color of writing, `line` of the grid between candidates, `rim` of the lines where
-    blocks end at the floor, which contrast with it by 3:1 or more. The floor is drawn by `paint`,
-    or is a `texture`.
+    blocks end at the floor. The floor is drawn by `paint`, or is a `texture`.
     """
 
     shadow: float
@@ -206,28 +203,18 @@ def shadow(background: Background, shaded: NDArray[np.bool_]) -> NDArray[np.floa
     `shaded` shape (size, size) is where the shadow is; its edge is drawn soft.
     """
     mask = Image.fromarray(shaded.astype(np.uint8) * np.uint8(255))
-    soft = mask.filter(ImageFilter.GaussianBlur(len(shaded) / _SOFTNESS))
-    left: NDArray[np.float32] = np.asarray(soft, dtype=np.float32)[..., None]
-    left = left * np.float32(-GROUNDS[background].shadow / 255.0)
-    left += np.float32(1.0)
-    return left
+    soft = np.asarray(mask.filter(ImageFilter.GaussianBlur(len(shaded) / _SOFTNESS)), np.float32)
+    return soft[..., None] * np.float32(-GROUNDS[background].shadow / 255.0) + np.float32(1.0)
 
 
 @functools.cache
 def surface_map(background: Background) -> tuple[NDArray[np.uint8], ...]:
-    """The texture at full size, then halved again and again down to one texel.
-
-    Each has shape (n, n, 3), 0..255; rows run along y, columns along x. Raises ValueError for a
-    background without texture.
-    """
+    """The texture, then halved again and again, each (n, n, 3), 0..255, rows along y."""
     texture = GROUNDS[background].texture
-    if texture is None:
-        raise ValueError(f"{background} has no texture")
+    assert texture is not None
     maps = [texture().astype(np.float32).clip(0, 255)]
-    while len(maps[-1]) > 1:
-        last = maps[-1]
-        half = len(last) // 2
-        maps.append(last.reshape(half, 2, half, 2, 3).mean(axis=(1, 3)))
+    while (half := len(maps[-1]) // 2) > 0:
+        maps.append(maps[-1].reshape(half, 2, half, 2, 3).mean(axis=(1, 3)))
     return tuple(np.rint(one).astype(np.uint8) for one in maps)
 
 

@@ -1,8 +1,7 @@
 """Cameras: views by name or angle, and framing that cuts off nothing of what is framed.
 
-A view direction fixes three axes (right, up, forward). For them, "every point lies inside this
-window of the picture" is a set of linear inequalities in the camera's position, so the closest
-camera that sees everything follows in closed form; no search, no bounding sphere.
+For the axes of a view, "every point lies inside this window of the picture" is a set of linear
+inequalities in the camera's position, so the closest camera that sees everything is a closed form.
 """
 
 from __future__ import annotations
@@ -89,11 +88,7 @@ class Camera:
         return (self.project(points_m) * [1.0, -1.0] + 1.0) * (size_px / 2)
 
     def ray_component(self, axis: int, size_px: int) -> NDArray[np.float32]:
-        """One world component of the direction through each pixel's center, row 0 on top.
-
-        Shape (size, size); the three components are not of unit length, but of unit depth. They
-        are given one by one because a picture's worth of all three takes much memory.
-        """
+        """One world component of the ray of unit depth through each pixel, (size, size)."""
         steps = ((np.arange(size_px) + 0.5) / size_px * 2 - 1) * self.half_tangent
         right, up, forward = self.axes[:, axis]
         across, down = steps * right + forward, steps * up
@@ -107,13 +102,8 @@ class Camera:
 def view_axes(azimuth_deg: float, elevation_deg: float) -> NDArray[np.float64]:
     """Right, up and forward of a view from that direction, rows of a (3, 3) array."""
     azimuth, elevation = math.radians(azimuth_deg), math.radians(elevation_deg)
-    towards = np.array(
-        [
-            math.cos(elevation) * math.cos(azimuth),
-            math.cos(elevation) * math.sin(azimuth),
-            math.sin(elevation),
-        ]
-    )
+    flat = math.cos(elevation)
+    towards = np.array([flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(elevation)])
     right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])
     return rounded(np.stack([right, np.cross(towards, right), -towards]))
 
@@ -125,11 +115,10 @@ def frame(
     min_distance_m: float = 0.0,
     drawn_m: NDArray[np.float64] | None = None,
 ) -> Camera:
-    """The closest camera with these axes that sees all points (n, 3) inside the window.
+    """The closest camera with these axes that sees all points (n, 3), one at least, in the window.
 
-    It stays at least `min_distance_m` [m] from the nearest point, and centers the points in the
-    window. `points_m` must hold a point. `drawn_m` (k, 3) is all that is drawn, where that is
-    more: it may reach out of the window, but lies in front of the camera and between its planes.
+    It stays at least `min_distance_m` [m] from the nearest. `drawn_m` (k, 3) is all that is drawn,
+    where that is more: it may reach out of the window, but lies between the camera's planes.
     """
     right, up, forward = turned(points_m, axes).T
     spans = []

@@ -1,8 +1,7 @@
 """Geometry of blocks in contact: overlaps, gaps, support, contact areas, and shared space.
 
-The exact tests between convex pieces rest on one fact: two convex polytopes are apart exactly when
-one of a finite set of axes separates them, namely a face normal of either or a cross product of two
-edge directions. The same axes are the face normals of their Minkowski difference, so that casting a
+Two convex polytopes are apart exactly when a face normal of either, or a cross product of two edge
+directions, separates them. The same axes are the face normals of their Minkowski difference: a
 vertical ray against it gives the distance by which one would fall onto the other.
 """
 
@@ -105,8 +104,7 @@ def separating_axes(first: ConvexPiece, second: ConvexPiece) -> Axes:
 def drop_m(axes: Axes) -> float | None:
     """The distance by which the second piece falls before it meets the first [m].
 
-    Negative when it would have to rise to be clear; None when they never meet, because the
-    second is not above the first.
+    Negative when it would have to rise to be clear; None when it is not above the first.
     """
     vertical = axes.directions[:, 2]
     beside = np.abs(vertical) < 1e-9
@@ -139,8 +137,9 @@ def find_overlaps(
     blocks: Sequence[Block], tolerance_m: float = FIT_TOLERANCE_M
 ) -> tuple[Overlap, ...]:
     """Pairs of blocks that share space deeper than `tolerance_m` [m]; blocks in the ground too."""
-    bottoms_m = [(block.order, float(bounds_m(block)[0, 2])) for block in blocks]
-    overlaps = [Overlap(GROUND, o, -low) for o, low in bottoms_m if low < -tolerance_m]
+    depths_m = {block.order: -float(bounds_m(block)[0, 2]) for block in blocks}
+    overlaps = [Overlap(GROUND, order, deep) for order, deep in depths_m.items()]
+    overlaps = [one for one in overlaps if one.depth_m > tolerance_m]
     for first, second in _near_pairs(blocks, 0.0):
         depth_m = -min(axes.gap_m for _, _, axes in piece_pairs(first, second))
         if depth_m > tolerance_m:
@@ -177,9 +176,8 @@ def drop_height_m(block: Block, others: Sequence[Block]) -> float:
 def support_graph(blocks: Sequence[Block]) -> dict[int, frozenset[int]]:
     """For each block's order, the orders of the blocks it rests on; 0 is the ground.
 
-    B rests on A when they are within `CONTACT_TOLERANCE_M`, the contact normal is within 45 degrees
-    of vertical and points up from A to B, and the contact is an area, or an edge lying on a face.
-    An edge that lies along the border of a face carries only what nothing else carries.
+    B rests on A when they touch in an area, or an edge on a face, whose normal points up from A to
+    B within 45 degrees. An edge on the border of a face carries only what nothing else carries.
     """
     rests_on: dict[int, set[int]] = {block.order: set() for block in blocks}
     for block in blocks:
@@ -358,9 +356,10 @@ def filled_voxels(blocks: Sequence[Block]) -> Voxels:
     found = [_filled(block.type, block.position_m, block.euler_deg) for block in blocks]
     if not found:
         return np.zeros(0, dtype=np.int64), np.zeros((0, _POINTS // 8), dtype=np.uint8)
-    names, places = np.unique(np.concatenate([name for name, _ in found]), return_inverse=True)
+    names, bits = (np.concatenate(part) for part in zip(*found, strict=True))
+    names, places = np.unique(names, return_inverse=True)
     points = np.zeros((len(names), _POINTS // 8), dtype=np.uint8)
-    np.bitwise_or.at(points, places, np.concatenate([bits for _, bits in found]))
+    np.bitwise_or.at(points, places, bits)
     return names, points
 
 

@@ -1,8 +1,7 @@
 """Blocks let go under physics: states, building orders, and plans with poses.
 
 Two facts save time and change no verdict. Blocks that nothing brings near one another cannot
-disturb one another, so they are tried group by group (`groups`); what stands elsewhere would only
-change the order in which an engine goes through contacts. And a group that has been quiet for a
+disturb one another, so they are tried group by group (`groups`). And a group that is quiet for a
 while is at rest (`moments`), for an unsupported load of .2 % of a block's weight would show.
 """
 
@@ -47,11 +46,7 @@ ONE_SETTING = Trial(physics=DEFAULT_TRIAL.physics[:1])
 
 
 REST_SPEED_M_S = 0.005
-"""Blocks are at rest when no corner was faster for a while [m/s].
-
-It lies above the jitter of resting contacts (up to 4 mm/s) and far below the speed of a block that
-has begun to tip.
-"""
+"""Blocks are at rest when no corner was faster: above the jitter of contacts (up to 4 mm/s)."""
 QUIET_S = 0.25
 """Time for which blocks must not be faster to be at rest [s]."""
 _EVERY_S = 0.05
@@ -195,12 +190,7 @@ _ONE_AT_A_TIME = threading.Lock()
 
 @dataclass(frozen=True)
 class Settled:
-    """Blocks that were let go.
-
-    `fallen` are the orders of those that passed the trial's limits, or did so in the fall of
-    others; `blocks` all of them, at their goal poses but for the fallen, which lie where they came
-    to rest.
-    """
+    """Blocks that were let go, at their goal poses but for the `fallen`, which lie at rest."""
 
     fallen: tuple[int, ...]
     blocks: tuple[Block, ...]
@@ -214,10 +204,9 @@ class Settled:
 class Site:
     """Worlds kept open to try one state after another, each once.
 
-    A partly built structure is always tried with every block at its goal pose, so that no step is
-    judged by the drift of the ones before it, and each arrangement of a group once, wherever on
-    the ground and in whatever colors it is met again: a verdict depends on nothing that was tried
-    before. `engine` is the chosen one unless another is given.
+    Every block is tried at its goal pose, and each arrangement of a group once, wherever it is met
+    again: a verdict depends on nothing that was tried before. `engine` is the chosen one unless
+    another is given.
     """
 
     def __init__(self, trial: Trial = DEFAULT_TRIAL, engine: PhysicsEngine | None = None) -> None:
@@ -315,12 +304,11 @@ class ExecutionLimits:
 
 @dataclass(frozen=True)
 class ExecutedStep:
-    """Result of a step.
+    """Result of a step: how far the block came to lie from the pose it was to have.
 
-    `moved_cm` and `turned_deg` say how far the block came to lie from the pose it was to have,
-    `gap_cm` how far it was above whatever it would fall on when it was let go, `overlap_cm` how far
-    it had to be moved out of others or the floor, or how deep it was refused; `knocked` are the
-    numbers of the steps whose blocks it moved, from 1.
+    `gap_cm` is how far it was above whatever it would fall on, `overlap_cm` how far it had to be
+    moved out of others or the floor, or how deep it was refused; `knocked` are the numbers of the
+    steps whose blocks it moved, from 1.
     """
 
     end: StepEnd
@@ -354,9 +342,8 @@ def execute(
 ) -> Execution:
     """Put blocks at their poses, one after another; None stands for a step that names no block.
 
-    Their orders are taken anew, from 1 by step. The same call gives the same result, whatever was
-    executed before; `engine` is the chosen one unless another is given. Raises SimulationError
-    where the engine cannot be used, and for a plan that takes longer than `LONGEST_S`.
+    The same call gives the same result, whatever was executed before. Raises SimulationError where
+    the engine cannot be used, and for a plan that takes longer than `LONGEST_S`.
     """
     give_up_s = time.monotonic() + LONGEST_S
     steps: list[ExecutedStep] = []
@@ -364,10 +351,7 @@ def execute(
     with Executor(limits, engine) as executor:
         for number, block in enumerate(blocks, 1):
             if time.monotonic() > give_up_s:
-                message = (
-                    f"carrying out a plan of {len(blocks)} steps took more than {LONGEST_S:g} s"
-                )
-                raise SimulationError(f"{message}; it was given up before step {number}")
+                raise SimulationError(f"step {number} was not reached within {LONGEST_S:g} s")
             steps.append(executor.step(block))
             worlds.append(executor.blocks)
     return Execution(tuple(steps), tuple(worlds))
@@ -376,10 +360,9 @@ def execute(
 class Executor:
     """Execution of a plan with poses, step by step; a context manager.
 
-    The hand that puts a block gives way a little: one that would share space with others, or with
-    the floor, by no more than a tolerance is moved out the shortest way, and one that hangs no
-    higher above them is lowered; where it would share more, it is refused and stays out. Nothing
-    is set right later: what fell or was knocked over stays so for the steps that follow.
+    A block that would share space with others, or with the floor, by no more than a tolerance is
+    moved out the shortest way, and one that hangs no higher above them is lowered; where it would
+    share more, it is refused and stays out. What fell or was knocked over stays so.
 
     A block is let go with the blocks near it alone; others join as soon as something that fell
     comes near them. Where a step moves no block past the limits of `DEFAULT_TRIAL`, all is set

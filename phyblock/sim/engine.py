@@ -1,14 +1,10 @@
 """Physics engines behind one protocol, in terms of blocks on a floor, and the choice of one.
 
-A `PhysicsEngine` opens simulations; a `Simulation` holds blocks and moves them; a `World` is a
-simulation that knows its blocks. The floor is the plane z = 0. Simulations name blocks by number.
-Poses are those of body frames (`phyblock.domain.blocks`). Engines take the material of a block from
-`SHAPES` (center of mass), `Physics.mass_kg` and `phyblock.sim.geometry` (`collision_pieces`,
-`solid_mesh` with its inertia).
+A `PhysicsEngine` opens simulations; a `Simulation` holds blocks by number and moves them; a `World`
+is a simulation that knows its blocks. The floor is the plane z = 0; poses are those of body frames.
 
 Blocks are let go in PyBullet where it is installed, in MuJoCo elsewhere; the environment variable
-`PHYBLOCK_PHYSICS` chooses by name, also for the processes that are started. Nothing is imported
-before it is chosen.
+`PHYBLOCK_PHYSICS` chooses by name. Nothing is imported before it is chosen.
 """
 
 from __future__ import annotations
@@ -92,8 +88,7 @@ class Physics:
     """Settings of a simulation.
 
     Time step [s], iterations of the contact solver in each step, friction coefficient of any two
-    bodies that touch, and gravity [m/s2], which is not straight down where the floor is to lean.
-    `mass_factors` names types of which every block has so many times its mass in plastic.
+    bodies that touch, gravity [m/s2], and types of which every block has so many times its mass.
     """
 
     time_step_s: float = 1 / 240

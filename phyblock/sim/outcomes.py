@@ -1,10 +1,8 @@
 """Outcomes of taking a block away, pushing one or putting one down: settled poses, and who moved.
 
-An outcome counts only where every setting names the same blocks, and names them clearly: each
-either stayed where it was or moved far. Time step, solver, friction and masses all vary, because
-which blocks fall changes with the time step alone in one removal of twenty. The floor leans a
-little, each time to another side, because a block whose weight is exactly over an edge falls in
-every simulation and stays on many a table.
+An outcome counts only where every setting names the same blocks: each either stayed where it was or
+moved far. Time step, solver, friction and masses vary, and the floor leans a little, each time to
+another side, because a block whose weight is exactly over an edge stays on many a table.
 """
 
 from __future__ import annotations
@@ -20,11 +18,8 @@ from phyblock.sim.engine import GRAVITY_M_S2, Physics, Pose, World
 
 LEAN_DEG = 2.0
 """Slope of the floor [degrees]; blocks begin to slide at 15, where friction is least."""
-STILL_M, STILL_DEG = 0.004, 4.0
-MOVED_M, MOVED_DEG = 0.02, 20.0
-"""A block stayed within the former limits, or it moved past the latter; what lies between is not
-clear, and no question is asked about it.
-"""
+_STILL_M, _STILL_DEG = 0.004, 4.0
+_MOVED_M, _MOVED_DEG = 0.02, 20.0
 _LONGEST_S = 5.0
 _PATIENCE = 4.0
 """A push is kept up this many times as long as without friction."""
@@ -54,9 +49,8 @@ OUTCOME_SETTINGS: tuple[Physics, ...] = (
 class Push:
     """A block pushed along the floor's plane: `direction` is a unit vector (x, y).
 
-    It is moved at `speed_m_s` [m/s] until it has gone `distance_m` [m] that way or has come down,
-    free to tip and to rise. The distance is 6 mm off every multiple of 12.5 mm, the grid that edges
-    of built structures lie on.
+    It is moved until it has gone so far or has come down, free to tip and to rise. The distance is
+    6 mm off every multiple of 12.5 mm, the grid that edges of built structures lie on.
     """
 
     order: int
@@ -69,9 +63,8 @@ class Push:
 class Outcome:
     """Result of a removal or push: `moved` are the orders of the blocks that did not stay.
 
-    `settled` are all blocks at their final poses under the first setting, rounded to 0.1 mm and
-    0.01 degrees. `is_clear` is true where all settings agree, with a margin, and all came to rest;
-    where it is False the rest means nothing.
+    `settled` are all blocks at their final poses under the first setting. `is_clear` is true where
+    all settings agree, with a margin, and all came to rest; where it is not the rest means nothing.
     """
 
     moved: tuple[int, ...]
@@ -88,23 +81,22 @@ def after(
     settings: Sequence[Physics] = OUTCOME_SETTINGS,
 ) -> Outcome:
     """Let blocks go where they are, or push one of them, and see what follows."""
-    agreed: tuple[int, ...] | None = None
+    agreed: dict[int, bool | None] = {}
     first: dict[int, Pose] = {}
     for setting in settings:
         with World(setting) as world:
             world.place(*blocks)
             if push is not None:
                 _push(world, push)
-            poses = world.poses() if wait(world, _LONGEST_S) else None
-        moved = None if poses is None else _moved_orders(blocks, poses)
-        if poses is None or moved is None or moved != (moved if agreed is None else agreed):
+            is_at_rest, poses = wait(world, _LONGEST_S), world.poses()
+        moved = _moved(blocks, poses)
+        agreed, first = agreed or moved, first or poses
+        if not is_at_rest or None in moved.values() or moved != agreed:
             return _UNCLEAR
-        agreed, first = moved, first or poses
         if push is not None and not _went_alike(blocks, push, first, poses):
             return _UNCLEAR
-    still = set(first) - set(agreed or ())
-    settled = [b if b.order in still else first[b.order].put(b) for b in blocks]
-    return Outcome(agreed or (), tuple(settled), True)
+    settled = tuple(first[b.order].put(b) if agreed[b.order] else b for b in blocks)
+    return Outcome(tuple(order for order, has in agreed.items() if has), settled, True)
 
 
 def after_removal(blocks: Sequence[Block], order: int) -> Outcome:
@@ -131,30 +123,24 @@ def _holds(blocks: Sequence[Block], setting: Physics) -> bool | None:
     with World(setting) as world:
         world.place(*blocks)
         for is_at_rest in moments(world, _LONGEST_S):
-            poses = world.poses()
-            if _moved_orders(blocks, poses, MOVED_M, MOVED_DEG):
+            moved = _moved(blocks, world.poses()).values()
+            if True in moved:
                 return False
             if is_at_rest:
-                return True if _moved_orders(blocks, poses) == () else None
+                return None if None in moved else True
     return None
 
 
-def _moved_orders(
-    blocks: Sequence[Block],
-    poses: Mapping[int, Pose],
-    still_m: float = STILL_M,
-    still_deg: float = STILL_DEG,
-) -> tuple[int, ...] | None:
-    """Orders of the blocks that `poses` has elsewhere; None where one lies between the limits."""
-    moved = []
-    for block in blocks:
-        start, end = Pose.goal(block), poses[block.order]
-        distance_m, angle_deg = end.distance_m(start), end.angle_deg(start)
-        if distance_m > MOVED_M or angle_deg > MOVED_DEG:
-            moved.append(block.order)
-        elif distance_m > still_m or angle_deg > still_deg:
-            return None
-    return tuple(moved)
+def _moved(blocks: Sequence[Block], poses: Mapping[int, Pose]) -> dict[int, bool | None]:
+    return {one.order: has_moved(Pose.goal(one), poses[one.order]) for one in blocks}
+
+
+def has_moved(start: Pose, end: Pose) -> bool | None:
+    """True if a block moved far, False if it stayed where it was, None where neither is clear."""
+    distance_m, angle_deg = end.distance_m(start), end.angle_deg(start)
+    if distance_m > _MOVED_M or angle_deg > _MOVED_DEG:
+        return True
+    return None if distance_m > _STILL_M or angle_deg > _STILL_DEG else False
 
 
 def _push(world: World, push: Push) -> None:

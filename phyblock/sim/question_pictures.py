@@ -311,7 +311,7 @@ def is_inside(recipe: QuestionPicture) -> bool:
 
 
 def block_mark(recipe: QuestionPicture, shot: Shot, order: int, letter: str) -> Mark | None:
-    """A mark in the middle of what shows of a block; None where less shows than its target needs."""
+    """A mark in the middle of what shows of a block; None where too little shows."""
     vertex = next(i for i, block in enumerate(recipe.blocks) if block.order == order)
     # The pixels that last longest as the mask is eaten from its edge.
     depth, last, left = 0, shot.block == vertex, shot.block == vertex

@@ -1,10 +1,8 @@
 """The rasterizer: triangles to pixels in numpy, with shadows, the same bytes on every machine.
 
-Colored meshes, a camera and a light in, pixels out; floor, outlines and smoothing are made in
-`phyblock.sim.pictures`. All triangles are scanned at once: each row of pixels that a triangle
-crosses is a span, each span a run of pixels. The nearest triangle of each pixel is kept by its
-nearness, a number that is linear over the screen (the inverse of depth for a camera; the height
-towards a light from far away).
+All triangles are scanned at once: each row of pixels that a triangle crosses is a span. The nearest
+triangle of each pixel is kept by its nearness, a number that is linear over the screen (the inverse
+of depth for a camera; the height towards a light from far away).
 """
 
 from __future__ import annotations
@@ -30,6 +28,7 @@ Rgb = tuple[int, int, int]
 """Red, green and blue, 0..255."""
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 _AT_ONCE = 1 << 16
 """Pixels that are worked on together: what they take of memory is used again and again."""
@@ -59,9 +58,8 @@ class Prop:
 class Light:
     """A light from far away: `direction` (3,) is the unit vector to it, in the world.
 
-    A face with the outward unit normal n has its mesh's color times
-    ambient + diffuse * max(0, n . direction), or times ambient where a mesh stands in the way of
-    the light.
+    A face with the normal n has its color times ambient + diffuse * max(0, n . direction), or times
+    ambient where a mesh stands in the way of the light.
     """
 
     direction: Floats
@@ -71,18 +69,16 @@ class Light:
 
 @dataclass(frozen=True, eq=False)
 class Raster:
-    """A drawing: `rgb` shape (size, size, 3), 0..255, row 0 on top.
+    """A drawing: `rgb` shape (size, size, 3), 0..255, row 0 on top; the others (size, size).
 
-    `prop` shape (size, size) is the place in the list of the prop that each pixel shows, -1 where
-    it shows none and its color does not matter. `face` shape (size, size) tells the faces of a
-    prop apart, by any numbers: outlines run between them. `shaded` shape (size, size) is where the
-    ground, the plane z = 0, lies in shadow, whatever stands before it.
+    `prop` is the place in the list of the prop that each pixel shows, or -1; `face` tells the faces
+    of a prop apart; `shaded` is where the ground lies in shadow, whatever stands before it.
     """
 
     rgb: NDArray[np.uint8]
     prop: Ints
     face: Ints
-    shaded: NDArray[np.bool_]
+    shaded: Bools
 
 
 def draw(props: Sequence[Prop], camera: Camera, light: Light, size_px: int) -> Raster:
@@ -100,7 +96,8 @@ def draw(props: Sequence[Prop], camera: Camera, light: Light, size_px: int) -> R
     triangle, nearness = _nearest(
         covering, screen.planes(front), size_px, screen.least, screen.most
     )
-    look = _Look(props, solid, front, screen, light)
+    colors = np.array([prop.rgb for prop in props], dtype=np.float64)
+    look = _Look(colors, solid, front, screen, light)
     prop, face = (np.full((size_px, size_px), NOTHING) for _ in range(2))
     pixels = np.flatnonzero(triangle != NOTHING)
     for start in range(0, len(pixels), _AT_ONCE):
@@ -115,12 +112,10 @@ def draw(props: Sequence[Prop], camera: Camera, light: Light, size_px: int) -> R
 
 @dataclass(frozen=True, eq=False)
 class _Solids:
-    """Triangles of all props in the world, n of them.
+    """Triangles of all props in the world, n of them, with their unit normals.
 
-    `corners_m` shape (n, 3, 3) [m]; `anchor_m` (n, 3) [m] a point of the plane that is the same
-    for all triangles of a flat face; `normals` (n, 3) of the triangles, unit; `bends` (n, 3, 3) of
-    the surface at their corners; `prop` (n,) the place of the prop in the list; `face` (n,) the
-    face's number within it.
+    `anchor_m` (n, 3) [m] is the same for all triangles of a flat face; `bends` (n, 3, 3) are the
+    normals of the surface at corners; `prop` and `face` (n,) the prop's place and the face in it.
     """
 
     corners_m: Floats
@@ -130,7 +125,7 @@ class _Solids:
     prop: Ints
     face: Ints
 
-    def __getitem__(self, chosen: NDArray[np.bool_]) -> _Solids:
+    def __getitem__(self, chosen: Bools) -> _Solids:
         """Some of the triangles."""
         return _Solids(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
@@ -187,14 +182,13 @@ class _CameraScreen:
         return self.linear(triangles.normals / away[:, None])
 
     def corners_px(self, corners_m: Floats) -> tuple[Floats, Ints]:
-        """Triangles (n, 3, 3) [m], cut at the least depth, on the screen (k, 3, 2), and their owners."""
+        """Triangles (n, 3, 3) [m] cut at the least depth, on screen (k, 3, 2), and their owners."""
         seen = turned(corners_m - self.camera.eye_m, self.camera.axes)
         whole = (seen[..., 2] >= _LEAST_DEPTH_M).all(axis=1)
         owner = np.flatnonzero(whole)
         kept, owners = [seen[whole]], [owner]
         for number in np.flatnonzero(~whole & (seen[..., 2] >= _LEAST_DEPTH_M).any(axis=1)):
-            parts = _cut(seen[number])
-            kept.append(parts)
+            kept.append(parts := _cut(seen[number]))
             owners.append(np.full(len(parts), number))
         points = np.concatenate(kept)
         middle = self.size_px / 2
@@ -301,14 +295,9 @@ class _Look:
     """Colors of the triangles in `front` of a camera, in a light that all of `solid` shades."""
 
     def __init__(
-        self,
-        props: Sequence[Prop],
-        solid: _Solids,
-        front: _Solids,
-        screen: _CameraScreen,
-        light: Light,
+        self, rgb: Floats, solid: _Solids, front: _Solids, screen: _CameraScreen, light: Light
     ) -> None:
-        self._rgb = np.array([prop.rgb for prop in props], dtype=np.float64)[front.prop]
+        self._rgb = rgb[front.prop]
         self._light, self._map = light, None
         # The cosine to the light is known at corners, and linear between them.
         cosines = dot(front.bends, light.direction)
@@ -357,11 +346,10 @@ def _gradient(corners_m: Floats, values: Floats) -> Floats:
 class _LightMap:
     """The picture from the light, `size_px` squared: shadows of props on props.
 
-    It shows, for each of its pixels, the face nearest to the light of those that look away from
-    it: where light leaves a solid. A point is in shadow when it lies behind that face's plane.
-    Faces that look to the light never shade themselves this way, so that no bias is needed, and
-    shadows touch what casts them (second-depth shadow mapping: Wang and Molnar 1994). Nearness is
-    the height towards the light [m]; `axes` are right, up, towards the light (world).
+    It shows the face nearest to the light of those that look away from it: a point is in shadow
+    behind that face's plane. Faces that look to the light never shade themselves this way, so that
+    no bias is needed (second-depth shadow mapping: Wang and Molnar 1994). Nearness is the height
+    towards the light [m]; `axes` are right, up, towards the light (world).
     """
 
     def __init__(self, solid: _Solids, direction: Floats, size_px: int) -> None:
@@ -420,16 +408,14 @@ class _LightMap:
         lit[mixed] = share
         return lit
 
-    def _is_before(
-        self, pixel: Ints, column: Floats, row: Floats, height: Floats
-    ) -> NDArray[np.bool_]:
+    def _is_before(self, pixel: Ints, column: Floats, row: Floats, height: Floats) -> Bools:
         """True for points on the light's side of the face that each pixel shows."""
         a, b, c = self._planes
         shown = self._shown[pixel]
         return height + _TOUCHING_M > a[shown] * column + (b[shown] * row + c[shown])
 
 
-def _ground_shadow(solid: _Solids, direction: Floats, screen: _CameraScreen) -> NDArray[np.bool_]:
+def _ground_shadow(solid: _Solids, direction: Floats, screen: _CameraScreen) -> Bools:
     """The pixels whose ground z = 0 lies in shadow, whatever stands before it, (size, size)."""
     size_px = screen.size_px
     inside = np.zeros((size_px, size_px), dtype=np.bool_)

@@ -51,15 +51,12 @@ from phyblock.sim.contact import bounds_m, boxes_near, support_graph, whole_boun
 from phyblock.sim.dynamics import groups
 from phyblock.sim.engine import Pose
 from phyblock.sim.outcomes import (
-    MOVED_DEG,
-    MOVED_M,
     OUTCOME_SETTINGS,
-    STILL_DEG,
-    STILL_M,
     Outcome,
     Push,
     after,
     after_removal,
+    has_moved,
 )
 from phyblock.sim.pictures import Shot
 from phyblock.sim.question_pictures import (
@@ -591,15 +588,14 @@ def _story(blocks: Sequence[Block], picture: QuestionPicture, push: Push) -> tup
         before = goal.get(block.order)
         if before is None or before.kind != block.kind:
             raise UnfairError(f"picture {label} shows a block that the scene has not")
-        start, end = Pose.goal(before), Pose.goal(block)
-        distance_m, angle_deg = end.distance_m(start), end.angle_deg(start)
+        has = has_moved(Pose.goal(before), Pose.goal(block))
         x, y, z = (b - a for a, b in zip(before.position_m, block.position_m, strict=True))
-        if distance_m > MOVED_M or angle_deg > MOVED_DEG:
+        if has:
             moved.append(block.order)
             if _LEVEL_M < abs(z) < _DOWN_M:
                 raise UnfairError(f"picture {label} shows a block hardly lower than before")
             down += [block.order] if -z >= _DOWN_M else []
-        elif distance_m > STILL_M or angle_deg > STILL_DEG:
+        elif has is None:
             raise UnfairError(f"picture {label} shows block {block.order} hardly moved")
         along += [block.order] if x * push.direction[0] + y * push.direction[1] > _ALONG_M else []
     gone = set(goal) - {block.order for block in picture.blocks}
