@@ -113,6 +113,8 @@ def main() -> None:
         has_values = any(re.search(r"=|,$", word) for word in sys.argv[1:])
         if has_values and "unexpected extra argument" in error.format_message():
             click.echo(f"Hint: {QUOTE_HINT}", err=True)
+        if isinstance(error, click.NoSuchOption):
+            _hint_at_field(error.option_name.lstrip("-").replace("-", "_"))
         sys.exit(2)
     except click.Abort:
         click.echo("Interrupted.", err=True)
@@ -133,6 +135,15 @@ def main() -> None:
         show_problems(StoreError(Problem(where, f"cannot be used: {reason_of(error)}")))
         sys.exit(2)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _hint_at_field(name: str) -> None:
+    """Say how a field of suites is set, where what was taken for an option is one."""
+    from phyblock.config.suite import Suite
+
+    if (field := Suite.model_fields.get(name)) is not None:
+        value = "[...]" if "tuple" in str(field.annotation) else "..."
+        click.echo(f"Hint: --set '{name}={value}' sets a field of the suite", err=True)
 
 
 def _drop_output() -> None:
