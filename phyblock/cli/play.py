@@ -60,6 +60,7 @@ _LARGEST_CONSENT_BYTES = 64 * 1024
     "--out", type=UserPath(), metavar="DIR", help="Folder. [default: results/SUITE-DIGEST]"
 )
 @click.option("--port", type=click.IntRange(0, 65535), default=0, help="[default: any free one]")
+@click.option("--exact", is_flag=True, help="Show the models' prompt unfolded, as for a study.")
 @click.option("--no-browser", is_flag=True, help="Print the address and open nothing.")
 def play(
     suite: str,
@@ -71,6 +72,7 @@ def play(
     beside: tuple[Path, ...],
     out: Path | None,
     port: int,
+    exact: bool,
     no_browser: bool,
 ) -> int:
     """Answer SUITE yourself, in a browser: what a model is sent, with a click for a word.
@@ -79,7 +81,7 @@ def play(
     where it stopped.
     """
     text = default_consent() if consent is None else _consent(consent)
-    person = Person(name, number, text)
+    person = Person(name, number, text, exact)
     path = find_suite(suite)
     data, prompts = bundled("benchmarks", "data"), prompt_dirs(path)
     loaded = load_suite(path, sets, data_dir=data, prompt_dirs=prompts)

@@ -264,7 +264,7 @@ class Picking:
 
     From `least` to `most` of them, each as often as one likes where `repeats`; `noun` is what one
     pick is called. `fields` are the numbers that go with each. `write` makes the reply, in the form
-    that the prompt asks for.
+    that the prompt asks for. `task` says in one line what to do.
     """
 
     choices: tuple[Choice, ...]
@@ -274,6 +274,7 @@ class Picking:
     noun: str
     write: Callable[[Sequence[Pick]], str]
     fields: tuple[NumberField, ...] = ()
+    task: str = ""
 
     def without_cells(self) -> Picking:
         """Return the same with choices that are not looked for in grids."""

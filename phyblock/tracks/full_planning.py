@@ -194,6 +194,7 @@ def pick_plan(subject: PlanSubject) -> Picking:
         repeats=True,
         noun="step",
         write=lambda picks: plan_text(pick.place + 1 for pick in picks),
+        task="Pick the blocks that build the goal, each once all it rests on is there.",
     )
 
 

@@ -238,7 +238,8 @@ def pick_answer(subject: ChoiceSubject) -> Picking:
     )
     noun = "place" if is_ordering else "option"
     write = lambda picks: choice_text([pick.place for pick in picks])  # noqa: E731
-    return Picking(choices, least=picked, most=picked, repeats=False, noun=noun, write=write)
+    task = subject.question.text
+    return Picking(choices, picked, picked, repeats=False, noun=noun, write=write, task=task)
 
 
 @dataclass(frozen=True)

@@ -348,7 +348,8 @@ def pick_step(subject: StepSubject) -> Picking:
         return step_text(pick.place + 1 if pick.place < n_candidates else None)
 
     choices = (*candidate_choices(n_candidates), Choice("Done", "the goal is complete"))
-    return Picking(choices, least=1, most=1, repeats=False, noun="step", write=write)
+    task = "Pick the next block to place, or Done when the goal is complete."
+    return Picking(choices, least=1, most=1, repeats=False, noun="step", write=write, task=task)
 
 
 _FORMAT: Mapping[str, str] = {

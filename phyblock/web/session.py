@@ -73,12 +73,14 @@ def arranged(items: Sequence[_ItemT], row: int) -> tuple[_ItemT, ...]:
 @dataclass(frozen=True)
 class Person:
     """A person who answers: a short name, the number in the study if there is one, and the text
-    that is agreed to first. Raises SpecError for a name with other characters than stated.
+    that is agreed to first. One who `is_exact` reads the prompt of models, as studies may want.
+    Raises SpecError for a name with other characters than stated.
     """
 
     name: str
     number: int | None
     consent: str
+    is_exact: bool = False
 
     def __post_init__(self) -> None:
         if not _NAME.fullmatch(self.name):
@@ -107,6 +109,8 @@ class Person:
         params: dict[str, JsonValue] = {"consent": self.consent_sha256}
         if self.number is not None:
             params["number"] = self.number
+        if self.is_exact:
+            params["exact"] = True
         return ModelConfig(name=self.model, extra_body=params, max_concurrency=1)
 
 
@@ -221,7 +225,7 @@ def shown(
             for message in request.messages
         ],
         "choices": choices,
-        **{name: getattr(picking, name) for name in ("least", "most", "repeats", "noun")},
+        **{name: getattr(picking, name) for name in ("least", "most", "repeats", "noun", "task")},
         "fields": [asdict(field) for field in picking.fields],
     }
 
@@ -257,6 +261,7 @@ class PlaySession:
         self._phase: Phase = "waiting"
         self._asked: _Asked | None = None
         self._about: Mapping[str, Any] = {}
+        self._is_exact = False
         self._results: Mapping[str, Any] | None = None
 
     async def run(
@@ -266,6 +271,8 @@ class PlaySession:
 
         `begun` is called when the run is open and the page can be shown. Raises what the run meets.
         """
+
+        self._is_exact = person.is_exact
 
         def watch(event: RunEvent) -> None:
             if isinstance(event, RunStarted):
@@ -330,7 +337,7 @@ class PlaySession:
                 count = len(pictures_of(asked.request))
                 addresses = [f"picture/{self._number}/{n}" for n in range(count)]
                 told["question"] = shown(asked.request, asked.picking, asked.place, addresses)
-                told["elapsed_s"] = asked.seen_s(now_s)
+                told |= {"elapsed_s": asked.seen_s(now_s), "exact": self._is_exact}
             return told
 
     def picture(self, change: int, number: int) -> Image | None:

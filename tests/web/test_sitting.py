@@ -291,13 +291,15 @@ def fits_the_phone(page: Page) -> None:
 
 
 def sent_to(page: Page) -> list[object]:
-    """Texts that are shown, and digests of the bytes of the pictures."""
+    """Texts of the prompt, which is one click away, and digests of the bytes of the pictures."""
     digest = """async image => {
         const bytes = await (await fetch(image.src)).arrayBuffer();
         const sum = new Uint8Array(await crypto.subtle.digest("SHA-256", bytes));
         return [...sum].map(one => one.toString(16).padStart(2, "0")).join("");
     }"""
-    texts = page.locator(".message .text").evaluate_all("all => all.map(one => one.textContent)")
+    page.get_by_text("The model's exact prompt").click()
+    shown = page.locator(".exact .text").all_inner_texts()
+    texts = [text for text in shown if not text.startswith("[picture: ")]
     pictures = {image.evaluate(digest) for image in page.locator("figure img").all()}
     return [*texts, *pictures]
 

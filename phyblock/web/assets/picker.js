@@ -4,8 +4,9 @@
 const Picker = (() => {
   const MOST_BUTTONS = 6;
 
-  /** Show `question` in `main`; `submit` takes the answer. What is given back takes keys. */
-  function show(main, question, submit) {
+  /** Show `question` in `main`; `submit` takes the answer. What is given back takes keys. `isExact`
+      shows the prompt of the model from the start. */
+  function show(main, question, submit, isExact = false) {
     const key = `${location.pathname} ${question.number} ${question.turn}`;
     const isOne = question.most === 1;
     const hasFields = question.fields.length > 0;
@@ -38,28 +39,27 @@ const Picker = (() => {
       el("div", { class: "acts" }, isOne ? null : [undo, clear], done),
     );
     main.classList.toggle("with-fields", hasFields);
+    const prompt = el("details", { class: "exact", open: isExact ? true : null },
+      el("summary", {}, "The model's exact prompt"), question.messages.map(text));
     main.replaceChildren(
-      el("h1", { class: "unseen" }, `Question ${question.number} of ${question.of}`),
-      el("div", { class: "asked" }, question.messages.map(message)),
-      answer,
+      el("h1", { class: "task" }, el("span", { class: "unseen" }, `Question ${question.number} of ${question.of}: `), question.task),
+      el("div", { class: "task-columns" },
+        el("div", { class: "asked" }, el("div", { class: "message" }, question.messages.map(figures))),
+        el("div", { class: "side" }, answer, prompt)),
     );
     repaint("");
     return onKey;
 
-    function message(one) {
-      const isText = (part) => part && part.text !== undefined;
-      const made = [];
-      one.parts.forEach((part, n) => {
-        const next = one.parts[n + 1];
-        if (isText(part)) {
-          // What stands before a picture is its caption.
-          if (!next || isText(next)) made.push(el("p", { class: "text" }, part.text));
-          return;
-        }
-        const before = isText(one.parts[n - 1]) ? one.parts[n - 1].text : "";
-        made.push(figure(part, before));
-      });
-      return el("div", { class: `message ${one.role}` }, made);
+    /** The pictures of a message; what stands before one is its caption. */
+    function figures(one) {
+      return one.parts.flatMap((part, n) => (part.text !== undefined ? []
+        : [figure(part, one.parts[n - 1]?.text ?? "")]));
+    }
+
+    /** The texts of a message as they are sent, with a word for each picture. */
+    function text(one) {
+      return el("div", { class: `sent ${one.role}` }, el("p", { class: "muted" }, one.role),
+        one.parts.map((part) => el("p", { class: "text" }, part.text !== undefined ? part.text : `[picture: ${part.label}]`)));
     }
 
     function figure(part, caption) {

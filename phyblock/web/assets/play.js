@@ -33,7 +33,7 @@
           about.consent.split(/\n{2,}/).map((text) => el("p", {}, text))),
         el("h2", {}, "How it works"),
         el("ul", {},
-          el("li", {}, "You see what models are sent: the same pictures and the same text. The text asks for a written form; here you click instead, and the form is written for you."),
+          el("li", {}, "You see the pictures that models are sent. Their exact prompt is one click away; it asks for a written form, which is written for you from your clicks."),
           el("li", {}, "Click a numbered block or an option to pick it. Where places are asked for as well, type the numbers. All can be undone until you submit; then it is kept, and the next task comes."),
           el("li", {}, "Without a mouse: type the number or letter (Enter where a longer number might follow), Backspace takes back, Ctrl+Enter submits."),
           el("li", {}, "The time you take is written down. Pause stops it and hides the task.")),
@@ -47,7 +47,7 @@
       const { question } = state;
       progress.textContent = `Task ${question.number} of ${question.of}`;
       shown.since = performance.now() - 1000 * state.elapsed_s;
-      shown.keys = Picker.show(main, question, (answer) => submit(state.change, answer));
+      shown.keys = Picker.show(main, question, (answer) => submit(state.change, answer), state.exact);
       if (shown.notice) main.prepend(el("p", { class: "notice", role: "alert" }, shown.notice));
       if (shown.number !== question.number) scrollTo(0, 0);
       shown.number = question.number;
