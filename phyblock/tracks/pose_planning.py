@@ -764,7 +764,7 @@ def pick_poses(subject: PoseSubject) -> Picking:
         noun="step",
         write=lambda picks: written(map(step, picks)),
         fields=tuple(fields),
-        task="Pick the blocks that build the goal, in order, and say where the center of each goes.",
+        task="Pick the blocks that build the goal, in order, and say where the center of each is.",
     )
 
 
