@@ -204,7 +204,12 @@ def _page(written: TablesWritten, sources: Sources, build: str) -> str:
     }
     about = design.suite.description
     one = (SiteRun(str(run.path), run, sources),)
-    board = board_of(one, entries_of(one), all_values(one))
+    parts = [
+        name
+        for track in design.suite.tracks
+        for name in (*kind_of(track).report().part_names, *_part_groups(run, track))
+    ]
+    board = {**board_of(one, entries_of(one), all_values(one)), "parts": parts}
     spans = partial(groupby, key=lambda column: column.group)
     return fill(
         "report.html.j2",

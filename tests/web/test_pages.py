@@ -114,6 +114,12 @@ def test_results_say_what_was_found_and_lead_to_samples(visit: ReportVisit) -> N
     plans.locator(".more summary").click()
     plans.get_by_role("button", name="Level 3").first.click()
     assert plans.locator(".board th[aria-sort=descending]").first.inner_text().startswith("Level 3")
+    plans.locator(".board tbody tr", has_text="oracle").get_by_role("link").nth(4).click()
+    page.wait_for_selector("#list [role=option]")
+    assert visit.hash.startswith("samples?track=full_planning")
+    assert "&level=3" in visit.hash
+    assert visit.count() == "4 samples"
+    visit.open("results")
     plans.locator(".stack a[title^='random, Shape']").click()
     page.wait_for_selector("#list [role=option]")
     assert "error=shape_not_in_gt" in visit.hash

@@ -1,5 +1,6 @@
 /* What a ranking is shown by, on the site and in a report: bars, levels, errors, failures, all numbers.
-   `to` gives addresses: `model(row)`, `error(row, name)`, `sample(sample)`. */
+   `to` gives addresses: `model(row)`, `error(row, name)`, and `part(row, cell)` where a number leads to
+   its samples. */
 "use strict";
 
 const Ranking = (() => {
@@ -181,7 +182,7 @@ const Ranking = (() => {
         el("th", { scope: "row", class: "text name" }, link(to.model(row), row.name), isModel(row) ? null : el("small", {}, "baseline")),
         columns.map((column) => {
           const { text: shown, below, isText } = column.cell(row);
-          return el("td", { class: [column.id === main?.id && "main", isText && "text"].filter(Boolean).join(" ") || null }, shown, below ? el("small", {}, below) : null);
+          return el("td", { class: [column.id === main?.id && "main", isText && "text"].filter(Boolean).join(" ") || null }, to.part && column.part && shown !== DASH ? link(to.part(row, column.part), shown) : shown, below ? el("small", {}, below) : null);
         }))))));
     return made;
   }

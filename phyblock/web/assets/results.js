@@ -15,7 +15,7 @@ const Results = (() => {
       const to = {
         model: (row) => address({ ...words, model: row.name }),
         error: (row, name) => address({ ...words, model: row.name, error: name }),
-        cell: (row, column) => address({ ...words, model: row.name, ...partOf(column) }),
+        part: (row, cell) => address({ ...words, model: row.name, ...partOf(data, cell) }),
       };
       document.getElementById(`ranking-${track.name}`).replaceChildren(...[
         el("ul", { class: "sentences" }, sentences(data, track, main).map((sentence, i) => el("li", { class: i === 0 ? "finding" : "" }, sentence))),
@@ -27,7 +27,8 @@ const Results = (() => {
     }
   }
 
-  const partOf = ({ cell }) => (/^\d$/.test(cell || "") ? { level: cell } : /^[A-Z]{2}$/.test(cell || "") ? { subtask: cell } : {});
+  /** The filter that a cell of the tables stands for: a level, a subtask or a group of them. */
+  const partOf = (data, cell) => (/^\d$/.test(cell) ? { level: cell } : data.parts.includes(cell) ? { subtask: cell } : {});
 
   /** Which model is best, how the models stand to a rule that never sees the goal, which error is most frequent. */
   function sentences(data, track, main) {

@@ -28,7 +28,7 @@ const Table = (() => {
   function valueColumn(column, track) {
     const share = column.unit ? `${column.unit === "%" ? "%" : column.unit}` : "";
     return {
-      id: column.id, heading: column.heading, 
+      id: column.id, heading: column.heading, part: column.cell, 
       about: [track.title, column.setting && `setting ${column.setting}`, share && `in ${share}`].filter(Boolean).join(", "),
       isMain: column.heading === track.main, better: column.better,
       value: (row) => (row.values[column.id] ? row.values[column.id][0] : null),
