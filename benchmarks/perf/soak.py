@@ -62,7 +62,7 @@ def make_run(folder: Path, samples: int) -> Path:
     for number, task in enumerate(tasks):
         steps = [1 + (number + step) % len(task.candidates) for step in range(len(task.scene))]
         text = "\n".join(f"Step{n}: Move block with index {i}" for n, i in enumerate(steps, 1))
-        (replies / f"{task.key}.json").write_text(json.dumps(5 * _REMARK + text))
+        (replies / f"{task.key}.json").write_text(json.dumps({"text": 5 * _REMARK + text}))
     (folder / "models.yaml").write_text(yaml.safe_dump({"recorded-model": {"replay": "replies"}}))
     seeds = list(range(-(-samples // len(tasks))))
     write_suite(folder / "once.yaml", seeds[:1])

@@ -194,13 +194,13 @@ class Comparable:
         for name, value in wanted.items():
             if value:
                 used &= rows.about[name].isin(["", value]).to_numpy()
-        about = rows.about[used]
+        about, counts = rows.about[used], rows.counts[used].to_numpy(np.float64)
         records = rows.run.records.iloc[about["place"]]
         table = records[["model", "scene", "seed", "variant"]].reset_index(drop=True)
         cell = masks[:, used].argmax(axis=0)
         table = table.assign(item=about["item"].to_numpy(), cell=cell, heard=rows.replied[used])
         heard = table.groupby(["model", "cell"])["heard"].transform("any").to_numpy(bool)
-        return table[heard], rows.counts[used][heard]
+        return table[heard], np.nan_to_num(counts[heard])
 
     def values(self, run: Run, part: Part, design: Design) -> Iterator[tuple[str, pd.Series]]:
         """Return the value of each sample in the measure's unit, by model; by scene, item, seed and

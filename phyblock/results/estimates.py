@@ -39,25 +39,27 @@ ESTIMATE_COLUMNS = (
 class Rows:
     """Counts of samples, a row a sample and way of counting it.
 
-    `counts` has shape (rows, columns of the counts). `about` has, by row, the place of its record
+    `counts` has the columns of the counts. `about` has, by row, the place of its record
     among the records of the run, its item, and the columns of `SCORED_BY`. `cells` says by pooled
     cell which rows are in it; a row may be in several.
     """
 
     run: Run
     about: pd.DataFrame
-    counts: Floats
+    counts: pd.DataFrame
     cells: Mapping[str, NDArray[np.bool_]]
 
-    def codes(self, *names: str) -> tuple[NDArray[np.intp], list[tuple[str, ...]]]:
-        """Return the number of each row's values in these columns among `values`, sorted."""
-        codes = np.zeros(len(self.about), dtype=np.intp)
+    def codes(
+        self, of: NDArray[np.intp], *names: str
+    ) -> tuple[NDArray[np.intp], list[tuple[str, ...]]]:
+        """Return numbers of the values of these rows in some columns, and the values, sorted."""
+        codes = np.zeros(len(of), dtype=np.intp)
         values: list[tuple[str, ...]] = [()]
         for name in names:
             is_own = name in SCORED_BY
             column = (self.about if is_own else self.run.records)[name].astype("category")
             own = column.cat.codes.to_numpy(np.intp)
-            own = own if is_own else own[self.about["place"].to_numpy()]
+            own = own[of if is_own else self.about["place"].to_numpy()[of]]
             known = list(column.cat.categories)
             numbers, codes = np.unique(codes * len(known) + own, return_inverse=True)
             codes = codes.reshape(-1)
@@ -81,12 +83,10 @@ def counted_rows(run: Run, track: str, counted: SampleCounts) -> Rows:
     items = table["item"] if "item" in table else run.records["item"].to_numpy()[places]
     ways = {name: np.asarray(table[name]) if name in table else "" for name in SCORED_BY}
     about = pd.DataFrame({"place": places, "item": np.asarray(items), **ways})
-    counts = table[list(counted.columns)].to_numpy(np.float64)
+    counts = table[list(counted.columns)]
     everything = np.ones(len(table), dtype=bool)
     cells = {cell.name: everything for cell in counted.cells}
-    return Rows(
-        run, about, np.nan_to_num(counts), cells or kind_of(track).report().in_cells(table, run)
-    )
+    return Rows(run, about, counts, cells or kind_of(track).report().in_cells(table, run))
 
 
 def _stored(run: Run, track: str, counted: SampleCounts) -> pd.DataFrame:
@@ -170,38 +170,40 @@ class _Pool:
     def of(cls, rows: Rows, cells: Sequence[Cell], parents: Mapping[str, tuple[str, ...]]) -> _Pool:
         """Pool rows in those of the cells that are no means of others."""
         pooled = [cell.name for cell in cells if not cell.of]
-        masks = [rows.cells[name] for name in pooled]
-        used = np.logical_or.reduce(masks)
-        rows = Rows(rows.run, pd.DataFrame(rows.about[used]), rows.counts[used], {})
-        masks = [mask[used] for mask in masks]
-        group, groups = rows.codes("model", *SCORED_BY)
-        model, models = rows.codes("model")
-        scene, scenes = rows.codes("scene")
-        seed, seeds = rows.codes("seed")
-        counts, n_rows = _summed(rows.counts, masks, (scene, group), (len(scenes), len(groups)))
-        of_seeds, in_seed = _summed(rows.counts, masks, (seed, group), (len(seeds), len(groups)))
+        used = np.flatnonzero(np.logical_or.reduce([rows.cells[name] for name in pooled]))
+        masks = [rows.cells[name][used] for name in pooled]
+        columns = [
+            np.nan_to_num(column.to_numpy(np.float64, na_value=np.nan)[used])
+            for _, column in rows.counts.items()
+        ]
+        group, groups = rows.codes(used, "model", *SCORED_BY)
+        model, models = rows.codes(used, "model")
+        scene, scenes = rows.codes(used, "scene")
+        seed, seeds = rows.codes(used, "seed")
+        counts, n_rows = _summed(columns, masks, (scene, group), (len(scenes), len(groups)))
+        of_seeds, in_seed = _summed(columns, masks, (seed, group), (len(seeds), len(groups)))
         of_seeds[in_seed == 0] = np.nan
-        heard = _summed(rows.replied[:, None] * 1.0, masks, (model,), (len(models),))[0][..., 0]
+        heard = _summed([rows.replied[used]], masks, (model,), (len(models),))[0][..., 0]
         silent = heard[[models.index(one[:1]) for one in groups]] == 0
         clusters = Clusters.of([parents[name] for (name,) in scenes])
         return cls(groups, pooled, counts, n_rows, of_seeds, silent, clusters)
 
 
 def _summed(
-    values: NDArray[Any],
+    columns: Sequence[NDArray[Any]],
     masks: Sequence[NDArray[np.bool_]],
     codes: Sequence[NDArray[np.intp]],
     shape: tuple[int, ...],
 ) -> tuple[Floats, NDArray[np.intp]]:
-    """Sums of values by codes and masks, (*shape, masks, columns), and of how many rows."""
+    """Sums of columns by codes and masks, (*shape, masks, columns), and of how many rows."""
     size = int(np.prod(shape))
-    sums = np.zeros((size, len(masks), values.shape[1]))
+    sums = np.zeros((size, len(masks), len(columns)))
     rows = np.zeros((size, len(masks)), dtype=np.intp)
     flat = np.ravel_multi_index(tuple(codes), shape) if size else np.zeros(0, dtype=np.intp)
     for place, mask in enumerate(masks):
         rows[:, place] = np.bincount(flat[mask], minlength=size)
-        for column in range(values.shape[1]):
-            sums[:, place, column] = np.bincount(flat[mask], values[mask, column], size)
+        for n, column in enumerate(columns):
+            sums[:, place, n] = np.bincount(flat[mask], column[mask], size)
     return sums.reshape(*shape, *sums.shape[1:]), rows.reshape(*shape, len(masks))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -46,10 +47,10 @@ _TYPES = {
     **dict.fromkeys(TOKENS, "Int64"),
     "paid_usd": "float64",
     **{f"error_{name}": kind for name, kind in _OF_ERROR.items()},
-    **{"rule": "object", "start": "int64"},
+    **{"rule": "object", "shown": "object", "start": "int64"},
 }
-"""Columns that records of all tracks have; each track adds its own. `start` is where the record
-begins in `records.jsonl` [bytes]."""
+"""Columns that records of all tracks have; each track adds its own. `shown` is the presentation of
+the scene as JSON, `start` where the record begins in `records.jsonl` [bytes]."""
 _LABELS = ("criterion", "matcher", "setting")
 _BLOCKS = tuple(f"blocks_{name}" for name in BLOCK_OUTCOMES)
 _COUNTS = ("tp", "fp", "fn", *ERROR_TYPES, *_BLOCKS, *Score.FURTHER)
@@ -80,6 +81,7 @@ class _Reader:
             "paid_usd": reply and record.paid_usd,
             **{f"error_{name}": getattr(error, name, None) for name in _OF_ERROR},
             "rule": None if rule is None else str(rule),
+            "shown": record.shown and json.dumps(record.shown.fields(), sort_keys=True),
             "start": start,
             **record.row(),
         }
@@ -345,9 +347,10 @@ class Run:
         rows = self.records[(self.records["track"] == track) & ~is_left_out]
         return rows.assign(row=rows.index)
 
-    def scored(self, track: str) -> pd.DataFrame:
-        """Return the scores of the samples of a track that count."""
-        return self.scores[self.scores["row"].isin(self.counted(track).index)]
+    def scored(self, track: str, counts: Sequence[str]) -> pd.DataFrame:
+        """Return these counts of the scores of a track's samples that count."""
+        rows = self.scores["row"].isin(self.counted(track).index)
+        return self.scores.loc[rows, ["row", *_LABELS, *counts]]
 
     def level_cells(self) -> tuple[Cell, ...]:
         """Return the levels of the suite as cells, then all scenes together."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from phyblock.errors import DataError, Problem, SpecError
 from phyblock.parsing.plan import ParsedPlan, parse_plan, plan_form, reader_version
 from phyblock.parsing.structured import AnswerForm
 from phyblock.records.line import Line
-from phyblock.records.record import Record, ShownScene
+from phyblock.records.record import Record
 from phyblock.resources import bundled
 from phyblock.scoring.counts import Floats, ratio_of
 from phyblock.scoring.plan import AssemblyScorer, Score
@@ -55,24 +55,6 @@ class PlanParse(Line):
     """True where the text breaks off within the plan."""
 
 
-PLAN_COLUMNS = dict.fromkeys(("parser", "plan", "file_plan", "dropped", "shown"), "object")
-
-
-def plan_row(parse: PlanParse | None, shown: ShownScene | None) -> Mapping[str, Any]:
-    """Return the values of `PLAN_COLUMNS`; `shown` is None for candidates as in the file."""
-    order = None if shown is None else shown.fields()
-    if parse is None:
-        return {**dict.fromkeys(PLAN_COLUMNS), "shown": order}
-    in_file = parse.plan if parse.file_plan is None else parse.file_plan
-    return {
-        "parser": parse.parser,
-        "plan": list(parse.plan),
-        "file_plan": list(in_file),
-        "dropped": list(parse.dropped),
-        "shown": order,
-    }
-
-
 class PlanRecord(Record):
     """A plan for a scene."""
 
@@ -80,12 +62,6 @@ class PlanRecord(Record):
     """`full_planning`."""
     parse: PlanParse | None = None
     """The plan that was read."""
-
-    columns: ClassVar[Mapping[str, str]] = PLAN_COLUMNS
-
-    def row(self) -> Mapping[str, Any]:
-        """Return the plan in both numberings, and by which parser it was read."""
-        return plan_row(self.parse, self.shown)
 
 
 def score_fields(score: Score) -> dict[str, Any]:

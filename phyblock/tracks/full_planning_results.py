@@ -68,7 +68,7 @@ _SUPPORTS = ("blocks_support_not_named", "blocks_support_turned", "blocks_suppor
 
 def _steps(run: Run) -> pd.DataFrame:
     """Under `membership` steps count over again, so that no plan has a value of its own."""
-    rows = run.scored(NAME)
+    rows = run.scored(NAME, ("tp", "fp", "fn"))
     alone = rows["criterion"] != "membership"
     whole = alone & (rows["fp"] == 0) & (rows["fn"] == 0)
     f1 = np.nan_to_num(f1_of(rows[["tp", "fp", "fn"]].to_numpy(np.float64)))
@@ -76,14 +76,15 @@ def _steps(run: Run) -> pd.DataFrame:
 
 
 def _wrong_steps(run: Run) -> pd.DataFrame:
-    rows = run.scored(NAME)
+    rows = run.scored(NAME, ERROR_TYPES)
     rows = rows[rows["criterion"] == "aov"]
     return rows.assign(wrong=rows[list(ERROR_TYPES)].sum(axis=1))
 
 
 def _in_order(run: Run) -> pd.DataFrame:
     """Plans whose order counts; those that an earlier version scored are left out."""
-    rows = run.scored(NAME)
+    outcomes = [f"blocks_{name}" for name in BLOCK_OUTCOMES]
+    rows = run.scored(NAME, ("tp", "fp", "fn", "kept", *outcomes))
     rows = rows[(rows["criterion"] == "aov") & rows["kept"].notna()]
     blocks, steps = rows["tp"] + rows["fn"], rows["tp"] + rows["fp"]
     distance = 1 - 2 * rows["kept"].astype("float64") / (blocks + steps)

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field
@@ -74,7 +74,7 @@ from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_s
 from phyblock.stable import plain_sum
 from phyblock.tracks.base import CARRYING, Opening, SceneTrack, SingleTrack, engine_identity
 from phyblock.tracks.baselines import NumberField, Pick, Picking, candidate_choices
-from phyblock.tracks.full_planning import PLAN_COLUMNS, PlanParse, plan_row, score_fields
+from phyblock.tracks.full_planning import PlanParse, score_fields
 from phyblock.tracks.items import ShownTask, file_plan
 from phyblock.tracks.measures import ListedScore, Listing, SampleCounts
 from phyblock.tracks.pictures import Drawing, Pictures, Workshop, goal_of, picture_style
@@ -270,12 +270,6 @@ class PoseRecord(Record):
     """The plan that was read."""
     pose: PoseOutcome | None = None
     """What it is worth."""
-
-    columns: ClassVar[Mapping[str, str]] = PLAN_COLUMNS
-
-    def row(self) -> Mapping[str, Any]:
-        """The plan in both numberings."""
-        return plan_row(self.parse, self.shown)
 
     def course(self, matcher: str) -> Course | None:
         """Return what was wrong with each step, and how many goal blocks were not reached."""

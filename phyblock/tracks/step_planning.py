@@ -28,7 +28,7 @@ from phyblock.sim.pictures import PictureStyle, goal_style
 from phyblock.sim.question_pictures import question_key, question_png, state_picture
 from phyblock.tracks.base import EpisodeTrack, Opening, SceneTrack, engine_identity
 from phyblock.tracks.baselines import Choice, Pick, Picking, candidate_choices
-from phyblock.tracks.full_planning import PLAN_COLUMNS, POSE_COUNTS, PlanParse, plan_row
+from phyblock.tracks.full_planning import POSE_COUNTS, PlanParse
 from phyblock.tracks.goal_blind import BlindGuesses
 from phyblock.tracks.items import file_plan
 from phyblock.tracks.pictures import Drawing, ScenePictures, outlined
@@ -153,18 +153,11 @@ class EpisodeRecord(Record):
     turns: tuple[EpisodeTurn, ...] = ()
     """Every request, with its reply and what came of it."""
 
-    columns: ClassVar[Mapping[str, str]] = {
-        **PLAN_COLUMNS,
-        "ending": "object",
-        "max_steps": "Int64",
-        "outcomes": "object",
-        "progress": "object",
-    }
+    columns: ClassVar[Mapping[str, str]] = {"ending": "object", "outcomes": "object"}
 
     def row(self) -> Mapping[str, Any]:
-        """The moves that were attempted, as a plan, and how the episode went."""
-        went = ("ending", "max_steps", "outcomes", "progress")
-        return {**plan_row(self.parse, self.shown), **{name: getattr(self, name) for name in went}}
+        """How the episode went."""
+        return {"ending": self.ending, "outcomes": tuple(self.outcomes)}
 
     exported: ClassVar[Mapping[str, str]] = {"ending": "string"}
 

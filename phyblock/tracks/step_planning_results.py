@@ -68,7 +68,7 @@ OUTCOME_NAMES = {
 
 
 def _moves(run: Run) -> pd.DataFrame:
-    return run.scored(NAME)
+    return run.scored(NAME, ("tp", "fp", "fn"))
 
 
 def _episodes(run: Run) -> pd.DataFrame:

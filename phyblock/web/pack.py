@@ -521,9 +521,8 @@ def _tasks_shown(run: Run, tasks: Mapping[str, AssemblyTask]) -> Iterator[Assemb
     form in which they were shown.
     """
     asked = run.records[run.records["item"] == run.records["scene"]]
-    forms = asked["shown"].map(json.dumps)
-    for scene, form in dict.fromkeys(zip(asked["scene"], forms, strict=True)):
-        task, shown = tasks.get(scene), json.loads(form)
+    for scene, form in dict.fromkeys(zip(asked["scene"], asked["shown"], strict=True)):
+        task, shown = tasks.get(scene), json.loads(form or "null")
         if task is not None and shown:
             yield in_order(task, shown["order"], tasks.get(shown["goal"]))
         elif task is not None:

@@ -41,7 +41,6 @@ def test_records_have_one_row_a_sample_and_scores_one_a_score(tmp_path: Path) ->
     assert first["levels"] == (2,)
     assert first["prompt_tokens"] == 7
     assert first["cost_usd"] == 0.25
-    assert first["plan"] == [1]
     failed = run.records.iloc[1]
     assert (failed["error_kind"], failed["error_status"]) == ("retryable", 429)
     assert pd.isna(failed["attempts"])
