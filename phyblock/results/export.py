@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import base64
-import contextlib
 import csv
 import json
 from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -50,19 +48,41 @@ _TYPES_OF_COUNTS = {"tp_": "Int64", "fp_": "Int64", "fn_": "Int64", "count_": "F
 """Types of columns by the beginning of their names."""
 
 
+def export_frame(run: Run) -> pd.DataFrame:
+    """Return one row a sample: what was asked, of whom, the reply, what was read, and the counts.
+
+    Counts are `tp_<setting>`, `fp_<setting>`, `fn_<setting>` of the headline matcher, all levels
+    by the `aov` criterion (of episodes: over placed blocks); `count_<name>_<column>` are those of
+    other measures. Columns have the same types whatever the rows are; what a track does not have
+    is missing. `levels`, `parents` and `plan` are lists.
+    """
+    rows, known = list(_rows(run)), _TYPES | _track_columns()
+    data = {}
+    for name in rows[0] if rows else ():
+        counts = (kind for begin, kind in _TYPES_OF_COUNTS.items() if name.startswith(begin))
+        kind = known.get(name) or next(counts, "string")
+        data[name] = pd.Series([row[name] for row in rows], dtype=kind)
+    return pd.DataFrame(data)
+
+
+def _track_columns() -> dict[str, str]:
+    """Columns that tracks add, with their types in pandas."""
+    return {name: kind for record in record_types() for name, kind in record.exported.items()}
+
+
 def _rows(run: Run) -> Iterator[dict[str, Any]]:
-    """The rows of `export_frame`."""
-    prompts, suite = read_prompts(run.path), run.design.suite
-    order = {name: place for place, name in enumerate(run.design.model_names)}
+    """Rows of `export_frame`, by track and model."""
+    prompts = read_prompts(run.path)
+    place = {name: n for n, name in enumerate(run.design.model_names)}
     newest = sorted(
-        read_records(run.path), key=lambda r: (r.track, order.get(r.model, len(order)), r.sample)
+        read_records(run.path), key=lambda r: (r.track, place.get(r.model, len(place)), r.sample)
     )
     for record in newest:
         reply, error = record.reply, record.error
         plan = getattr(record.parse, "plan", None)
         yield {
             **{name: getattr(record, name) for name in _SAMPLE},
-            **({"variant": record.way.key} if suite.vary.factors else {}),
+            **({"variant": record.way.key} if run.design.suite.vary.factors else {}),
             "levels": list(record.levels),
             "parents": list(record.parents),
             "n_blocks": record.n_blocks,
@@ -87,31 +107,25 @@ def _prompt_text(record: Record, prompts: Mapping[str, Sequence[PromptMessage]])
     messages = None if record.prompt is None else prompts.get(record.prompt.messages)
     if messages is None:
         return None
-    parts = (part for message in messages for part in message.parts)
     return "\n".join(
-        f"[picture: {part.image}]" if isinstance(part, PictureMark) else part for part in parts
+        f"[picture: {part.image}]" if isinstance(part, PictureMark) else part
+        for message in messages
+        for part in message.parts
     )
-
-
-def _track_columns() -> dict[str, str]:
-    """Columns that tracks add, with their types in pandas."""
-    return {name: kind for record in record_types() for name, kind in record.exported.items()}
 
 
 def _counts(run: Run, record: Record) -> dict[str, float | None]:
     """The counts of the headline scores, then those of the measures that have their own."""
+    counts, design = ("tp", "fp", "fn"), run.design
     found: dict[str, float | None] = {
-        f"{name}_{setting.lower()}": None
-        for setting in run.design.suite.settings
-        for name in ("tp", "fp", "fn")
+        f"{name}_{setting.lower()}": None for setting in design.suite.settings for name in counts
     }
     for score in record.scores:
-        is_headline = score.matcher in (None, "", run.design.matcher)
+        is_headline = score.matcher in (None, "", design.matcher)
         if is_headline and score.criterion in ("aov", "placed"):
-            for name in ("tp", "fp", "fn"):
-                found[f"{name}_{score.setting.lower()}"] = getattr(score, name)
-    for track in run.design.suite.tracks:
-        for counted in {measure.counted: None for measure in track_measures(track)}:
+            found |= {f"{name}_{score.setting.lower()}": getattr(score, name) for name in counts}
+    for track in design.suite.tracks:
+        for counted in dict.fromkeys(measure.counted for measure in track_measures(track)):
             if counted.sample is not None:
                 names = [f"count_{counted.name}_{column}" for column in counted.columns]
                 numbers = record.counts.get(counted.name, ()) if record.track == track else ()
@@ -119,23 +133,6 @@ def _counts(run: Run, record: Record) -> dict[str, float | None]:
                     check_numbers(counted, len(numbers), record.sample)
                 found |= dict(zip(names, numbers or [None] * len(names), strict=True))
     return found
-
-
-def export_frame(run: Run) -> pd.DataFrame:
-    """Return one row a sample: what was asked, of whom, the reply, what was read, and the counts.
-
-    Counts are `tp_<setting>`, `fp_<setting>`, `fn_<setting>` of the headline matcher, all levels
-    by the `aov` criterion (of episodes: over placed blocks); `count_<name>_<column>` are those of
-    other measures. Columns have the same types whatever the rows are; what a track does not have
-    is missing. `levels`, `parents` and `plan` are lists.
-    """
-    rows, known = list(_rows(run)), _TYPES | _track_columns()
-    data = {}
-    for name in rows[0] if rows else ():
-        counts = (kind for begin, kind in _TYPES_OF_COUNTS.items() if name.startswith(begin))
-        kind = known.get(name) or next(counts, "string")
-        data[name] = pd.Series([row[name] for row in rows], dtype=kind)
-    return pd.DataFrame(data)
 
 
 def export_run(run: Run, form: str, folder: Path | None = None) -> tuple[Path, ...]:
@@ -175,7 +172,6 @@ EXPORT_FILES = {
 }
 """The files of each format of questions."""
 _COLUMNS = ("index", "question", *LETTERS, "answer", "category", "l2-category", "scene")
-_AT_ONCE = 4
 _CARD = """---
 configs:
 - config_name: default
@@ -220,10 +216,10 @@ async def _write_tsv(
     tasks: Sequence[QuestionTask], pictures: QuestionPictures, folder: Path
 ) -> None:
     """Write pictures as base64; those of several are lists, with names in `image_path`."""
-    with contextlib.ExitStack() as stack:
-        opened = partial(Path.open, mode="w", newline="", encoding="utf-8")
-        files = [stack.enter_context(opened(folder / n)) for n in (MCQ_FILE, ORDERING_FILE)]
-        writers = [csv.writer(file, delimiter="\t", lineterminator="\n") for file in files]
+    opened = [(folder / name).open("w", newline="", encoding="utf-8") for name in
+              (MCQ_FILE, ORDERING_FILE)]  # fmt: skip
+    with opened[0], opened[1]:
+        writers = [csv.writer(file, delimiter="\t", lineterminator="\n") for file in opened]
         for writer in writers:
             writer.writerow((*_COLUMNS, "image", "image_path"))
         async for question, images in _drawn(tasks, pictures):
@@ -247,10 +243,10 @@ async def _write_hugging_face(
     from datasets import Dataset, Features, Value, utils
     from datasets import Image as HfImage
 
-    same = ("id", "subtask", "category", "wording")
+    texts = ("id", "subtask", "category", "scene", "wording", "question", "answer", "evidence")
     rows = [
         {
-            **{name: getattr(question, name) for name in same},
+            **{name: getattr(question, name) for name in ("id", "subtask", "category", "wording")},
             "scene": question.scene.id,
             "question": question.text,
             "answer": question.answer_letters,
@@ -262,7 +258,6 @@ async def _write_hugging_face(
         }
         async for question, images in _drawn(tasks, pictures)
     ]
-    texts = ("id", "subtask", "category", "scene", "wording", "question", "answer", "evidence")
     lists = {"options": Value("string"), "levels": Value("int64"), "labels": Value("string")}
     features = {name: Value("string") for name in texts} | {n: [v] for n, v in lists.items()}
     utils.disable_progress_bars()
@@ -276,8 +271,5 @@ async def _drawn(
     tasks: Sequence[QuestionTask], pictures: QuestionPictures
 ) -> AsyncIterator[tuple[Question, tuple[Image, ...]]]:
     """Yield questions with their pictures in the order in which models get them."""
-    for start in range(0, len(tasks), _AT_ONCE):
-        some = tasks[start : start + _AT_ONCE]
-        drawn = await asyncio.gather(*(pictures.of(AskedQuestion(task)) for task in some))
-        for task, images in zip(some, drawn, strict=True):
-            yield task.question, images
+    for task in tasks:
+        yield task.question, await pictures.of(AskedQuestion(task))

@@ -94,10 +94,10 @@ class _Reader:
             labels = (score.criterion, score.matcher or "", score.setting)
             self._owners.append(row)
             self._labels.append(self._shared.setdefault(("labels", labels), len(self._shared)))
-            self._counts.extend((score.tp, score.fp, score.fn))
-            self._counts.extend(errors.get(name, np.nan) for name in ERROR_TYPES)
-            self._counts.extend(blocks.get(name, np.nan) for name in BLOCK_OUTCOMES)
-            self._counts.append(np.nan if score.kept is None else score.kept)
+            counts = [score.tp, score.fp, score.fn]
+            counts += [errors.get(name, np.nan) for name in ERROR_TYPES]
+            counts += [blocks.get(name, np.nan) for name in BLOCK_OUTCOMES]
+            self._counts.extend([*counts, np.nan if score.kept is None else score.kept])
         for name, numbers in record.counts.items():
             empty = (array("i"), array("i"), array("d"))
             owners, lengths, held = self._numbers.setdefault(name, empty)
