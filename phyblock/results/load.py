@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -47,10 +46,10 @@ _TYPES = {
     **dict.fromkeys(TOKENS, "Int64"),
     "paid_usd": "float64",
     **{f"error_{name}": kind for name, kind in _OF_ERROR.items()},
-    **{"rule": "object", "shown": "object", "start": "int64"},
+    **{"rule": "object", "start": "int64"},
 }
-"""Columns that records of all tracks have; each track adds its own. `shown` is the presentation of
-the scene as JSON, `start` where the record begins in `records.jsonl` [bytes]."""
+"""Columns that records of all tracks have; each track adds its own. `start` is where the record
+begins in `records.jsonl` [bytes]."""
 _LABELS = ("criterion", "matcher", "setting")
 _BLOCKS = tuple(f"blocks_{name}" for name in BLOCK_OUTCOMES)
 _COUNTS = ("tp", "fp", "fn", *ERROR_TYPES, *_BLOCKS, *Score.FURTHER)
@@ -81,7 +80,6 @@ class _Reader:
             "paid_usd": reply and record.paid_usd,
             **{f"error_{name}": getattr(error, name, None) for name in _OF_ERROR},
             "rule": None if rule is None else str(rule),
-            "shown": record.shown and json.dumps(record.shown.fields(), sort_keys=True),
             "start": start,
             **record.row(),
         }
@@ -90,11 +88,12 @@ class _Reader:
             is_shared = isinstance(value, (str, tuple)) and name != "sample"
             column.append(self._shared.setdefault(value, value) if is_shared else value)
         for score in record.scores:
-            errors, blocks = score.errors or {}, score.blocks or {}
+            errors: Mapping[Any, float] = score.errors or {}
+            blocks: Mapping[Any, float] = score.blocks or {}
             labels = (score.criterion, score.matcher or "", score.setting)
             self._owners.append(row)
             self._labels.append(self._shared.setdefault(("labels", labels), len(self._shared)))
-            counts = [score.tp, score.fp, score.fn]
+            counts: list[float] = [score.tp, score.fp, score.fn]
             counts += [errors.get(name, np.nan) for name in ERROR_TYPES]
             counts += [blocks.get(name, np.nan) for name in BLOCK_OUTCOMES]
             self._counts.extend([*counts, np.nan if score.kept is None else score.kept])

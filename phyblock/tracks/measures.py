@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +15,14 @@ from phyblock.scoring.counts import Floats, mean_of, ratio_of
 from phyblock.scoring.plan import ERROR_TYPES
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import pandas as pd
 
     from phyblock.data import AssemblyTask, Dataset
-    from phyblock.models import Image
     from phyblock.records.record import Record
     from phyblock.results.load import Design, Run
     from phyblock.results.text import TextTable
     from phyblock.scoring.counts import Metric
     from phyblock.sim.film import FilmStep
-    from phyblock.sim.pictures import PictureStyle
 
 SCORED_BY = ("setting", "matcher", "criterion")
 """Columns that say how a sample was scored; "" where its track knows no such choice."""
@@ -217,40 +213,13 @@ class HeadlineColumn:
     criterion: str = ""
 
 
-class KeptPictures(Protocol):
-    """Pictures of items in a folder of kept ones."""
-
-    def outline(self, item: Any) -> tuple[Sequence[Image], bool]:
-        """The pictures of an item as far as they are at hand, and whether all are."""
-
-    def keys(self, item: Any) -> Sequence[str]:
-        """Names under which they are kept."""
-
-
-@dataclass(frozen=True)
-class PageItems:
-    """The data of a report's page on items that are more than their scene.
-
-    `shown` gives what a record asked about, as it was shown, with its `question`; None where that
-    is not known. `pictures` finds those that were sent in a folder of kept ones.
-    """
-
-    shown: Callable[[Record], Any | None]
-    pictures: Callable[[Path, PictureStyle], KeptPictures]
-
-
 @dataclass(frozen=True)
 class EpisodeView:
-    """The views of a record step by step: as a table, and as frames of a film.
-
-    `state_keys` name, in the cache, the pictures that its turns were sent beside those of the
-    scene.
-    """
+    """The views of a record step by step: as a table, and as frames of a film."""
 
     track: str
     table: Callable[[Any], TextTable]
     frames: Callable[[Any, AssemblyTask], Iterable[FilmStep]]
-    state_keys: Callable[[Any, AssemblyTask, PictureStyle], Iterable[str]] = lambda *_: ()
 
 
 WHOLE = Cell("overall", "Overall")
@@ -275,8 +244,8 @@ class TrackReport:
     `check_alike` raises SpecError where the first run cannot be compared with the second in these
     cells by a measure.
     `part_names` say what `Record.part` stands for. `items` opens, for the page of a run, what was
-    asked about where that is more than scenes; it raises DataError where that is not what the run
-    was made on.
+    asked about where that is more than scenes, and gives of a record what has a `question` as it
+    was shown; it raises DataError where that is not what the run was made on.
     `episodes` shows records that are episodes. `listings` are the scores that the page of a run
     lists samples by, the one that the headline leads with first.
     `showing` says, in words that end every caption, what is unusual about how items were shown.
@@ -291,7 +260,7 @@ class TrackReport:
     notes: Callable[[Run], Sequence[str]] = lambda _: ()
     check_alike: Callable[[Run, Run, Sequence[str], Measure], None] | None = None
     part_names: Mapping[str, str] = field(default_factory=dict)
-    items: Callable[[Run, Dataset], PageItems] | None = None
+    items: Callable[[Run, Dataset], Callable[[Record], Any | None]] | None = None
     episodes: EpisodeView | None = None
     listings: Callable[[Design], tuple[Listing, ...]] = by_settings
     showing: Callable[[Run], tuple[str, ...]] = lambda _: ()

@@ -24,7 +24,6 @@ from phyblock.scoring.plan import ERROR_TYPES
 from phyblock.scoring.steps import Assembly, MoveOutcome, attempted_counts, placed_counts
 from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, Settled, settle
 from phyblock.sim.engine import described_engine
-from phyblock.sim.pictures import PictureStyle, goal_style
 from phyblock.sim.question_pictures import question_key, question_png, state_picture
 from phyblock.tracks.base import EpisodeTrack, Opening, SceneTrack, engine_identity
 from phyblock.tracks.baselines import Choice, Pick, Picking, candidate_choices
@@ -763,19 +762,6 @@ class StepEpisode:
                 ("attempted", attempted, errors),
             )
         ]
-
-
-def state_keys(record: Any, task: AssemblyTask, style: PictureStyle) -> Iterator[str]:
-    """Yield the names in the cache of what stood before each step of an episode."""
-    if not isinstance(record, EpisodeRecord):
-        return
-    wide = goal_style(task.scene, style)
-    world: tuple[int, ...] = ()
-    for turn in record.turns:
-        blocks = [task.scene.blocks[vertex] for vertex in world]
-        yield question_key(state_picture(task.scene, blocks, wide), wide)
-        if turn.outcome is not None:
-            world = turn.world
 
 
 TRACK = StepPlanning

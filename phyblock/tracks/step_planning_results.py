@@ -31,7 +31,6 @@ from phyblock.tracks.step_planning import (
     EpisodeRecord,
     EpisodeTurn,
     StepsSpec,
-    state_keys,
 )
 
 if TYPE_CHECKING:
@@ -229,5 +228,5 @@ REPORT = TrackReport(
     notes=_notes,
     check_alike=_check_alike,
     showing=lambda run: run.showing("steps"),
-    episodes=EpisodeView(NAME, _table, _film, state_keys),
+    episodes=EpisodeView(NAME, _table, _film),
 )

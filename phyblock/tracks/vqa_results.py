@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,16 +19,13 @@ from phyblock.tracks.measures import (
     Cell,
     HeadlineColumn,
     Measure,
-    PageItems,
     SampleCounts,
     TrackReport,
     share,
 )
-from phyblock.tracks.pictures import Workshop
 from phyblock.tracks.questions import (
     AskedQuestion,
     ChoiceRecord,
-    QuestionPictures,
     VqaSpec,
     open_questions,
 )
@@ -40,7 +37,6 @@ if TYPE_CHECKING:
     from phyblock.data import Dataset
     from phyblock.records.record import Record
     from phyblock.results.load import Run
-    from phyblock.sim.pictures import PictureStyle
 
 NAME = "vqa"
 CATEGORY_NAMES = {
@@ -188,9 +184,9 @@ def _question_digest(run: Run) -> str | None:
     return run.manifest.tracks.get(NAME, {}).get("questions")
 
 
-def question_items(run: Run, dataset: Dataset) -> PageItems:
+def question_items(run: Run, dataset: Dataset) -> Callable[[Record], AskedQuestion | None]:
     """Return the questions of a run; DataError where they are not what it was made on."""
-    recorded, shown = run.manifest.questions, _spec(run)
+    recorded = run.manifest.questions
     if recorded is None:
         raise DataError(Problem(str(run.path / MANIFEST), "names no questions", "questions"))
     questions = open_questions(recorded.format, Path(recorded.root), dataset)
@@ -204,12 +200,7 @@ def question_items(run: Run, dataset: Dataset) -> PageItems:
             return None
         return AskedQuestion(by_id[record.question.id], record.question.rotation)
 
-    def pictures(folder: Path, style: PictureStyle) -> QuestionPictures:
-        # Null is each question's own, which no style can say.
-        ground = run.manifest.suite["images"]["background"] and style.background
-        return QuestionPictures(Workshop(1, folder), style, shown.options_as, ground)
-
-    return PageItems(asked, pictures)
+    return asked
 
 
 REPORT = TrackReport(

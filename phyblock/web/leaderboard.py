@@ -47,7 +47,6 @@ from phyblock.web.pack import (
     open_sources,
     pack_scenes,
     places_of,
-    question_entry,
     records_at,
     write_script,
     write_three,
@@ -303,17 +302,13 @@ def _write_samples(
         for record in records_at(one.run.path, places):
             track, item = record.track, record.item
             if (track, item) not in numbered:
-                known = one.sources.items.get(track)
-                shown = known.shown(record) if known else None
                 items.add(
                     track=tracks.of(track),
                     key=item,
                     scene=scenes.of(record.scene),
                     levels=list(record.levels),
                     part=record.part,
-                    question=packs["questions"].add(question_entry(shown.question))
-                    if known and shown
-                    else -1,
+                    question=one.sources.question(record, packs["questions"]),
                 )
             worth = values[number, track].samples.get(record.model, {})
             score = worth.get((record.scene, item, record.seed, record.way.key))

@@ -13,8 +13,9 @@ import json
 import os
 import re
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
@@ -22,12 +23,10 @@ from typing import Any, NamedTuple
 
 import jinja2
 
-from phyblock.config.suite import FACTORS, ImagesSpec, with_values
 from phyblock.data import AssemblyTask
 from phyblock.domain import BLOCK_TYPES, Block, CandidateSet, Question, Scene
 from phyblock.errors import DataError
-from phyblock.files import atomic_write
-from phyblock.models import Image
+from phyblock.files import atomic_write, digest_of_file
 from phyblock.records.files import PromptLines, RecordLines
 from phyblock.records.record import Record, Score, SentPrompt
 from phyblock.resources import cache_dir
@@ -37,19 +36,13 @@ from phyblock.sim.geometry import solid_mesh
 from phyblock.sim.pictures import COLOR_RGB
 from phyblock.stable import hex_digest
 from phyblock.tracks.base import kind_of, kinds
-from phyblock.tracks.items import in_order
-from phyblock.tracks.measures import PageItems
-from phyblock.tracks.pictures import (
-    Drawing,
-    ScenePictures,
-    Workshop,
-    picture_style,
-)
 
 _LAYOUT = 6
 """Version of the scripts."""
 _CHUNK_CHARACTERS = 400_000
 _DIGITS = 24
+PICTURES = "report/pictures/"
+"""The folder of pictures that were sent, below that of a run."""
 _DECIMALS = 6
 """Decimals of numbers that pages draw by."""
 _ONLY_IN_TABLES = ("errors", "blocks", *Score.FURTHER)
@@ -152,13 +145,6 @@ class Place(NamedTuple):
     start: int
 
 
-class Item(NamedTuple):
-    """The subject of samples of one track."""
-
-    track: str
-    key: str
-
-
 def places_of(run: Run) -> list[Place]:
     """Return every sample once: by track, item, then model in the suite's order, and seed."""
     names = ("track", "item", "model", "seed", "start")
@@ -212,17 +198,18 @@ class SampleIndex:
         self._tracks, self._models = Numbers(tracks), Numbers(design.model_names)
         self.scenes, self.items = Numbers(), Numbers()
         self._outcomes, self._subtasks, self._variants = Numbers(), Numbers(), Numbers()
-        self._about = Columns("scene", "levels", "subtask")
+        self._about = Columns("scene", "levels", "subtask", "question")
         self._rows = Columns("track", "model", "item", "seed", "variant", "outcome", "correct")
         names = {listing.name: None for group in self._listings.values() for listing in group}
         self._scores = {name: Columns("tp", "fp", "fn", "wrong") for name in names}
 
-    def add(self, record: Record) -> None:
-        """Append the sample of a record."""
-        item = Item(record.track, record.item)
+    def add(self, record: Record, question: Callable[[Record], int]) -> None:
+        """Append the sample of a record; of a new item, the number of its `question`."""
+        item = (record.track, record.item)
         if item not in self.items:
             part = None if record.part is None else self._subtasks.of(record.part)
-            self._about.add(scene=self.scenes.of(record.scene), levels=record.levels, subtask=part)
+            about = {"scene": self.scenes.of(record.scene), "levels": record.levels}
+            self._about.add(**about, subtask=part, question=question(record))
         self._rows.add(
             track=self._tracks.of(record.track),
             model=self._models.of(record.model),
@@ -243,8 +230,8 @@ class SampleIndex:
             wrong = sum(1 << n for n, name in enumerate(listing.errors) if name in listed.errors)
             columns.add(tp=listed.tp, fp=listed.fp, fn=listed.fn, wrong=wrong)
 
-    def columns(self, questions: Mapping[Item, int]) -> dict[str, Any]:
-        """Return the index as the page takes it; `questions` numbers items that have a question."""
+    def columns(self) -> dict[str, Any]:
+        """Return the index as the page takes it."""
         return {
             "tracks": list(self._tracks),
             "track_titles": [kinds()[name].title for name in self._tracks],
@@ -264,9 +251,8 @@ class SampleIndex:
             ],
             "matcher": self._matcher,
             "items": {
-                "key": [item.key for item in self.items],
+                "key": [key for _, key in self.items],
                 **self._about,
-                "question": [questions.get(item, -1) for item in self.items],
             },
             "rows": {**self._rows, "scores": self._scores},
         }
@@ -276,18 +262,19 @@ def pack_samples(
     folder: Path,
     places: Iterable[Place],
     index: SampleIndex,
-    pack: Pack,
-    prompts: Pack,
-    pictures: Mapping[str, str],
+    packs: Mapping[str, Pack],
+    sources: Sources,
+    picture: Callable[[str], str | None],
     see: Callable[[Record, int], None],
 ) -> None:
-    """Pack the newest record of every sample and the prompts as sent, and add it to the index.
+    """Pack the newest record of every sample, its question and the prompts as sent; add it to the
+    index.
 
-    `pictures` are addresses of pictures as seen from the page, by the digest of their bytes. `see`
+    `picture` gives the address of a picture as seen from the page by the digest of its bytes. `see`
     is called with every record and its number.
     """
     sent_as = {
-        line.sha256: prompts.add([message.fields() for message in line.messages])
+        line.sha256: packs["prompts"].add([message.fields() for message in line.messages])
         for _, line in PromptLines(folder)
     }
 
@@ -297,11 +284,11 @@ def pack_samples(
         images = []
         for image in prompt.images:
             size = {"width_px": image.width_px, "height_px": image.height_px}
-            images.append({"label": image.label, **size, "file": pictures.get(image.sha256)})
+            images.append({"label": image.label, **size, "file": picture(image.sha256)})
         return {"template": prompt.template, "n": sent_as.get(prompt.messages), "images": images}
 
     for record in records_at(folder, places):
-        index.add(record)
+        index.add(record, lambda record: sources.question(record, packs["questions"]))
         entry = {name: value for name, value in record.fields().items() if name not in IN_INDEX}
         entry["prompt"] = sent(record.prompt)
         entry["scores"] = [
@@ -311,7 +298,7 @@ def pack_samples(
         if record.asked_turns:
             turns = record.asked_turns
             entry["turns"] = [{**turn.fields(), "prompt": sent(turn.prompt)} for turn in turns]
-        see(record, pack.add(entry))
+        see(record, packs["records"].add(entry))
 
 
 def pack_scenes(scenes: Iterable[str], sources: Sequence[Sources], pack: Pack) -> bool:
@@ -388,21 +375,6 @@ def _rounded(values: Iterable[float]) -> list[float]:
     return [round(float(value), _DECIMALS) for value in values]
 
 
-def items_shown(
-    folder: Path, places: Sequence[Place], known: Mapping[str, PageItems]
-) -> dict[Item, Any]:
-    """Return the subject of every item of the tracks in `known`, as it was shown."""
-    first = {
-        Item(place.track, place.key): place for place in reversed(places) if place.track in known
-    }
-    found = {}
-    for record in records_at(folder, sorted(first.values(), key=lambda place: place.start)):
-        shown = known[record.track].shown(record)
-        if shown is not None:
-            found[Item(record.track, record.item)] = shown
-    return found
-
-
 @dataclass(frozen=True)
 class Sources:
     """Tasks by scene id, and items that are more than scenes by track; where there are none,
@@ -410,8 +382,14 @@ class Sources:
     """
 
     tasks: Mapping[str, AssemblyTask] = field(default_factory=dict)
-    items: Mapping[str, PageItems] = field(default_factory=dict)
+    items: Mapping[str, Callable[[Record], Any]] = field(default_factory=dict)
     lacking: str = ""
+
+    def question(self, record: Record, pack: Pack) -> int:
+        """Pack the question that a record is about, as it was shown; -1 where there is none."""
+        opener = self.items.get(record.track)
+        shown = opener(record) if opener else None
+        return pack.add(question_entry(shown.question)) if shown else -1
 
 
 def open_sources(run: Run, data: Path | None) -> Sources:
@@ -433,100 +411,38 @@ def open_sources(run: Run, data: Path | None) -> Sources:
         return Sources(lacking=f"Nothing can be drawn without the data set ({said}); {how}.")
 
 
-def has_pictures(run: Run, places: Sequence[Place]) -> bool:
-    """True if a model's first record of any track tells of a picture that was sent."""
-    first = {(place.track, place.model): place for place in reversed(places)}
-    prompts = (record.prompt for record in records_at(run.path, first.values()))
-    return any(prompt is not None and prompt.images for prompt in prompts)
+class SentPictures:
+    """Pictures that were sent, put into `folder` as they are asked for by their digests.
 
-
-def keep_pictures(
-    run: Run,
-    sources: Sources,
-    asked: Mapping[Item, Any],
-    places: Sequence[Place],
-    folder: Path,
-    earlier: Path,
-) -> dict[str, str]:
-    """Put the pictures that were sent into `folder`, unless `earlier` holds them; return their
-    names by the digest of their bytes.
-
-    Nothing is rendered: a picture that is not in the cache is left out. Files are hard links into
-    the cache where that is possible, else copies. Raises OSError where the disk refuses.
+    They are found in the picture cache and among the data set's own; nothing is rendered. Files are
+    hard links into the cache where that is possible, else copies.
     """
-    cache, names = cache_dir() / "pictures", {}
-    for image, key in _cached(run, sources, asked, places, cache):
-        name = f"{image.sha256[:_DIGITS]}.png"
-        path = folder / name
-        if not path.exists() and not (earlier / name).exists():
+
+    def __init__(self, folder: Path, earlier: Path, sources: Sources) -> None:
+        """Take what `earlier` holds as there."""
+        self._folder, self._earlier, self._sources = folder, earlier, sources
+
+    @cached_property
+    def _paths(self) -> dict[str, Path]:
+        own = (task.composite for task in self._sources.tasks.values())
+        paths = [*(cache_dir() / "pictures").glob("*/*.png"), *(path for path in own if path)]
+        return {digest_of_file(path): path for path in paths}
+
+    def name(self, digest: str) -> str | None:
+        """Return the address of a picture from the page; None where it is not kept.
+
+        Raises OSError where the disk refuses.
+        """
+        name = f"{digest[:_DIGITS]}.png"
+        path = self._folder / name
+        if not path.exists() and not (self._earlier / name).exists():
+            if digest not in self._paths:
+                return None
             try:
-                os.link(cache / key[:2] / f"{key}.png", path)
+                os.link(self._paths[digest], path)
             except OSError:
-                atomic_write(path, image.data)
-        names[image.sha256] = name
-    return names
-
-
-def _cached(
-    run: Run,
-    sources: Sources,
-    asked: Mapping[Item, Any],
-    places: Sequence[Place],
-    cache: Path,
-) -> Iterator[tuple[Image, str]]:
-    """Yield what is at hand of the pictures of a run, with names in the cache, "" outside of it."""
-    for images in _images_of(run):
-        shop, style = Workshop(1, cache), picture_style(images)
-        goals = ScenePictures(shop, images)
-        for task in _tasks_shown(run, sources.tasks):
-            found, are_real = goals.outline(task)
-            if are_real:
-                is_drawn = images.source == "render"
-                yield from zip(
-                    found, goals.keys(task) if is_drawn else [""] * len(found), strict=True
-                )
-        views = {name: kind.report().episodes for name, kind in kinds().items()}
-        for record in records_at(run.path, (place for place in places if views.get(place.track))):
-            view, scene = views[record.track], sources.tasks.get(record.scene)
-            if view is None or scene is None or record.prompt is None:
-                continue
-            for key in view.state_keys(record, scene, style):
-                if (state := shop.kept(Drawing("", key, bytes))) is not None:
-                    yield state, key
-        for track, items in sources.items.items():
-            pictures = items.pictures(cache, style)
-            for shown in (one for item, one in asked.items() if item.track == track):
-                outlined, are_real = pictures.outline(shown)
-                if are_real:
-                    yield from zip(outlined, pictures.keys(shown), strict=True)
-
-
-def _images_of(run: Run) -> Iterable[ImagesSpec]:
-    """What a run's suite says of pictures, in every condition that has other ones."""
-    vary, images = run.design.suite.vary, run.design.suite.images
-    found = {images: None}
-    for variant in vary.variants:
-        paths = ((FACTORS[factor] or (), factor, level) for factor, level in variant.levels)
-        values = {
-            path[1:]: vary.value(factor, level)
-            for path, factor, level in paths
-            if path[:1] == ("images",)
-        }
-        found[with_values(images, values)] = None
-    return found
-
-
-def _tasks_shown(run: Run, tasks: Mapping[str, AssemblyTask]) -> Iterator[AssemblyTask]:
-    """Yield scenes that were asked about as such, whose names are those of the items, in every
-    form in which they were shown.
-    """
-    asked = run.records[run.records["item"] == run.records["scene"]]
-    for scene, form in dict.fromkeys(zip(asked["scene"], asked["shown"], strict=True)):
-        task, shown = tasks.get(scene), json.loads(form or "null")
-        if task is not None and shown:
-            yield in_order(task, shown["order"], tasks.get(shown["goal"]))
-        elif task is not None:
-            yield task
+                atomic_write(path, self._paths[digest].read_bytes())
+        return f"{PICTURES}{name}"
 
 
 def asset(name: str) -> bytes:

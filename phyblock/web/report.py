@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from functools import partial
 from itertools import groupby
 from pathlib import Path
@@ -25,20 +26,18 @@ from phyblock.web.board import (
     telling,
 )
 from phyblock.web.pack import (
+    PICTURES,
     Pack,
     SampleIndex,
+    SentPictures,
     Sources,
     build_of,
     fill,
-    has_pictures,
-    items_shown,
-    keep_pictures,
     kit,
     open_sources,
     pack_samples,
     pack_scenes,
     places_of,
-    question_entry,
     write_script,
     write_three,
 )
@@ -55,7 +54,6 @@ _STYLES = (
 )
 REPORT_FILE = "report.html"
 _FOLDER = "report"
-_PICTURES = f"{_FOLDER}/pictures/"
 _FAILURES = 6
 _MOST_NAMED = 6
 
@@ -122,7 +120,7 @@ def write_report(written: TablesWritten, data: Path | None = None) -> Path:
             page = _page(written, sources, build)
         (path,) = out.write({REPORT_FILE: page})
         # A page of an earlier build that is still open says that it was written again.
-        lasting = (own, _PICTURES)
+        lasting = (own, PICTURES)
         out.remove(name for name in out.names(f"{_FOLDER}/") if not name.startswith(lasting))
     return path
 
@@ -134,7 +132,7 @@ def files_of(*, page: bool) -> tuple[str, ...]:
 
 def page_files() -> tuple[str, ...]:
     """Return the page and the folders beside it, by their names in a run folder."""
-    return (REPORT_FILE, f"{_FOLDER}/", _PICTURES)
+    return (REPORT_FILE, f"{_FOLDER}/", PICTURES)
 
 
 def report_files(folder: Path) -> dict[str, Path]:
@@ -148,21 +146,15 @@ def _write_data(run: Run, sources: Sources, out: OutFolder, new: Path, build: st
     """Write the scripts and the pictures."""
     packs = {kind: Pack(new, kind, build) for kind in ("records", "scenes", "questions", "prompts")}
     places, tracks = places_of(run), run.design.suite.tracks
-    asked = items_shown(run.path, places, sources.items)
-    pictures: dict[str, str] = {}
-    if has_pictures(run, places):
-        with out.making(_PICTURES) as folder:
-            kept = keep_pictures(run, sources, asked, places, folder, out.path / _PICTURES)
-        pictures = {digest: f"{_PICTURES}{name}" for digest, name in kept.items()}
     index, failures = SampleIndex(run.design), Failures(run, frozenset(sources.tasks))
-    pack_samples(
-        run.path, places, index, packs["records"], packs["prompts"], pictures, failures.see
-    )
+    with ExitStack() as made:
+        sent = None
+        if (run.path / PROMPTS).exists():
+            folder = made.enter_context(out.making(PICTURES))
+            sent = SentPictures(folder, out.path / PICTURES, sources)
+        picture = sent.name if sent else lambda _: None
+        pack_samples(run.path, places, index, packs, sources, picture, failures.see)
     pack_scenes(index.scenes if sources.tasks else (), [sources], packs["scenes"])
-    questions = {
-        item: packs["questions"].add(question_entry(shown.question))
-        for item, shown in asked.items()
-    }
     for pack in packs.values():
         pack.close()
     names: dict[str, str] = {}
@@ -171,7 +163,7 @@ def _write_data(run: Run, sources: Sources, out: OutFolder, new: Path, build: st
         names |= kind_of(track).report().part_names
         groups |= _part_groups(run, track)
     content: dict[str, Any] = {
-        **index.columns(questions),
+        **index.columns(),
         "telling": telling([failures], _FAILURES),
         "model_kinds": {model.name: model.kind for model in run.manifest.models},
         "starts": {kind: pack.starts for kind, pack in packs.items()},

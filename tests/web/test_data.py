@@ -90,11 +90,12 @@ def test_the_newest_record_of_every_sample_is_there_once(
     ]
     write_run(folder, [*stale, *records], facts)
     design = design_of(Manifest.model_validate(facts))
-    index, pack = SampleIndex(design), Pack(folder, "records", "build")
-    prompts = Pack(folder, "prompts", "build")
-    pack_samples(folder, places_of(load_run(folder)), index, pack, prompts, {}, lambda *_: None)
-    columns = index.columns({})
-    entries = entries_in(folder, pack, "records")
+    index, kinds = SampleIndex(design), ("records", "prompts", "questions")
+    packs = {kind: Pack(folder, kind, "build") for kind in kinds}
+    places = places_of(load_run(folder))
+    pack_samples(folder, places, index, packs, Sources(), {}.get, lambda *_: None)
+    columns = index.columns()
+    entries = entries_in(folder, packs["records"], "records")
     by_name = {one["sample"]: one for one in records}
     rows = columns["rows"]
     assert len(entries) == len(rows["item"]) == len(by_name)
