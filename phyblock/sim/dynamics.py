@@ -19,13 +19,7 @@ from numpy.typing import NDArray
 
 from phyblock.domain import Block
 from phyblock.errors import SimulationError
-from phyblock.sim.contact import (
-    FIT_TOLERANCE_M,
-    bounds_m,
-    boxes_near,
-    drop_height_m,
-    piece_pairs,
-)
+from phyblock.sim.contact import FIT_TOLERANCE_M, bounds_m, boxes_near, drop_height_m, piece_pairs
 from phyblock.sim.engine import Physics, PhysicsEngine, Pose, World, physics_engine
 from phyblock.types import StepEnd
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import importlib
+import importlib.metadata
 import math
 import os
 from collections.abc import Mapping
@@ -144,10 +145,6 @@ class PhysicsEngine(Protocol):
     def name(self) -> str:
         """Its name in `ENGINES`, and in what is written about a run."""
 
-    @property
-    def versions(self) -> Mapping[str, str]:
-        """Name and version of each library that decides where blocks end up."""
-
     def open(self, physics: Physics) -> AbstractContextManager[Simulation]:
         """Open a floor without blocks, as a context manager that closes it on leaving.
 
@@ -208,11 +205,17 @@ def _made(name: str) -> PhysicsEngine:
 
 def described_engine() -> str:
     """The engine in use and its version, as in `pybullet 3.2.7`; raises as `physics_engine`."""
-    engine = physics_engine()
-    versions = engine.versions
-    if list(versions) == [engine.name]:
-        return f"{engine.name} {versions[engine.name]}"
-    return f"{engine.name} ({', '.join(' '.join(pair) for pair in versions.items())})"
+    name = physics_engine().name
+    return f"{name} {engine_version(name)}"
+
+
+@functools.cache
+def engine_version(name: str) -> str:
+    """The installed version of an engine's library."""
+    try:
+        return importlib.metadata.version(ENGINES[name].distribution)
+    except importlib.metadata.PackageNotFoundError:  # Some builds of MuJoCo are one distribution.
+        return importlib.metadata.version(name)
 
 
 def other_engine() -> str:

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import importlib.metadata
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, cast
@@ -40,14 +39,6 @@ class MujocoEngine:
     """Opens simulations, each with data of its own."""
 
     name = "mujoco"
-
-    @functools.cached_property
-    def versions(self) -> Mapping[str, str]:
-        """MuJoCo's."""
-        try:
-            return {"mujoco": importlib.metadata.version("mujoco-core")}
-        except importlib.metadata.PackageNotFoundError:  # Some builds are one distribution.
-            return {"mujoco": importlib.metadata.version("mujoco")}
 
     @contextlib.contextmanager
     def open(self, physics: Physics) -> Iterator[_Simulation]:

@@ -20,13 +20,7 @@ import PIL
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from phyblock.domain.blocks import (
-    SHAPES,
-    BlockType,
-    Color,
-    Euler,
-    euler_deg_to_matrix,
-)
+from phyblock.domain.blocks import SHAPES, BlockType, Color, Euler, euler_deg_to_matrix
 from phyblock.domain.scene import Block, CandidateSet, Scene
 from phyblock.errors import DataError, Problem
 from phyblock.sim.backgrounds import DARK_INK, GROUNDS, INK_RGB, LIGHT_INK, TEXTURED, floor, shadow
@@ -320,10 +314,7 @@ def goal_style(scene: Scene, style: PictureStyle) -> PictureStyle:
 
 
 def camera_for(
-    blocks: Sequence[Block],
-    style: PictureStyle,
-    where: str,
-    shown: Sequence[Block] = (),
+    blocks: Sequence[Block], style: PictureStyle, where: str, shown: Sequence[Block] = ()
 ) -> Camera:
     """The camera that frames blocks, of all that are shown; DataError, at `where`, of none."""
     if not blocks:

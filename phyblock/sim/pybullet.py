@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import importlib.metadata
 import math
 import os
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import cast
@@ -34,11 +33,6 @@ class BulletEngine:
     """Opens simulations, each in a PyBullet client of its own."""
 
     name = "pybullet"
-
-    @functools.cached_property
-    def versions(self) -> Mapping[str, str]:
-        """PyBullet's."""
-        return {"pybullet": importlib.metadata.version("pybullet")}
 
     @contextlib.contextmanager
     def open(self, physics: Physics) -> Iterator[_Simulation]:

@@ -1,15 +1,15 @@
 """Pictures with measures: the goal on a ruled floor, and the kit sheet of all candidates.
 
-The floor has lines every centimeter, numbers every five, axes with their names. The rules lie on
-it, so that blocks stand on them and hide what is behind; numbers run along the two edges next to
-the camera, where nothing hides them. A pole at the far corner rules the height.
+The floor has lines every centimeter, numbers every five along the two edges next to the camera, and
+axes with names. A pole at the far corner rules the height.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,25 +73,23 @@ class RuledFloor:
     """The ruled floor of a scene, which must have a block: draws blocks seen as its goal is."""
 
     def __init__(self, scene: Scene, style: PictureStyle) -> None:
-        blocks = scene.blocks
-        field = _field(blocks, style)
-        self._camera, self._style = _camera(blocks, field, style), style
+        field = _field(scene.blocks, style)
+        self._camera, self._style = _camera(scene.blocks, field, style), style
         ground = empty_ground(style.background, self._camera, style.size_px)
         size_px, ink = len(ground), GROUNDS[style.background].ink
         rules = _Pen(self._camera, Image.new("L", (size_px, size_px)))
         (x0, x1), (y0, y1) = field.x, field.y
         for is_major in (False, True):
             shade, width = (_MAJOR, 2) if is_major else (_MINOR, 1)
-            for x in range(x0, x1 + 1):
-                if (x % _MAJOR_CM == 0) == is_major:
-                    rules.line((x, y0, 0.0), (x, y1, 0.0), shade, width)
-            for y in range(y0, y1 + 1):
-                if (y % _MAJOR_CM == 0) == is_major:
-                    rules.line((x0, y, 0.0), (x1, y, 0.0), shade, width)
+            lines = [((x, y0, 0), (x, y1, 0), x) for x in range(x0, x1 + 1)]
+            lines += [((x0, y, 0), (x1, y, 0), y) for y in range(y0, y1 + 1)]
+            for start, end, at in lines:
+                if (at % _MAJOR_CM == 0) == is_major:
+                    rules.line(start, end, shade, width)
         share = np.asarray(rules.image, dtype=np.float32)[..., None] / np.float32(255)
         ruled = ground * (1 - share) + np.array(ink, dtype=np.float32) * share
         written = _Pen(self._camera, Image.fromarray(np.rint(ruled).astype(np.uint8)))
-        _write(written, field, ink, has_pole=_has_pole(style))
+        _write(written, field, ink, has_pole=style.elevation_deg < _TOP_DEG)
         self._ground: NDArray[np.float32] = np.array(written.image, dtype=np.float32)
 
     def image(self, blocks: Sequence[Block]) -> Image.Image:
@@ -100,60 +98,41 @@ class RuledFloor:
         return picture(blocks, self._camera, style.background, style.size_px, self._ground)
 
 
-@dataclass(frozen=True)
-class _Field:
-    """The ruled rectangle [cm], and its sides next to the camera."""
+class _Field(NamedTuple):
+    """The ruled rectangle [cm], and along x and y its sides next to the camera and far from it."""
 
     x: tuple[int, int]
     y: tuple[int, int]
     z: int
-    near_x: int
-    near_y: int
-
-    @property
-    def far_x(self) -> int:
-        return self.x[0] if self.near_x == self.x[1] else self.x[1]
-
-    @property
-    def far_y(self) -> int:
-        return self.y[0] if self.near_y == self.y[1] else self.y[1]
+    near: tuple[int, int]
+    far: tuple[int, int]
 
     def beyond(self, axis: int, by: float) -> float:
         """A place beyond the near side of an axis."""
-        near, far = (self.near_x, self.far_x) if axis == 0 else (self.near_y, self.far_y)
-        return near + math.copysign(by, near - far)
+        return self.near[axis] + math.copysign(by, self.near[axis] - self.far[axis])
 
 
 def _field(blocks: Sequence[Block], style: PictureStyle) -> _Field:
     points = np.vstack([drawn_m(block) for block in blocks]) * _CM
     low, high = rounded(points.min(axis=0)), rounded(points.max(axis=0))
-    x, y = (
-        (
-            math.floor((low[axis] - _MARGIN_CM) / _MAJOR_CM) * _MAJOR_CM,
-            math.ceil((high[axis] + _MARGIN_CM) / _MAJOR_CM) * _MAJOR_CM,
-        )
-        for axis in (0, 1)
-    )
+    first = [math.floor((side - _MARGIN_CM) / _MAJOR_CM) * _MAJOR_CM for side in low]
+    last = [math.ceil((side + _MARGIN_CM) / _MAJOR_CM) * _MAJOR_CM for side in high]
     azimuth = math.radians(style.azimuth_deg)
     # The camera is on the side of +x at azimuth 0; beside an axis, either of its ends will do.
-    near_x = x[1] if math.cos(azimuth) > -1e-6 else x[0]
-    near_y = y[1] if math.sin(azimuth) > -1e-6 else y[0]
+    x, y = ((first[axis], last[axis]) for axis in (0, 1))
+    near_x, near_y = math.cos(azimuth) > -1e-6, math.sin(azimuth) > -1e-6
     top = math.ceil((high[2] + 1) / _MAJOR_CM) * _MAJOR_CM
-    return _Field(x, y, top, near_x, near_y)
+    return _Field(x, y, top, (x[near_x], y[near_y]), (x[not near_x], y[not near_y]))
 
 
 def _camera(blocks: Sequence[Block], field: _Field, style: PictureStyle) -> Camera:
     wide_x, wide_y = field.beyond(0, _NAME_CM + 1), field.beyond(1, _NAME_CM + 1)
     marks = [(x, y, 0.0) for x in (*field.x, wide_x) for y in (*field.y, wide_y)]
-    if _has_pole(style):
-        marks.append((field.far_x, field.far_y, field.z + 2.0))
+    if style.elevation_deg < _TOP_DEG:
+        marks.append((*field.far, field.z + 2.0))
     corners = np.array(marks, dtype=np.float64) / _CM
     points = np.vstack([*(drawn_m(block) for block in blocks), corners])
     return frame(points, style.axes, _WINDOW, _LEAST_DISTANCE_M)
-
-
-def _has_pole(style: PictureStyle) -> bool:
-    return style.elevation_deg < _TOP_DEG
 
 
 class _Pen:
@@ -205,7 +184,7 @@ def _write(pen: _Pen, field: _Field, ink: Rgb, *, has_pole: bool) -> None:
     pen.text(((x0 + x1) / 2, field.beyond(1, _NAME_CM), 0), "x", x_ink, 2.8)
     pen.text((field.beyond(0, _NAME_CM), (y0 + y1) / 2, 0), "y", y_ink, 2.8)
     if has_pole:
-        x, y = field.far_x, field.far_y
+        x, y = field.far
         pen.line((x, y, 0), (x, y, field.z), z_ink, SUPERSAMPLE)
         for z in range(1, field.z + 1):
             long = 0.9 if z % _MAJOR_CM == 0 else 0.4

@@ -27,7 +27,7 @@ from phyblock.parsing.structured import AnswerForm
 from phyblock.records.manifest import Manifest
 from phyblock.records.record import Record, Reply
 from phyblock.registry import added_measures, known_track, known_tracks
-from phyblock.sim.engine import REFERENCE_ENGINE, physics_engine
+from phyblock.sim.engine import REFERENCE_ENGINE, engine_version, physics_engine
 from phyblock.stable import hex_digest
 from phyblock.tracks.baselines import Picking
 from phyblock.tracks.items import (
@@ -55,7 +55,7 @@ def engine_identity() -> dict[str, Any]:
     engine = physics_engine()
     if engine.name == REFERENCE_ENGINE:
         return {}
-    return {ENGINE: {"engine": engine.name, **engine.versions}}
+    return {ENGINE: {"engine": engine.name, engine.name: engine_version(engine.name)}}
 
 
 class Judgement(Protocol):

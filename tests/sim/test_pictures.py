@@ -30,12 +30,7 @@ from phyblock.sim import ruled
 from phyblock.sim.backgrounds import TEXTURED
 from phyblock.sim.camera import VIEWS, Camera, Window, frame, view_axes
 from phyblock.sim.engine import Pose, quat_xyzw_to_euler_deg
-from phyblock.sim.film import (
-    FilmStep,
-    assembly_gif,
-    episode_gif,
-    episode_images,
-)
+from phyblock.sim.film import FilmStep, assembly_gif, episode_gif, episode_images
 from phyblock.sim.pictures import (
     COLOR_RGB,
     LABEL_STRIP,
@@ -365,7 +360,7 @@ def test_all_that_is_ruled_and_written_is_in_the_picture(
         assert points[:, axis].max() + 3 - 1e-6 <= high
     # The numbers are on the sides from which it is seen.
     middle = np.array([sum(field.x) / 2, sum(field.y) / 2])
-    near = np.array([field.near_x, field.near_y]) - middle
+    near = np.array(field.near) - middle
     assert near @ -camera.axes[2, :2] >= -1e-6
 
 
