@@ -180,10 +180,7 @@ TEXTURED: tuple[Background, ...] = tuple(name for name, one in GROUNDS.items() i
 
 
 def floor(background: Background, camera: Camera, size_px: int) -> NDArray[np.float32]:
-    """Color of every pixel's floor, shape (size, size, 3), 0..255, before any shadow.
-
-    Above the horizon of a texture its mean color goes on.
-    """
+    """Color of every pixel's floor, shape (size, size, 3), 0..255, before any shadow."""
     if (paint := GROUNDS[background].paint) is not None:
         return paint(camera, size_px)
     down, distance = _to_floor(camera, size_px)
@@ -198,10 +195,7 @@ def floor(background: Background, camera: Camera, size_px: int) -> NDArray[np.fl
 
 
 def shadow(background: Background, shaded: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Share of light that is left on each pixel's floor, shape (size, size, 1), 0..1.
-
-    `shaded` shape (size, size) is where the shadow is; its edge is drawn soft.
-    """
+    """Share of light left on the floor, shape (size, size, 1), 0..1, by where it is `shaded`."""
     mask = Image.fromarray(shaded.astype(np.uint8) * np.uint8(255))
     soft = np.asarray(mask.filter(ImageFilter.GaussianBlur(len(shaded) / _SOFTNESS)), np.float32)
     return soft[..., None] * np.float32(-GROUNDS[background].shadow / 255.0) + np.float32(1.0)
@@ -219,10 +213,7 @@ def surface_map(background: Background) -> tuple[NDArray[np.uint8], ...]:
 
 
 def sample(background: Background, x_m: Grid, y_m: Grid, footprint_m: Grid) -> NDArray[np.float32]:
-    """Colors of a texture at points of the floor, shape of `x_m` plus (3,), 0..255.
-
-    `footprint_m` is the width of floor that each pixel sees [m]: finer detail is left out.
-    """
+    """Colors of a texture at points, shape (..., 3), no finer than what each pixel sees [m]."""
     maps = surface_map(background)
     texel_m = PERIOD_M / _SIZE
     # The nearest power of two: borders lie half way between powers, and need no logarithm.

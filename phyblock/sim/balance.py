@@ -113,8 +113,7 @@ def is_balanced(
 ) -> bool:
     """True if contacts can bear all weights, whichever of the masses blocks have.
 
-    With a margin [m], also all weights moved by up to so much to any side, and
-    those in their place
+    With a margin [m], also all weights moved by up to so much to any side, and those in their place
     where every contact is narrower by it. The former is asked at the corners of an octagon: of two
     shifts, or masses, that can be borne, what lies between is borne by the mean of their forces.
     """

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import combinations, product
 from typing import NamedTuple
 
@@ -102,10 +101,7 @@ def separating_axes(first: ConvexPiece, second: ConvexPiece) -> Axes:
 
 
 def drop_m(axes: Axes) -> float | None:
-    """The distance by which the second piece falls before it meets the first [m].
-
-    Negative when it would have to rise to be clear; None when it is not above the first.
-    """
+    """The fall [m] of the second piece onto the first, None when it is not above it."""
     vertical = axes.directions[:, 2]
     beside = np.abs(vertical) < 1e-9
     if np.any(axes.gaps_m[beside] >= -1e-9):
@@ -116,8 +112,7 @@ def drop_m(axes: Axes) -> float | None:
     return meets if meets < leaves else None
 
 
-@dataclass(frozen=True)
-class Overlap:
+class Overlap(NamedTuple):
     """Two blocks (by order, the ground is 0) that share space, `depth_m` deep [m]."""
 
     first: int
@@ -125,8 +120,7 @@ class Overlap:
     depth_m: float
 
 
-@dataclass(frozen=True)
-class Gap:
+class Gap(NamedTuple):
     """A block (by order) that hangs `height_m` [m] above whatever it would fall on."""
 
     order: int
@@ -137,14 +131,11 @@ def find_overlaps(
     blocks: Sequence[Block], tolerance_m: float = FIT_TOLERANCE_M
 ) -> tuple[Overlap, ...]:
     """Pairs of blocks that share space deeper than `tolerance_m` [m]; blocks in the ground too."""
-    depths_m = {block.order: -float(bounds_m(block)[0, 2]) for block in blocks}
-    overlaps = [Overlap(GROUND, order, deep) for order, deep in depths_m.items()]
-    overlaps = [one for one in overlaps if one.depth_m > tolerance_m]
+    found = [Overlap(GROUND, block.order, -float(bounds_m(block)[0, 2])) for block in blocks]
     for first, second in _near_pairs(blocks, 0.0):
         depth_m = -min(axes.gap_m for _, _, axes in piece_pairs(first, second))
-        if depth_m > tolerance_m:
-            overlaps.append(Overlap(first.order, second.order, depth_m))
-    return tuple(overlaps)
+        found.append(Overlap(first.order, second.order, depth_m))
+    return tuple(one for one in found if one.depth_m > tolerance_m)
 
 
 def find_gaps(blocks: Sequence[Block], tolerance_m: float = FIT_TOLERANCE_M) -> tuple[Gap, ...]:
@@ -154,10 +145,7 @@ def find_gaps(blocks: Sequence[Block], tolerance_m: float = FIT_TOLERANCE_M) -> 
 
 
 def drop_height_m(block: Block, others: Sequence[Block]) -> float:
-    """The distance by which a block falls straight down onto one of others or the ground [m].
-
-    Zero when it touches or overlaps what is below it already.
-    """
+    """The distance by which a block falls straight down onto others or the ground [m]."""
     box = bounds_m(block)
     clearance = max(float(box[0, 2]), 0.0)
     for other in others:
@@ -246,9 +234,7 @@ def contact_corners_m(
             shared = _clip(shared, outline, margin_m / 2)
     if len(shared) < 2:
         return np.empty((0, 3))
-    corners: Floats = shared @ basis
-    corners += (first.vertices_m @ direction).max() * direction
-    return corners
+    return shared @ basis + (first.vertices_m @ direction).max() * direction
 
 
 def _patches(
@@ -349,10 +335,7 @@ def voxel_iou(one: Sequence[Block], other: Sequence[Block]) -> float:
 
 
 def filled_voxels(blocks: Sequence[Block]) -> Voxels:
-    """The voxels of `VOXEL_M` that some block reaches into, names ascending.
-
-    With each the points that lie in a block, of 64 that are 1.25 mm apart, a bit for each.
-    """
+    """The voxels that blocks reach into, names ascending, and which points of each they hold."""
     found = [_filled(block.type, block.position_m, block.euler_deg) for block in blocks]
     if not found:
         return np.zeros(0, dtype=np.int64), np.zeros((0, _POINTS // 8), dtype=np.uint8)

@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,11 +98,7 @@ def check(
 
 
 def check_steps(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> tuple[Stability, ...]:
-    """Stability after each step when blocks are placed in the order given.
-
-    Only the group of the block just placed is tried, every block at its goal pose; the other
-    groups were tried at earlier steps.
-    """
+    """Stability after each step: only the group of the block just placed is tried."""
     near = [
         next(g for g in groups(blocks[:n]) if blocks[n - 1] in g) for n in range(1, len(blocks) + 1)
     ]
@@ -182,8 +179,7 @@ _PLACE_DIGITS = 6
 _ONE_AT_A_TIME = threading.Lock()
 
 
-@dataclass(frozen=True)
-class Settled:
+class Settled(NamedTuple):
     """Blocks that were let go, at their goal poses but for the `fallen`, which lie at rest."""
 
     fallen: tuple[int, ...]
@@ -254,15 +250,12 @@ class Site:
 def _arrangement(group: Sequence[Block]) -> tuple[Block, ...]:
     """All of a group that its stability depends on: the first block at the origin, no colors."""
     x0, y0, _ = group[0].position_m
-
-    def moved(block: Block) -> tuple[float, float, float]:
+    kept = []
+    for number, block in enumerate(group, 1):
         x, y, z = block.position_m
-        return (round(x - x0, _PLACE_DIGITS) + 0.0, round(y - y0, _PLACE_DIGITS) + 0.0, z)
-
-    return tuple(
-        Block(number, block.type, "red", moved(block), block.euler_deg, (), 1)
-        for number, block in enumerate(group, 1)
-    )
+        place = (round(x - x0, _PLACE_DIGITS) + 0.0, round(y - y0, _PLACE_DIGITS) + 0.0, z)
+        kept.append(Block(number, block.type, "red", place, block.euler_deg, (), 1))
+    return tuple(kept)
 
 
 @functools.cache
@@ -315,10 +308,7 @@ class ExecutedStep:
 
 @dataclass(frozen=True)
 class Execution:
-    """Result of a plan: its steps, and the blocks where they lie after each of them.
-
-    The order of a block is the number of its step.
-    """
+    """Result of a plan: its steps, and the blocks, by step, where they lie after each of them."""
 
     steps: tuple[ExecutedStep, ...]
     worlds: tuple[tuple[Block, ...], ...]
@@ -461,18 +451,18 @@ def _out_of_others(
     block: Block, others: Sequence[Block], most_m: float
 ) -> tuple[Block | None, float]:
     """The block moved out of others and of the floor, and the distance [m]."""
-    start = np.array(block.position_m)
+    start = place = np.array(block.position_m)
     for _ in range(_TRIES):
         way = _way_out(block, others)
-        depth_m = float(np.linalg.norm(way))
-        moved_m = float(np.linalg.norm(np.array(block.position_m) + way - start))
-        if moved_m > most_m or depth_m > most_m:
+        depth_m, moved_m = (float(np.linalg.norm(part)) for part in (way, place + way - start))
+        if max(moved_m, depth_m) > most_m:
             return None, max(moved_m, depth_m)
         if depth_m <= FIT_TOLERANCE_M:
             break
-        x, y, z = (float(part) for part in np.array(block.position_m) + way)
+        place = place + way
+        x, y, z = place.tolist()
         block = replace(block, position_m=(x, y, z))
-    return block, float(np.linalg.norm(np.array(block.position_m) - start))
+    return block, float(np.linalg.norm(place - start))
 
 
 def _way_out(block: Block, others: Sequence[Block]) -> NDArray[np.float64]:

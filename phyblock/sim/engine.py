@@ -146,10 +146,7 @@ class PhysicsEngine(Protocol):
         """Its name in `ENGINES`, and in what is written about a run."""
 
     def open(self, physics: Physics) -> AbstractContextManager[Simulation]:
-        """Open a floor without blocks, as a context manager that closes it on leaving.
-
-        Raises SimulationError when the engine can open no more.
-        """
+        """Open a floor without blocks until the context is left; SimulationError where none is."""
 
 
 PHYSICS_VARIABLE = "PHYBLOCK_PHYSICS"

@@ -40,11 +40,7 @@ _FRAME_MS, _LAST_FRAME_MS = 900, 2600
 
 
 def assembly_gif(scene: Scene, style: PictureStyle) -> bytes:
-    """The assembly in the stored order as an animated GIF that repeats for ever.
-
-    Raises DataError when that order places a block before one that it depends on, or when there is
-    no block.
-    """
+    """The assembly in the stored order as a GIF; DataError where that is none."""
     camera = goal_camera(scene, style)
     if not scene.graph.is_valid(range(len(scene))):
         message = "places a block before one that it depends on"

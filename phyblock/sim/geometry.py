@@ -94,11 +94,7 @@ class Mesh:
 
     @functools.cached_property
     def faces(self) -> NDArray[np.int64]:
-        """The face that each triangle is part of, shape (m,), by the number of its first triangle.
-
-        Neighbors whose normals differ by less than 30 degrees are parts of one face, which is flat
-        or curved.
-        """
+        """The face of each triangle, (m,), by its first triangle: neighbors within 30 degrees."""
         number = list(range(len(self.triangles)))
         for one, other in self._neighbors():
             if dot(self.normals[one], self.normals[other]) > _SMOOTH_COSINE:
@@ -108,11 +104,7 @@ class Mesh:
 
     @functools.cached_property
     def corner_normals(self) -> NDArray[np.float64]:
-        """Outward unit normal of the face at each corner of every triangle, shape (m, 3, 3).
-
-        On a curved face it is the mean of the triangles' around the corner, each counted by its
-        angle there, which makes the facets of a cylinder look round.
-        """
+        """Outward unit normal of the face, flat or round, at each corner, shape (m, 3, 3)."""
         before, after = (np.roll(self.corners_m, n, axis=1) - self.corners_m for n in (1, -1))
         sines = np.sqrt(dot(crossed := cross(after, before), crossed))
         angles = rounded(np.arctan2(sines, dot(after, before)))
@@ -282,10 +274,7 @@ def origin_m(
 
 
 def put(step: PoseStep, candidates: CandidateSet) -> Block | None:
-    """The block that a step puts, None for a number that no candidate has.
-
-    Without a rotation of its own it has that of its candidate.
-    """
+    """The block that a step puts, as turned as its candidate; None where it names none."""
     if not 1 <= step.candidate <= len(candidates):
         return None
     candidate = candidates[step.candidate]

@@ -80,10 +80,7 @@ def picture(
     size_px: int,
     ground: NDArray[np.float32] | None = None,
 ) -> Image.Image:
-    """Blocks on their floor, anti-aliased, an RGB image of `size_px` squared.
-
-    `ground` is the floor as `empty_ground` gives it, for those who draw it often.
-    """
+    """Blocks on their floor, or on a `ground` as `empty_ground` gives it, anti-aliased, RGB."""
     image = empty_ground(background, camera, size_px) if ground is None else ground.copy()
     if blocks:
         raster = _raster(blocks, camera, size_px * SUPERSAMPLE)
@@ -101,11 +98,7 @@ def empty_ground(background: Background, camera: Camera, size_px: int) -> NDArra
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """Blocks with their outlines, before floor and smoothing.
-
-    `rgb` shape (size, size, 3), 0..255; `block` shape (size, size), the 0-based number of the
-    block seen in each pixel, -1 where there is none.
-    """
+    """Blocks, outlined: `rgb` (size, size, 3), and the `block` of each pixel, from 0, or -1."""
 
     rgb: NDArray[np.uint8]
     block: NDArray[np.int64]
@@ -146,10 +139,7 @@ def light_direction(camera: Camera) -> NDArray[np.float64]:
 def draw_outlines(
     image: NDArray[Pixel], raster: Raster, background: Background | None
 ) -> NDArray[Pixel]:
-    """A picture (size, size, 3) of a raster with lines where faces end.
-
-    On a background, a rim goes round the blocks too, a pixel wider on the floor.
-    """
+    """A picture (size, size, 3) of a raster with lines where faces, and blocks, end."""
     lined: NDArray[Pixel] = image.copy()
     lined[_ends(raster.face, raster.prop) & (raster.prop >= 0)] = INK_RGB
     if background is not None:
@@ -399,10 +389,7 @@ def candidate_camera(block: Block, style: PictureStyle, distance_m: float | None
 
 
 def close_camera(block: Block, style: PictureStyle, window: Window) -> Camera:
-    """The camera of a block by itself, which fills a like share of the window whatever its type.
-
-    Longer ones fill a little more, so that a picture still tells which of two is the larger.
-    """
+    """The camera of a block by itself, which fills a like share whatever its type."""
     shape = SHAPES[block.type]
     share = math.dist(shape.low_m, shape.high_m) / _LARGEST_DIAGONAL_M
     return frame(drawn_m(block), style.axes, window.scaled(share**_SIZE_CUE))

@@ -228,10 +228,7 @@ def _cost(
 
 
 def lettered_sheet_png(pictures: Sequence[bytes], letters: str, side_px: int) -> bytes:
-    """PNG with the encoded pictures in rows of two, each `side_px` wide and high.
-
-    A dark letter on a white badge stands in the upper left corner of each.
-    """
+    """PNG with pictures in rows of two, `side_px` wide, a letter on each."""
     sheet = Image.new("RGB", sheet_size_px(len(pictures), side_px), "white")
     step = side_px + gap_px(side_px)
     side, start = max(18, round(side_px * _BADGE)), round(side_px * _MARGIN)
@@ -329,10 +326,7 @@ def block_mark(recipe: QuestionPicture, shot: Shot, order: int, letter: str) -> 
 
 
 def visible_tops(recipe: QuestionPicture, shot: Shot, step_px: int, least_rise: float) -> list[Top]:
-    """Points of surfaces that show, behind every `step_px`-th pixel, `rise` at least so much.
-
-    Pixels at the edge of what shows of a block are left out.
-    """
+    """Points of surfaces behind every `step_px`-th pixel, `rise` at least so much."""
     camera, blocks = question_camera(recipe, _STYLE), drawn_blocks(recipe)
     tops = []
     for row, column in product(range(step_px // 2, SEEN_PX - 2, step_px), repeat=2):

@@ -205,10 +205,7 @@ def kit_png(candidates: CandidateSet, style: PictureStyle) -> bytes:
 
 
 def kit_sheet(candidates: CandidateSet, style: PictureStyle) -> Image.Image:
-    """Every candidate with its number, its dimensions, and a dot in the middle of its box.
-
-    Square, 4 by 4 cells, seen from where the style says.
-    """
+    """Every candidate with its number, its dimensions, and a dot in the middle of its box."""
     sheet, blocks, distance_m = candidates_grid(candidates, style)
     draw, side = ImageDraw.Draw(sheet), style.size_px / GRID_COLUMNS
     font = ImageFont.load_default(size=_TEXT * side)
