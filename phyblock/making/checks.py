@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Literal, NamedTuple
 
 from phyblock.domain.aov import AOVGraph, CycleError
@@ -241,32 +241,17 @@ def _floating(facts: SceneFacts) -> Iterator[Finding]:
         yield facts.finding("floating", message, gap.order, **measured)
 
 
-def _undeclared(facts: SceneFacts) -> Iterator[Finding]:
-    """Contacts that carry and are not declared."""
-    message = "block {} rests on {}, which is not declared"
-    yield from _beyond(facts, "undeclared dependency", facts.contacts, facts.declared, message)
-
-
-def _without_contact(facts: SceneFacts) -> Iterator[Finding]:
-    """Declared dependencies that are no contacts that carry."""
-    message = "block {} does not rest on {}, which is declared"
-    yield from _beyond(facts, "dependency without contact", facts.declared, facts.contacts, message)
-
-
-def _beyond(
-    facts: SceneFacts,
-    name: CheckName,
-    more: Mapping[int, Collection[int]],
-    less: Mapping[int, Collection[int]],
-    message: str,
-) -> Iterator[Finding]:
+def _dependencies(facts: SceneFacts, name: CheckName, message: str) -> Iterator[Finding]:
+    """Contacts that carry and are not declared, or what is declared without contact."""
     for at, block in _blocks(facts):
-        for other in sorted(set(more[block.order]) - set(less[block.order])):
+        contacts, declared = facts.contacts[block.order], facts.declared[block.order]
+        is_undeclared = name == "undeclared dependency"
+        for other in sorted(contacts - declared if is_undeclared else declared - contacts):
             yield facts.finding(
                 *(name, message.format(block.order, _name(other)), block.order, other),
                 field=f"{at}.depend",
-                found=str(sorted(facts.declared[block.order])),
-                allowed=str(sorted(facts.contacts[block.order])),
+                found=str(sorted(declared)),
+                allowed=str(sorted(contacts)),
             )
 
 
@@ -336,8 +321,16 @@ CHECKS: dict[CheckName, Callable[[SceneFacts], Iterable[Finding]]] = {
     "hidden": _hidden,
     "overlap": _overlap,
     "floating": _floating,
-    "undeclared dependency": _undeclared,
-    "dependency without contact": _without_contact,
+    "undeclared dependency": partial(
+        _dependencies,
+        name="undeclared dependency",
+        message="block {} rests on {}, which is not declared",
+    ),
+    "dependency without contact": partial(
+        _dependencies,
+        name="dependency without contact",
+        message="block {} does not rest on {}, which is declared",
+    ),
     "unstable step": _unstable_step,
     "unstable": _unstable,
     "candidates": _candidates,

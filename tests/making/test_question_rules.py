@@ -16,7 +16,7 @@ from phyblock.domain.blocks import SHAPES, Euler
 from phyblock.domain.question import Mark
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, turned_form
 from phyblock.making.questions.affordance import is_on_face, stays_at
-from phyblock.making.questions.base import UnfairError, four_alike
+from phyblock.making.questions.base import Draft, UnfairError, four_alike
 from phyblock.making.questions.dynamics import ranked_as_drawn, resting_on
 from phyblock.making.questions.names import (
     SHAPE_WORDS,
@@ -33,7 +33,7 @@ from phyblock.making.questions.relations import (
     put_beside,
     tipped_over,
 )
-from phyblock.making.questions.selection import BALANCE, Texts, even_letters, keeping_odds
+from phyblock.making.questions.selection import BALANCE, even_letters, keeping_odds
 from phyblock.making.questions.structures import (
     is_sure,
     lowered,
@@ -291,7 +291,11 @@ def test_every_letter_is_right_about_as_often(count: int, seed: int) -> None:
 SHAPE_TEXTS = ("cube", "arch", "cylinder", "prism", "half cylinder")
 
 
-def pool(count: int, odds: tuple[float, ...], seed: int) -> list[Texts]:
+def told(base: str, text: str, options: tuple[str, ...]) -> Draft:
+    return Draft(Scene(base, (1,), (), (base,)), text, options, (), "", "", {})
+
+
+def pool(count: int, odds: tuple[float, ...], seed: int) -> list[Draft]:
     """Drafts in which shapes are right as often as `odds` say, the more so of what is on top."""
     rng = np.random.default_rng(seed)
     made = []
@@ -301,11 +305,11 @@ def pool(count: int, odds: tuple[float, ...], seed: int) -> list[Texts]:
         right = int(rng.choice(len(SHAPE_TEXTS), p=chances / chances.sum()))
         others = [int(i) for i in rng.permutation(len(SHAPE_TEXTS)) if i != right][:3]
         options = tuple(SHAPE_TEXTS[i] for i in (right, *others))
-        made.append(Texts(f"s{number % 60}", "", f"What shape is the {word} block?", options))
+        made.append(told(f"s{number % 60}", f"What shape is the {word} block?", options))
     return made
 
 
-def rate_off(texts: list[Texts]) -> float:
+def rate_off(texts: list[Draft]) -> float:
     """How far from chance the shape is that is right most or least often where it is offered."""
     right = Counter(one.options[0] for one in texts)
     offered = Counter(option for one in texts for option in one.options)
@@ -316,8 +320,8 @@ def test_of_the_drafts_kept_each_option_is_right_equally_often() -> None:
     texts, rng = pool(3000, (0.4, 0.25, 0.15, 0.1, 0.1), 1), np.random.default_rng(2)
     odds = dict(zip(map(id, texts), keeping_odds(texts), strict=True))
     for word in ("topmost", "leftmost"):
-        before = [one for one in texts if word in one.question]
+        before = [one for one in texts if word in one.text]
         assert rate_off(before) > 0.15
         assert rate_off([one for one in before if rng.random() < odds[id(one)]]) < 0.08
     assert np.mean(keeping_odds(pool(800, (0.2,) * 5, 3))) > 0.7
-    assert keeping_odds([Texts("s", "k", "Which picture?", ())] * 5) == [1.0] * 5
+    assert keeping_odds([told("s", "Which picture?", ())] * 5) == [1.0] * 5

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from phyblock.domain import BLOCK_TYPES, KIT_PALETTE, Scene
 from phyblock.domain.symmetry import canonical_form
-from phyblock.making.scenes.designs import BUILDINGS, COMPOSITIONS, CREATURES
+from phyblock.making.scenes.designs import BUILDINGS, COMPOSITIONS, CREATURES, beside
 from phyblock.making.scenes.production import (
     GROUP_LEVELS,
     Request,
@@ -24,7 +24,7 @@ from phyblock.making.scenes.production import (
 )
 from phyblock.making.scenes.sketch import PALETTES, POSES, Draft
 from phyblock.making.workers import open_workers
-from phyblock.sim.contact import find_gaps, find_overlaps
+from phyblock.sim.contact import bounds_m, find_gaps, find_overlaps
 from phyblock.sim.pictures import hidden_blocks
 from tests.designs.acceptance import accept, form_problems
 from tests.designs.pad import Pad
@@ -123,6 +123,18 @@ def test_a_combined_scene_holds_both_parents() -> None:
     split = len(whole[0])
     assert canonical_form(scene.blocks[:split]) == canonical_form(whole[0].blocks)
     assert canonical_form(scene.blocks[split:]) == canonical_form(whole[1].blocks)
+
+
+@given(st.integers(0, 3), st.integers(0, 3), st.sampled_from([0.0, 1.0, 2.5]), st.booleans())
+@settings(deadline=None, max_examples=20)
+def test_parts_stand_beside_one_another_with_their_gap(one, other, gap, deep) -> None:
+    axis = 0 if deep else 1
+    parts = [draw(request).blocks for request in (some("2", 4)[one], some("2", 4)[other])]
+    row = beside(parts, gap, axis)
+    low = min(bounds_m(block)[0][axis] for block in row[len(parts[0]) :])
+    high = max(bounds_m(block)[1][axis] for block in row[: len(parts[0])])
+    assert low - high == pytest.approx(gap * 0.025, abs=1e-5)
+    assert [block.order for block in row] == list(range(1, len(row) + 1))
 
 
 SMALL = (Share("1", 3, 1), Share("2", 4, 2), Share("3", 2, 1))

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from phyblock.domain import BLOCK_TYPES, SHAPES, Block
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, canonical_form
 from phyblock.making.scenes.sketch import POSES, transformed
+from phyblock.sim.contact import find_overlaps, support_graph
 from phyblock.sim.pictures import drawn_m
 from tests.designs.scenes import designed_scenes
 
@@ -78,3 +79,11 @@ def test_another_color_or_place_is_another_form(blocks, pick: int) -> None:
     for changed in (other, raised):
         whole = [changed if b is block else b for b in blocks]
         assert canonical_form(whole) != canonical_form(blocks)
+
+
+@given(structures, st.sampled_from(SYMMETRIES))
+@settings(deadline=None, max_examples=25)
+def test_contacts_are_kept(blocks, symmetry: Symmetry) -> None:
+    image = transformed(blocks, symmetry)
+    assert support_graph(image) == support_graph(blocks)
+    assert find_overlaps(image) == find_overlaps(blocks)

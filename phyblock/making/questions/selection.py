@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections import Counter, defaultdict
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,7 +77,7 @@ def _spread(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list
 
 def _kept(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[Draft]:
     """The drafts that chance leaves; more likely ones as well where they would be too few."""
-    odds = np.array(keeping_odds([_texts(draft) for draft in pool]))
+    odds = np.array(keeping_odds(pool))
     rank = rng.random(len(pool)) / np.maximum(odds, 1e-9)
     least = float(np.sort(rank)[: _SPARE * count][-1]) if len(pool) else 0.0
     return [one for one, place in zip(pool, rank, strict=True) if place <= max(1.0, least)]
@@ -87,7 +87,7 @@ def _even(draft: Draft) -> Iterator[tuple[Hashable, Hashable, float]]:
     """Groups, the draft's member of each, and weights: members should be equally frequent."""
     yield "kind", draft.kind, _WEIGHTS["kind"]
     yield ("wording", draft.kind), draft.wording, _WEIGHTS["wording"]
-    if texts := _option_texts(draft):
+    if texts := _texts(draft):
         yield ("options", draft.kind), frozenset(texts), _WEIGHTS["options"]
         return
     for place, part in enumerate(draft.value.split(", ")):
@@ -96,7 +96,7 @@ def _even(draft: Draft) -> Iterator[tuple[Hashable, Hashable, float]]:
     yield "level", draft.scene.level, _WEIGHTS["level"]
 
 
-def _option_texts(draft: Draft) -> tuple[str, ...]:
+def _texts(draft: Draft) -> tuple[str, ...]:
     """The options as texts; of pictures and places, whose texts tell nothing, none."""
     return tuple(option for option in draft.options if isinstance(option, str))
 
@@ -107,12 +107,6 @@ def _identity(draft: Draft) -> Hashable:
     slots = sorted((name, str(slot)) for name, slot in draft.evidence.get("slots", {}).items())
     options = frozenset(option for option in draft.options if not isinstance(option, str))
     return (draft.scene.id, colors, draft.kind, tuple(slots), draft.pictures, options)
-
-
-def _texts(draft: Draft) -> Texts:
-    """The draft as a reader without pictures sees it."""
-    group = (draft.scene.parents or (draft.scene.id,))[0]
-    return Texts(group, draft.kind, draft.text, _option_texts(draft), draft.looks)
 
 
 BALANCE = (0.22, 0.28)
@@ -135,44 +129,22 @@ def even_letters(count: int, rng: np.random.Generator) -> list[int]:
             return [int(letter) for letter in drawn]
 
 
-_STEPS = 60
-_RATE = 0.3
-_PENALTY = 2.0
+_STEPS, _RATE, _PENALTY = 60, 0.3, 2.0
 _FITTED = 2000
 """So many drafts are learned from at most, spread over the pool."""
-
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Texts:
-    """A draft as a reader without pictures sees it; the right option stands first.
+class _Table(NamedTuple):
+    """Features of options as a sparse matrix: entry `values[i]` at `rows[i]`, `columns[i]`.
 
-    `group` is equal for drafts about scenes that share parts, `kind` for those that ask the same.
-    `looks` are measures of options that are no texts, as many of each.
+    `starts` are the rows at which the options of each draft begin, the right one first.
     """
-
-    group: str
-    kind: str
-    question: str
-    options: tuple[str, ...]
-    looks: tuple[tuple[float, ...], ...] = ()
-
-    @property
-    def tells(self) -> bool:
-        """True if there is anything to go by."""
-        return bool(self.options or self.looks)
-
-
-@dataclass(frozen=True)
-class _Table:
-    """Features of options as a sparse matrix: entry `values[i]` at `rows[i]`, `columns[i]`."""
 
     rows: NDArray[np.int64]
     columns: NDArray[np.int64]
     values: Floats
     starts: NDArray[np.int64]
-    """Rows at which the options of each draft begin, the right one first."""
 
     def chances(self, weights: Floats) -> Floats:
         """Probability of each option, one after the other."""
@@ -184,50 +156,47 @@ class _Table:
         return chances
 
 
-def keeping_odds(texts: Sequence[Texts]) -> list[float]:
-    """The probability with which each draft is kept; 1 where there is nothing to go by."""
-    groups = sorted({one.group for one in texts if one.tells})
-    half_of = {group: place % 2 for place, group in enumerate(groups)}
-    odds = [1.0] * len(texts)
-    for half in (0, 1):
-        known = [one for one in texts if one.tells and half_of[one.group] != half]
-        mine = [i for i, one in enumerate(texts) if one.tells and half_of[one.group] == half]
-        if known and mine:
-            for i, kept in zip(mine, _judged(known, [texts[i] for i in mine]), strict=True):
-                odds[i] = kept
+def keeping_odds(drafts: Sequence[Draft]) -> list[float]:
+    """The probability with which each draft is kept; 1 where there is nothing to guess by.
+
+    A reader without pictures learns from half of the base scenes, and guesses at the other half.
+    """
+    group_of = [(one.scene.parents or (one.scene.id,))[0] for one in drafts]
+    telling = [i for i, one in enumerate(drafts) if _texts(one) or one.looks]
+    half_of = {g: n % 2 for n, g in enumerate(sorted({group_of[i] for i in telling}))}
+    halves = [[i for i in telling if half_of[group_of[i]] == half] for half in (0, 1)]
+    odds = [1.0] * len(drafts)
+    for mine, known in (halves, halves[::-1]) if all(halves) else ():
+        names: dict[str, int] = {}
+        learned = _table([drafts[i] for i in known[:: -(-len(known) // _FITTED)]], names, True)
+        weights = _fit(learned, len(names))
+        asked = _table([drafts[i] for i in mine], names, False)
+        of_each = np.split(asked.chances(weights), asked.starts[1:])
+        for i, chances in zip(mine, of_each, strict=True):
+            odds[i] = float(chances.min() / chances[0])
     return odds
 
 
-def _judged(known: Sequence[Texts], asked: Sequence[Texts]) -> list[float]:
-    names: dict[str, int] = {}
-    step = -(-len(known) // _FITTED)
-    learned = _table(known[::step], names, grows=True)
-    weights = _fit(learned, len(names))
-    table = _table(asked, names, grows=False)
-    chances = table.chances(weights)
-    return [float(of_one.min() / of_one[0]) for of_one in np.split(chances, table.starts[1:])]
-
-
-def _table(texts: Sequence[Texts], names: dict[str, int], grows: bool) -> _Table:
+def _table(drafts: Sequence[Draft], names: dict[str, int], grows: bool) -> _Table:
     """The features of all options; unknown ones are added to `names`, or dropped."""
     rows, columns, values, starts = [], [], [], []
     row = 0
-    for one in texts:
+    for one in drafts:
         starts.append(row)
         for features in _features(one):
             for name, value in features.items():
-                if not (grows or name in names):
-                    continue
-                rows.append(row)
-                columns.append(names.setdefault(name, len(names)))
-                values.append(value)
+                if grows or name in names:
+                    rows.append(row)
+                    columns.append(names.setdefault(name, len(names)))
+                    values.append(value)
             row += 1
     return _Table(np.array(rows), np.array(columns), np.array(values), np.array(starts))
 
 
-def _features(one: Texts) -> Iterator[Mapping[str, float]]:
+def _features(one: Draft) -> Iterator[Mapping[str, float]]:
     """Of each option, as they are and for its kind, with the others it stands beside."""
     if one.looks:
+        # How far each measure is from the mean of the options, in standard deviations.
         values = np.array(one.looks)
         spread = values.std(axis=0)
         for steps in (values - values.mean(axis=0)) / np.where(spread > 0, spread, 1.0):
@@ -235,8 +204,9 @@ def _features(one: Texts) -> Iterator[Mapping[str, float]]:
                 f"{one.kind}: off {i}": abs(step) for i, step in enumerate(steps)
             }
         return
-    together = " / ".join(sorted(one.options))
-    for option, features in zip(one.options, text_features(one.question, one.options), strict=True):
+    options = _texts(one)
+    together = " / ".join(sorted(options))
+    for option, features in zip(options, text_features(one.text, options), strict=True):
         own = {f"{one.kind}: {name}": value for name, value in features.items()}
         yield {"": 1.0, **features, **own, f"{one.kind}: {option} of {together}": 1.0}
 
