@@ -460,6 +460,10 @@ def test_every_view_of_a_report_can_be_read_and_reached(visit: ReportVisit, addr
     page = visit.open(address)
     if address.startswith("samples"):
         page.wait_for_selector("#detail .tabs")
+        page.set_viewport_size({"width": 1024, "height": 800})
+        box = page.locator("#sample-title").bounding_box()
+        assert box
+        assert box["width"] > 100
     assert page.evaluate(STRUCTURE) == SOUND
     light = page.evaluate("getComputedStyle(document.documentElement).backgroundColor")
     page.locator("#theme").click()
