@@ -263,6 +263,8 @@ def board_of(
         about |= {"unit": measure.unit, "better": measure.better}
         about["best"] = None if math.isnan(measure.best) else measure.best
         about["notes"] = list(kind.report().notes(run))
+        wrong = [one.name for one in track_measures(track) if one.name.startswith("wrong_")]
+        about["errors"] = [name.removeprefix("wrong_") for name in wrong]
         floor = headline_floors(run, track).get(heading)
         about["floor"] = floor and {"name": floor.name, "value": round(floor.value, 4)}
         tracks.append({**about, "physics": kind.physics(run.manifest.suite)})

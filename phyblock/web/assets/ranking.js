@@ -117,7 +117,7 @@ const Ranking = (() => {
   function losses(data, track, main, to) {
     const rows = Table.sorted(data.rows.filter((row) => Object.keys(row.facts[track.name]?.errors || {}).length),
       { value: (row) => row.values[main?.id]?.[0] ?? null }, track.better !== "lower");
-    const names = [...new Set(rows.flatMap((row) => Object.keys(row.facts[track.name].errors)))];
+    const names = track.errors.filter((name) => rows.some((row) => row.facts[track.name].errors[name]));
     if (!names.length) return null;
     return el("section", { class: "losses", "aria-labelledby": `errors-${track.name}` }, el("h2", { id: `errors-${track.name}` }, "Wrong steps by type"),
       el("p", { class: "keys-of" }, names.map((name, i) => el("span", { class: `key error-${i}` }, Words.named(name)))),
