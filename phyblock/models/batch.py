@@ -99,11 +99,13 @@ class Batch:
 class Ledger:
     """The batches of one model; every change is on disk when `note` returns."""
 
-    def __init__(self, model: str, files: BatchFiles) -> None:
+    def __init__(
+        self, model: str, lines: Iterable[BatchLine], put: Callable[[BatchLine], Awaitable[None]]
+    ) -> None:
         self._model = model
-        self._files = files
+        self._put = put
         self.batches: dict[str, Batch] = {}
-        for line in files.earlier:
+        for line in lines:
             if line.model == model and line.event == "intended":
                 costs = line.most_usd or [None] * len(line.keys)
                 created = datetime.strptime(line.time, _TIME).replace(tzinfo=UTC)
@@ -122,7 +124,7 @@ class Ledger:
         known = {"batch": batch.token, "model": self._model, "event": event}
         now = datetime.now(UTC).strftime(_TIME)
         line = BatchLine.model_validate({**known, "time": now, **fields})
-        await self._files.put(line)
+        await self._put(line)
         self._take(batch, line)
 
     def _take(self, batch: Batch, line: BatchLine) -> None:
@@ -138,9 +140,7 @@ class BatchModel:
     """A GatheringModel over a provider's batches.
 
     `client` makes a client that sends through an HTTP client: by it requests are written and
-    answers are read as those of direct calls. `_again` are requests whose answer in the newest
-    batch failed, `_failures` how often; `_given` those whose answer a sample of this command has,
-    `_billed_usd` what a limit counted for each.
+    answers are read as those of direct calls.
     """
 
     config: ModelConfig
@@ -156,13 +156,14 @@ class BatchModel:
     def __post_init__(self) -> None:
         self.name = self.config.name
         self._provider = PROVIDERS[self.config.provider](self.config)
-        self._ledger = Ledger(self.name, self.files)
+        self._ledger = Ledger(self.name, self.files.earlier, self.files.put)
         self._earlier = {key for batch in self._ledger.batches.values() for key in batch.most_usd}
         self._drafting = asyncio.Lock()
         self._draft: Batch | None = None
         self._refusal: UnavailableError | None = None
         self._has_begun = False
         self._takes_seed = self.config.seed != "never"
+        # Requests whose newest answer failed, how often, and those whose answer a sample has.
         self._again: set[str] = set()
         self._failures: Counter[str] = Counter()
         self._given: set[str] = set()
@@ -235,16 +236,15 @@ class BatchModel:
                     raise AskLaterError from None
             raise
         cost_usd = reply_cost_usd(self.prices, reply, batch.created.date())
+        reply = reply.model_copy(update={"cost_usd": cost_usd})
         if key in self._given:
             # A second sample that asks the same.
-            update = {"cost_usd": cost_usd, "cached": True, "attempts": 0}
-            return reply.model_copy(update=update)
+            return reply.model_copy(update={"cached": True, "attempts": 0})
         self._given.add(key)
         self._settle(key, batch, cost_usd)
         if self.budget is not None:
             self.budget.learn(estimate(self.config, request), reply.usage)
-        billed_usd, attempts = self._billed_usd.get(key), self._failures[key] + 1
-        update = {"cost_usd": cost_usd, "billed_usd": billed_usd, "attempts": attempts}
+        update = {"billed_usd": self._billed_usd.get(key), "attempts": self._failures[key] + 1}
         reply = reply.model_copy(update=update)
         if self.cache is not None:
             self.cache.put(key, self.config.id, reply)
@@ -352,11 +352,7 @@ class BatchModel:
         self._following(draft)
 
     async def _send(self, batch: Batch) -> None:
-        """Send a draft; then the provider has it, and its id is on disk.
-
-        Raises UnavailableError where it cannot be sent, and nothing was asked; UnsureError where
-        that is not known.
-        """
+        """Send a draft and note its id; UnsureError where it is not known if it was sent."""
         costs = [] if None in batch.most_usd.values() else list(batch.most_usd.values())
         fields = {"keys": tuple(batch.most_usd), "most_usd": costs, "seeded": batch.seeded}
         await self._ledger.note(batch, "intended", **fields)
@@ -384,11 +380,7 @@ class BatchModel:
         batch.lines.clear()
 
     async def _find(self, batch: Batch, until_s: float) -> BatchStatus | None:
-        """Return the batch that was being sent; None where there is none until then.
-
-        Those without a name that may be it are waited for: their answers say whose they are.
-        Raises UnsureError where the list or the answers of one cannot be read.
-        """
+        """Return the batch that was being sent, None where there is none; raises UnsureError."""
         strangers = {one.id for one in self._ledger.batches.values()}
         earliest_s = batch.created.timestamp() - _CLOCKS_APART_S
 
@@ -446,11 +438,7 @@ class BatchModel:
         return batch.following
 
     async def _follow(self, batch: Batch) -> None:
-        """Return when the batch has ended and its answers are here, or when it is lost: refused as
-        a whole, so that nothing was asked.
-
-        Raises UnavailableError where nothing can be learned of it now: it is left as it is.
-        """
+        """Return when the answers are here, or when the batch was refused as a whole."""
         path = self.files.answers(batch.token)
         if batch.event == "created":
             try:
@@ -507,9 +495,7 @@ class BatchModel:
     # Requests as lines and answers as replies, by the client of direct calls.
 
     async def _written(self, request: Request) -> tuple[_NoConnection, bool]:
-        """Return the body and headers of a direct call, and True if it has a seed; raises as a
-        direct call does before it sends.
-        """
+        """Return what a direct call would send, and True if it has a seed; raises as that."""
         while True:
             http, with_seed = _NoConnection(), self._takes_seed
             try:
@@ -522,10 +508,7 @@ class BatchModel:
                 return http, with_seed
 
     async def _read(self, key: str, request: Request, batch: Batch) -> Reply:
-        """Return the reply that a direct call would have made of the answer; raises as that does.
-
-        RetryableError also where there is no answer, or none that can be read.
-        """
+        """Return the reply that a direct call would have made of the answer; raises as that."""
         assert batch.answers is not None, "the batch has ended"
         answer = batch.answers.get(key)
         if answer is None:
@@ -615,10 +598,9 @@ def waiting_keys(
     async def put(line: BatchLine) -> None:
         raise AssertionError(f"only read here: {line.event}")
 
-    files = BatchFiles(tuple(lines), put, run_folder)
+    files, waiting = BatchFiles((), put, run_folder), set[str]()
     provider = PROVIDERS[config.provider](config)
-    waiting: set[str] = set()
-    for batch in Ledger(config.name, files).batches.values():
+    for batch in Ledger(config.name, lines, put).batches.values():
         path = files.answers(batch.token)
         # Without its answers a batch stops its model: nothing of it is asked again.
         if batch.event != "ended" or not path.is_file():

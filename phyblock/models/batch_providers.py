@@ -177,11 +177,7 @@ class BatchProvider(ABC):
 
 
 class _OpenAI(BatchProvider):
-    """`{api_base}/files` and `{api_base}/batches`, of OpenAI and of servers that have both.
-
-    A file of requests is uploaded with the purpose `batch`, then a batch is made of it; answers are
-    in its output file, errors and what expired in its error file.
-    """
+    """`{api_base}/files` and `{api_base}/batches`, of OpenAI and servers that have both."""
 
     headers: ClassVar[Mapping[str, str]] = {"Authorization": "Bearer {key}"}
 
@@ -237,11 +233,7 @@ class _OpenAI(BatchProvider):
 
 
 class _Anthropic(BatchProvider):
-    """`/v1/messages/batches`: one call carries all requests, and answers come as JSON lines.
-
-    A batch has no name of ours, so that one whose making was cut off is found by what its answers
-    answer.
-    """
+    """`/v1/messages/batches`, in which a batch has no name of ours."""
 
     headers: ClassVar[Mapping[str, str]] = {"anthropic-version": "2023-06-01", "x-api-key": "{key}"}
     after = "after_id"
@@ -293,9 +285,7 @@ class _Anthropic(BatchProvider):
 
 
 class _Gemini(BatchProvider):
-    """`/v1beta/models/{model}:batchGenerateContent` and `/v1beta/batches`: a file of requests is
-    uploaded, then a batch is made of it by our name.
-    """
+    """`/v1beta/models/{model}:batchGenerateContent` and `/v1beta/batches`."""
 
     headers: ClassVar[Mapping[str, str]] = {"x-goog-api-key": "{key}"}
 

@@ -175,11 +175,7 @@ class ReplyCache:
         self._db.close()
 
     def _prepare(self) -> None:
-        """Open the file, or make it.
-
-        In WAL mode a committed reply survives the death of the process, and readers do not wait
-        for a writer.
-        """
+        """Open the file, or make it, so that a committed reply survives the process (WAL)."""
         self._db.execute("BEGIN")
         version = self._db.execute("PRAGMA user_version").fetchone()[0]
         tables = self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]

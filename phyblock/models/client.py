@@ -22,11 +22,9 @@ from typing import TYPE_CHECKING, Any
 from phyblock.config.models import ModelConfig, host_of
 from phyblock.errors import (
     ModelError,
-    Problem,
     RefusedError,
     RetryableError,
     SampleError,
-    SpecError,
     UnavailableError,
     UnreachableError,
 )
@@ -233,13 +231,8 @@ class OpenAIClient(Client):
     """`POST {api_base}/chat/completions`."""
 
     def __init__(self, config: ModelConfig, http: HttpClient | None = None) -> None:
-        """Raise SpecError where no address is given and the provider is not OpenAI.
-
-        Without an address the request, with another provider's key, would go to OpenAI.
-        """
-        if config.api_base is None and config.provider != "openai":
-            message = "needs an api_base to be called directly"
-            raise SpecError(Problem(f"model {config.name}", message, "api_base", config.id))
+        # Else the request, with another provider's key, would go to OpenAI.
+        assert config.api_base is not None or config.provider == "openai"
         super().__init__(config, http)
         self._url = f"{(config.api_base or OPENAI_API_BASE).rstrip('/')}/chat/completions"
 

@@ -224,9 +224,7 @@ def _mapped_tariff(config: ModelConfig) -> Tariff | None:
 
 
 def _mapped_price(entry: Mapping[str, Any], ending: str) -> dict[str, float] | None:
-    """Return the price in the keys that end so; that of a cached prompt may lack the ending, and
-    is never more than that of the prompt.
-    """
+    """Return the price in the keys that end so; that of a cached prompt may lack the ending."""
     found = {name: entry.get(key + ending) for name, key in _MAP_KEYS.items()}
     usd = {name: float(n) * 1_000_000 for name, n in found.items() if n is not None}
     if "input" not in usd or "output" not in usd:
@@ -258,8 +256,8 @@ class Budget:
         spent_usd: float = 0.0,
         of_models: Mapping[str, float] | None = None,
     ) -> None:
-        self.max_usd = math.inf if max_cost_usd is None else _amount(max_cost_usd)
-        self.spent_usd = _amount(spent_usd)
+        self.max_usd = math.inf if max_cost_usd is None else max_cost_usd
+        self.spent_usd = spent_usd
         """The cost of settled calls, what was spent at the start included."""
         self.held_usd = 0.0
         self.holds = 0
@@ -281,8 +279,8 @@ class ModelBudget:
 
     def __init__(self, run: Budget, max_cost_usd: float | None, spent_usd: float) -> None:
         self._run = run
-        self._max_usd = math.inf if max_cost_usd is None else _amount(max_cost_usd)
-        self._spent_usd = _amount(spent_usd)
+        self._max_usd = math.inf if max_cost_usd is None else max_cost_usd
+        self._spent_usd = spent_usd
         self._held: dict[int, float] = {}
         self._held_usd = 0.0
         self._next = 0
@@ -309,7 +307,7 @@ class ModelBudget:
         """
         run = self._run
         while True:
-            usd = _amount(most_usd())
+            usd = most_usd()
             if not self._held and self._spent_usd + usd > self._max_usd:
                 spent = f"{self._spent_usd:.4f} spent, the next call can cost {usd:.4f}"
                 raise UnavailableError(f"its max_cost_usd {self._max_usd:g} is reached: {spent}")
@@ -332,7 +330,7 @@ class ModelBudget:
     def hold(self, usd: float) -> int:
         """Make a reservation, whether it fits or not; return its number."""
         self._next += 1
-        self._held[self._next] = _amount(usd)
+        self._held[self._next] = usd
         self._held_usd += usd
         self._run.held_usd += usd
         self._run.holds += 1
@@ -345,7 +343,7 @@ class ModelBudget:
         held = self._held.pop(reservation)
         self._under_way.discard(reservation)
         self._settled += 1
-        counted = usd if usd is not None and _is_amount(usd) else held
+        counted = usd if usd is not None and math.isfinite(usd) and usd >= 0 else held
         self._spent_usd += counted
         run = self._run
         run.holds -= 1
@@ -367,16 +365,6 @@ class ModelBudget:
         self._prompt_ratio = ratio(self._prompt_ratio, usage.prompt_tokens, expected.prompt_tokens)
         longest = expected.most_completion_tokens
         self._reply_ratio = ratio(self._reply_ratio, usage.completion_tokens, longest)
-
-
-def _amount(usd: float) -> float:
-    if not _is_amount(usd):
-        raise ValueError(f"no amount of money: {usd}")
-    return usd
-
-
-def _is_amount(usd: float) -> bool:
-    return math.isfinite(usd) and usd >= 0
 
 
 @dataclass(frozen=True)
@@ -544,9 +532,7 @@ def _tiles(whole: int, tile: int) -> _Count:
 
 
 def _patches(factor: float, most: int, longest_px: int = 2048) -> _Count:
-    """Square patches of 32 pixels of a picture that is scaled down to a longest side, then until
-    they are at most so many; each counts as `factor` tokens.
-    """
+    """Patches of 32 pixels of a picture scaled to a side, then to `most`; `factor` tokens each."""
 
     def count(width: float, height: float) -> float:
         scale = min(1.0, longest_px / max(width, height))

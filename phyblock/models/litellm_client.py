@@ -38,8 +38,6 @@ from phyblock.models.request import Request, wire_messages, wire_params
 from phyblock.records.record import Reply, Usage
 
 if TYPE_CHECKING:
-    import types
-
     import httpx
 
 _GRACE_S = 10.0
@@ -120,12 +118,7 @@ class LitellmClient(Client):
         return read_completion(body, latency_s, exchange.answer.status if exchange.answer else 200)
 
     def _after(self, error: Exception, exchange: _Exchange, latency_s: float) -> Reply:
-        """Raise the error of a call that litellm gave up, by what was on the wire; or return the
-        reply where it failed on a good one, as on counts that are no numbers.
-
-        litellm gives whatever went wrong a class of its own, which says less; but it knows more of
-        the words by which providers refuse for their policy.
-        """
+        """Raise the error of a failed call by what was on the wire, or return the reply there."""
         if exchange.failure is not None:
             raise exchange.failure from None
         answer = exchange.answer
@@ -149,10 +142,7 @@ class LitellmClient(Client):
 
 
 def _sender(config: ModelConfig) -> Any:
-    """Return the client that litellm sends with for this model.
-
-    It takes one of the OpenAI SDK for some providers and its own handler for others; this is both.
-    """
+    """Return an OpenAI client and a handler of litellm in one: it takes either."""
     import httpx
     import openai
     from litellm.llms.custom_httpx.http_handler import AsyncHTTPHandler
@@ -224,7 +214,7 @@ async def _send(exchange: _Exchange, config: ModelConfig, request: httpx.Request
 
 
 @cache
-def _litellm() -> types.ModuleType:
+def _litellm() -> Any:
     """Import litellm; the environment is as it was when that is done."""
     before = {name: os.environ.pop(name, None) for name in _WHILE_IMPORTED}
     os.environ.update(_WHILE_IMPORTED)
@@ -238,8 +228,7 @@ def _litellm() -> types.ModuleType:
         litellm.suppress_debug_info = True
         for name in ("LiteLLM", "LiteLLM Router", "LiteLLM Proxy"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
-    module: types.ModuleType = litellm
-    return module
+    return litellm
 
 
 _is_quiet = False

@@ -255,11 +255,7 @@ class ChatModel:
                 return reply
 
     async def _send_as_taken(self, call: _Call, server: Server) -> Reply:
-        """Send with the seed, or without where the provider takes none.
-
-        That an error speaks of a seed proves nothing, as some repeat the whole request: only a
-        reply to the same request without a seed does.
-        """
+        """Send with the seed, or without, where only that is answered."""
         try:
             return await self._send(call, server, with_seed=self._takes_seed)
         except SeedRefusedError as error:

@@ -97,10 +97,7 @@ _Records = dict[tuple[str, str, int], Record]
 
 
 def _read_records(folder: Path, model: str) -> _Records:
-    """Read the records of one model by track, key and seed, the last one of a sample.
-
-    A run of one model is that model's whatever its name. Of a varied run only the reference counts.
-    """
+    """Read the records of one model, or of the only one, by track, key and seed."""
     found: dict[str, _Records] = {}
     for _, record in RecordLines(folder):
         if not record.variant:
@@ -165,10 +162,7 @@ def read_chat_completion(raw: object) -> Reply | None:
 
 
 def _anthropic(raw: object) -> Reply | None:
-    """Read Anthropic Messages: `content` is a list of text and thinking blocks.
-
-    Its `input_tokens` are those that no cache knows.
-    """
+    """Read Anthropic Messages, whose `input_tokens` are those that no cache knows."""
     content, counts = _get(raw, "content"), _get(raw, "usage")
     if not isinstance(content, list) or not all(isinstance(b, Mapping) for b in content):
         return None
@@ -187,10 +181,7 @@ def _anthropic(raw: object) -> Reply | None:
 
 
 def _gemini(raw: object) -> Reply | None:
-    """Read Gemini's generateContent, in the REST names or those of the Python client.
-
-    An answer without candidates is an empty reply when it says why or what it took.
-    """
+    """Read generateContent; without candidates it is empty if it says why or what it took."""
     if not isinstance(raw, Mapping) or "candidates" not in raw:
         return None
     candidate = _first(raw["candidates"])

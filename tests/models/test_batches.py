@@ -20,7 +20,6 @@ from phyblock.errors import BudgetReachedError, SampleError, UnavailableError
 from phyblock.models import Budget, ModelEvent, Reply, ReplyCache, Request
 from phyblock.models.batch import (
     Batch,
-    BatchFiles,
     Ledger,
     UnsureError,
     answers_of,
@@ -380,7 +379,7 @@ def test_a_request_is_in_the_last_batch_that_was_not_lost(
         lines.append(BatchLine.model_validate_json(line.as_json()))
 
     async def write() -> Ledger:
-        ledger = Ledger("m", BatchFiles((), put, Path()))
+        ledger = Ledger("m", (), put)
         made = [Batch(f"t{n}", most_usd=dict.fromkeys(of)) for n, (of, _) in enumerate(batches)]
         for batch in made:
             await ledger.note(batch, "intended", keys=tuple(batch.most_usd))
@@ -394,8 +393,8 @@ def test_a_request_is_in_the_last_batch_that_was_not_lost(
     async def nowhere(_: BatchLine) -> None: ...
 
     written = asyncio.run(write())
-    read = Ledger("m", BatchFiles(tuple(lines), nowhere, Path()))
-    others = Ledger("another", BatchFiles(tuple(lines), nowhere, Path()))
+    read = Ledger("m", lines, nowhere)
+    others = Ledger("another", lines, nowhere)
     for key in "abcdef":
         holding = [n for n, (k, fate) in enumerate(batches) if key in k and fate != "lost"]
         expected = f"t{holding[-1]}" if holding else None
@@ -458,6 +457,18 @@ def test_bodies_stand_in_lines_as_they_are(fields: dict[str, Any], name: str, bo
     assert b"\n" not in line
 
 
+def test_results_that_are_not_there_yet_are_not_taken_for_none(disk: Disk) -> None:
+    class Late(OpenAIBatches):
+        def told(self, made: Made) -> dict[str, Any]:
+            is_early = made.looks <= self.batch_faults.looks
+            return {**super().told(made), **({"output_file_id": None} if is_early else {})}
+
+    with Running(Late()) as running:
+        ended = run_command(config_at("direct", running.url), disk, requests_of(2))
+        assert len(texts(ended)) == 2
+        assert len(running.server.made) == 1  # type: ignore[attr-defined]
+
+
 def test_headers_that_requests_need_go_with_their_batch(disk: Disk) -> None:
     schema = {"type": "object", "properties": {}, "additionalProperties": False}
     form = {"type": "json_schema", "json_schema": {"name": "a", "strict": True, "schema": schema}}
@@ -476,15 +487,3 @@ def test_headers_that_requests_need_go_with_their_batch(disk: Disk) -> None:
     assert isinstance(reply, Reply)
     assert betas[0].startswith("structured-outputs")
     assert set(betas[2:]) == {""}
-
-
-def test_results_that_are_not_there_yet_are_not_taken_for_none(disk: Disk) -> None:
-    class Late(OpenAIBatches):
-        def told(self, made: Made) -> dict[str, Any]:
-            is_early = made.looks <= self.batch_faults.looks
-            return {**super().told(made), **({"output_file_id": None} if is_early else {})}
-
-    with Running(Late()) as running:
-        ended = run_command(config_at("direct", running.url), disk, requests_of(2))
-        assert len(texts(ended)) == 2
-        assert len(running.server.made) == 1  # type: ignore[attr-defined]
