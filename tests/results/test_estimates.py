@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from random import Random
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -66,15 +64,6 @@ def test_each_value_of_plans_is_the_micro_average_of_its_records(
         answered = any(one["outcome"] not in ("missing", "api_error") for one in mine)
         wanted = getattr(micro(counts), row["measure"]) if answered else None
         assert math.isnan(row["value"]) if wanted is None else row["value"] == pytest.approx(wanted)
-
-
-@laws
-@given(record_lists(), st.randoms())
-def test_the_order_of_records_changes_no_estimate(records: Records, random: Random) -> None:
-    shuffled = records.copy()
-    random.shuffle(shuffled)
-    frames = (all_estimates(run_of(one, manifest())) for one in (records, shuffled))
-    pd.testing.assert_frame_equal(*frames)
 
 
 @laws
@@ -252,13 +241,6 @@ def test_episodes_by_hand() -> None:
     assert value(run, "step_unread", model="beta") == 0.4
     assert value(run, "ended_max_failures", model="beta") == 1
     assert math.isnan(value(run, "detour", model="beta"))
-
-
-@pytest.mark.parametrize(("missing", "n"), [("count", 2), ("skip", 1)])
-def test_episodes_without_a_reply_are_counted_as_the_suite_says(missing: str, n: int) -> None:
-    failed = episode("alpha", "002", "", "unanswered", outcome="api_error")
-    run = episodes(episode("alpha", "001", "pppp", "completed"), failed, missing=missing)
-    assert of(run, "completion")["n"] == of(run, "f1", criterion="placed")["n"] == n
 
 
 def test_the_strongest_blind_baseline_is_the_best_of_those_that_were_run() -> None:

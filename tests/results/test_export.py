@@ -7,7 +7,6 @@ import base64
 import csv
 import io
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +16,7 @@ from PIL import Image as PillowImage
 
 from phyblock.data import Dataset, QuestionSet, read_builtin, read_questions
 from phyblock.domain import LETTERS, is_picture_option
-from phyblock.errors import SpecError, StoreError
-from phyblock.results.export import FORMATS, export_frame, export_questions, export_run
+from phyblock.results.export import export_frame, export_questions, export_run
 from phyblock.results.load import load_run
 from tests.vqa_set import write_questions
 from tests.web.factory import LEVELS, manifest, record, score, write_run
@@ -103,29 +101,6 @@ def test_a_hugging_face_dataset_has_the_right_rows(folder: Path, tmp_path: Path)
         assert rows["tp_a"][2:4] == [1, 1]
         assert rows["tp_a"][-3:] == [None, None, None]
         assert rows["answer_correct"][-2:] == [True, False]
-
-
-@pytest.mark.parametrize(
-    ("form", "package", "extra"),
-    [
-        ("hf", "datasets", "hf"),
-        ("parquet", "pyarrow", "hf"),
-    ],
-)
-def test_a_missing_package_is_named_with_what_to_install(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, form: str, package: str, extra: str
-) -> None:
-    monkeypatch.setitem(sys.modules, package, None)
-    name = package.partition(".")[0]
-    with pytest.raises(SpecError, match=rf"(?s)needs the package {name}\b.*phyblock\[{extra}\]"):
-        export_run(load_run(folder), form)
-
-
-@pytest.mark.parametrize("form", FORMATS)
-def test_a_folder_that_cannot_be_written_is_said_so(folder: Path, form: str) -> None:
-    (folder / "export").write_text("in the way")
-    with pytest.raises(StoreError, match="cannot be written"):
-        export_run(load_run(folder), form)
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from phyblock.errors import StoreError
 from phyblock.results.estimates import headline_of
 from phyblock.results.figures import (
     COLUMN_IN,
@@ -115,12 +114,3 @@ def test_a_paper_gets_each_figure_in_three_formats_with_a_caption(tmp_path: Path
     assert "Wrong steps" not in (folder / "paper" / "errors.svg").read_text("utf-8")
     wide = write_paper_figures(run, ["losses"], Look(), tmp_path / "out")
     assert r"\begin{figure*}[t]" in wide[-1].read_text("utf-8")
-
-
-def test_nothing_of_the_user_is_written_over(tmp_path: Path) -> None:
-    folder = write_run(tmp_path / "run", records(), manifest(models=MODELS, seeds=[0]))
-    (folder / "paper").mkdir()
-    (folder / "paper" / "errors.svg").write_text("mine")
-    with pytest.raises(StoreError, match=r"errors\.svg"):
-        write_paper_figures(load_run(folder), ["errors"], Look())
-    assert (folder / "paper" / "errors.svg").read_text("utf-8") == "mine"

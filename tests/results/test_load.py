@@ -63,6 +63,7 @@ def test_the_order_of_records_changes_nothing(
     left, right = (run_of(one, manifest()) for one in (records, shuffled))
     pd.testing.assert_frame_equal(left.records, right.records)
     pd.testing.assert_frame_equal(left.scores, right.scores)
+    pd.testing.assert_frame_equal(left.estimates, right.estimates)
 
 
 @laws
@@ -86,23 +87,6 @@ def test_a_cut_last_line_is_passed_over_and_counted(
     run = load_run(folder)
     assert run.records["model"].tolist() == ["alpha"]
     assert run.is_cut
-
-
-def test_a_whole_last_line_without_its_end_is_read(tmp_path: Path) -> None:
-    folder = write_run(tmp_path / "run", [record()], manifest())
-    with (folder / "records.jsonl").open("a", encoding="utf-8") as file:
-        file.write(json.dumps(record("beta")))
-    run = load_run(folder)
-    assert run.records["model"].tolist() == ["alpha", "beta"]
-    assert not run.is_cut
-
-
-def test_a_run_without_records_is_empty(tmp_path: Path) -> None:
-    folder = write_run(tmp_path / "run", [], manifest())
-    (folder / "records.jsonl").unlink()
-    run = load_run(folder)
-    assert run.records.empty
-    assert run.scores.empty
 
 
 @pytest.mark.parametrize(
@@ -131,42 +115,6 @@ def test_a_corrupt_line_is_named(tmp_path: Path, line: str, at: str, field: str)
     assert problem.message.startswith("is not a record")
     assert problem.field == field
     assert problem.hint
-
-
-def test_a_folder_that_is_no_run_is_said_so(tmp_path: Path) -> None:
-    with pytest.raises(StoreError, match=r"holds no run\.yaml"):
-        load_run(tmp_path)
-
-
-@pytest.mark.parametrize("text", ["a: [", "- 1\n", "", "\udcff"])
-def test_a_broken_manifest_is_said_so(tmp_path: Path, text: str) -> None:
-    (tmp_path / "run.yaml").write_bytes(text.encode("utf-8", "surrogateescape"))
-    with pytest.raises(StoreError, match=r"run\.yaml"):
-        load_run(tmp_path)
-
-
-def test_all_that_a_manifest_lacks_is_said_at_once(tmp_path: Path) -> None:
-    facts = manifest()
-    del facts["suite"]["name"]
-    facts["suite"]["scoring"]["missing"] = "ignore"
-    with pytest.raises(StoreError) as caught:
-        load_run(write_run(tmp_path / "run", [], facts))
-    assert {problem.field for problem in caught.value.problems} == {
-        "suite.name",
-        "suite.scoring.missing",
-    }
-
-
-def test_models_of_one_name_are_refused(tmp_path: Path) -> None:
-    facts = manifest(models=["alpha", "beta"])
-    facts["models"] *= 2
-    with pytest.raises(StoreError) as caught:
-        load_run(write_run(tmp_path / "run", [record()], facts))
-    (problem,) = caught.value.problems
-    assert (problem.field, problem.allowed) == (
-        "models",
-        "models of different names, not alpha, beta twice",
-    )
 
 
 def test_reading_runs_needs_no_simulator_and_no_network() -> None:

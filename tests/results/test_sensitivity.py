@@ -10,8 +10,6 @@ import pytest
 
 from phyblock.config.suite import VarySpec
 from phyblock.results.compare import (
-    compare_models,
-    flipped_lines,
     sensitivity_frame,
     sensitivity_view,
 )
@@ -83,20 +81,3 @@ def test_a_model_that_was_barely_asked_changes_nothing_of_others() -> None:
     assert set(of_model(run, "barely")["n_items"]) == {2}
     notes = sensitivity_view(sensitivity_frame(run), run).notes
     assert any("2 to 12 items" in note for note in notes)
-
-
-def test_what_flipped_says_in_which_way_it_was_asked() -> None:
-    records = [
-        {**one, "scores": [score(4 if one["model"] == "alpha" and i == 1 else 2, 0, 0)]}
-        for model in ("alpha", "beta")
-        for i, one in enumerate(asked({model: 1}))
-    ]
-    for one in records:
-        tp = one["scores"][0]["tp"]
-        one["scores"] = [score(tp, 0, 4 - tp)]
-    found = compare_models(run_of(records, facts("alpha", "beta")))
-    variant = records[1]["variant"]
-    (row,) = found.flipped.to_dict("records")
-    named = ",".join(f"{name}={level}" for name, level in variant.items())
-    assert row["variant"] == named != ""
-    assert flipped_lines(found) == (f"alpha is right where beta is not, 1: s00 ({named})",)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import subprocess
 from pathlib import Path
@@ -13,9 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.cli.progress import Tally
 from phyblock.files import LIST
-from phyblock.records.files import known_records
 from phyblock.results.compare import compare_models, write_comparison
 from phyblock.results.estimates import all_estimates, track_measures
 from phyblock.results.figures import Look, write_paper_figures
@@ -28,9 +25,7 @@ from phyblock.results.tables import (
     table_files,
     write_tables,
 )
-from phyblock.results.text import NO_VALUE, number, to_latex, to_markdown
-from phyblock.run.events import Summary
-from phyblock.tracks.base import kinds
+from phyblock.results.text import NO_VALUE, number
 from phyblock.types import OUTCOMES
 from tests.results.test_estimates import complete, episode, episodes, questions
 from tests.web.factory import laws, manifest, record, record_lists, run_of, score, write_run
@@ -92,34 +87,6 @@ def test_what_was_not_answered_and_seeds_that_were_refused_stand_under_tables() 
         assert "Values pool the samples of 2 seeds." in notes
 
 
-@pytest.mark.parametrize(
-    ("shown", "words"),
-    [
-        ({"blind": True}, "blind"),
-        ({"wrong_image": True}, "pictures of another scene"),
-        ({"options_as": "letters"}, "options on one sheet"),
-        ({"circular": True}, "circular"),
-    ],
-)
-def test_how_questions_were_shown_is_in_the_captions(shown: dict[str, Any], words: str) -> None:
-    tables = make_tables(questions(complete({}), **shown), ["table2", "letters"])
-    for name in ("table2", "letters"):
-        view = tables[name].view
-        assert words in view.caption
-        assert words in to_markdown(view)
-        assert words in to_latex(view, "x")
-
-
-def test_layouts_name_what_tracks_declare() -> None:
-    for track in kinds():
-        layouts = layouts_of(track)
-        measures = {measure.name for measure in track_measures(track)}
-        for layout in layouts.values():
-            named = {name for column in layout.columns for name in column.measures}
-            rows = layout.rows if isinstance(layout.rows, tuple) else ()
-            assert named | set(rows) <= measures
-
-
 @laws
 @given(record_lists())
 def test_outcomes_split_what_was_expected(records: Records) -> None:
@@ -170,24 +137,6 @@ def test_an_unknown_cost_is_never_shown_as_zero() -> None:
     }
 
 
-def test_an_episode_that_is_partly_from_the_cache_cost_what_was_asked_anew() -> None:
-    one = record("alpha", cost_usd=0.75)
-    parse = {"rule": "move", "move": 1, "problem": None}
-    turns = [
-        {"n": n, "step": n, "parse": parse,
-         "reply": {**one["reply"], "cost_usd": usd, "cached": old}}
-        for n, (usd, old) in enumerate([(0.5, True), (0.25, False)], 1)
-    ]  # fmt: skip
-    facts = manifest(models=["alpha"])
-    facts["suite"]["tracks"] = ["step_planning"]
-    told = {**one, "track": "step_planning", "turns": turns}
-    run = run_of([told], facts)
-    assert coverage_frame(run)[["cost_usd", "cost_unknown"]].values.tolist() == [[0.25, 0]]
-    tally = Tally(1)
-    tally.add(Summary.of(known_records().validate_python(told)))
-    assert (tally.cost_usd, tally.unpriced) == (0.25, 0)
-
-
 def records_of(model: str) -> Records:
     scores = [score(1, 1, 1), score(2, 1, 0, setting="B"), score(3, 0, 1, criterion="selection")]
     return [
@@ -207,15 +156,6 @@ def test_a_run_writes_estimates_the_tables_of_its_tracks_and_cost(tmp_path: Path
     }
     assert {f"tables/{file.name}" for file in written.files} <= set(table_files())
     assert set(make_tables(written.run, ["errors"])) == {"errors"}
-
-
-def test_coverage_is_written_where_it_is_not_complete(tmp_path: Path) -> None:
-    facts = manifest(models=["alpha"], levels=[3], seeds=[0])
-    facts["items"] = {"full_planning": 1}
-    folder = write_run(tmp_path / "run", [record(scene="002", scores=[score(1, 0, 0)])], facts)
-    assert "coverage" not in write_tables(folder).tables
-    (folder / "records.jsonl").write_text(json.dumps(record(scene="002"))[:50])
-    assert "coverage" in write_tables(folder).tables
 
 
 @settings(laws, max_examples=3)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.results.text import NO_VALUE, Column, TextTable, number, to_latex, to_markdown
+from phyblock.results.text import NO_VALUE, Column, TextTable, to_latex, to_markdown
 
 TABLE = TextTable(
     "Precision & recall (%)",
@@ -58,17 +57,3 @@ def test_markdown_rows_have_as_many_cells_as_the_table_has_columns(
     assert len(lines) == 2 + len(rows)
     for line in lines:
         assert line.replace("\\\\", "").replace("\\|", "").count("|") == 3
-
-
-@pytest.mark.parametrize(
-    ("shown", "text"),
-    [
-        (number(float("nan")), NO_VALUE),
-        (number(47.06), "47.1"),
-        (number(-0.004, 2, signed=True), "0.00"),
-        (number(0.06, 2, signed=True), "+0.06"),
-        (number(-1, 1, signed=True), "-1.0"),
-    ],
-)
-def test_numbers_as_they_are_shown(shown: str, text: str) -> None:
-    assert shown == text

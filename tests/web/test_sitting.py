@@ -330,9 +330,3 @@ def test_what_cannot_be_played_is_said_before_anything_is_begun(
     assert error in done.err
     assert "Traceback" not in done.err
     assert sorted(workspace.root.rglob("*")) == before
-
-
-def test_a_person_is_not_asked_by_run(workspace: Workspace) -> None:
-    done = workspace.run("--models", "human:eve")
-    assert done.code == 2
-    assert "is a person, who answers in `phyblock play`" in done.err
