@@ -465,8 +465,8 @@ def _differences(
             np.add.at(sums[:, n, side], at, np.concatenate([counts[side], ones], axis=1))
         seen[scene[both], n] = True
         # A plan without a step for a goal without a block would have no F1; there is none.
-        a, b = np.nan_to_num(what.measure.value(counts))
-        sign = np.sign(a - b) * (1 if what.measure.better == "higher" else -1)
+        a, b = what.measure.value(counts)
+        sign = np.sign(np.nan_to_num(a - b)) * (1 if what.measure.better == "higher" else -1)
         tallies.append([(sign > 0).sum(), (sign < 0).sum(), (sign == 0).sum(), len(sign)])
     used = seen.any(axis=1)
     sums, seen = sums[used], seen[used]

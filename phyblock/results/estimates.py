@@ -344,13 +344,10 @@ def main_measure(run: Run, track: str) -> Measure:
 class Value:
     """An estimate as tables show it, in the unit of its measure (percent for shares).
 
-    `value` is of all samples, pooled over seeds; `mean` and `sd` are over the values of single
-    seeds, `sd` NaN where one alone has a value; `lo` and `hi` are NaN where there is no interval.
+    `value` is of all samples, pooled over seeds; `lo` and `hi` are NaN where there is no interval.
     """
 
     value: float
-    mean: float
-    sd: float
     lo: float
     hi: float
 
@@ -374,8 +371,7 @@ def headline_of(run: Run, track: str, design: Design | None = None) -> dict[tupl
         mine = rows[(rows["measure"] == column.measure) & (rows[CELL] == column.cell)]
         for row in mine.to_dict("records"):
             if column.criterion in ("", row["criterion"]):
-                names = ("value", "mean", "sd", "lo", "hi")
-                numbers = (scale[column.measure] * float(row[name]) for name in names)
+                numbers = (scale[column.measure] * float(row[n]) for n in ("value", "lo", "hi"))
                 values[str(row["model"]), column.heading] = Value(*numbers)
     return values
 

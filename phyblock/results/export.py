@@ -31,8 +31,6 @@ from phyblock.tracks.questions import (
     select_questions,
 )
 
-FORMATS = ("csv", "parquet", "hf")
-"""Words for `--to`."""
 _SAMPLE = ("sample", "track", "model", "scene", "seed")
 _REPLY = ("finish", "cost_usd", "latency_s", "provider_model", "attempts", "cached")
 _LISTS = ("levels", "parents", "plan")
