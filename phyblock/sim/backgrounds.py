@@ -21,17 +21,13 @@ from phyblock.sim.camera import Camera
 from phyblock.sim.raster import Rgb
 from phyblock.types import BACKGROUNDS, Background
 
-Grid = NDArray[np.float32]
-"""One number a texel or pixel, shape (n, n)."""
-Colors = NDArray[np.float64]
-"""Colors of a texture, shape (n, n, 3), about 0..255."""
+Grid = NDArray[np.float32]  # One number a texel or pixel, shape (n, n).
+Colors = NDArray[np.float64]  # Colors of a texture, shape (n, n, 3), about 0..255.
 
-INK_RGB: Rgb = (14, 14, 16)
-"""Lines between faces of blocks, and round blocks on light floors."""
+INK_RGB: Rgb = (14, 14, 16)  # Lines between faces of blocks, and round blocks on light floors.
 DARK_INK: Rgb = (20, 24, 32)
 LIGHT_INK: Rgb = (255, 255, 255)
-PERIOD_M = 2.0
-"""Textures repeat after this in x and y [m]."""
+PERIOD_M = 2.0  # Textures repeat after this in x and y [m].
 _SIZE = 2048
 _PLANKS = 16
 _JOINT_PX = 1.6
@@ -40,8 +36,7 @@ _LIGHT_TILE = np.array([39.0, 56.0, 75.0], dtype=np.float32)
 _DARK_TILE = np.array([21.0, 37.0, 53.0], dtype=np.float32)
 _FADE_FROM_M = np.float32(4.0)
 """Farther tiles blend into their mean color; at the horizon they are finer than a pixel."""
-_SOFTNESS = 340
-"""Pictures are this many times as wide as the blur at the edge of a shadow."""
+_SOFTNESS = 340  # Pictures are this many times as wide as the blur at the edge of a shadow.
 
 
 def _wood(pale: tuple[int, int, int], deep: tuple[int, int, int], seed: int) -> Colors:

@@ -5,10 +5,9 @@ friction, all forces and moments of a block in balance. That is a set of linear 
 forces that only push, each cone as a pyramid of four edges. Where such forces exist, rigid bodies
 may stand; where none exist, they cannot.
 
-Non-negative least squares (Lawson and Hanson, 1974) look for the forces. The result is checked, for
-a solver may stop early and may misstate what is left over: forces that it gives are put into the
-equations, and that there are none is believed only where the residual proves it (Farkas' lemma).
-Linear programming settles the rest.
+Non-negative least squares (Lawson and Hanson, 1974) look for forces. Those that it gives are put
+into the equations, and that there are none is believed only where the residual proves it (Farkas'
+lemma), for a solver may stop early. Linear programming settles the rest.
 
 `surely_stands` and `surely_falls` ask so with all weights off by up to `MARGIN_M` to any side and
 long blocks heavier or lighter by `MASS_FACTORS`, with all that lies between, so that no verdict
@@ -43,10 +42,8 @@ from phyblock.sim.geometry import cross
 
 Floats = NDArray[np.float64]
 
-MARGIN_M = 0.005
-"""Distance by which every weight may be off its place [m]."""
-FRICTIONS = (0.28, 0.45)
-"""The least and the most friction that a verdict has to hold under."""
+MARGIN_M = 0.005  # Distance by which every weight may be off its place [m].
+FRICTIONS = (0.28, 0.45)  # The least and the most friction that a verdict has to hold under.
 Masses = tuple[tuple[BlockType, float], ...]
 """Types of which every block has so many times its mass."""
 MASS_FACTORS = (0.87, 1.15)
@@ -59,8 +56,7 @@ MASSES: tuple[Masses, ...] = tuple(
 _SIDES = np.array([(math.cos(a), math.sin(a)) for a in np.arange(8) * math.pi / 4])
 _LEAST_VERTICAL = 0.15
 _TOLERANCE = 1e-5
-_PROOF = 1e4
-"""A residual is a proof for forces that add up to so many times all weights, no more."""
+_PROOF = 1e4  # A residual is a proof for forces that add up to so many times all weights, no more.
 _UP = np.array([0.0, 0.0, 1.0])
 _STEEP = 0.9
 _SAME_GAP_M = 1e-4
@@ -75,9 +71,8 @@ def surely_stands(blocks: Sequence[Block]) -> bool:
 def surely_falls(blocks: Sequence[Block]) -> bool:
     """True if blocks fall with weights off by up to `MARGIN_M`, much friction, any masses.
 
-    One linear program has forces, shifts and the mass of long blocks as its unknowns, and no
-    solution. Its unknown shifts are those of all long blocks and of all others, each anywhere in
-    the octagon round the margin, so that it has every balance that is asked about and some more.
+    One linear program has forces, shifts (of all long blocks, of all others) and the mass of long
+    blocks as its unknowns, and no solution.
     """
     # SciPy takes a third of a second to import, which a run that asks nobody does without.
     from scipy import sparse  # type: ignore[import-untyped]

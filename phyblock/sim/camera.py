@@ -21,13 +21,11 @@ def _half_tangent(angle_deg: float) -> float:
     return round(math.tan(math.radians(angle_deg / 2)), 12)
 
 
-FIELD_OF_VIEW_DEG = 30.0
-"""Vertical and horizontal field of view; pictures are square."""
+FIELD_OF_VIEW_DEG = 30.0  # Vertical and horizontal field of view; pictures are square.
 _HALF_TANGENT = _half_tangent(FIELD_OF_VIEW_DEG)
 _DEPTH_MARGIN_M = 0.02
 _NEARER = 0.9
-_LEAST_DEPTH_M = 0.05
-"""What is drawn and not framed is not nearer to the camera than this."""
+_LEAST_DEPTH_M = 0.05  # What is drawn and not framed is not nearer to the camera than this.
 
 VIEWS: dict[View, tuple[float, float]] = {
     "oblique": (45.0, 22.0),
@@ -59,11 +57,7 @@ FULL_WINDOW = Window(-1.0, 1.0, -1.0, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A perspective camera: `eye_m` shape (3,) [m]; `axes` rows right, up, forward (world).
-
-    `near_m` and `far_m` bound the depths that are drawn [m]; the field of view is that from the
-    upper to the lower edge and from the left to the right one, since pictures are square.
-    """
+    """A perspective camera at `eye_m` (3,) [m]; `axes` rows right, up, forward (world)."""
 
     eye_m: NDArray[np.float64]
     axes: NDArray[np.float64]

@@ -19,12 +19,9 @@ from phyblock.domain.blocks import BlockType, Euler, euler_deg_to_matrix
 from phyblock.domain.scene import Block
 from phyblock.sim.geometry import ConvexPiece, collision_pieces, corners_m, cross
 
-GROUND = 0
-"""Stands for the ground where orders of blocks are named, as in the files."""
-FIT_TOLERANCE_M = 0.0005
-"""Overlaps and gaps up to this are not worth a word [m]."""
-CONTACT_TOLERANCE_M = 0.0015
-"""Blocks closer than this touch [m]."""
+GROUND = 0  # Stands for the ground where orders of blocks are named, as in the files.
+FIT_TOLERANCE_M = 0.0005  # Overlaps and gaps up to this are not worth a word [m].
+CONTACT_TOLERANCE_M = 0.0015  # Blocks closer than this touch [m].
 _MAX_CONTACT_OVERLAP_M = 0.003
 _MIN_VERTICAL = 0.7
 _MIN_AREA_M2 = 1e-5
@@ -74,11 +71,7 @@ def moved(piece: ConvexPiece, rotation: Floats, position_m: Floats) -> ConvexPie
 
 
 class Axes(NamedTuple):
-    """Unit axes (k, 3) that can separate a pair, first to second, and `gaps_m` (k,) along each [m].
-
-    The pair overlaps when every gap is negative, by the depth of the largest; when the largest is
-    positive, the pieces are at least that far apart.
-    """
+    """Unit axes (k, 3) that can separate a pair, first to second, and the gap along each [m]."""
 
     directions: Floats
     gaps_m: Floats

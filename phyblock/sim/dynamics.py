@@ -42,22 +42,17 @@ ONE_SETTING = Trial(physics=DEFAULT_TRIAL.physics[:1])
 
 REST_SPEED_M_S = 0.005
 """Blocks are at rest when no corner was faster: above the jitter of contacts (up to 4 mm/s)."""
-QUIET_S = 0.25
-"""Time for which blocks must not be faster to be at rest [s]."""
+QUIET_S = 0.25  # Time for which blocks must not be faster to be at rest [s].
 _EVERY_S = 0.05
-REACH_M = 0.012
-"""Groups this far apart stay apart while no block passes the limits of a trial."""
-_COLLAPSE_S = 3.0
-"""Time that fallen blocks are given to come to rest [s]."""
+REACH_M = 0.012  # Groups this far apart stay apart while no block passes the limits of a trial.
+_COLLAPSE_S = 3.0  # Time that fallen blocks are given to come to rest [s].
 
 
 @dataclass(frozen=True)
 class Stability:
-    """Result of a trial, at one of its settings or over all of them.
+    """Result of a trial: orders that passed a limit, the largest movement [m] and turn [degrees].
 
-    `fallen` are the orders of blocks that passed a limit under any setting; `moved_m` [m] and
-    `turned_deg` [degrees] the largest movement of any block. `agreed` is true where the settings
-    name the same blocks.
+    `agreed` is true where all of its settings name the same blocks.
     """
 
     fallen: tuple[int, ...] = ()
@@ -84,11 +79,7 @@ class Stability:
 def check(
     blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL, quiet_s: float | None = None
 ) -> Stability:
-    """Let blocks go at their goal poses and see which of them stay.
-
-    With `quiet_s` [s], each group is let go alone and watched until it is at rest for so long;
-    without, all blocks are watched together for the whole time.
-    """
+    """Let blocks go and see which stay: all to the end, or each group until quiet for so long."""
     settings = []
     for physics in trial.physics:
         with World(physics) as world:
@@ -173,8 +164,7 @@ def _placed(world: World, blocks: Sequence[Block]) -> Iterator[None]:
             world.remove(block.order)
 
 
-_KEPT = 65_536
-"""Arrangements and states that are remembered, about 1 kB each."""
+_KEPT = 65_536  # Arrangements and states that are remembered, about 1 kB each.
 _PLACE_DIGITS = 6
 _ONE_AT_A_TIME = threading.Lock()
 
@@ -192,11 +182,9 @@ class Settled(NamedTuple):
 
 
 class Site:
-    """Worlds kept open to try one state after another, each once.
+    """Worlds kept open to try each arrangement of a group once, wherever it is met again.
 
-    Every block is tried at its goal pose, and each arrangement of a group once, wherever it is met
-    again: a verdict depends on nothing that was tried before. `engine` is the chosen one unless
-    another is given.
+    Every block is tried at its goal pose: a verdict depends on nothing that was tried before.
     """
 
     def __init__(self, trial: Trial = DEFAULT_TRIAL, engine: PhysicsEngine | None = None) -> None:
@@ -219,8 +207,7 @@ class Site:
     def _settle(self, blocks: tuple[Block, ...]) -> Settled:
         if all(self._stands(_arrangement(group)) for group in groups(blocks)):
             return Settled((), blocks)
-        fallen: set[int] = set()
-        shown: tuple[Block, ...] = ()
+        fallen, shown = set[int](), tuple[Block, ...]()
         for physics in self.trial.physics:
             # A fresh world: how blocks tumble could depend on what was in a used one before.
             with World(physics, self._engine) as world:
@@ -230,10 +217,9 @@ class Site:
                 if moved:
                     wait(world, _COLLAPSE_S)
                     poses = world.poses()
-                    moved = (*moved, *movement(blocks, poses, self.trial).fallen)
-                    shown = shown or tuple(
-                        poses[b.order].put(b) if b.order in moved else b for b in blocks
-                    )
+                    moved += movement(blocks, poses, self.trial).fallen
+                    lying = (poses[b.order].put(b) if b.order in moved else b for b in blocks)
+                    shown = shown or tuple(lying)
             fallen.update(moved)
         return Settled(tuple(sorted(fallen)), shown or blocks)
 
@@ -269,8 +255,7 @@ def settle(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> Settled:
         return _shared_site(trial, physics_engine()).settle(blocks)
 
 
-LONGEST_S = 600.0
-"""A plan whose execution takes longer, by the clock, is given up [s]."""
+LONGEST_S = 600.0  # A plan whose execution takes longer, by the clock, is given up [s].
 _TRIES = 16
 _CM = 100.0
 _DIGITS = 3
@@ -278,11 +263,7 @@ _DIGITS = 3
 
 @dataclass(frozen=True)
 class ExecutionLimits:
-    """Tolerances of an execution.
-
-    A block may be moved out of others by `overlap_cm` [cm]; one that moves by up to `stand_cm` and
-    `stand_deg` [degrees] when it is let go, or another is, still counts as standing.
-    """
+    """Most that a block may be moved out of others, and that it moves and turns where it stands."""
 
     overlap_cm: float = 0.5
     stand_cm: float = 1.0
@@ -326,8 +307,7 @@ def execute(
 ) -> Execution:
     """Put blocks at their poses, one after another; None stands for a step that names no block.
 
-    The same call gives the same result, whatever was executed before. Raises SimulationError where
-    the engine cannot be used, and for a plan that takes longer than `LONGEST_S`.
+    Raises SimulationError where the engine cannot be used, or after `LONGEST_S`.
     """
     give_up_s = time.monotonic() + LONGEST_S
     steps: list[ExecutedStep] = []
@@ -344,13 +324,10 @@ def execute(
 class Executor:
     """Execution of a plan with poses, step by step; a context manager.
 
-    A block that would share space with others, or with the floor, by no more than a tolerance is
-    moved out the shortest way, and one that hangs no higher above them is lowered; where it would
-    share more, it is refused and stays out. What fell or was knocked over stays so.
-
-    A block is let go with the blocks near it alone; others join as soon as something that fell
-    comes near them. Where a step moves no block past the limits of `DEFAULT_TRIAL`, all is set
-    back, so that no step is judged by the drift of the ones before it.
+    A block that shares space by no more than a tolerance is moved out the shortest way, one that
+    hangs no higher is lowered; where it shares more, it stays out. It is let go with blocks near it
+    alone; others join as soon as something that fell comes near. Where a step moves nothing past
+    the limits of `DEFAULT_TRIAL`, all is set back, so that no step is judged by earlier drift.
     """
 
     def __init__(

@@ -1,10 +1,7 @@
 """Physics engines behind one protocol, in terms of blocks on a floor, and the choice of one.
 
-A `PhysicsEngine` opens simulations; a `Simulation` holds blocks by number and moves them; a `World`
-is a simulation that knows its blocks. The floor is the plane z = 0; poses are those of body frames.
-
-Blocks are let go in PyBullet where it is installed, in MuJoCo elsewhere; the environment variable
-`PHYBLOCK_PHYSICS` chooses by name. Nothing is imported before it is chosen.
+The floor is the plane z = 0; poses are those of body frames. Blocks are let go in PyBullet where it
+is installed, in MuJoCo elsewhere; the environment variable `PHYBLOCK_PHYSICS` chooses by name.
 """
 
 from __future__ import annotations
@@ -35,8 +32,7 @@ from phyblock.domain.blocks import (
 from phyblock.domain.scene import Block
 from phyblock.errors import InputError, Problem
 
-Vector = tuple[float, float, float]
-"""x, y and z in the world."""
+Vector = tuple[float, float, float]  # x, y and z in the world.
 GRAVITY_M_S2 = 9.81
 _POSITION_DIGITS = 4
 _ANGLE_DIGITS = 2
@@ -80,8 +76,7 @@ def quat_xyzw_to_euler_deg(quat_xyzw: NDArray[np.float64]) -> Euler:
     else:
         roll = np.arctan2(rotation[2, 1], rotation[2, 2])
         yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
-    x, y, z = (float(np.degrees(angle)) for angle in (roll, pitch, yaw))
-    return (x, y, z)
+    return float(np.degrees(roll)), float(np.degrees(pitch)), float(np.degrees(yaw))
 
 
 @dataclass(frozen=True)
@@ -111,10 +106,7 @@ class Velocity(NamedTuple):
 
 
 class Simulation(Protocol):
-    """Rigid blocks on a floor; callers name only blocks that are there.
-
-    The same calls on the same machine give the same bits, whatever other simulations are open.
-    """
+    """Rigid blocks on a floor by number; the same calls on one machine give the same bits."""
 
     def add(self, number: int, block_type: BlockType, pose: Pose) -> None:
         """Put a block at a pose, at rest; its number is above 0 and not taken."""
@@ -179,10 +171,7 @@ def installed_engines() -> tuple[str, ...]:
 
 
 def physics_engine() -> PhysicsEngine:
-    """Return the engine that `PHYBLOCK_PHYSICS` names, or the usual one; one object a process.
-
-    Raises InputError for a name that is not known, and where the engine is not installed.
-    """
+    """Return the engine that `PHYBLOCK_PHYSICS` names, or the usual one; else InputError."""
     usual = next(iter(installed_engines()), REFERENCE_ENGINE)
     name = os.environ.get(PHYSICS_VARIABLE, usual)
     if name not in ENGINES:
@@ -222,11 +211,7 @@ def other_engine() -> str:
 
 
 class World:
-    """Blocks on the ground in a simulation of their own; a context manager.
-
-    Blocks are named by their order. The same calls on the same machine give bitwise the same
-    poses. `engine` is the chosen one unless another is given.
-    """
+    """Blocks on the ground in a simulation, named by their order; a context manager."""
 
     def __init__(self, physics: Physics | None = None, engine: PhysicsEngine | None = None) -> None:
         self.physics = physics or Physics()

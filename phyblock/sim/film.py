@@ -1,8 +1,7 @@
 """Films for people: an assembly step by step, an episode with what was tried.
 
-Every step of an assembly is seen by one camera, which frames the finished structure, so that
-nothing jumps. A frame of an episode shows the goal, the candidates with the one that was tried, and
-the assembly after it.
+One camera, which frames the finished structure, sees every step. A frame of an episode shows the
+goal, the candidates with the one that was tried, and the assembly after it.
 """
 
 from __future__ import annotations

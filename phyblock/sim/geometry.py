@@ -1,9 +1,8 @@
 """Geometry of the blocks: meshes, convex pieces, and exact sums for whatever decides a pixel.
 
-A block is a prism, and what is needed of it follows from its profile in `SHAPES`: a closed triangle
-mesh for mass properties, a finer one for pictures, and the convex pieces that physics and contact
-tests use. Curved sides are polygons, because that is what the blocks are: a smooth cylinder rolls
-away where an 18-gon stands. Pictures show them round, by facets of five degrees.
+From the profile of a prism in `SHAPES` follow a closed triangle mesh for mass properties, a finer
+one for pictures, and the convex pieces of physics and contact tests. Curved sides are polygons: a
+smooth cylinder rolls away where an 18-gon stands. Pictures show them round.
 
 Matrix products go to a BLAS, which adds up in another order, and with fused operations, on another
 machine; trigonometric functions differ by a unit in the last place from one C library to the next.
@@ -71,12 +70,7 @@ _SMOOTH_COSINE = math.cos(math.radians(30))
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A triangle mesh: `vertices_m` shape (n, 3) [m], `triangles` shape (m, 3), 0-based.
-
-    Corners run counter-clockwise seen from outside. The mass properties are those of the solid
-    that a closed mesh bounds, by the divergence theorem: sums over the tetrahedra that the
-    triangles span with the origin.
-    """
+    """Vertices (n, 3) [m] and triangles (m, 3) of a mesh, counter-clockwise seen from outside."""
 
     vertices_m: NDArray[np.float64]
     triangles: NDArray[np.int64]
@@ -155,11 +149,7 @@ class Mesh:
 
 @dataclass(frozen=True, eq=False)
 class ConvexPiece:
-    """A convex polytope in a body frame.
-
-    `vertices_m` shape (n, 3) [m]; `face_normals` and `edge_directions`, shape (k, 3), hold one
-    unit vector for each set of parallel faces or edges: the axes that can separate two pieces.
-    """
+    """A convex polytope; a unit vector (3,) for each set of parallel faces, and of edges."""
 
     vertices_m: NDArray[np.float64]
     face_normals: NDArray[np.float64]
@@ -211,11 +201,7 @@ def corners_m(
 
 @functools.cache
 def collision_pieces(block_type: BlockType, inset_m: float = 0.0) -> tuple[ConvexPiece, ...]:
-    """Convex pieces that fill the block, every plane moved inward by `inset_m` [m].
-
-    One piece, but for the arch: ten (each leg with its first arc segment, and eight slices).
-    The inset takes back the margin that a simulator adds around hulls.
-    """
+    """Convex pieces that fill the block, ten of an arch, every plane `inset_m` [m] further in."""
     shape = SHAPES[block_type]
     half_m = shape.length_m / 2 - inset_m
     axis = np.array([1.0, 0.0, 0.0] if shape.axis == "x" else [0.0, 0.0, 1.0])

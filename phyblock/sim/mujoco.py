@@ -1,9 +1,8 @@
 """MuJoCo as a physics engine, where PyBullet has no wheels; loaded when a simulation is opened.
 
-The measured conditions for block structures to stand as they do in PyBullet: four substeps in
-each time step; contacts stiff enough not to creep, but not so stiff that they burst where facets
-meet edge to edge; the elliptic cone of friction; collision pieces moved inward by a hair, so that
-blocks side by side do not touch. The center of mass and the inertia are those of the true solid.
+Structures stand as in PyBullet with four substeps in each time step; contacts stiff enough not to
+creep, but not so stiff that they burst where facets meet edge to edge; the elliptic cone of
+friction; collision pieces moved inward by a hair, so that blocks side by side do not touch.
 """
 
 from __future__ import annotations
@@ -28,8 +27,7 @@ _CONTACT_STEPS = 5.0
 """Time constant of contacts in substeps; with 2, facets that meet edge to edge burst apart."""
 _FRICTION_STIFFNESS = 10.0
 """Stiffness of friction over that of normal forces; with less of it blocks creep."""
-_INSET_M = 0.00002
-"""Distance by which collision pieces are moved inward."""
+_INSET_M = 0.00002  # Distance by which collision pieces are moved inward.
 _KEPT = 256
 
 Floats = NDArray[np.float64]
@@ -78,11 +76,7 @@ class _Body:
 
 
 class _Simulation:
-    """Blocks on a plane, as `Simulation`.
-
-    A model in MuJoCo holds the blocks that it was made with, so another is begun when a block came
-    or went; it takes over the poses and velocities.
-    """
+    """Blocks on a plane, as `Simulation`; another model is begun where a block comes or goes."""
 
     def __init__(self, mujoco: ModuleType, physics: Physics) -> None:
         self._mujoco, self._physics = mujoco, physics

@@ -21,8 +21,7 @@ LEAN_DEG = 2.0
 _STILL_M, _STILL_DEG = 0.004, 4.0
 _MOVED_M, _MOVED_DEG = 0.02, 20.0
 _LONGEST_S = 5.0
-_PATIENCE = 4.0
-"""A push is kept up this many times as long as without friction."""
+_PATIENCE = 4.0  # A push is kept up this many times as long as without friction.
 _DOWN_M = 0.008
 _SAME_M, _SAME_DEG = 0.015, 15.0
 _AS_FAR_M, _STRAIGHT_DEG = 0.005, 10.0
@@ -47,10 +46,9 @@ OUTCOME_SETTINGS: tuple[Physics, ...] = (
 
 @dataclass(frozen=True)
 class Push:
-    """A block pushed along the floor's plane: `direction` is a unit vector (x, y).
+    """A block pushed along a unit vector (x, y), until it has gone so far or has come down.
 
-    It is moved until it has gone so far or has come down, free to tip and to rise. The distance is
-    6 mm off every multiple of 12.5 mm, the grid that edges of built structures lie on.
+    The distance is 6 mm off the grid of 12.5 mm that edges of built structures lie on.
     """
 
     order: int
@@ -61,10 +59,9 @@ class Push:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of a removal or push: `moved` are the orders of the blocks that did not stay.
+    """Result of a removal or push: orders that moved, and final poses under the first setting.
 
-    `settled` are all blocks at their final poses under the first setting. `is_clear` is true where
-    all settings agree, with a margin, and all came to rest; where it is not the rest means nothing.
+    Where settings do not agree, with a margin, it is not clear, and the rest means nothing.
     """
 
     moved: tuple[int, ...]
@@ -105,11 +102,7 @@ def after_removal(blocks: Sequence[Block], order: int) -> Outcome:
 
 
 def holds(blocks: Sequence[Block], about: int) -> bool | None:
-    """True if all blocks stay where they are; None where the settings, or the limits, differ.
-
-    Quicker than `after`: a trial ends as soon as a block has clearly left its place, and only the
-    blocks in reach of the one with the order `about` are tried, for the others stand anyway.
-    """
+    """True if all blocks near one stay where they are; None where settings, or limits, differ."""
     near = next(group for group in groups(blocks) if any(b.order == about for b in group))
     verdicts = set()
     for setting in OUTCOME_SETTINGS:

@@ -160,11 +160,9 @@ def _ends(*numbers: NDArray[np.int64] | NDArray[np.bool_]) -> NDArray[np.bool_]:
     return ends
 
 
-SMALLEST_PX, LARGEST_PX = 128, 2048
-"""Sides that pictures may have."""
+SMALLEST_PX, LARGEST_PX = 128, 2048  # Sides that pictures may have.
 GRID_COLUMNS = 4
-LABEL_STRIP = 0.23
-"""Share of a cell's height, at its foot, that is kept free for the number."""
+LABEL_STRIP = 0.23  # Share of a cell's height, at its foot, that is kept free for the number.
 _LABEL_SIZE = 0.17
 _LABEL_MARGIN = 0.05
 _RIM = 0.012
@@ -333,10 +331,7 @@ class Lookout:
 def candidates_grid(
     candidates: CandidateSet, style: PictureStyle
 ) -> tuple[Image.Image, list[Block], float | None]:
-    """Candidates in a 4 by 4 grid from the top left, numbered from 1, the blocks as drawn.
-
-    The number is their common distance from the camera [m], None where each fills its cell.
-    """
+    """Candidates in a 4 by 4 grid, numbered from 1, as drawn, and their common distance [m]."""
     size_px, cell_px = style.size_px, math.ceil(style.size_px / GRID_COLUMNS)
     blocks = [on_the_floor(c.type, c.color, c.euler_deg) for c in candidates.candidates]
     distance_m = common_distance_m(blocks, style) if style.candidate_scale == "common" else None

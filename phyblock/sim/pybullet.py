@@ -1,9 +1,8 @@
 """PyBullet as a physics engine, loaded when a simulation is opened.
 
-The measured conditions for wooden-block structures to stand as they do on a table: collision
-hulls moved inward by the 1 mm margin that Bullet adds to meshes, the cylinder as the 18-gon it
-is, the arch as ten convex pieces, the center of mass and the inertia of the true solid, and the
-square root of the pair's friction on each body, because Bullet multiplies them.
+Structures stand as on a table with collision hulls moved inward by the 1 mm margin that Bullet adds
+to meshes, the center of mass and the inertia of the true solid, and the square root of the pair's
+friction on each body, because Bullet multiplies them.
 """
 
 from __future__ import annotations

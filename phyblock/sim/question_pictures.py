@@ -46,12 +46,9 @@ QUESTION_RENDER_VERSION = 2
 """Raised whenever the same recipe gives other pixels, so that stored pictures are made again."""
 LETTERED_VERSION = 1
 """Raised whenever the same pictures give another sheet, so that stored sheets are made again."""
-BLOCK_LABEL = "block"
-"""The label of a picture that shows one block by itself."""
-SEEN_PX = 256
-"""Side of the pictures that are compared."""
-MARKS_APART_PX = 18.0
-"""Targets are this far apart at the least, in pixels of `SEEN_PX`."""
+BLOCK_LABEL = "block"  # The label of a picture that shows one block by itself.
+SEEN_PX = 256  # Side of the pictures that are compared.
+MARKS_APART_PX = 18.0  # Targets are this far apart at the least, in pixels of `SEEN_PX`.
 
 _BLOCK_WINDOW = Window(-0.52, 0.52, -0.52, 0.52)
 _STYLE = PictureStyle(SEEN_PX)
@@ -253,11 +250,7 @@ def sheet_size_px(n: int, side_px: int) -> tuple[int, int]:
 
 
 class Top(NamedTuple):
-    """A point of a block's surface [m], rounded to 0.1 mm.
-
-    `rise` is the z of the surface's unit normal, `off_center_m` how far the point is from the
-    vertical line through the middle of the block.
-    """
+    """A point of a surface [m], the z of its unit normal, its way from the block's middle [m]."""
 
     position_m: tuple[float, float, float]
     rise: float

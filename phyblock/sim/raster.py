@@ -19,21 +19,17 @@ from phyblock.sim.camera import Camera
 from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import Mesh, cross, dot, rounded, turned, unit
 
-RASTER_VERSION = "1"
-"""Raised whenever the same props give other pixels."""
-NOTHING = -1
-"""Stands for the triangle of a pixel that shows none."""
+RASTER_VERSION = "1"  # Raised whenever the same props give other pixels.
+NOTHING = -1  # Stands for the triangle of a pixel that shows none.
 
-Rgb = tuple[int, int, int]
-"""Red, green and blue, 0..255."""
+Rgb = tuple[int, int, int]  # Red, green and blue, 0..255.
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 _AT_ONCE = 1 << 16
 """Pixels that are worked on together: what they take of memory is used again and again."""
-_FLAT = 1e-9
-"""Unit normals that differ by less in each component are those of one plane."""
+_FLAT = 1e-9  # Unit normals that differ by less in each component are those of one plane.
 _LEAST_DEPTH_M = 1e-3
 """What is nearer to a camera is not drawn, as one cannot project what is behind it."""
 _LIGHT_SCREEN = 0.75
@@ -58,8 +54,7 @@ class Prop:
 class Light:
     """A light from far away: `direction` (3,) is the unit vector to it, in the world.
 
-    A face with the normal n has its color times ambient + diffuse * max(0, n . direction), or times
-    ambient where a mesh stands in the way of the light.
+    A face in the light has its color times ambient + diffuse * max(0, normal . direction).
     """
 
     direction: Floats

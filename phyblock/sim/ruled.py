@@ -211,8 +211,10 @@ def kit_sheet(candidates: CandidateSet, style: PictureStyle) -> Image.Image:
     font = ImageFont.load_default(size=_TEXT * side)
     for place, block in enumerate(blocks):
         row, column = divmod(place, GRID_COLUMNS)
-        low, high = box_cm(block)
-        sizes = (f"{name} {_number(size)}" for name, size in zip("xyz", high - low, strict=True))
+        points = drawn_m(block) * _CM
+        low, high = points.min(axis=0), points.max(axis=0)
+        sides = zip("xyz", (high - low).tolist(), strict=True)
+        sizes = (f"{name} {round(side_cm, 1):g}" for name, side_cm in sides)
         left, foot = column * side + _MARGIN * side, row * side + side * (1 - _MARGIN)
         ink = GROUNDS[style.background].ink
         draw.text((left, foot), ", ".join(sizes), ink, font, anchor="ls")
@@ -228,13 +230,3 @@ def kit_key(candidates: CandidateSet, style: PictureStyle) -> str:
     """SHA-256 [hex] of all that the sheet depends on."""
     content = [astuple(candidate) for candidate in candidates.candidates]
     return picture_key("kit", style, [KIT_VERSION, style.candidate_scale, *content])
-
-
-def box_cm(block: Block) -> NDArray[np.float64]:
-    """Low and high corner of the smallest box round a block as it is drawn, shape (2, 3) [cm]."""
-    points = drawn_m(block) * _CM
-    return np.stack([points.min(axis=0), points.max(axis=0)])
-
-
-def _number(size_cm: float) -> str:
-    return f"{round(float(size_cm), 1):g}"
