@@ -23,7 +23,6 @@ from phyblock.sim.dynamics import (
     Trial,
     check,
     check_steps,
-    groups,
     settle,
 )
 from phyblock.sim.engine import ENGINES, Physics, Pose, World
@@ -112,16 +111,6 @@ def test_what_falls_midway_or_slowly_is_named_at_its_step() -> None:
     slow.put("cube")
     slow.put("cuboid3", 1.004, pose="flat-y")
     assert not check(slow.blocks, FIRST).stable
-
-
-def test_groups_are_what_nothing_brings_near() -> None:
-    sketch = Pad()
-    for y in (-4, 4):
-        sketch.put("arch", y)
-        sketch.put("triangle", y)
-    assert [[b.order for b in group] for group in groups(sketch.blocks)] == [[1, 2], [3, 4]]
-    assert len(groups(sketch.blocks, reach_m=0.2)) == 1
-    assert groups([]) == ()
 
 
 @pytest.mark.parametrize("trial", [ONE_SETTING, DEFAULT_TRIAL], ids=["one", "default"])

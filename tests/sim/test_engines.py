@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from phyblock.domain import BLOCK_TYPES, SHAPES, Block, BlockType, euler_deg_to_matrix
+from phyblock.domain import SHAPES, Block, BlockType, euler_deg_to_matrix
 from phyblock.errors import InputError
 from phyblock.scoring.pose import blocks_reached, overlap_volume, placed
 from phyblock.sim.contact import VOXEL_M, filled_voxels, voxel_iou
@@ -83,15 +83,6 @@ def test_a_block_is_where_it_was_put_and_at_rest(
         assert opened.pose(3).distance_m(Pose.goal(one)) < 1e-9
         assert opened.pose(3).angle_deg(Pose.goal(one)) < 1e-3
         assert_allclose(opened.velocity(3), 0.0)
-
-
-@pytest.mark.parametrize("block_type", BLOCK_TYPES)
-def test_a_block_on_the_floor_stands(simulation: Simulation, block_type: BlockType) -> None:
-    one = block(1, block_type, (0.1, 0.2, -SHAPES[block_type].low_m[2]))
-    add_all(simulation, [one])
-    simulation.step(120)
-    assert simulation.pose(1).distance_m(Pose.goal(one)) < 0.001
-    assert simulation.pose(1).angle_deg(Pose.goal(one)) < 1.0
 
 
 def test_the_same_calls_give_the_same_bits_beside_others(engine: PhysicsEngine) -> None:
@@ -173,12 +164,6 @@ def test_a_tower_stands_in_its_order_and_falls_in_the_opposite_one(engine: Physi
     assert voxel_iou(tower(3), done.blocks) == 1
     assert blocks_reached(tower(3), done.blocks, 1, 10) == 3
     assert ends(tower(3)[::-1], engine)[0] == "falls"
-
-
-def test_what_floats_falls_as_far_as_the_gap_below_it(engine: PhysicsEngine) -> None:
-    (step,) = execute([at(tower(1)[0], 0, 0, 0.065)], engine=engine).steps
-    assert (step.end, step.gap_cm, step.overlap_cm) == ("falls", pytest.approx(4), 0)
-    assert step.moved_cm == pytest.approx(4, abs=0.1)
 
 
 def test_overlaps_beyond_the_tolerance_are_refused_and_smaller_ones_give_way(

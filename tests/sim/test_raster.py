@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import phyblock.sim
-from phyblock.domain import BLOCK_TYPES, Block, euler_deg_to_quat_xyzw, quat_xyzw_to_matrix
+from phyblock.domain import BLOCK_TYPES, Block, quat_xyzw_to_matrix
 from phyblock.sim.camera import FULL_WINDOW, Camera, frame, view_axes
 from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import drawn_mesh
@@ -43,11 +43,7 @@ def heaps(draw: st.DrawFn) -> list[Block]:
 
 def props_of(blocks: list[Block]) -> list[Prop]:
     return [
-        Prop(
-            drawn_mesh(one.type),
-            COLOR_RGB[COLORS[place % len(COLORS)]],
-            Pose(np.array(one.position_m), euler_deg_to_quat_xyzw(one.euler_deg)),
-        )
+        Prop(drawn_mesh(one.type), COLOR_RGB[COLORS[place % len(COLORS)]], Pose.goal(one))
         for place, one in enumerate(blocks)
     ]
 
@@ -214,19 +210,12 @@ def test_what_reaches_behind_the_camera_is_drawn_as_far_as_it_is_before_it() -> 
 
 def test_the_bytes_of_a_picture_are_the_same_on_every_machine() -> None:
     """Where these change on purpose, `RASTER_VERSION` is raised, or cached pictures are mixed."""
-    blocks = [
-        Block(
-            place,
-            kind,
-            "red",
-            (0.09 * place, 0.07 * (place % 3), 0.1),
-            (20.0 * place, 10.0, 35.0 * place),
-            (),
-            1,
-        )
-        for place, kind in enumerate(BLOCK_TYPES)
-    ]
-    props = props_of(blocks)
+    props = props_of(
+        [
+            block(n, kind, (0.09 * n, 0.07 * (n % 3), 0.1), (20.0 * n, 10.0, 35.0 * n))
+            for n, kind in enumerate(BLOCK_TYPES)
+        ]
+    )
     raster = drawn(props, camera_on(props, (45.0, 22.0)))
     digest = hashlib.sha256()
     for part in (raster.rgb, raster.prop.astype("<i8"), raster.face.astype("<i8"), raster.shaded):
