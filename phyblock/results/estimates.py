@@ -94,7 +94,7 @@ def _stored(run: Run, track: str, counted: SampleCounts) -> pd.DataFrame:
     none: NDArray[np.intp] = np.zeros(0, dtype=np.intp)
     rows, lengths, numbers = run.counts.get(counted.name, (none, none, np.zeros(0)))
     starts, width = np.cumsum(lengths) - lengths, len(counted.columns)
-    kept = np.isin(rows, run.counted(track).index) & (lengths > 0)
+    kept = np.isin(rows, run.counted_rows(track)) & (lengths > 0)
     rows, starts, lengths = rows[kept], starts[kept], lengths[kept]
     for length in np.unique(lengths):
         check_numbers(counted, int(length), str(run.path / RECORDS))
@@ -172,10 +172,8 @@ class _Pool:
         pooled = [cell.name for cell in cells if not cell.of]
         used = np.flatnonzero(np.logical_or.reduce([rows.cells[name] for name in pooled]))
         masks = [rows.cells[name][used] for name in pooled]
-        columns = [
-            np.nan_to_num(column.to_numpy(np.float64, na_value=np.nan)[used])
-            for _, column in rows.counts.items()
-        ]
+        # Numbers of four bytes stay so: sums are of eight.
+        columns = [np.nan_to_num(column.to_numpy()[used]) for _, column in rows.counts.items()]
         group, groups = rows.codes(used, "model", *SCORED_BY)
         model, models = rows.codes(used, "model")
         scene, scenes = rows.codes(used, "scene")

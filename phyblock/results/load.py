@@ -337,18 +337,22 @@ class Run:
         n = self.design.suite.vary.n_variants
         return (f"asked in {n:,} ways",) if n > 1 else ()
 
-    def counted(self, track: str) -> pd.DataFrame:
-        """Return the records of a track that count, with their places in `records` as `row`.
+    def counted_rows(self, track: str) -> pd.Index[int]:
+        """Return the places in `records` of the samples of a track that count.
 
         Under `missing: skip`, missing replies and API errors are left out.
         """
         is_left_out = self.records["outcome"].isin(self.design.outcomes_left_out)
-        rows = self.records[(self.records["track"] == track) & ~is_left_out]
-        return rows.assign(row=rows.index)
+        return self.records.index[(self.records["track"] == track) & ~is_left_out]
+
+    def counted(self, track: str) -> pd.DataFrame:
+        """Return the records of a track that count, with their places in `records` as `row`."""
+        rows = self.counted_rows(track)
+        return self.records.loc[rows].assign(row=rows)
 
     def scored(self, track: str, counts: Sequence[str]) -> pd.DataFrame:
         """Return these counts of the scores of a track's samples that count."""
-        rows = self.scores["row"].isin(self.counted(track).index)
+        rows = self.scores["row"].isin(self.counted_rows(track))
         return self.scores.loc[rows, ["row", *_LABELS, *counts]]
 
     def level_cells(self) -> tuple[Cell, ...]:
