@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import re
 import subprocess
 import sys
@@ -70,12 +71,13 @@ def test_the_guide_runs_and_every_object_shows_itself(
     assert "random" in run._repr_html_()
     assert set(run.estimates["model"]) == {"random", "goal-blind"}
     # What a reply is worth here is what it is worth in the run.
-    records = run.records.set_index("sample")
+    lines = map(json.loads, (run.path / "records.jsonl").read_text("utf-8").splitlines())
+    texts = {line["sample"]: line["reply"]["text"] for line in lines}
     scores = run.scores[(run.scores["criterion"] == "aov") & (run.scores["setting"] == "A")]
     scenes = names["suite"].scenes
     for row in scores.head(40).to_dict("records"):
-        record = records.loc[row["sample"]]
-        alone = phyblock.score(record["text"], scenes[record["scene"]])
+        record = run.records.loc[row["row"]]
+        alone = phyblock.score(texts[record["sample"]], scenes[record["scene"]])
         assert (alone.tp, alone.fp, alone.fn) == (row["tp"], row["fp"], row["fn"])
 
 

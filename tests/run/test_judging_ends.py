@@ -94,7 +94,7 @@ def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
     kept = workspace.records(rescore(workspace.out, None, None, workspace.root / "slow"))
     given_up = next(record for record in kept if record["sample"] == lost["sample"])
     assert given_up["error"]["kind"] == "unjudged"
-    assert "took more than -1 s; it was given up before step 1" in given_up["error"]["message"]
+    assert "step 1 was not reached within -1 s" in given_up["error"]["message"]
     assert given_up["reply"] == lost["reply"]
     monkeypatch.undo()
     again = workspace.records(rescore(workspace.out, None, None, workspace.root / "again"))
