@@ -131,7 +131,7 @@ const Board = (() => {
         track.physics ? el("li", {}, `${track.title}: what fell is taken from the records; physics is not run again.`) : null),
       el("h3", {}, "Take part"),
       el("p", {}, "Run the suite, then send the bundle; it is scored again before it is listed:"),
-      el("pre", {}, el("code", {}, `phyblock run ${runs[0].suite || "full"} --models my-model\nphyblock bundle results/${runs[0].suite || "full"}-… --out my-model.zip`)),
+      el("pre", { tabindex: 0 }, el("code", {}, `phyblock run ${runs[0].suite || "full"} --models my-model\nphyblock bundle results/${runs[0].suite || "full"}-… --out my-model.zip`)),
       el("h3", {}, "Cite"),
       el("p", { class: "notes" }, "Ma, Wen, Lin, Xu, Liang, Lin et al.: PhyBlock: A Progressive Benchmark for Physical Understanding and Planning via 3D Block Assembly. NeurIPS 2025, Datasets and Benchmarks Track."));
   }

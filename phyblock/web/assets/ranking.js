@@ -28,7 +28,7 @@ const Ranking = (() => {
     const marks = () => lines.map(({ value, kind }) => place(el("i", { class: `line ${kind}` }), { left: at(value) }));
     const parts = partsOf(data, track, main);
     const solved = rows.some((row) => row.facts[track.name]?.solved !== null && row.facts[track.name]?.solved !== undefined);
-    return el("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Ranking" }, el("table", { class: "bars" },
+    return el("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": `Bars of ${track.title}` }, el("table", { class: "bars" },
       el("caption", { class: "unseen" }, `Models ranked by ${track.title}, ${track.main}`),
       el("thead", {}, el("tr", {},
         el("th", { scope: "col", class: "rank" }, "Rank"), el("th", { scope: "col", class: "text" }, "Model"),
@@ -97,7 +97,7 @@ const Ranking = (() => {
     });
     const over = Math.max(0, labels.at(-1).y - (height - 6));
     const line = (row) => parts.map((part, i) => `${x(i)},${y(row.values[part.id][0])}`).join(" ");
-    const drawing = svg("svg", { viewBox: `0 0 ${width} ${height + over}`, class: "slope", role: "img", "aria-label": `${track.main} by level; the table below has the same numbers` },
+    const drawing = svg("svg", { viewBox: `0 0 ${width} ${height + over}`, class: "slope", role: "group", "aria-label": `${track.main} by level; the table below has the same numbers` },
       ...Array.from({ length: Math.floor(most / step) + 1 }, (_, n) => n * step).flatMap((value) => [
         svg("line", { class: "grid", x1: left, x2: width - right, y1: y(value), y2: y(value) }),
         svg("text", { x: left - 8, y: y(value) + 4, class: "end tick" }, text(value, 0))]),
@@ -107,8 +107,8 @@ const Ranking = (() => {
         ...parts.map((part, i) => svg("circle", { cx: x(i), cy: y(row.values[part.id][0]), r: 3 })),
         svg("line", { class: "leader", x1: x(last) + 5, y1: y(row.values[parts[last].id][0]), x2: x(last) + 14, y2: at - 4 }),
         svg("text", { x: x(last) + 17, y: at }, row.name.length > 26 ? `${row.name.slice(0, 25)}…` : row.name))));
-    return el("section", { "aria-labelledby": "levels" }, el("h2", { id: "levels" }, "By level"),
-      el("p", { class: "muted" }, floor ? `Dashed: ${floor.name}, which never sees the goal.` : ""), el("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "By level" }, drawing));
+    return el("section", { "aria-labelledby": `levels-${track.name}` }, el("h2", { id: `levels-${track.name}` }, "By level"),
+      el("p", { class: "muted" }, floor ? `Dashed: ${floor.name}, which never sees the goal.` : ""), el("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Chart by level" }, drawing));
   }
 
   // ---- errors
@@ -172,7 +172,7 @@ const Ranking = (() => {
       if (spans.length && spans.at(-1).over === over) spans.at(-1).span += 1;
       else spans.push({ over, span: 1 });
     }
-    const made = el("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "All numbers" }, el("table", { class: "board" },
+    const made = el("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": `All numbers of ${track.title}` }, el("table", { class: "board" },
       el("caption", { class: "unseen" }, `All numbers of ${track.title}`),
       el("thead", {}, el("tr", {}, el("td", {}), spans.map(({ over, span }) => (over ? el("th", { scope: "colgroup", colspan: span, class: "over" }, over) : el("td", { colspan: span })))),
         el("tr", {}, el("th", { scope: "col", class: "text name" }, "Model"), columns.map((column) => el("th", { scope: "col", title: column.about || null,
