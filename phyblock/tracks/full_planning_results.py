@@ -215,7 +215,6 @@ def _film(record: PlanRecord, task: AssemblyTask) -> Iterator[FilmStep]:
     yield FilmStep(_outcome(record), tone, None, blocks)
 
 
-PLAN_VIEW = EpisodeView(NAME, _table, _film)
 REPORT = TrackReport(
     measures=PLANNING_MEASURES,
     cells=lambda run: run.level_cells(),
@@ -226,5 +225,5 @@ REPORT = TrackReport(
     notes=_notes,
     check_alike=_check_alike,
     showing=lambda run: run.showing(NAME),
-    episodes=PLAN_VIEW,
+    episodes=EpisodeView(_table, _film),
 )

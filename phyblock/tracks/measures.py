@@ -217,7 +217,6 @@ class HeadlineColumn:
 class EpisodeView:
     """The views of a record step by step: as a table, and as frames of a film."""
 
-    track: str
     table: Callable[[Any], TextTable]
     frames: Callable[[Any, AssemblyTask], Iterable[FilmStep]]
 

@@ -231,9 +231,9 @@ class StepOutcome(Line):
     """Numbers of the steps, from 1, whose blocks it moved."""
     error: PoseError | None = None
     """What was wrong, null where nothing was."""
-    rests: tuple[RestingBlock, ...] | None = None
+    rests: tuple[RestingBlock, ...]
     """The blocks that lie elsewhere after it than before, its own than where it was put, by more
-    than 1 mm or 1 degree; null: not kept."""
+    than 1 mm or 1 degree."""
 
 
 class PoseOutcome(Line):

@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from phyblock.data import AssemblyTask
-from phyblock.domain import Block, PoseStep
+from phyblock.domain import PoseStep
 from phyblock.errors import Problem, SpecError
 from phyblock.results.text import NO_VALUE, Column, TextTable, number
 from phyblock.scoring.counts import Floats, f1_of, mean_of, ratio_of
 from phyblock.scoring.pose import POSE_ERRORS, POSE_FRAMES, PoseError, PoseFrame
 from phyblock.scoring.pose_matching import TOLERANCES_CM
-from phyblock.sim.dynamics import ExecutionLimits, execute
-from phyblock.sim.engine import described_engine
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.geometry import put, upright
 from phyblock.text import counted
@@ -177,11 +175,7 @@ def pose_table(record: PoseRecord) -> TextTable:
 
 
 def pose_film(record: PoseRecord, task: AssemblyTask) -> Iterator[FilmStep]:
-    """A frame for the plan as it was given, one for the world after each step, and one for the end.
-
-    A plan of which the record does not keep where blocks came to lie is carried out again, in the
-    engine that is chosen now.
-    """
+    """A frame for the plan as given, one for the world after each step, and one for the end."""
     given = record.parse.steps if record.parse else ()
     pose, candidates = record.pose, task.candidates
     if pose is None:
@@ -194,30 +188,16 @@ def pose_film(record: PoseRecord, task: AssemblyTask) -> Iterator[FilmStep]:
         f"{record.model}, {task.scene.id}: the plan as given", "plain", None,
         tuple(block for block in blocks if block is not None),
     )  # fmt: skip
-    worlds = _kept_worlds(blocks, pose.steps)
-    by = ""
-    if worlds is None:
-        tolerances = pose.limits
-        limits = ExecutionLimits(tolerances.overlap_cm, tolerances.stand_cm, tolerances.stand_deg)
-        worlds = execute(blocks, limits).worlds
-        if pose.engine != (engine := described_engine()):
-            by = f" (shown in {engine}, not {pose.engine})"
+    stays = [step.end not in REFUSED_ENDS for step in pose.steps]
+    worlds = worlds_of(blocks, stays, [step.rests for step in pose.steps])
     for n, (one, step, world) in enumerate(zip(given, pose.steps, worlds, strict=True), 1):
         tone: Tone = "good" if step.error is None else "bad"
-        where = "" if step.error is None or step.end != "stands" else _where(step.error)
+        where = ""
+        if step.error is not None and step.end == "stands":
+            where = f", but {ERROR_NAMES[step.error].lower()}"
         yield FilmStep(f"{n}. block {one.block}: {_ended(step)}{where}", tone, one.block, world)
     tone = "good" if pose.completed else "bad"
-    yield FilmStep(f"{_came_to(record, pose)}{by}", tone, None, worlds[-1] if worlds else ())
-
-
-def _kept_worlds(
-    blocks: Sequence[Block | None], steps: Sequence[StepOutcome]
-) -> tuple[tuple[Block, ...], ...] | None:
-    """The blocks after each step, None where that was not kept."""
-    kept = [step.rests for step in steps if step.rests is not None]
-    if len(kept) < len(steps):
-        return None
-    return worlds_of(blocks, [step.end not in REFUSED_ENDS for step in steps], kept)
+    yield FilmStep(f"{_came_to(record, pose)}", tone, None, worlds[-1] if worlds else ())
 
 
 def _no_plan(record: PoseRecord) -> str:
@@ -238,11 +218,6 @@ def _ended(step: StepOutcome) -> str:
     return _ENDS[step.end]
 
 
-def _where(error: PoseError) -> str:
-    """Return what is wrong with a step that stands."""
-    return f", but {ERROR_NAMES[error].lower()}"
-
-
 def _came_to(record: PoseRecord, pose: PoseOutcome | None) -> str:
     if pose is None:
         return "nothing was carried out"
@@ -250,7 +225,6 @@ def _came_to(record: PoseRecord, pose: PoseOutcome | None) -> str:
 
 
 _MAIN = "Overall F1 in C"
-_VIEW = EpisodeView(NAME, pose_table, pose_film)
 
 
 def _headline(run: Run) -> tuple[HeadlineColumn, ...]:
@@ -299,7 +273,7 @@ REPORT = TrackReport(
     short="f1_c",
     notes=_notes,
     check_alike=_check_alike,
-    episodes=_VIEW,
+    episodes=EpisodeView(pose_table, pose_film),
     listings=_listings,
     showing=lambda run: run.showing("pose"),
 )

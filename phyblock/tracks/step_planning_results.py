@@ -228,5 +228,5 @@ REPORT = TrackReport(
     notes=_notes,
     check_alike=_check_alike,
     showing=lambda run: run.showing("steps"),
-    episodes=EpisodeView(NAME, _table, _film),
+    episodes=EpisodeView(_table, _film),
 )
