@@ -22,7 +22,7 @@ _CHROMIUMS = ("chromium", "chromium-browser", "google-chrome")
 
 
 def expect(locator: Locator) -> LocatorAssertions:
-    """What is waited for; the page forbids the `eval` that other ways of waiting need."""
+    """Return what waits for a locator; the page forbids `eval`, which other ways need."""
     from playwright.sync_api import expect as expected
 
     return expected(locator)
@@ -59,5 +59,5 @@ class Visit:
             self.complaints.append(text)
 
     def asked_elsewhere(self, *own: str) -> list[str]:
-        """What it asked for at addresses that do not begin so."""
+        """Return the requests to addresses that do not begin so."""
         return [url for url in self.requests if not url.startswith(own)]

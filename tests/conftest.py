@@ -32,7 +32,7 @@ os.environ.update(ONE_THREAD)
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """What is collected stays to the end, and what tests make is mostly gone without a collector:
+    """Collected objects stay to the end, and what tests make is mostly gone without a collector:
     it need not go through the one, nor often through the other.
     """
     gc.disable()
@@ -76,7 +76,7 @@ def _no_process_is_left() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def pictures_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where all workspaces of a test session, in all its processes, keep rendered pictures."""
+    """The folder of rendered pictures of all workspaces of a test session, in all its processes."""
     base = tmp_path_factory.getbasetemp()
     return (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "pictures"
 

@@ -46,7 +46,7 @@ _PRELOADED = ("PIL.GifImagePlugin", "PIL.JpegPresets", "aiohttp", "matplotlib.ba
 
 @dataclass(frozen=True)
 class Done:
-    """How a command ended."""
+    """The end of a command."""
 
     code: int
     out: str
@@ -65,7 +65,7 @@ class Done:
 
 
 def small_files_only(limit_bytes: int) -> Callable[[], None]:
-    """What a process does before anything else, so that it can write no larger file."""
+    """Return a first call of a process, after which it can write no larger file."""
 
     def apply() -> None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

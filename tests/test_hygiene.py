@@ -1,4 +1,4 @@
-"""What the project depends on is declared, pinned with hashes, and licensed."""
+"""Dependencies are declared, pinned with hashes, and licensed."""
 
 from __future__ import annotations
 

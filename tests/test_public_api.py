@@ -1,4 +1,4 @@
-"""What a notebook may import, what it costs, and that the guide to it runs."""
+"""The public API: what a notebook may import, what it costs, and that the guide to it runs."""
 
 from __future__ import annotations
 

@@ -50,19 +50,19 @@ def test_values_are_added_one_after_another(values: list[float]) -> None:
 
 
 def texts() -> list[Any]:
-    """What is seen of options' texts: by it drafts are kept, and the text-only probe answers."""
+    """Features of options' texts, by which drafts are kept and the text-only probe answers."""
     return [text_features(task.question.text, task.question.options) for task in ASKED.tasks[::5]]
 
 
 def solids() -> list[Any]:
-    """What two arches share, which are three pieces each or more."""
+    """The overlap of two arches, which are three pieces each or more."""
     arch = [Piece(p.vertices_m, p.face_normals) for p in collision_pieces("arch")]
     turns = (euler_deg_to_matrix((7.0 * n, 11.0 * n, 13.0 * n)) for n in range(5))
     return [overlap_volume(arch, placed(arch, turn, np.full(3, 0.003))) for turn in turns]
 
 
 def fits() -> list[Any]:
-    """What a record counts of how steps lie to goal blocks."""
+    """Counts of how steps lie to goal blocks, as records hold them."""
     off = [PoseFit(n, 0.1 * n, 0.0, 0.0, 0.7 * n, 1 / (n + 1)) for n in range(30)]
     return [FITS.sample(None, SimpleNamespace(fits=off[:n])) for n in range(30)]
 

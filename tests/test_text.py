@@ -14,7 +14,7 @@ risky = st.text(alphabet="'=+-@\t\r\n1.a") | st.text()
 
 
 def taken_back(cell: str) -> str:
-    """What docs/results.md says a reader does."""
+    """Read a line as docs/results.md says a reader does."""
     return cell[1:] if cell.startswith("'") and cell.lstrip("'").startswith(STARTS) else cell
 
 

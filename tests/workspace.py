@@ -70,7 +70,7 @@ SCENES: tuple[Raw, ...] = (
 
 
 def shared_folders(pictures: Path) -> list[Path]:
-    """Where workspaces that share rendered pictures have each of `SHARED`."""
+    """The folder of each of `SHARED` for workspaces that share rendered pictures."""
     return [pictures, *map(pictures.with_name, SHARED[1:])]
 
 

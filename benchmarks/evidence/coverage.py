@@ -1,4 +1,4 @@
-"""How often 95 % intervals hold the truth, how often tests err, and how often they find a gap.
+"""Coverage of 95 % intervals, and the error rate and power of tests.
 
     python -m benchmarks.evidence.coverage [--worlds 1000] [--resamples 1000] [--seed 0]
 
@@ -39,7 +39,7 @@ def difference_of(sums: Floats) -> Floats:
 
 
 def weights(clusters: Clusters, rng: np.random.Generator, resamples: int) -> Floats:
-    """How often each unit counts in each resample: base scenes are drawn, a scene of several counts
+    """Return each unit's count in each resample: base scenes are drawn, a scene of several counts
     the product of their draws; shape (resamples, units).
     """
     n = clusters.size

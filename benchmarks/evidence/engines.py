@@ -1,4 +1,4 @@
-"""Whether the physics engines agree: on every built-in scene, order and question that needs one.
+"""Agreement of the physics engines: on every built-in scene, order and question that needs one.
 
     python benchmarks/evidence/engines.py [--all] [--every 20] [--orders 1] [--seed 0] [--list]
 
@@ -37,7 +37,7 @@ WIDTHS = (31, 7, 10, 10, 8, 10, 8)
 
 @dataclass
 class Agreement:
-    """How many were tried, in how many each engine says yes, and how far they agree."""
+    """Numbers tried, numbers to which each engine says yes, and their agreement."""
 
     tried: int = 0
     yes: tuple[int, ...] = (0, 0)
@@ -59,7 +59,7 @@ class Agreement:
 def states(
     scene: Scene, orders: int, rng: np.random.Generator
 ) -> Iterator[tuple[str, str, tuple[Block, ...]]]:
-    """What is tried of a scene: its row in the table, its name, and the blocks."""
+    """Yield the trials of a scene: its row in the table, its name, and the blocks."""
     yield "scenes as they are", scene.id, scene.blocks
     for number in range(orders):
         order = scene.graph.random_order(rng)
@@ -73,7 +73,7 @@ def states(
 
 
 def is_found(problem: str | None) -> bool | None:
-    """Whether the answer was found again; None where none was sure."""
+    """Return True if the answer was found again; None where none was sure."""
     return None if problem is not None and not problem.startswith("the answer is") else not problem
 
 

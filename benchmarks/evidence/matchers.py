@@ -1,4 +1,4 @@
-"""What the two matchers make of valid orders and of recorded replies: the evidence for `optimal`.
+"""The two matchers on valid orders and of recorded replies: the evidence for `optimal`.
 
     python benchmarks/evidence/matchers.py CHECKOUT [--orders 200] [--seed 0]
 

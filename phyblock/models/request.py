@@ -106,7 +106,7 @@ class Model(Protocol):
 
 
 class Journal(Protocol):
-    """Where calls are written before they are sent and when they have ended."""
+    """The record of calls before they are sent and when they have ended."""
 
     def kept(self, key: str) -> Reply | None:
         """Return the reply to a request that an earlier command was answered, or None."""

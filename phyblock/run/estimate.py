@@ -117,7 +117,7 @@ class Estimate:
 
     @property
     def price_source(self) -> str:
-        """Where the price of the day stands, "" where none is known."""
+        """Return the source of the price of the day, "" where none is known."""
         is_known = self.prices is not None and self.prices.on(self.day) is not None
         return self.prices.source(self.day) if is_known and self.prices is not None else ""
 

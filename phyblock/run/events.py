@@ -141,7 +141,7 @@ class Standing:
 
     @property
     def limit_usd(self) -> dict[str, float]:
-        """What a cost limit counts, by model [US dollars]: calls whose end is not known in full."""
+        """Return the cost that a limit counts, by model [US dollars]: unknown ends in full."""
         usd = dict(self._calls_usd)
         told = [(call.model, call.most_usd or 0.0) for call in self.unanswered.values()]
         told += [(self.samples[sample].model, cost) for sample, cost in self._records_usd.items()]
@@ -151,7 +151,7 @@ class Standing:
 
     @property
     def unanswered_text(self) -> str:
-        """What is to be said of calls whose end is not known, or nothing."""
+        """Return a sentence on calls whose end is not known, or ""."""
         if not self.unanswered:
             return ""
         usd = [call.most_usd for call in self.unanswered.values()]

@@ -1,4 +1,4 @@
-"""What answers in place of a model: guesses from the texts of questions, and the picks of people.
+"""Answers in place of a model's: guesses from the texts of questions, and the picks of people.
 
 Guesses are told the answers of other questions only: questions are split into folds by the base
 scene they are about, and those of a fold are answered by rules learned from questions whose scenes

@@ -153,7 +153,7 @@ class ShownTask(AssemblyTask):
 
 @dataclass(frozen=True)
 class Presentation:
-    """How a suite shows scenes; what is drawn is drawn again with each of the `seeds`.
+    """The presentation of scenes in a suite; what is drawn is drawn again with each of the `seeds`.
 
     `blind` leaves out the goal; with `elsewhere` that of another scene of its level is shown.
     """

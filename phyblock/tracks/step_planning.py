@@ -155,7 +155,7 @@ class EpisodeRecord(Record):
     columns: ClassVar[Mapping[str, str]] = {"ending": "object", "outcomes": "object"}
 
     def row(self) -> Mapping[str, Any]:
-        """How the episode went."""
+        """The course of the episode."""
         return {"ending": self.ending, "outcomes": tuple(self.outcomes)}
 
     exported: ClassVar[Mapping[str, str]] = {"ending": "string"}

@@ -1,4 +1,4 @@
-"""What a page shows of runs: models with values, ranks and facts, and the finding in words."""
+"""The data of a ranking: models with values, ranks and facts, and the finding in words."""
 
 from __future__ import annotations
 

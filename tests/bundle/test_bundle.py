@@ -241,7 +241,7 @@ def test_samples_that_were_left_out_are_counted(made: Workspace, tmp_path: Path)
 
 
 def test_what_is_not_changed_is_made_here_to_the_byte(made: Workspace, tmp_path: Path) -> None:
-    """What refuses forgeries is what was changed, not how they are made."""
+    """Forgeries are refused for what was changed, not for how they are made."""
     path = forged(made, tmp_path / "forged", lambda *_: None)
     (tmp_path / "again").mkdir()
     unpack(path, tmp_path / "again")

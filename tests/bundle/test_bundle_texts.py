@@ -1,4 +1,4 @@
-"""What is of one machine is taken out of a bundle, and nothing else."""
+"""Texts of one machine are taken out of a bundle, and nothing else."""
 
 from __future__ import annotations
 

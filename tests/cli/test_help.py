@@ -27,7 +27,7 @@ main()
 
 
 def ask(*args: str) -> tuple[str, set[str]]:
-    """What a command prints, and the packages that it imported."""
+    """Return what a command prints, and the packages that it imported."""
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT, *args], capture_output=True, text=True, check=True
     )

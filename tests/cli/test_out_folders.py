@@ -1,4 +1,4 @@
-"""Where commands write: what is the user's is never written over, removed or reached by a link."""
+"""Output of commands: what is the user's is never written over, removed or reached by a link."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is printed where: pipes, terminals, and outputs that know few characters."""
+"""Output on pipes, terminals, and outputs that know few characters."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_a_pipe_gets_whole_tables_without_escapes(suite: Workspace) -> None:
 
 def test_a_terminal_shows_the_panel_and_then_the_tables(suite: Workspace) -> None:
     class Bracketing(OpenAIChat):
-        """What it says looks like markup."""
+        """A model whose messages look like markup."""
 
         def error(self, status: int, ending: str, message: str) -> dict[str, object]:
             return super().error(status, ending, f"[/bold] busy [blink {message}")

@@ -1,4 +1,4 @@
-"""What the acceptance test of scenes finds, with the long trial and our own tolerances."""
+"""The acceptance test of scenes, with the long trial and our own tolerances."""
 
 from __future__ import annotations
 

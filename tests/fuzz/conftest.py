@@ -20,13 +20,13 @@ _SCENES = SCENES[:2]
 
 @pytest.fixture(scope="session")
 def tallies() -> dict[str, Counter[str]]:
-    """What was tried by its kind, and how often it ended in which way; printed in the end."""
+    """Counts of what was tried, by kind and end; printed in the end."""
     return _tallies
 
 
 @pytest.fixture(scope="session")
 def worker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Worker]:
-    """Where all commands of the session run."""
+    """The folder in which all commands of the session run."""
     with Worker(tmp_path_factory.mktemp("worker")) as made:
         yield made
 
@@ -95,7 +95,7 @@ def pytest_report_header() -> str:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """What was tried, and how it ended."""
+    """Print what was tried, and how it ended."""
     if not _tallies:
         return
     terminalreporter.section(f"fuzzing with seed {SEED}")

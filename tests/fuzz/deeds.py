@@ -1,4 +1,4 @@
-"""What this process does to files and whom it connects to, told by Python's own audit events."""
+"""Files that this process touches and hosts that it connects to, by Python's audit events."""
 
 from __future__ import annotations
 

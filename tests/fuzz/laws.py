@@ -49,7 +49,7 @@ def take_tree(root: Path) -> dict[str, Fingerprint]:
 
 
 def ending_broken(ended: Ended) -> Iterator[Broken]:
-    """How the first law was broken by the way a command ended."""
+    """Return the first law that the end of a command breaks, in words."""
     told = ended.out + ended.err
     if ended.code is None:
         yield Broken(1, "it hangs", ended.err[-2000:])

@@ -43,7 +43,7 @@ class Entry(NamedTuple):
 
     @property
     def key(self) -> tuple[str, str]:
-        """What was asked, of whom."""
+        """A request, and whom it was sent to."""
         return self.model, self.sample
 
 
@@ -55,20 +55,20 @@ class Ledger:
 
     @property
     def faults(self) -> Counter[str]:
-        """How many requests did not end in an ordinary answer, by how they did."""
+        """Numbers of requests without an ordinary answer, by their end."""
         return Counter(entry.ending for entry in self.entries if entry.ending != "ok")
 
     def answered(self) -> set[tuple[str, str]]:
-        """What got a reply."""
+        """Requests that got a reply."""
         return {entry.key for entry in self.entries if entry.comes_to == "reply"}
 
     def refused(self) -> set[tuple[str, str]]:
-        """What was refused for good."""
+        """Requests that were refused for good."""
         return {entry.key for entry in self.entries if entry.comes_to == "sample"}
 
 
 def asked_twice(entries: Iterable[Entry], *, retries_refused: bool = False) -> Iterator[Broken]:
-    """What was asked again after it was answered, or refused for good."""
+    """Return what was asked again after it was answered, or refused for good."""
     ended: dict[tuple[str, str], Entry] = {}
     for entry in entries:
         if entry.key in ended:
@@ -78,14 +78,14 @@ def asked_twice(entries: Iterable[Entry], *, retries_refused: bool = False) -> I
 
 
 def lost(ledger: Ledger, kept: Collection[tuple[str, str]]) -> Iterator[Broken]:
-    """What was answered and is not kept."""
+    """Return what was answered and is not kept."""
     for model, sample in sorted(ledger.answered() - set(kept)):
         endings = [entry.ending for entry in ledger.entries if entry.key == (model, sample)]
         yield Broken(3, "a reply is lost", f"{sample} of {model}: {endings}")
 
 
 def kept_in(folder: Path) -> set[tuple[str, str]]:
-    """What stands in a run's records, or among its calls, by model and signature of the reply.
+    """Return the entries of a run's records or calls, by model and signature of the reply.
 
     A last line that a kill cut short does not count.
     """

@@ -1,4 +1,4 @@
-"""How much is fuzzed, and with which seed: set by environment variables, as `make fuzz` does."""
+"""Amount and seed of fuzzing: set by environment variables, as `make fuzz` does."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ failures = st.lists(st.sampled_from(["", "500", "reset", "done-reset"]), max_siz
 
 @st.composite
 def batch_faults(draw: st.DrawFn) -> BatchFaults:
-    """What four batches meet, one of which may be cancelled or refused, and calls about them."""
+    """Faults of four batches, one of which may be cancelled or refused, and calls about them."""
     lines = st.dictionaries(st.integers(0, QUESTIONS - 1), endings, max_size=QUESTIONS)
     kinds = ["upload", "create", "look", "list", "results"]
     ends = st.dictionaries(st.integers(0, 1), st.sampled_from(["refused", "cancelled"]), max_size=1)

@@ -37,7 +37,7 @@ _ROOT = Path(__file__).parents[2]
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command ended: code None where it hung, negative where a signal ended the process."""
+    """The end of a command: code None where it hung, negative where a signal ended the process."""
 
     code: int | None
     out: str

@@ -310,7 +310,7 @@ def pool(count: int, odds: tuple[float, ...], seed: int) -> list[Draft]:
 
 
 def rate_off(texts: list[Draft]) -> float:
-    """How far from chance the shape is that is right most or least often where it is offered."""
+    """Return the largest distance from chance of a shape that is offered."""
     right = Counter(one.options[0] for one in texts)
     offered = Counter(option for one in texts for option in one.options)
     return max(abs(right[shape] / offered[shape] - 0.25) for shape in SHAPE_TEXTS)

@@ -32,7 +32,7 @@ POLL_S = 0.01
 
 @dataclass
 class Disk:
-    """What is left when a process is killed: lines about batches, a folder, perhaps a cache."""
+    """The remains of a killed process: lines about batches, a folder, perhaps a cache."""
 
     folder: Path
     cache: Path | None = None

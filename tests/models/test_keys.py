@@ -1,4 +1,4 @@
-"""Which key a model needs, and that keys stay out of all text."""
+"""Keys: the one that a model needs, and that keys stay out of all text."""
 
 from __future__ import annotations
 

@@ -151,7 +151,7 @@ def test_what_is_missing_on_this_machine_is_no_outage(
 
 
 def settings_of(litellm: Any) -> dict[str, object]:
-    """What a program may have set: the module's values, its loggers and the environment."""
+    """Return what a program may have set: the module's values, its loggers and the environment."""
     kinds = (bool, int, float, str, type(None), tuple)
     found: dict[str, object] = {
         name: value for name, value in vars(litellm).items() if isinstance(value, kinds)

@@ -226,7 +226,7 @@ json_values = st.recursive(
 
 @given(json_values)
 def test_any_document_is_read_or_refused_with_a_data_error(raw: object) -> None:
-    """What is read can be written: texts as UTF-8, counts as numbers."""
+    """Values that are read can be written: texts as UTF-8, counts as numbers."""
     try:
         read = read_raw_reply(raw, "x.json")
     except DataError:

@@ -1,4 +1,4 @@
-"""What is sent again, how often, how long, after which waits; what a cancellation ends."""
+"""Retries: their causes, numbers, waits and ends; what a cancellation ends."""
 
 from __future__ import annotations
 

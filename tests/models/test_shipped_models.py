@@ -42,7 +42,7 @@ def of_group(group: str) -> dict[str, ModelConfig]:
 
 
 def faults(models: Mapping[str, ModelConfig]) -> Iterator[str]:
-    """What litellm's map has against models that their providers serve.
+    """Return objections of litellm's map to models that their providers serve.
 
     Servers of one's own serve what they like: the map knows none of them.
     """

@@ -1,4 +1,4 @@
-"""What arrives at the servers: pictures byte for byte and in order, texts, parameters."""
+"""Requests as they arrive at servers: pictures byte for byte and in order, texts, parameters."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def test_thoughts_left_in_the_text_become_reasoning(route: str) -> None:
 
 
 def looked_at(seen: Seen) -> list[object]:
-    """What a request says, picture by picture or as a whole, of how closely to look."""
+    """Return the detail that a request asks for, picture by picture or as a whole."""
     if "contents" in seen.raw:
         whole = seen.params.get("mediaResolution")
         parts = [part for content in seen.raw["contents"] for part in content["parts"]]

@@ -50,7 +50,7 @@ def _environment(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def answers_to(route: Route, server: LocalServer, url: str, faults: list[str]) -> Answers:
-    """What a model says of each fault, met one after another; each costs one request."""
+    """Return a model's error for each fault, met one after another; each costs one request."""
 
     async def one(mode: str) -> Reply | ModelError:
         server.faults = Faults(mode=mode)
@@ -90,7 +90,7 @@ def test_every_fault_ends_as_it_must_after_one_request(name: str) -> None:
 
 
 def check_usage(route: str, answers: Answers) -> None:
-    """What cannot be a count is not known; a good usage is."""
+    """Impossible counts are not known; a good usage is."""
     for mode, answer in answers.items():
         if mode.startswith("usage-") and (route, mode) not in AS_LITELLM_READS:
             assert isinstance(answer, Reply)

@@ -31,7 +31,7 @@ def prepare(workspace: Workspace, url: str, **suite: Any) -> None:
 
 
 def counted_once(server: BatchServer, samples: int) -> bool:
-    """Where no seeds are sent, both seeds of an item ask the same."""
+    """Both seeds of an item ask the same where no seeds are sent."""
     return sum(server.asked.values()) == samples and len(set(server.asked.values())) == 1
 
 

@@ -1,4 +1,4 @@
-"""What a dry run expects is what a provider bills, as far as it can be known before."""
+"""A dry run expects what a provider bills, as far as it can be known before."""
 
 from __future__ import annotations
 

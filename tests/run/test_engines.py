@@ -47,7 +47,7 @@ def unsteady_scene() -> Raw:
 def test_runs_in_two_engines_are_scored_anywhere_and_never_compared(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What fell is read from the records, whichever engine is here now."""
+    """Falls are read from the records, whichever engine is here now."""
     monkeypatch.chdir(workspace.root)
     monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
     workspace.write_scenes(unsteady_scene())

@@ -1,4 +1,4 @@
-"""What goes wrong at a provider: retried, recorded by its kind, or the end of one model alone."""
+"""Failures of a provider: retried, recorded by its kind, or the end of one model alone."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ def lines_in(workspace: Workspace, name: str) -> list[dict[str, Any]]:
 
 
 def counted_usd(workspace: Workspace) -> tuple[float, int]:
-    """What the run's calls cost, those without an end at their most; and how many these are."""
+    """Return the cost of a run's calls, those without an end at their most, and their number."""
     calls = {call["call"]: call for call in lines_in(workspace, "calls.jsonl")}
     open_calls = [call for call in calls.values() if not call.get("ended")]
     ended_usd = sum(call["billed_usd"] for call in calls.values() if call.get("ended"))

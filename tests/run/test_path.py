@@ -1,4 +1,4 @@
-"""How much of phyblock one sample touches: the modules that it goes through, those it imports."""
+"""The path of one sample: the modules that it goes through, those it imports."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ def lasting(files: dict[str, bytes]) -> dict[str, bytes]:
 
 
 def scores(records: list[Raw]) -> dict[str, Raw]:
-    """What was read in each reply and what it is worth, by sample."""
+    """Return what was read in each reply and what it is worth, by sample."""
     return {r["sample"]: {k: r[k] for k in ("outcome", "parse", "scores")} for r in records}
 
 

@@ -107,7 +107,7 @@ def test_known_components_lie_in_their_intervals() -> None:
 
 
 def test_scenes_that_agree_by_chance_are_no_certainty() -> None:
-    """Where every scene says the same the error is 0, but there are four scenes of each alone."""
+    """The error is 0 where every scene says the same, but there are four scenes of each alone."""
     alike = np.tile(np.array([0.0, 1.0, 0.0, 1.0]), (4, 3, 1))
     spread = np.array([0.0, 1.0, 0.0, 1.0])[:, None] * np.ones((4, 3))
     across = np.array([[[0.0, 0.0], [1.0, 1.0]], [[1.0, 1.0], [0.0, 0.0]]] * 2)

@@ -1,4 +1,4 @@
-"""What became of every goal block, and how near a plan is to a valid order."""
+"""Losses: what became of every goal block, and how near a plan is to a valid order."""
 
 from __future__ import annotations
 

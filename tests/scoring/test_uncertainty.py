@@ -234,7 +234,7 @@ def test_holm_only_raises_and_keeps_the_order_and_the_least_is_bonferronis(p: np
 
 
 def influence(counts: Floats) -> Floats:
-    """How much each scene moves F1, by the derivative of the ratio."""
+    """Return the influence of each scene on F1, by the derivative of the ratio."""
     weights = np.stack([2 * counts[:, 0], counts @ [2, 1, 1]])
     part, whole = weights.sum(axis=1)
     return np.asarray((weights[0] - part / whole * weights[1]) / whole)
@@ -246,7 +246,7 @@ def dyadic_se(moves: Floats, clusters: Clusters) -> float:
 
 
 def in_common(clusters: Clusters) -> np.ndarray:
-    """Which pairs of units have a base scene in common."""
+    """Return the pairs of units that have a base scene in common."""
     members = np.zeros((len(clusters.members), clusters.size + 1))
     np.put_along_axis(members, clusters.members, 1.0, axis=1)
     return (members[:, :-1] @ members[:, :-1].T) > 0

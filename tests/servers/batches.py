@@ -30,7 +30,7 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 @dataclass(frozen=True)
 class BatchFaults:
-    """How batches and calls go wrong; batches are counted from 0.
+    """Faults of batches and calls; batches are counted from 0.
 
     `lines` gives by batch the places whose line is not "ok": a status ("500", "400"), an ending of
     LocalServer.reply ("length"), "expired", "cancelled", "missing", "broken", "twice" or "stranger"
@@ -89,7 +89,7 @@ class BatchServer(LocalServer):
         raise NotImplementedError
 
     def told(self, made: Made) -> dict[str, Any]:
-        """What the provider says of a batch."""
+        """Return what the provider says of a batch."""
         raise NotImplementedError
 
     def call(self, kind: str, work: Callable[[web.Request], Awaitable[Any]]) -> Handler:
@@ -133,7 +133,7 @@ class BatchServer(LocalServer):
         return [self.told(made) for made in newest], end < len(self.made)
 
     def after(self, batch_id: str | None) -> int:
-        """Where the page begins that follows on a batch."""
+        """Return the start of the page that follows on a batch."""
         newest = [made.id for made in reversed(self.made)]
         return newest.index(batch_id) + 1 if batch_id else 0
 

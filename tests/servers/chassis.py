@@ -1,4 +1,4 @@
-"""What the local servers share: counting, faults, running in a thread or as a process.
+"""Parts that the local servers share: counting, faults, running in a thread or as a process.
 
 A server derives a sample's id from the content of its messages and its seed, and draws faults from
 that id and the number of times the sample was asked, so that a run meets the same faults whatever

@@ -29,7 +29,7 @@ class StepAgent(OpenAIChat):
 
 
 def said(seen: Seen) -> str:
-    """What the agent answers."""
+    """Return the agent's answer."""
     digest = hashlib.sha256(json.dumps([seen.system, seen.parts]).encode()).digest()
     if digest[0] < 20:
         return "I would rather not say."

@@ -57,7 +57,7 @@ def add_all(simulation: Simulation, blocks: list[Block]) -> None:
 
 
 def bits(simulation: Simulation, blocks: list[Block]) -> str:
-    """Where blocks are and how they move, to the last bit."""
+    """Return places and motions of blocks, to the last bit."""
     rows = []
     for one in blocks:
         pose, velocity = simulation.pose(one.order), simulation.velocity(one.order)

@@ -70,7 +70,7 @@ def drawn(props: list[Prop], camera: Camera) -> Raster:
 def hits(
     starts: NDArray[np.float64], ways: NDArray[np.float64], corners: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """How far along each ray (n, 3) it first meets a triangle, inf for never, and the normal."""
+    """Return the distance along each ray (n, 3) to a triangle, inf for none, and the normal."""
     one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     crossed = np.cross(ways[:, None], two)
     scale = np.where(np.abs(s := (one * crossed).sum(-1)) > 1e-14, s, np.inf)
@@ -99,7 +99,7 @@ def some_pixels(seed: int, n: int = RAYS) -> NDArray[np.int64]:
 def met_by(
     props: list[Prop], starts: NDArray[np.float64], ways: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """How far along each ray meets each prop, (k, n), inf for never, and the normals, (k, n, 3)."""
+    """Return distances along rays to props, (k, n), inf for none, and normals, (k, n, 3)."""
     found = [hits(starts, ways, triangles_m(prop)) for prop in props]
     return np.stack([away for away, _ in found]), np.stack([normals for _, normals in found])
 
@@ -209,7 +209,7 @@ def test_what_reaches_behind_the_camera_is_drawn_as_far_as_it_is_before_it() -> 
 
 
 def test_the_bytes_of_a_picture_are_the_same_on_every_machine() -> None:
-    """Where these change on purpose, `RASTER_VERSION` is raised, or cached pictures are mixed."""
+    """`RASTER_VERSION` is raised where these change on purpose, or cached pictures are mixed."""
     props = props_of(
         [
             block(n, kind, (0.09 * n, 0.07 * (n % 3), 0.1), (20.0 * n, 10.0, 35.0 * n))

@@ -1,4 +1,4 @@
-"""What answers without a model: guesses of questions, plans without the goal, picks of people."""
+"""Answers without a model: guesses of questions, plans without the goal, picks of people."""
 
 from __future__ import annotations
 

@@ -235,7 +235,7 @@ def fit(position_cm: float, up_cm: float, turn_deg: float = 0.0) -> PoseFit:
 def test_a_step_has_one_error_the_first_in_time(
     one: PoseFit, error: str | None, end: StepEnd
 ) -> None:
-    """What was said wrongly comes before what follows when it is carried out."""
+    """Errors of a reply come before those of its execution."""
     goal = Goal(_TASK.scene, _TASK.candidates, "A")
     physical = {"stands": None, "falls": "floating", "knocks_over": "toppling"}
     physical |= {"overlaps": "interpenetrating", "under_floor": "interpenetrating"}

@@ -116,7 +116,7 @@ def test_a_rotation_keeps_what_is_right_and_rotations_add_up(
 
 
 def _meaning(question: Question, index: int) -> object:
-    """What an option is: its picture, its place in the world, or its words."""
+    """Return an option: its picture, its place in the world, or its words."""
     letter = LETTERS[index]
     for picture in question.pictures:
         if picture.label == letter:

@@ -66,7 +66,7 @@ class ReportVisit(Visit):
 
     @property
     def hash(self) -> str:
-        """What the address says behind `#`."""
+        """The part of the address behind `#`."""
         found: str = self.page.evaluate("location.hash")
         return found.removeprefix("#")
 

@@ -53,7 +53,7 @@ def entries_in(folder: Path, pack: Pack, kind: str) -> list[Any]:
 
 
 class Report:
-    """What a page reads out of a folder of scripts."""
+    """A page's reading of a folder of scripts."""
 
     def __init__(self, run: Path, data: Path | None = None) -> None:
         path = write_report(write_tables(run), data)

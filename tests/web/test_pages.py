@@ -29,7 +29,7 @@ WIDE = "document.documentElement.scrollWidth <= innerWidth"
 
 
 def painted(page: Page, selector: str) -> int:
-    """How many pixels of a canvas are drawn."""
+    """Return the number of pixels of a canvas that are drawn."""
     script = """canvas => {
         const copy = new OffscreenCanvas(canvas.width, canvas.height);
         const context = copy.getContext("2d", { willReadFrequently: true });

@@ -241,7 +241,7 @@ def end_on_a_phone(page: Page, run: Path) -> None:
 
 
 def give_places_by_touch(page: Page) -> None:
-    """What is no number is said at its field; rows are moved and removed, and all is undone."""
+    """A field says what is no number; rows are moved and removed, and all is undone."""
     task(page, 8)
     fits_the_phone(page)
     page.get_by_role("button", name="Candidate 3").first.tap()
