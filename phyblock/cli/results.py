@@ -344,11 +344,12 @@ def verify(file: Path, data: tuple[Path, ...]) -> None:
     with opened_bundle(file, data) as verified:
         console.print(f"{shown_path(file)} verifies.")
         samples = f"{verified.records:,} of {verified.expected:,} expected samples"
-        console.print(f"{samples}." if verified.is_whole else f"{samples}: the run is not whole.")
+        is_whole = verified.records == verified.expected
+        console.print(f"{samples}." if is_whole else f"{samples}: the run is not whole.")
         models = counted(len(verified.manifest.models), "model")
         records = counted(verified.records, "record")
         console.print(f"{records} of {models}, scored again, are the same bytes.")
-        console.print(f"Run {verified.manifest.run}, made with phyblock {verified.about.phyblock}.")
+        console.print(f"Run {verified.manifest.run}, made with phyblock {verified.phyblock}.")
         console.print("Not verified:")
         for sentence in verified.unverified:
             console.print(f"* {sentence}")

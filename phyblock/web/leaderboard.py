@@ -16,7 +16,7 @@ from typing import Any
 from PIL import Image, ImageDraw, ImageFont
 from pydantic import BaseModel
 
-from phyblock.bundle import named, opened_bundle
+from phyblock.bundle import opened_bundle
 from phyblock.errors import DataError, Problem, SpecError, StoreError
 from phyblock.files import LIST, OutFolder, digest_of_file, writing
 from phyblock.records.files import RECORDS
@@ -171,8 +171,7 @@ def open_runs(paths: Sequence[Path], data: Sequence[Path], kept: ExitStack) -> t
         if path.is_file():
             verified = kept.enter_context(opened_bundle(path, data))
             unverified = verified.unverified
-            with named(verified.folder, where):
-                run = load_run(verified.folder)
+            run = load_run(verified.folder)
         else:
             run = load_run(path)
         identity = run.manifest.identity

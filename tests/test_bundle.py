@@ -1,0 +1,405 @@
+"""A bundle of a run: scored again elsewhere it says the same; changed, it is refused."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import shutil
+import signal
+import stat
+import struct
+import subprocess
+import sys
+import warnings
+import zipfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from phyblock.bundle import (
+    ABOUT,
+    MEMBERS,
+    add,
+    bundle_run,
+    opened_bundle,
+    portable,
+    portable_manifest,
+    unpack,
+)
+from phyblock.errors import DataError, StoreError
+from phyblock.records.files import RECORDS, known_records
+from phyblock.records.manifest import MANIFEST, Manifest
+from phyblock.stable import hex_digest
+from tests.servers.chassis import Running
+from tests.servers.openai_chat import OpenAIChat
+from tests.vqa_set import questions, write_questions
+from tests.web.factory import manifest, record
+from tests.workspace import SCENES, Raw, Workspace
+
+SUBTASKS = ["SH", "OR"]
+Change = Callable[[list[Raw], Raw], None]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+    """A model and a baseline in three tracks, and the bundle of the run beside it."""
+    workspace = Workspace(tmp_path_factory.mktemp("bundled"), pictures_dir)
+    workspace.write_scenes(*SCENES[:3])
+    write_questions(workspace.root / "questions", questions(per_subtask=2, subtasks=SUBTASKS))
+    workspace.write_suite(
+        tracks=["full_planning", "vqa", "step_planning"],
+        vqa={"path": "./questions", "subtasks": SUBTASKS},
+        steps={"physics": "off"},
+        seeds=[0],
+        models=["random", "alpha"],
+    )
+    with Running(OpenAIChat()) as running:
+        workspace.write_models(running.url, "alpha", price={"input": 0.0, "output": 0.0})
+        done = workspace.run()
+    assert done.code == 0, done.err
+    done = workspace.phyblock("bundle", "out")
+    assert done.code == 0, done.err
+    return workspace
+
+
+def folders(made: Workspace) -> list[Path]:
+    return [made.root / "data", made.root / "questions"]
+
+
+def refused(
+    path: Path, data: list[Path], error: type[Exception] = StoreError, match: str = ""
+) -> None:
+    with pytest.raises(error, match=match), opened_bundle(path, data):
+        pytest.fail("it was taken")
+
+
+def contents(made: Workspace, folder: Path) -> dict[str, bytes]:
+    folder.mkdir()
+    unpack(made.out / "bundle.zip", folder)
+    return {name: (folder / name).read_bytes() for name in MEMBERS}
+
+
+def forged(made: Workspace, folder: Path, change: Change) -> Path:
+    """A bundle whose author changed records or manifest and made the digests of them anew."""
+    found = contents(made, folder)
+    records = [json.loads(line) for line in found[RECORDS].splitlines()]
+    manifest = yaml.safe_load(found[MANIFEST])
+    change(records, manifest)
+    text = "".join(json.dumps(r, ensure_ascii=False, separators=(",", ":")) + "\n" for r in records)
+    files = {MANIFEST: yaml.safe_dump(manifest, sort_keys=False).encode(), RECORDS: text.encode()}
+    path = folder.with_suffix(".zip")
+    path.write_bytes(archive(*with_digests(files, json.loads(found[ABOUT])).items()))
+    return path
+
+
+def archive(*members: tuple[str | zipfile.ZipInfo, bytes]) -> bytes:
+    file = io.BytesIO()
+    with warnings.catch_warnings(), zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as made:
+        warnings.simplefilter("ignore")
+        for name, data in members:
+            made.writestr(name, data)
+    return file.getvalue()
+
+
+def with_digests(files: Mapping[str, bytes], about: Raw) -> dict[str, bytes]:
+    digests = {name: hex_digest(data) for name, data in files.items()}
+    return {**files, ABOUT: json.dumps({**about, "files": digests}).encode()}
+
+
+def test_a_bundle_verifies_elsewhere_and_holds_nothing_of_this_machine(
+    made: Workspace, tmp_path: Path
+) -> None:
+    held = contents(made, tmp_path / "held")
+    assert not any(str(made.root).encode() in data for data in held.values())
+    assert b"messages" not in held[MANIFEST]
+    (tmp_path / "elsewhere").mkdir()
+    elsewhere = Workspace(tmp_path / "elsewhere", tmp_path / "pictures")
+    for folder in folders(made):
+        shutil.copytree(folder, elsewhere.root / folder.name)
+    shutil.copy(made.out / "bundle.zip", elsewhere.root / "b.zip")
+    done = elsewhere.phyblock("verify", "b.zip", "--data", "data", "--data", "questions")
+    assert done.code == 0, done.err
+    assert "20 of 20 expected samples." in done.out
+    assert "the prompts after the first of an episode" in done.out
+    for data, lacking in ((["--data", "data"], "questions questions"), ([], "data set data")):
+        done = elsewhere.phyblock("verify", "b.zip", *data)
+        assert (done.code, "Traceback" in done.err) == (2, False)
+        assert f"needs the {lacking}, which a bundle does not hold" in done.err
+
+
+def test_data_are_told_by_what_they_hold_whatever_their_names(
+    made: Workspace, tmp_path: Path
+) -> None:
+    """Scenes and questions in one folder are found, and so are questions beside others of their
+    name.
+    """
+    both, other = tmp_path / "both", tmp_path / "questions"
+    shutil.copytree(made.root / "data", both)
+    shutil.copytree(made.root / "questions", both, dirs_exist_ok=True)
+    write_questions(other, questions(per_subtask=3, subtasks=SUBTASKS))
+    bundle = made.out / "bundle.zip"
+    for data in ([both], [other, *folders(made)]):
+        with opened_bundle(bundle, data) as found:
+            assert found.records == 20
+    refused(bundle, [other, made.root / "data"], DataError, "needs the questions questions")
+
+
+def test_a_run_without_its_data_is_bundled_to_the_same_bytes(
+    made: Workspace, tmp_path: Path
+) -> None:
+    moved = tmp_path / "moved"
+    shutil.copytree(made.out, moved)
+    text = (moved / MANIFEST).read_text(encoding="utf-8")
+    (moved / MANIFEST).write_text(text.replace(str(made.root), "/gone"), encoding="utf-8")
+    path = bundle_run(moved, tmp_path / "b.zip")
+    assert path.read_bytes() == (made.out / "bundle.zip").read_bytes()
+
+
+def test_samples_that_were_left_out_are_counted(made: Workspace, tmp_path: Path) -> None:
+    """Anyone may leave out what went wrong and bundle the rest: then it is said."""
+    shutil.copytree(made.out, tmp_path / "run")
+    lines = (tmp_path / "run" / RECORDS).read_text(encoding="utf-8").splitlines(keepends=True)
+    (tmp_path / "run" / RECORDS).write_text("".join(lines[1:]), encoding="utf-8")
+    bundle_run(tmp_path / "run", made.root / "less.zip")
+    done = made.phyblock("verify", "less.zip", "--data", "data", "--data", "questions")
+    assert done.code == 0, done.err
+    assert "19 of 20 expected samples: the run is not whole" in done.out
+
+
+def test_a_bundle_that_is_killed_leaves_nothing_behind(made: Workspace, tmp_path: Path) -> None:
+    """Killed once all is packed, before it is put in its place."""
+    code = (
+        "import os, signal, sys, phyblock.bundle as bundle\n"
+        "from pathlib import Path\n"
+        "bundle.write_named = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "bundle.bundle_run(Path(sys.argv[1]), Path(sys.argv[2]))\n"
+    )
+    for name in ("scratch", "out"):
+        (tmp_path / name).mkdir()
+    env = made.env | {"TMPDIR": str(tmp_path / "scratch")}
+    command = [sys.executable, "-c", code, str(made.out), str(tmp_path / "out" / "b.zip")]
+    assert subprocess.run(command, env=env, check=False).returncode == -signal.SIGKILL
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+def of_track(records: list[Raw], track: str, model: str = "random") -> Raw:
+    return next(r for r in records if r["track"] == track and r["model"] == model)
+
+
+def put(place: str, value: object, track: str = "", model: str = "random") -> Change:
+    """A change of one value: in the first record of a track and model, or in the manifest."""
+
+    def change(records: list[Raw], manifest: Raw) -> None:
+        node: Any = of_track(records, track, model) if track else manifest
+        *above, last = (int(part) if part.isdigit() else part for part in place.split("."))
+        for part in above:
+            node = node[part]
+        node[last] = value
+
+    return change
+
+
+def _score(records: list[Raw], _: Raw) -> None:
+    score = of_track(records, "full_planning")["scores"][0]
+    score["tp"], score["fp"] = score["tp"] + score["fp"], 0
+
+
+def _answer(records: list[Raw], _: Raw) -> None:
+    wrong = next(r for r in records if r["track"] == "vqa" and not r["answer"]["correct"])
+    wrong["answer"] = {**wrong["answer"], "given": wrong["answer"]["right"], "correct": True}
+
+
+def _turn(records: list[Raw], _: Raw) -> None:
+    turns = (turn for r in records if r["track"] == "step_planning" for turn in r["turns"])
+    next(t for t in turns if t["outcome"] != "placed").update(outcome="placed", placed=0)
+
+
+def _asked_about_less(records: list[Raw], manifest: Raw) -> None:
+    del records[1:]
+    manifest["items"] = {"full_planning": 1, "vqa": 0, "step_planning": 0}
+    manifest["scenes"] = 1
+
+
+def _no_models(records: list[Raw], manifest: Raw) -> None:
+    manifest["models"] = []
+    records.clear()
+
+
+ZEROS = "0" * 64
+FORGED: dict[str, tuple[Change, str]] = {
+    "score": (_score, "does not verify"),
+    "answer": (_answer, RECORDS),
+    "turn": (_turn, RECORDS),
+    "twice": (lambda records, _: records.append(records[0]), "jsonl:21: does not verify"),
+    "less": (_asked_about_less, "items, scenes"),
+    "subtask": (put("question.subtask", "CO", "vqa"), RECORDS),
+    "level": (put("levels", [4], "full_planning"), RECORDS),
+    "parents": (put("parents", ["t1", "t2"], "full_planning"), RECORDS),
+    "plan": (put("parse.plan", [1], "full_planning"), RECORDS),
+    "prompt": (put("prompt.messages", ZEROS, "full_planning", "alpha"), ": prompt: "),
+    "template": (put("prompt.version", ZEROS, "vqa", "alpha"), ": prompt: "),
+    "turn-prompt": (put("turns.0.prompt.messages", ZEROS, "step_planning", "alpha"), ": prompt: "),
+    "label": (put("prompt.images.0.label", "answer", "vqa", "alpha"), ": prompt: "),
+    "time": (put("time", "9999-12-31T00:00:00+00:00", "full_planning"), ": time: "),
+    "pictures": (put("tracks.full_planning.pictures", ZEROS), "tracks.full_planning.pictures"),
+    "no-prompt": (put("tracks.full_planning.prompt", None), ": prompt: "),
+    "created": (put("created", "1999-12-31T00:00:00+00:00"), "created"),
+    "no-plan": (put("suite.levels.0", [1]), re.escape("suite.levels")),
+    "no-models": (_no_models, "models"),
+}
+
+
+@pytest.mark.parametrize("name", FORGED)
+def test_what_does_not_follow_from_the_replies_is_refused(
+    made: Workspace, tmp_path: Path, name: str
+) -> None:
+    change, said = FORGED[name]
+    refused(forged(made, tmp_path / "forged", change), folders(made), match=f"forged.zip.*{said}")
+
+
+def test_what_is_not_changed_is_made_here_to_the_byte(made: Workspace, tmp_path: Path) -> None:
+    """Forgeries are refused for what was changed, not for how they are made."""
+    was = contents(made, tmp_path / "was")
+    path = forged(made, tmp_path / "forged", lambda *_: None)
+    with opened_bundle(path, folders(made)) as found:
+        assert (found.folder / RECORDS).read_bytes() == was[RECORDS]
+
+
+def test_prompts_of_an_author_s_own_template_are_said_to_be_unverified(
+    made: Workspace, tmp_path: Path
+) -> None:
+    own = put("tracks.vqa.prompt", {"name": "mine", "version": ZEROS})
+    with opened_bundle(forged(made, tmp_path / "forged", own), folders(made)) as found:
+        assert "VQA: the prompts, whose template is not at hand." in found.unverified
+
+
+def test_data_are_never_looked_for_where_a_bundle_says(made: Workspace, tmp_path: Path) -> None:
+    def change(_: list[Raw], manifest: Raw) -> None:
+        manifest["dataset"] |= {"root": "/proc", "name": "../../.."}
+
+    path = forged(made, tmp_path / "forged", change)
+    refused(path, [], DataError, "which a bundle does not hold")
+
+
+SOUND = with_digests(
+    {name: f"{name} holds this\n".encode() * 50 for name in (MANIFEST, RECORDS)}, {"format": 1}
+)
+LESS = [(name, data) for name, data in SOUND.items() if name != RECORDS]
+
+
+def packed() -> bytes:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as made:
+        for name in MEMBERS:
+            add(made, name, [SOUND[name].decode()])
+    return file.getvalue()
+
+
+PACKED = packed()
+
+
+def linked() -> bytes:
+    info = zipfile.ZipInfo(RECORDS)
+    info.external_attr = (stat.S_IFLNK | 0o777) << 16
+    return archive(*LESS, (info, b"/etc/passwd"))
+
+
+def smaller_than_it_is() -> bytes:
+    """The list of members says that one holds less than it does."""
+    size = struct.pack("<L", len(SOUND[RECORDS]))
+    assert size in PACKED
+    return PACKED.replace(size, struct.pack("<L", 7))
+
+
+def encrypted() -> bytes:
+    data = bytearray(PACKED)
+    data[data.index(b"PK\1\2") + 8] |= 1
+    return bytes(data)
+
+
+HOSTILE: dict[str, Callable[[], bytes]] = {
+    "empty": lambda: b"",
+    "text": lambda: b"hello\n" * 100,
+    "out of the folder": lambda: archive(*SOUND.items(), ("../../evil", b"x")),
+    "absolute": lambda: archive(*SOUND.items(), ("/tmp/evil", b"x")),
+    "other name": lambda: archive(*LESS, ("evil.py", b"x")),
+    "folder": lambda: archive(*LESS, (f"{RECORDS}/", b"")),
+    "twice": lambda: archive(*SOUND.items(), (RECORDS, b"x")),
+    "link": linked,
+    "bomb": lambda: archive(*LESS[:1], (RECORDS, b"x"), (ABOUT, bytes(2**24))),
+    "larger than it says": smaller_than_it_is,
+    "encrypted": encrypted,
+    "lacks one": lambda: archive(*LESS),
+    "thousands": lambda: archive(*((f"{n}", b"") for n in range(70))),
+    "changed": lambda: archive(*LESS, (RECORDS, b"other")),
+    "no digests": lambda: archive(*LESS[:1], (RECORDS, b"other"), (ABOUT, b"[]")),
+    "deep": lambda: archive(*LESS[:1], (RECORDS, b"other"), (ABOUT, b"[" * 9000)),
+    "lists too much": lambda: PACKED[:-10] + struct.pack("<L", 2**31) + PACKED[-6:],
+    "large archive": lambda: PACKED[:-22] + b"PK\6\7" + bytes(16) + PACKED[-22:],
+}
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_a_hostile_archive_is_refused_and_writes_nothing_elsewhere(
+    tmp_path: Path, kind: str
+) -> None:
+    path, folder = tmp_path / "b.zip", tmp_path / "a" / "b" / "c"
+    folder.mkdir(parents=True)
+    path.write_bytes(HOSTILE[kind]())
+    with pytest.raises(StoreError, match=re.escape(str(path))):
+        unpack(path, folder)
+    written = {p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*") if p.is_file()}
+    assert written <= {"b.zip", *(f"a/b/c/{name}" for name in MEMBERS)}
+    assert all(p.stat().st_size < 2**21 and not p.is_symlink() for p in folder.iterdir())
+
+
+@settings(max_examples=80)
+@given(at=st.integers(0, len(PACKED) - 1), byte=st.integers(0, 255), cut=st.booleans())
+def test_a_bundle_that_was_cut_or_changed_is_refused_or_holds_the_same(
+    tmp_path_factory: pytest.TempPathFactory, at: int, byte: int, cut: bool
+) -> None:
+    folder = tmp_path_factory.mktemp("changed")
+    rest = b"" if cut else bytes([byte]) + PACKED[at + 1 :]
+    (folder / "b.zip").write_bytes(PACKED[:at] + rest)
+    try:
+        unpack(folder / "b.zip", folder)
+    except StoreError:
+        return
+    assert not cut
+    assert {name: (folder / name).read_bytes() for name in MEMBERS} == SOUND
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("/srv/models/Qwen2-VL", "Qwen2-VL"),
+        ("hosted_vllm//srv/models/Qwen2-VL/", "hosted_vllm/Qwen2-VL"),
+        ("hosted_vllm/~/Qwen", "hosted_vllm/Qwen"),
+        ("D:\\models\\Qwen", "Qwen"),
+        ("openai/gpt-4o", "openai/gpt-4o"),
+        ("hosted_vllm/Qwen/Qwen2-VL", "hosted_vllm/Qwen/Qwen2-VL"),
+    ],
+)
+def test_of_what_one_machine_knows_the_ends_of_paths_stay(before: str, after: str) -> None:
+    """Failed requests keep their kind alone; what is sent to a model stays as it is."""
+    params = {"stop": ["/no_think", "/a/b"], "extra_body": {"path": "/v1/x"}}
+    fields = manifest(models=["alpha"])
+    served = {"kind": "litellm", "served_at": ["http://10.0.0.5:8000/v1"], "id": before}
+    fields["models"] = [{**fields["models"][0], **served, "params": params}]
+    found = portable_manifest(one := Manifest.model_validate(fields))
+    assert (found.models[0].fields()["id"], found.identity) == (after, one.identity)
+    assert found.models[0].fields()["params"] == params
+    assert not found.models[0].served_at
+    line = record(outcome="api_error")
+    line["error"] |= {"message": "POST http://10.0.0.5:8000/v1/chat: open '/scratch/bob/keys.txt'"}
+    failed = portable(known_records().validate_python(line))
+    assert json.loads(failed.as_json()) == {**line, "error": {**line["error"], "message": ""}}
+    named = portable(known_records().validate_python(record(provider_model=before)))
+    assert named.reply is not None
+    assert named.reply.provider_model == after
