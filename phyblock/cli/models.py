@@ -34,8 +34,7 @@ from phyblock.models import (
     build_model,
     ends_on,
     is_billed,
-    prices_of,
-    today,
+    tariff_of,
 )
 from phyblock.models.litellm_client import be_quiet
 from phyblock.registry import baseline_names
@@ -96,9 +95,7 @@ def _row(name: str, config: ModelConfig) -> tuple[str, ...]:
         key = "set"
     else:
         key = f"needs {status.variables[0]}" if status.is_needed else "not needed"
-    known = prices_of(config)
-    tariff = None if known is None else known.on(today())
-    if tariff is None:
+    if (tariff := tariff_of(config)) is None:
         return (name, config.id, key, "unknown", "unknown")
     tiers = [tariff, *tariff.tiers]
     return (

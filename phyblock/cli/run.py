@@ -256,11 +256,11 @@ def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) ->
     console.print(_sum_text(left))
     by_source: dict[str, list[str]] = {}
     for row in left:
-        if row.price_source:
+        if row.tariff is not None:
             by_source.setdefault(row.price_source, []).append(row.model)
     if by_source:
         sources = [f"{source} ({', '.join(names)})" for source, names in by_source.items()]
-        console.print(f"Prices of {left[0].day}: {'; '.join(sources)}.")
+        console.print(f"Prices: {'; '.join(sources)}.")
     for row in rows:
         if row.waiting:
             console.print(f"{counted(row.waiting, 'call')} of {row.model} are in batches already.")

@@ -8,7 +8,6 @@ import os
 import re
 import urllib.parse
 from collections.abc import Callable, Mapping, Sequence
-from datetime import date
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -139,17 +138,6 @@ def _say_one_or_list(schema: dict[str, Any]) -> None:
     schema["anyOf"] = [several["items"], {**several, "minItems": 1}, {"type": "null"}]
 
 
-def _check_day(value: object) -> date:
-    try:
-        if isinstance(value, str) and re.fullmatch(r"\d{4}-\d\d-\d\d", value):
-            return date.fromisoformat(value)
-    except ValueError:
-        pass
-    if isinstance(value, date):
-        return value
-    raise refuse("is no day", allowed="a day such as 2026-12-01")
-
-
 class Price(Section):
     """Prices of tokens [USD per million]."""
 
@@ -189,22 +177,8 @@ def _check_rising(tiers: tuple[Tier, ...]) -> tuple[Tier, ...]:
 class Tariff(Rate):
     """The price of a model, where litellm's price map does not know it or is wrong."""
 
-    since: Annotated[date, BeforeValidator(_check_day)] | None = Field(default=None, alias="from")
-    """Day from which this holds (UTC). Before the first one that is named, litellm's price map
-    does."""
     tiers: Annotated[tuple[Tier, ...], AfterValidator(_check_rising)] = ()
     """Other prices of calls with long prompts, by rising `above`."""
-
-
-def _check_days(prices: tuple[Tariff, ...]) -> tuple[Tariff, ...]:
-    for index, (price, following) in enumerate(pairwise(prices), start=1):
-        if following.since is None:
-            message = "does not say from which day on it holds"
-            raise refuse(message, at=(index,), hint="add from, for example from: 2026-12-01")
-        if price.since is not None and following.since <= price.since:
-            message, allowed = "is not later than the one before it", f"a day after {price.since}"
-            raise refuse(message, at=(index, "from"), allowed=allowed)
-    return prices
 
 
 def _check_id(model_id: str) -> str:
@@ -317,11 +291,8 @@ class ModelConfig(Section):
     )
     """Further fields of the request body, sent as they are; not model, messages, n, best_of,
     stream, max_tokens, max_completion_tokens."""
-    prices: Annotated[
-        tuple[Tariff, ...], AfterValidator(_check_days), BeforeValidator(_one_or_list)
-    ] = Field(default=(), alias="price", json_schema_extra=_say_one_or_list)
-    """Price, or a list of prices by the day from which they hold; null: litellm's price map, or
-    unknown."""
+    price: Tariff | None = None
+    """Price; null: that of litellm's price map, or unknown."""
     max_cost_usd: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] | None = None
     """The model is asked no more before it costs more than this in a run [USD]; null: the run's
     limit alone."""

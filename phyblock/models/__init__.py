@@ -6,17 +6,7 @@ Importing this package imports neither litellm nor aiohttp: the first call throu
 from phyblock.models.batch import BatchFiles, under_way, waiting_keys
 from phyblock.models.build import build_model
 from phyblock.models.cache import ReplyCache, reply_key
-from phyblock.models.costs import (
-    Budget,
-    Estimate,
-    Prices,
-    ends_on,
-    estimate,
-    is_billed,
-    most_usd,
-    prices_of,
-    today,
-)  # fmt: skip
+from phyblock.models.costs import Budget, Estimate, ends_on, estimate, is_billed, tariff_of
 from phyblock.models.keys import api_key_status, server_address
 from phyblock.models.litellm_client import known_providers
 from phyblock.models.model import ModelEvent, RetryPolicy, takes_format
@@ -33,8 +23,7 @@ from phyblock.records.record import Reply, Usage
 
 __all__ = [
     "AskLaterError", "BatchFiles", "Budget", "Estimate", "GatheringModel", "HaltedError", "Image",
-    "Message", "Model", "ModelEvent", "Prices", "Reply", "ReplyCache", "Request", "RetryPolicy",
-    "Usage", "api_key_status", "build_model", "ends_on", "estimate", "is_billed", "known_providers",
-    "most_usd", "prices_of", "reply_key", "server_address", "takes_format", "today", "under_way",
-    "waiting_keys",
+    "Message", "Model", "ModelEvent", "Reply", "ReplyCache", "Request", "RetryPolicy", "Usage",
+    "api_key_status", "build_model", "ends_on", "estimate", "is_billed", "known_providers",
+    "reply_key", "server_address", "takes_format", "tariff_of", "under_way", "waiting_keys",
 ]  # fmt: skip

@@ -27,13 +27,10 @@ from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.client import Answer, Client, HttpClient, SeedRefusedError
 from phyblock.models.costs import (
     ModelBudget,
-    Prices,
+    cost_usd,
     counted,
     estimate,
     may_be_billed,
-    reply_cost_usd,
-    today,
-    worst_usd,
 )
 from phyblock.models.model import EventKind, ModelEvent, Observer, RetryPolicy
 from phyblock.models.request import AskLaterError, Request
@@ -147,8 +144,7 @@ class BatchModel:
     client: Callable[[HttpClient], Client]
     files: BatchFiles
     cache: ReplyCache | None
-    budget: ModelBudget | None
-    prices: Prices | None
+    budget: ModelBudget
     policy: RetryPolicy
     observer: Observer
     needs_messages: bool = field(default=True, init=False)
@@ -214,8 +210,7 @@ class BatchModel:
             kept = None if self.cache is None else self.cache.get(key)
             if kept is None:
                 raise AskLaterError
-            cost_usd = reply_cost_usd(self.prices, kept, today())
-            return kept.model_copy(update={"cost_usd": cost_usd})
+            return kept.model_copy(update={"cost_usd": cost_usd(self.budget.tariff, kept)})
         try:
             await asyncio.shield(self._following(batch))
             if batch.answers is None:
@@ -235,15 +230,14 @@ class BatchModel:
                 if self._failures[key] < self.policy.attempts or self._refusal is not None:
                     raise AskLaterError from None
             raise
-        cost_usd = reply_cost_usd(self.prices, reply, batch.created.date())
-        reply = reply.model_copy(update={"cost_usd": cost_usd})
+        paid_usd = cost_usd(self.budget.tariff, reply)
+        reply = reply.model_copy(update={"cost_usd": paid_usd})
         if key in self._given:
             # A second sample that asks the same.
             return reply.model_copy(update={"cached": True, "attempts": 0})
         self._given.add(key)
-        self._settle(key, batch, cost_usd)
-        if self.budget is not None:
-            self.budget.learn(estimate(self.config, request), reply.usage)
+        self._settle(key, batch, paid_usd)
+        self.budget.learn(estimate(self.config, request), reply.usage)
         update = {"billed_usd": self._billed_usd.get(key), "attempts": self._failures[key] + 1}
         reply = reply.model_copy(update=update)
         if self.cache is not None:
@@ -264,7 +258,7 @@ class BatchModel:
         """Return True if `ask` has an answer to a request, or will have when a batch ends."""
         batch = self._ledger.newest(key)
         if batch is not None and key not in self._again:
-            if key in self._earlier and self.budget is not None:
+            if key in self._earlier:
                 # Held once, however often it is gathered.
                 self._earlier.discard(key)
                 batch.held[key] = self.budget.hold(batch.most_usd[key] or 0.0)
@@ -286,17 +280,15 @@ class BatchModel:
         """Put a request into the draft, or a new one; False where the budget has no room for it."""
         http, seeded = await self._written(request)
         expected = estimate(self.config, request)
-        usd = worst_usd(self.prices, self.budget, expected, batched=True)
-        held: int | None = None
-        if self.budget is not None:
-            # Under a limit prices are known.
-            most = usd or 0.0
-            if self.budget.fits(most):
-                held = self.budget.hold(most)
-            elif self._draft or any(b.event == "created" for b in self._ledger.batches.values()):
-                return False
-            else:
-                held = await self.budget.reserve(lambda: most)
+        usd = self.budget.most_usd(expected, batched=True)
+        # Under a limit prices are known.
+        most = usd or 0.0
+        if self.budget.fits(most):
+            held = self.budget.hold(most)
+        elif self._draft or any(b.event == "created" for b in self._ledger.batches.values()):
+            return False
+        else:
+            held = await self.budget.reserve(lambda: most)
         for draft in (self._draft, Batch(seeded=seeded)):
             if draft is None:
                 continue
@@ -312,26 +304,24 @@ class BatchModel:
                 await sending
                 raise
             if self._refusal is not None:
-                if held is not None and self.budget is not None:
-                    self.budget.settle(held, 0.0)
+                self.budget.settle(held, 0.0)
                 return False
         self._draft = draft
         assert draft is not None
         draft.lines.append(line)
         draft.size += len(line) + 1
         draft.most_usd[key] = usd
-        if held is not None:
-            draft.held[key] = held
+        draft.held[key] = held
         return True
 
     def _settle(self, key: str, batch: Batch, usd: float | None) -> None:
         """Count the cost of a request, once; None is all that it can have cost."""
-        if self.budget is not None and key in batch.held:
+        if key in batch.held:
             spent_usd = self.budget.settle(batch.held.pop(key), usd)
             self._billed_usd[key] = self._billed_usd.get(key, 0.0) + spent_usd
 
     def _settle_all(self, batch: Batch, usd: float | None) -> None:
-        while self.budget is not None and batch.held:
+        while batch.held:
             self.budget.settle(batch.held.popitem()[1], usd)
 
     # Sending, and finding again what an earlier process was sending.

@@ -10,7 +10,7 @@ from phyblock.errors import Problem, SpecError
 from phyblock.models.batch import BatchFiles, BatchModel
 from phyblock.models.cache import ReplyCache
 from phyblock.models.client import Client, HttpClient, OpenAIClient
-from phyblock.models.costs import Budget, prices_of, require_prices
+from phyblock.models.costs import Budget, tariff_of
 from phyblock.models.limits import Limits
 from phyblock.models.litellm_client import LitellmClient
 from phyblock.models.model import ChatModel, Observer, RetryPolicy, Tell
@@ -46,14 +46,18 @@ def build_model(
         where, hint = f"model {config.name}", "for example openai/gpt-4o-2024-08-06"
         raise SpecError(Problem(where, "needs a provider", "id", config.id, hint=hint))
     policy = policy or RetryPolicy()
-    own = None if budget is None else budget.of(config.name, config.max_cost_usd)
-    prices = (require_prices if own is not None and own.is_limited else prices_of)(config)
+    tariff = tariff_of(config)
+    own = (budget or Budget()).of(config.name, tariff, config.max_cost_usd)
+    if own.is_limited and tariff is None:
+        hint = "give it a price in models.yaml, or run without max_cost_usd"
+        message = "has no known price, so that max_cost_usd cannot be kept"
+        raise SpecError(Problem(f"model {config.name}", message, "price", config.id, hint=hint))
 
     def client(at: ModelConfig, http: HttpClient | None = None) -> Client:
         return (OpenAIClient if at.is_direct else LitellmClient)(at, http)
 
-    shared: dict[str, Any] = {"config": config, "cache": cache, "budget": own, "prices": prices,
-                              "policy": policy, "observer": observer}  # fmt: skip
+    shared: dict[str, Any] = {"config": config, "cache": cache, "budget": own, "policy": policy,
+                              "observer": observer}  # fmt: skip
     if config.batch:
         assert batches is not None, "batches are kept in a run"
         return BatchModel(client=lambda http: client(config, http), files=batches, **shared)

@@ -13,14 +13,14 @@ import json
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from datetime import UTC, date, datetime, timedelta
+from dataclasses import dataclass
+from datetime import date
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar
 
 from phyblock.config.models import ModelConfig, Price, Rate, Tariff, host_of
-from phyblock.errors import BudgetReachedError, ModelError, Problem, SpecError, UnavailableError
+from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
 from phyblock.models.keys import KEYLESS, api_key_status
 from phyblock.models.request import Image, Request, wire_params
 from phyblock.records.record import Reply, Usage
@@ -28,6 +28,7 @@ from phyblock.types import ImageDetail
 
 _RateT = TypeVar("_RateT", bound=Rate)
 
+FREE = Tariff(input=0.0, output=0.0)
 _MAP_FILE = "model_prices_and_context_window_backup.json"
 _MAP_KEYS = {
     "input": "input_cost_per_token",
@@ -42,128 +43,81 @@ _HALVING_HOSTS = {
     "gemini": "generativelanguage.googleapis.com",
 }
 """By provider: the host whose batches cost half, as their price lists of November 2026 say."""
+_TYPICAL_REPLY_TOKENS = 500
+_TYPICAL_THINKING_TOKENS = 4_000
+_ROOM_TO_THINK_TOKENS = 8_192
+_LONGEST_REPLY_TOKENS = 32_768
+_PROMPT_MARGIN = 1.5
+_MOST_TIMES_EXPECTED = 100
+_LEAST_EXPECTED_TOKENS = 1_000
 
 
-def today() -> date:
-    """Return the day by which calls are priced, in UTC."""
-    return datetime.now(UTC).date()
-
-
-@dataclass(frozen=True)
-class Prices:
-    """Prices of a model day by day: tariffs in the order of their days; with `is_mapped` the first
-    is of litellm's map.
-    """
-
-    tariffs: tuple[Tariff, ...]
-    is_mapped: bool = False
-
-    @classmethod
-    def flat(cls, input_usd: float, output_usd: float) -> Prices:
-        """Return one price [US dollars per million tokens] for all days and prompts."""
-        return cls((Tariff(input=input_usd, output=output_usd),))
-
-    def on(self, day: date) -> Tariff | None:
-        """Return the tariff of a day; None where nothing is known of it."""
-        begun = (t for t in reversed(self.tariffs) if t.since is None or t.since <= day)
-        return next(begun, None)
-
-    def source(self, day: date) -> str:
-        """Return where the tariff of a day stands."""
-        is_of_map = self.is_mapped and self.on(day) is self.tariffs[0]
-        return f"litellm {version('litellm')} map" if is_of_map else "the models file"
-
-    def at(self, day: date, prompt_tokens: int = 0, *, batched: bool = False) -> Price | None:
-        """Return the price of a call with such a prompt; None where it is not known."""
-        if (tariff := self.on(day)) is None:
-            return None
-        longer = (tier for tier in reversed(tariff.tiers) if prompt_tokens > tier.above)
-        rate: Rate = next(longer, tariff)
-        return rate.batch if batched and rate.batch is not None else rate
-
-    def is_free_from(self, day: date) -> bool:
-        """True if nothing is to be paid on this day and all that follow."""
-        now = self.on(day)
-        held = [t for t in self.tariffs if t is now or (t.since is not None and t.since > day)]
-        rates = [rate for tariff in held for rate in (tariff, *tariff.tiers)]
-        prices = [price for rate in rates for price in (rate, rate.batch) if price is not None]
-        return now is not None and not any(map(_numbers, prices))
-
-
-def _numbers(price: Price) -> dict[str, float]:
-    """Return what is to be paid of a price, by name."""
-    return {name: usd for name in _MAP_KEYS if (usd := getattr(price, name))}
-
-
-def cost_usd(price: Price, usage: Usage) -> float | None:
-    """Return US dollars of a call; None where the numbers of tokens are not known."""
-    if not _numbers(price):
-        return 0.0
-    if usage.prompt_tokens is None or usage.completion_tokens is None:
-        return None
-    read, written = usage.cached_tokens or 0, usage.cache_write_tokens or 0
-    read_usd = price.input if price.cached is None else price.cached
-    write_usd = price.input if price.cache_write is None else price.cache_write
-    fresh = max(0, usage.prompt_tokens - read - written)
-    prompt = (fresh * price.input + read * read_usd + written * write_usd) / 1_000_000
-    return prompt + usage.completion_tokens * price.output / 1_000_000
-
-
-def reply_cost_usd(prices: Prices | None, reply: Reply, day: date) -> float | None:
-    """Return US dollars of a reply that was asked for on a day; None when price or tokens are not
-    known.
-    """
-    prompt = reply.usage.prompt_tokens or 0
-    price = None if prices is None else prices.at(day, prompt, batched=reply.batched)
-    return None if price is None else cost_usd(price, reply.usage)
-
-
-def prices_of(config: ModelConfig) -> Prices | None:
-    """Return the prices of a model: its own, before their first day those of litellm's map; None
-    where neither knows any. Baselines and recordings cost nothing.
+def tariff_of(config: ModelConfig) -> Tariff | None:
+    """Return the price of a model: its own, else that of litellm's map; None where neither knows
+    one. Baselines and recordings cost nothing.
 
     Batches without a price of their own cost half at the provider's own address, and as other
     calls elsewhere.
     """
     if config.kind != "litellm":
-        return Prices.flat(0.0, 0.0)
-    tariffs = config.prices
-    mapped = None if tariffs and tariffs[0].since is None else _mapped_tariff(config)
-    tariffs = tariffs if mapped is None else (mapped, *tariffs)
+        return FREE
+    tariff = config.price or _mapped_tariff(config)
     host, base = _HALVING_HOSTS.get(config.provider), config.api_base
-    if host is not None and (host_of(base) == host if base else not config.has_address):
-        tariffs = tuple(
-            _halved(t).model_copy(update={"tiers": tuple(map(_halved, t.tiers))}) for t in tariffs
-        )
-    return Prices(tariffs, mapped is not None) if tariffs else None
+    is_halved = host is not None and (host_of(base) == host if base else not config.has_address)
+    if tariff is None or not is_halved:
+        return tariff
+    return _halved(tariff).model_copy(update={"tiers": tuple(map(_halved, tariff.tiers))})
 
 
 def _halved(rate: _RateT) -> _RateT:
     """Return the rate with half its price for batches, unless it has one for them."""
-    half = Price.model_validate(
-        {name: usd if usd is None else usd / 2 for name, usd in rate if name in _MAP_KEYS}
-    )
-    return rate if rate.batch else rate.model_copy(update={"batch": half})
+    half = {name: None if usd is None else usd / 2 for name, usd in rate if name in _MAP_KEYS}
+    return rate if rate.batch else rate.model_copy(update={"batch": Price.model_validate(half)})
 
 
-def require_prices(config: ModelConfig) -> Prices:
-    """Return the prices of a model under a cost limit; SpecError when today's is not known."""
-    prices = prices_of(config)
-    if prices is None or prices.on(today()) is None:
-        hint = "give it a price in models.yaml, or run without max_cost_usd"
-        message = "has no known price, so that max_cost_usd cannot be kept"
-        raise SpecError(Problem(f"model {config.name}", message, "price", config.id, hint=hint))
-    return prices
+def price_source(config: ModelConfig) -> str:
+    """Return the source of a model's price."""
+    return "the models file" if config.price else f"litellm {version('litellm')} map"
+
+
+def price_at(tariff: Tariff, prompt_tokens: int = 0, *, batched: bool = False) -> Price:
+    """Return the price of a call with such a prompt."""
+    longer = (tier for tier in reversed(tariff.tiers) if prompt_tokens > tier.above)
+    rate: Rate = next(longer, tariff)
+    return rate.batch if batched and rate.batch is not None else rate
+
+
+def is_free(tariff: Tariff) -> bool:
+    """True if nothing is to be paid, whatever the prompt and however it is sent."""
+    rates = (tariff, *tariff.tiers)
+    prices = [price for rate in rates for price in (rate, rate.batch) if price is not None]
+    return not any(getattr(price, name) for price in prices for name in _MAP_KEYS)
+
+
+def cost_usd(tariff: Tariff | None, reply: Reply) -> float | None:
+    """Return US dollars of a reply; None when price or numbers of tokens are not known."""
+    if tariff is None or is_free(tariff):
+        return None if tariff is None else 0.0
+    usage = reply.usage
+    if usage.prompt_tokens is None or usage.completion_tokens is None:
+        return None
+    price = price_at(tariff, usage.prompt_tokens, batched=reply.batched)
+    read, written = usage.cached_tokens or 0, usage.cache_write_tokens or 0
+    read_usd = price.input if price.cached is None else price.cached
+    write_usd = price.input if price.cache_write is None else price.cache_write
+    fresh = max(0, usage.prompt_tokens - read - written)
+    prompt = fresh * price.input + read * read_usd + written * write_usd
+    return prompt / 1_000_000 + usage.completion_tokens * price.output / 1_000_000
 
 
 def is_billed(config: ModelConfig) -> bool:
-    """True if somebody may be billed for calls: not where the price is 0 from today on, nor by a
-    local server where no price is known and no key would be sent.
+    """True if somebody may be billed for calls: not where the price is 0, nor by a local server
+    where no price is known and no key would be sent.
     """
-    prices = prices_of(config)
-    if prices is None:
+    tariff = tariff_of(config)
+    if tariff is None:
         return config.provider not in KEYLESS or api_key_status(config).is_set
-    return not prices.is_free_from(today())
+    return not is_free(tariff)
 
 
 @functools.cache
@@ -203,7 +157,7 @@ def ends_on(config: ModelConfig) -> date | None:
 
 
 def _mapped_tariff(config: ModelConfig) -> Tariff | None:
-    """Return the tariff of the map, which knows no days; None where it knows no price."""
+    """Return the price in the map; None where it knows none."""
     entry = map_entry(config)
     if isinstance(entry.get("tiered_pricing"), list):
         tiers = entry["tiered_pricing"]
@@ -217,13 +171,12 @@ def _mapped_tariff(config: ModelConfig) -> Tariff | None:
         for above, fields, ending in sorted(places, key=lambda place: place[0])
         if (price := _mapped_price(fields, ending)) is not None
     ]
-    if not rates or rates[0]["above"] != 0:
+    if not rates or rates[0].pop("above") != 0:
         return None
-    first = {name: value for name, value in rates[0].items() if name != "above"}
-    return Tariff.model_validate({**first, "tiers": rates[1:]})
+    return Tariff.model_validate({**rates[0], "tiers": rates[1:]})
 
 
-def _mapped_price(entry: Mapping[str, Any], ending: str) -> dict[str, float] | None:
+def _mapped_price(entry: Mapping[str, Any], ending: str) -> dict[str, Any] | None:
     """Return the price in the keys that end so; that of a cached prompt may lack the ending."""
     found = {name: entry.get(key + ending) for name, key in _MAP_KEYS.items()}
     usd = {name: float(n) * 1_000_000 for name, n in found.items() if n is not None}
@@ -234,15 +187,6 @@ def _mapped_price(entry: Mapping[str, Any], ending: str) -> dict[str, float] | N
     return usd
 
 
-_TYPICAL_REPLY_TOKENS = 500
-_TYPICAL_THINKING_TOKENS = 4_000
-_ROOM_TO_THINK_TOKENS = 8_192
-_LONGEST_REPLY_TOKENS = 32_768
-_PROMPT_MARGIN = 1.5
-_MOST_TIMES_EXPECTED = 100
-_LEAST_EXPECTED_TOKENS = 1_000
-
-
 class Budget:
     """A cost limit for a whole run: room is reserved before a call and settled after it.
 
@@ -251,34 +195,36 @@ class Budget:
     """
 
     def __init__(
-        self,
-        max_cost_usd: float | None = None,
-        spent_usd: float = 0.0,
-        of_models: Mapping[str, float] | None = None,
+        self, max_cost_usd: float | None = None, of_models: Mapping[str, float] | None = None
     ) -> None:
         self.max_usd = math.inf if max_cost_usd is None else max_cost_usd
-        self.spent_usd = spent_usd
+        self._of_models = dict(of_models or {})
+        self.spent_usd = sum(self._of_models.values())
         """The cost of settled calls, what was spent at the start included."""
         self.held_usd = 0.0
         self.holds = 0
         self.changed = asyncio.Event()
-        self._of_models = dict(of_models or {})
 
-    def of(self, model: str, max_cost_usd: float | None = None) -> ModelBudget:
+    def of(
+        self, model: str, tariff: Tariff | None = None, max_cost_usd: float | None = None
+    ) -> ModelBudget:
         """Return the part of it that a model spends, which may have a limit of its own."""
-        return ModelBudget(self, max_cost_usd, self._of_models.get(model, 0.0))
+        return ModelBudget(self, tariff, max_cost_usd, self._of_models.get(model, 0.0))
 
 
 class ModelBudget:
-    """The calls of one model within a run's budget, and what their replies have told of its costs.
+    """The calls of one model within a run's budget, and what its replies have told of its costs.
 
     The largest ratios of real to estimated tokens are remembered, of prompts and of replies, so
     that a provider that counts higher is soon reserved for. Under a limit one call is sent first,
     and then at most one more at once than have been settled: 1, 2, 4, ...
     """
 
-    def __init__(self, run: Budget, max_cost_usd: float | None, spent_usd: float) -> None:
+    def __init__(
+        self, run: Budget, tariff: Tariff | None, max_cost_usd: float | None, spent_usd: float
+    ) -> None:
         self._run = run
+        self.tariff = tariff
         self._max_usd = math.inf if max_cost_usd is None else max_cost_usd
         self._spent_usd = spent_usd
         self._held: dict[int, float] = {}
@@ -289,13 +235,15 @@ class ModelBudget:
         self._prompt_ratio = self._reply_ratio = 1.0
         self.is_limited = min(self._max_usd, run.max_usd) < math.inf
 
-    def most_usd(
-        self, prices: Prices, expected: Estimate, day: date, *, batched: bool = False
-    ) -> float:
-        """Return the most that a call can cost, as far as the model is known by now."""
+    def most_usd(self, expected: Estimate, *, batched: bool = False) -> float | None:
+        """Return the most that a call can cost, as far as the model is known by now; None where no
+        price is.
+        """
+        if self.tariff is None:
+            return None
         longest = math.ceil(expected.most_completion_tokens * self._reply_ratio)
-        known = replace(expected, most_completion_tokens=longest)
-        return most_usd(prices, known, day, self._prompt_ratio, batched=batched)
+        prompt = expected.prompt_tokens * self._prompt_ratio
+        return most_usd(self.tariff, prompt, longest, batched=batched)
 
     async def reserve(self, most_usd: Callable[[], float]) -> int:
         """Hold the most that a call can cost, waiting for calls under way to settle; return the
@@ -398,36 +346,18 @@ def estimate(config: ModelConfig, request: Request) -> Estimate:
 
 
 def most_usd(
-    prices: Prices, expected: Estimate, day: date, ratio: float = 1.0, *, batched: bool = False
+    tariff: Tariff, prompt_tokens: float, reply_tokens: int, *, batched: bool = False
 ) -> float:
-    """Return the most US dollars that a call can cost, its prompt `ratio` times its estimate and
-    all put into a cache.
-
-    There is a margin on the prompt, as its tokens are estimated, and a day: a call that is sent
-    before midnight may be answered after it, and one of a batch a day after that.
+    """Return the most US dollars that a call can cost, all of its prompt put into a cache. There is
+    a margin on the prompt, as its tokens are estimated.
     """
-    prompt = expected.prompt_tokens * _PROMPT_MARGIN * ratio
-    days = [day + timedelta(days=n) for n in range(3 if batched else 2)]
-    prices_then = [prices.at(one, math.ceil(prompt), batched=batched) for one in days]
-    longest = expected.most_completion_tokens
+    prompt = prompt_tokens * _PROMPT_MARGIN
+    # Longer prompts may be cheaper.
+    prices = [price_at(tariff, math.ceil(n), batched=batched) for n in (prompt_tokens, prompt)]
     return max(
-        (prompt * max(p.input, p.cache_write or 0.0) + longest * p.output) / 1_000_000
-        for p in prices_then
-        if p is not None
+        (prompt * max(p.input, p.cache_write or 0.0) + reply_tokens * p.output) / 1_000_000
+        for p in prices
     )
-
-
-def worst_usd(
-    prices: Prices | None, budget: ModelBudget | None, expected: Estimate, *, batched: bool = False
-) -> float | None:
-    """Return the most that a call can cost today, as far as the model is known by now; None where
-    no price is known.
-    """
-    if prices is None or prices.on(today()) is None:
-        return None
-    if budget is None:
-        return most_usd(prices, expected, today(), batched=batched)
-    return budget.most_usd(prices, expected, today(), batched=batched)
 
 
 def may_be_billed(error: ModelError) -> bool:

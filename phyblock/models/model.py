@@ -17,14 +17,11 @@ from phyblock.models.client import SeedRefusedError
 from phyblock.models.costs import (
     Estimate,
     ModelBudget,
-    Prices,
+    cost_usd,
     counted,
     estimate,
     map_entry,
     may_be_billed,
-    reply_cost_usd,
-    today,
-    worst_usd,
 )
 from phyblock.models.limits import Clock, Limits
 from phyblock.models.request import Journal, Request
@@ -154,8 +151,7 @@ class ChatModel:
     servers: Servers
     limits: Limits
     cache: ReplyCache | None = None
-    budget: ModelBudget | None = None
-    prices: Prices | None = None
+    budget: ModelBudget
     journal: Journal | None = None
     policy: RetryPolicy
     observer: Observer
@@ -272,8 +268,8 @@ class ChatModel:
 
     async def _send(self, call: _Call, server: Server, *, with_seed: bool) -> Reply:
         """Send with the call's greatest cost reserved in the budget."""
-        held: int | None = None
-        if self.budget is not None and self._most_usd(call) is not None:
+        held = None
+        if self.budget.tariff is not None:
             held = await self.budget.reserve(lambda: self._most_usd(call) or 0.0)
         exchange = asyncio.ensure_future(self._exchange(call, server, held, with_seed=with_seed))
         try:
@@ -309,8 +305,7 @@ class ChatModel:
                 server.under_way -= 1
             reply = counted(reply, call.expected)
             spent_usd = self._cost_usd(reply)
-            if self.budget is not None:
-                self.budget.learn(call.expected, reply.usage)
+            self.budget.learn(call.expected, reply.usage)
         except ModelError as error:
             is_free = isinstance(error, UnavailableError) or not may_be_billed(error)
             spent_usd = 0.0 if is_free else None
@@ -319,7 +314,7 @@ class ChatModel:
             spent_usd = 0.0
             raise
         finally:
-            if held is not None and self.budget is not None:
+            if held is not None:
                 spent_usd = self.budget.settle(held, spent_usd)
                 call.billed_usd = (call.billed_usd or 0.0) + spent_usd
             if reply is not None:
@@ -330,10 +325,10 @@ class ChatModel:
         return reply
 
     def _most_usd(self, call: _Call) -> float | None:
-        return worst_usd(self.prices, self.budget, call.expected)
+        return self.budget.most_usd(call.expected)
 
     def _cost_usd(self, reply: Reply) -> float | None:
-        return reply_cost_usd(self.prices, reply, today())
+        return cost_usd(self.budget.tariff, reply)
 
 
 def takes_format(config: ModelConfig) -> bool:

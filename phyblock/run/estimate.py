@@ -6,25 +6,15 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
-from datetime import date
 from pathlib import Path
 
-from phyblock.config.models import ModelConfig
+from phyblock.config.models import ModelConfig, Tariff
 from phyblock.config.suite import Variant
 from phyblock.errors import Problem, SpecError
 from phyblock.models import Estimate as CallEstimate
-from phyblock.models import (
-    Prices,
-    ReplyCache,
-    Request,
-    is_billed,
-    most_usd,
-    prices_of,
-    reply_key,
-    today,
-    waiting_keys,
-)
+from phyblock.models import ReplyCache, Request, is_billed, reply_key, tariff_of, waiting_keys
 from phyblock.models import estimate as estimate_call
+from phyblock.models.costs import is_free, most_usd, price_at, price_source
 from phyblock.records.files import BatchLines, run_records
 from phyblock.resources import reply_cache_file
 from phyblock.run.plan import RunPlan, Sample
@@ -64,7 +54,7 @@ class ReplyLengths:
 
 @dataclass
 class Estimate:
-    """The estimate of one model; dollars are None where the price of `day` is not known.
+    """The estimate of one model; dollars are None where no price is known.
 
     `done` samples have a record in the folder, `cached` ones a reply in the cache, `waiting` ones
     went out in batches, `calls` are left to make (none for recordings and baselines, which answer
@@ -76,8 +66,8 @@ class Estimate:
     model: str
     kind: str
     samples: int
-    prices: Prices | None
-    day: date
+    tariff: Tariff | None
+    price_source: str = ""
     batch: bool = False
     done: int = 0
     cached: int = 0
@@ -95,13 +85,12 @@ class Estimate:
         self.calls += 1
         self.prompt_tokens += expected.prompt_tokens
         usual, most, reply_usd = expected.completion_tokens, expected.most_completion_tokens, 0.0
-        price = None
-        if self.prices is not None:
-            price = self.prices.at(self.day, expected.prompt_tokens, batched=self.batch)
-        if self.prices is not None and price is not None:
+        if self.tariff is not None:
+            prompt = expected.prompt_tokens
+            price = price_at(self.tariff, prompt, batched=self.batch)
             reply_usd = price.output / 1_000_000
-            self._prompt_usd += expected.prompt_tokens * price.input / 1_000_000
-            self._most_usd += most_usd(self.prices, expected, self.day, batched=self.batch)
+            self._prompt_usd += prompt * price.input / 1_000_000
+            self._most_usd += most_usd(self.tariff, prompt, most, batched=self.batch)
         self.lengths[kind].coming[usual, most, reply_usd] += 1
 
     def add_reply(self, completion_tokens: int | None, kind: str) -> None:
@@ -116,38 +105,32 @@ class Estimate:
         return round(sum(lengths.expected()[0] for lengths in self.lengths.values()))
 
     @property
-    def price_source(self) -> str:
-        """Return the source of the price of the day, "" where none is known."""
-        is_known = self.prices is not None and self.prices.on(self.day) is not None
-        return self.prices.source(self.day) if is_known and self.prices is not None else ""
-
-    @property
     def prompt_usd(self) -> float | None:
         """Dollars of the prompts alone."""
-        return None if not self.price_source else self._prompt_usd
+        return None if self.tariff is None else self._prompt_usd
 
     @property
     def reply_usd(self) -> float | None:
         """Dollars of the replies alone."""
         usd = sum(lengths.expected()[1] for lengths in self.lengths.values())
-        return None if not self.price_source else usd
+        return None if self.tariff is None else usd
 
     @property
     def cost_usd(self) -> float | None:
-        """Dollars of the calls, at the price of the day."""
+        """Dollars of the calls."""
         if self.prompt_usd is None or self.reply_usd is None:
             return None
         return self.prompt_usd + self.reply_usd
 
     @property
     def may_cost(self) -> bool:
-        """True if money may be spent: calls are left, and not known to be free for good."""
-        return self.calls > 0 and (self.prices is None or not self.prices.is_free_from(self.day))
+        """True if money may be spent: calls are left, and not known to be free."""
+        return self.calls > 0 and (self.tariff is None or not is_free(self.tariff))
 
     @property
     def most_usd(self) -> float | None:
         """Dollars if every reply were as long as it can be and no call had to be repeated."""
-        return None if not self.price_source else self._most_usd
+        return None if self.tariff is None else self._most_usd
 
 
 def estimate(
@@ -160,12 +143,7 @@ def estimate(
     """
     rows = {
         m.name: Estimate(
-            m.name,
-            m.kind,
-            plan.samples_per_model,
-            prices_of(m),
-            today(),
-            m.batch,
+            m.name, m.kind, plan.samples_per_model, tariff_of(m), price_source(m), m.batch
         )
         for m in plan.models
     }

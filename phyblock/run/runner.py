@@ -213,12 +213,11 @@ class Session:
         calls = RecordWriter(store.calls)
         stack.push_async_callback(calls.drain)
         journal = CallJournal(calls, plan.manifest.run, standing)
-        of_models = standing.limit_usd
         build = partial(
             build_model,
             cache=cache,
             overall=asyncio.Semaphore(limits.max_concurrency),
-            budget=Budget(limits.max_cost_usd, sum(of_models.values()), of_models),
+            budget=Budget(limits.max_cost_usd, standing.limit_usd),
             journal=journal,
             observer=self._watch,
             tell=tell,

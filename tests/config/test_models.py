@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from phyblock.config.models import (
     ModelConfig,
     SamplingSpec,
+    Tariff,
     address_fault,
     host_of,
     load_models,
@@ -64,7 +65,7 @@ m:
     assert [model.kind for model in models.values()] == ["litellm"] * 3 + ["replay", "litellm"]
     assert models["m"].addresses == ("http://h:1/v1", "http://h:2/v1")
     assert models["m"].api_base is None
-    assert [(price.input, price.output) for price in models["m"].prices] == [(0.0, 1.5)]
+    assert models["m"].price == Tariff(input=0, output=1.5)
     assert load(tmp_path, "# none yet\n") == {}
 
 

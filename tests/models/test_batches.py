@@ -105,7 +105,7 @@ def test_a_batch_asks_and_answers_as_single_calls_do(route: str, disk: Disk) -> 
         assert other.cost_usd is not None
         assert one.cost_usd == pytest.approx(other.cost_usd / 2)
         if place != 1:
-            alike = {"batched": False, "latency_s": 0.0, "cost_usd": None}
+            alike = {"batched": False, "latency_s": 0.0, "cost_usd": None, "billed_usd": None}
             assert one.model_copy(update=alike) == other.model_copy(update=alike)
     assert server.keys == {KEY}
     assert once(server, 3)

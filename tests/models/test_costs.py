@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import functools
-from datetime import date, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,6 @@ from phyblock.models import (
     Estimate,
     Image,
     Message,
-    Prices,
     Reply,
     ReplyCache,
     Request,
@@ -27,17 +25,14 @@ from phyblock.models import (
     build_model,
     estimate,
     is_billed,
-    most_usd,
-    prices_of,
+    tariff_of,
 )
-from phyblock.models.costs import cost_usd, counted, map_entry, picture_tokens, reply_cost_usd
+from phyblock.models.costs import cost_usd, counted, map_entry, most_usd, picture_tokens, price_at
 from phyblock.tracks.full_planning import PlanSubject
 from tests.models.factory import CANDIDATES, SCENE, ask, make_model, make_request, run, with_fields
 from tests.models.routes import ROUTES
 from tests.servers.chassis import Faults, Running, Seen
 from tests.servers.openai_chat import OpenAIChat
-
-DAY = date(2026, 11, 22)
 
 
 def config(model_id: str, **fields: object) -> ModelConfig:
@@ -205,11 +200,11 @@ def test_a_call_costs_no_more_than_was_held_once_a_reply_like_it_has_come(
 
     The first call is alone, and never are more under way than one more than were answered.
     """
-    price, expected = Prices.flat(10.0, 100.0), Estimate(1000, 100, 100)
+    expected = Estimate(1000, 100, 100)
 
     async def main() -> None:
         budget = Budget(limit)
-        own = budget.of("m")
+        own = budget.of("m", Tariff(input=10.0, output=100.0))
         room = asyncio.Semaphore(width)
         longest, over_usd, under_way, answered = (0, 0), 0.0, 0, 0
 
@@ -218,10 +213,10 @@ def test_a_call_costs_no_more_than_was_held_once_a_reply_like_it_has_come(
             async with room:
                 known = (0, 0)
                 try:
-                    held = await own.reserve(lambda: own.most_usd(price, expected, DAY))
+                    held = await own.reserve(lambda: own.most_usd(expected) or 0.0)
                 except BudgetReachedError:
                     return
-                known, held_usd = longest, own.most_usd(price, expected, DAY)
+                known, held_usd = longest, own.most_usd(expected) or 0.0
                 under_way += 1
                 assert under_way <= answered + 1
                 await asyncio.sleep(0)
@@ -243,8 +238,8 @@ def test_a_call_costs_no_more_than_was_held_once_a_reply_like_it_has_come(
 
 def test_a_limit_of_one_model_stops_that_model_alone() -> None:
     async def main() -> None:
-        budget = Budget(10.0, 0.5, {"a": 0.5})
-        capped, other = budget.of("a", 1.0), budget.of("b")
+        budget = Budget(10.0, {"a": 0.5})
+        capped, other = budget.of("a", max_cost_usd=1.0), budget.of("b")
         capped.settle(await capped.reserve(lambda: 0.25), 0.25)
         with pytest.raises(UnavailableError, match=r"its max_cost_usd 1 is reached: 0\.7500 spent"):
             await capped.reserve(lambda: 0.3)
@@ -280,13 +275,13 @@ def test_what_was_spent_never_becomes_less_and_an_unknown_cost_is_the_dearest(
 
 @given(st.lists(st.tuples(st.integers(0, 5000), st.none() | st.integers(0, 10**9)), max_size=20))
 def test_what_is_learned_stays_within_bounds(counts: list[tuple[int, int | None]]) -> None:
-    own, price = Budget(1.0).of("m"), Prices.flat(1.0, 1.0)
+    own = Budget(1.0).of("m", Tariff(input=1.0, output=1.0))
     expected = Estimate(1000, 100, 100)
-    plain = own.most_usd(price, expected, DAY)
+    plain = own.most_usd(expected) or 0.0
     last = plain
     for asked, told in counts:
         own.learn(Estimate(asked, 1, 1), Usage(prompt_tokens=told, completion_tokens=told))
-        most = own.most_usd(price, expected, DAY)
+        most = own.most_usd(expected) or 0.0
         assert last <= most <= 100 * plain
         last = most
 
@@ -320,12 +315,14 @@ def test_a_server_that_does_not_count_stops_within_the_limit(route: str, usage: 
         config = ROUTES[route].config(
             running.url, price={"input": 10.0, "output": 100.0}, max_concurrency=4
         )
-        dearest = most_usd(Prices.flat(10.0, 100.0), estimate(config, make_request()), DAY)
+        asked = estimate(config, make_request())
+        tariff = Tariff(input=10.0, output=100.0)
+        dearest = most_usd(tariff, asked.prompt_tokens, asked.most_completion_tokens)
 
         async def main() -> list[Reply | BaseException | None]:
             model = make_model(config, budget=budget)
-            asked = (model.ask(make_request(f"{n:03}")) for n in range(40))
-            answers = await asyncio.gather(*asked, return_exceptions=True)
+            calls = (model.ask(make_request(f"{n:03}")) for n in range(40))
+            answers = await asyncio.gather(*calls, return_exceptions=True)
             await model.aclose()
             return list(answers)
 
@@ -364,11 +361,10 @@ def test_a_reply_says_what_the_limit_counts_for_all_its_attempts(tmp_path: Path)
         budget = Budget(100.0)
         replies = ask(make_model(config, cache=cache, budget=budget), *requests)
         again = ask(make_model(config, cache=cache, budget=Budget(1.0)), *requests)
-        free = ask(make_model(config), requests[0])
     billed = [reply.billed_usd for reply in replies]  # type: ignore[union-attr]
     assert sum(usd or 0.0 for usd in billed) == pytest.approx(budget.spent_usd)
     assert max(usd or 0.0 for usd in billed) > min(usd or 0.0 for usd in billed) > 0
-    assert {reply.billed_usd for reply in [*again, *free]} == {None}  # type: ignore[union-attr]
+    assert {reply.billed_usd for reply in again} == {None}  # type: ignore[union-attr]
 
 
 usd = st.floats(0, 100)
@@ -395,7 +391,9 @@ def test_each_prompt_token_is_paid_once(
     read_usd = price.input if price.cached is None else price.cached
     write_usd = price.input if price.cache_write is None else price.cache_write
     paid = fresh * price.input + cached * read_usd + written * write_usd
-    assert cost_usd(price, usage) == pytest.approx((paid + out * price.output) / 1e6)
+    assert cost_usd(Tariff(**dict(price)), Reply(text="a", usage=usage)) == pytest.approx(
+        (paid + out * price.output) / 1e6
+    )
 
 
 @given(
@@ -409,7 +407,7 @@ def test_the_highest_tier_below_the_prompt_holds(
 ) -> None:
     told = [Tier(above=n, **dict(p)) for n, p in sorted(tiers, key=lambda t: t[0])]
     tariff = Tariff(**dict(base), tiers=tuple(told))
-    found = Prices((tariff,)).at(DAY, prompt, batched=batched)
+    found = price_at(tariff, prompt, batched=batched)
     assert found is [tariff, *(tier for tier in told if tier.above < prompt)][-1]
 
 
@@ -430,41 +428,16 @@ def test_batches_cost_half_only_where_that_is_known(
     whole = {"input": 8.0, "output": 40.0, "cached": 1.0}
     half = {name: usd / 2 for name, usd in whole.items()}
     served = config(model_id, batch=True, **fields)
-    known = prices_of(with_fields(served, price={"input": 8, "output": 40, "cached": 1}))
+    known = tariff_of(with_fields(served, price={"input": 8, "output": 40, "cached": 1}))
     assert known is not None
-    found = known.at(DAY, batched=True)
-    assert found is not None
+    found = price_at(known, batched=True)
     assert found.model_dump(include=set(whole)) == (half if is_half else whole)
-    expected = Estimate(1000, 500, 500)
-    most = [most_usd(known, expected, DAY, batched=batched) for batched in (True, False)]
+    most = [most_usd(known, 1000, 500, batched=batched) for batched in (True, False)]
     assert most[0] == pytest.approx(most[1] / (1 + is_half))
-    batch = {"input": 3, "output": 4}
-    told = {"input": 8, "output": 40, "cached": 1, "batch": batch}
-    own = prices_of(with_fields(served, price=told))
+    told = {"input": 8, "output": 40, "cached": 1, "batch": {"input": 3, "output": 4}}
+    own = tariff_of(with_fields(served, price=told))
     assert own is not None
-    assert own.at(DAY, batched=True) == Price(input=3.0, output=4.0)
-
-
-@given(
-    st.lists(st.integers(0, 400), min_size=1, max_size=4, unique=True),
-    st.integers(-9, 410),
-    st.booleans(),
-)
-def test_the_price_of_a_day_is_the_last_that_has_begun(
-    begins: list[int], asked: int, is_mapped: bool
-) -> None:
-    days = [DAY + timedelta(days=n) for n in sorted(begins)]
-    told = [{"from": one, "input": float(n), "output": 0} for n, one in enumerate(days, start=1)]
-    model_id = "azure/gpt-4o-2024-08-06" if is_mapped else "azure/mine"
-    known, mapped = prices_of(config(model_id, price=told)), prices_of(config(model_id))
-    day = DAY + timedelta(days=asked)
-    begun = [price["input"] for price in told if price["from"] <= day]  # type: ignore[operator]
-    assert known is not None
-    assert (mapped is not None) == is_mapped
-    if begun:
-        assert known.at(day).input == begun[-1]  # type: ignore[union-attr]
-    else:
-        assert known.at(day) == (mapped and mapped.at(day))
+    assert price_at(own, batched=True) == Price(input=3.0, output=4.0)
 
 
 @given(prices, st.integers(0, 10**6), st.integers(0, 10**5), st.data())
@@ -472,17 +445,13 @@ def test_no_call_costs_more_than_the_most(
     price: Price, prompt: int, completion: int, data: st.DataObject
 ) -> None:
     batched = data.draw(st.booleans())
-    days = [DAY + timedelta(days=n) for n in range(3 if batched else 2)]
-    tiers = (Tier(above=100_000, input=50.0, output=60.0),)
-    later: Any = {**dict(price), "from": days[-1], "tiers": tiers}
-    both = Prices((Tariff(**dict(price)), Tariff(**later)))
-    most = most_usd(both, Estimate(prompt, 1, completion), DAY, batched=batched)
+    tariff = Tariff(**dict(price), tiers=(Tier(above=100_000, input=50.0, output=60.0),))
+    most = most_usd(tariff, prompt, completion, batched=batched)
     written = data.draw(st.integers(0, prompt))
     usage = Usage(prompt_tokens=prompt, completion_tokens=completion, cache_write_tokens=written)
-    for day in days:
-        cost = reply_cost_usd(both, Reply(text="a", usage=usage, batched=batched), day)
-        assert cost is not None
-        assert cost <= most * (1 + 1e-9)
+    cost = cost_usd(tariff, Reply(text="a", usage=usage, batched=batched))
+    assert cost is not None
+    assert cost <= most * (1 + 1e-9)
 
 
 @pytest.mark.parametrize(
@@ -500,11 +469,10 @@ def test_tiers_batches_and_caches_are_priced_as_the_map_says(
     model_id: str, prompt: int, names: tuple[str, str]
 ) -> None:
     entry = map_entry(config(model_id))
-    known = prices_of(config(model_id))
+    known = tariff_of(config(model_id))
     assert known is not None
-    price = known.at(DAY, prompt, batched=bool(names[1]))
+    price = price_at(known, prompt, batched=bool(names[1]))
     ending = "".join(names)
-    assert price is not None
     assert price.input == pytest.approx(entry["input_cost_per_token" + ending] * 1e6)
     assert price.output == pytest.approx(entry["output_cost_per_token" + ending] * 1e6)
     assert price.cached == pytest.approx(entry["cache_read_input_token_cost" + ending] * 1e6)

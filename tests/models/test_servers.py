@@ -17,7 +17,7 @@ from phyblock.errors import (
     UnavailableError,
     UnreachableError,
 )
-from phyblock.models import Model, Reply, Request, RetryPolicy
+from phyblock.models import Budget, Model, Reply, Request, RetryPolicy
 from phyblock.models.limits import Limits
 from phyblock.models.model import ChatModel
 from phyblock.models.servers import FAILURES_TO_REST, Server, Servers
@@ -79,7 +79,12 @@ def ask_through(
         limits = Limits(width, overall, rest_s=servers.rest_s, clock=time.clock)
         config = ModelConfig(name="m", id="openai/m", api_base="http://gone:1/v1")
         model = ChatModel(
-            config=config, servers=servers, limits=limits, policy=policy, observer=lambda _: None
+            config=config,
+            servers=servers,
+            limits=limits,
+            budget=Budget().of("m"),
+            policy=policy,
+            observer=lambda _: None,
         )
         queue = [make_request(f"{n:03}") for n in range(samples)]
 

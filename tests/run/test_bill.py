@@ -14,10 +14,9 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from phyblock.cli.run import print_estimate
-from phyblock.config.models import load_models
+from phyblock.config.models import Tariff, load_models
 from phyblock.config.suite import load_suite
 from phyblock.models import Estimate as CallEstimate
-from phyblock.models import Prices, today
 from phyblock.models.costs import text_tokens
 from phyblock.resources import bundled
 from phyblock.run.estimate import Estimate, estimate
@@ -138,7 +137,7 @@ def test_a_dry_run_is_near_the_bill_of_every_provider(workspace: Workspace) -> N
 def test_replies_of_one_kind_say_nothing_of_another_and_none_is_longer_than_it_can_be(
     calls: list[tuple[str, int, int]], replies: list[tuple[str, int]]
 ) -> None:
-    row = Estimate("m", "litellm", 100, Prices.flat(0.0, 10.0), today())
+    row = Estimate("m", "litellm", 100, Tariff(input=0.0, output=10.0))
     for kind, usual, more in calls:
         row.add_call(CallEstimate(100, usual, usual + more), kind)
     for kind, tokens in replies:
@@ -204,6 +203,4 @@ def test_a_dry_run_says_where_prices_are_from(workspace: Workspace) -> None:
     workspace.write_suite(models=["a", "b"])
     plan = planned(workspace)
     told = " ".join(printed(plan, estimate(plan, workspace.out, use_cache=False)).split())
-    assert (
-        f"Prices of {today()}: the models file (a); litellm {version('litellm')} map (b)." in told
-    )
+    assert f"Prices: the models file (a); litellm {version('litellm')} map (b)." in told
