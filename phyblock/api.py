@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import functools
+import inspect
+import re
 import signal
 import sys
 import threading
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
-from dataclasses import dataclass, field
-from html import escape
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import NoneType
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Literal, ParamSpec, TypeVar
+
+from pydantic import ConfigDict, Field, InstanceOf, SkipValidation, ValidationError, validate_call
 
 from phyblock.config.models import load_models
 from phyblock.config.suite import Suite as ConfigSuite
@@ -24,26 +26,18 @@ from phyblock.data import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.files import write_named
 from phyblock.parsing.plan import parse_plan
+from phyblock.records.line import problems_of, worded
 from phyblock.resources import bundled
 from phyblock.results.load import Run, load_run
 from phyblock.run.estimate import spending_refused, unlimited_spending
 from phyblock.run.events import RunEvent, Stopping
 from phyblock.run.plan import find_models_file, find_suite, make_plan, open_dataset, prompt_dirs
-from phyblock.run.runner import RunResult, Session, check_ready
+from phyblock.run.runner import Cause, RunResult, Session, check_ready
 from phyblock.scoring.plan import AssemblyScorer, ErrorType
 from phyblock.sim.pictures import PictureStyle, candidates_png, composite_png, goal_png, goal_style
 from phyblock.text import counted, did_you_mean
 from phyblock.tracks.items import select_tasks
-from phyblock.types import (
-    MATCHERS,
-    PLAN_PARSERS,
-    SETTINGS,
-    Background,
-    Matcher,
-    PlanParser,
-    Setting,
-    View,
-)
+from phyblock.types import Background, Matcher, PlanParser, Setting, View
 
 __all__ = [
     "Picture",
@@ -59,22 +53,33 @@ __all__ = [
     "score",
 ]
 
-
-def _expect(function: str, **given: tuple[object, Any, str]) -> None:
-    """Raise SpecError for all arguments that are of another kind; a bool is no number.
-
-    An argument is told by its value, the types that it may have, and these in words.
-    """
-    problems = [
-        Problem(function, "is of another kind", name, f"{type(one).__name__} {one!r:.60}", allowed)
-        for name, (one, types, allowed) in given.items()
-        if not isinstance(one, types) or isinstance(one, bool)
-    ]
-    if problems:
-        raise SpecError(problems)
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+_Text = Annotated[str, Field(min_length=1)]
+Place = Annotated[
+    _Text | Path, worded("is no path: is a variable not set?", "a text or a pathlib.Path")
+]
 
 
-Shown = Literal["both", "goal", "candidates"]
+def _checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
+    """Raise SpecError for all arguments that are not of the types that the function declares."""
+    check = validate_call(config=ConfigDict(strict=True))(function)
+    names = list(inspect.signature(function).parameters)
+
+    @functools.wraps(function)
+    def checked(*args: _P.args, **kwargs: _P.kwargs) -> _T:
+        try:
+            return check(*args, **kwargs)
+        except ValidationError as error:
+            raise SpecError(map(named, problems_of(error, function.__name__))) from None
+
+    def named(problem: Problem) -> Problem:
+        found = re.match(r"\[(\d+)\](.*)", problem.field)
+        if found is None:
+            return problem
+        return replace(problem, field=names[min(int(found[1]), len(names) - 1)] + found[2])
+
+    return checked
 
 
 @dataclass(frozen=True, repr=False)
@@ -95,12 +100,13 @@ class Picture:
         return f"<picture: PNG, {len(self.png):,} bytes>"
 
 
+@_checked
 def render(
-    scene: AssemblyTask,
+    scene: InstanceOf[AssemblyTask],
     *,
-    show: Shown = "both",
+    show: Literal["both", "goal", "candidates"] = "both",
     view: View = "oblique",
-    background: Background = "checkerboard",
+    background: SkipValidation[Background] = "checkerboard",
     size_px: int = 512,
 ) -> Picture:
     """Draw a scene as models see it: goal and numbered candidates, or one of the two.
@@ -108,19 +114,6 @@ def render(
     `size_px` is the side of each square [pixels]. Raises SpecError for a view, background or size
     that there is not and for arguments of another kind, DataError for a scene without blocks.
     """
-    texts = {"show": show, "view": view, "background": background}
-    _expect(
-        "render",
-        **{
-            "scene": (scene, AssemblyTask, "a scene of a suite: suite.scenes[ID]"),
-            "size_px": (size_px, int, "a whole number of pixels"),
-            **{name: (text, str, "a word") for name, text in texts.items()},
-        },
-    )
-    if show not in get_args(Shown):
-        raise SpecError(
-            Problem("render", "is not known", "show", str(show), ", ".join(get_args(Shown)))
-        )
     try:
         style = PictureStyle.from_view(view, size_px, background)
     except ValueError as error:
@@ -147,31 +140,15 @@ class SceneTask(AssemblyTask):
         return render(self).png
 
 
-class Scenes(Mapping[str, SceneTask]):
+class Scenes(dict[str, SceneTask]):
     """Scenes by id, in the order of the data set."""
 
-    def __init__(self, tasks: Sequence[AssemblyTask]) -> None:
-        self._tasks = {
-            one.key: SceneTask(one.scene, one.candidates, one.composite) for one in tasks
-        }
-
-    def __getitem__(self, key: str) -> SceneTask:
-        if key not in self._tasks:
-            hint = did_you_mean(str(key), list(self._tasks))
-            raise SpecError(Problem("suite.scenes", "has no such scene", "", str(key), hint=hint))
-        return self._tasks[key]
-
-    def __contains__(self, key: object) -> bool:
-        return key in self._tasks
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._tasks)
-
-    def __len__(self) -> int:
-        return len(self._tasks)
+    def __missing__(self, key: str) -> SceneTask:
+        hint = did_you_mean(str(key), list(self))
+        raise SpecError(Problem("suite.scenes", "has no such scene", "", str(key), hint=hint))
 
     def __repr__(self) -> str:
-        first = ", ".join(list(self._tasks)[:3])
+        first = ", ".join(list(self)[:3])
         return f"<{counted(len(self), 'scene')}: {first}{', ...' if len(self) > 3 else ''}>"
 
 
@@ -200,35 +177,23 @@ class Suite:
         """
         suite = self.loaded
         dataset = open_dataset(suite.dataset.format, self.loaded.files.dataset)
-        return Scenes(select_tasks(dataset.tasks, suite.levels, suite.limit))
+        tasks = select_tasks(dataset.tasks, suite.levels, suite.limit)
+        return Scenes({t.key: SceneTask(t.scene, t.candidates, t.composite) for t in tasks})
 
     def __repr__(self) -> str:
-        return f"<suite {self.name}: {self._about()}>"
-
-    def _about(self) -> str:
         suite = self.loaded
-        levels = ", ".join(map(str, suite.levels))
-        return (
-            f"{', '.join(suite.tracks)}; levels {levels}; {counted(len(suite.seeds), 'seed')}; "
-            f"models {', '.join(self.models)}"
-        )
-
-    def _repr_html_(self) -> str:
-        """Return what a notebook shows: name, description, what it asks of whom."""
-        described = self.loaded.description
-        return (
-            f"<p><b>{escape(self.name)}</b> {escape(described)}</p><p>{escape(self._about())}</p>"
-        )
+        levels, seeds = ", ".join(map(str, suite.levels)), counted(len(suite.seeds), "seed")
+        asked = f"{', '.join(suite.tracks)}; levels {levels}; {seeds}"
+        return f"<suite {self.name}: {asked}; models {', '.join(self.models)}>"
 
 
-def load_suite(suite: str | Path, *overrides: str) -> Suite:
+@_checked
+def load_suite(suite: Place, *overrides: str) -> Suite:
     """Read a suite: a YAML file, or the name of a bundled one; `overrides` are `KEY=VALUE` texts,
     as of `--set`.
 
     Raises SpecError with all that is wrong, each with its file, line and field.
     """
-    texts = {f"overrides[{n}]": (text, str, "KEY=VALUE") for n, text in enumerate(overrides)}
-    _expect("load_suite", **{"suite": (suite, (str, Path), "a name or a path"), **texts})
     path = find_suite(str(suite))
     data, prompts = bundled("benchmarks", "data"), prompt_dirs(path)
     return Suite(read_suite(path, overrides, data_dir=data, prompt_dirs=prompts))
@@ -247,8 +212,6 @@ class PlanScore:
     plan: tuple[int, ...]
     rule: str | None
     problem: str | None
-    setting: Setting
-    matcher: Matcher
     tp: int
     fp: int
     fn: int
@@ -257,26 +220,11 @@ class PlanScore:
     f1: float | None
     errors: tuple[ErrorType | None, ...]
 
-    def _repr_html_(self) -> str:
-        """Return what a notebook shows: F1, and what became of each step."""
-        if self.rule is None:
-            return f"<p>Nothing could be read: {escape(str(self.problem))}</p>"
-        f1 = "none" if self.f1 is None else f"{100 * self.f1:.1f} %"
-        head = f"F1 {f1}, setting {self.setting}, {self.matcher} matcher"
-        rows = (
-            f"<tr><td>{n}</td><td>{block}</td><td>{(error or 'placed').replace('_', ' ')}</td></tr>"
-            for n, (block, error) in enumerate(zip(self.plan, self.errors, strict=True), 1)
-        )
-        return (
-            f"<p><b>{head}</b>: {self.tp} right, {self.fp} wrong, {self.fn} missing</p><table>"
-            f"<thead><tr><th>Step</th><th>Block</th><th>Outcome</th></tr></thead>"
-            f"<tbody>{''.join(rows)}</tbody></table>"
-        )
 
-
+@_checked
 def score(
     reply: str,
-    scene: AssemblyTask,
+    scene: InstanceOf[AssemblyTask],
     *,
     setting: Setting = "A",
     matcher: Matcher = "optimal",
@@ -287,57 +235,32 @@ def score(
     Raises SpecError for a setting, matcher or parser that there is not, and for arguments of
     another kind.
     """
-    _expect(
-        "score",
-        **{
-            "reply": (reply, str, "text"),
-            "scene": (scene, AssemblyTask, "a scene of a suite: suite.scenes[ID]"),
-        },
-    )
-    given = {
-        "setting": (setting, SETTINGS),
-        "matcher": (matcher, MATCHERS),
-        "parser": (parser, PLAN_PARSERS),
-    }
-    problems = [
-        Problem("score", "is not known", name, str(word), ", ".join(words))
-        for name, (word, words) in given.items()
-        if word not in words
-    ]
-    if problems:
-        raise SpecError(problems)
     parsed = parse_plan(reply, len(scene.candidates), parser)
-    (scored,) = AssemblyScorer(scene.scene, scene.candidates, (setting,)).score(
-        parsed.plan, (matcher,), None
-    )
+    scorer = AssemblyScorer(scene.scene, scene.candidates, (setting,))
+    (scored,) = scorer.score(parsed.plan, (matcher,), None)
     counts = scored.counts
     return PlanScore(
-        plan=parsed.plan.steps,
-        rule=parsed.rule,
-        problem=parsed.problem,
-        setting=setting,
-        matcher=matcher,
-        tp=counts.tp,
-        fp=counts.fp,
-        fn=counts.fn,
-        precision=counts.precision,
-        recall=counts.recall,
-        f1=counts.f1,
-        errors=scored.step_errors or (),
+        parsed.plan.steps,
+        parsed.rule,
+        parsed.problem,
+        counts.tp,
+        counts.fp,
+        counts.fn,
+        counts.precision,
+        counts.recall,
+        counts.f1,
+        scored.step_errors or (),
     )
 
 
-_NAP_S = 0.2
-"""How long an interrupt may wait to be noticed."""
-
-
+@_checked
 def run_suite(
-    suite: Suite | str | Path,
+    suite: Annotated[Suite | str | Path, worded("is no suite", "a suite, its name or its path")],
     *,
-    models: Sequence[str] | None = None,
-    limit: int | None = None,
-    out: str | Path | None = None,
-    models_file: str | Path | None = None,
+    models: Annotated[Sequence[str], Field(min_length=1)] | None = None,
+    limit: Annotated[int, Field(ge=1)] | None = None,
+    out: Place | None = None,
+    models_file: Place | None = None,
     use_cache: bool = True,
     retry_failed: bool = False,
     yes: bool = False,
@@ -353,143 +276,110 @@ def run_suite(
     run sends nothing more, waits for calls under way (not after a second interrupt), and raises
     KeyboardInterrupt once what was answered is on disk.
     """
-    _check(suite, models, limit, out, models_file)
     loaded = (suite if isinstance(suite, Suite) else load_suite(suite)).loaded
     named = None if models_file is None else str(models_file)
-    known_in = find_models_file(named, loaded.files.path)
-    plan = make_plan(loaded, load_models(known_in), only=models or (), limit=limit)
-    folder = Path(out) if out is not None else plan.folder_in(Path("results"))
+    known = load_models(find_models_file(named, loaded.files.path))
+    plan = make_plan(loaded, known, only=models or (), limit=limit)
+    folder = plan.folder_in(Path("results")) if out is None else Path(out)
     check_ready(plan)
-    costly = (
-        ()
-        if yes
-        else unlimited_spending(plan, folder, use_cache=use_cache, retry_failed=retry_failed)
-    )
-    if costly:
+    asks: dict[str, Any] = {"use_cache": use_cache, "retry_failed": retry_failed}
+    if not yes and (costly := unlimited_spending(plan, folder, **asks)):
         hint = "agree with yes=True, or set a limit: load_suite(NAME, 'limits.max_cost_usd=5')"
         raise spending_refused(plan, costly, "would cost money, and nobody agreed", hint)
-    session = Session(plan, folder, _hear, use_cache=use_cache, retry_failed=retry_failed)
-    _tell(folder, _RunApart(session).completed())
-    return load_run(folder)
 
+    def tell(event: RunEvent) -> None:
+        if isinstance(event, Stopping):
+            print(event.text, file=sys.stderr, flush=True)
 
-def _check(suite: object, models: object, limit: object, out: object, models_file: object) -> None:
-    paths, a_path = (str, Path, NoneType), "a path"
-    _expect(
-        "run_suite",
-        **{
-            "suite": (suite, (Suite, str, Path), "a suite, its name or its path"),
-            "models": (models, (list, tuple, NoneType), "a list of names: ['gpt-4o']"),
-            "limit": (limit, (int, NoneType), "1..."),
-            "out": (out, paths, a_path),
-            "models_file": (models_file, paths, a_path),
-        },
-    )
-    names = list(models) if isinstance(models, list | tuple) else None
-    if names is not None:
-        _expect("run_suite", **{f"models[{n}]": (m, str, "a name") for n, m in enumerate(names)})
-    if names == []:
-        hint = "leave it out for the suite's own models"
-        raise SpecError(Problem("run_suite", "names no model", "models", "[]", hint=hint))
-    if isinstance(limit, int) and limit < 1:
-        raise SpecError(Problem("run_suite", "is no number of scenes", "limit", str(limit), "1..."))
-    if out == "":
-        raise SpecError(Problem("run_suite", "is empty: is a variable not set?", "out"))
-
-
-class _RunApart:
-    """A run in a thread of its own, since a notebook's has a loop already, and how it is stopped.
-
-    As for `phyblock run`, the first interrupt lets it send nothing more, the second gives up calls
-    under way.
-    """
-
-    def __init__(self, opening: Session) -> None:
-        self._opening = opening
-        self._is_interrupted = False
-        self._stops = 0
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._whole: asyncio.Task[RunResult] | None = None
-        self._session: Session | None = None
-
-    def completed(self) -> RunResult:
-        """Run to the end; KeyboardInterrupt, once all is written, where it was interrupted."""
-        try:
-            with self._interruptible(), ThreadPoolExecutor(1) as pool:
-                try:
-                    running = pool.submit(asyncio.run, self._run())
-                    # A signal that the system gives to another thread wakes nobody here.
-                    while not wait((running,), _NAP_S).done:
-                        continue
-                    return running.result()
-                except BaseException:
-                    # A program's handlers of other signals may raise what they like.
-                    self._stop()
-                    raise
-        finally:
-            if self._is_interrupted:
-                raise KeyboardInterrupt
-
-    async def _run(self) -> RunResult:
-        self._whole, self._loop = asyncio.current_task(), asyncio.get_running_loop()
-        async with self._opening as session:
-            self._session = session
-            self._heed()
-            return await session.run()
-
-    @contextlib.contextmanager
-    def _interruptible(self) -> Iterator[None]:
-        """Note Ctrl-C in the place of being torn from waiting by it, unless it is ignored."""
-        is_main = threading.current_thread() is threading.main_thread()
-        before = signal.getsignal(signal.SIGINT)
-        if not is_main or not callable(before):
-            yield
-            return
-        signal.signal(signal.SIGINT, self._on_interrupt)
-        try:
-            yield
-        finally:
-            signal.signal(signal.SIGINT, before)
-
-    def _on_interrupt(self, *_: object) -> None:
-        self._is_interrupted = True
-        self._stop()
-
-    def _stop(self) -> None:
-        self._stops += 1
-        if self._loop is not None:
-            # A loop that is closed has nothing to stop.
-            with contextlib.suppress(RuntimeError):
-                self._loop.call_soon_threadsafe(self._heed)
-
-    def _heed(self) -> None:
-        """Do in the run's thread what was asked for; at the latest when the run is open."""
-        if self._stops and self._session is not None:
-            self._session.interrupt()
-        if self._stops > 1 and self._whole is not None:
-            self._whole.cancel()
-            # Once, as what is answered must be written.
-            self._whole = None
-
-
-def _hear(event: RunEvent) -> None:
-    """Say what an interrupted run waits for; of all else a program hears at the end."""
-    if isinstance(event, Stopping):
-        print(event.text, file=sys.stderr, flush=True)
-
-
-def _tell(folder: Path, result: RunResult) -> None:
-    for model, reason in result.stopped.items():
-        warnings.warn(f"{model} was stopped: {reason}", stacklevel=3)
+    result = completed(Session(plan, folder, tell, **asks))
+    if result.stop is not None and result.stop.cause is Cause.INTERRUPTED:
+        raise KeyboardInterrupt
+    remarks = remarks_on(result, folder)
     if result.left:
         reason = f" ({result.stop.reason})" if result.stop else ""
         counts = f"{result.left:,} of {counted(result.samples, 'sample')} left{reason}"
-        warnings.warn(f"{counts}: the same call again goes on", stacklevel=3)
+        remarks.append(f"{counts}: the same call again goes on")
+    for remark in remarks:
+        warnings.warn(remark, stacklevel=3)
+    return load_run(folder)
+
+
+def remarks_on(result: RunResult, folder: Path | str) -> list[str]:
+    """Return a sentence on each model that was stopped, and on samples that need a person."""
+    remarks = [f"{model} was stopped: {reason}" for model, reason in result.stopped.items()]
     if result.failed:
-        counts = f"{counted(result.failed, 'request')} rejected for good"
-        warnings.warn(f"{counts}: ask again with retry_failed=True", stacklevel=3)
+        rejected = f"{counted(result.failed, 'request')} rejected for good"
+        how = "when the cause is fixed, ask again with --retry-failed, retry_failed=True"
+        remarks.append(f"{rejected}: {how}")
     if result.unjudged:
-        counts = f"{counted(result.unjudged, 'answer')} could not be judged"
-        warnings.warn(
-            f"{counts}: phyblock score {folder} tries again, without a call", stacklevel=3
-        )
+        unjudged = f"{counted(result.unjudged, 'answer')} could not be judged"
+        remarks.append(f"{unjudged}: phyblock score {folder} tries again, without a call")
+    return remarks
+
+
+_NAP_S = 0.1
+"""How long a signal may wait to be noticed that the system gives to another thread."""
+
+
+def completed(
+    session: Session,
+    signals: Collection[signal.Signals] = (signal.SIGINT,),
+    tick: Callable[[], object] = lambda: None,
+) -> RunResult:
+    """Run a session to its end in a thread of its own, since a notebook's has a loop already.
+
+    The first signal lets it send nothing more, the second gives up calls under way; what was
+    answered is on disk when this returns. `tick` is called several times a second.
+    """
+    loop, stops = asyncio.new_event_loop(), 0
+    whole: asyncio.Task[RunResult] | None = None
+
+    async def run() -> RunResult:
+        nonlocal whole
+        async with session:
+            whole = asyncio.current_task()
+            heed()
+            try:
+                return await session.run()
+            except asyncio.CancelledError:
+                return session.result
+
+    def in_thread() -> RunResult:
+        with asyncio.Runner(loop_factory=lambda: loop) as runner:
+            return runner.run(run())
+
+    def heed() -> None:
+        nonlocal whole
+        if stops and whole is not None:
+            session.interrupt()
+        if stops > 1 and whole is not None:
+            whole.cancel()
+            # Once, as what is answered must be written.
+            whole = None
+
+    def stop(*_: object) -> None:
+        nonlocal stops
+        stops += 1
+        # A loop that is closed has nothing to stop.
+        with suppress(RuntimeError):
+            loop.call_soon_threadsafe(heed)
+
+    is_main = threading.current_thread() is threading.main_thread()
+    before = {name: signal.getsignal(name) for name in signals if is_main}
+    heard = {name: was for name, was in before.items() if was not in (None, signal.SIG_IGN)}
+    for name in heard:
+        signal.signal(name, stop)
+    try:
+        with ThreadPoolExecutor(1) as pool:
+            running = pool.submit(in_thread)
+            try:
+                while not wait((running,), _NAP_S).done:
+                    tick()
+            except BaseException:
+                # A program's handlers of other signals may raise what they like.
+                stop()
+                raise
+        return running.result()
+    finally:
+        for name, was in heard.items():
+            signal.signal(name, was)

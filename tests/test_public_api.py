@@ -63,11 +63,10 @@ def test_the_guide_runs_and_every_object_shows_itself(
     assert "levels[0]" in capsys.readouterr().out
     assert (tmp_path / "front.png").read_bytes() == names["picture"].png
     assert names["picture"]._repr_png_().startswith(PNG)
-    scene, found, run = names["scene"], names["found"], names["run"]
+    scene, run = names["scene"], names["run"]
     assert scene._repr_png_().startswith(PNG)
     assert f"<scene {scene.key}: level 1" in repr(scene)
-    assert "F1" in found._repr_html_()
-    assert "quick" in names["suite"]._repr_html_()
+    assert "quick" in repr(names["suite"])
     assert "random" in run._repr_html_()
     assert set(run.estimates["model"]) == {"random", "goal-blind"}
     # What a reply is worth here is what it is worth in the run.
@@ -86,7 +85,7 @@ def test_what_is_wrong_is_named() -> None:
     scene = next(iter(suite.scenes.values()))
     wrong: dict[str, typing.Callable[[], object]] = {
         "there is no such suite": lambda: phyblock.load_suite("quik"),
-        "suite: is empty": lambda: phyblock.load_suite(""),
+        "load_suite: suite: is no path": lambda: phyblock.load_suite(""),
         "--set limit=0": lambda: phyblock.load_suite("quick", "limit=0"),
         "has no such scene": lambda: suite.scenes["l9"],
         "render: show": lambda: phyblock.render(scene, show="all"),  # type: ignore[arg-type]
@@ -95,24 +94,26 @@ def test_what_is_wrong_is_named() -> None:
         "score: setting": lambda: phyblock.score("", scene, setting="C"),  # type: ignore[arg-type]
         "score: reply": lambda: phyblock.score(None, scene),  # type: ignore[arg-type]
         "run_suite: limit": lambda: phyblock.run_suite(suite, limit=0),
-        "a list of names": lambda: phyblock.run_suite(suite, models="random"),
+        "run_suite: models: is of the wrong type": lambda: phyblock.run_suite(
+            suite, models="random"
+        ),
         "run_suite: models[0]": lambda: phyblock.run_suite(suite, models=[1]),  # type: ignore[list-item]
-        "names no model": lambda: phyblock.run_suite(suite, models=[]),
+        "run_suite: models: is not a non-empty list": lambda: phyblock.run_suite(suite, models=[]),
         "is a variable not set": lambda: phyblock.run_suite(suite, out=""),
-        "found: str 'x'": lambda: phyblock.run_suite(suite, limit="x"),  # type: ignore[arg-type]
-        "found: bool True": lambda: phyblock.run_suite(suite, limit=True),
+        'found: "x"': lambda: phyblock.run_suite(suite, limit="x"),  # type: ignore[arg-type]
+        "found: true": lambda: phyblock.run_suite(suite, limit=True),
         "score: scene": lambda: phyblock.score("", "l1-001-animal"),  # type: ignore[arg-type]
         "render: scene": lambda: phyblock.render(suite),  # type: ignore[arg-type]
         "render: size_px": lambda: phyblock.render(scene, size_px=128.5),  # type: ignore[arg-type]
         "render: view": lambda: phyblock.render(scene, view=["front"]),  # type: ignore[arg-type]
-        "overrides[0]": lambda: phyblock.load_suite("quick", 5),  # type: ignore[arg-type]
+        "load_suite: overrides": lambda: phyblock.load_suite("quick", 5),  # type: ignore[arg-type]
     }
     for said, call in wrong.items():
         with pytest.raises(SpecError, match=re.escape(said)):
             call()
     unread = phyblock.score("I cannot.", scene)
     assert (unread.rule, unread.f1, unread.tp) == (None, 0, 0)
-    assert "Nothing could be read" in unread._repr_html_()
+    assert unread.problem
 
 
 def test_nothing_is_spent_unasked_and_a_loop_may_run(

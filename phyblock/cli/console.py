@@ -5,15 +5,14 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Sequence
-from itertools import groupby
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
 import click
 from rich import box
-from rich.cells import cell_len
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
@@ -22,11 +21,6 @@ from phyblock.results.text import Column, TextTable
 from phyblock.text import one_line, plain_lines
 
 _PIPE_WIDTH = 160
-_HEADING_WIDTH = 6
-"""Characters after which a heading above narrower cells goes on in a new line."""
-_TEXT_WIDTH = 32
-"""Characters after which a cell of text may go on in a new line."""
-_GAP = 2
 
 
 class _PlainConsole(Console):
@@ -62,66 +56,40 @@ def print_table(console: Console, view: TextTable) -> None:
     """
     if view.caption:
         console.print(view.caption, style="bold")
-    for columns in _pieces(view, console.width):
+    texts = [column.is_text for column in view.columns]
+    names = list(range(texts.index(False) if False in texts[1:] else len(texts)))
+    pieces = [names]
+    endless = console.options.update(width=10_000)
+    for column in range(len(names), len(texts)):
+        wider = [*pieces[-1], column]
+        needed = Measurement.get(console, endless, _piece(view, wider)).minimum
+        if needed > console.width and pieces[-1] != names:
+            pieces.append(names)
+        pieces[-1] = [*pieces[-1], column]
+    for piece in pieces:
         console.print()
-        console.print(_piece(view, columns))
+        console.print(_piece(view, piece))
     for number, note in enumerate(view.notes):
         console.print(f"\n{note}" if not number else note, style="dim")
     console.print()
 
 
-def _pieces(view: TextTable, width: int) -> list[list[int]]:
-    """Return the columns of each piece; columns of one group stay together where they fit."""
-    texts = [column.is_text for column in view.columns]
-    n_names = max(1, texts.index(False) if False in texts else len(texts))
-    names = list(range(n_names))
-    rest = range(n_names, len(texts))
-    groups = [list(part) for _, part in groupby(rest, key=lambda i: view.columns[i].group or i)]
-    pieces = [names]
-    for group in groups:
-        if _width(view, [*names, *group]) > width:
-            parts = [[column] for column in group]
-        else:
-            parts = [group]
-        for part in parts:
-            if pieces[-1] != names and _width(view, [*pieces[-1], *part]) > width:
-                pieces.append(names)
-            pieces[-1] = [*pieces[-1], *part]
-    return pieces
-
-
-def _width(view: TextTable, columns: Sequence[int]) -> int:
-    """Return the characters that these columns need at least, side by side."""
-    widths = []
-    for i in columns:
-        cells = max((cell_len(row[i]) for row in view.rows), default=0)
-        if view.columns[i].is_text:
-            cells = min(cells, _TEXT_WIDTH)
-        widths.append(max(cells, *map(cell_len, _heading(view, columns, i).split("\n"))))
-    return sum(widths) + _GAP * (len(widths) - 1)
-
-
-def _heading(view: TextTable, columns: Sequence[int], i: int) -> str:
-    """Return a column's name, below its group's name where it is the first of the group there."""
-    column = view.columns[i]
-    before = columns[columns.index(i) - 1] if columns.index(i) else None
-    is_first = before is None or view.columns[before].group != column.group
-    cells = max((cell_len(row[i]) for row in view.rows), default=0)
-    width = max(_HEADING_WIDTH, min(cells, _TEXT_WIDTH))
-    lines = wrap(column.group, width, break_long_words=False) if is_first else []
-    return "\n".join([*lines, *wrap(column.name, width, break_long_words=False)])
-
-
 def _piece(view: TextTable, columns: Sequence[int]) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, _GAP - 1, 0, 0))
+    """Return some of the columns; the name of a group stands above the first of it."""
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
+    group = ""
     for i in columns:
-        is_text = view.columns[i].is_text
+        column = view.columns[i]
+        width = max(6, *(len(row[i]) for row in view.rows), 0)
+        lines = [] if column.group == group else wrap(column.group, width, break_long_words=False)
+        lines += wrap(column.name, width, break_long_words=False)
         table.add_column(
-            Text(_heading(view, columns, i)),
-            justify="left" if is_text else "right",
-            no_wrap=not is_text,
+            Text("\n".join(lines)),
+            justify="left" if column.is_text else "right",
+            no_wrap=not column.is_text,
             overflow="fold",
         )
+        group = column.group
     for row in view.rows:
         table.add_row(*(Text(row[i]) for i in columns))
     return table

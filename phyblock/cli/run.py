@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
 import shlex
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, cast
 
 import click
 from rich.console import Console
 
+from phyblock.api import completed, load_suite, remarks_on
 from phyblock.cli.console import make_console, may_spend, print_path, print_table, shown_path
 from phyblock.cli.options import (
     NAME_OR_PATH,
@@ -30,11 +29,9 @@ from phyblock.cli.options import (
 from phyblock.cli.progress import ProgressView
 from phyblock.cli.results import show_tables
 from phyblock.config.models import load_models
-from phyblock.config.suite import load_suite
 from phyblock.files import OutFolder
 from phyblock.models import is_billed
 from phyblock.models.litellm_client import be_quiet
-from phyblock.resources import bundled
 from phyblock.results.text import NO_VALUE, Column, TextTable
 from phyblock.run.estimate import Estimate, estimate
 from phyblock.run.plan import (
@@ -42,19 +39,18 @@ from phyblock.run.plan import (
     asking_remarks,
     bundled_suites,
     find_models_file,
-    find_suite,
     make_plan,
     moved_remarks,
-    prompt_dirs,
 )
 from phyblock.run.rescore import rescore
 from phyblock.run.runner import Cause, RunResult, Session, check_ready
 from phyblock.run.store import held_run
-from phyblock.text import counted, one_line, plain_lines
+from phyblock.text import counted, one_line
 from phyblock.tracks import kind_of
 from phyblock.types import MATCHERS, PLAN_PARSERS, Matcher, PlanParser
 
 _INTERRUPTED = 130
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _LINE_EVERY_S = 2.0
 
 
@@ -101,11 +97,8 @@ def run(
     nothing is asked twice.
     """
     console = make_console()
-    path = find_suite(suite)
-    loaded = load_suite(
-        path, sets, data_dir=bundled("benchmarks", "data"), prompt_dirs=prompt_dirs(path)
-    )
-    known = load_models(find_models_file(models_file, path))
+    loaded = load_suite(suite, *sets).loaded
+    known = load_models(find_models_file(models_file, loaded.files.path))
     plan = make_plan(loaded, known, only=split_names(models), limit=limit)
     folder = out or plan.folder_in(Path("results"))
     found = held_run(folder, plan.manifest)
@@ -114,7 +107,7 @@ def run(
         from phyblock.web.report import files_of
 
         OutFolder(folder).check(() if dry_run else files_of(page=not no_report))
-    asks = {"use_cache": not no_cache, "retry_failed": retry_failed}
+    asks: dict[str, Any] = {"use_cache": not no_cache, "retry_failed": retry_failed}
     if dry_run:
         print_estimate(console, plan, estimate(plan, folder, **asks))
     for remark in (*remarks, *asking_remarks(loaded, plan)):
@@ -125,58 +118,13 @@ def run(
     if not yes and not _is_agreed(console, plan, folder, **asks):
         console.print("Nothing was asked.")
         return 1
-    view = ProgressView(console, plan.suite.name)
     be_quiet()
-    session = Session(plan, folder, view, use_cache=not no_cache, retry_failed=retry_failed)
-    result = asyncio.run(_run(session, view))
+    with ProgressView(console) as view:
+        result = completed(Session(plan, folder, view, **asks), _SIGNALS, view.tick)
     made = show_tables(folder, page=not no_report)
     code = _conclude(console, folder, result, view)
     print_path(console, made)
     return code
-
-
-async def _run(opened: Session, view: ProgressView) -> RunResult:
-    whole = asyncio.current_task()
-    assert whole is not None
-    with view:
-        async with opened as session:
-
-            def stop() -> None:
-                if session.stopping:
-                    assert whole is not None
-                    whole.cancel()
-                session.interrupt()
-
-            async def tick() -> None:
-                while True:
-                    await asyncio.sleep(1)
-                    view.tick()
-
-            ticking = asyncio.create_task(tick())
-            with _interrupts(stop, view.hear):
-                try:
-                    return await session.run()
-                except asyncio.CancelledError:
-                    return session.result
-                finally:
-                    ticking.cancel()
-
-
-@contextlib.contextmanager
-def _interrupts(stop: Callable[[], None], hear: Callable[[], None]) -> Iterator[None]:
-    """Call `stop` in the loop on Ctrl-C or SIGTERM; `hear` at once, even where the loop is busy."""
-    loop = asyncio.get_running_loop()
-
-    def handler(*_: Any) -> None:
-        hear()
-        loop.call_soon_threadsafe(stop)
-
-    before = {name: signal.signal(name, handler) for name in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for name, earlier in before.items():
-            signal.signal(name, earlier)
 
 
 def _is_agreed(console: Console, plan: RunPlan, folder: Path, **asks: bool) -> bool:
@@ -191,17 +139,8 @@ def _is_agreed(console: Console, plan: RunPlan, folder: Path, **asks: bool) -> b
 
 def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressView) -> int:
     """Print how a run ended, what it cost and how to go on; return the exit code."""
-    where = shown_path(folder)
-    for name, reason in result.stopped.items():
-        console.print(f"{one_line(name)} was stopped: {reason}", style="red")
-    if result.failed:
-        rejected = f"{counted(result.failed, 'request')} rejected for good;"
-        console.print(
-            f"{rejected} when the cause is fixed, ask again with --retry-failed", style="red"
-        )
-    if result.unjudged:
-        unjudged = f"{counted(result.unjudged, 'answer')} could not be judged:"
-        console.print(f"{unjudged} phyblock score {where} tries again, without a call", style="red")
+    for remark in remarks_on(result, shown_path(folder)):
+        console.print(one_line(remark), style="red")
     done = f"All {result.samples:,} samples are done"
     if result.left:
         reason = f" ({result.stop.reason})" if result.stop else ""
@@ -224,12 +163,10 @@ def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressV
 def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> None:
     """Print what each model would take, the sum, and where prices are from."""
     items = [counted(len(track.items), kind_of(track.name).item) for track in plan.tracks]
-    facts = [
-        f"{', '.join(items)} of {plan.dataset.name}",
-        counted(len(plan.suite.seeds), "seed"),
-        *([f"{len(plan.variants):,} conditions"] if len(plan.variants) > 1 else []),
-        counted(len(plan.models), "model"),
-    ]
+    facts = [f"{', '.join(items)} of {plan.dataset.name}", counted(len(plan.suite.seeds), "seed")]
+    if len(plan.variants) > 1:
+        facts.append(f"{len(plan.variants):,} conditions")
+    facts.append(counted(len(plan.models), "model"))
     examples = {plan.suite.at(variant).examples for variant in plan.variants}
     numbers = sorted({n if isinstance(n, int) else len(n) for n in examples})
     if numbers != [0]:
@@ -253,7 +190,16 @@ def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) ->
     if free := [row.model for row in rows if row.kind != "litellm"]:
         console.print(f"Without a call: {', '.join(free)}.")
     left = [row for row in rows if row.calls]
-    console.print(_sum_text(left))
+    known = [row for row in left if row.cost_usd is not None]
+    prompts = sum(row.prompt_usd or 0.0 for row in known)
+    replies = sum(row.reply_usd or 0.0 for row in known)
+    costs = []
+    if known or not left:
+        parts = f" (prompts {_dollars(prompts)}, replies {_dollars(replies)})" if known else ""
+        costs.append(f"about {_dollars(prompts + replies)}{parts}")
+    if unknown := len(left) - len(known):
+        costs.append(f"unknown cost of {counted(unknown, 'model')} (give a price in models.yaml)")
+    console.print(f"{counted(sum(row.calls for row in left), 'call')}, {' and '.join(costs)}.")
     by_source: dict[str, list[str]] = {}
     for row in left:
         if row.tariff is not None:
@@ -270,37 +216,10 @@ def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) ->
     if left:
         text = (
             "Tokens are estimates: texts by their words, pictures by their providers' rules, "
-            f"{_lengths_text(left)}; at most: each reply as long as it can be."
+            "replies as earlier ones of the model, or of usual length where there are none; at "
+            "most: each reply as long as it can be."
         )
         console.print(text, style="dim")
-
-
-def _sum_text(rows: Sequence[Estimate]) -> str:
-    known = [row for row in rows if row.cost_usd is not None]
-    costs = []
-    if known or not rows:
-        costs.append(f"about {_dollars(sum(row.cost_usd or 0.0 for row in known))}")
-    if known:
-        prompts = _dollars(sum(row.prompt_usd or 0.0 for row in known))
-        replies = _dollars(sum(row.reply_usd or 0.0 for row in known))
-        costs[0] += f" (prompts {prompts}, replies {replies})"
-    if unknown := len(rows) - len(known):
-        costs.append(f"unknown cost of {counted(unknown, 'model')} (give a price in models.yaml)")
-    return f"{counted(sum(row.calls for row in rows), 'call')}, {' and '.join(costs)}."
-
-
-def _lengths_text(rows: Sequence[Estimate]) -> str:
-    """Name the assumed length of replies: as the earlier ones of a model, else of usual length."""
-    measured, is_usual = [], False
-    for row in rows:
-        for kind, lengths in row.lengths.items():
-            if lengths.coming and lengths.mean is not None:
-                asked = f" in {kind}" if len(row.lengths) > 1 else ""
-                mean = f"{lengths.mean:,.0f} tokens (the mean of {lengths.replies:,})"
-                measured.append(f"of {row.model}{asked} {mean}")
-            else:
-                is_usual |= bool(lengths.coming)
-    return f"replies {', '.join((*measured, *['of usual length'] * is_usual))}"
 
 
 def _dollars(cost_usd: float | None) -> str:
@@ -325,18 +244,14 @@ def score(
     to RUN/scores/PARSER-MATCHER, or to --out, and RUN stays as it is.
     """
 
-    def log(text: str) -> None:
-        click.echo(plain_lines(text), err=True)
-
-    chosen = cast("PlanParser | None", parser), cast("Matcher | None", matcher)
-    told_s = time.monotonic()
+    console, shown_s = make_console(stderr=True), time.monotonic()
 
     def progress(done: int) -> None:
-        nonlocal told_s
-        if time.monotonic() - told_s > _LINE_EVERY_S:
-            told_s = time.monotonic()
-            log(f"scored {done:,} samples")
+        nonlocal shown_s
+        if time.monotonic() - shown_s > _LINE_EVERY_S:
+            shown_s = time.monotonic()
+            console.print(f"scored {done:,} samples")
 
-    print_path(
-        make_console(), show_tables(rescore(run, *chosen, out, data, log, progress), data=data)
-    )
+    chosen = cast("PlanParser | None", parser), cast("Matcher | None", matcher)
+    folder = rescore(run, *chosen, out, data, console.print, progress)
+    print_path(make_console(), show_tables(folder, data=data))

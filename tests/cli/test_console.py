@@ -19,7 +19,7 @@ from phyblock.results.export import export_run
 from phyblock.results.load import load_run
 from phyblock.results.tables import summary_of, write_tables
 from phyblock.results.text import Column, TextTable, to_csv, to_latex, to_markdown
-from phyblock.run.events import RunStarted
+from phyblock.run.events import ModelStopped, RunStarted
 from tests.web.factory import LEVELS, manifest, record, score, write_run
 
 NAME = ":b: [red]x[/red]\n=2 \x1b[31m\u202e|&\r"
@@ -70,11 +70,12 @@ def test_tables_show_names_as_they_are() -> None:
     columns = (Column("Model", is_text=True), Column("F1"))
     print_table(console, TextTable(NAME, columns, ((NAME, "1.0"), ("b", "2.0")), (NAME,)))
     console.print(NAME.replace("\n", " "))
-    view = ProgressView(console, NAME)
+    view = ProgressView(console)
     view(RunStarted({NAME: 1}, {NAME: ()}))
-    console.print(view._panel())
+    console.print(view._progress.make_tasks_table(view._progress.tasks))
+    view(ModelStopped(NAME, NAME))
     shown = console.file.getvalue()
-    assert shown.count(SHOWN) == 6
+    assert shown.count(SHOWN) == 7
     assert "\x1b" not in shown
     assert any(SHOWN in line and line.rstrip().endswith("1.0") for line in shown.splitlines())
 

@@ -57,7 +57,7 @@ def test_a_pipe_gets_whole_tables_without_escapes(suite: Workspace) -> None:
     assert done.out.splitlines()[-1] == "out/tables"
 
 
-def test_a_terminal_shows_the_panel_and_then_the_tables(suite: Workspace) -> None:
+def test_a_terminal_shows_bars_and_then_the_tables(suite: Workspace) -> None:
     class Bracketing(OpenAIChat):
         """A model whose messages look like markup."""
 
@@ -74,7 +74,7 @@ def test_a_terminal_shows_the_panel_and_then_the_tables(suite: Workspace) -> Non
     assert "Traceback" not in screen
     assert "Go on?" not in screen
     assert "[/bold] busy [blink" in screen
-    assert screen.index("of 40 samples") < screen.index("Full planning, suite trial")
+    assert screen.index("20/20") < screen.index("Full planning, suite trial")
     assert "All 40 samples are done" in screen
 
 
