@@ -32,7 +32,7 @@ from phyblock.results.load import Run, load_run
 from phyblock.run.estimate import spending_refused, unlimited_spending
 from phyblock.run.events import RunEvent, Stopping
 from phyblock.run.plan import find_models_file, find_suite, make_plan, open_dataset, prompt_dirs
-from phyblock.run.runner import Cause, RunResult, Session, check_ready
+from phyblock.run.runner import RunResult, Session, check_ready
 from phyblock.scoring.plan import AssemblyScorer, ErrorType
 from phyblock.sim.pictures import PictureStyle, candidates_png, composite_png, goal_png, goal_style
 from phyblock.text import counted, did_you_mean
@@ -292,7 +292,7 @@ def run_suite(
             print(event.text, file=sys.stderr, flush=True)
 
     result = completed(Session(plan, folder, tell, **asks))
-    if result.stop is not None and result.stop.cause is Cause.INTERRUPTED:
+    if result.stop is not None and result.stop.cause == "interrupted":
         raise KeyboardInterrupt
     remarks = remarks_on(result, folder)
     if result.left:
@@ -336,13 +336,12 @@ def completed(
 
     async def run() -> RunResult:
         nonlocal whole
-        async with session:
-            whole = asyncio.current_task()
-            heed()
-            try:
-                return await session.run()
-            except asyncio.CancelledError:
-                return session.result
+        whole = asyncio.current_task()
+        heed()
+        try:
+            return await session.run()
+        except asyncio.CancelledError:
+            return session.result
 
     def in_thread() -> RunResult:
         with asyncio.Runner(loop_factory=lambda: loop) as runner:

@@ -41,8 +41,7 @@ from phyblock.records.record import Record, SentPrompt
 from phyblock.resources import bundled
 from phyblock.results.load import design_of
 from phyblock.run.judge import about_prompt
-from phyblock.run.plan import recorded_dataset
-from phyblock.run.rescore import judged_anew, recorded_suite, reopen_tracks
+from phyblock.run.rescore import judged_anew, recorded_dataset, recorded_suite, reopen_tracks
 from phyblock.run.store import manifest_text, prompt_of, record_lines
 from phyblock.tracks import AnyTrack, EpisodeTrack, Item, kind_of
 from phyblock.tracks.base import kinds_with_physics
@@ -203,7 +202,7 @@ class _Prompts:
         """By condition and name, with items by key; None where the prompts are not known here."""
         self._known: dict[tuple[object, ...], tuple[object, ...]] = {}
         suite = recorded_suite(folder, manifest)
-        dataset = recorded_dataset(folder, manifest, suite.levels, None)
+        dataset = recorded_dataset(folder, manifest)
         for variant in dict.fromkeys(one.shown for one in suite.vary.variants):
             for name, was in manifest.variants.get(variant.key, manifest.tracks).items():
                 if name not in suite.tracks or was.get("prompt") is None:
@@ -270,7 +269,7 @@ def _localized(folder: Path, manifest: Manifest, data: Sequence[Path]) -> Manife
             moved = held.model_copy(update={"root": str(path)})
             here = manifest.model_copy(update={part: moved})
             with suppress(DataError, SpecError):
-                dataset = recorded_dataset(folder, here, suite.levels, None)
+                dataset = recorded_dataset(folder, here)
                 if part == "questions":
                     reopen_tracks(folder, here, suite, dataset)
                 manifest = here

@@ -44,9 +44,7 @@ suite = load_suite(folder / "soak.yaml", (), data_dir=bundled("benchmarks", "dat
 plan = make_plan(suite, load_models(folder / "models.yaml"))
 
 async def resume():
-    session = Session(plan, folder / "run", lambda event: None, use_cache=False)
-    async with session:
-        return await session.run()
+    return await Session(plan, folder / "run", lambda event: None, use_cache=False).run()
 
 result = asyncio.run(resume())
 assert not result.left, result

@@ -43,7 +43,7 @@ from phyblock.run.plan import (
     moved_remarks,
 )
 from phyblock.run.rescore import rescore
-from phyblock.run.runner import Cause, RunResult, Session, check_ready
+from phyblock.run.runner import RunResult, Session, check_ready
 from phyblock.run.store import held_run
 from phyblock.text import counted, one_line
 from phyblock.tracks import kind_of
@@ -152,10 +152,10 @@ def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressV
     console.print(f"{done}. Cost so far: {view.cost_text}{unanswered}.{cached}")
     cause = result.stop.cause if result.stop else None
     if result.left:
-        how = "raise limits.max_cost_usd and give" if cause is Cause.COST else "give"
+        how = "raise limits.max_cost_usd and give" if cause == "cost" else "give"
         console.print(f"To go on, {how} the same command again:")
         print_path(console, f"  {shlex.join(['phyblock', *sys.argv[1:]])}")
-    if cause is Cause.INTERRUPTED and result.left:
+    if cause == "interrupted" and result.left:
         return _INTERRUPTED
     return 1 if result.left or result.failed or result.unjudged else 0
 

@@ -148,13 +148,12 @@ def _print_reply(console: Console, reply: Reply, number: str) -> None:
 
 def _task(run: Path, record: Record, data: Path | None) -> AssemblyTask:
     """Return the scene with its candidates as it was shown; DataError where it is not at hand."""
-    from phyblock.records.manifest import MANIFEST, read_manifest, suite_of
-    from phyblock.run.plan import recorded_dataset
+    from phyblock.records.manifest import read_manifest
+    from phyblock.run.rescore import recorded_dataset
     from phyblock.tracks.items import as_recorded
 
     manifest = read_manifest(run)
-    levels = suite_of(manifest, str(run / MANIFEST)).levels
-    dataset = recorded_dataset(run, manifest, levels, data)
+    dataset = recorded_dataset(run, manifest, data)
     for task in dataset.tasks:
         if task.scene.id == record.scene:
             return as_recorded(task, record)

@@ -23,6 +23,7 @@ from phyblock.errors import (
 from phyblock.models import AskLaterError, HaltedError, Image, Message, Model, Request
 from phyblock.records.files import known_records
 from phyblock.records.record import (
+    ErrorKind,
     Extraction,
     Record,
     Reply,
@@ -91,39 +92,53 @@ def judged(
     fields: Mapping[str, Any],
     item: Item,
     judgement: Judgement | Episode,
-    more: Mapping[str, Any] | None = None,
+    asked: Sequence[Mapping[str, Any]] = (),
 ) -> Record:
     """Return the record with its outcome and what the track says and counts of it.
 
-    `fields` are those of a record that was begun, or of one that was judged before; `more` replaces
-    some of what the judgement says.
+    `fields` are those of a record that was begun, or of one that was judged before; `asked` are
+    those of the turns of an episode that the track does not know.
     """
     outcome = _outcome(fields["reply"], fields["error"], judgement.is_read)
-    told = {**fields, "outcome": outcome, **judgement.fields(), **(more or {})}
+    told = {**fields, "outcome": outcome, **judgement.fields()}
+    if "turns" in told:
+        told["turns"] = [{**one, **now} for one, now in zip(asked, told["turns"], strict=True)]
     if counts := count_sample(fields["track"], item, judgement):
         told["counts"] = {**fields.get("counts", {}), **counts}
     return known_records().validate_python(told)
 
 
-async def judged_apart(
+async def judge_reply(
     track: SingleTrack[Any],
     item: Item,
-    text: str | None,
     fields: Mapping[str, Any],
     earlier: Record | None = None,
 ) -> Record:
-    """Return the record of a reply, for the first time or again after an `earlier` one.
+    """Return the record of a sample that is asked once, judged by its reply or, where that cannot
+    be read, by what another model copied of it; for the first time or again after an `earlier` one.
 
-    Where no engine could carry the reply out, it says so and can be judged again.
+    Where no engine could carry the reply out, the record says so and can be judged again.
     """
-    try:
-        return judged(fields, item, await track.judge_apart(item, text, earlier))
-    except SimulationError as error:
-        if text is None:
-            raise
-        lacking = StoredError(kind="unjudged", message=str(error))
-        nothing = await track.judge_apart(item, None, None)
-        return judged({**fields, "error": lacking}, item, nothing)
+
+    async def by(text: str | None) -> Record:
+        try:
+            return judged(fields, item, await track.judge_apart(item, text, earlier))
+        except SimulationError as error:
+            if text is None:
+                raise
+            lacking = StoredError(kind="unjudged", message=str(error))
+            nothing = await track.judge_apart(item, None, None)
+            return judged({**fields, "error": lacking}, item, nothing)
+
+    reply, extraction = fields["reply"], fields.get("extraction")
+    record = await by(None if reply is None else reply.text)
+    if record.outcome != "parse_failure" or extraction is None:
+        return record
+    copied = extraction.reply.text
+    again = await by("" if copied.strip().strip(".").upper() == "NONE" else copied)
+    if again.outcome != "ok":
+        return record
+    return again.model_copy(update={"parse": again.parse.model_copy(update={"rule": RULE})})
 
 
 def _outcome(reply: Reply | None, error: StoredError | None, readable: bool) -> Outcome:
@@ -139,14 +154,13 @@ def _outcome(reply: Reply | None, error: StoredError | None, readable: bool) -> 
 
 
 def _error(error: ModelError) -> StoredError:
-    kind = "unavailable"
+    kind: ErrorKind = "unavailable"
     if isinstance(error, RetryableError):
         kind = "retryable"
     elif isinstance(error, SampleError):
         kind = "refused" if isinstance(error, RefusedError) else "sample"
     message, billed_usd = str(error), error.billed_usd
-    fields = {"kind": kind, "status": error.status, "message": message, "billed_usd": billed_usd}
-    return StoredError.model_validate(fields)
+    return StoredError(kind=kind, status=error.status, message=message, billed_usd=billed_usd)
 
 
 def pooled(replies: Sequence[Reply]) -> Reply:
@@ -211,21 +225,4 @@ class Extractor:
         if reply is None:
             return record
         extraction = Extraction(model=self._model.name, reply=reply.storable())
-        return await read_extraction(track, item, record, extraction)
-
-
-async def read_extraction(
-    track: SingleTrack[Any],
-    item: Item,
-    record: Record,
-    extraction: Extraction,
-    earlier: Record | None = None,
-) -> Record:
-    """Return the record of an unread reply, judged by an extraction where that can be read."""
-    given = {**record.as_given(), "extraction": extraction}
-    copied = extraction.reply.text
-    text = "" if copied.strip().strip(".").upper() == "NONE" else copied
-    again = await judged_apart(track, item, text, given, earlier)
-    if again.outcome != "ok":
-        return record.model_copy(update={"extraction": extraction})
-    return again.model_copy(update={"parse": again.parse.model_copy(update={"rule": RULE})})
+        return await judge_reply(track, item, {**record.as_given(), "extraction": extraction})

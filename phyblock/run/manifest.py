@@ -6,7 +6,7 @@ import contextlib
 import hashlib
 import json
 import platform
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -17,21 +17,21 @@ from phyblock.data import UNNUMBERED, Dataset, read_version
 from phyblock.parsing.text import READER_VERSION
 from phyblock.records.manifest import FORMAT, Manifest, ManifestModel
 from phyblock.run.judge import extraction_prompt
-from phyblock.sim.engine import ENGINES, PHYSICS_VARIABLE, REFERENCE_ENGINE, described_engine
+from phyblock.sim.engine import ENGINES, described_engine
 from phyblock.stable import hex_digest
 from phyblock.tracks import AnyTrack, kind_of
-from phyblock.tracks.base import CARRYING, ENGINE, kinds_with_physics
+from phyblock.tracks.base import kinds_with_physics
 
 _ENGINES = (engine.distribution for engine in ENGINES.values())
 _LIBRARIES = ("litellm", *_ENGINES, "numpy", "pillow", "jinja2")
 """Of the physics engines, one or both may be there."""
 _LABELS = ("published", "served_at", "size_b")
 _NOT_IDENTITY = {
-    *(f"suite.{name}" for name in ("name", "description", "limit", "limits", "models")),
-    *(f"suite.{name}" for name in ("baselines", "seeds", "dataset")),
-    "dataset.root",
+    *("dataset.root", "suite.name", "suite.description", "suite.limit", "suite.limits"),
+    *("suite.models", "suite.baselines", "suite.seeds", "suite.dataset"),
 }
 """Parts of a manifest that may change while the run stays the same, or that others repeat."""
+_LONGEST_SHOWN = 60
 
 
 def make_manifest(
@@ -79,7 +79,12 @@ def make_manifest(
         **inputs,
         "suite": suite.model_dump(mode="json"),
         "models": [
-            {**one, "published": m.published, "size_b": m.size_b, **_place(m)}
+            {
+                **one,
+                "published": m.published,
+                "size_b": m.size_b,
+                **({"served_at": m.addresses} if m.addresses else {}),
+            }
             for one, m in zip(decisive, models, strict=True)
         ],
         "dataset": {
@@ -111,12 +116,6 @@ def code_versions() -> dict[str, str]:
     return {"phyblock": version("phyblock"), "readers": str(READER_VERSION)}
 
 
-def _place(model: ModelConfig) -> dict[str, object]:
-    """Address of a model's server, which decides nothing."""
-    addresses = model.addresses
-    return {"served_at": addresses} if addresses else {}
-
-
 def _versions() -> dict[str, str]:
     found = {}
     for name in _LIBRARIES:
@@ -137,9 +136,9 @@ def _model(model: ModelConfig) -> dict[str, object]:
 
 
 def differences(found: Manifest, wanted: Manifest) -> list[str]:
-    """Return dotted names of what makes two manifests two runs; none where they are of one."""
+    """Return what makes two manifests two runs, by dotted names; none where they are of one."""
     asked = {model.name: _decisive(model) for model in (*found.models, *found.others)}
-    models = [
+    names = [
         f"models.{model.name}.{key}"
         for model in wanted.models
         for was, now in [(asked.get(model.name, {}), _decisive(model))]
@@ -147,41 +146,18 @@ def differences(found: Manifest, wanted: Manifest) -> list[str]:
         if was and now.get(key) != was.get(key)
     ]
     if found.identity == wanted.identity:
-        return models
-    old, new = dict(_parts(found)), dict(_parts(wanted))
-    gone = (name for name in old.keys() - new.keys() if name.partition(".")[0] in wanted.tracks)
-    names = [
-        name
-        for name in (*new, *sorted(gone))
-        # What an older version did not know of a suite, it did not do otherwise.
-        if name not in _NOT_IDENTITY
-        and (name in old or not name.startswith("suite."))
-        and old.get(name) != new.get(name)
-    ]
-    if {"suite.levels", "limit"} & set(names):
+        return names
+    old, new = _parts(found), _parts(wanted)
+    differ = [name for name in new | old if old.get(name) != new.get(name)]
+    if {"suite.levels", "limit"} & set(differ):
         # Other scenes of the same data have other digests, too.
-        names = [name for name in names if not name.endswith("sha256")]
-    return [*names, *models] or ["how phyblock asks, draws or reads"]
-
-
-def reasons(found: Manifest, wanted: Manifest) -> Iterator[str]:
-    """Yield the differences of manifests that a user wrote in the same words."""
-    made, now = (one.dataset.version if one.dataset else 1 for one in (found, wanted))
-    if made != now:
-        yield f"its data are version {made}, these version {now}"
-    tracks = [name for name in wanted.tracks if name in found.tracks]
-    differs = {
-        key: any(found.tracks[name].get(key) != wanted.tracks[name].get(key) for name in tracks)
-        for key in (ENGINE, CARRYING)
-    }
-    if differs[ENGINE]:
-        was, is_now = (one.engine or REFERENCE_ENGINE for one in (found, wanted))
-        yield f"its blocks are let go in {was}, here in {is_now} ({PHYSICS_VARIABLE} chooses)"
-    if differs[CARRYING]:
-        yield (
-            "this version carries plans out and measures what stands otherwise than the one "
-            "that made it, which phyblock score leaves as it was"
-        )
+        differ = [name for name in differ if not name.endswith("sha256")]
+    shown = {name: tuple(json.dumps(one.get(name)) for one in (old, new)) for name in differ}
+    names += [
+        f"{name} ({was}, now {now})" if len(was + now) < _LONGEST_SHOWN else name
+        for name, (was, now) in shown.items()
+    ]
+    return names or ["how phyblock asks, draws or reads"]
 
 
 def _decisive(model: ManifestModel) -> dict[str, Any]:
@@ -189,14 +165,13 @@ def _decisive(model: ManifestModel) -> dict[str, Any]:
     return {key: value for key, value in model.fields().items() if key not in _LABELS}
 
 
-def _parts(manifest: Manifest) -> Iterator[tuple[str, Any]]:
-    """Yield dotted names and values of what a run is made of, without digests of pictures."""
+def _parts(manifest: Manifest) -> dict[str, Any]:
+    """Return what a run is made of by dotted name, without digests of pictures."""
     fields = manifest.fields()
-    yield "limit", manifest.limit
-    for part, about in (
-        *((one, fields.get(one)) for one in ("suite", "dataset")),
-        *manifest.tracks.items(),
-    ):
-        yield from (
-            (f"{part}.{key}", one) for key, one in (about or {}).items() if key != "pictures"
-        )
+    parts = {"suite": fields["suite"], "dataset": fields.get("dataset") or {}, **manifest.tracks}
+    return {"limit": manifest.limit} | {
+        f"{part}.{key}": value
+        for part, about in parts.items()
+        for key, value in about.items()
+        if key != "pictures" and f"{part}.{key}" not in _NOT_IDENTITY
+    }

@@ -6,6 +6,7 @@ import asyncio
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -19,17 +20,18 @@ from phyblock.parsing.plan import reader_version
 from phyblock.records.files import run_records
 from phyblock.records.manifest import MANIFEST, Manifest, read_manifest, suite_of
 from phyblock.records.record import Record, StoredError
-from phyblock.run.judge import about_item, judged, judged_apart, read_extraction
+from phyblock.run.judge import about_item, judge_reply, judged
 from phyblock.run.manifest import asked_counts, code_versions
-from phyblock.run.plan import CHANGED, asked_about, recorded_dataset
+from phyblock.run.plan import open_dataset
 from phyblock.run.store import check_place, locked, write_run
 from phyblock.text import counted
 from phyblock.tracks import AnyTrack, EpisodeTrack, Item, kind_of, open_tracks
 from phyblock.tracks.base import CARRYING, ENGINE, Opening
+from phyblock.tracks.items import select_tasks
 from phyblock.types import Matcher, PlanParser
 
-__all__ = ["judged_anew", "recorded_suite", "reopen_tracks", "rescore"]
-
+_CHANGED = "is not the data set that the run was made on, or it was changed since"
+_MOVED = "name the folder where it is now with --data"
 _RESTORE = "restore the file from a copy"
 _NO_DATA = ("prompt", "pictures", "examples", CARRYING, ENGINE)
 """Parts of a track's identity that are not the data that it asks about."""
@@ -71,8 +73,7 @@ def rescore(
         if (target / MANIFEST).exists() and read_manifest(target).identity != changes["identity"]:
             hint = "choose another folder with --out"
             raise StoreError(Problem(str(target), "holds another run", hint=hint))
-    dataset = recorded_dataset(folder, manifest, suite.levels, data)
-    tracks = _by_condition(folder, manifest, suite, dataset)
+    tracks = _by_condition(folder, manifest, suite, recorded_dataset(folder, manifest, data))
     changes["versions"] = {**manifest.versions, **code_versions()}
     diverged: Counter[str] = Counter()
 
@@ -102,10 +103,9 @@ def judged_anew(folder: Path) -> tuple[Manifest, Iterator[Record]]:
     """
     manifest = read_manifest(folder)
     suite = recorded_suite(folder, manifest)
-    dataset = recorded_dataset(folder, manifest, suite.levels, None)
+    dataset = recorded_dataset(folder, manifest)
     tracks = _by_condition(folder, manifest, suite, dataset)
-    asked = asked_about(manifest, suite.levels, dataset)
-    changes = asked_counts(suite, asked, tracks[""].values())
+    changes = asked_counts(suite, _asked_about(manifest, dataset), tracks[""].values())
     records = (again for _, again in _judged(folder, manifest, tracks, strict=True))
     return manifest.model_copy(update=changes), records
 
@@ -132,6 +132,31 @@ def recorded_suite(
     return suite.model_copy(update={"scoring": scoring, "parser": parser or suite.parser})
 
 
+def recorded_dataset(folder: Path, manifest: Manifest, data: Path | None = None) -> Dataset:
+    """Return the whole data set of the run in `folder`, from `data` or from where the run found it.
+
+    Raises DataError where the manifest names none, or where what it was asked about is not what
+    is there.
+    """
+    recorded = manifest.dataset
+    if recorded is None:
+        raise DataError(Problem(str(folder / MANIFEST), "names no data set", "dataset"))
+    root = data or Path(recorded.root)
+    if not root.is_dir():
+        raise DataError(Problem(str(root), "the data set of the run is not there", hint=_MOVED))
+    dataset = open_dataset(recorded.format, root)
+    digest = _asked_about(manifest, dataset).sha256
+    if digest != recorded.sha256:
+        raise DataError(Problem(str(root), _CHANGED, "sha256", digest, recorded.sha256, _MOVED))
+    return dataset
+
+
+def _asked_about(manifest: Manifest, dataset: Dataset) -> Dataset:
+    """Return the part of a data set that a run asks about."""
+    tasks = select_tasks(dataset.tasks, suite_of(manifest, MANIFEST).levels, manifest.limit)
+    return replace(dataset, tasks=tasks)
+
+
 def reopen_tracks(
     folder: Path, manifest: Manifest, suite: Suite, dataset: Dataset, *, with_prompts: bool = False
 ) -> tuple[AnyTrack, ...]:
@@ -153,7 +178,7 @@ def reopen_tracks(
             if key not in _NO_DATA and value not in (None, stored.get(key)):
                 root, field = folders.get(track.name, dataset.root), f"tracks.{track.name}.{key}"
                 was = str(stored.get(key))
-                raise DataError(Problem(str(root), CHANGED, field, str(value), was))
+                raise DataError(Problem(str(root), _CHANGED, field, str(value), was))
     return tracks
 
 
@@ -214,15 +239,10 @@ async def _judged_again(
         # Nothing is let go again: what fell stands in the record, and so does what let it fall.
         given["engine"] = record.as_given()["engine"]
     if not isinstance(track, EpisodeTrack):
-        earlier: Record | None = record
-        if not record.is_judged:
-            # No plan was carried out of which it could tell.
-            given["error"] = earlier = None
-        text = None if record.reply is None else record.reply.text
-        again = await judged_apart(track, item, text, given, earlier)
-        if again.outcome != "parse_failure" or record.extraction is None:
-            return again
-        return await read_extraction(track, item, again, record.extraction, earlier)
+        if record.is_judged:
+            return await judge_reply(track, item, given, record)
+        # No plan was carried out of which the record could tell.
+        return await judge_reply(track, item, {**given, "error": None})
     episode, asked = track.again(item, record), record.asked_turns
     for turn in asked:
         request = await episode.request()
@@ -231,12 +251,10 @@ async def _judged_again(
         episode.take(request, turn.reply)
     # What the last reply comes to shows when the next is asked for: blocks are let go.
     goes_on = await episode.request() is not None
-    went = episode.fields()["turns"]
-    pairs = list(zip(asked, went, strict=False))
-    same = sum(1 for _ in takewhile(lambda pair: _led_on(*pair), pairs))
+    turns, now = [turn.fields() for turn in asked], episode.fields()["turns"]
+    same = sum(1 for _ in takewhile(lambda pair: _led_on(*pair), zip(turns, now, strict=False)))
     if same == len(asked) and not (goes_on and record.error is None):
-        turns = [{**was.fields(), **now} for was, now in pairs]
-        return judged(given, item, episode, {"turns": turns})
+        return judged(given, item, episode, turns)
     if strict:
         message = "goes otherwise than it did, in another version"
         hint = "the version of phyblock that made the run plays it as it went"
@@ -246,10 +264,9 @@ async def _judged_again(
     return record.model_copy(update={"error": error, "outcome": "api_error"})
 
 
-def _led_on(was: Any, now: Mapping[str, Any]) -> bool:
+def _led_on(was: Mapping[str, Any], now: Mapping[str, Any]) -> bool:
     """True if a stored turn came to what it comes to now, by whichever rule it was read."""
-    stored = was.fields()
-    return all(_plain(stored.get(name)) == _plain(value) for name, value in now.items())
+    return all(_plain(was.get(name)) == _plain(value) for name, value in now.items())
 
 
 def _plain(value: object) -> object:

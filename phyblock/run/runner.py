@@ -1,4 +1,4 @@
-"""A run from its open folder to its last record: request, model, judgement, record on disk.
+"""A run from its folder to its last record: request, model, judgement, record on disk.
 
 A session emits events and prints nothing. It stops cleanly: nothing more is sent, calls that are
 under way are waited for, because they are paid for. What was answered is written whatever ends it,
@@ -10,13 +10,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections import deque
-from collections.abc import Coroutine, Iterator, Mapping
+from collections.abc import Coroutine, Mapping
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, field, replace
-from enum import Enum, auto
 from functools import partial
 from pathlib import Path
-from types import TracebackType
 from typing import Any, TypeVar
 
 from phyblock.config.models import ModelConfig
@@ -40,10 +38,11 @@ from phyblock.models import (
     RetryPolicy,
     api_key_status,
     build_model,
+    reply_key,
     under_way,
 )
 from phyblock.records.files import BATCHES
-from phyblock.records.record import Record, Reply, SentPrompt
+from phyblock.records.record import Record, Reply
 from phyblock.resources import reply_cache_file
 from phyblock.run.events import (
     ModelStopped,
@@ -54,30 +53,12 @@ from phyblock.run.events import (
     Summary,
     Watcher,
 )
-from phyblock.run.judge import Extractor, about_prompt, begun, judged, judged_apart, pooled
+from phyblock.run.judge import Extractor, about_prompt, begun, judge_reply, judged, pooled
 from phyblock.run.plan import RunPlan, Sample, provider_problem
-from phyblock.run.store import CallJournal, Journaled, RecordWriter, RunStore
-from phyblock.tracks import AnyTrack, EpisodeTrack
-from phyblock.types import AskedAs
+from phyblock.run.store import RunStore
+from phyblock.tracks import EpisodeTrack
 
 _Result = TypeVar("_Result")
-
-
-class Cause(Enum):
-    """The kinds of causes that end a run before all is asked."""
-
-    INTERRUPTED = auto()
-    COST = auto()
-    """The cost limit is reached."""
-    ERROR = auto()
-
-
-@dataclass(frozen=True)
-class Stop:
-    """The reason why a run stopped before all was asked: its kind, and the words for a person."""
-
-    cause: Cause
-    reason: str
 
 
 @dataclass
@@ -92,13 +73,19 @@ class RunResult:
     failed: int = 0
     unjudged: int = 0
     stopped: dict[str, str] = field(default_factory=dict)
-    stop: Stop | None = None
+    stop: Stopping | None = None
     unanswered: str = ""
 
     @property
     def left(self) -> int:
         """Samples that have no final record."""
         return self.samples - self.settled
+
+    def add(self, sample: Record | Summary) -> None:
+        """Count a sample by its record."""
+        self.settled += sample.is_final
+        self.failed += sample.is_final and not sample.is_answered
+        self.unjudged += not sample.is_judged
 
 
 def check_ready(plan: RunPlan) -> None:
@@ -120,11 +107,10 @@ def check_ready(plan: RunPlan) -> None:
 
 
 class Session:
-    """Runs one plan in one folder: an async context manager that holds cache, limits, models and
-    store, closed whatever happens.
+    """Runs one plan in one folder, once.
 
-    It asks every model about every sample that has no final record yet; `settled` sums up those
-    that had one from the start, by sample.
+    It asks every model about every sample that has no final record yet. `interrupt` may be called
+    at any time, before `run` too.
     """
 
     def __init__(
@@ -138,58 +124,82 @@ class Session:
         present: Mapping[str, Model] | None = None,
     ) -> None:
         """`retry_failed` asks again also where a request was rejected for good; `present` are
-        models that are there already, by name; others are built.
+        models that answer here, by name; others are built.
         """
         self._plan = plan
         self._folder = folder
         self._watch = watch
         self._use_cache = use_cache
         self._retry_failed = retry_failed
-        self._models = dict(present or {})
-        self._cancellation = Cancellation()
+        self._present = present or {}
+        self._models: dict[str, Model] = {}
         self._extractor: Extractor | None = None
+        self._waiting: set[asyncio.Task[Any]] = set()
         self._is_over = False
         self._failure: Exception | None = None
-        self.settled: Mapping[str, Summary] = {}
         self.result = RunResult(plan.samples_per_model * len(plan.models))
 
-    async def __aenter__(self) -> Session:
-        plan = self._plan
+    @property
+    def stopping(self) -> bool:
+        """True if no new sample is started."""
+        return self.result.stop is not None
+
+    def interrupt(self) -> None:
+        """Send nothing more; safe to call from a signal handler in the loop's thread."""
+        self._stop(Stopping("interrupted", "interrupted"))
+
+    async def run(self) -> RunResult:
+        """Open the folder, ask what earlier records have not settled, and close it.
+
+        Raises what the folder or the models meet, and the first error that a sample met and that is
+        neither its own nor its model's, once calls under way have ended. Where this is cancelled,
+        they are given up.
+        """
         async with AsyncExitStack() as stack:
-            stack.callback(plan.close)
-            samples = plan.sample_ids()
-            self._store = store = stack.enter_context(
-                RunStore(self._folder, plan.manifest, samples)
-            )
-            known = store.standing.samples
-            self.settled = {
-                sample: summary
-                for sample, summary in known.items()
-                if sample in samples
-                if (summary.is_answered if self._retry_failed else summary.is_final)
-            }
-            self.result.failed = sum(not one.is_answered for one in self.settled.values())
-            self.result.unjudged = sum(not one.is_judged for one in self.settled.values())
-            self.result.unanswered = store.standing.unanswered_text
-            self._records = RecordWriter(store.records)
-            await self._open_models(stack, store)
-            self._open = stack.pop_all()
-        return self
+            queues = self._open(stack)
+            # An interrupt that came meanwhile is heard before anything is asked.
+            await asyncio.sleep(0)
+            try:
+                await self._ask_all(queues)
+            except BaseException:
+                # Where the disk is full, what ended the run comes first.
+                with contextlib.suppress(StoreError):
+                    self._note_stopped()
+                raise
+            self._note_stopped()
+        return self.result
 
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        await self._open.aclose()
+    def _open(self, stack: AsyncExitStack) -> dict[str, deque[Sample]]:
+        """Open store, cache and models until the stack is closed, and tell how far the run is;
+        return what is left to ask of each model.
+        """
+        plan, result = self._plan, self.result
+        stack.callback(plan.close)
+        store = RunStore(self._folder, plan.manifest, plan.sample_ids())
+        self._store = stack.enter_context(store)
+        self._open_models(stack)
+        queues: dict[str, deque[Sample]] = {model.name: deque() for model in plan.models}
+        earlier: dict[str, list[Summary]] = {name: [] for name in queues}
+        for name, queue in queues.items():
+            for sample in plan.samples(name):
+                known = store.progress.samples.get(sample.id)
+                if known and (known.is_answered if self._retry_failed else known.is_final):
+                    earlier[name].append(known)
+                    result.add(known)
+                else:
+                    queue.append(sample)
+        result.unanswered = store.progress.unanswered_text
+        self._watch(RunStarted(dict.fromkeys(earlier, plan.samples_per_model), earlier))
+        if result.unanswered:
+            self._watch(RunNotice(result.unanswered))
+        return queues
 
-    async def _open_models(self, stack: AsyncExitStack, store: RunStore) -> None:
+    def _open_models(self, stack: AsyncExitStack) -> None:
         """Build the models that are not present; SpecError for one with a batch under way that is
         asked singly now.
         """
-        plan, standing, limits = self._plan, store.standing, self._plan.suite.limits
-        waiting = under_way(standing.batches)
+        plan, store, limits = self._plan, self._store, self._plan.suite.limits
+        waiting = under_way(store.progress.batches)
         message = "has a batch under way, whose questions would be asked twice"
         hint = f"let it end with batch: true, or remove its lines from {BATCHES} to give it up"
         if problems := [
@@ -207,80 +217,42 @@ class Session:
         if self._use_cache and (asks or plan.extractor):
             cache = ReplyCache(reply_cache_file(), tell)
             stack.callback(cache.close)
-        writer = RecordWriter(store.batches)
-        stack.push_async_callback(writer.drain)
-        batches = BatchFiles(tuple(standing.batches), writer.put, self._folder, limits.batch_poll_s)
-        calls = RecordWriter(store.calls)
-        stack.push_async_callback(calls.drain)
-        journal = CallJournal(calls, plan.manifest.run, standing)
+        for file in (store.batches, store.calls):
+            stack.push_async_callback(file.drain)
+        earlier = tuple(store.progress.batches)
+        batches = BatchFiles(earlier, store.batches.put, self._folder, limits.batch_poll_s)
+        attempts = limits.max_attempts, limits.retry_for_s, limits.max_connection_failures
         build = partial(
             build_model,
             cache=cache,
             overall=asyncio.Semaphore(limits.max_concurrency),
-            budget=Budget(limits.max_cost_usd, standing.limit_usd),
-            journal=journal,
+            budget=Budget(limits.max_cost_usd, store.progress.limit_usd),
+            journal=store,
             observer=self._watch,
             tell=tell,
-            policy=RetryPolicy(
-                limits.max_attempts, limits.retry_for_s, limits.max_connection_failures
-            ),
+            policy=RetryPolicy(*attempts),
         )
         for planned in plan.models:
-            present = self._models.get(planned.name)
-            self._models[planned.name] = (
-                build(planned, batches=batches if planned.batch else None)
-                if present is None
-                else Journaled(present, planned, journal)
-            )
-            stack.push_async_callback(self._models[planned.name].aclose)
+            if (present := self._present.get(planned.name)) is not None:
+                model: Model = _Journaled(present, planned, store)
+            else:
+                model = build(planned, batches=batches if planned.batch else None)
+            self._models[planned.name] = model
+            stack.push_async_callback(model.aclose)
         if plan.extractor is not None:
             extracting = build(plan.extractor)
             stack.push_async_callback(extracting.aclose)
             self._extractor = Extractor(extracting, plan.extractor)
 
-    @property
-    def stopping(self) -> bool:
-        """True if no new sample is started."""
-        return self.result.stop is not None
-
-    def interrupt(self) -> None:
-        """Send nothing more; safe to call from a signal handler in the loop's thread."""
-        self._stop(Stop(Cause.INTERRUPTED, "interrupted"))
-
-    async def run(self) -> RunResult:
-        """Ask what earlier records have not settled.
-
-        Raises the first error that a sample met and that is neither its own nor its model's, once
-        calls under way have ended. Where this is cancelled, they are given up.
-        """
-        names = [model.name for model in self._plan.models]
-        settled = self.settled.values()
-        earlier = {name: tuple(one for one in settled if one.model == name) for name in names}
-        self._watch(RunStarted(dict.fromkeys(names, self._plan.samples_per_model), earlier))
-        if self.result.unanswered:
-            self._watch(RunNotice(self.result.unanswered))
-        try:
-            await self._run()
-        except BaseException:
-            # Where the disk is full, what ended the run comes first.
-            with contextlib.suppress(StoreError):
-                self._note_stopped(names)
-            raise
-        self._note_stopped(names)
-        return self.result
-
-    def _note_stopped(self, names: list[str]) -> None:
+    def _note_stopped(self) -> None:
         result = self.result
         reason = result.stop.reason if result.stop and result.left else ""
-        self._store.note_stopped(result.stopped, reason, names)
+        self._store.note_stopped(result.stopped, reason, list(self._models))
 
-    async def _run(self) -> None:
+    async def _ask_all(self, queues: Mapping[str, deque[Sample]]) -> None:
         workers: list[asyncio.Task[None]] = []
         for planned in self._plan.models:
-            samples = self._plan.samples(planned.name)
-            queue = deque(sample for sample in samples if sample.id not in self.settled)
-            self.result.settled += self._plan.samples_per_model - len(queue)
-            model = self._models[planned.name]
+            queue, model = queues[planned.name], self._models[planned.name]
             if isinstance(model, GatheringModel):
                 workers.append(asyncio.create_task(self._in_rounds(planned, model, queue)))
             else:
@@ -307,7 +279,7 @@ class Session:
                 worker.cancel()
             await asyncio.sleep(0)
         await asyncio.gather(*workers, return_exceptions=True)
-        await self._records.drain()
+        await self._store.records.drain()
 
     async def _work(
         self, planned: ModelConfig, queue: deque[Sample], later: deque[Sample] | None = None
@@ -326,14 +298,12 @@ class Session:
         self, planned: ModelConfig, model: GatheringModel, queue: deque[Sample]
     ) -> None:
         """Ask a model that sends many requests together."""
-        width = planned.max_concurrency
         while queue and self._goes_on(planned):
             taken: deque[Sample] = deque()
             later: deque[Sample] = deque()
             await self._guarded(planned, self._gather(planned, model, queue, taken))
-            await asyncio.gather(
-                *(self._work(planned, taken, later) for _ in range(min(width, len(taken))))
-            )
+            width = min(planned.max_concurrency, len(taken))
+            await asyncio.gather(*(self._work(planned, taken, later) for _ in range(width)))
             queue.extendleft(reversed(later))
 
     async def _gather(
@@ -344,8 +314,7 @@ class Session:
         taken: deque[Sample],
     ) -> None:
         """Have a round's requests sent; those that belong to it are `taken` from the queue."""
-        with self._cancellation.scope():
-            await model.begin()
+        await self._until_stopped(model.begin())
         left: deque[Sample] = deque()
         is_full = False
 
@@ -354,9 +323,8 @@ class Session:
             while queue and not is_full and self._goes_on(planned):
                 sample = queue.popleft()
                 request = await self._request(sample.shown(), planned, with_messages=True)
-                with self._cancellation.scope():
-                    known = sample.id in self._store.standing.samples
-                    is_taken = await model.gather(request, anew=known)
+                known = sample.id in self._store.progress.samples
+                is_taken = await self._until_stopped(model.gather(request, anew=known))
                 is_full = is_full or not is_taken
                 (taken if is_taken else left).append(sample)
 
@@ -384,7 +352,7 @@ class Session:
                 self.result.stopped[planned.name] = str(error)
                 self._watch(ModelStopped(planned.name, str(error)))
         except BudgetReachedError as error:
-            self._stop(Stop(Cause.COST, str(error)))
+            self._stop(Stopping("cost", str(error)))
         except HaltedError:
             return
         except AskLaterError:
@@ -392,14 +360,34 @@ class Session:
         except Exception as error:
             # A mistake of our own is no reason to lose what others have paid for.
             self._failure = self._failure or error
-            self._stop(Stop(Cause.ERROR, "an error that the run cannot go on with"))
+            self._stop(Stopping("error", "an error that the run cannot go on with"))
 
-    def _stop(self, stop: Stop) -> None:
+    def _stop(self, stop: Stopping) -> None:
         if self.result.stop is None:
-            self.result.stop = stop
             calls = sum(getattr(model, "under_way", 0) for model in self._models.values())
-            self._cancellation.set()
-            self._watch(Stopping(stop.reason, calls))
+            self.result.stop = stop = replace(stop, in_flight=calls)
+            for task in self._waiting:
+                task.cancel()
+            self._watch(stop)
+
+    async def _until_stopped(self, work: Coroutine[Any, Any, _Result]) -> _Result:
+        """Return what work gives, which is cancelled once the run stops; then HaltedError is raised
+        unless it comes to its end all the same, as a request that is under way does.
+        """
+        task, message = asyncio.current_task(), "the run was ended before this request was sent"
+        assert task is not None
+        if self.stopping:
+            work.close()
+            raise HaltedError(message)
+        self._waiting.add(task)
+        try:
+            return await work
+        except asyncio.CancelledError:
+            if self.stopping:
+                raise HaltedError(message) from None
+            raise
+        finally:
+            self._waiting.discard(task)
 
     async def _one(self, sample: Sample, config: ModelConfig) -> None:
         """Ask one sample, judge what came, and wait until its record is on disk."""
@@ -408,18 +396,15 @@ class Session:
             record = await self._play(sample, model, config)
         else:
             record = await self._ask(sample, model, config)
-        await self._records.put(record)
-        self.result.settled += record.is_final
-        self.result.failed += record.is_final and not record.is_answered
-        self.result.unjudged += not record.is_judged
+        await self._store.records.put(record)
+        self.result.add(record)
         self._watch(SampleDone(record))
 
     async def _ask(self, sample: Sample, model: Model, config: ModelConfig) -> Record:
         request = await self._request(sample, config, with_messages=model.needs_messages)
         answer = await self._answer(model, request)
-        fields = self._fields(sample, answer) | _asked(config, request)
-        fields["prompt"] = self._prompt(sample.track, request)
-        record, is_cancelled = await to_its_end(self._judged(sample, answer, fields))
+        fields = self._fields(sample, answer, request, config)
+        record, is_cancelled = await to_its_end(self._judged(sample, fields))
         task = asyncio.current_task()
         if is_cancelled and task is not None:
             # It ends at its next wait, which is that for its record.
@@ -432,116 +417,90 @@ class Session:
         """Return the request of a sample that is asked once."""
         track, item = sample.track, sample.item
         assert not isinstance(track, EpisodeTrack), "an episode has many requests"
-        with self._cancellation.scope():
-            request = await track.request(
-                item, sample.seed, config.params, with_messages=with_messages
-            )
-        return sample.asking(replace(request, track=track.name))
+        made = track.request(item, sample.seed, config.params, with_messages=with_messages)
+        return sample.asking(replace(await self._until_stopped(made), track=track.name))
 
-    async def _judged(
-        self, sample: Sample, answer: Reply | ModelError | None, fields: Mapping[str, Any]
-    ) -> Record:
+    async def _judged(self, sample: Sample, fields: Mapping[str, Any]) -> Record:
         track, item = sample.track, sample.item
         assert not isinstance(track, EpisodeTrack)
-        text = answer.text if isinstance(answer, Reply) else None
-        record = await judged_apart(track, item, text, fields)
-        if self._extractor is not None:
-            record = await self._extractor.read(track, item, record)
-        return record
+        record = await judge_reply(track, item, fields)
+        return await self._extractor.read(track, item, record) if self._extractor else record
 
     async def _play(self, sample: Sample, model: Model, config: ModelConfig) -> Record:
         track, item = sample.track, sample.item
         assert isinstance(track, EpisodeTrack)
         episode = track.start(item, sample.seed, config.params, with_messages=model.needs_messages)
-        asked: dict[str, AskedAs] = {}
         turns: list[dict[str, Any]] = []
-        failed: ModelError | None = None
-        while True:
-            with self._cancellation.scope():
-                wanted = await episode.request()
-            if wanted is None:
-                break
+        fields = self._fields(sample, None, None, config)
+        while (wanted := await self._until_stopped(episode.request())) is not None:
             request = sample.asking(wanted)
-            asked = _asked(config, request)
-            prompt = self._prompt(track, request)
             answer = await self._answer(model, request)
+            fields = self._fields(sample, answer, request, config)
             if not isinstance(answer, Reply):
-                failed = answer
                 break
             reply = answer.storable()
-            turns.append({"n": len(turns) + 1, "reply": reply, "prompt": prompt})
+            turns.append({"n": len(turns) + 1, "reply": reply, "prompt": fields["prompt"]})
             episode.take(request, reply)
-        fields = self._fields(sample, failed) | asked
         if turns:
-            fields["reply"] = pooled([turn["reply"] for turn in turns]).storable()
-            fields["prompt"] = turns[0]["prompt"]
-        both = zip(turns, episode.fields()["turns"], strict=True)
-        return judged(fields, item, episode, {"turns": [{**one, **more} for one, more in both]})
+            whole = pooled([turn["reply"] for turn in turns]).storable()
+            fields |= {"reply": whole, "prompt": turns[0]["prompt"]}
+        return judged(fields, item, episode, turns)
 
     async def _answer(self, model: Model, request: Request) -> Reply | ModelError | None:
         """Return the reply, or the error that is this sample's alone."""
         try:
-            with self._cancellation.scope():
-                return await model.ask(request)
+            return await self._until_stopped(model.ask(request))
         except (UnavailableError, BudgetReachedError):
             raise
         except ModelError as error:
             return error
 
-    def _prompt(self, track: AnyTrack, request: Request) -> SentPrompt | None:
-        if not request.messages:
-            return None
-        digest = self._store.prompts.keep(request.messages)
-        return about_prompt(request, track.prompt_name, digest)
-
-    def _fields(self, sample: Sample, answer: Reply | ModelError | None) -> dict[str, Any]:
-        item = sample.item
-        fields = begun(sample.id, sample.track.name, sample.model, item, sample.seed, answer)
+    def _fields(
+        self,
+        sample: Sample,
+        answer: Reply | ModelError | None,
+        request: Request | None,
+        config: ModelConfig,
+    ) -> dict[str, Any]:
+        """Return the fields of a record before it is judged."""
+        track, item = sample.track, sample.item
+        fields = begun(sample.id, track.name, sample.model, item, sample.seed, answer)
+        fields |= {"run": self._plan.manifest.run, **track.about(item)}
         if sample.variant.levels:
             fields["variant"] = dict(sample.variant.levels)
-        return {**fields, "run": self._plan.manifest.run, **sample.track.about(item)}
+        if request is not None and request.messages:
+            digest = self._store.keep_prompt(request.messages)
+            fields["prompt"] = about_prompt(request, track.prompt_name, digest)
+        if request is not None and request.response_format and config.kind == "litellm":
+            fields["asked"] = "response_format" if config.sends_format else "prompt"
+        return fields
 
 
-def _asked(config: ModelConfig, request: Request) -> dict[str, AskedAs]:
-    """Return how a record says that JSON was asked for; nothing where it was asked of nobody."""
-    if request.response_format is None or config.kind != "litellm":
-        return {}
-    return {"asked": "response_format" if config.sends_format else "prompt"}
+class _Journaled:
+    """A model that answers here and cannot be asked again: its answers are written as they come."""
 
+    needs_messages = True
 
-class Cancellation:
-    """A switch that all calls of a run share; asyncio, one loop."""
+    def __init__(self, model: Model, config: ModelConfig, journal: RunStore) -> None:
+        self.name = model.name
+        self._model = model
+        self._config = config
+        self._journal = journal
 
-    def __init__(self) -> None:
-        self._is_set = False
-        self._inside: set[asyncio.Task[Any]] = set()
+    async def ask(self, request: Request) -> Reply | None:
+        """Return the answer of the model, or that which it gave to an earlier command."""
+        key = reply_key(self._config, request)
+        if (kept := self._journal.kept(key)) is not None:
+            return kept
+        reply = await self._model.ask(request)
+        if reply is not None:
+            call = await self._journal.sent(self.name, request.sample, key, 0.0)
+            await self._journal.ended(call, 0.0, reply)
+        return reply
 
-    def set(self) -> None:
-        """Cancel what is inside a `scope`, and whatever enters one later."""
-        self._is_set = True
-        for task in self._inside:
-            task.cancel()
-
-    @contextlib.contextmanager
-    def scope(self) -> Iterator[None]:
-        """Raise HaltedError before or out of what is inside, once the switch is set.
-
-        What comes to its end all the same, as a request that is under way, is kept.
-        """
-        task = asyncio.current_task()
-        assert task is not None
-        message = "the run was ended before this request was sent"
-        if self._is_set:
-            raise HaltedError(message)
-        self._inside.add(task)
-        try:
-            yield
-        except asyncio.CancelledError:
-            if self._is_set:
-                raise HaltedError(message) from None
-            raise
-        finally:
-            self._inside.discard(task)
+    async def aclose(self) -> None:
+        """Release what the model holds."""
+        await self._model.aclose()
 
 
 async def to_its_end(work: Coroutine[Any, Any, _Result]) -> tuple[_Result, bool]:

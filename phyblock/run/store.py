@@ -14,18 +14,18 @@ import json
 import os
 import re
 import threading
+from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass, field
 from io import FileIO
 from pathlib import Path
 from typing import Any, TypeVar
 
-from phyblock.config.models import ModelConfig
 from phyblock.config.yaml import dump_yaml
 from phyblock.errors import Problem, StoreError
 from phyblock.files import LIST, OutFolder, append_whole, atomic_write, sync_folder, writing
-from phyblock.models.cache import reply_key
-from phyblock.models.request import Image, Message, Model, Request
+from phyblock.models.request import Image, Message
 from phyblock.records.files import (
     BATCHES,
     CALLS,
@@ -43,21 +43,181 @@ from phyblock.records.files import (
 )
 from phyblock.records.line import Line, encodable
 from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
-from phyblock.records.record import Call, PictureMark, Prompt, PromptMessage, Record, Reply, Stopped
-from phyblock.run.events import Standing
-from phyblock.run.manifest import code_versions, differences, reasons
+from phyblock.records.record import (
+    BatchLine,
+    Call,
+    PictureMark,
+    Prompt,
+    PromptMessage,
+    Record,
+    Reply,
+    Stopped,
+)
+from phyblock.run.events import Summary
+from phyblock.run.manifest import code_versions, differences
 from phyblock.stable import hex_digest
+from phyblock.text import counted
 
 LineT = TypeVar("LineT", bound=Line)
 
-_HINT = "choose another folder with --out"
+_OTHER_FOLDER = "choose another folder with --out"
+_APPENDING = "free some space and give the same command again: it goes on from here"
+
+
+class AppendFile:
+    """Lines that are on disk when `append` or `put` returns; safe to call from several threads.
+
+    The file is made with the first line.
+    """
+
+    def __init__(self, path: Path, *, sync: bool = True) -> None:
+        """Without `sync` lines survive the death of the process, not that of the machine."""
+        self._path = path
+        self._sync = sync
+        self._writing = threading.Lock()
+        self._file: FileIO | None = None
+        self._size_bytes = 0
+        self._waiting: list[tuple[Line, asyncio.Future[None]]] = []
+        self._flusher: asyncio.Task[None] | None = None
+
+    def append(self, lines: Iterable[Mapping[str, Any]]) -> None:
+        """Write objects, a line each, and wait until they are on disk.
+
+        Raises StoreError when the disk refuses, or when somebody else removed, replaced or changed
+        the file meanwhile; what was written before stays whole.
+        """
+        data = "".join(f"{_json_line(line)}\n" for line in lines).encode("utf-8", "replace")
+        with self._writing, writing(self._path, _APPENDING):
+            if self._file is None:
+                # Unbuffered: a write that failed must not be tried again behind our back.
+                self._file = FileIO(self._path, "a")
+                self._size_bytes = os.fstat(self._file.fileno()).st_size
+                if self._sync:
+                    sync_folder(self._path.parent)
+            self._check(self._file.fileno())
+            append_whole(self._file.fileno(), data, sync=self._sync)
+            self._size_bytes += len(data)
+
+    async def put(self, line: Line) -> None:
+        """Append a line off the event loop, together with others that wait, until it is on disk.
+
+        Raises StoreError as `append`.
+        """
+        written: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._waiting.append((line, written))
+        if self._flusher is None:
+            self._flusher = asyncio.create_task(self._flush())
+        await written
+
+    async def drain(self) -> None:
+        """Wait until everything that was put is on disk or refused."""
+        if self._flusher is not None:
+            await self._flusher
+
+    def check(self) -> None:
+        """Raise StoreError unless the file that was written is the one at its path, and whole."""
+        with self._writing:
+            if self._file is not None:
+                self._check(self._file.fileno())
+
+    def close(self) -> None:
+        """Close the file, once what is being written is written."""
+        with self._writing:
+            if self._file is not None:
+                self._file.close()
+                self._file = None
+
+    async def _flush(self) -> None:
+        while self._waiting:
+            batch, self._waiting = self._waiting, []
+            failure: Exception | None = None
+            try:
+                await asyncio.to_thread(self.append, [line.fields() for line, _ in batch])
+            except Exception as error:
+                # Whatever it is, those who wait must hear of it, or they wait for ever.
+                failure = error
+            # A waiter that was cancelled has a future that is already done.
+            for written in (future for _, future in batch if not future.done()):
+                if failure is None:
+                    written.set_result(None)
+                else:
+                    written.set_exception(failure)
+        self._flusher = None
+
+    def _check(self, number: int) -> None:
+        opened = os.fstat(number)
+        try:
+            is_same = os.path.samestat(opened, os.stat(self._path))
+        except FileNotFoundError:
+            is_same = False
+        if not is_same or opened.st_size != self._size_bytes:
+            message = "was removed, replaced or changed while the run was writing it"
+            hint = f"restore it from a copy; replies that have arrived are in {CALLS}"
+            raise StoreError(Problem(str(self._path), message, hint=hint))
+
+
+@dataclass
+class Progress:
+    """The newest record of every sample that counts, summed up, and what the run cost so far.
+
+    `batches` are all lines about batches, oldest first; `calls` is how many calls were made,
+    `replies` are those that no final record holds, by key, and `unanswered` the calls whose end is
+    not known, by number: each may have been billed.
+    """
+
+    samples: dict[str, Summary] = field(default_factory=dict)
+    batches: list[BatchLine] = field(default_factory=list)
+    calls: int = 0
+    replies: dict[str, Reply] = field(default_factory=dict)
+    unanswered: dict[int, Call] = field(default_factory=dict)
+    _calls_usd: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+    _records_usd: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+
+    def add(self, record: Record) -> None:
+        """Take in a record as it was read, oldest first."""
+        self.samples[record.sample] = Summary.of(record)
+        self._records_usd[record.sample] += record.limit_usd
+
+    def add_call(self, call: Call) -> None:
+        """Take in a line about a call, oldest first, when all records are."""
+        self.calls = max(self.calls, call.call + 1)
+        # The cost of a sample that went out alone is counted here, of one in a batch by its record.
+        self._records_usd.pop(call.sample, None)
+        if not call.ended:
+            self.unanswered[call.call] = call
+            return
+        self.unanswered.pop(call.call, None)
+        self._calls_usd[call.model] += call.billed_usd or 0.0
+        sample = self.samples.get(call.sample)
+        if call.reply is not None and not (sample and sample.is_final):
+            self.replies[call.key] = call.reply
+
+    @property
+    def limit_usd(self) -> dict[str, float]:
+        """Return the cost that a limit counts, by model [US dollars]: unknown ends in full."""
+        usd = self._calls_usd.copy()
+        for call in self.unanswered.values():
+            usd[call.model] += call.most_usd or 0.0
+        for sample, cost_usd in self._records_usd.items():
+            usd[self.samples[sample].model] += cost_usd
+        return usd
+
+    @property
+    def unanswered_text(self) -> str:
+        """Return a sentence on calls whose end is not known, or ""."""
+        if not self.unanswered:
+            return ""
+        usd = [call.most_usd for call in self.unanswered.values()]
+        known = [cost for cost in usd if cost is not None]
+        most = f" (${sum(known):,.4f} at most)" if len(known) == len(usd) else ""
+        return f"{counted(len(usd), 'call')} may have been billed without a reply{most}"
 
 
 class RunStore:
-    """A run folder opened for writing; one process at a time.
+    """A run folder opened for writing, and the journal of the run's calls; one process at a time.
 
-    `records`, `calls` and `batches` are synced line by line; `prompts` hold what could be made
-    again. `standing` is how far the run was when it was opened.
+    `records` and `batches` are synced line by line. `progress` is how far the run was when the
+    folder was opened; a reply in it that no record holds is not asked for again.
     """
 
     def __init__(self, folder: Path, manifest: Manifest, samples: Collection[str]) -> None:
@@ -66,27 +226,24 @@ class RunStore:
         `samples` are the ids of the run's samples. Raises StoreError when the folder cannot be
         written, holds records of another run, or is being written by another process.
         """
-        self.standing = Standing()
+        self.progress = Progress()
         self._folder = folder
-        self._validation = Validation(manifest, samples)
-        self._lock = ExitStack()
-        self._files: list[AppendFile] = []
+        self._run = manifest.run
+        self._prompts_known: set[str] = set()
+        self._open = ExitStack()
         try:
-            with writing(folder, _HINT):
+            with writing(folder, _OTHER_FOLDER):
                 check_place(folder)
                 OutFolder(folder).claim([])
-                self._lock.enter_context(locked(folder))
+                self._open.enter_context(locked(folder))
                 self._claim(manifest)
                 records = run_records(folder, manifest, samples, whole=True)
-                self.records = self._open(records, self.standing.add)
-                calls = CallLines(folder, self._validation)
-                self.calls = self._open(calls, self.standing.add_call)
-                batches = BatchLines(folder)
-                self.batches = self._open(batches, self.standing.batches.append)
-                known: set[str] = set()
-                prompts = PromptLines(folder)
-                file = self._open(prompts, lambda one: known.add(one.sha256), sync=False)
-                self.prompts = PromptFile(file, known)
+                self.records = self._file(records, self.progress.add)
+                calls = CallLines(folder, Validation(manifest, samples))
+                self.calls = self._file(calls, self.progress.add_call)
+                self.batches = self._file(BatchLines(folder), self.progress.batches.append)
+                # Prompts can be made again.
+                self._prompts = self._file(PromptLines(folder), self._know, sync=False)
         except StoreError:
             self.close()
             raise
@@ -99,9 +256,34 @@ class RunStore:
 
     def close(self) -> None:
         """Release the files and the lock, once what is being written is written."""
-        for file in self._files:
-            file.close()
-        self._lock.close()
+        self._open.close()
+
+    def kept(self, key: str) -> Reply | None:
+        """Return the reply to a request that an earlier command was answered, or None."""
+        return self.progress.replies.get(key)
+
+    async def sent(self, model: str, sample: str, key: str, most_usd: float | None) -> Call:
+        """Write a call that is about to be sent; StoreError where the disk refuses."""
+        number = self.progress.calls
+        self.progress.calls += 1
+        names = {"call": number, "model": model, "sample": sample, "key": key, "run": self._run}
+        call = Call.model_validate({**names, "most_usd": most_usd})
+        await self.calls.put(call)
+        return call
+
+    async def ended(self, call: Call, billed_usd: float | None, reply: Reply | None) -> None:
+        """Write what became of a call; StoreError where the disk refuses."""
+        stored = None if reply is None else reply.storable()
+        known = {"ended": True, "billed_usd": billed_usd, "reply": stored}
+        await self.calls.put(call.model_copy(update=known))
+
+    def keep_prompt(self, messages: Sequence[Message]) -> str:
+        """Write a prompt unless it is there, and return its digest; StoreError as `append`."""
+        prompt = prompt_of(messages)
+        if prompt.sha256 not in self._prompts_known:
+            self._know(prompt)
+            self._prompts.append([prompt.fields()])
+        return prompt.sha256
 
     def note_stopped(self, models: Mapping[str, str], run: str, asked: Collection[str]) -> None:
         """Keep why the models `asked` about, or the whole run, were stopped, for whoever reads it.
@@ -118,25 +300,26 @@ class RunStore:
         else:
             folder.remove([STOPPED])
 
-    def _open(
-        self,
-        lines: Lines[LineT],
-        take: Callable[[LineT], None] = lambda _: None,
-        *,
-        sync: bool = True,
+    def _know(self, prompt: Prompt) -> None:
+        self._prompts_known.add(prompt.sha256)
+
+    def _file(
+        self, lines: Lines[LineT], take: Callable[[LineT], object], *, sync: bool = True
     ) -> AppendFile:
         """Open a file for appending, rid of a line that a kill cut short; `take` sees the rest."""
         file = AppendFile(lines.path, sync=sync)
-        self._files.append(file)
+        self._open.callback(file.close)
         for _, line in lines:
             take(line)
         if lines.is_cut:
             os.truncate(lines.path, lines.whole_bytes)
         elif lines.lacks_newline:
-            file.end_line()
+            with FileIO(lines.path, "a") as end:
+                end.write(b"\n")
         return file
 
     def _claim(self, manifest: Manifest) -> None:
+        """Write the manifest where the folder has none that selects the same."""
         found = held_run(self._folder, manifest)
         if found is not None:
             if _selection(found) == _selection(manifest):
@@ -145,8 +328,7 @@ class RunStore:
             others = [m for m in (*found.models, *found.others) if m.name not in named]
             changes = {"created": found.created, "others": tuple(others)}
             manifest = manifest.model_copy(update=changes)
-        with writing(self._folder, _HINT):
-            atomic_write(self._folder / MANIFEST, manifest_text(manifest), sync=True)
+        atomic_write(self._folder / MANIFEST, manifest_text(manifest), sync=True)
 
 
 def _selection(manifest: Manifest) -> tuple[list[str], object]:
@@ -170,95 +352,20 @@ def held_run(folder: Path, manifest: Manifest) -> Manifest | None:
     if all(next(iter(lines), None) is None for lines in paid):
         return None
     if differ := differences(found, manifest):
-        changed = f"different: {', '.join(differ)}"
-        hint = "; ".join((*reasons(found, manifest), _HINT))
-        raise StoreError(Problem(str(folder), "holds another run", found=changed, hint=hint))
-    if differ := [
-        name for name in code_versions() if found.versions.get(name) != manifest.versions[name]
-    ]:
-        made, here = (
-            ", ".join(f"{name} {one.versions.get(name, 'unknown')}" for name in differ)
-            for one in (found, manifest)
+        different = f"different: {', '.join(differ)}"
+        raise StoreError(
+            Problem(str(folder), "holds another run", "", different, "", _OTHER_FOLDER)
+        )
+    here = code_versions()
+    if differ := [name for name in here if found.versions.get(name) != here[name]]:
+        made, now = (
+            ", ".join(f"{name} {one.get(name)}" for name in differ)
+            for one in (found.versions, here)
         )
         message = "was judged by another version of phyblock"
         hint = f"phyblock score {folder} first: it judges the replies again and asks nobody"
-        raise StoreError(Problem(str(folder), message, found=made, allowed=here, hint=hint))
+        raise StoreError(Problem(str(folder), message, found=made, allowed=now, hint=hint))
     return found
-
-
-_HINT_APPENDING = "free some space and give the same command again: it goes on from here"
-
-
-class AppendFile:
-    """Lines that are on disk when `append` returns; safe to call from several threads.
-
-    The file is made with the first line.
-    """
-
-    def __init__(self, path: Path, *, sync: bool = True) -> None:
-        """Without `sync` lines survive the death of the process, not that of the machine."""
-        self._path = path
-        self._sync = sync
-        self._writing = threading.Lock()
-        self._file: FileIO | None = None
-        self._size_bytes = 0
-
-    def append(self, lines: Iterable[Mapping[str, Any]]) -> None:
-        """Write objects, a line each, and wait until they are on disk.
-
-        Raises StoreError when the disk refuses, or when somebody else removed, replaced or changed
-        the file meanwhile; what was written before stays whole.
-        """
-        data = b"".join(_line(line) for line in lines)
-        with self._writing:
-            self._append(data)
-
-    def end_line(self) -> None:
-        """Write the newline that the last line lacks."""
-        with FileIO(self._path, "a") as file:
-            file.write(b"\n")
-
-    def check(self) -> None:
-        """Raise StoreError unless the file that was written is the one at its path, and whole."""
-        with self._writing:
-            if self._file is not None:
-                self._check(self._file.fileno())
-
-    def close(self) -> None:
-        """Close the file, once what is being written is written."""
-        with self._writing:
-            if self._file is not None:
-                self._file.close()
-                self._file = None
-
-    def _append(self, data: bytes) -> None:
-        with writing(self._path, _HINT_APPENDING):
-            if self._file is None:
-                # Unbuffered: a write that failed must not be tried again behind our back.
-                self._file = FileIO(self._path, "a")
-                self._size_bytes = os.fstat(self._file.fileno()).st_size
-                if self._sync:
-                    sync_folder(self._path.parent)
-            self._check(self._file.fileno())
-            append_whole(self._file.fileno(), data, sync=self._sync)
-            self._size_bytes += len(data)
-
-    def _check(self, number: int) -> None:
-        opened = os.fstat(number)
-        try:
-            there = os.stat(self._path)
-            is_same = os.path.samestat(opened, there)
-        except FileNotFoundError:
-            is_same = False
-        if not is_same or opened.st_size != self._size_bytes:
-            message = "was removed, replaced or changed while the run was writing it"
-            hint = f"restore it from a copy; replies that have arrived are in {CALLS}"
-            raise StoreError(Problem(str(self._path), message, hint=hint))
-
-
-def _line(line: Mapping[str, Any]) -> bytes:
-    text = json.dumps(line, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
-    return text.encode("utf-8", "replace") + b"\n"
 
 
 LOCK = ".lock"
@@ -286,7 +393,7 @@ def check_place(folder: Path) -> None:
     A folder without our manifest that holds anything is somebody's: a run makes names of its own
     in it. What a run grows must be files of the folder itself, no links to others.
     """
-    with writing(folder, _HINT):
+    with writing(folder, _OTHER_FOLDER):
         try:
             os.lstat(folder)
         except FileNotFoundError:
@@ -298,10 +405,9 @@ def check_place(folder: Path) -> None:
         message = f"is not empty and holds no run (no {MANIFEST})"
         hint = "name a new or an empty folder with --out"
         raise StoreError(Problem(str(folder), message, found=found, hint=hint))
-    links = [folder / name for name in _OWN if (folder / name).is_symlink()]
-    if links:
+    if links := [folder / name for name in _OWN if (folder / name).is_symlink()]:
         message = "is a link, and a run writes nowhere but in its own folder"
-        raise StoreError([Problem(str(path), message, hint=_HINT) for path in links])
+        raise StoreError([Problem(str(path), message, hint=_OTHER_FOLDER) for path in links])
 
 
 def write_run(folder: Path, manifest: Manifest, records: Iterable[Record]) -> None:
@@ -324,134 +430,25 @@ def manifest_text(manifest: Manifest) -> str:
 def record_lines(records: Iterable[Record]) -> Iterator[str]:
     """`records.jsonl`, line by line: the same text for the same records."""
     for record in records:
-        yield json.dumps(record.fields(), ensure_ascii=False, separators=(",", ":")) + "\n"
+        yield f"{_json_line(record.fields())}\n"
 
 
-class RecordWriter:
-    """Appends records off the event loop; `put` returns when its record is synced."""
-
-    def __init__(self, file: AppendFile) -> None:
-        self._file = file
-        self._waiting: list[tuple[Line, asyncio.Future[None]]] = []
-        self._flusher: asyncio.Task[None] | None = None
-
-    async def put(self, record: Line) -> None:
-        """Append a record and wait until it is on disk; StoreError when the disk refuses."""
-        written: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self._waiting.append((record, written))
-        if self._flusher is None:
-            self._flusher = asyncio.create_task(self._flush())
-        await written
-
-    async def drain(self) -> None:
-        """Wait until everything that was put is on disk or refused."""
-        if self._flusher is not None:
-            await self._flusher
-
-    async def _flush(self) -> None:
-        while self._waiting:
-            batch, self._waiting = self._waiting, []
-            failure: Exception | None = None
-            try:
-                await asyncio.to_thread(self._file.append, [line.fields() for line, _ in batch])
-            except Exception as error:
-                # Whatever it is, those who wait must hear of it, or they wait for ever.
-                failure = error
-            # A waiter that was cancelled has a future that is already done.
-            for written in (future for _, future in batch if not future.done()):
-                if failure is None:
-                    written.set_result(None)
-                else:
-                    written.set_exception(failure)
-        self._flusher = None
-
-
-class PromptFile:
-    """Prompts on their way to disk, each once."""
-
-    def __init__(self, file: AppendFile, known: set[str]) -> None:
-        self._file = file
-        self._known = known
-
-    def keep(self, messages: Sequence[Message]) -> str:
-        """Write a prompt unless it is there; its digest. Raises StoreError as the file does."""
-        prompt = prompt_of(messages)
-        if prompt.sha256 not in self._known:
-            self._known.add(prompt.sha256)
-            self._file.append([prompt.fields()])
-        return prompt.sha256
+def _json_line(fields: Mapping[str, Any]) -> str:
+    return json.dumps(fields, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
 
 
 def prompt_of(messages: Sequence[Message]) -> Prompt:
     """Return messages as they are kept, with the labels of pictures in their place."""
-    content = tuple(_content(message) for message in messages)
+    content = tuple(
+        PromptMessage(
+            role=message.role,
+            parts=tuple(
+                PictureMark(image=part.label) if isinstance(part, Image) else encodable(part)
+                for part in message.parts
+            ),
+        )
+        for message in messages
+    )
     fields = [message.fields() for message in content]
     digest = hex_digest(json.dumps(fields, sort_keys=True, separators=(",", ":")))
     return Prompt(sha256=digest, messages=content)
-
-
-def _content(message: Message) -> PromptMessage:
-    parts = (
-        PictureMark(image=part.label) if isinstance(part, Image) else encodable(part)
-        for part in message.parts
-    )
-    return PromptMessage(role=message.role, parts=tuple(parts))
-
-
-class CallJournal:
-    """The calls of a run, each on disk before it is sent, and with its reply before that is judged.
-
-    What an earlier command was answered and no record holds is kept in `replies` by its key.
-    """
-
-    def __init__(self, writer: RecordWriter, run: str, standing: Standing) -> None:
-        self._writer = writer
-        self._run = run
-        self._next = standing.calls
-        self._replies = standing.replies
-
-    def kept(self, key: str) -> Reply | None:
-        """Return the reply to a request that an earlier command was answered, or None."""
-        return self._replies.get(key)
-
-    async def sent(self, model: str, sample: str, key: str, most_usd: float | None) -> Call:
-        """Write a call that is about to be sent; StoreError where the disk refuses."""
-        number, self._next = self._next, self._next + 1
-        call = Call(
-            call=number, model=model, sample=sample, key=key, run=self._run, most_usd=most_usd
-        )
-        await self._writer.put(call)
-        return call
-
-    async def ended(self, call: Call, billed_usd: float | None, reply: Reply | None) -> None:
-        """Write what became of a call; StoreError where the disk refuses."""
-        stored = None if reply is None else reply.storable()
-        known = {"ended": True, "billed_usd": billed_usd, "reply": stored}
-        await self._writer.put(call.model_copy(update=known))
-
-
-class Journaled:
-    """A model that answers here and cannot be asked again: its answers are written as they come."""
-
-    needs_messages = True
-
-    def __init__(self, model: Model, config: ModelConfig, journal: CallJournal) -> None:
-        self.name = model.name
-        self._model = model
-        self._config = config
-        self._journal = journal
-
-    async def ask(self, request: Request) -> Reply | None:
-        """Return the answer of the model, or that which it gave to an earlier command."""
-        key = reply_key(self._config, request)
-        if (kept := self._journal.kept(key)) is not None:
-            return kept
-        reply = await self._model.ask(request)
-        if reply is not None:
-            call = await self._journal.sent(self.name, request.sample, key, 0.0)
-            await self._journal.ended(call, 0.0, reply)
-        return reply
-
-    async def aclose(self) -> None:
-        """Release what the model holds."""
-        await self._model.aclose()

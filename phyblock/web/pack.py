@@ -31,7 +31,7 @@ from phyblock.records.files import PromptLines, RecordLines
 from phyblock.records.record import Record, Score, SentPrompt
 from phyblock.resources import cache_dir
 from phyblock.results.load import Design, Run
-from phyblock.run.plan import recorded_dataset
+from phyblock.run.rescore import recorded_dataset
 from phyblock.sim.geometry import solid_mesh
 from phyblock.sim.pictures import COLOR_RGB
 from phyblock.stable import hex_digest
@@ -399,7 +399,7 @@ def open_sources(run: Run, data: Path | None) -> Sources:
     Raises DataError when `data` is given and is not what the run was made on.
     """
     try:
-        dataset = recorded_dataset(run.path, run.manifest, run.design.suite.levels, data)
+        dataset = recorded_dataset(run.path, run.manifest, data)
         openers = {name: kind_of(name).report().items for name in run.design.suite.tracks}
         items = {name: opener(run, dataset) for name, opener in openers.items() if opener}
         return Sources({task.scene.id: task for task in dataset.tasks}, items)

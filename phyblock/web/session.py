@@ -287,24 +287,22 @@ class PlaySession:
 
         model, loop = PersonModel(person.model, plan.suite, self.ask), asyncio.get_running_loop()
         signals = (signal.SIGINT, signal.SIGTERM)
-        async with Session(
-            plan, folder, watch, use_cache=False, present={model.name: model}
-        ) as opened:
+        session = Session(plan, folder, watch, use_cache=False, present={model.name: model})
 
-            def interrupted() -> None:
-                opened.interrupt()
-                self.close()
+        def interrupted() -> None:
+            session.interrupt()
+            self.close()
 
+        for one in signals:
+            loop.add_signal_handler(one, interrupted)
+        try:
+            return await session.run()
+        except BaseException:
+            self.close()
+            raise
+        finally:
             for one in signals:
-                loop.add_signal_handler(one, interrupted)
-            try:
-                return await opened.run()
-            except BaseException:
-                self.close()
-                raise
-            finally:
-                for one in signals:
-                    loop.remove_signal_handler(one)
+                loop.remove_signal_handler(one)
 
     async def ask(self, request: Request, picking: Picking) -> Given:
         """Return what the person picks; HaltedError where the session is closed first."""

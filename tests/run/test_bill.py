@@ -91,9 +91,8 @@ def asked(workspace: Workspace, plan: RunPlan) -> None:
     """Ask everything of a plan; no tables are made."""
 
     async def ask() -> None:
-        async with Session(plan, workspace.out, lambda _: None, use_cache=False) as session:
-            result = await session.run()
-            assert (result.left, result.failed) == (0, 0), result
+        result = await Session(plan, workspace.out, lambda _: None, use_cache=False).run()
+        assert (result.left, result.failed) == (0, 0), result
 
     asyncio.run(ask())
 

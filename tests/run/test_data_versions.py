@@ -33,7 +33,7 @@ def test_runs_on_two_versions_are_not_mixed(tmp_path: Path) -> None:
     refused = work.run()
     assert refused.code != 0
     assert "out: holds another run" in refused.err
-    assert "its data are version 1, these version 2" in refused.err
+    assert "dataset.version (1, now 2)" in refused.err
     newer = tmp_path / "newer"
     assert work.phyblock("run", "suite.yaml", "--out", newer, "--no-report").code == 0
     versions = [read_manifest(path).dataset for path in (work.out, newer)]

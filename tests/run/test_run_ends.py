@@ -17,8 +17,8 @@ from phyblock.records.line import Line
 from phyblock.records.record import Record
 from phyblock.run.events import RunEvent, SampleDone, Stopping
 from phyblock.run.plan import make_plan
-from phyblock.run.runner import Cause, Session
-from phyblock.run.store import AppendFile, RecordWriter
+from phyblock.run.runner import Session
+from phyblock.run.store import AppendFile
 from phyblock.tracks.full_planning import FullPlanning
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
@@ -75,11 +75,9 @@ def test_a_mistake_of_ours_loses_no_call_under_way(
 
     async def run() -> None:
         watch = watches_badly if place == "watch" else nobody
-        async with session(workspace, watch, "alpha") as opened:
-            # Floors were judged when it opened, before anything was asked.
-            if place == "judge":
-                monkeypatch.setattr(FullPlanning, "judge", judges_badly)
-            await opened.run()
+        if place == "judge":
+            monkeypatch.setattr(FullPlanning, "judge", judges_badly)
+        await session(workspace, watch, "alpha").run()
 
     with Running(FirstAtOnce()) as running:
         workspace.write_models(running.url, "alpha")
@@ -93,10 +91,10 @@ def test_an_impatient_cancellation_keeps_all_that_was_answered(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begun, may_end = threading.Event(), threading.Event()
-    append, put = AppendFile.append, RecordWriter.put
+    append, put = AppendFile.append, AppendFile.put
     answered: list[str] = []
 
-    async def notes(self: RecordWriter, record: Line) -> None:
+    async def notes(self: AppendFile, record: Line) -> None:
         assert isinstance(record, Record)
         answered.append(record.sample)
         await put(self, record)
@@ -109,22 +107,22 @@ def test_an_impatient_cancellation_keeps_all_that_was_answered(
         append(self, lines)
 
     async def run() -> None:
-        async with session(workspace, nobody, "random") as opened:
-            running = asyncio.create_task(opened.run())
-            await asyncio.to_thread(begun.wait, 20)
-            opened.interrupt()
-            for _ in range(3):
-                running.cancel()
-                for _ in range(10):
-                    await asyncio.sleep(0)
-            may_end.set()
-            with pytest.raises(asyncio.CancelledError):
-                await running
-            assert opened.result.stop is not None
-            assert opened.result.stop.cause is Cause.INTERRUPTED
+        opened = session(workspace, nobody, "random")
+        running = asyncio.create_task(opened.run())
+        await asyncio.to_thread(begun.wait, 20)
+        opened.interrupt()
+        for _ in range(3):
+            running.cancel()
+            for _ in range(10):
+                await asyncio.sleep(0)
+        may_end.set()
+        with pytest.raises(asyncio.CancelledError):
+            await running
+        assert opened.result.stop is not None
+        assert opened.result.stop.cause == "interrupted"
 
     monkeypatch.setattr(AppendFile, "append", appends_slowly)
-    monkeypatch.setattr(RecordWriter, "put", notes)
+    monkeypatch.setattr(AppendFile, "put", notes)
     asyncio.run(run())
     assert len(answered) > 1
     assert sorted(record["sample"] for record in workspace.records()) == sorted(answered)

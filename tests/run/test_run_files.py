@@ -19,9 +19,8 @@ from phyblock.config.suite import load_suite
 from phyblock.errors import StoreError
 from phyblock.records.files import PromptLines, read_prompts
 from phyblock.records.record import Call, Reply
-from phyblock.run.events import Standing
 from phyblock.run.plan import make_plan
-from phyblock.run.store import AppendFile, RunStore
+from phyblock.run.store import AppendFile, Progress, RunStore
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
@@ -154,23 +153,23 @@ def test_a_run_is_on_disk_with_its_name_before_anything_is_asked(
 def test_a_limit_counts_every_call_once_and_one_without_an_end_in_full(
     calls: list[tuple[str, str, int, bool, int | None]],
 ) -> None:
-    standing, expected = Standing(), dict.fromkeys("ab", 0.0)
+    progress, expected = Progress(), dict.fromkeys("ab", 0.0)
     for number, (sample, model, most, is_ended, billed) in enumerate(calls):
         line = Call(
             call=number, model=model, sample=sample, key=f"k{number}", run="r", most_usd=most
         )
-        standing.add_call(line)
+        progress.add_call(line)
         if is_ended:
             reply = Reply(text=f"{number}")
             ended = {"ended": True, "billed_usd": billed, "reply": reply}
-            standing.add_call(line.model_copy(update=ended))
-            assert standing.replies[f"k{number}"] == reply
+            progress.add_call(line.model_copy(update=ended))
+            assert progress.replies[f"k{number}"] == reply
         expected[model] += (billed or 0) if is_ended else most
     unanswered = sum(not call[3] for call in calls)
-    assert standing.calls == len(calls)
-    assert len(standing.unanswered) == unanswered
-    assert standing.unanswered_text.startswith(f"{unanswered} call" if unanswered else "")
-    assert {model: standing.limit_usd.get(model, 0.0) for model in "ab"} == expected
+    assert progress.calls == len(calls)
+    assert len(progress.unanswered) == unanswered
+    assert progress.unanswered_text.startswith(f"{unanswered} call" if unanswered else "")
+    assert {model: progress.limit_usd.get(model, 0.0) for model in "ab"} == expected
 
 
 def test_every_record_names_a_prompt_that_is_there(tmp_path: Path, pictures_dir: Path) -> None:
