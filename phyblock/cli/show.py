@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING
 import click
 from rich.console import Console
 
-from phyblock.cli.console import make_console, print_path, print_table
+from phyblock.cli.console import make_console, print_path
 from phyblock.cli.options import UserPath, data_option, run_argument
 from phyblock.errors import DataError, Problem, StoreError
-from phyblock.text import counted
+from phyblock.text import counted, one_line
 
 if TYPE_CHECKING:
     from phyblock.data import AssemblyTask
     from phyblock.records.record import Record, Reply
 
+_STYLES = {"plain": "", "good": "green", "bad": "red"}
 _NAMED = 5
 """Samples that a message names when it is unclear which one is meant."""
 
@@ -49,7 +50,7 @@ def show(run: Path, sample: str, gif: Path | None, size: int, data: Path | None)
     from phyblock.tracks import kind_of
 
     record = _find(run, sample)
-    view = kind_of(record.track).report().episodes
+    film = kind_of(record.track).report().film
     console = make_console()
     console.print(record.sample, style="bold")
     facts = [f"scene {record.scene}", f"level {', '.join(map(str, record.levels))}"]
@@ -76,21 +77,23 @@ def show(run: Path, sample: str, gif: Path | None, size: int, data: Path | None)
             raise
         console.print(f"Names of blocks are not shown: {error}", style="dim")
         task = None
-    if view is not None and task is not None:
+    if film is not None and task is not None:
         blocks = enumerate(task.candidates.candidates, 1)
         names = ", ".join(f"{n} {one.color} {one.type}" for n, one in blocks)
         console.print(f"Candidates: {names}", style="dim")
-    if view is not None:
+    frames = list(film(record, task)) if film is not None else []
+    if frames:
         console.print()
-        print_table(console, view.table(record))
+    for frame in frames[1:] or frames:
+        note = f" ({frame.note})" if frame.note else ""
+        console.print(one_line(f"{frame.caption}{note}"), style=_STYLES[frame.tone])
     if gif is None:
         return
-    if view is None or task is None:
+    if not frames or task is None:
         raise StoreError(Problem(record.sample, "has no steps to draw", "--gif"))
     from phyblock.sim.film import episode_gif, episode_images
     from phyblock.sim.pictures import PictureStyle
 
-    frames = list(view.frames(record, task))
     images = episode_images(task.scene, task.candidates, frames, PictureStyle(size))
     write_named(gif, episode_gif(images))
     print_path(console, gif)

@@ -258,15 +258,8 @@ class Record(Line):
     counts: dict[str, tuple[Amount, ...]] = Field(default_factory=dict)
     """Counts of measures beside `scores`, by name."""
 
-    columns: ClassVar[Mapping[str, str]] = {}
-    """Columns that the track adds to the frame of records, with their types in pandas."""
-
     exported: ClassVar[Mapping[str, str]] = {}
     """Columns that the track adds to exports, with their types in pandas."""
-
-    def row(self) -> Mapping[str, Any]:
-        """The values of `columns`."""
-        return {}
 
     def export_row(self) -> Mapping[str, Any]:
         """The values of `exported`."""
@@ -318,6 +311,11 @@ class Record(Line):
     def item(self) -> str:
         """The name of its item inside the track."""
         return self.key or self.scene
+
+    @property
+    def group(self) -> str:
+        """The name of the samples that may count together: its item."""
+        return self.item
 
     @property
     def named(self) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -16,16 +16,15 @@ from phyblock.config.suite import REPEAT, Variant, VarySpec
 from phyblock.errors import Problem, SpecError
 from phyblock.files import OutFolder
 from phyblock.results.estimates import (
-    Rows,
     base_scenes,
+    cell_value,
     counted_rows,
     headline_columns,
     main_measure,
     pooled_in,
-    track_measures,
-    value_of_cells,
+    track_notes,
 )
-from phyblock.results.load import Design, Run, checked_models
+from phyblock.results.load import Design, Run, checked_models, track_measures
 from phyblock.results.text import (
     NO_VALUE,
     Column,
@@ -65,20 +64,18 @@ from phyblock.tracks.measures import SCORED_BY, Cell, Measure, in_unit
 _LEVEL = 1 - CONFIDENCE
 _KEYS = ["scene", "item", "seed", "variant"]
 _FLIPPED = ["a", "b", *_KEYS, "right", "value_a", "value_b"]
-_AT_ONCE = 100
-"""Pairs that are estimated together, which bounds memory."""
 
 
 def check_alike(run: Run, first: Run, cells: Sequence[str], track: str, measure: Measure) -> None:
     """Raise SpecError where `run` cannot be compared with `first` by a measure in these cells.
 
-    The track says what must agree in how the two were asked and scored; scenes of a name must be
-    the same.
+    They must be scored by the same rules, agree in what the measure names in its counts, ask of the
+    same version of a set and in the same ways; scenes of a name must have the same blocks.
     """
 
-    def differs(message: str, field: str, found: str, wanted: str = "", hint: str = "") -> None:
+    def differs(message: str, field: str, found: Any, allowed: Any = "", hint: str = "") -> None:
         message = f"{message} {first.path}"
-        raise SpecError(Problem(str(run.path), message, field, found, wanted, hint))
+        raise SpecError(Problem(str(run.path), message, field, str(found), str(allowed), hint))
 
     sets = [(one.manifest.dataset, one.manifest.questions) for one in (run, first)]
     for field, mine, other in zip(("dataset", "questions"), *sets, strict=True):
@@ -87,24 +84,47 @@ def check_alike(run: Run, first: Run, cells: Sequence[str], track: str, measure:
             continue
         names = [getattr(one, "name", "") or Path(one.root).name for one in (mine, other)]
         if names[0] == names[1]:
-            hint, versions = "run the suite again on the newer version", (mine, other)
-            said, wanted = (str(one.version) for one in versions)
-            differs(f"is of another version of {names[0]} than", f"{field}.version", said, wanted,
+            hint, message = "run the suite again on the newer version", "is of another version of"
+            differs(f"{message} {names[0]} than", f"{field}.version", mine.version, other.version,
                     hint)  # fmt: skip
-    vary, wanted_vary = (one.design.suite.vary for one in (run, first))
-    if vary != wanted_vary:
-        said, wanted = (", ".join(one.factors) or "nothing" for one in (vary, wanted_vary))
+    suite, wanted = run.design.suite, first.design.suite
+    if suite.vary != wanted.vary:
+        varied = [", ".join(one.vary.factors) or "nothing" for one in (suite, wanted)]
         hint = "compare runs that vary the same, in the same order"
-        differs("asks in other ways than", "vary", said, wanted, hint)
-    if (check := kind_of(track).report().check_alike) is not None:
-        check(run, first, cells, measure)
+        differs("asks in other ways than", "vary", varied[0], varied[1], hint)
+    held = first.counts.get((track, measure.counted.name))
+    scored = [set(names) - {""} for names in zip(*held.ways, strict=True)] if held else [set()] * 3
+    criteria = {cell.criterion for cell in first.cells(track) if cell.name in cells} - {""}
+    rules: list[tuple[str, Sequence[str], set[str]]] = [
+        ("settings", suite.settings, {first.design.setting}),
+        ("scoring.matchers", suite.scoring.matchers, {first.design.matcher}),
+        ("scoring.level1", ("aov", suite.scoring.level1), criteria),
+    ]
+    for (field, known, needed), is_scored in zip(rules, scored, strict=True):
+        for name in sorted(needed.difference(known)) if is_scored else ():
+            hint = "phyblock score reads stored replies again under other rules"
+            differs(f"is not scored by {name}, as is", field, ", ".join(known), name, hint)
+    for path in measure.counted.alike:
+        found, other_found = (_field(one, path) for one in (run, first))
+        if found != other_found:
+            differs(f"differs in what decides {measure.name} from", path, found, other_found,
+                    "run the older one again, or compare by another measure")  # fmt: skip
     blocks = [
         one.records.drop_duplicates("scene").set_index("scene")["n_blocks"] for one in (first, run)
     ]
     both = pd.concat(blocks, axis=1, join="inner", keys=["first", "other"])
     if len(differ := both[both["first"] != both["other"]]):
-        said = f"other blocks in {counted(len(differ), 'scene')}, the first {differ.index[0]}"
-        differs("is of other data than", "scenes", said)
+        said_of = f"other blocks in {counted(len(differ), 'scene')}, the first {differ.index[0]}"
+        differs("is of other data than", "scenes", said_of)
+
+
+def _field(run: Run, path: str) -> Any:
+    """Return the value at a path of keys in `run.yaml`, None where there is none or it is false."""
+    name, *keys = path.split(".")
+    value: Any = getattr(run.manifest, name)
+    for key in keys:
+        value = value.get(key) if isinstance(value, Mapping) else None
+    return value or None
 
 
 @dataclass(frozen=True)
@@ -129,8 +149,9 @@ class Side:
 class Samples:
     """Counts of the samples that several sides have in a part of a track.
 
-    `keys` has a row for each scene, item, seed and variant, ascending; `cell` is its pooled cell,
-    and `counts`, (sides, keys, columns), NaN where a side has no such sample.
+    `keys` has a row for each scene, item, seed and variant, ascending; `cell` is the place of its
+    cell among those pooled, and `counts`, (sides, keys, columns), NaN where a side has no such
+    sample.
     """
 
     keys: pd.DataFrame
@@ -157,50 +178,42 @@ class Comparable:
     parts: tuple[Part, ...]
     how: str
 
-    def pooled(self, part: Part) -> tuple[str, ...]:
-        """The pooled cells that a part is made of."""
-        (cell,) = (cell for cell in self.cells if cell.name == part.cell)
-        members = pooled_in(cell, self.cells)
-        return tuple(cell.name for cell in self.cells if cell.name in members)
+    def pooled(self, part: Part) -> list[str]:
+        """Return the cells that are no means of which a part is made."""
+        members = pooled_in(self._cells[part.cell], self.cells)
+        return [cell.name for cell in self.cells if cell.name in members]
+
+    @property
+    def _cells(self) -> dict[str, Cell]:
+        return {cell.name: cell for cell in self.cells}
 
     def samples(self, sides: Sequence[Side], part: Part, design: Design) -> Samples:
-        """Return the samples of sides in the headline setting and matcher of a design."""
-        runs = list({id(side.run): side.run for side in sides}.values())
-        found, counts = [], []
-        for n, run in enumerate(runs):
-            rows = counted_rows(replace(run, design=design), self.track, self.measure.counted)
-            table, own = self._chosen(rows, part, design)
-            found.append(table.assign(run=n))
-            counts.append(own)
-        table, numbers = pd.concat(found, ignore_index=True), np.concatenate(counts)
-        key = table.groupby(_KEYS, sort=True).ngroup().to_numpy()
-        _, first = np.unique(key, return_index=True)
-        all_counts = np.full((len(sides), len(first), numbers.shape[1]), np.nan)
-        for n, side in enumerate(sides):
-            place = next(place for place, run in enumerate(runs) if run is side.run)
-            mine = ((table["run"] == place) & (table["model"] == side.model)).to_numpy()
-            all_counts[n, key[mine]] = numbers[mine]
-        keys = table.loc[first, _KEYS].reset_index(drop=True)
-        return Samples(keys, table["cell"].to_numpy(np.intp)[first], all_counts)
-
-    def _chosen(self, rows: Rows, part: Part, design: Design) -> tuple[pd.DataFrame, Floats]:
-        """Rows of a part with the number of their pooled cell, and their counts.
+        """Return the samples of sides in the headline setting and matcher of a design.
 
         Those of models that said nothing at all in a cell are left out.
         """
-        masks = np.stack([rows.cells[name] for name in self.pooled(part)])
+        runs = {id(side.run): side.run for side in sides}
         wanted = dict(zip(SCORED_BY, (design.setting, design.matcher, part.criterion), strict=True))
-        used = masks.any(axis=0)
-        for name, value in wanted.items():
-            if value:
-                used &= rows.about[name].isin(["", value]).to_numpy()
-        about, counts = rows.about[used], rows.counts[used].to_numpy(np.float64)
-        records = rows.run.records.iloc[about["place"]]
-        table = records[["model", "scene", "seed", "variant"]].reset_index(drop=True)
-        cell = masks[:, used].argmax(axis=0)
-        table = table.assign(item=about["item"].to_numpy(), cell=cell, heard=rows.replied[used])
-        heard = table.groupby(["model", "cell"])["heard"].transform("any").to_numpy(bool)
-        return table[heard], np.nan_to_num(counts[heard])
+        tables, counts = [], []
+        for name, run in runs.items():
+            rows = counted_rows(run, self.track, self.measure.counted, self.cells, design)
+            masks = np.stack([rows.cells[cell] for cell in self.pooled(part)])
+            used = masks.any(axis=0)
+            for column, value in wanted.items():
+                used &= rows.about[column].isin(["", value]).to_numpy() | (not value)
+            table = rows.about[used].assign(cell=masks[:, used].argmax(axis=0), run=name)
+            heard = table.groupby(["model", "cell"])["replied"].transform("any").to_numpy(bool)
+            tables.append(table[heard])
+            counts.append(rows.counts[used][heard])
+        table, numbers = pd.concat(tables, ignore_index=True), np.concatenate(counts)
+        key = table.groupby(_KEYS, sort=True).ngroup().to_numpy()
+        _, first = np.unique(key, return_index=True)
+        every = np.full((len(sides), len(first), numbers.shape[1]), np.nan)
+        for n, side in enumerate(sides):
+            mine = ((table["run"] == id(side.run)) & (table["model"] == side.model)).to_numpy()
+            every[n, key[mine]] = numbers[mine]
+        keys = table.loc[first, _KEYS].reset_index(drop=True)
+        return Samples(keys, table["cell"].to_numpy(np.intp)[first], every)
 
     def values(self, run: Run, part: Part, design: Design) -> Iterator[tuple[str, pd.Series]]:
         """Return the value of each sample in the measure's unit, by model; by scene, item, seed and
@@ -214,21 +227,62 @@ class Comparable:
                 worth = self.measure.scale * self.measure.value(counts)
                 yield side.model, pd.Series(worth, index=index)[has].dropna()
 
-    def of_sums(self, part: Part, totals: Floats) -> Callable[[Floats], Floats]:
-        """Return the value of sums of counts (..., pooled, columns and number of samples).
+    def contrast(
+        self,
+        samples: Samples,
+        pair: Sequence[int],
+        part: Part,
+        parents: Mapping[str, tuple[str, ...]],
+    ) -> dict[str, float]:
+        """Return a row of `Comparison.table`, but for names, corrected p and verdicts.
 
-        Means are over the pooled cells of which `totals` have samples.
+        The difference of two sides on the samples that both have, from the sums of their counts by
+        scene and cell; means are over the cells of which there are samples.
         """
-        reached = {part.cell}
-        for cell in reversed(self.cells):
-            reached |= set(cell.of) if cell.name in reached else set()
-        cells = [cell for cell in self.cells if cell.name in reached]
-        values = value_of_cells(self.measure, cells, self.pooled(part))
-        return lambda sums: values(sums[..., :-1], totals[..., -1] > 0)[..., -1]
+        measure, both = self.measure, samples.has[list(pair)].all(axis=0)
+        scene, scenes = pd.factorize(samples.keys["scene"].to_numpy()[both], sort=True)
+        pooled, counts = self.pooled(part), samples.counts[list(pair)][:, both]
+        sums = np.zeros((len(scenes), 2, len(pooled), counts.shape[-1]))
+        for side in range(2):
+            np.add.at(sums[:, side], (scene, samples.cell[both]), counts[side])
+        asked = np.bincount(samples.cell[both], minlength=len(pooled)) > 0
+        cell, cells = self._cells[part.cell], self._cells
+
+        def values(of: Floats) -> Floats:
+            single = measure.value(of)
+            there = np.broadcast_to(asked, single.shape)
+            known = {name: (single[..., n], there[..., n]) for n, name in enumerate(pooled)}
+            return cell_value(cell, cells, known)[0]
+
+        clusters, scale = Clusters.of([parents[name] for name in scenes]), measure.scale
+        estimate = bounded(
+            jackknife(sums, clusters, lambda of: values(of)[..., 0] - values(of)[..., 1]),
+            measure.most_apart / scale,
+        )
+        value_a, value_b = scale * values(sums.sum(axis=0))
+        # A plan without a step for a goal without a block would have no F1; there is none.
+        a, b = measure.value(counts)
+        sign = np.sign(np.nan_to_num(a - b)) * (1 if measure.better == "higher" else -1)
+        ends = {name: scale * float(getattr(estimate, name)) for name in ("se", "lo", "hi")}
+        return {
+            **{"value_a": value_a, "value_b": value_b, "difference": scale * float(estimate.value)},
+            **{**ends, "p": float(estimate.p), "better": (sign > 0).sum()},
+            **{"worse": (sign < 0).sum(), "same": (sign == 0).sum(), "n_samples": len(sign)},
+            **{"n_scenes": len(scenes), "n_clusters": clusters.size},
+        }
+
+    def flips(self, samples: Samples, pair: Sequence[int], names: tuple[str, str]) -> pd.DataFrame:
+        """Return the samples that one of two sides alone got wholly right."""
+        both, best = samples.has[list(pair)].all(axis=0), self.measure.best
+        counts = samples.counts[list(pair)][:, both]
+        a, b = self.measure.scale * np.nan_to_num(self.measure.value(counts))
+        table = samples.keys[both].assign(a=names[0], b=names[1], value_a=a, value_b=b)
+        table["right"] = np.where(a == best, *names)
+        return table.loc[(a == best) != (b == best), _FLIPPED].sort_values(["right", *_KEYS])
 
 
 def comparable(run: Run, track: str, measure: str = "") -> Comparable:
-    """A measure of a track of a run, the main one where none is named.
+    """Return a measure of a track of a run, the main one where none is named, to compare by.
 
     Raises SpecError for a measure that the track has not.
     """
@@ -237,8 +291,7 @@ def comparable(run: Run, track: str, measure: str = "") -> Comparable:
         message, allowed = "has no such measure", ", ".join(known)
         raise SpecError(Problem(f"track {track}", message, "--measure", measure, allowed))
     chosen = known[measure] if measure else main_measure(run, track)
-    report, columns = kind_of(track).report(), headline_columns(run, track)
-    cells = report.cells(run)
+    columns, cells = headline_columns(run, track), chosen.counted.cells or run.cells(track)
     criteria = [s.criterion for s in columns if s.measure == chosen.name and s.criterion]
     # A part of a mean that is pooled itself is too small to be compared alone.
     names = [
@@ -247,62 +300,10 @@ def comparable(run: Run, track: str, measure: str = "") -> Comparable:
     parts = [Part(name, name) for name in names]
     if criteria:
         parts = [Part(one, name, one) for name in names for one in reversed(criteria)]
-    notes = report.notes(run) if chosen.name in {column.measure for column in columns} else ()
+    is_shown = chosen.name in {column.measure for column in columns}
+    notes = track_notes(run, track) if is_shown else ()
     how = " ".join((f"{chosen.heading}: {chosen.meaning}.", *notes, "Samples that both have."))
     return Comparable(track, chosen, cells, tuple(parts), how)
-
-
-def with_verdicts(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:
-    """A table of tests (a, b, difference, se, p, n_clusters, ...) with what they say together.
-
-    Behind `p` stand p_holm, verdict, detectable and detectable_holm, as `Comparison` explains.
-    """
-    n_tests = int(table["p"].notna().sum())
-    judged = table.assign(p_holm=holm(table["p"]))
-    judged["verdict"] = [_verdict(row, measure, n_tests) for row in judged.to_dict("records")]
-    levels = {"detectable": _LEVEL, "detectable_holm": _LEVEL / max(n_tests, 1)}
-    for name, level in levels.items():
-        judged[name] = detectable(table["se"], table["n_clusters"], level, measure.most_apart)
-    columns = [str(name) for name in table]
-    after = columns.index("p") + 1
-    return judged[[*columns[:after], "p_holm", "verdict", *levels, *columns[after:]]]
-
-
-def _verdict(row: Mapping[Any, Any], measure: Measure, n_tests: int) -> str:
-    if np.isnan(row["difference"]):
-        return "nothing to compare"
-    if np.isnan(row["p_holm"]):
-        return "cannot tell: a single base scene"
-    if row["p_holm"] >= _LEVEL:
-        # So few base scenes give no p value that the correction leaves below the level.
-        too_few = n_tests * least_p(row["n_clusters"]) >= _LEVEL
-        return "too few base scenes to tell" if too_few else "cannot tell"
-    a_is_better = (row["difference"] > 0) == (measure.better == "higher")
-    return f"{row['a' if a_is_better else 'b']} is better"
-
-
-def ranks(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:
-    """The ranks that each model may have, the best first: model, value, best, worst.
-
-    Out of a table that compares every pair of its models as a whole; empty for any other.
-    """
-    whole = table[table["part"] == table["part"].iloc[-1]] if len(table) else table
-    names = list(dict.fromkeys([*whole["a"], *whole["b"]]))
-    n, columns = len(names), ["model", "value", "best", "worst"]
-    if len(whole) != n * (n - 1) // 2 or whole["p"].isna().any():
-        return pd.DataFrame(columns=columns)
-    is_better, values = np.zeros((n, n), dtype=bool), dict.fromkeys(names, np.nan)
-    for row in whole.to_dict("records"):
-        a, b = names.index(row["a"]), names.index(row["b"])
-        a_is_better = (row["difference"] > 0) == (measure.better == "higher")
-        is_better[(a, b) if a_is_better else (b, a)] = row["p_holm"] < _LEVEL
-        values |= {row["a"]: row["value_a"], row["b"]: row["value_b"]}
-    ranges = rank_ranges(is_better)
-    rows = [(name, values[name], *ranges[place]) for place, name in enumerate(names)]
-    is_ascending = measure.better == "lower"
-    return pd.DataFrame(rows, columns=columns).sort_values(
-        "value", ascending=is_ascending, ignore_index=True, kind="stable"
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -333,7 +334,7 @@ class Comparison:
 def compare_models(
     run: Run, models: Sequence[str] = (), track: str = "", measure: str = ""
 ) -> Comparison:
-    """Every pair of models of a run as a whole; in every part where there are but two.
+    """Compare every pair of models of a run as a whole; in every part where there are but two.
 
     `models` limits it to those named; `track` is the first that the run has and `measure` the first
     of the track, if they are not named. Raises SpecError for a name that the run has not, or when
@@ -351,27 +352,25 @@ def compare_models(
 def compare_runs(
     first: Run, second: Run, models: Sequence[str] = (), track: str = "", measure: str = ""
 ) -> Comparison:
-    """Each model that both runs have; or, with two `models`, one of the first and one of the other.
+    """Compare each model that both runs have; of two `models`, one of each run.
 
     In every part where that is one pair, else as a whole; `track` and `measure` as for
     `compare_models`. Raises SpecError for names that are not there.
     """
-    where = f"{first.path}, {second.path}"
     if len(models) == 2:
         names = [(*checked_models(first, models[:1]), *checked_models(second, models[1:]))]
     else:
         shared = [name for name in first.design.model_names if name in second.design.model_names]
-        if unknown := [name for name in models if name not in shared]:
-            allowed = ", ".join(shared) or "none is in both"
-            raise SpecError(
-                Problem(where, f"are not both runs of {', '.join(unknown)}", allowed=allowed)
-            )
+        unknown = [name for name in models if name not in shared]
+        if unknown or not shared:
+            named = f"are not both runs of {', '.join(unknown)}"
+            message = named if unknown else "have no model in common"
+            where, allowed = f"{first.path}, {second.path}", ", ".join(shared)
+            hint = "name one of each: --models A,B"
+            raise SpecError(Problem(where, message, allowed=allowed, hint=hint))
         names = [(name, name) for name in models or shared]
-    if not names:
-        hint = "name one of each: --models A,B"
-        raise SpecError(Problem(where, "have no model in common", hint=hint))
-    folders = first.path.resolve().name, second.path.resolve().name
-    tags = folders if folders[0] != folders[1] else (str(first.path), str(second.path))
+    tags = first.path.resolve().name, second.path.resolve().name
+    tags = tags if tags[0] != tags[1] else (str(first.path), str(second.path))
     tags = tags if tags[0] != tags[1] else ("first", "second")
     pairs = [
         (Side(f"{a} ({tags[0]})", a, first), Side(f"{b} ({tags[1]})", b, second)) for a, b in names
@@ -383,7 +382,7 @@ def compare_runs(
 
 
 def _shared_track(runs: Sequence[Run], wanted: str) -> str:
-    """The track that is compared: `wanted`, else the first one that all runs have."""
+    """Return the track that is compared: `wanted`, else the first one that all runs have."""
     shared = [name for name in kinds() if all(name in run.design.suite.tracks for run in runs)]
     if not shared or (wanted and wanted not in shared):
         where, allowed = ", ".join(str(run.path) for run in runs), ", ".join(shared) or "none"
@@ -400,42 +399,32 @@ def compare(
     Raises SpecError when a run was not scored so, asked other questions, or has other blocks in a
     scene of the same name.
     """
-    design = pairs[0][0].run.design
     sides = list({side.label: side for pair in pairs for side in pair}.values())
     place = {side.label: n for n, side in enumerate(sides)}
     runs = list({id(side.run): side.run for side in sides}.values())
     for run in runs[1:]:
         check_alike(run, runs[0], [part.cell for part in parts], what.track, what.measure)
     parents = {scene: found for run in runs for scene, found in base_scenes(run).items()}
-    labels = pd.DataFrame([(a.label, b.label) for a, b in pairs], columns=["a", "b"])
-    numbers = np.array([(place[a.label], place[b.label]) for a, b in pairs])
-    tables: list[pd.DataFrame] = []
-    flipped = pd.DataFrame(columns=_FLIPPED)
+    rows, flips = [], [pd.DataFrame(columns=_FLIPPED)]
     for part in parts:
-        samples = what.samples(sides, part, design)
-        batches = [
-            _differences(samples, numbers[start : start + _AT_ONCE], parents, part, what)
-            for start in range(0, len(pairs), _AT_ONCE)
-        ]
-        found = pd.concat(batches, ignore_index=True)
-        tables.append(pd.concat([labels.assign(part=part.name), found], axis=1))
-        if part == parts[-1]:
-            flips = [
-                _flips(samples, of_pair, (a.label, b.label), what)
-                for of_pair, (a, b) in zip(numbers, pairs, strict=True)
-            ]
-            if flips := [flip for flip in flips if len(flip)]:
-                flipped = pd.concat(flips, ignore_index=True)[_FLIPPED]
-    table = with_verdicts(pd.concat(tables, ignore_index=True), what.measure)
-    measure, how = what.measure, " ".join([what.how, *_asked(runs, what.track)])
-    rows = ranks(table, measure)
-    return Comparison(table, flipped, rows, measure.heading, measure.unit, how)
+        samples = what.samples(sides, part, pairs[0][0].run.design)
+        for a, b in pairs:
+            pair, names = (place[a.label], place[b.label]), (a.label, b.label)
+            about = {"a": a.label, "b": b.label, "part": part.name}
+            rows.append({**about, **what.contrast(samples, pair, part, parents)})
+            if part == parts[-1]:
+                flips.append(what.flips(samples, pair, names))
+    table, measure = with_verdicts(pd.DataFrame(rows), what.measure), what.measure
+    flipped = pd.concat([flip for flip in flips if len(flip)] or flips[:1], ignore_index=True)
+    how = " ".join([what.how, *_asked(runs, what.track)])
+    ranked = ranks(table, measure)
+    return Comparison(table, flipped, ranked, measure.heading, measure.unit, how)
 
 
 def _asked(runs: Sequence[Run], track: str) -> Iterator[str]:
-    """Return what is unusual about how each run asked and read, where there is anything."""
+    """Yield what is unusual about how each run asked and read, where there is anything."""
     for run in runs:
-        if words := (*kind_of(track).report().showing(run), *run.varied_words):
+        if words := run.presentation(track):
             yield f"Run {run.path.name}: {', '.join(words)}."
     readers = {run.path.name: run.manifest.versions.get("readers", "1") for run in runs}
     if len(set(readers.values())) > 1:
@@ -443,64 +432,57 @@ def _asked(runs: Sequence[Run], track: str) -> Iterator[str]:
         yield f"Replies were read: {names}; phyblock score reads a run with those of this version."
 
 
-def _differences(
-    samples: Samples,
-    pairs: NDArray[np.intp],
-    parents: Mapping[str, tuple[str, ...]],
-    part: Part,
-    what: Comparable,
-) -> pd.DataFrame:
-    """Rows of `Comparison.table` for pairs of sides, but for names, corrected p and verdicts."""
-    scene, scenes = pd.factorize(samples.keys["scene"], sort=True)
-    shape = (len(scenes), len(what.pooled(part)), samples.counts.shape[-1] + 1)
-    sums = np.zeros((shape[0], len(pairs), 2, *shape[1:]))
-    seen = np.zeros((shape[0], len(pairs)), dtype=bool)
-    tallies = []
-    for n, pair in enumerate(pairs):
-        both = samples.has[pair].all(axis=0)
-        counts = samples.counts[pair][:, both]
-        for side in range(2):
-            at = (scene[both], samples.cell[both])
-            ones = np.ones((len(at[0]), 1))
-            np.add.at(sums[:, n, side], at, np.concatenate([counts[side], ones], axis=1))
-        seen[scene[both], n] = True
-        # A plan without a step for a goal without a block would have no F1; there is none.
-        a, b = what.measure.value(counts)
-        sign = np.sign(np.nan_to_num(a - b)) * (1 if what.measure.better == "higher" else -1)
-        tallies.append([(sign > 0).sum(), (sign < 0).sum(), (sign == 0).sum(), len(sign)])
-    used = seen.any(axis=1)
-    sums, seen = sums[used], seen[used]
-    clusters = Clusters.of([parents[name] for name in np.asarray(scenes)[used]])
-    totals = sums.sum(axis=0)
-    whole = what.of_sums(part, totals)
-    sizes = clusters.behind(seen)
-    values = whole(totals)
-    estimate = jackknife(
-        sums, clusters, lambda one: whole(one)[..., 0] - whole(one)[..., 1], n_clusters=sizes
-    )
-    scale = what.measure.scale
-    estimate = bounded(estimate, what.measure.most_apart / scale)
-    table = pd.DataFrame(
-        {
-            **{"value_a": scale * values[:, 0], "value_b": scale * values[:, 1]},
-            **{"difference": scale * estimate.value, "se": scale * estimate.se},
-            **{"lo": scale * estimate.lo, "hi": scale * estimate.hi, "p": estimate.p},
-        }
-    )
-    table[["better", "worse", "same", "n_samples"]] = tallies
-    return table.assign(n_scenes=seen.sum(axis=0), n_clusters=sizes)
+def with_verdicts(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:
+    """Return a table of tests (a, b, difference, se, p, n_clusters, ...) with what they say.
+
+    Behind `p` stand p_holm, verdict, detectable and detectable_holm, as `Comparison` explains.
+    """
+    n_tests = int(table["p"].notna().sum())
+    judged = table.assign(p_holm=holm(table["p"]))
+    judged["verdict"] = [_verdict(row, measure, n_tests) for row in judged.to_dict("records")]
+    levels = {"detectable": _LEVEL, "detectable_holm": _LEVEL / max(n_tests, 1)}
+    for name, level in levels.items():
+        judged[name] = detectable(table["se"], table["n_clusters"], level, measure.most_apart)
+    columns = [str(name) for name in table]
+    after = columns.index("p") + 1
+    return judged[[*columns[:after], "p_holm", "verdict", *levels, *columns[after:]]]
 
 
-def _flips(
-    samples: Samples, pair: NDArray[np.intp], names: tuple[str, str], what: Comparable
-) -> pd.DataFrame:
-    """Samples that one of two sides alone got wholly right."""
-    both = samples.has[pair].all(axis=0)
-    a, b = what.measure.scale * np.nan_to_num(what.measure.value(samples.counts[pair][:, both]))
-    table = samples.keys[both].assign(a=names[0], b=names[1], value_a=a, value_b=b)
-    table["right"] = np.where(a == what.measure.best, *names)
-    rows = table.loc[(a == what.measure.best) != (b == what.measure.best), _FLIPPED]
-    return rows.sort_values(["right", *_KEYS])
+def _verdict(row: Mapping[Any, Any], measure: Measure, n_tests: int) -> str:
+    if np.isnan(row["difference"]):
+        return "nothing to compare"
+    if np.isnan(row["p_holm"]):
+        return "cannot tell: a single base scene"
+    if row["p_holm"] >= _LEVEL:
+        # So few base scenes give no p value that the correction leaves below the level.
+        too_few = n_tests * least_p(row["n_clusters"]) >= _LEVEL
+        return "too few base scenes to tell" if too_few else "cannot tell"
+    a_is_better = (row["difference"] > 0) == (measure.better == "higher")
+    return f"{row['a' if a_is_better else 'b']} is better"
+
+
+def ranks(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:
+    """Return the ranks that each model may have, the best first: model, value, best, worst.
+
+    Out of a table that compares every pair of its models as a whole; empty for any other.
+    """
+    whole = table[table["part"] == table["part"].iloc[-1]] if len(table) else table
+    names = list(dict.fromkeys([*whole["a"], *whole["b"]]))
+    n, columns = len(names), ["model", "value", "best", "worst"]
+    if len(whole) != n * (n - 1) // 2 or whole["p"].isna().any():
+        return pd.DataFrame(columns=columns)
+    is_better, values = np.zeros((n, n), dtype=bool), dict.fromkeys(names, np.nan)
+    for row in whole.to_dict("records"):
+        a, b = names.index(row["a"]), names.index(row["b"])
+        a_is_better = (row["difference"] > 0) == (measure.better == "higher")
+        is_better[(a, b) if a_is_better else (b, a)] = row["p_holm"] < _LEVEL
+        values |= {row["a"]: row["value_a"], row["b"]: row["value_b"]}
+    ranges = rank_ranges(is_better)
+    rows = [(name, values[name], *ranges[place]) for place, name in enumerate(names)]
+    is_ascending = measure.better == "lower"
+    return pd.DataFrame(rows, columns=columns).sort_values(
+        "value", ascending=is_ascending, ignore_index=True, kind="stable"
+    )
 
 
 def compare_view(found: Comparison) -> TextTable:

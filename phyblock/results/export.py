@@ -19,8 +19,7 @@ from phyblock.models.request import Image
 from phyblock.records.files import read_prompts, read_records, record_types
 from phyblock.records.record import PictureMark, PromptMessage, Record
 from phyblock.resources import needs
-from phyblock.results.estimates import check_numbers, track_measures
-from phyblock.results.load import TOKENS, Run
+from phyblock.results.load import TOKENS, Run, track_measures
 from phyblock.results.text import to_csv
 from phyblock.sim.pictures import PictureStyle
 from phyblock.tracks.pictures import Workshop
@@ -127,8 +126,6 @@ def _counts(run: Run, record: Record) -> dict[str, float | None]:
             if counted.sample is not None:
                 names = [f"count_{counted.name}_{column}" for column in counted.columns]
                 numbers = record.counts.get(counted.name, ()) if record.track == track else ()
-                if numbers:
-                    check_numbers(counted, len(numbers), record.sample)
                 found |= dict(zip(names, numbers or [None] * len(names), strict=True))
     return found
 

@@ -33,7 +33,7 @@ from phyblock.results.estimates import (
     main_values,
 )
 from phyblock.results.load import Run
-from phyblock.results.tables import cost_frame, filled, layouts_of
+from phyblock.results.tables import cost_frame, filled
 from phyblock.results.text import between, escape, level_name, number
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of
@@ -233,8 +233,9 @@ def levels(run: Run, *, track: str) -> Figure | None:
 
 def shares(run: Run, *, track: str, table: str) -> Figure | None:
     """Stacked shares of a table, a row a model, of all cells together; None without a share."""
-    layout, report = layouts_of(track)[table], kind_of(track).report()
-    frame, whole = filled(run, track, layout).frame, report.cells(run)[-1].name
+    report = kind_of(track).report()
+    layout = report.tables[table]
+    frame, whole = filled(run, track, layout).frame, run.cells(track)[-1].name
     if frame.empty:
         return None
     if layout.rows == "cell":
@@ -327,21 +328,13 @@ def sensitivity(run: Run, *, track: str) -> Figure | None:
     return _finished(figure, run, f"{kind_of(track).title}: what the way of asking changes", how)
 
 
-_STACKED = {
-    "full_planning": ("errors", "losses"),
-    "step_planning": ("moves",),
-    "pose_planning": ("pose_errors",),
-}
-"""Tables whose shares are drawn, by track."""
-
-
 def figures_of(run: Run) -> dict[str, Callable[[Run], Figure | None]]:
     """Return what draws each figure that a run may have, by name."""
     found: dict[str, Callable[[Run], Figure | None]] = {}
     for track in run.design.suite.tracks:
         dashed = track.replace("_", "-")
         found[f"levels-{dashed}"] = partial(levels, track=track)
-        for table in _STACKED.get(track, ()):
+        for table in [n for n, one in kind_of(track).report().tables.items() if one.drawn]:
             found[table.replace("_", "-")] = partial(shares, track=track, table=table)
         found[f"cost-{dashed}"] = partial(cost, track=track)
         found[f"sensitivity-{dashed}"] = partial(sensitivity, track=track)
@@ -392,9 +385,9 @@ def _captions(run: Run, name: str, figure: Figure) -> dict[str, str]:
     """Return the caption as text, and a LaTeX float, which spans both columns if it is wide."""
     title, _, subtitle = str(figure.get_label()).partition("\n")
     tracks = run.design.suite.tracks
-    words = [word for track in tracks for word in kind_of(track).report().showing(run)]
+    words = [word for track in tracks for word in run.presentation(track)]
     sentences = [title, subtitle[:1].upper() + subtitle[1:]]
-    sentences += [", ".join(dict.fromkeys((*words, *run.varied_words)))]
+    sentences += [", ".join(dict.fromkeys(words))]
     text = " ".join(f"{sentence}." for sentence in sentences if sentence)
     star = "*" if figure.get_figwidth() > COLUMN_IN + 0.1 else ""
     lines = (

@@ -1,4 +1,4 @@
-"""A run as data frames: its design, one row a sample, one row a score."""
+"""A run as data frames: its design, one row a sample, and the counts that measures are made of."""
 
 from __future__ import annotations
 
@@ -14,23 +14,22 @@ from numpy.typing import NDArray
 
 from phyblock.config.suite import Suite
 from phyblock.errors import Problem, SpecError
-from phyblock.records.files import record_types, run_records
+from phyblock.records.files import run_records
 from phyblock.records.manifest import MANIFEST, Manifest, ManifestModel, read_manifest, suite_of
-from phyblock.records.record import Record, Score
-from phyblock.results.text import level_name
-from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES
-from phyblock.tracks.measures import Cell
+from phyblock.records.record import Record
+from phyblock.registry import added_measures
+from phyblock.scoring.counts import Floats
+from phyblock.tracks.base import kind_of
+from phyblock.tracks.measures import Cell, Measure, SampleCounts, Way
 from phyblock.types import WITHOUT_REPLY
 
 if TYPE_CHECKING:
     from phyblock.results.compare import Comparison
 
-OVERALL = "overall"
-"""Name of the row that pools the scenes of all levels."""
 TOKENS = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
 """Columns that count tokens."""
 _OF_RECORD = {
-    **dict.fromkeys(("sample", "track", "model", "scene", "item"), "object"),
+    **dict.fromkeys(("sample", "track", "model", "scene", "item", "group", "part"), "object"),
     **dict.fromkeys(("levels", "parents"), "object"),
     **{"n_blocks": "Int64", "seed": "int64", "outcome": "object"},
 }
@@ -48,115 +47,114 @@ _TYPES = {
     **{f"error_{name}": kind for name, kind in _OF_ERROR.items()},
     **{"rule": "object", "start": "int64"},
 }
-"""Columns that records of all tracks have; each track adds its own. `start` is where the record
-begins in `records.jsonl` [bytes]."""
-_LABELS = ("criterion", "matcher", "setting")
-_BLOCKS = tuple(f"blocks_{name}" for name in BLOCK_OUTCOMES)
-_COUNTS = ("tp", "fp", "fn", *ERROR_TYPES, *_BLOCKS, *Score.FURTHER)
+"""Columns of `Run.records` with their types. `start` is where the record begins in
+`records.jsonl` [bytes]."""
 
 
-class _Reader:
-    """The columns of a run while its records are read."""
+def track_measures(track: str) -> tuple[Measure, ...]:
+    """Return the measures of a track, those that were added behind its own.
+
+    Raises ValueError where two measures, or two sorts of counts, have one name.
+    """
+    measures = (*kind_of(track).report().measures, *added_measures(track))
+    for named in (measures, {measure.counted for measure in measures}):
+        names = [one.name for one in named]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise ValueError(f"two measures or counts of {track} are called {', '.join(twice)}")
+    return measures
+
+
+@dataclass(frozen=True, eq=False)
+class Counted:
+    """Counts of a name in a track: one row a sample and way of scoring it.
+
+    `row` is that of its record in `Run.records`, `way` its place in `ways`; `widths` are the
+    lengths of `numbers` that records hold, one where all were counted by the same measure.
+    """
+
+    row: NDArray[np.intp]
+    way: NDArray[np.intp]
+    ways: Sequence[Way]
+    numbers: Floats
+    widths: frozenset[int]
+
+
+class _Column:
+    """Counts of a name while records are read."""
 
     def __init__(self) -> None:
-        self._types = dict(_TYPES)
-        for kind in record_types():
-            self._types.update(kind.columns)
-        self._columns: dict[str, list[Any]] = {name: [] for name in self._types}
-        self._shared: dict[Any, Any] = {}
-        self._owners, self._labels, self._counts = array("i"), array("i"), array("f")
-        self._numbers: dict[str, tuple[array[int], array[int], array[float]]] = {}
+        self.owners, self.ways, self.numbers = array("i"), array("h"), array("d")
+        self.known: dict[Way, int] = {}
+        self.widths: set[int] = set()
 
-    def add(self, record: Record, start: int) -> None:
-        """Take in a record, which begins at `start` [bytes]."""
-        row = len(self._columns["sample"])
-        reply, error, parse = record.reply, record.error, record.parse
-        rule = parse.get("rule") if isinstance(parse, dict) else getattr(parse, "rule", None)
-        values = {
-            **{name: getattr(record, name) for name in _OF_RECORD},
-            "variant": record.way.key,
-            **{name: getattr(reply, name, None) for name in _OF_REPLY},
-            **{name: getattr(reply and reply.usage, name, None) for name in TOKENS},
-            "paid_usd": reply and record.paid_usd,
-            **{f"error_{name}": getattr(error, name, None) for name in _OF_ERROR},
-            "rule": None if rule is None else str(rule),
-            "start": start,
-            **record.row(),
-        }
-        for name, column in self._columns.items():
-            value = values.get(name)
+    def add(self, owner: int, way: Way, numbers: Sequence[float]) -> None:
+        """Take in the numbers of a record."""
+        self.owners.append(owner)
+        self.ways.append(self.known.setdefault(way, len(self.known)))
+        self.numbers.extend(numbers)
+        self.widths.add(len(numbers))
+
+    def placed(self, rows: NDArray[np.intp]) -> Counted:
+        """Return the counts by row; records that a newer one replaced have row -1."""
+        row, way = rows[np.asarray(self.owners)], np.asarray(self.ways, dtype=np.intp)
+        numbers = np.asarray(self.numbers)
+        if len(self.widths) == 1:
+            order = np.argsort(row, kind="stable")
+            order = order[row[order] >= 0]
+            row, way, numbers = row[order], way[order], numbers.reshape(len(row), -1)[order]
+        return Counted(row, way, tuple(self.known), numbers, frozenset(self.widths))
+
+
+def frames_of(
+    records: Iterable[tuple[Record, int]], design: Design
+) -> tuple[pd.DataFrame, dict[tuple[str, str], Counted]]:
+    """Return `Run.records` and `Run.counts` of records and where they begin [bytes].
+
+    The newest record of a sample stands for it. Order and types do not depend on the file.
+    """
+    columns: dict[str, list[Any]] = {name: [] for name in _TYPES}
+    counts: dict[tuple[str, str], _Column] = {}
+    taken: dict[str, list[SampleCounts]] = {}
+    shared: dict[Any, Any] = {}
+    for owner, (record, start) in enumerate(records):
+        for name, value in _values(record, start).items():
             is_shared = isinstance(value, (str, tuple)) and name != "sample"
-            column.append(self._shared.setdefault(value, value) if is_shared else value)
-        for score in record.scores:
-            errors: Mapping[Any, float] = score.errors or {}
-            blocks: Mapping[Any, float] = score.blocks or {}
-            labels = (score.criterion, score.matcher or "", score.setting)
-            self._owners.append(row)
-            self._labels.append(self._shared.setdefault(("labels", labels), len(self._shared)))
-            counts: list[float] = [score.tp, score.fp, score.fn]
-            counts += [errors.get(name, np.nan) for name in ERROR_TYPES]
-            counts += [blocks.get(name, np.nan) for name in BLOCK_OUTCOMES]
-            self._counts.extend([*counts, np.nan if score.kept is None else score.kept])
+            columns[name].append(shared.setdefault(value, value) if is_shared else value)
+        track = record.track
+        if track not in taken:
+            known = dict.fromkeys(measure.counted for measure in track_measures(track))
+            taken[track] = [counted for counted in known if counted.rows is not None]
+        for counted in taken[track]:
+            for way, numbers in counted.of(record):
+                counts.setdefault((track, counted.name), _Column()).add(owner, way, numbers)
         for name, numbers in record.counts.items():
-            empty = (array("i"), array("i"), array("d"))
-            owners, lengths, held = self._numbers.setdefault(name, empty)
-            owners.append(row)
-            lengths.append(len(numbers))
-            held.extend(numbers)
-
-    def frames(self, models: Sequence[str]) -> tuple[pd.DataFrame, pd.DataFrame, Stored]:
-        """Return `records`, `scores` and `counts` of a run; call it once.
-
-        The newest record of a sample stands for it. Order and types do not depend on the file.
-        """
-        place = {name: n for n, name in enumerate(models)}
-        newest = {sample: row for row, sample in enumerate(self._columns["sample"])}
-        names = ("track", "model", "scene", "seed", "sample")
-        track, model, scene, seed, sample = (self._columns[name] for name in names)
-        order = sorted(
-            newest.values(),
-            key=lambda n: (track[n], place.get(model[n], len(place)), model[n], scene[n], seed[n],
-                           sample[n]),
-        )  # fmt: skip
-        rows = np.full(len(sample), -1, dtype=np.int32)
-        rows[order] = np.arange(len(order))
-        columns = {}
-        for name, kind in self._types.items():
-            held, values = self._columns.pop(name), np.empty(len(order), dtype=object)
-            values[:] = [held[n] for n in order]
-            columns[name] = pd.Series(values, dtype=kind, copy=False)
-        owners, kept = _placed(rows, self._owners)
-        counts = (
-            np.frombuffer(self._counts, np.float32) if self._counts else np.zeros(0, np.float32)
-        )
-        scores = pd.DataFrame(counts.reshape(-1, len(_COUNTS))[kept], columns=list(_COUNTS))
-        codes = np.asarray(self._labels, dtype=np.intp)[kept]
-        known = {code: key[1] for key, code in self._shared.items() if key[:1] == ("labels",)}
-        used, codes = np.unique(codes, return_inverse=True)
-        for n, name in enumerate(_LABELS):
-            label = [known[number][n] for number in used.tolist()]
-            categories = pd.Index(sorted(set(label)), dtype="object")
-            own = categories.get_indexer(pd.Index(label))[codes.reshape(-1)]
-            labels = pd.Categorical.from_codes(own.tolist(), categories)
-            scores.insert(n, name, pd.Series(labels))
-        scores.insert(0, "row", owners)
-        stored = {}
-        for name, (of, lengths, numbers) in self._numbers.items():
-            stored[name] = (rows[np.asarray(of)], np.asarray(lengths), np.asarray(numbers))
-        return pd.DataFrame(columns, copy=False), scores, stored
+            if numbers:
+                counts.setdefault((track, name), _Column()).add(owner, ("", "", ""), numbers)
+    frame = pd.DataFrame({name: pd.Series(columns.pop(name), dtype=kind)
+                          for name, kind in _TYPES.items()})  # fmt: skip
+    rows = np.full(len(frame), -1, dtype=np.intp)
+    place = {name: n for n, name in enumerate(design.model_names)}
+    frame = frame.drop_duplicates("sample", keep="last")
+    frame["place"] = [place.get(name, len(place)) for name in frame["model"]]
+    frame = frame.sort_values(["track", "place", "model", "scene", "seed", "sample"])
+    rows[frame.index] = np.arange(len(frame))
+    frame = frame.drop(columns="place").reset_index(drop=True)
+    return frame, {key: column.placed(rows) for key, column in counts.items()}
 
 
-Stored = Mapping[str, tuple[NDArray[Any], NDArray[Any], NDArray[Any]]]
-"""By name of counts: the row of each record that has them (-1: a newer one replaced it), how many
-numbers it has, and these, one after another."""
-
-
-def _placed(rows: NDArray[np.int32], owners: array[int]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return the rows of owners that were kept, ascending, and the places where they stand."""
-    of = rows[np.asarray(owners, dtype=np.intp)]
-    places = np.argsort(of, kind="stable")
-    places = places[of[places] >= 0]
-    return of[places], places
+def _values(record: Record, start: int) -> dict[str, Any]:
+    reply, error, parse = record.reply, record.error, record.parse
+    rule = parse.get("rule") if isinstance(parse, dict) else getattr(parse, "rule", None)
+    return {
+        **{name: getattr(record, name) for name in _OF_RECORD},
+        "variant": record.way.key,
+        **{name: getattr(reply, name, None) for name in _OF_REPLY},
+        **{name: getattr(reply and reply.usage, name, None) for name in TOKENS},
+        "paid_usd": reply and record.paid_usd,
+        **{f"error_{name}": getattr(error, name, None) for name in _OF_ERROR},
+        "rule": None if rule is None else str(rule),
+        "start": start,
+    }
 
 
 @dataclass(frozen=True)
@@ -183,33 +181,18 @@ class Design:
         return frozenset(model.name for model in self.models if model.is_baseline)
 
     @property
-    def published(self) -> dict[str, str]:
-        """Names in the paper of the models that it knows; Table 1 need not have a row of it."""
-        return {model.name: model.published for model in self.models if model.published}
-
-    @property
     def of_suite(self) -> str:
         """The suite as captions of tables end in it, `, suite NAME`; "" where it has no name."""
         return f", suite {self.suite.name}" if self.suite.name else ""
 
     def samples(self, track: str) -> int:
         """Samples that a complete run holds of one model in a track."""
-        return self.items.get(track, 0) * self.repeats
+        return self.items.get(track, 0) * len(self.suite.seeds) * self.suite.vary.n_variants
 
     @property
     def all_samples(self) -> int:
         """Samples that a complete run holds."""
         return len(self.models) * sum(self.samples(track) for track in self.suite.tracks)
-
-    @property
-    def repeats(self) -> int:
-        """Number of samples of an item and model: with every seed, in every way."""
-        return len(self.suite.seeds) * self.suite.vary.n_variants
-
-    @property
-    def levels(self) -> tuple[str, ...]:
-        """Level names in ascending order, then `overall`."""
-        return (*(str(level) for level in sorted(self.suite.levels)), OVERALL)
 
     @property
     def matcher(self) -> str:
@@ -226,19 +209,14 @@ class Design:
         """Outcomes whose samples enter no score under the policy on missing replies."""
         return frozenset(WITHOUT_REPLY) if self.suite.scoring.missing == "skip" else frozenset()
 
-    def criterion(self, level: str) -> str:
-        """The criterion that scores a level.
-
-        Level 1 has its own. `overall` counts every scene once by `aov`, or by the Level-1
-        criterion where no other level was run.
-        """
-        is_level1 = level == "1" or (level == OVERALL and set(self.suite.levels) == {1})
-        return self.suite.scoring.level1 if is_level1 else "aov"
-
 
 def design_of(manifest: Manifest, where: str = MANIFEST) -> Design:
     """Return the design of a run; StoreError naming `where` and every field that is wrong."""
     return Design(suite_of(manifest, where), manifest.models, manifest.items, manifest.scenes)
+
+
+_SHOWN_AS = {"circular": "circular", "blind": "blind", "wrong_image": "pictures of another scene"}
+"""Options of a track's section of a suite, in words for captions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,20 +224,16 @@ class Run:
     """A run folder, read: `manifest` is its `run.yaml`, `design` the plan in it.
 
     `records` has one row a sample: track, model, scene, levels, parents, n_blocks, seed, outcome,
-    tokens, cost_usd, latency_s and so on, and the error. `scores` has one row a sample (the `row`
-    of its record), criterion, matcher ("" where a criterion knows none) and setting with the counts
-    tp, fp, fn, the four error types, what became of the goal's blocks and the steps that the
-    nearest valid order keeps (NaN where there are none). `counts` are those of other measures.
-    `is_cut` says that the last line was cut off by a kill and therefore ignored. `made` keeps
-    frames that are made once.
+    tokens, cost_usd, latency_s and so on, and the error. `counts` are those of its measures, by
+    track and name. `is_cut` says that the last line was cut off by a kill and therefore ignored.
+    `made` keeps frames that are made once.
     """
 
     path: Path
     manifest: Manifest = field(repr=False)
     design: Design = field(repr=False)
     records: pd.DataFrame = field(repr=False)
-    scores: pd.DataFrame = field(repr=False)
-    counts: Stored = field(repr=False)
+    counts: Mapping[tuple[str, str], Counted] = field(repr=False)
     is_cut: bool = False
     made: dict[str, pd.DataFrame] = field(default_factory=dict, repr=False, init=False)
 
@@ -279,7 +253,6 @@ class Run:
         Columns have the short name of a track, or its name, and then `_lo` and `_hi`.
         """
         from phyblock.results.estimates import main_values
-        from phyblock.tracks.base import kind_of
 
         table = pd.DataFrame(index=pd.Index(self.design.model_names, name="model"))
         for track in self.design.suite.tracks:
@@ -315,64 +288,23 @@ class Run:
             return compare_models(self, models, track, measure)
         return compare_runs(self, other, models, track, measure)
 
-    def controls(self, section: str) -> tuple[str, ...]:
-        """Return, in words for captions, the controls that a section of the suite sets."""
-        held = self.manifest.suite.get(section) or {}
-        words = {"blind": "blind", "wrong_image": "pictures of another scene"}
-        as_json = self.design.suite.answer_format == "json_schema"
-        form = ("answers asked for as JSON",) if as_json else ()
-        return (*(text for name, text in words.items() if held.get(name)), *form)
+    def cells(self, track: str) -> tuple[Cell, ...]:
+        """Return the cells of a track, of which the last stands for all."""
+        return kind_of(track).report().cells(self.design.suite, self.manifest)
 
-    def showing(self, section: str) -> tuple[str, ...]:
-        """Return, in words for captions, what is unusual about how scenes were shown."""
-        suite = self.design.suite
-        varied = "candidate_order" in suite.vary.factors
-        is_shuffled = suite.candidates.order == "shuffled" and not varied
-        order = ("candidates shuffled",) if is_shuffled else ()
-        return (*order, *self.controls(section))
-
-    @property
-    def varied_words(self) -> tuple[str, ...]:
-        """The number of ways in which each item was asked, in words, where there are several."""
-        n = self.design.suite.vary.n_variants
-        return (f"asked in {n:,} ways",) if n > 1 else ()
-
-    def counted_rows(self, track: str) -> pd.Index[int]:
-        """Return the places in `records` of the samples of a track that count.
-
-        Under `missing: skip`, missing replies and API errors are left out.
-        """
-        is_left_out = self.records["outcome"].isin(self.design.outcomes_left_out)
-        return self.records.index[(self.records["track"] == track) & ~is_left_out]
-
-    def counted(self, track: str) -> pd.DataFrame:
-        """Return the records of a track that count, with their places in `records` as `row`."""
-        rows = self.counted_rows(track)
-        return self.records.loc[rows].assign(row=rows)
-
-    def scored(self, track: str, counts: Sequence[str]) -> pd.DataFrame:
-        """Return these counts of the scores of a track's samples that count."""
-        rows = self.scores["row"].isin(self.counted_rows(track))
-        return self.scores.loc[rows, ["row", *_LABELS, *counts]]
-
-    def level_cells(self) -> tuple[Cell, ...]:
-        """Return the levels of the suite as cells, then all scenes together."""
-        return tuple(Cell(level, level_name(level)) for level in self.design.levels)
-
-    def in_levels(self, rows: pd.DataFrame) -> dict[str, NDArray[np.bool_]]:
-        """Return, by level, which rows of counts enter it: those of its scenes, by its criterion.
-
-        Levels that the suite does not run are left out.
-        """
-        codes, held = pd.factorize(self.records["levels"].to_numpy())
-        codes = codes[self.records.index.get_indexer(pd.Index(rows["row"]))]
-        found = {}
-        for level in self.design.levels:
-            has = np.array([level == OVERALL or int(level) in one for one in held], dtype=bool)
-            found[level] = has[codes]
-            if "criterion" in rows:
-                found[level] &= (rows["criterion"] == self.design.criterion(level)).to_numpy()
-        return found
+    def presentation(self, track: str) -> tuple[str, ...]:
+        """Return, in words for captions, what is unusual about how items were shown and asked."""
+        suite, kind = self.design.suite, kind_of(track)
+        held = self.manifest.suite.get(kind.section[0] if kind.section else "") or {}
+        is_shuffled = "candidate_order" in kind.varies and suite.candidates.order == "shuffled"
+        words = ["candidates shuffled"] * (
+            is_shuffled and "candidate_order" not in suite.vary.factors
+        )
+        words += [text for name, text in _SHOWN_AS.items() if held.get(name)]
+        words += ["options on one sheet"] * (held.get("options_as") == "letters")
+        words += ["answers asked for as JSON"] * (suite.answer_format == "json_schema")
+        n = suite.vary.n_variants
+        return (*words, *([f"asked in {n:,} ways"] if n > 1 else []))
 
 
 def load_run(path: str | Path) -> Run:
@@ -389,19 +321,6 @@ def load_run(path: str | Path) -> Run:
     return Run(folder, manifest, design, *frames, lines.is_cut)
 
 
-def frames_of(
-    records: Iterable[tuple[Record, int]], design: Design
-) -> tuple[pd.DataFrame, pd.DataFrame, Stored]:
-    """Return `Run.records`, `scores` and `counts` of records and where they begin [bytes].
-
-    A later record of a sample replaces an earlier one.
-    """
-    reader = _Reader()
-    for record, start in records:
-        reader.add(record, start)
-    return reader.frames(design.model_names)
-
-
 def of_models(run: Run, models: Sequence[str]) -> Run:
     """Return the run as if it had these models alone, in its own order; all where none are named.
 
@@ -413,9 +332,7 @@ def of_models(run: Run, models: Sequence[str]) -> Run:
     chosen = checked_models(run, models)
     kept = tuple(model for model in run.design.models if model.name in chosen)
     records = run.records[run.records["model"].isin(chosen)]
-    scores = run.scores[run.scores["row"].isin(records.index)]
-    design = replace(run.design, models=kept)
-    return replace(run, design=design, records=records, scores=scores)
+    return replace(run, design=replace(run.design, models=kept), records=records)
 
 
 def checked_models(run: Run, models: Sequence[str]) -> Sequence[str]:

@@ -10,10 +10,9 @@ import numpy as np
 import pandas as pd
 
 from phyblock.results.estimates import headline_rows, pooled_in, track_estimates
-from phyblock.results.load import OVERALL, Run
+from phyblock.results.load import Run
 from phyblock.results.text import Column, Table, TextTable, number
-from phyblock.tracks.base import kind_of
-from phyblock.tracks.measures import CELL
+from phyblock.tracks.measures import CELL, OVERALL
 
 _SETTING = "A"
 """The setting of every number in Table 1."""
@@ -95,7 +94,10 @@ def published_frame(run: Run, table: int) -> pd.DataFrame:
     printed = printed.rename(
         columns={"model": "published_name", "value": "published", "level": CELL}
     )
-    names = pd.DataFrame(list(design.published.items()), columns=["model", "published_name"])
+    names = pd.DataFrame(
+        [(m.name, m.published) for m in design.models if m.published],
+        columns=["model", "published_name"],
+    )
     cells = names.astype("object").merge(printed, on="published_name")
     rows = pd.DataFrame(columns=["model", CELL, "metric", "ours", "n"])
     if paper.track in design.suite.tracks and (table != 5 or len(design.suite.seeds) > 1):
@@ -143,7 +145,7 @@ def _ours(run: Run, table: int) -> pd.DataFrame:
         # A mean over a part of what the paper averages is not the same number.
         from phyblock.tracks.vqa_results import ALL_CELLS
 
-        cells = kind_of(paper.track).report().cells(run)
+        cells = run.cells(paper.track)
         asked = {cell.name: pooled_in(cell, cells) for cell in cells}
         whole = {cell.name: pooled_in(cell, ALL_CELLS) for cell in ALL_CELLS}
         rows.loc[rows[CELL].map(asked) != rows[CELL].map(whole), "ours"] = np.nan
@@ -174,7 +176,7 @@ def beside_paper(run: Run, table: int) -> Table | None:
     if len(compared):
         largest = number(compared.abs().max(), 3)
         notes.insert(0, f"Largest absolute difference of {len(compared)} cells: {largest}.")
-    headings = {cell.name: cell.heading for cell in kind_of(paper.track).report().cells(run)}
+    headings = {cell.name: cell.heading for cell in run.cells(paper.track)}
     columns = (Column(kind, headings.get(cell, cell)) for cell in cells for kind in kinds)
     head = (Column("Model", is_text=True), Column("", is_text=True), *columns)
     caption = f"Our numbers beside the paper's Table {table}{run.design.of_suite} (%)"

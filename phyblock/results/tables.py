@@ -6,18 +6,16 @@ import math
 from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
-import yaml
 
 from phyblock.files import OutFolder
 from phyblock.registry import added_measures
 from phyblock.results.compare import sensitivity_frame, sensitivity_view
 from phyblock.results.estimates import (
+    HeadlineColumn,
     all_estimates,
     headline_columns,
     headline_floors,
@@ -27,9 +25,9 @@ from phyblock.results.estimates import (
     main_measure,
     main_values,
     track_estimates,
-    track_measures,
+    track_notes,
 )
-from phyblock.results.load import TOKENS, Run, load_run
+from phyblock.results.load import TOKENS, Run, load_run, track_measures
 from phyblock.results.paper import beside_paper, is_as_published
 from phyblock.results.text import (
     NO_VALUE,
@@ -47,7 +45,7 @@ from phyblock.results.text import (
 )
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of, kinds
-from phyblock.tracks.measures import CELL, HeadlineColumn, Measure
+from phyblock.tracks.measures import CELL, Layout, LayoutColumn, Measure
 from phyblock.types import OUTCOMES, Outcome
 
 TABLES = "tables"
@@ -65,37 +63,6 @@ HEADINGS: dict[Outcome, str] = {
 
 
 @dataclass(frozen=True)
-class LayoutColumn:
-    """Columns of a table: a measure each, in one cell or in each.
-
-    `measures` are names, with headings where a column is not headed as its measure. `cell` is the
-    one that is shown, the last of the track where it is left out; with `cells: each`, all are.
-    `show` gives the value, the ends of the interval, or both. `group` heads neighbors; in it, in
-    headings and in `key`, the name in CSV files, `{cell}`, `{group}`, `{level}`, `{measure}` and
-    `{criterion}` stand for what a column is of.
-    """
-
-    measures: Mapping[str, str] | Sequence[str] = ()
-    cells: str = "one"
-    cell: str = ""
-    criterion: str = ""
-    group: str = ""
-    show: str = "value"
-    key: str = "{measure}"
-    digits: int = 1
-
-
-@dataclass(frozen=True)
-class Layout:
-    """A table: a row a model; by `rows`, a row a model and cell, or one a model and measure."""
-
-    caption: str
-    columns: Sequence[LayoutColumn]
-    rows: str | Sequence[str] = "model"
-    notes: Sequence[str] = ()
-
-
-@dataclass(frozen=True)
 class _Shown:
     """A column of numbers: what it is of ("" for what the row says), and how it is shown."""
 
@@ -108,17 +75,6 @@ class _Shown:
     digits: int
 
 
-@cache
-def layouts_of(track: str) -> Mapping[str, Layout]:
-    """Return the layouts of a track's tables by name; {} for a track that has none of its own."""
-    path = files("phyblock.results") / "layouts" / f"{track}.yaml"
-    held = yaml.safe_load(path.read_text(encoding="utf-8")) if path.is_file() else {}
-    return {
-        name: Layout(**{**one, "columns": [LayoutColumn(**column) for column in one["columns"]]})
-        for name, one in held.items()
-    }
-
-
 def _layouts(run: Run, track: str) -> Mapping[str, Layout]:
     """Return the layouts of a track, of one that has none its headline under the track's name."""
     kind, added = kind_of(track), added_measures(track)
@@ -127,7 +83,7 @@ def _layouts(run: Run, track: str) -> Mapping[str, Layout]:
                      show="both", key="{cell}_{measure}")
         for one in headline_columns(run, track)
     ]  # fmt: skip
-    own = layouts_of(track) or {track: Layout(kind.title, columns)}
+    own = kind.report().tables or {track: Layout(kind.title, columns)}
     if not added:
         return own
     notes = [f"{m.heading}: {m.meaning}; over {m.over}; {m.better} is better." for m in added]
@@ -139,8 +95,7 @@ def _layouts(run: Run, track: str) -> Mapping[str, Layout]:
 def filled(run: Run, track: str, layout: Layout) -> Table:
     """Fill a layout with the estimates of a track in the headline setting and matcher."""
     measures = {measure.name: measure for measure in track_measures(track)}
-    report = kind_of(track).report()
-    cells = {cell.name: cell for cell in report.cells(run)}
+    cells = {cell.name: cell for cell in run.cells(track)}
     known: dict[tuple[str, ...], Mapping[Hashable, Any]] = {}
     for row in headline_rows(track_estimates(run, track), run.design).to_dict("records"):
         key = (str(row["model"]), str(row["measure"]), str(row[CELL]))
@@ -178,9 +133,8 @@ def filled(run: Run, track: str, layout: Layout) -> Table:
             rows.append(tuple(texts))
     head = [Column("Model", is_text=True)]
     head += [Column("", is_text=True)] if layout.rows != "model" else []
-    words = (*report.showing(run), *run.varied_words)
-    caption = captioned(f"{layout.caption}{run.design.of_suite}", words)
-    notes = (*report.notes(run), *layout.notes, *_sample_notes(run, track))
+    caption = captioned(f"{layout.caption}{run.design.of_suite}", run.presentation(track))
+    notes = (*track_notes(run, track), *layout.notes, *_sample_notes(run, track))
     frame = pd.DataFrame(numbers, columns=None if numbers else ["model"])
     columns = (*head, *(one.column for one in shown))
     return Table(frame, TextTable(caption, columns, tuple(rows), notes))
@@ -193,23 +147,22 @@ def _shown(
     there: set[tuple[str, str]],
 ) -> Iterator[_Shown]:
     """Return the columns of a layout; of each cell, those that have an estimate."""
-    last = list(cells)[-1]
     of_rows = [] if isinstance(layout.rows, str) else list(layout.rows)
     for spec in layout.columns:
-        headings = spec.measures if isinstance(spec.measures, Mapping) else {}
+        headings = spec.headings
         names = list(spec.measures) or [""]
-        places = [spec.cell or last]
+        places = [cell.name for cell in spec.places([*cells.values()])]
         if spec.cells == "each":
             asked = list(spec.measures) or of_rows
-            places = [cell for cell in cells if any((name, cell) in there for name in asked)]
+            places = [cell for cell in places if any((name, cell) in there for name in asked)]
         for place in places:
             for name in names:
-                cell = cells.get(place, cells[last])
+                cell = cells[place]
                 about = {"cell": cell.heading, "group": cell.group, "measure": name}
                 about |= {"level": f"level{place}" if place.isdigit() else place}
                 about |= {"criterion": spec.criterion}
                 measure = measures[name or of_rows[0]]
-                heading = headings.get(name, measure.heading if name else "").format(**about)
+                heading = (headings.get(name) or (measure.heading if name else "")).format(**about)
                 group, unit = spec.group.format(**about), measure.unit or "Value"
                 if spec.show == "both" and not group:
                     heading, group = unit, heading
@@ -402,7 +355,7 @@ def write_tables(path: str | Path) -> TablesWritten:
 
 def table_files() -> tuple[str, ...]:
     """Return every file of tables that a run folder may hold, by its name in it."""
-    names = [name for track in kinds() for name in layouts_of(track) or (track,)]
+    names = [name for track in kinds() for name in kinds()[track].report().tables or (track,)]
     names += [*(f"{track}_measures" for track in kinds()), *_FURTHER]
     made = (f"{TABLES}/{name}.{form}" for form in ("csv", "md", "tex") for name in names)
     return (f"{TABLES}/estimates.csv", *made)
@@ -506,8 +459,7 @@ def headline_table(run: Run, track: str, coverage: pd.DataFrame) -> TextTable:
         rows.append((str(rank) if has_rank else "", model, *cells))
     names = ["95 % CI", *(one.heading for one in columns[1:])] + ["Samples"] * is_short
     head = (Column("#", is_text=True), Column("Model", is_text=True), Column(main.heading))
-    words = (*kind.report().showing(run), *run.varied_words)
-    caption = captioned(f"{kind.title}{run.design.of_suite}{unit}", words)
+    caption = captioned(f"{kind.title}{run.design.of_suite}{unit}", run.presentation(track))
     return TextTable(caption, (*head, *map(Column, names)), tuple(rows))
 
 

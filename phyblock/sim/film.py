@@ -61,12 +61,16 @@ def _gif(images: Sequence[Image.Image], each_ms: int, last_ms: int, colorful: Im
 
 @dataclass(frozen=True)
 class FilmStep:
-    """One frame: its caption and tone, the candidate that it is about, and the blocks then."""
+    """One frame: its caption and tone, the candidate that it is about, and the blocks then.
+
+    `note` has no room in a picture.
+    """
 
     caption: str
     tone: Tone
     candidate: int | None
     blocks: tuple[Block, ...]
+    note: str = ""
 
 
 def episode_images(

@@ -25,7 +25,7 @@ from phyblock.tracks.base import Opening, SceneTrack, SingleTrack
 from phyblock.tracks.baselines import Picking, candidate_choices
 from phyblock.tracks.goal_blind import BlindGuesses
 from phyblock.tracks.items import examples_of, file_plan
-from phyblock.tracks.measures import Measure, SampleCounts
+from phyblock.tracks.measures import SampleCounts
 from phyblock.tracks.prompts import OfficialPrompt, Prompt
 from phyblock.types import PlanParser
 
@@ -219,29 +219,14 @@ def pose_counts(item: Any, judged: Any) -> tuple[int, int, int, int]:
     return sum(first), len(first), sum(later), len(later)
 
 
-def _gap(sums: Floats) -> Floats:
+def pose_gap(sums: Floats) -> Floats:
+    """Return the difference of the two shares of `POSE_COUNTS`."""
     return np.asarray(ratio_of(sums[..., :2]) - ratio_of(sums[..., 2:]))
 
 
 POSE_COUNTS = SampleCounts(
     "poses", ("first_right", "first_n", "later_right", "later_n"), sample=pose_counts
 )
-POSE_MEASURES = (
-    Measure(
-        "pose_first", "Right pose, listed first", POSE_COUNTS, lambda s: ratio_of(s[..., :2]),
-        "kinds named in the right pose, of those whose right pose is listed first among others",
-        over="kinds",
-    ),
-    Measure(
-        "pose_later", "Right pose, listed later", POSE_COUNTS, lambda s: ratio_of(s[..., 2:]),
-        "the same, of those of which a wrong pose is listed first", over="kinds",
-    ),
-    Measure(
-        "pose_gap", "Listed first less later", POSE_COUNTS, _gap,
-        "what is won by the place in the list: nothing, for a model that goes by the picture",
-        better="lower", over="kinds", is_difference=True,
-    ),
-)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -1,34 +1,40 @@
-"""Measures of a track, the cells that they are pooled in, and what results show of them."""
+"""Measures of a track: counts of samples, the cells that they are summed in, values of the sums.
+
+Beside a track's module stands a YAML file of its name with its headline, notes, measures and
+tables, which are data: `read_report` joins it with the counts.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+import yaml
 
-from phyblock.scoring.counts import Floats, mean_of, ratio_of
+from phyblock.scoring.counts import mean_of, ratio_of
 from phyblock.scoring.plan import ERROR_TYPES
 
 if TYPE_CHECKING:
-    import pandas as pd
-
+    from phyblock.config.suite import Suite
     from phyblock.data import AssemblyTask, Dataset
-    from phyblock.records.record import Record
-    from phyblock.results.load import Design, Run
-    from phyblock.results.text import TextTable
+    from phyblock.records.manifest import Manifest
+    from phyblock.records.record import Record, Score
     from phyblock.scoring.counts import Metric
     from phyblock.sim.film import FilmStep
 
+Way = tuple[str, str, str]
+"""Setting, matcher and criterion that a sample was scored by; "" where there is no choice."""
 SCORED_BY = ("setting", "matcher", "criterion")
-"""Columns that say how a sample was scored; "" where its track knows no such choice."""
+"""Columns of the parts of a `Way`."""
 CELL = "cell"
-"""Column of the cell that a row of counts is pooled in."""
-
+"""Column of the cell that samples are summed in."""
+OVERALL = "overall"
+"""The name of the cell of all samples."""
 Better = Literal["higher", "lower"]
 Unit = Literal["%", "cm", "degrees", "steps", "blocks", ""]
 
@@ -37,34 +43,74 @@ Unit = Literal["%", "cm", "degrees", "steps", "blocks", ""]
 class Cell:
     """A part of what a track asks about, as a level or a subtask: a column of its tables.
 
-    Samples of a cell are pooled. Where `of` names other cells, it is the unweighted mean of these
-    instead, and has no value where one of them has none.
+    Samples of a cell are summed, where they are scored by several criteria those of its own. Where
+    `of` names other cells, it is the unweighted mean of these instead, and has no value where one
+    of them has none.
     """
 
     name: str
     heading: str
     group: str = ""
     of: tuple[str, ...] = ()
+    criterion: str = ""
+
+
+WHOLE = Cell(OVERALL, "Overall")
+"""The one cell of a track that has no parts."""
+
+
+def level_cells(suite: Suite, _: Manifest) -> tuple[Cell, ...]:
+    """Return the levels of a suite, then all scenes; Level 1 alone is scored without an order."""
+    level1 = suite.scoring.level1
+    levels = [
+        Cell(str(n), f"Level {n}", criterion=level1 if n == 1 else "aov")
+        for n in sorted(suite.levels)
+    ]
+    whole = level1 if set(suite.levels) == {1} else "aov"
+    return (*levels, Cell(OVERALL, "Overall", criterion=whole))
 
 
 @dataclass(frozen=True)
 class SampleCounts:
-    """Counts of samples, from which one or several measures are made.
+    """Counts of samples, one for each of the `columns`, from which measures are made.
 
-    `frame` makes them out of a run: a row a sample and way of counting it, with the columns `row`
-    (of the sample's record), those of `SCORED_BY` where they tell ways apart, and one of each name
-    in `columns`. Samples that the run leaves out have no row. Instead of it, `sample` counts one
-    sample when its reply is judged: it is given the item that was asked about and the track's
-    judgement of the reply (or the episode that was played), and its numbers, one of each name in
-    `columns`, are kept in the record. Where
-    it returns None, the sample is not counted. `cells` are its own where they are not the track's.
+    `sample` counts when a reply is judged: it is given the item that was asked about and the
+    track's judgement of the reply (or the episode that was played), and its numbers are kept in the
+    record; None: the sample is not counted. Instead of it, `rows` takes them from a record as it is
+    read, once for each way of scoring it. `cells` are its own where they are not the track's.
+
+    With `parts`, the samples of one group, as the rotations of a question, count as one, right only
+    if all of so many are. `alike` names fields of `run.yaml` that decide the counts: runs that
+    differ in one cannot be compared.
     """
 
     name: str
     columns: tuple[str, ...]
-    frame: Callable[[Run], pd.DataFrame] | None = None
     sample: Callable[[Any, Any], Sequence[float] | None] | None = None
+    rows: Callable[[Any], Iterable[tuple[Way, Sequence[float]]]] | None = None
     cells: tuple[Cell, ...] = ()
+    parts: Callable[[Suite], int] | None = None
+    alike: tuple[str, ...] = ()
+
+    def of(self, record: Record) -> Iterable[tuple[Way, Sequence[float]]]:
+        """Yield the numbers of a record with the way in which it was scored."""
+        if self.rows is not None:
+            yield from self.rows(record)
+        elif numbers := record.counts.get(self.name):
+            yield ("", "", ""), numbers
+
+
+def each_score(
+    count: Callable[[Score], Sequence[float] | None],
+) -> Callable[[Record], Iterator[tuple[Way, Sequence[float]]]]:
+    """Return the `rows` of counts that are taken from each score of a record, unless None."""
+
+    def rows(record: Record) -> Iterator[tuple[Way, Sequence[float]]]:
+        for score in record.scores:
+            if (numbers := count(score)) is not None:
+                yield (score.setting, score.matcher or "", score.criterion), numbers
+
+    return rows
 
 
 @dataclass(frozen=True)
@@ -73,9 +119,9 @@ class Measure:
 
     `value` makes it of summed counts, shape (..., columns of `counted`), NaN where it is not
     defined. `heading`, `meaning` and `over` (what is counted) are for people; `unit` "%" stands for
-    values in [0, 1] that tables show times 100. `chance` says what guessing gives in a cell,
-    `floors` names baselines that never see the goal. One that `is_difference` of two shares may be
-    below zero. Values in another unit are from 0 to `most` where that is given, infinity for none.
+    values in [0, 1] that tables show times 100. `chance` says what guessing gives in a cell that is
+    no mean. One that `is_difference` of two shares may be below zero. Values in another unit are
+    from 0 to `most` where that is given, infinity for none.
     """
 
     name: str
@@ -86,8 +132,7 @@ class Measure:
     unit: Unit = "%"
     better: Better = "higher"
     over: str = "samples"
-    chance: Callable[[Run, str], float] | None = None
-    floors: tuple[str, ...] = ()
+    chance: Callable[[Suite, str], float] | None = None
     is_difference: bool = False
     most: float | None = None
 
@@ -97,14 +142,9 @@ class Measure:
         return in_unit(self.heading, self.unit)
 
     @property
-    def is_share(self) -> bool:
-        """True if values are parts of a whole, which bounds their intervals."""
-        return self.unit == "%" and not self.is_difference
-
-    @property
     def end_of_range(self) -> float:
         """The end of the range of values, which begins at 0; NaN for no range."""
-        if self.is_share:
+        if self.unit == "%" and not self.is_difference:
             return 1.0
         return math.nan if self.most is None else self.most
 
@@ -126,37 +166,23 @@ class Measure:
         return self.scale * (2 if self.is_difference else 1) if self.unit == "%" else math.inf
 
 
-def share(
-    counted: SampleCounts,
-    parts: str | tuple[str, ...],
-    whole: str,
-    heading: str,
-    *,
-    name: str = "",
-    unit: Unit = "%",
-    ratio: Metric | None = None,
-    **about: Any,
-) -> Measure:
-    """Return the measure of a part of a whole: the sum of some columns over that of another.
-
-    In another unit than "%" it is a mean, which has no upper end. `ratio` divides another way.
-    """
-    columns = [parts] if isinstance(parts, str) else list(parts)
-    places = [counted.columns.index(column) for column in columns]
-    end = counted.columns.index(whole)
-    divide = ratio or (ratio_of if unit == "%" else mean_of)
-
-    def value(sums: Floats) -> Floats:
-        pair = np.stack([sums[..., places].sum(axis=-1), sums[..., end]], axis=-1)
-        return divide(pair)
-
-    about = {"over": whole, **({} if unit == "%" else {"most": math.inf}), **about}
-    return Measure(name or columns[0], heading, counted, value, unit=unit, **about)
-
-
 def in_unit(heading: str, unit: str) -> str:
-    """A heading with the unit of the values below it in brackets, where they have one."""
+    """Return a heading with the unit of the values below it in brackets, where they have one."""
     return f"{heading} ({unit})" if unit else heading
+
+
+def share_of(columns: Sequence[str], part: Sequence[str], whole: Sequence[str]) -> Metric:
+    """Return the metric that divides the sum of some columns by that of others."""
+    parts, wholes = ([columns.index(name) for name in names] for names in (part, whole))
+    return lambda sums: ratio_of(
+        np.stack([sums[..., parts].sum(axis=-1), sums[..., wholes].sum(axis=-1)], axis=-1)
+    )
+
+
+def mean_per(columns: Sequence[str], part: Sequence[str], whole: Sequence[str]) -> Metric:
+    """Return the metric of a mean, which may be more than 1: one column by another."""
+    places = [columns.index(name) for name in (*part, *whole)]
+    return lambda sums: mean_of(sums[..., places])
 
 
 class ListedScore(NamedTuple):
@@ -170,7 +196,7 @@ class ListedScore(NamedTuple):
 
 @dataclass(frozen=True)
 class Listing:
-    """A score that samples of a track can be listed by.
+    """A score that the page of a run lists samples by.
 
     `name` is what people choose, as the name of a setting. `errors` are the types that its wrong
     steps may have. `score` is of a record, None where it was not scored so. Its parts are counts of
@@ -183,83 +209,138 @@ class Listing:
     is_counted: bool = True
 
 
-def by_settings(design: Design) -> tuple[Listing, ...]:
-    """The settings of a suite, the headline's first, each by the headline matcher."""
-    return tuple(
-        Listing(setting, ERROR_TYPES, partial(_scored, setting, design.matcher))
-        for setting in design.suite.settings
-    )
+def by_settings(suite: Suite) -> tuple[Listing, ...]:
+    """Return the settings of a suite, the headline's first, each by the headline matcher."""
+    matcher = suite.scoring.matchers[0]
+    return tuple(Listing(name, ERROR_TYPES, partial(_listed, name, matcher))
+                 for name in suite.settings)  # fmt: skip
 
 
-def _scored(setting: str, matcher: str, record: Record) -> ListedScore | None:
+def _listed(setting: str, matcher: str, record: Record) -> ListedScore | None:
     scores = [score for score in record.scores if score.setting == setting]
-    headline = [score for score in scores if score.matcher == matcher]
-    for score in headline or scores:
+    for score in [score for score in scores if score.matcher == matcher] or scores:
         errors = [name for name, count in (score.errors or {}).items() if count]
         return ListedScore(score.tp, score.fp, score.fn, errors)
     return None
 
 
 @dataclass(frozen=True)
-class HeadlineColumn:
-    """A measure in a cell, as a column of a headline table.
+class LayoutColumn:
+    """Columns of a table: a measure each, in one cell or in several.
 
-    `criterion` says how it is counted, where one measure is counted in several ways.
+    `measures` are names, with headings where a column is not headed as its measure. `cells` are
+    `one` (`cell`, the last of the track where it is left out), `each`, `parts` (each but the last)
+    or `means` (parts that are means of others). `show` gives the value, the ends of the interval,
+    or both. `group` heads neighbors; in it, in headings and in `key`, the name in CSV files,
+    `{cell}`, `{group}`, `{level}`, `{measure}` and `{criterion}` stand for what a column is of. In
+    a headline, models are ranked by the column that is `main`, else by the last.
     """
 
-    measure: str
-    cell: str
-    heading: str
+    measures: Mapping[str, str] | Sequence[str] = ()
+    cells: Literal["one", "each", "parts", "means"] = "one"
+    cell: str = ""
     criterion: str = ""
+    group: str = ""
+    show: Literal["value", "interval", "both"] = "value"
+    key: str = "{measure}"
+    digits: int = 1
+    main: bool = False
+
+    @property
+    def headings(self) -> dict[str, str]:
+        """The measures with their headings, "" for those headed by their own."""
+        if isinstance(self.measures, Mapping):
+            return dict(self.measures)
+        return dict.fromkeys(self.measures, "")
+
+    def places(self, cells: Sequence[Cell]) -> list[Cell]:
+        """Return the cells that it has columns for, of those of a track."""
+        if self.cells == "one":
+            return [cell for cell in cells if cell.name == self.cell] or [cells[-1]]
+        parts = cells if self.cells == "each" else cells[:-1]
+        return [cell for cell in parts if self.cells != "means" or cell.of]
 
 
 @dataclass(frozen=True)
-class EpisodeView:
-    """The views of a record step by step: as a table, and as frames of a film."""
+class Layout:
+    """A table: a row a model; by `rows`, a row a model and cell, or one a model and measure.
 
-    table: Callable[[Any], TextTable]
-    frames: Callable[[Any, AssemblyTask], Iterable[FilmStep]]
+    `drawn` says that its shares are a figure as well.
+    """
 
-
-WHOLE = Cell("overall", "Overall")
-"""The one cell of a track that has no parts."""
-
-
-def _in_whole(rows: pd.DataFrame, _: Run) -> Mapping[str, NDArray[np.bool_]]:
-    """All samples in one cell."""
-    return {WHOLE.name: np.ones(len(rows), dtype=bool)}
+    caption: str
+    columns: Sequence[LayoutColumn]
+    rows: str | Sequence[str] = "model"
+    notes: Sequence[str] = ()
+    drawn: bool = False
 
 
 @dataclass(frozen=True)
 class TrackReport:
     """The measures of a track, and what is shown of them.
 
-    `cells` are those of a run, the last of which stands for all; `in_cells` says by
-    pooled cell which rows of counts are in it. `headline` chooses
-    the columns of the headline table, the first measure in every cell where it is left out; the
-    column headed `main`, else the last, is the one that models are ranked by. `notes` say how its
-    values are counted. `short` is the name of the column that stands for the track in a summary.
+    `cells` are those of a suite and its run, the last of which stands for all. `headline` are the
+    columns that models are ranked by, where it is empty the first measure in every cell. `notes`
+    say how its values are counted: Jinja templates that are given the `suite`, the `spec` (the
+    track's section of it) and the `manifest`; those that come out empty are left out. `floors`
+    names baselines that never see the goal, `short` the column of `Run.summary`.
 
-    `check_alike` raises SpecError where the first run cannot be compared with the second in these
-    cells by a measure.
-    `part_names` say what `Record.part` stands for. `items` opens, for the page of a run, what was
-    asked about where that is more than scenes, and gives of a record what has a `question` as it
-    was shown; it raises DataError where that is not what the run was made on.
-    `episodes` shows records that are episodes. `listings` are the scores that the page of a run
-    lists samples by, the one that the headline leads with first.
-    `showing` says, in words that end every caption, what is unusual about how items were shown.
+    `part_names` say what `Record.part` stands for. `items` opens, for the page of a run in a
+    folder, what was asked about where that is more than scenes, and gives of a record what has a
+    `question` as it was shown; it raises DataError where that is not what the run was made on.
+    `film` shows a record step by step: a frame for the start, one a step, and one for the end,
+    without blocks where no task is given. `listings` are scores beside those by settings.
     """
 
     measures: tuple[Measure, ...]
-    cells: Callable[[Run], tuple[Cell, ...]] = lambda _: (WHOLE,)
-    in_cells: Callable[[pd.DataFrame, Run], Mapping[str, NDArray[np.bool_]]] = _in_whole
-    headline: Callable[[Run], tuple[HeadlineColumn, ...]] | None = None
-    main: str = ""
+    cells: Callable[[Suite, Manifest], tuple[Cell, ...]] = lambda *_: (WHOLE,)
+    headline: tuple[LayoutColumn, ...] = ()
+    tables: Mapping[str, Layout] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    floors: tuple[str, ...] = ()
     short: str = ""
-    notes: Callable[[Run], Sequence[str]] = lambda _: ()
-    check_alike: Callable[[Run, Run, Sequence[str], Measure], None] | None = None
     part_names: Mapping[str, str] = field(default_factory=dict)
-    items: Callable[[Run, Dataset], Callable[[Record], Any | None]] | None = None
-    episodes: EpisodeView | None = None
-    listings: Callable[[Design], tuple[Listing, ...]] = by_settings
-    showing: Callable[[Run], tuple[str, ...]] = lambda _: ()
+    items: Callable[[Path, Manifest, Dataset], Callable[[Record], Any | None]] | None = None
+    film: Callable[[Any, AssemblyTask | None], Iterator[FilmStep]] | None = None
+    listings: tuple[Listing, ...] = ()
+
+    def heading(self, kind: str, name: str) -> str:
+        """Return the heading of the measure `<kind>_<name>`, of none the name in plain words."""
+        plain = name.replace("_", " ").capitalize()
+        return next((m.heading for m in self.measures if m.name == f"{kind}_{name}"), plain)
+
+
+def read_report(
+    track: str,
+    counts: Iterable[SampleCounts],
+    values: Mapping[str, Metric] | None = None,
+    **more: Any,
+) -> TrackReport:
+    """Return the report of a track: its YAML file, joined with what is code.
+
+    Measures stand in groups that share fields. Each is the sum of the columns in `part` (by default
+    the column of its name) over that of `whole`, a mean where its unit is not "%" or it says so,
+    or one of the `values`.
+    """
+    told = yaml.safe_load(Path(__file__).with_name(f"{track}.yaml").read_text(encoding="utf-8"))
+    by_name, measures = {counted.name: counted for counted in counts}, []
+    for group in told.pop("measures"):
+        for name, own in group.pop("of").items():
+            about = {**group, **own}
+            counted, is_mean = by_name[about.pop("counts")], about.pop("mean", False)
+            part, whole = ([n] if isinstance(n, str) else n or [] for n in
+                           (about.pop("part", name), about.pop("whole", None)))  # fmt: skip
+            about.setdefault("over", *whole[:1])
+            if about.get("unit", "%") != "%":
+                is_mean, about = True, {"most": math.inf, **about}
+            value = (values or {}).get(name)
+            value = value or (mean_per if is_mean else share_of)(counted.columns, part, whole)
+            measures.append(Measure(name, counted=counted, value=value, **about))
+    for name in ("headline", "notes"):
+        told[name] = tuple(told[name])
+    told["headline"] = tuple(LayoutColumn(**column) for column in told["headline"])
+    told["tables"] = {
+        name: Layout(**{**one, "columns": [LayoutColumn(**column) for column in one["columns"]]})
+        for name, one in told["tables"].items()
+    }
+    return TrackReport(tuple(measures), **told, **more)

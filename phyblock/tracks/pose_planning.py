@@ -72,7 +72,7 @@ from phyblock.sim.geometry import (
 from phyblock.sim.pictures import PictureStyle, goal_style
 from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
 from phyblock.stable import plain_sum
-from phyblock.tracks.base import CARRYING, Opening, SceneTrack, SingleTrack, engine_identity
+from phyblock.tracks.base import CARRYING, ENGINE, Opening, SceneTrack, SingleTrack, engine_identity
 from phyblock.tracks.baselines import NumberField, Pick, Picking, candidate_choices
 from phyblock.tracks.full_planning import PlanParse, score_fields
 from phyblock.tracks.items import ShownTask, file_plan
@@ -311,6 +311,7 @@ def _plan(setting: Setting, _: Any, judged: Any) -> tuple[int, int, int] | None:
     return None if counts is None else (counts.tp, counts.fp, counts.fn)
 
 
+_ALIKE = tuple(f"tracks.pose_planning.{key}" for key in (CARRYING, ENGINE))
 RIGHT = SampleCounts(
     "poses",
     (*(f"{frame}_{cm:g}" for frame in POSE_FRAMES for cm in TOLERANCES_CM), "steps", "blocks"),
@@ -321,14 +322,16 @@ CARRIED = SampleCounts(
     "carried",
     (*STEP_ENDS, "steps", "reached", "blocks", "iou", "completed", "plans"),
     sample=_carried_counts,
+    alike=_ALIKE,
 )
-ERRORS = SampleCounts("pose_errors", (*POSE_ERRORS, "steps"), sample=_errors)
-PLANS = {
-    setting: SampleCounts(
-        f"plan_{setting.lower()}", ("tp", "fp", "fn"), sample=partial(_plan, setting)
-    )
-    for setting in SETTINGS
-}
+ERRORS = SampleCounts("pose_errors", (*POSE_ERRORS, "steps"), sample=_errors, alike=_ALIKE)
+COUNTS = (
+    *(RIGHT, FITS, CARRIED, ERRORS),
+    *(
+        SampleCounts(f"plan_{setting.lower()}", ("tp", "fp", "fn"), sample=partial(_plan, setting))
+        for setting in SETTINGS
+    ),
+)
 
 
 def _in_c(record: Record) -> ListedScore | None:
@@ -806,7 +809,7 @@ class PosePlanning(SceneTrack, SingleTrack[AssemblyTask]):
     baselines = POSE_RULES
     by_hand = staticmethod(pick_poses)
     record = PoseRecord
-    counted = (RIGHT, FITS, CARRIED, ERRORS, *PLANS.values())
+    counted = COUNTS
     varies = ("prompt", "background", "candidate_order", "repeats")
     no_examples = "one would need the floor and the sheet of blocks of a scene of its own"
     drawn_here = "the floor is ruled in pictures that are drawn here"

@@ -143,13 +143,6 @@ class ChoiceRecord(Record):
     answer: GivenAnswer | None = None
     """What was answered."""
 
-    columns: ClassVar[Mapping[str, str]] = {
-        "question": "object",
-        "subtask": "object",
-        "rotation": "Int64",
-        "right": "object",
-        "given": "object",
-    }
     exported: ClassVar[Mapping[str, str]] = {
         "question_id": "string",
         "question_subtask": "string",
@@ -159,12 +152,6 @@ class ChoiceRecord(Record):
         "answer_given": "string",
         "answer_correct": "boolean",
     }
-
-    def row(self) -> Mapping[str, Any]:
-        """The question, the letters that are right and those given."""
-        about = {name: getattr(self.question, name) for name in ("subtask", "rotation")}
-        letters = {name: getattr(self.answer, name, None) for name in ("right", "given")}
-        return {"question": self.question.id, **about, **letters}
 
     def export_row(self) -> Mapping[str, Any]:
         """The question, the right answer, and the one that was given."""
@@ -178,6 +165,11 @@ class ChoiceRecord(Record):
     def part(self) -> str:
         """The subtask."""
         return self.question.subtask
+
+    @property
+    def group(self) -> str:
+        """The question, of which every rotation is a sample."""
+        return self.question.id
 
     @property
     def is_correct(self) -> bool | None:

@@ -152,12 +152,6 @@ class EpisodeRecord(Record):
     turns: tuple[EpisodeTurn, ...] = ()
     """Every request, with its reply and what came of it."""
 
-    columns: ClassVar[Mapping[str, str]] = {"ending": "object", "outcomes": "object"}
-
-    def row(self) -> Mapping[str, Any]:
-        """The course of the episode."""
-        return {"ending": self.ending, "outcomes": tuple(self.outcomes)}
-
     exported: ClassVar[Mapping[str, str]] = {"ending": "string"}
 
     def export_row(self) -> Mapping[str, Any]:

@@ -27,9 +27,9 @@ from phyblock.results.estimates import (
     main_column,
     main_measure,
     track_estimates,
-    track_measures,
+    track_notes,
 )
-from phyblock.results.load import Run
+from phyblock.results.load import Run, track_measures
 from phyblock.results.tables import cost_frame, coverage_frame
 from phyblock.results.text import number as rounded
 from phyblock.text import counted
@@ -207,7 +207,7 @@ def _facts_of(
 
 def _error_shares(run: Run, track: str) -> dict[str, dict[str, float]]:
     """Return the share [%] of each type of wrong step by model, in the headline setting."""
-    cell = kind_of(track).report().cells(run)[-1].name
+    cell = run.cells(track)[-1].name
     rows = headline_rows(track_estimates(run, track), run.design)
     wanted = rows["measure"].str.startswith("wrong_") & (rows["cell"] == cell)
     found: dict[str, dict[str, float]] = {}
@@ -262,7 +262,7 @@ def board_of(
         about = {"name": track, "title": kind.title, "item": kind.item, "main": heading}
         about |= {"unit": measure.unit, "better": measure.better}
         about["best"] = None if math.isnan(measure.best) else measure.best
-        about["notes"] = list(kind.report().notes(run))
+        about["notes"] = list(track_notes(run, track))
         wrong = [one.name for one in track_measures(track) if one.name.startswith("wrong_")]
         about["errors"] = [name.removeprefix("wrong_") for name in wrong]
         floor = headline_floors(run, track).get(heading)
@@ -339,7 +339,7 @@ def _values(entry: Entry, values: AllValues) -> dict[str, list[float | None]]:
 
 def _run(one: SiteRun) -> dict[str, Any]:
     run, manifest, data = one.run, one.run.manifest, one.run.manifest.dataset
-    showing = [word for track in one.tracks for word in kind_of(track).report().showing(run)]
+    words = [word for track in one.tracks for word in run.presentation(track)]
     return {
         "suite": run.design.suite.name,
         "id": manifest.identity[:12],
@@ -349,7 +349,7 @@ def _run(one: SiteRun) -> dict[str, Any]:
         "seeds": len(run.design.suite.seeds),
         "data": data.name if data else "",
         "version": data.version if data else None,
-        "asked": list(dict.fromkeys((*showing, *run.varied_words))),
+        "asked": list(dict.fromkeys(words)),
         "phyblock": manifest.versions.get("phyblock", ""),
     }
 

@@ -36,6 +36,7 @@ from phyblock.sim.geometry import solid_mesh
 from phyblock.sim.pictures import COLOR_RGB
 from phyblock.stable import hex_digest
 from phyblock.tracks.base import kind_of, kinds
+from phyblock.tracks.measures import by_settings
 
 _LAYOUT = 6
 """Version of the scripts."""
@@ -193,7 +194,9 @@ class SampleIndex:
     def __init__(self, design: Design) -> None:
         tracks = design.suite.tracks
         self._matcher = design.matcher
-        self._listings = {name: kind_of(name).report().listings(design) for name in tracks}
+        self._listings = {
+            name: (*kind_of(name).report().listings, *by_settings(design.suite)) for name in tracks
+        }
         # A model and a track without any record are in the run as well.
         self._tracks, self._models = Numbers(tracks), Numbers(design.model_names)
         self.scenes, self.items = Numbers(), Numbers()
@@ -401,7 +404,8 @@ def open_sources(run: Run, data: Path | None) -> Sources:
     try:
         dataset = recorded_dataset(run.path, run.manifest, data)
         openers = {name: kind_of(name).report().items for name in run.design.suite.tracks}
-        items = {name: opener(run, dataset) for name, opener in openers.items() if opener}
+        facts = (run.path, run.manifest, dataset)
+        items = {name: opener(*facts) for name, opener in openers.items() if opener}
         return Sources({task.scene.id: task for task in dataset.tasks}, items)
     except DataError as error:
         if data is not None:

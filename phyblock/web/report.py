@@ -63,7 +63,7 @@ def _part_groups(run: Run, track: str) -> dict[str, dict[str, Any]]:
     report = kind_of(track).report()
     return {
         cell.name: {"title": cell.heading, "of": list(cell.of)}
-        for cell in report.cells(run)
+        for cell in run.cells(track)
         if cell.of and all(name in report.part_names for name in cell.of)
     }
 

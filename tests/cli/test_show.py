@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from PIL import Image
 from phyblock.data import read_builtin
 from phyblock.records.files import read_records
 from phyblock.tracks.step_planning import EpisodeRecord
-from phyblock.tracks.step_planning_results import OUTCOME_NAMES, REPORT
+from phyblock.tracks.step_planning_results import REPORT
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.vqa_set import questions, vqa_suite, write_questions
@@ -59,7 +60,7 @@ def test_an_episode_is_shown_step_by_step(played: Workspace) -> None:
     done = played.phyblock("show", "out", f"oracle/seesaw/s{fallen}", "--gif", gif, "--size", "128")
     assert (done.code, done.err) == (0, "")
     assert "Collapsed" in done.out
-    assert ["2", "Move(3)", "Placed"] in [line.split()[:3] for line in done.out.splitlines()]
+    assert ["2.", "Move(3):", "Placed"] in [line.split()[:3] for line in done.out.splitlines()]
     assert "3 yellow cuboid3" in done.out
     with Image.open(gif) as frames:
         assert frames.n_frames == 4
@@ -69,21 +70,17 @@ def test_an_episode_is_shown_step_by_step(played: Workspace) -> None:
         assert frames.convert("RGB").crop((262, 17, 390, 145)).tobytes() != before
 
 
-def test_frames_tell_of_steps_what_tables_do(played: Workspace) -> None:
+def test_a_film_tells_the_outcome_of_each_step_and_the_end(played: Workspace) -> None:
     (task,) = read_builtin(played.root / "data").tasks
     for record in read_records(played.root / "out"):
         assert isinstance(record, EpisodeRecord)
-        _, *frames, last = REPORT.episodes.frames(record, task)
-        outcomes = [row[2] for row in REPORT.episodes.table(record).rows]
-        assert all(
-            frame.caption.endswith(f": {outcome}")
-            for frame, outcome in zip(frames, outcomes, strict=True)
-            if outcome != "Done"
-        )
-        assert set(outcomes) <= set(OUTCOME_NAMES.values())
+        _, *frames, last = REPORT.film(record, task)
+        for frame, outcome in zip(frames, record.outcomes, strict=True):
+            heading = REPORT.heading("step", outcome)
+            assert frame.caption.endswith("Done" if outcome == "done" else f": {heading}")
         turns = tuple(turn.model_copy(update={"outcome": "empty"}) for turn in record.turns)
-        unread = record.model_copy(update={"turns": turns})
-        assert {row[2] for row in REPORT.episodes.table(unread).rows} == {"Empty"}
+        _, *unread, _ = REPORT.film(record.model_copy(update={"turns": turns}), None)
+        assert all(frame.caption.endswith(": Empty") for frame in unread)
         assert last.caption.startswith(f"{record.progress[-1]} of 3 blocks placed; ended: ")
 
 
@@ -120,14 +117,12 @@ def test_a_plan_is_shown_from_its_prompt_to_its_verdicts(workspace: Workspace) -
     done = workspace.phyblock("show", "out", "alpha/t3", env={"COLUMNS": "80"})
     assert (done.code, done.err) == (0, "")
     assert max(map(len, done.out.splitlines())) <= 80
-    order = [
-        done.out.index(text) for text in ("\nPrompt (", "\nReply\n", "\nRead\n", " blocks placed\n")
-    ]
+    parts = ("\nPrompt (", "\nReply\n", "\nRead\n", "\n1. block ", " blocks placed\n")
+    order = [done.out.index(text) for text in parts]
     assert order == sorted(order)
     assert record["reply"]["text"].splitlines()[0] in done.out
     assert " ".join(map(str, record["parse"]["plan"])) in done.out
-    rows = [line.split() for line in done.out[order[-1] :].splitlines()]
-    steps = [row[1] for row in rows if row and row[0].isdigit()]
+    steps = re.findall(r"^\d+\. block (\d+): ", done.out, re.MULTILINE)
     assert steps == [str(candidate) for candidate in record["parse"]["plan"]]
 
 

@@ -158,7 +158,7 @@ def test_runs_that_cannot_be_compared_are_refused() -> None:
     other = record("alpha", "000", scores=[score(4, 0, 5)]) | {"n_blocks": 9}
     with pytest.raises(SpecError, match="other blocks in 1 scene, the first 000"):
         compare_runs(first, one_seed(other, models=["alpha"]))
-    with pytest.raises(SpecError, match="was not scored as run was, by optimal"):
+    with pytest.raises(SpecError, match="is not scored by optimal, as is run"):
         compare_runs(first, one_seed(models=["alpha"], matchers=["paper"]))
     with pytest.raises(SpecError, match="no model in common"):
         compare_runs(first, one_seed(models=["beta"]))
@@ -177,7 +177,7 @@ def test_level_1_is_compared_by_one_criterion_alone() -> None:
     other = one_seed(
         *plans("alpha", {"001": 4, "002": 4}), models=["alpha", "beta"], level1="membership"
     )
-    with pytest.raises(SpecError, match="was not scored as run was, by selection"):
+    with pytest.raises(SpecError, match="is not scored by selection, as is run"):
         compare_runs(first, other)
     second = one_seed(*plans("alpha", {"001": 4, "002": 4}), models=["alpha"], levels=[2, 3])
     table = compare_runs(first, second).table.set_index("part")

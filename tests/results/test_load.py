@@ -44,10 +44,12 @@ def test_records_have_one_row_a_sample_and_scores_one_a_score(tmp_path: Path) ->
     failed = run.records.iloc[1]
     assert (failed["error_kind"], failed["error_status"]) == ("retryable", 429)
     assert pd.isna(failed["attempts"])
-    assert run.scores[["row", "criterion", "matcher", "tp"]].values.tolist() == [
-        [0, "aov", "optimal", 4],
-        [2, "aov", "optimal", 2],
-        [2, "selection", "", 3],
+    steps = run.counts["full_planning", "steps"]
+    ways = [steps.ways[n] for n in steps.way]
+    assert list(zip(steps.row, ways, steps.numbers[:, 0], strict=True)) == [
+        (0, ("A", "optimal", "aov"), 4),
+        (2, ("A", "optimal", "aov"), 2),
+        (2, ("A", "", "selection"), 3),
     ]
     assert run.path == tmp_path / "run"
     assert run.manifest.scenes == 5
@@ -62,7 +64,6 @@ def test_the_order_of_records_changes_nothing(
     random.shuffle(shuffled)
     left, right = (run_of(one, manifest()) for one in (records, shuffled))
     pd.testing.assert_frame_equal(left.records, right.records)
-    pd.testing.assert_frame_equal(left.scores, right.scores)
     pd.testing.assert_frame_equal(left.estimates, right.estimates)
 
 
@@ -71,7 +72,6 @@ def test_the_order_of_records_changes_nothing(
 def test_columns_and_types_do_not_depend_on_the_records(records: list[dict[str, object]]) -> None:
     some, none = (run_of(one, manifest()) for one in (records, []))
     assert some.records.dtypes.to_dict() == none.records.dtypes.to_dict()
-    assert some.scores.dtypes.astype(str).to_dict() == none.scores.dtypes.astype(str).to_dict()
 
 
 @laws

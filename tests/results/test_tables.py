@@ -14,18 +14,18 @@ from hypothesis import strategies as st
 
 from phyblock.files import LIST
 from phyblock.results.compare import compare_models, write_comparison
-from phyblock.results.estimates import all_estimates, track_measures
+from phyblock.results.estimates import all_estimates
 from phyblock.results.figures import Look, write_paper_figures
-from phyblock.results.load import Run, load_run
+from phyblock.results.load import Run, load_run, track_measures
 from phyblock.results.tables import (
     coverage_frame,
-    layouts_of,
     make_tables,
     summary_of,
     table_files,
     write_tables,
 )
 from phyblock.results.text import NO_VALUE, number
+from phyblock.tracks.base import kind_of
 from phyblock.types import OUTCOMES
 from tests.results.test_estimates import complete, episode, episodes, questions
 from tests.web.factory import laws, manifest, record, record_lists, run_of, score, write_run
@@ -42,7 +42,7 @@ def shown_numbers(run: Run, track: str) -> int:
         ends = (scales[one["measure"]] * one[end] for end in ("value", "lo", "hi"))
         known.setdefault(one["model"], set()).update(round(float(end), 6) for end in ends)
     found = 0
-    for table in make_tables(run, list(layouts_of(track))).values():
+    for table in make_tables(run, list(kind_of(track).report().tables)).values():
         if "model" not in table.frame or "expected" in table.frame or "replies" in table.frame:
             continue
         assert len(table.frame) == len(table.view.rows)

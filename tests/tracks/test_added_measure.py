@@ -16,8 +16,8 @@ import pytest
 from phyblock import registry
 from phyblock.cli.main import phyblock
 from phyblock.errors import StoreError
-from phyblock.results.estimates import track_estimates, track_measures
-from phyblock.results.load import load_run
+from phyblock.results.estimates import track_estimates
+from phyblock.results.load import load_run, track_measures
 from phyblock.results.tables import write_tables
 from phyblock.run.rescore import rescore
 from phyblock.scoring.counts import ratio_of

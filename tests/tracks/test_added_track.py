@@ -24,7 +24,7 @@ from phyblock.results.estimates import main_column
 from phyblock.results.load import Run, load_run
 from phyblock.scoring.counts import mean_of, ratio_of
 from phyblock.tracks import SceneTrack, SingleTrack
-from phyblock.tracks.measures import WHOLE, HeadlineColumn, Measure, SampleCounts, TrackReport
+from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts, TrackReport
 from phyblock.web.board import SiteRun, all_values, board_of, entries_of, values_of
 from phyblock.web.pack import Sources
 from tests.servers.chassis import Running, Seen
@@ -133,9 +133,8 @@ def test_a_track_runs_from_yaml_to_the_report(
 
 def led_by(leading: Measure, *measures: Measure) -> type[Counting]:
     """The track with these measures, the leading one behind what stands first."""
-    columns = tuple(HeadlineColumn(m.name, WHOLE.name, m.heading) for m in measures)
-    main = leading.heading
-    report = replace(Counting.report(), measures=measures, headline=lambda _: columns, main=main)
+    columns = tuple(LayoutColumn({m.name: m.heading}, main=m is leading) for m in measures)
+    report = replace(Counting.report(), measures=measures, headline=columns)
     return type("Led", (Counting,), {"report": classmethod(lambda _: report)})
 
 

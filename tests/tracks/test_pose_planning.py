@@ -37,7 +37,7 @@ from phyblock.tracks.pose_planning import (
     worlds_of,
     written,
 )
-from phyblock.tracks.pose_planning_results import pose_film, pose_table
+from phyblock.tracks.pose_planning_results import REPORT
 from phyblock.types import REFUSED_ENDS, STEP_ENDS, StepEnd
 from tests.data.broken import write_scenes
 from tests.servers.chassis import Faults, Running, Seen
@@ -144,15 +144,14 @@ def test_a_reply_is_read_scored_and_carried_out(
     record = judged({**fields, **track.about(task)}, task, found)
     assert known_records().validate_json(record.as_json()) == record
     assert isinstance(record, PoseRecord)
-    frames = list(pose_film(record, task))[1:-1]
+    first, *frames = REPORT.film(record, task)
+    assert ("there is no plan: " in first.caption) == (not ends)
+    assert ("(no_plan)" in first.caption) == (text == "I cannot say.")
+    frames = frames[:-1]
     assert [frame.tone == "good" for frame in frames] == [error is None for error in errors]
     assert not any(frame.caption.endswith("stands") for frame in frames if frame.tone == "bad")
-    assert [row[4] == "overlaps" for row in pose_table(record).rows] == [
-        end == "overlaps" for end in ends
-    ]
-    notes = " ".join(pose_table(record).notes)
-    assert ("There is no plan" in notes) == (not ends)
-    assert ("(no_plan)" in notes) == (text == "I cannot say.")
+    overlaps = [frame.caption.endswith(": overlaps") for frame in frames]
+    assert overlaps == [end == "overlaps" for end in ends]
     again = asyncio.run(track.judge_apart(task, text, record))
     assert judged({**fields, **track.about(task)}, task, again) == record
 
@@ -179,7 +178,7 @@ def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(
             start, end = Pose.goal(one), Pose.goal(other)
             assert start.distance_m(end) < 0.0012
             assert start.angle_deg(end) < 1.1
-    last = list(pose_film(record, item))[-1].blocks
+    last = list(REPORT.film(record, item))[-1].blocks
     assert [block.order for block in last] == [block.order for block in worlds[-1]]
 
 
