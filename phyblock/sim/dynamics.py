@@ -22,6 +22,7 @@ from phyblock.domain import Block
 from phyblock.errors import SimulationError
 from phyblock.sim.contact import FIT_TOLERANCE_M, bounds_m, boxes_near, drop_height_m, piece_pairs
 from phyblock.sim.engine import Physics, PhysicsEngine, Pose, World, physics_engine
+from phyblock.sim.geometry import rounded, significant
 from phyblock.types import StepEnd
 
 
@@ -364,7 +365,7 @@ class Executor:
         free, given_m = _out_of_others(block, others, most_m)
         if free is None:
             return ExecutedStep("overlaps", overlap_cm=round(given_m * _CM, _DIGITS))
-        gap_m = drop_height_m(free, others)
+        gap_m = significant(drop_height_m(free, others))
         if FIT_TOLERANCE_M < gap_m <= most_m:
             x, y, z = free.position_m
             free = replace(free, position_m=(x, y, z - gap_m))
@@ -436,7 +437,7 @@ def _out_of_others(
             return None, max(moved_m, depth_m)
         if depth_m <= FIT_TOLERANCE_M:
             break
-        place = place + way
+        place = rounded(place + way)
         x, y, z = place.tolist()
         block = replace(block, position_m=(x, y, z))
     return block, float(np.linalg.norm(place - start))

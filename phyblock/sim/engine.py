@@ -31,6 +31,7 @@ from phyblock.domain.blocks import (
 )
 from phyblock.domain.scene import Block
 from phyblock.errors import InputError, Problem
+from phyblock.sim.geometry import rounded, significant
 
 Vector = tuple[float, float, float]  # x, y and z in the world.
 GRAVITY_M_S2 = 9.81
@@ -95,7 +96,8 @@ class Physics:
 
     def mass_kg(self, block_type: BlockType) -> float:
         """Mass of a block of this type [kg]."""
-        return SHAPES[block_type].mass_kg * dict(self.mass_factors).get(block_type, 1.0)
+        factor = dict(self.mass_factors).get(block_type, 1.0)
+        return significant(SHAPES[block_type].mass_kg * factor)
 
 
 class Velocity(NamedTuple):
@@ -228,9 +230,11 @@ class World:
         self._stack.close()
 
     def place(self, *blocks: Block) -> None:
-        """Put blocks at their goal poses, at rest."""
+        """Put blocks at their goal poses, at rest; last digits that machines differ in are cut."""
         for block in blocks:
-            self._simulation.add(block.order, block.type, Pose.goal(block))
+            goal = Pose.goal(block)
+            pose = Pose(rounded(goal.position_m), rounded(goal.quat_xyzw))
+            self._simulation.add(block.order, block.type, pose)
             self._blocks[block.order] = block
 
     def remove(self, order: int) -> None:

@@ -64,6 +64,11 @@ def rounded(numbers: Vectors) -> Vectors:
     return np.round(numbers, _DIGITS) + 0.0
 
 
+def significant(number: float) -> float:
+    """A number to 12 significant digits, where machines agree."""
+    return float(f"{number:.{_DIGITS}g}")
+
+
 _SMOOTH_COSINE = math.cos(math.radians(30))
 """Triangles that meet at a smaller angle are parts of one surface, flat or curved."""
 
@@ -160,6 +165,13 @@ class ConvexPiece:
 def solid_mesh(block_type: BlockType) -> Mesh:
     """The block's surface: closed, outward, every corner once, in the body frame."""
     return _mesh(SHAPES[block_type], SHAPES[block_type].profile)
+
+
+@functools.cache
+def principal_inertia_m2(block_type: BlockType) -> tuple[float, float, float]:
+    """Moments of inertia of the solid about its body axes through its center, per mass [m2]."""
+    x, y, z = map(significant, np.diag(solid_mesh(block_type).inertia_m2).tolist())
+    return x, y, z
 
 
 @functools.cache

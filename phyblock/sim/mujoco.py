@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from phyblock.domain.blocks import SHAPES, BlockType, quat_xyzw_to_matrix
 from phyblock.errors import SimulationError
 from phyblock.sim.engine import Physics, Pose, Velocity
-from phyblock.sim.geometry import collision_pieces, solid_mesh
+from phyblock.sim.geometry import collision_pieces, principal_inertia_m2, rounded
 
 _SUBSTEPS = 4
 _CONTACT_STEPS = 5.0
@@ -164,13 +164,13 @@ def _model(types: tuple[BlockType, ...], physics: Physics) -> Any:
         if not SHAPES[block_type].is_box:
             for number, piece in enumerate(collision_pieces(block_type, _INSET_M)):
                 name = f"{block_type}{number}"
-                spec.add_mesh(name=name, uservert=piece.vertices_m.ravel())
+                spec.add_mesh(name=name, uservert=rounded(piece.vertices_m).ravel())
     for block_type in types:
         mass_kg = physics.mass_kg(block_type)
         body = spec.worldbody.add_body(
             mass=mass_kg,
-            ipos=SHAPES[block_type].center_of_mass_m,
-            inertia=np.diag(solid_mesh(block_type).inertia_m2) * mass_kg,
+            ipos=rounded(np.array(SHAPES[block_type].center_of_mass_m)),
+            inertia=[mass_kg * of_axis for of_axis in principal_inertia_m2(block_type)],
             explicitinertial=True,
         )
         body.add_freejoint()

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from phyblock.domain.blocks import SHAPES, BlockType, quat_xyzw_to_matrix
 from phyblock.errors import SimulationError
 from phyblock.sim.engine import Physics, Pose, Velocity
-from phyblock.sim.geometry import collision_pieces, solid_mesh
+from phyblock.sim.geometry import collision_pieces, principal_inertia_m2, rounded, turned
 
 _MESH_MARGIN_M = 0.001
 
@@ -88,13 +88,14 @@ class _Simulation:
             baseCollisionShapeIndex=self._shapes[block_type],
             physicsClientId=self._client,
         )
-        inertia = np.diag(solid_mesh(block_type).inertia_m2) * mass_kg
+        inertia = [mass_kg * of_axis for of_axis in principal_inertia_m2(block_type)]
         self._bullet.changeDynamics(
-            body, -1, localInertiaDiagonal=inertia.tolist(), physicsClientId=self._client
+            body, -1, localInertiaDiagonal=inertia, physicsClientId=self._client
         )
         self._set_friction(body)
         offset_m = np.array(SHAPES[block_type].center_of_mass_m)
-        center_m = pose.position_m + quat_xyzw_to_matrix(pose.quat_xyzw) @ offset_m
+        offset_here_m = turned(offset_m, quat_xyzw_to_matrix(pose.quat_xyzw))
+        center_m = rounded(pose.position_m + offset_here_m)
         self._bullet.resetBasePositionAndOrientation(
             body, center_m.tolist(), pose.quat_xyzw.tolist(), physicsClientId=self._client
         )
@@ -147,7 +148,8 @@ class _Simulation:
         first = 1
         for number, piece in enumerate(collision_pieces(block_type, _MESH_MARGIN_M)):
             lines.append(f"o piece{number}")
-            lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in (piece.vertices_m - center).tolist()]
+            vertices_m = rounded(piece.vertices_m - center).tolist()
+            lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices_m]
             count = len(piece.vertices_m)
             lines += [f"f {first} {first + i} {first + i + 1}" for i in range(1, count - 1)]
             first += count

@@ -80,10 +80,9 @@ from phyblock.tracks.measures import ListedScore, Listing, SampleCounts
 from phyblock.tracks.pictures import Drawing, Pictures, Workshop, goal_of, picture_style
 from phyblock.types import SETTINGS, STEP_ENDS, Matcher, PoseRotation, Setting, StepEnd, View
 
-CARRY_VERSION = 2
-"""Version of how plans are carried out and of how what stands in the end is measured; it goes up
-where some plan may end otherwise. Before 2 everything in the world was let go together, for 5 s
-where it crept, and voxels were whole or empty.
+CARRY_VERSION = 3
+"""Version of the execution of plans and of how its end is measured; it goes up where some plan may
+end differently.
 """
 KIT_LABEL = "blocks"
 """The label of the sheet of candidates."""

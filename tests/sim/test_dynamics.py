@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -82,6 +83,34 @@ def test_the_same_scene_gives_the_same_bits_in_another_process_that_loads_engine
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
     assert (answer.stdout.strip(), answer.stderr) == (here, "")
+
+
+SHAKEN = """
+from dataclasses import replace
+import numpy as np
+from phyblock.sim.dynamics import execute
+from tests.sim.test_dynamics import BUILT_IN
+rng = np.random.default_rng(0)
+(blocks,) = (task.scene.blocks for task in BUILT_IN if task.scene.id == "l4-001-avenue")
+print(execute([
+    replace(block, position_m=tuple((block.position_m + rng.normal(0, 0.003, 3)).tolist()))
+    for block in blocks
+]))
+"""
+"""A plan that falls here and there, where a last digit decides how blocks come to lie."""
+
+
+def test_execution_depends_on_no_processor() -> None:
+    """OpenBLAS adds up in another order, and without fused operations, for an old processor."""
+
+    def printed(**more: str) -> str:
+        command, env = [sys.executable, "-c", SHAKEN], {**os.environ, **more}
+        root = Path(__file__).parents[2]
+        return subprocess.run(
+            command, cwd=root, env=env, capture_output=True, text=True, check=True
+        ).stdout
+
+    assert printed() == printed(OPENBLAS_CORETYPE="Nehalem")
 
 
 @pytest.mark.slow
