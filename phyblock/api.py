@@ -29,7 +29,7 @@ from phyblock.parsing.plan import parse_plan
 from phyblock.records.line import problems_of, worded
 from phyblock.resources import bundled
 from phyblock.results.load import Run, load_run
-from phyblock.run.estimate import spending_refused, unlimited_spending
+from phyblock.run.estimate import may_bill
 from phyblock.run.events import RunEvent, Stopping
 from phyblock.run.plan import find_models_file, find_suite, make_plan, open_dataset, prompt_dirs
 from phyblock.run.runner import RunResult, Session, check_ready
@@ -283,9 +283,12 @@ def run_suite(
     folder = plan.folder_in(Path("results")) if out is None else Path(out)
     check_ready(plan)
     asks: dict[str, Any] = {"use_cache": use_cache, "retry_failed": retry_failed}
-    if not yes and (costly := unlimited_spending(plan, folder, **asks)):
+    is_agreed = yes or plan.suite.limits.max_cost_usd is not None
+    if costly := [] if is_agreed else may_bill(plan, folder, **asks):
+        found = ", ".join(row.model.name for row in costly if row.may_cost)
         hint = "agree with yes=True, or set a limit: load_suite(NAME, 'limits.max_cost_usd=5')"
-        raise spending_refused(plan, costly, "would cost money, and nobody agreed", hint)
+        where, message = f"suite {plan.suite.name}", "would cost money, and nobody agreed"
+        raise SpecError(Problem(where, message, found=found, hint=hint))
 
     def tell(event: RunEvent) -> None:
         if isinstance(event, Stopping):

@@ -30,17 +30,16 @@ from phyblock.cli.progress import ProgressView
 from phyblock.cli.results import show_tables
 from phyblock.config.models import load_models
 from phyblock.files import OutFolder
-from phyblock.models import is_billed
+from phyblock.models.costs import price_source
 from phyblock.models.litellm_client import be_quiet
 from phyblock.results.text import NO_VALUE, Column, TextTable
-from phyblock.run.estimate import Estimate, estimate
+from phyblock.run.estimate import Estimate, estimate, may_bill
 from phyblock.run.plan import (
     RunPlan,
     asking_remarks,
     bundled_suites,
     find_models_file,
     make_plan,
-    moved_remarks,
 )
 from phyblock.run.rescore import rescore
 from phyblock.run.runner import RunResult, Session, check_ready
@@ -101,16 +100,14 @@ def run(
     known = load_models(find_models_file(models_file, loaded.files.path))
     plan = make_plan(loaded, known, only=split_names(models), limit=limit)
     folder = out or plan.folder_in(Path("results"))
-    found = held_run(folder, plan.manifest)
-    remarks = [] if found is None else moved_remarks(found, plan)
-    if found is not None:
+    if held_run(folder, plan.manifest) is not None:
         from phyblock.web.report import files_of
 
         OutFolder(folder).check(() if dry_run else files_of(page=not no_report))
     asks: dict[str, Any] = {"use_cache": not no_cache, "retry_failed": retry_failed}
     if dry_run:
         print_estimate(console, plan, estimate(plan, folder, **asks))
-    for remark in (*remarks, *asking_remarks(loaded, plan)):
+    for remark in asking_remarks(loaded, plan):
         console.print(remark, style="dim")
     if dry_run:
         return 0
@@ -128,11 +125,8 @@ def run(
 
 
 def _is_agreed(console: Console, plan: RunPlan, folder: Path, **asks: bool) -> bool:
-    billed = {model.name for model in plan.models if is_billed(model)}
-    if not billed:
-        return True
-    rows = estimate(plan, folder, **asks)
-    may_cost = [row.model for row in rows if row.may_cost and row.model in billed]
+    rows = may_bill(plan, folder, **asks)
+    may_cost = [row.model.name for row in rows if row.may_cost]
     has_limit = plan.suite.limits.max_cost_usd is not None
     return may_spend(may_cost, lambda: print_estimate(console, plan, rows), has_limit=has_limit)
 
@@ -171,28 +165,27 @@ def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) ->
     numbers = sorted({n if isinstance(n, int) else len(n) for n in examples})
     if numbers != [0]:
         facts.append(f"{' or '.join(map(str, numbers))} worked examples before each question")
-    asked = [row for row in rows if row.kind == "litellm"]
+    asked = [row for row in rows if row.model.kind == "litellm"]
     columns: dict[str, Callable[[Estimate], str]] = {
         "samples": lambda row: f"{row.samples:,}",
         "done": lambda row: f"{row.done:,}",
         "cached": lambda row: f"{row.cached:,}",
         "calls": lambda row: f"{row.calls:,}",
         "tokens in": lambda row: f"{row.prompt_tokens:,}",
-        "tokens out": lambda row: f"{row.completion_tokens:,}",
+        "tokens out": lambda row: f"{row.replies[0]:,.0f}",
         "cost": lambda row: _dollars(row.cost_usd) if row.calls else NO_VALUE,
         "at most": lambda row: _dollars(row.most_usd) if row.calls else NO_VALUE,
     }
     cells = {heading: [text(row) for row in asked] for heading, text in columns.items()}
     cells = {heading: texts for heading, texts in cells.items() if set(texts) != {"0"}}
     headings = (Column("model", is_text=True), *map(Column, cells))
-    lines = tuple(zip((row.model for row in asked), *cells.values(), strict=True))
+    lines = tuple(zip((row.model.name for row in asked), *cells.values(), strict=True))
     print_table(console, TextTable(f"{plan.suite.name}: {', '.join(facts)}", headings, lines))
-    if free := [row.model for row in rows if row.kind != "litellm"]:
+    if free := [row.model.name for row in rows if row.model.kind != "litellm"]:
         console.print(f"Without a call: {', '.join(free)}.")
     left = [row for row in rows if row.calls]
     known = [row for row in left if row.cost_usd is not None]
-    prompts = sum(row.prompt_usd or 0.0 for row in known)
-    replies = sum(row.reply_usd or 0.0 for row in known)
+    prompts, replies = sum(r.prompt_usd for r in known), sum(r.replies[1] for r in known)
     costs = []
     if known or not left:
         parts = f" (prompts {_dollars(prompts)}, replies {_dollars(replies)})" if known else ""
@@ -203,14 +196,16 @@ def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) ->
     by_source: dict[str, list[str]] = {}
     for row in left:
         if row.tariff is not None:
-            by_source.setdefault(row.price_source, []).append(row.model)
+            by_source.setdefault(price_source(row.model), []).append(row.model.name)
     if by_source:
         sources = [f"{source} ({', '.join(names)})" for source, names in by_source.items()]
         console.print(f"Prices: {'; '.join(sources)}.")
     for row in rows:
         if row.waiting:
-            console.print(f"{counted(row.waiting, 'call')} of {row.model} are in batches already.")
-    if batched := [row.model for row in left if row.batch]:
+            console.print(
+                f"{counted(row.waiting, 'call')} of {row.model.name} are in batches already."
+            )
+    if batched := [row.model.name for row in left if row.model.batch]:
         text = f"In batches: {', '.join(batched)}; answers come within a day, at the batch price."
         console.print(text, style="dim")
     if left:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from collections import Counter
 from typing import Any
@@ -112,6 +113,7 @@ def test_all_tracks_ask_and_read_by_the_schema(
     # A recording is read in the form in which it was asked for.
     lines = [json.dumps(r) for r in records if r["track"] == "full_planning"]
     (workspace.root / "recorded").mkdir()
+    shutil.copy(workspace.out / "run.yaml", workspace.root / "recorded")
     (workspace.root / "recorded" / "records.jsonl").write_text("\n".join(lines) + "\n")
     workspace.write_yaml("models.yaml", {"alpha": {"replay": "./recorded"}})
     workspace.write_suite(models=["alpha"])

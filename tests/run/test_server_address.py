@@ -81,11 +81,9 @@ def test_a_server_that_moved_is_asked_nothing_again(workspace: Workspace) -> Non
         workspace.write_yaml("models.yaml", {"alpha": served})
         again = workspace.run()
         assert (again.code, second.server.ended) == (0, {}), again.err
-        assert "was asked at" not in again.out
         workspace.write_models(second.url, "alpha")
         moved = workspace.run()
         assert (moved.code, second.server.ended) == (0, {}), moved.err
-        assert f"alpha was asked at {first.url}/v1 and is now at {second.url}/v1" in moved.out
 
 
 def test_a_check_asks_every_server(workspace: Workspace) -> None:
