@@ -156,7 +156,7 @@ def compare(
         second = load_run(other)
         comparison = compare_runs(first, second, names, track, measure)
     console = make_console()
-    print_table(console, compare_view(comparison))
+    print_table(console, compare_view(comparison).view)
     if len(comparison.ranks) > 2:
         print_table(console, ranks_view(comparison))
     if comparison.table[["a", "b"]].drop_duplicates().shape[0] == 1:

@@ -28,16 +28,17 @@ from phyblock.results.load import Design, Run, checked_models, track_measures
 from phyblock.results.text import (
     NO_VALUE,
     Column,
+    Row,
+    Table,
     TextTable,
-    between,
+    intervals,
     level_name,
     number,
+    texts,
     to_csv,
-    to_latex,
-    to_markdown,
-    track_column,
-    track_text,
-    with_interval,
+    track_name,
+    values,
+    wholes,
 )
 from phyblock.scoring.counts import Floats
 from phyblock.scoring.statistics import (
@@ -248,7 +249,7 @@ class Comparable:
         asked = np.bincount(samples.cell[both], minlength=len(pooled)) > 0
         cell, cells = self._cells[part.cell], self._cells
 
-        def values(of: Floats) -> Floats:
+        def worth(of: Floats) -> Floats:
             single = measure.value(of)
             there = np.broadcast_to(asked, single.shape)
             known = {name: (single[..., n], there[..., n]) for n, name in enumerate(pooled)}
@@ -256,10 +257,10 @@ class Comparable:
 
         clusters, scale = Clusters.of([parents[name] for name in scenes]), measure.scale
         estimate = bounded(
-            jackknife(sums, clusters, lambda of: values(of)[..., 0] - values(of)[..., 1]),
+            jackknife(sums, clusters, lambda of: worth(of)[..., 0] - worth(of)[..., 1]),
             measure.most_apart / scale,
         )
-        value_a, value_b = scale * values(sums.sum(axis=0))
+        value_a, value_b = scale * worth(sums.sum(axis=0))
         # A plan without a step for a goal without a block would have no F1; there is none.
         a, b = measure.value(counts)
         sign = np.sign(np.nan_to_num(a - b)) * (1 if measure.better == "higher" else -1)
@@ -471,106 +472,97 @@ def ranks(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:
     n, columns = len(names), ["model", "value", "best", "worst"]
     if len(whole) != n * (n - 1) // 2 or whole["p"].isna().any():
         return pd.DataFrame(columns=columns)
-    is_better, values = np.zeros((n, n), dtype=bool), dict.fromkeys(names, np.nan)
+    is_better, known = np.zeros((n, n), dtype=bool), dict.fromkeys(names, np.nan)
     for row in whole.to_dict("records"):
         a, b = names.index(row["a"]), names.index(row["b"])
         a_is_better = (row["difference"] > 0) == (measure.better == "higher")
         is_better[(a, b) if a_is_better else (b, a)] = row["p_holm"] < _LEVEL
-        values |= {row["a"]: row["value_a"], row["b"]: row["value_b"]}
+        known |= {row["a"]: row["value_a"], row["b"]: row["value_b"]}
     ranges = rank_ranges(is_better)
-    rows = [(name, values[name], *ranges[place]) for place, name in enumerate(names)]
+    rows = [(name, known[name], *ranges[place]) for place, name in enumerate(names)]
     is_ascending = measure.better == "lower"
     return pd.DataFrame(rows, columns=columns).sort_values(
         "value", ascending=is_ascending, ignore_index=True, kind="stable"
     )
 
 
-def compare_view(found: Comparison) -> TextTable:
-    """A row a pair and part; the part is left out where there is but one."""
-    table = found.table
-    parts = table["part"].nunique() > 1
+def compare_view(found: Comparison) -> Table:
+    """Show a row a pair and part; the part is left out where there is but one."""
     group = in_unit(found.name, found.unit)
-    columns = [Column("A", is_text=True), Column("B", is_text=True)]
-    columns += [Column("Part", is_text=True)] if parts else []
-    columns += [Column(name, group) for name in ("A", "B", "A - B", "95 % CI", "finds")]
-    columns += [Column("p (Holm)"), Column("Verdict", is_text=True)]
-    columns += [Column(name, "Samples") for name in ("A better", "B better", "same")]
-    rows, previous = [], ("", "")
-    for row in table.to_dict("records"):
-        pair = (row["a"], row["b"])
-        texts = [*(pair if pair != previous else ("", ""))]
-        texts += [level_name(row["part"].replace("_", " "))] if parts else []
-        texts += [number(row["value_a"]), number(row["value_b"])]
-        texts += [number(row["difference"], signed=True)]
-        texts += [between(row["lo"], row["hi"], signed=True), number(row["detectable_holm"])]
-        texts += [p_text(row["p_holm"]), row["verdict"]]
-        rows.append((*texts, *(str(row[name]) for name in ("better", "worse", "same"))))
-        previous = pair
+    columns = [texts("a", "A", once=True), texts("b", "B", once=True)]
+    if found.table["part"].nunique() > 1:
+        part = lambda row: level_name(row["part"].replace("_", " "))  # noqa: E731
+        columns.append(Column("Part", "", True, part))
+    columns += [
+        *(values("value_a", "A", group), values("value_b", "B", group)),
+        values("difference", "A - B", group, signed=True),
+        intervals(group, signed=True),
+        values("detectable_holm", "finds", group),
+        Column("p (Holm)", show=lambda row: p_text(row["p_holm"])),
+        texts("verdict", "Verdict"),
+        wholes("better", "A better", "Samples"),
+        wholes("worse", "B better", "Samples"),
+        wholes("same", "same", "Samples"),
+    ]
     title = "Models compared on the same samples"
-    return TextTable(title, tuple(columns), tuple(rows), _notes(found))
+    return Table.of(found.table, title, columns, _notes(found))
 
 
-def _notes(found: Comparison) -> tuple[str, ...]:
-    table, notes = found.table, [found.how]
+def _notes(found: Comparison) -> Iterator[str]:
+    table = found.table
+    yield found.how
     if len(table):
         most = table.to_dict("records")[int(table["n_scenes"].argmax())]
-        single = table["detectable"].dropna().median()
-        median = "" if pd.isna(single) else f"; a single test, in the median, {number(single)}"
-        notes += [
+        yield (
             f"{counted(most['n_samples'], 'sample')} of {counted(most['n_scenes'], 'scene')} from "
             f"{counted(most['n_clusters'], 'base scene')}; scenes that share one are not taken as "
-            "independent.",
-            f"“finds”: the difference that this comparison would find in {POWER:.0%} of cases"
-            f"{median}; {NO_VALUE}: none that is possible, or no sample differs.",
-        ]
-    notes.append(
+            "independent."
+        )
+        single = number(table["detectable"].median())
+        yield (
+            f"“finds”: the difference that this comparison would find in {POWER:.0%} of cases; a "
+            f"single test, in the median, {single}. {NO_VALUE}: none that is possible, or no "
+            "sample differs."
+        )
+    yield (
         f"p values are corrected for {table['p'].notna().sum()} comparisons (Holm); “cannot tell” "
         "stands where p is 0.05 or more."
     )
-    return tuple(notes)
-
-
-def rank_text(row: Mapping[Any, Any]) -> str:
-    """Return the ranks that a model may have: `2`, or `1 to 3`."""
-    return " to ".join(str(n) for n in sorted({row["best"], row["worst"]}))
 
 
 def ranks_view(found: Comparison) -> TextTable:
-    """The rank that each model may have, out of `Comparison.ranks`, the best first."""
-    rows = [
-        (row["model"], number(row["value"]), rank_text(row))
-        for row in found.ranks.to_dict("records")
+    """Show the rank that each model may have, out of `Comparison.ranks`, the best first."""
+
+    def ranks(row: Row) -> str:
+        return " to ".join(str(n) for n in sorted({row["best"], row["worst"]}))
+
+    columns = [
+        texts("model", "Model"),
+        values("value", in_unit(found.name, found.unit)),
+        Column("Rank", show=ranks),
     ]
-    columns = (
-        Column("Model", is_text=True), Column(in_unit(found.name, found.unit)), Column("Rank"),
-    )  # fmt: skip
     note = "All ranges hold at once with 95 % confidence, by the comparisons above."
-    return TextTable("Ranks that each model may have", columns, tuple(rows), (note,))
+    return Table.of(found.ranks, "Ranks that each model may have", columns, [note]).view
 
 
 def p_text(p: float) -> str:
-    """A p value with three decimals; `< 0.001` where it is less."""
-    if pd.isna(p):
-        return NO_VALUE
-    return "< 0.001" if p < 0.001 else f"{p:.3f}"
+    """Return a p value with three decimals; `< 0.001` where it is less."""
+    return "< 0.001" if p < 0.001 else number(p, 3)
 
 
-def flipped_lines(found: Comparison) -> tuple[str, ...]:
-    """For each side of each pair, the samples that it alone got wholly right, as sentences."""
-    lines = []
+def flipped_lines(found: Comparison) -> Iterator[str]:
+    """Yield, for each side of each pair, the samples that it alone got wholly right."""
     several = found.flipped["seed"].nunique() > 1
     for (a, b), flips in found.flipped.groupby(["a", "b"], sort=False):
         for side, other in ((a, b), (b, a)):
             names = []
             for row in flips[flips["right"] == side].to_dict("records"):
-                how = filter(None, (f"seed {row['seed']}" if several else "", row["variant"]))
-                told = ", ".join(how)
+                seed = f"seed {row['seed']}" if several else ""
+                told = ", ".join(filter(None, (seed, row["variant"])))
                 names.append(f"{row['item']} ({told})" if told else str(row["item"]))
             if names:
-                lines.append(
-                    f"{side} is right where {other} is not, {len(names)}: {', '.join(names)}"
-                )
-    return tuple(lines)
+                listed = f"{len(names)}: {', '.join(names)}"
+                yield f"{side} is right where {other} is not, {listed}"
 
 
 def write_comparison(found: Comparison, folder: Path) -> tuple[Path, ...]:
@@ -578,16 +570,10 @@ def write_comparison(found: Comparison, folder: Path) -> tuple[Path, ...]:
 
     Raises StoreError where they cannot be written.
     """
-    view = compare_view(found)
-    return OutFolder(folder).write(
-        {
-            "comparison.csv": to_csv(found.table, "%.6f"),
-            "comparison.md": to_markdown(view),
-            "comparison.tex": to_latex(view, "phyblock-comparison"),
-            "flipped.csv": to_csv(found.flipped, "%.2f"),
-            "ranks.csv": to_csv(found.ranks, "%.6f"),
-        }
-    )
+    files = compare_view(found).files("comparison", "comparison")
+    files |= {"flipped.csv": to_csv(found.flipped, "%.2f")}
+    files |= {"ranks.csv": to_csv(found.ranks, "%.6f")}
+    return OutFolder(folder).write(files)
 
 
 ITEMS = "items"
@@ -600,7 +586,7 @@ _COLUMNS = (
 
 
 def sensitivity_frame(run: Run) -> pd.DataFrame:
-    """One row a track, model and factor: how far it moves scores, in the measure's unit.
+    """Return one row a track, model and factor: how far it moves scores, in the measure's unit.
 
     `shift` is the standard deviation of the means of the `levels` of a factor, `single` that of the
     scores of single items over levels beyond the shift; of repeats, that of one question asked
@@ -639,15 +625,15 @@ def _scores(run: Run, what: Comparable) -> Iterator[tuple[str, Floats, Clusters]
         names = sorted(sizes.index[sizes == len(ways)])
         if names:
             wanted = pd.MultiIndex.from_tuples([(*name, *way) for name in names for way in ways])
-            values = np.nan_to_num(what.measure.value(counts[index.get_indexer(wanted)]))
-            scores = values.reshape(len(names), len(suite.seeds), suite.vary.n_variants)
+            worth = np.nan_to_num(what.measure.value(counts[index.get_indexer(wanted)]))
+            scores = worth.reshape(len(names), len(suite.seeds), suite.vary.n_variants)
             yield side.model, scores, Clusters.of([parents[scene] for scene, _ in names])
 
 
 def _components(
     vary: VarySpec, factor: str, scores: Floats, clusters: Clusters
 ) -> tuple[Component, Component]:
-    """The shift of a factor, and what it does to single items."""
+    """Return the shift of a factor, and what it does to single items."""
     if factor == ITEMS:
         return NO_COMPONENT, spread_of_items(scores, clusters)
     # (items, levels, blocks with each seed, repeats)
@@ -661,7 +647,7 @@ def _components(
 
 
 def _places(vary: VarySpec, factor: str) -> NDArray[np.intp]:
-    """Numbers of the variants in which a factor has all its levels while all else stays, of shape
+    """Return numbers of the variants in which a factor has all its levels while all else stays,
     (levels, blocks, repeats).
     """
     levels, repeats = vary.names(factor), vary.names(REPEAT) or ("1",)
@@ -685,19 +671,15 @@ def factor_name(factor: str) -> str:
     return names.get(factor, factor.replace("_", " "))
 
 
-def sensitivity_view(table: pd.DataFrame, run: Run) -> TextTable:
-    """Standard deviations with intervals out of `sensitivity_frame`, a row a model and factor."""
-    tracks = run.design.suite.tracks
-    rows = [
-        (
-            *(row["model"], *track_text(row["track"], tracks), factor_name(row["factor"])),
-            *(*with_interval(row, "shift"), *with_interval(row, "single")),
-        )
-        for row in table.to_dict("records")
-    ]
-    pairs = [
-        Column(n, head) for head in ("Shift of all", "Single items") for n in ("SD", "95 % CI")
-    ]
+def sensitivity_table(run: Run) -> Table | None:
+    """Return standard deviations with intervals, a row a model and factor; None where none is."""
+    table, tracks = sensitivity_frame(run), run.design.suite.tracks
+    if table.empty:
+        return None
+    columns = [texts("model", "Model"), *track_name(tracks)]
+    columns.append(Column("Factor", "", True, lambda row: factor_name(row["factor"])))
+    for name, group in (("shift", "Shift of all"), ("single", "Single items")):
+        columns += [values(name, "SD", group), intervals(group, f"{name}_lo", f"{name}_hi")]
     notes = [
         f"{kind_of(str(track)).title}: {comparable(run, str(track)).measure.heading_in_unit}, "
         f"{sizes_text(group)}."
@@ -705,16 +687,10 @@ def sensitivity_view(table: pd.DataFrame, run: Run) -> TextTable:
     ]
     notes.append(
         "Shift: standard deviation of the means of a factor's levels. Single items: of one item's "
-        "score over levels, beyond the shift and noise; asked again: of one question repeated."
+        "score over levels, beyond the shift and noise; asked again: of one question repeated. One "
+        "factor alone without repeats cannot be told from noise in single items."
     )
-    if table.loc[~table["factor"].isin([REPEAT, ITEMS]), "single"].isna().any():
-        notes.append("One factor alone without repeats cannot be told from noise in single items.")
-    columns = (
-        *(Column("Model", is_text=True), *track_column(tracks), Column("Factor", is_text=True)),
-        *pairs,
-    )
-    title = f"What the way of asking changes{run.design.of_suite}"
-    return TextTable(title, columns, tuple(rows), tuple(notes))
+    return Table.of(table, f"What the way of asking changes{run.design.of_suite}", columns, notes)
 
 
 def sizes_text(table: pd.DataFrame) -> str:

@@ -33,7 +33,7 @@ from phyblock.results.estimates import (
     main_values,
 )
 from phyblock.results.load import Run
-from phyblock.results.tables import cost_frame, filled
+from phyblock.results.tables import coverage_frame, filled
 from phyblock.results.text import between, escape, level_name, number
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of
@@ -43,7 +43,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_INK, _MUTED, _GRID, _PALE, _ACCENT = "#1b1f24", "#5c6670", "#e3e6ea", "#c3cad2", "#0b62a4"
+_STYLE = Path(__file__).with_name("paper.mplstyle")
+_MUTED, _PALE, _ACCENT = "#5c6670", "#c3cad2", "#0b62a4"
 _COLORS = (
     *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195", "#1b1f24"),
 )
@@ -69,20 +70,6 @@ _FORMATS: dict[str, tuple[int, dict[str, Any]]] = {
     "png": (200, {"Software": "phyblock"}),
 }
 """Dots per inch and metadata: without a date, the same numbers give the same bytes."""
-_STYLE: dict[str, Any] = {
-    "font.size": 8,
-    # A name is a name, whatever signs are in it.
-    "text.parse_math": False,
-    **{"axes.titlesize": 8.5, "axes.titleweight": "bold", "axes.titlelocation": "left"},
-    **{"axes.labelcolor": _INK, "axes.edgecolor": _MUTED, "axes.axisbelow": True},
-    **{"text.color": _INK, "xtick.labelcolor": _INK, "ytick.labelcolor": _INK},
-    **{"xtick.color": _MUTED, "ytick.color": _MUTED, "grid.color": _GRID},
-    **{"xtick.labelsize": 7.5, "ytick.labelsize": 7.5, "legend.fontsize": 7.5},
-    **dict.fromkeys(("axes.linewidth", "grid.linewidth", "xtick.major.width"), 0.6),
-    **{"legend.frameon": False, "lines.markersize": 4, "lines.linewidth": 1.4},
-    **{"figure.titlesize": 10.5, "figure.titleweight": "bold"},
-    **{"svg.hashsalt": "phyblock", "svg.fonttype": "none", "pdf.fonttype": 42},
-}
 
 
 @dataclass(frozen=True)
@@ -104,20 +91,23 @@ def _styled(look: Look) -> Iterator[None]:
     import matplotlib as mpl
 
     family, font = _FONTS[look.font]
-    chosen = {**_STYLE, "font.family": [family], f"font.{family}": [font]}
-    chosen["figure.figsize"] = (look.width_in, look.width_in)
     with mpl.rc_context():
         mpl.rcdefaults()
+        mpl.rc_file(_STYLE, use_default_template=False)
+        size = (look.width_in, look.width_in)
+        chosen = {"font.family": [family], f"font.{family}": [font], "figure.figsize": size}
         mpl.rcParams.update(chosen)  # type: ignore[arg-type]
         yield
 
 
-def _new_figure(height_in: float) -> Figure:
-    """Return an empty figure of the chosen width; no window, no global state."""
+def _axes(height_in: float, columns: int = 1) -> tuple[Figure, list[Axes]]:
+    """Return an empty figure of the chosen width with axes; no window, no global state."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(mpl.rcParams["figure.figsize"][0], height_in), layout="constrained")
+    width_in = mpl.rcParams["figure.figsize"][0]
+    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+    return figure, list(figure.subplots(1, columns, sharex=True, sharey=True, squeeze=False)[0])
 
 
 def _finished(
@@ -175,15 +165,13 @@ def forest(run: Run, *, track: str) -> Figure | None:
         table = table[table["a"].isin(models[: 1 if len(models) > _MOST_MODELS else None])]
         labels = [f"{row['a']} - {row['b']}" for row in table.to_dict("records")]
         title = f"{kind_of(track).title}: paired differences of {found.name}"
-    figure = _new_figure(0.7 + _ROW_IN * len(table))
-    ax, places = figure.subplots(), np.arange(len(table))
+    figure, (ax,) = _axes(0.7 + _ROW_IN * len(table))
+    places = np.arange(len(table))
     ax.axvline(0, color=_MUTED, linewidth=0.8)
     ax.hlines(places, table["lo"], table["hi"], color=_ACCENT, linewidth=1.2)
     is_found = (table["p_holm"] < 0.05).to_numpy()
-    for chosen, face, label in (
-        (is_found, _ACCENT, "difference found"),
-        (~is_found, "white", "cannot tell"),
-    ):
+    faces = {_ACCENT: (is_found, "difference found"), "white": (~is_found, "cannot tell")}
+    for face, (chosen, label) in faces.items():
         look: dict[str, Any] = {"color": _ACCENT, "markerfacecolor": face, "label": label}
         ax.plot(table["difference"][chosen], places[chosen], "o", **look)
     edge = ax.get_yaxis_transform()
@@ -213,8 +201,7 @@ def levels(run: Run, *, track: str) -> Figure | None:
     models, values = list(main_values(run, track, ranked=True)), headline_of(run, track)
     if len(columns) < 2 or not models:
         return None
-    figure = _new_figure(3.2)
-    ax = figure.subplots()
+    figure, (ax,) = _axes(3.2)
     for place, model in reversed(list(enumerate(models))):
         known = [values.get((model, column.heading)) for column in columns]
         line = [math.nan if value is None else value.value for value in known]
@@ -251,8 +238,8 @@ def shares(run: Run, *, track: str, table: str) -> Figure | None:
     if not models or not frame.to_numpy().any():
         return None
     frame, headings = frame.loc[models], {one.name: one.heading for one in report.measures}
-    figure = _new_figure(0.6 + _ROW_IN * len(models))
-    ax, left = figure.subplots(), np.zeros(len(models))
+    figure, (ax,) = _axes(0.6 + _ROW_IN * len(models))
+    left = np.zeros(len(models))
     for place, name in enumerate(map(str, frame)):
         values, color = frame[name].to_numpy(np.float64), _COLORS[place % len(_COLORS)]
         ax.barh(models, values, left=left, color=color, height=0.66, label=headings[name])
@@ -273,13 +260,12 @@ _CALLOUTS = 4
 def cost(run: Run, *, track: str) -> Figure | None:
     """The main value against dollars for 100 replies; None where no cost is known."""
     ranked, measure = main_values(run, track, ranked=True), main_measure(run, track)
-    table = cost_frame(run)
+    table = coverage_frame(run)
     prices = table[table["track"] == track].set_index("model")["cost_per_100_usd"].to_dict()
     models = [model for model in ranked if prices.get(model, 0.0) > 0]
     if not models:
         return None
-    figure = _new_figure(3.2)
-    ax = figure.subplots()
+    figure, (ax,) = _axes(3.2)
     for model in models:
         value = ranked[model]
         ax.vlines(prices[model], value.lo, value.hi, color=_PALE, linewidth=2.2)
@@ -308,8 +294,7 @@ def sensitivity(run: Run, *, track: str) -> Figure | None:
     if not len(table):
         return None
     factors, models = list(table["factor"].unique()), list(table["model"].unique())
-    figure = _new_figure(0.9 + 0.3 * len(models))
-    axes = figure.subplots(1, len(factors), sharey=True, sharex=True, squeeze=False)[0]
+    figure, axes = _axes(0.9 + 0.3 * len(models), len(factors))
     parts = {"shift": ("shift of all items", _ACCENT), "single": ("single items", _COLORS[1])}
     for ax, factor in zip(axes, factors, strict=True):
         rows = table[table["factor"] == factor].set_index("model").loc[models]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +13,10 @@ import pandas as pd
 
 from phyblock.files import OutFolder
 from phyblock.registry import added_measures
-from phyblock.results.compare import sensitivity_frame, sensitivity_view
+from phyblock.results.compare import sensitivity_table
 from phyblock.results.estimates import (
     HeadlineColumn,
+    Value,
     all_estimates,
     headline_columns,
     headline_floors,
@@ -34,45 +35,25 @@ from phyblock.results.text import (
     Column,
     Table,
     TextTable,
-    between,
     captioned,
+    intervals,
     number,
+    texts,
     to_csv,
-    to_latex,
-    to_markdown,
-    track_column,
-    track_text,
+    track_name,
+    values,
+    wholes,
 )
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of, kinds
-from phyblock.tracks.measures import CELL, Layout, LayoutColumn, Measure
-from phyblock.types import OUTCOMES, Outcome
+from phyblock.tracks.measures import CELL, Cell, Layout, LayoutColumn, Measure
+from phyblock.types import OUTCOMES
 
 TABLES = "tables"
 """The folder of tables in the folder of a run."""
 _FURTHER = ("published", "sensitivity", "coverage", "cost")
 """Tables that are no layouts of tracks."""
-HEADINGS: dict[Outcome, str] = {
-    "ok": "OK",
-    "parse_failure": "Unparsed",
-    "refusal": "Refusal",
-    "truncated": "Truncated",
-    "api_error": "API error",
-    "missing": "Missing",
-}
-
-
-@dataclass(frozen=True)
-class _Shown:
-    """A column of numbers: what it is of ("" for what the row says), and how it is shown."""
-
-    column: Column
-    key: str
-    measure: str
-    cell: str
-    criterion: str
-    is_interval: bool
-    digits: int
+_NONE = Value(math.nan, math.nan, math.nan)
 
 
 def _layouts(run: Run, track: str) -> Mapping[str, Layout]:
@@ -94,8 +75,7 @@ def _layouts(run: Run, track: str) -> Mapping[str, Layout]:
 
 def filled(run: Run, track: str, layout: Layout) -> Table:
     """Fill a layout with the estimates of a track in the headline setting and matcher."""
-    measures = {measure.name: measure for measure in track_measures(track)}
-    cells = {cell.name: cell for cell in run.cells(track)}
+    measures, cells = {one.name: one for one in track_measures(track)}, run.cells(track)
     known: dict[tuple[str, ...], Mapping[Hashable, Any]] = {}
     for row in headline_rows(track_estimates(run, track), run.design).to_dict("records"):
         key = (str(row["model"]), str(row["measure"]), str(row[CELL]))
@@ -103,74 +83,74 @@ def filled(run: Run, track: str, layout: Layout) -> Table:
     there = {(measure, cell) for _, measure, cell, _ in known}
     shown = list(_shown(layout, measures, cells, there))
     # What a row is of beside its model: a measure, a cell, or nothing.
-    parts = [("", "", "")]
+    parts = {"": ""}
     if layout.rows == "cell":
-        wanted = {column.measure for column in shown}
-        with_values = {cell for measure, cell in there if measure in wanted}
-        parts = [("", n, cell.heading) for n, cell in cells.items() if n in with_values]
+        with_values = {cell for measure, cell in there if measure in {one.measure for one in shown}}
+        parts = {cell.name: cell.heading for cell in cells if cell.name in with_values}
     elif layout.rows != "model":
-        parts = [(name, "", measures[name].heading) for name in layout.rows]
-    numbers: list[dict[str, Any]] = []
-    rows: list[tuple[str, ...]] = []
+        parts = {name: measures[name].heading for name in layout.rows}
+    rows: list[dict[str, Any]] = []
     for model in run.design.model_names:
-        for place, (measure, cell, heading) in enumerate(parts):
-            named: dict[str, Any] = {"model": model}
-            texts = [model if place == 0 else ""]
-            if heading:
-                named["part"] = measure or cell
-                texts.append(heading)
+        for part in parts:
+            rows.append({"model": model, **({"part": part} if part else {})})
             for one in shown:
-                at = (model, measure or one.measure, cell or one.cell, one.criterion)
-                scale, found = measures[at[1]].scale, known.get(at, {})
-                value, lo, hi = (scale * found.get(n, math.nan) for n in ("value", "lo", "hi"))
-                if one.is_interval:
-                    named |= {f"{one.key}_lo": lo, f"{one.key}_hi": hi}
-                    texts.append(between(lo, hi))
-                else:
-                    named[one.key] = value
-                    texts.append(number(value, one.digits))
-            numbers.append(named)
-            rows.append(tuple(texts))
-    head = [Column("Model", is_text=True)]
-    head += [Column("", is_text=True)] if layout.rows != "model" else []
+                measure = measures[one.measure or part]
+                found = known.get((model, measure.name, one.cell or part, one.criterion), {})
+                for name, end in one.ends:
+                    rows[-1][name] = measure.scale * found.get(end, math.nan)
+    fields = [texts("model", "Model", once=True)]
+    if layout.rows != "model":
+        fields.append(Column("", "", True, lambda row: parts[row["part"]]))
+    fields += [one.column for one in shown]
     caption = captioned(f"{layout.caption}{run.design.of_suite}", run.presentation(track))
     notes = (*track_notes(run, track), *layout.notes, *_sample_notes(run, track))
-    frame = pd.DataFrame(numbers, columns=None if numbers else ["model"])
-    columns = (*head, *(one.column for one in shown))
-    return Table(frame, TextTable(caption, columns, tuple(rows), notes))
+    return Table.of(pd.DataFrame(rows, columns=None if rows else ["model"]), caption, fields, notes)
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """A column of numbers: what it is of ("" for what the row says), and how it is shown.
+
+    `ends` are the columns of the frame with those of the estimates that they hold.
+    """
+
+    column: Column
+    ends: tuple[tuple[str, str], ...]
+    measure: str
+    cell: str
+    criterion: str
 
 
 def _shown(
     layout: Layout,
     measures: Mapping[str, Measure],
-    cells: Mapping[str, Any],
+    cells: Sequence[Cell],
     there: set[tuple[str, str]],
 ) -> Iterator[_Shown]:
-    """Return the columns of a layout; of each cell, those that have an estimate."""
+    """Yield the columns of a layout; of each cell, those that have an estimate."""
     of_rows = [] if isinstance(layout.rows, str) else list(layout.rows)
     for spec in layout.columns:
-        headings = spec.headings
-        names = list(spec.measures) or [""]
-        places = [cell.name for cell in spec.places([*cells.values()])]
-        if spec.cells == "each":
-            asked = list(spec.measures) or of_rows
-            places = [cell for cell in places if any((name, cell) in there for name in asked)]
-        for place in places:
-            for name in names:
-                cell = cells[place]
+        asked = list(spec.headings) or of_rows
+        for cell in spec.places(cells):
+            if spec.cells == "each" and not any((name, cell.name) in there for name in asked):
+                continue
+            for name, heading in (spec.headings or {"": ""}).items():
+                level = f"level{cell.name}" if cell.name.isdigit() else cell.name
                 about = {"cell": cell.heading, "group": cell.group, "measure": name}
-                about |= {"level": f"level{place}" if place.isdigit() else place}
-                about |= {"criterion": spec.criterion}
-                measure = measures[name or of_rows[0]]
-                heading = (headings.get(name) or (measure.heading if name else "")).format(**about)
-                group, unit = spec.group.format(**about), measure.unit or "Value"
+                about |= {"level": level, "criterion": spec.criterion}
+                measure, group = measures[name or of_rows[0]], spec.group.format(**about)
+                unit = measure.unit or "Value"
+                heading = (heading or (measure.heading if name else "")).format(**about)
                 if spec.show == "both" and not group:
                     heading, group = unit, heading
-                at = (spec.key.format(**about), name, "" if layout.rows == "cell" else place)
-                kinds_shown = {"value": (False,), "interval": (True,), "both": (False, True)}
-                for is_interval in kinds_shown[spec.show]:
-                    column = Column("95 % CI" if is_interval else heading or unit, group)
-                    yield _Shown(column, *at, spec.criterion, is_interval, spec.digits)
+                key = spec.key.format(**about)
+                at = (name, "" if layout.rows == "cell" else cell.name, spec.criterion)
+                if spec.show != "interval":
+                    shown = values(key, heading or unit, group, spec.digits)
+                    yield _Shown(shown, ((key, "value"),), *at)
+                if spec.show != "value":
+                    lo, hi = f"{key}_lo", f"{key}_hi"
+                    yield _Shown(intervals(group, lo, hi), ((lo, "lo"), (hi, "hi")), *at)
 
 
 def _sample_notes(run: Run, track: str) -> Iterator[str]:
@@ -179,9 +159,8 @@ def _sample_notes(run: Run, track: str) -> Iterator[str]:
     table = table[table["track"] == track]
     if len(design.suite.seeds) > 1:
         yield f"Values pool the samples of {len(design.suite.seeds)} seeds."
-    if len(short := table[table["not_run"] > 0]):
-        counts = zip(short["model"], short["recorded"], strict=True)
-        listed = ", ".join(f"{model} {n}" for model, n in counts)
+    short = table[table["not_run"] > 0]
+    if listed := ", ".join(f"{row.model} {row.recorded}" for row in short.itertuples()):
         yield f"Not complete, of {design.samples(track)} samples: {listed}."
     lacking = {"api_error": "API errors", "missing": "missing replies"}
     listed = ", ".join(
@@ -199,114 +178,97 @@ def _sample_notes(run: Run, track: str) -> Iterator[str]:
 
 
 _ROW = ["model", "track"]
-_SUMS = (
+_COVERAGE = [*_ROW, "expected", "recorded", "not_run", *OUTCOMES, "extracted"]
+_COST = [
+    *(*_ROW, "replies", *TOKENS, "tokens_unknown", "cost_usd", "cost_unknown", "cost_per_100_usd"),
+    *("latency_median_s", "latency_p90_s", "cached", "attempts"),
+]
+
+_SUMS = [
     *("recorded", *OUTCOMES, "extracted", "replies"),
     *("tokens_unknown", "cost_unknown", "cached", "attempts"),
-)
-_COLUMNS = (
-    *(*_ROW, "expected", "recorded", "not_run", *OUTCOMES, "extracted", "replies", *TOKENS),
-    *("tokens_unknown", "cost_usd", "cost_unknown", "latency_s", "cached", "attempts"),
-)
+]
 
 
 def coverage_frame(run: Run) -> pd.DataFrame:
-    """Return one row a model and track.
+    """Return one row a model and track: what was asked of it, and what that took.
 
     `expected` samples are `recorded` + `not_run`; the outcomes split `recorded`, and `extracted`
-    are those that an extraction model read. Of the `replies` (samples that hold one): token sums of
-    those that tell, with `tokens_unknown` that do not; `cost_usd` what the run paid, the sum of the
-    known prices, NaN where none is, with `cost_unknown` without one; `cached` ones were paid for by
-    another run and cost nothing here; `latency_s` the mean over replies for which a request was
-    sent, so neither `cached` ones nor recordings; `attempts` the sum of requests sent for them.
+    are those that an extraction model read. Of the `replies` (samples that hold one; of step
+    planning, a whole episode together): mean tokens of those that tell, with `tokens_unknown` that
+    do not; `cost_usd` what the run paid, the sum of the known prices, NaN where none is, with
+    `cost_unknown` without one; `cached` ones were paid for by another run and cost nothing here;
+    `cost_per_100_usd` what 100 cost at the price of those with a known one, cached ones included;
+    median and 90th percentile of the latency [s] of those for which a request was sent; `attempts`
+    the sum of requests sent for them. NaN where nothing is known.
     """
     records, design = run.records, run.design
     replied, cached = records["finish"].notna(), records["cached"].fillna(False).astype(bool)
-    paid, attempts = replied & ~cached, records["attempts"].fillna(0).astype("int64")
-    facts = records[[*_ROW, *TOKENS]].assign(
+    attempts = records["attempts"].fillna(0).astype("int64")
+    paid, sent = replied & ~cached, attempts > 0
+    facts = records[[*_ROW, *TOKENS]].astype(dict.fromkeys(TOKENS, "Float64"))
+    facts = facts.assign(
         recorded=1,
         **{name: records["outcome"] == name for name in OUTCOMES},
         extracted=records["rule"] == "extractor",
         replies=replied,
         tokens_unknown=replied & records["completion_tokens"].isna(),
-        cost_usd=records["paid_usd"].where(paid),
         cost_unknown=paid & records["paid_usd"].isna(),
         cached=cached,
         attempts=attempts,
-        latency_s=records["latency_s"].where(attempts > 0),
+        cost_usd=records["paid_usd"].where(paid),
+        price=records["cost_usd"].where(sent | cached),
+        latency_s=records["latency_s"].where(sent),
     )
     groups = facts.groupby(_ROW)
     planned = [(m, t, design.samples(t)) for m in design.model_names for t in design.suite.tracks]
     table = pd.DataFrame(planned, columns=[*_ROW, "expected"])
-    table = table.join(groups[list(_SUMS)].sum(), on=_ROW)
-    table = table.join(groups[[*TOKENS, "cost_usd"]].sum(min_count=1), on=_ROW)
-    table = table.join(groups["latency_s"].mean(), on=_ROW)
+    table = table.join(groups[_SUMS].sum(), on=_ROW)
     # Out of an empty frame columns of any type come, and pandas fills these with a warning.
-    table[list(_SUMS)] = table[list(_SUMS)].astype("float64").fillna(0).astype("int64")
-    table.loc[(table["replies"] > 0) & (table["replies"] == table["cached"]), "cost_usd"] = 0.0
-    table["not_run"] = table["expected"] - table["recorded"]
-    return table[list(_COLUMNS)]
-
-
-def coverage_view(table: pd.DataFrame, run: Run) -> TextTable:
-    """Show outcomes out of `coverage_frame`."""
-    tracks = run.design.suite.tracks
-    headings: dict[str, str] = {"expected": "Expected", "not_run": "Not run"}
-    headings |= {name: HEADINGS[name] for name in OUTCOMES}
-    rows = tuple(
-        (row["model"], *track_text(row["track"], tracks), *(f"{row[name]:,}" for name in headings))
-        for row in table.to_dict("records")
-    )
-    columns = (
-        Column("Model", is_text=True), *track_column(tracks), *map(Column, headings.values()),
-    )  # fmt: skip
-    read = table[table["extracted"] > 0]
-    counts = zip(read["model"], read["extracted"], read["recorded"], strict=True)
-    listed = ", ".join(f"{model} {count} of {recorded}" for model, count, recorded in counts)
-    notes = [f"Read by extractor: {listed}."] if listed else []
-    if run.is_cut:
-        notes.append("The last line of records.jsonl was cut off and is ignored.")
-    return TextTable(f"Coverage{run.design.of_suite}", columns, rows, tuple(notes))
-
-
-def cost_frame(run: Run) -> pd.DataFrame:
-    """One row a model and track: replies, mean tokens a reply, dollars and seconds.
-
-    A reply is what a sample got: of step planning, those of a whole episode together.
-    Tokens are means over the replies that tell them. `cost_usd` is what the run paid, as in
-    `coverage`, and `cost_per_100_usd` what 100 replies cost at the price of those with a known
-    one, cached ones included: what another run of the same would cost. Latency [s] is of replies
-    for which a request was sent: median and 90th percentile. NaN where nothing is known.
-    """
-    records = run.records
-    sent = records["attempts"].fillna(0).astype("int64") > 0
-    facts = records[[*_ROW, *TOKENS]].astype(dict.fromkeys(TOKENS, "Float64"))
-    facts["price"] = records["cost_usd"].where(sent | records["cached"].fillna(False).astype(bool))
-    facts["latency_s"] = records["latency_s"].where(sent)
-    groups = facts.groupby(_ROW)
+    table[_SUMS] = table[_SUMS].astype("float64").fillna(0).astype("int64")
     costs = groups[list(TOKENS)].mean().astype("float64")
+    costs["cost_usd"] = groups["cost_usd"].sum(min_count=1)
     costs["cost_per_100_usd"] = 100 * groups["price"].mean()
     costs["latency_median_s"] = groups["latency_s"].median()
     costs["latency_p90_s"] = groups["latency_s"].quantile(0.9)
-    return coverage_frame(run)[[*_ROW, "replies", "cost_usd"]].join(costs, on=_ROW)
+    table = table.join(costs, on=_ROW)
+    table.loc[(table["replies"] > 0) & (table["replies"] == table["cached"]), "cost_usd"] = 0.0
+    table["not_run"] = table["expected"] - table["recorded"]
+    return table[[*_COVERAGE, *_COST[2:]]]
 
 
-def cost_view(table: pd.DataFrame, run: Run) -> TextTable:
-    """Tokens, dollars and seconds out of `cost_frame`."""
-    groups = {
-        "Tokens a reply": ("in", "out", "reasoning"),
-        "Cost (USD)": ("this run", "100 replies"),
-        "Latency (s)": ("median", "90 %"),
-    }
-    columns = [Column("Model", is_text=True), Column("Track", is_text=True), Column("Replies")]
-    columns += [Column(name, group) for group, names in groups.items() for name in names]
-    rows = [
-        (
-            *(row["model"], row["track"].replace("_", " "), f"{row['replies']:,}"),
-            *(number(row[name], 0) for name in TOKENS),
-            *(_dollars(row[name]) for name in ("cost_usd", "cost_per_100_usd")),
-            *(number(row[name], 2) for name in ("latency_median_s", "latency_p90_s")),
-        )
-        for row in table.to_dict("records")
+def coverage_table(run: Run) -> Table:
+    """Return the outcomes of every model's samples."""
+    table = coverage_frame(run)
+    fields = [texts("model", "Model"), *track_name(run.design.suite.tracks)]
+    for name in ("expected", "not_run", *OUTCOMES):
+        fields.append(wholes(name, _HEADINGS.get(name, name.replace("_", " ").capitalize())))
+    read = table[table["extracted"] > 0]
+    listed = ", ".join(f"{r.model} {r.extracted} of {r.recorded}" for r in read.itertuples())
+    notes = [f"Read by extractor: {listed}."] if listed else []
+    if run.is_cut:
+        notes.append("The last line of records.jsonl was cut off and is ignored.")
+    return Table.of(table[_COVERAGE], f"Coverage{run.design.of_suite}", fields, notes)
+
+
+_HEADINGS = {"ok": "OK", "parse_failure": "Unparsed", "api_error": "API error"}
+
+
+def cost_table(run: Run) -> Table:
+    """Return tokens, dollars and seconds of every model."""
+
+    def dollars(key: str, heading: str) -> Column:
+        return Column(heading, "Cost (USD)", show=lambda row: _dollars(row[key]))
+
+    headings = zip(TOKENS, ("in", "out", "reasoning"), strict=True)
+    fields = [
+        texts("model", "Model"),
+        *track_name(("", *run.design.suite.tracks)),
+        wholes("replies", "Replies"),
+        *(values(name, heading, "Tokens a reply", 0) for name, heading in headings),
+        *(dollars("cost_usd", "this run"), dollars("cost_per_100_usd", "100 replies")),
+        values("latency_median_s", "median", "Latency (s)", 2),
+        values("latency_p90_s", "90 %", "Latency (s)", 2),
     ]
     notes = ["Replies from the cache cost this run nothing; 100 replies are priced as if asked."]
     notes += [
@@ -315,7 +277,7 @@ def cost_view(table: pd.DataFrame, run: Run) -> TextTable:
         if kind_of(name).plays
     ]
     title = f"Tokens, cost and latency{run.design.of_suite}"
-    return TextTable(title, tuple(columns), tuple(rows), tuple(notes))
+    return Table.of(coverage_frame(run)[_COST], title, fields, notes)
 
 
 def _dollars(amount: float) -> str:
@@ -342,9 +304,7 @@ def write_tables(path: str | Path) -> TablesWritten:
     made = make_tables(run)
     texts: dict[str, str | bytes] = {f"{TABLES}/estimates.csv": to_csv(all_estimates(run), "%.6f")}
     for name, table in made.items():
-        texts[f"{TABLES}/{name}.csv"] = to_csv(table.frame, "%.6f")
-        texts[f"{TABLES}/{name}.md"] = to_markdown(table.view)
-        texts[f"{TABLES}/{name}.tex"] = to_latex(table.view, f"phyblock-{name}")
+        texts |= table.files(f"{TABLES}/{name}", name)
     folder = OutFolder(run.path)
     written = folder.write(texts)
     # Coverage that was not complete before may be so now.
@@ -355,7 +315,7 @@ def write_tables(path: str | Path) -> TablesWritten:
 
 def table_files() -> tuple[str, ...]:
     """Return every file of tables that a run folder may hold, by its name in it."""
-    names = [name for track in kinds() for name in kinds()[track].report().tables or (track,)]
+    names = [name for track, kind in kinds().items() for name in kind.report().tables or (track,)]
     names += [*(f"{track}_measures" for track in kinds()), *_FURTHER]
     made = (f"{TABLES}/{name}.{form}" for form in ("csv", "md", "tex") for name in names)
     return (f"{TABLES}/estimates.csv", *made)
@@ -373,25 +333,22 @@ def make_tables(run: Run, names: Sequence[str] | None = None) -> dict[str, Table
     A run writes the tables of its tracks, what the way of asking changes, coverage that is not
     complete, cost, and the paper's numbers where it counts as the paper does.
     """
-    made: dict[str, Table] = {}
-    wanted = set(table_names(run) if names is None else names)
-    for track in run.design.suite.tracks:
+    wanted, made = set(table_names(run) if names is None else names), dict[str, Table | None]()
+    for track in run.design.suite.tracks if run.design.models else ():
         for name, layout in _layouts(run, track).items():
             if name in wanted:
-                made |= {name: filled(run, track, layout)} if run.design.models else {}
+                made[name] = filled(run, track, layout)
     if "published" in wanted and (names is not None or is_as_published(run)):
-        beside = beside_paper(run, 1)
-        made |= {} if beside is None else {"published": beside}
-    if "sensitivity" in wanted and len(moved := sensitivity_frame(run)):
-        made["sensitivity"] = Table(moved, sensitivity_view(moved, run))
+        made["published"] = beside_paper(run, 1)
+    if "sensitivity" in wanted:
+        made["sensitivity"] = sensitivity_table(run)
     coverage = coverage_frame(run)
     is_complete = bool((coverage["ok"] == coverage["expected"]).all()) and not run.is_cut
     if "coverage" in wanted and not (names is None and is_complete):
-        made["coverage"] = Table(coverage, coverage_view(coverage, run))
+        made["coverage"] = coverage_table(run)
     if "cost" in wanted:
-        cost = cost_frame(run)
-        made["cost"] = Table(cost, cost_view(cost, run))
-    return made
+        made["cost"] = cost_table(run)
+    return {name: table for name, table in made.items() if table is not None}
 
 
 @dataclass(frozen=True)
@@ -411,12 +368,13 @@ def summary_of(run: Run) -> Summary:
     """Sum up a run."""
     coverage, tracks = coverage_frame(run), run.design.suite.tracks
     tables = [headline_table(run, track, coverage) for track in tracks]
-    lacking = coverage[coverage["ok"] < coverage["recorded"]]
-    if len(lacking):
-        view = coverage_view(lacking, run)
-        cells = [{row[n] for row in view.rows} for n in range(len(view.columns))]
+    lacking = (coverage["ok"] < coverage["recorded"]).to_numpy()
+    if lacking.any():
+        view = coverage_table(run).view
+        rows = tuple(row for row, is_short in zip(view.rows, lacking, strict=True) if is_short)
+        cells = [{row[n] for row in rows} for n in range(len(view.columns))]
         none = [c.name for c, of in zip(view.columns, cells, strict=True) if of == {"0"}]
-        tables.append(view.without(none))
+        tables.append(replace(view, rows=rows).without(none))
     blind = [sentence for track in tracks if (sentence := blind_sentence(run, track))]
     failed = run.records.dropna(subset=["error_message"])
     messages = Counter(zip(failed["model"], failed["error_message"], strict=True))
@@ -424,43 +382,37 @@ def summary_of(run: Run) -> Summary:
     return Summary(tuple(tables), tuple(blind), tuple(failures))
 
 
-def shown_columns(run: Run, track: str) -> tuple[HeadlineColumn, ...]:
-    """Return the main column of a track's headline and those beside it, which tell most: where its
-    measure stands in several cells, as by level, these alone.
-    """
-    main = main_column(run, track)
-    others = [one for one in headline_columns(run, track) if one != main]
-    by_cell = [one for one in others if one.measure == main.measure and one.cell != main.cell]
-    return (main, *(by_cell or others))
-
-
 def headline_table(run: Run, track: str, coverage: pd.DataFrame) -> TextTable:
-    """Show models by the main column of a track, the best first.
+    """Show models by the main column of a track, the best first, and the columns beside it: where
+    its measure stands in several cells, as by level, these alone.
 
     Baselines have no rank, nor have models with samples that were not asked.
     """
-    kind, columns = kind_of(track), shown_columns(run, track)
-    main = columns[0]
+    kind, main = kind_of(track), main_column(run, track)
+    others = [one for one in headline_columns(run, track) if one != main]
+    by_cell = [one for one in others if one.measure == main.measure and one.cell != main.cell]
+    columns: list[HeadlineColumn] = [main, *(by_cell or others)]
     units = {one.name: one.unit for one in track_measures(track)}
     unit = " (%)" if {units[column.measure] for column in columns} == {"%"} else ""
-    values, ranked = headline_of(run, track), main_values(run, track, ranked=True)
+    known, ranked = headline_of(run, track), main_values(run, track, ranked=True)
     mine = coverage[coverage["track"] == track].set_index("model").to_dict("index")
-    is_short = any(row["not_run"] for row in mine.values())
     rows, rank = [], 0
     for model in dict.fromkeys((*ranked, *run.design.model_names)):
         has_rank = model in ranked and model not in run.design.baselines
         has_rank = has_rank and not mine[model]["not_run"]
         rank += has_rank
-        found = [values.get((model, column.heading)) for column in columns]
-        cells = [number(math.nan if value is None else value.value) for value in found]
-        cells.insert(1, NO_VALUE if found[0] is None else between(found[0].lo, found[0].hi))
-        if is_short:
-            cells.append(f"{mine[model]['recorded']:,}/{mine[model]['expected']:,}")
-        rows.append((str(rank) if has_rank else "", model, *cells))
-    names = ["95 % CI", *(one.heading for one in columns[1:])] + ["Samples"] * is_short
-    head = (Column("#", is_text=True), Column("Model", is_text=True), Column(main.heading))
+        found = [known.get((model, column.heading), _NONE) for column in columns]
+        row: dict[str, Any] = {"rank": str(rank) if has_rank else "", "model": model}
+        row |= {column.heading: value.value for column, value in zip(columns, found, strict=True)}
+        samples = f"{mine[model]['recorded']:,}/{mine[model]['expected']:,}"
+        rows.append({**row, "lo": found[0].lo, "hi": found[0].hi, "samples": samples})
+    fields = [texts("rank", "#"), texts("model", "Model")]
+    fields += [values(column.heading, column.heading) for column in columns]
+    fields.insert(3, intervals())
+    if any(row["not_run"] for row in mine.values()):
+        fields.append(Column("Samples", show=lambda row: str(row["samples"])))
     caption = captioned(f"{kind.title}{run.design.of_suite}{unit}", run.presentation(track))
-    return TextTable(caption, (*head, *map(Column, names)), tuple(rows))
+    return Table.of(pd.DataFrame(rows), caption, fields).view
 
 
 def blind_sentence(run: Run, track: str) -> str:

@@ -1,11 +1,11 @@
-"""Tables as text: cells as they are shown, and the same as CSV, Markdown and LaTeX."""
+"""Tables: frames with the way in which people read them, as text, CSV, Markdown and LaTeX."""
 
 from __future__ import annotations
 
 import itertools
 import math
 import re
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -16,15 +16,22 @@ if TYPE_CHECKING:
 
 NO_VALUE = "–"  # noqa: RUF001
 """What stands in a cell that has no value; it is not a zero."""
+Row = Mapping[Hashable, Any]
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column; neighbors of one `group` share a heading. Numbers are aligned to the right."""
+    """A column; neighbors of one `group` share a heading. Numbers are aligned to the right.
+
+    `show` gives its text of a row of a frame. Columns that are shown `once` are empty where all of
+    them are as in the row above.
+    """
 
     name: str
     group: str = ""
     is_text: bool = False
+    show: Callable[[Row], str] = lambda _: NO_VALUE
+    once: bool = False
 
 
 @dataclass(frozen=True)
@@ -40,14 +47,14 @@ class TextTable:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        columns = (Column(one_line(c.name), one_line(c.group), c.is_text) for c in self.columns)
+        columns = (replace(c, name=one_line(c.name), group=one_line(c.group)) for c in self.columns)
         object.__setattr__(self, "caption", one_line(self.caption))
         object.__setattr__(self, "columns", tuple(columns))
         object.__setattr__(self, "rows", tuple(tuple(map(one_line, row)) for row in self.rows))
         object.__setattr__(self, "notes", tuple(map(one_line, self.notes)))
 
     def without(self, names: Collection[str]) -> TextTable:
-        """The table but for the columns of these names."""
+        """Return the table but for the columns of these names."""
         kept = [place for place, column in enumerate(self.columns) if column.name not in names]
         return replace(
             self,
@@ -63,9 +70,60 @@ class Table:
     frame: pd.DataFrame
     view: TextTable
 
+    @classmethod
+    def of(
+        cls, frame: pd.DataFrame, caption: str, columns: Sequence[Column], notes: Iterable[str] = ()
+    ) -> Table:
+        """Return the table with a text for each row of the frame and column."""
+        rows, above = [], None
+        for row in frame.to_dict("records"):
+            texts = [column.show(row) for column in columns]
+            told = [text for text, column in zip(texts, columns, strict=True) if column.once]
+            if told == above:
+                texts = ["" if c.once else text for text, c in zip(texts, columns, strict=True)]
+            above = told
+            rows.append(tuple(texts))
+        return cls(frame, TextTable(caption, tuple(columns), tuple(rows), tuple(notes)))
+
+    def files(self, name: str, label: str, float_format: str = "%.6f") -> dict[str, str | bytes]:
+        """Return the table as CSV, Markdown and LaTeX, by name of the file."""
+        return {
+            f"{name}.csv": to_csv(self.frame, float_format),
+            f"{name}.md": to_markdown(self.view),
+            f"{name}.tex": to_latex(self.view, f"phyblock-{label}"),
+        }
+
+
+def texts(key: str, heading: str, *, once: bool = False) -> Column:
+    """Return a column of text."""
+    return Column(heading, "", True, lambda row: str(row[key]), once)
+
+
+def wholes(key: str, heading: str, group: str = "") -> Column:
+    """Return a column of whole numbers."""
+    return Column(heading, group, show=lambda row: f"{row[key]:,}")
+
+
+def values(
+    key: str, heading: str, group: str = "", digits: int = 1, *, signed: bool = False
+) -> Column:
+    """Return a column of numbers with `digits` decimals."""
+    return Column(heading, group, show=lambda row: number(row[key], digits, signed=signed))
+
+
+def intervals(group: str = "", lo: str = "lo", hi: str = "hi", *, signed: bool = False) -> Column:
+    """Return a column of intervals between two columns of the frame."""
+    return Column("95 % CI", group, show=lambda row: between(row[lo], row[hi], signed=signed))
+
+
+def track_name(tracks: Sequence[str]) -> list[Column]:
+    """Return the column that says of which track a row is; none where there is one track alone."""
+    show = Column("Track", "", True, lambda row: str(row["track"]).replace("_", " "))
+    return [show] if len(tracks) > 1 else []
+
 
 def number(value: float, digits: int = 1, *, signed: bool = False) -> str:
-    """A number with `digits` decimals, `NO_VALUE` for NaN."""
+    """Return a number with `digits` decimals, `NO_VALUE` for NaN."""
     if math.isnan(value):
         return NO_VALUE
     # Adding 0.0 turns a rounded -0.0 into 0.0.
@@ -74,15 +132,10 @@ def number(value: float, digits: int = 1, *, signed: bool = False) -> str:
 
 
 def between(lo: float, hi: float, *, signed: bool = False) -> str:
-    """`[44.0, 50.3]`; `NO_VALUE` where there is no interval."""
+    """Return `[44.0, 50.3]`; `NO_VALUE` where there is no interval."""
     if math.isnan(lo) or math.isnan(hi):
         return NO_VALUE
     return f"[{number(lo, signed=signed)}, {number(hi, signed=signed)}]"
-
-
-def with_interval(row: Mapping[Hashable, Any], name: str) -> tuple[str, str]:
-    """A value and its interval, out of the columns `<name>`, `<name>_lo` and `<name>_hi`."""
-    return number(row[name]), between(row[f"{name}_lo"], row[f"{name}_hi"])
 
 
 def captioned(caption: str, words: Sequence[str]) -> str:
@@ -91,22 +144,12 @@ def captioned(caption: str, words: Sequence[str]) -> str:
 
 
 def level_name(level: str) -> str:
-    """`Level 3` or `Overall`."""
+    """Return `Level 3` or `Overall`."""
     return f"Level {level}" if level.isdigit() else level.capitalize()
 
 
-def track_column(tracks: Sequence[str]) -> tuple[Column, ...]:
-    """The column that says of which track a row is; none where there is one track alone."""
-    return (Column("Track", is_text=True),) if len(tracks) > 1 else ()
-
-
-def track_text(track: str, tracks: Sequence[str]) -> tuple[str, ...]:
-    """Return the cells of a row in the `track_column`."""
-    return (track.replace("_", " "),) if len(tracks) > 1 else ()
-
-
 def to_csv(frame: pd.DataFrame, float_format: str | None = None) -> str:
-    """A frame as CSV, without its index; no text in it is taken for a formula (see `csv_cell`)."""
+    """Return a frame as CSV without its index; no text in it is a formula (see `csv_cell`)."""
     import pandas as pd
 
     safe = frame.rename(columns=csv_cell)
@@ -122,7 +165,7 @@ _ESCAPES = str.maketrans({c: f"\\{c}" for c in "\\`*_[]<>|#~$"} | {"&": "&amp;",
 
 
 def to_markdown(table: TextTable) -> str:
-    """The caption in bold, the table with its columns padded to align, the notes as a list.
+    """Return the caption in bold, the table with its columns padded to align, the notes as a list.
 
     Group headings join the column names, because Markdown has one heading row.
     """
@@ -182,7 +225,7 @@ _FLOAT = r"""% Needs \usepackage{{booktabs}} and \usepackage{{graphicx}}.
 
 
 def to_latex(table: TextTable, label: str) -> str:
-    r"""A `table*` float that compiles by `\input`, made smaller only where it is too large.
+    r"""Return a `table*` float that compiles by `\input`, made smaller only where it is too large.
 
     `label` follows `tab:`. Needs booktabs and graphicx, and says so in its first line.
     """
@@ -215,5 +258,5 @@ def to_latex(table: TextTable, label: str) -> str:
 
 
 def escape(text: str) -> str:
-    """Text as LaTeX prints it literally."""
+    """Return text as LaTeX prints it literally."""
     return _LIGATURE.sub("-{}", text.translate(_ESCAPES_LATEX))

@@ -30,7 +30,7 @@ from phyblock.results.estimates import (
     track_notes,
 )
 from phyblock.results.load import Run, track_measures
-from phyblock.results.tables import cost_frame, coverage_frame
+from phyblock.results.tables import coverage_frame
 from phyblock.results.text import number as rounded
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of
@@ -172,10 +172,8 @@ def _facts_of(
     `solved` samples are worth all that a sample can be; None where a sample may always be worth
     more. Costs [US dollars] are at the prices of the replies, cached ones included.
     """
-    costs, outcomes = (
-        frame[frame["track"] == track].set_index("model").to_dict("index")
-        for frame in (cost_frame(run), coverage_frame(run))
-    )
+    table = coverage_frame(run)
+    outcomes = table[table["track"] == track].set_index("model").to_dict("index")
 
     def known(value: Any) -> Any:
         if not isinstance(value, float):
@@ -184,19 +182,19 @@ def _facts_of(
 
     errors, found = _error_shares(run, track), {}
     for model, row in outcomes.items():
-        cost, solved, whole = costs[model], None, None
+        solved, whole = None, None
         if not math.isnan(best):
             solved = sum(value == best for value in samples.get(str(model), {}).values())
-        if known(price := cost["cost_per_100_usd"]) is not None and solved:
+        if known(price := row["cost_per_100_usd"]) is not None and solved:
             whole = price / 100 * int(row["replies"]) / solved
         facts = {
             "expected": int(row["expected"]),
             "done": int(row["recorded"]),
             "failed": int(row["recorded"] - row["ok"]),
             "solved": solved,
-            "prompt_tokens": cost["prompt_tokens"],
-            "completion_tokens": cost["completion_tokens"],
-            "latency_s": cost["latency_median_s"],
+            "prompt_tokens": row["prompt_tokens"],
+            "completion_tokens": row["completion_tokens"],
+            "latency_s": row["latency_median_s"],
             "usd_per_100": price,
             "usd_per_solved": whole,
             "errors": errors.get(str(model), {}),

@@ -86,7 +86,7 @@ def test_flipped_samples_are_those_that_one_side_alone_got_right() -> None:
         found.flipped[["scene", "right", "value_a", "value_b"]].to_records(index=False).tolist()
     )
     assert flipped == [("002", "alpha", 100, 75), ("001", "beta", 50, 100)]
-    assert flipped_lines(found) == (
+    assert tuple(flipped_lines(found)) == (
         "alpha is right where beta is not, 1: 002",
         "beta is right where alpha is not, 1: 001",
     )

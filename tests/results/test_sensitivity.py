@@ -11,7 +11,7 @@ import pytest
 from phyblock.config.suite import VarySpec
 from phyblock.results.compare import (
     sensitivity_frame,
-    sensitivity_view,
+    sensitivity_table,
 )
 from phyblock.results.figures import sensitivity
 from phyblock.results.load import Run
@@ -61,7 +61,9 @@ def test_the_figure_and_the_table_show_the_same_components() -> None:
         for line, part in zip(ax.lines, ("shift", "single"), strict=True):
             drawn = dict(zip(models, line.get_xdata(), strict=True))
             assert drawn == pytest.approx({m: table.loc[(factor, m), part] for m in models})
-    for row in sensitivity_view(sensitivity_frame(run), run).rows:
+    shown = sensitivity_table(run)
+    assert shown is not None
+    for row in shown.view.rows:
         if row[1] in VARY:
             wanted = table.loc[(row[1], row[0])]
             assert (row[2], row[4]) == (number(wanted["shift"]), number(wanted["single"]))
@@ -79,5 +81,6 @@ def test_a_model_that_was_barely_asked_changes_nothing_of_others() -> None:
     for model in MODELS:
         pd.testing.assert_frame_equal(of_model(run, model), of_model(alone, model))
     assert set(of_model(run, "barely")["n_items"]) == {2}
-    notes = sensitivity_view(sensitivity_frame(run), run).notes
-    assert any("2 to 12 items" in note for note in notes)
+    shown = sensitivity_table(run)
+    assert shown is not None
+    assert any("2 to 12 items" in note for note in shown.view.notes)
