@@ -43,8 +43,8 @@ from phyblock.results.load import design_of
 from phyblock.run.judge import about_prompt
 from phyblock.run.rescore import judged_anew, recorded_dataset, recorded_suite, reopen_tracks
 from phyblock.run.store import manifest_text, prompt_of, record_lines
-from phyblock.tracks import AnyTrack, EpisodeTrack, Item, kind_of
-from phyblock.tracks.base import kinds_with_physics
+from phyblock.tracks import Item, Track, kind_of
+from phyblock.tracks.base import simulating
 
 BUNDLE_FILE = "bundle.zip"
 """Its name in the run's folder, unless another place is named."""
@@ -166,7 +166,7 @@ def opened_bundle(path: Path, data: Sequence[Path] = ()) -> Iterator[Verified]:
                     raise _differs(where, "time", made_by)
                 seen.add(record.sample)
         expected = design_of(here, str(path)).all_samples
-        physics = ", ".join(kind.title for kind in kinds_with_physics(here.suite))
+        physics = ", ".join(kind.title for kind in simulating(here.suite))
         fell = [f"{physics}: what fell, which is taken from the records."] if physics else []
         unverified = (*dict.fromkeys(prompts.unverified), *fell, *_NEVER_VERIFIED)
         yield Verified(made_by, here, folder, count, expected, unverified)
@@ -198,7 +198,7 @@ class _Prompts:
     def __init__(self, folder: Path, manifest: Manifest, *, is_ours: bool) -> None:
         self.differ: list[str] = []
         self.unverified: list[str] = []
-        self._tracks: dict[tuple[str, str], tuple[AnyTrack, dict[str, Item]] | None] = {}
+        self._tracks: dict[tuple[str, str], tuple[Track, dict[str, Item]] | None] = {}
         """By condition and name, with items by key; None where the prompts are not known here."""
         self._known: dict[tuple[object, ...], tuple[object, ...]] = {}
         suite = recorded_suite(folder, manifest)
@@ -221,7 +221,7 @@ class _Prompts:
                 self.differ += [f"tracks.{name}.{key}" for key in changed]
                 items = {item.key: item for item in track.items}
                 self._tracks[variant.key, name] = (track, items)
-                if isinstance(track, EpisodeTrack):
+                if track.plays:
                     self.unverified.append(f"{title}: the prompts after the first of an episode.")
 
     def made(self, record: Record) -> bool:
@@ -236,7 +236,7 @@ class _Prompts:
         key = (*at, record.item, record.seed)
         if key not in self._known:
             shown = track.shown(items[record.item], record.seed)
-            request, _ = next(iter(track.outlines(shown)))
+            request = next(iter(track.outlines(shown)))
             digest = prompt_of(request.messages).sha256
             self._known[key] = _sent(about_prompt(request, track.prompt_name, digest))
         return self._known[key] == _sent(prompt)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from phyblock.tracks.base import AnyTrack
+    from phyblock.tracks.base import Track
 
 _MODULES = (
     "phyblock.tracks.full_planning",
@@ -24,23 +24,23 @@ _MODULES = (
 """The comparison with the paper, which a suite has only if it asks for it."""
 
 
-_registered: dict[str, type[AnyTrack]] = {}
+_registered: dict[str, type[Track]] = {}
 _measures: dict[str, tuple[Any, ...]] = {}
 _baselines: dict[str, dict[str, Callable[..., str]]] = {}
 
 
-def known_tracks() -> Mapping[str, type[AnyTrack]]:
+def known_tracks() -> Mapping[str, type[Track]]:
     """Every track by name, the built-in ones first."""
     built_in = [importlib.import_module(module).TRACK for module in _MODULES]
     return {kind.name: kind for kind in built_in} | _registered
 
 
-def known_track(name: str) -> type[AnyTrack]:
+def known_track(name: str) -> type[Track]:
     """The track of a name; KeyError for one that there is not."""
     return known_tracks()[name]
 
 
-def register_track(kind: type[AnyTrack]) -> None:
+def register_track(kind: type[Track]) -> None:
     """Add a track. Raises ValueError for a name or section that is taken."""
     taken = {name for other in known_tracks().values() for name in _names_of(other)}
     if clash := sorted(_names_of(kind) & taken):
@@ -48,9 +48,9 @@ def register_track(kind: type[AnyTrack]) -> None:
     _registered[kind.name] = kind
 
 
-def _names_of(kind: type[AnyTrack]) -> set[str]:
+def _names_of(kind: type[Track]) -> set[str]:
     """Names that a suite says for a track."""
-    return {kind.name} | ({kind.section[0]} if kind.section is not None else set())
+    return {kind.name, kind.section} - {""}
 
 
 def unregister_track(name: str) -> None:
@@ -82,7 +82,7 @@ def add_baseline(track: str, name: str, rule: Callable[..., str]) -> None:
     _baselines.setdefault(track, {})[name] = rule
 
 
-def track_baselines(kind: type[AnyTrack]) -> Mapping[str, Callable[..., str]]:
+def track_baselines(kind: type[Track]) -> Mapping[str, Callable[..., str]]:
     """Return the rules of a track by name, the built-in ones first."""
     return {**kind.baselines, **_baselines.get(kind.name, {})}
 
@@ -93,10 +93,7 @@ def baseline_names() -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for kind in tracks for name in track_baselines(kind)))
 
 
-def baseline_rules(name: str) -> Mapping[type[object], Callable[..., str]]:
-    """The rules of one baseline by what they answer about; empty for a name that is none."""
-    return {
-        kind.subject: rules[name]
-        for kind in known_tracks().values()
-        if name in (rules := track_baselines(kind))
-    }
+def baseline_rules(name: str) -> Mapping[str, Callable[..., str]]:
+    """The rules of one baseline by track; empty for a name that is none."""
+    rules = {track: track_baselines(kind) for track, kind in known_tracks().items()}
+    return {track: known[name] for track, known in rules.items() if name in known}

@@ -62,7 +62,6 @@ def init(folder: Path, suite: str) -> None:
     prompts = [
         ("prompts", path.name)
         for template in templates
-        if template is not None
         for path in sorted(bundled("prompts").glob(f"{template.stem}*.j2"))
     ]
     names = (*_FILES, ("benchmarks", f"{suite}.yaml"), *prompts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,8 @@ def suite_schema() -> dict[str, Any]:
     schema = suite_model().model_json_schema()
     properties, kinds = schema["properties"], known_tracks()
     properties["tracks"]["items"]["enum"] = list(kinds)
-    properties["tracks"]["description"] = " ".join(f"{k.name}: {k.asks}." for k in kinds.values())
+    said = (f"{kind.name}: {inspect.getdoc(kind)}" for kind in kinds.values())
+    properties["tracks"]["description"] = " ".join(said)
     names = [{"enum": list(baseline_names())}, {"type": "string", "pattern": _NAME}]
     listed = next(branch for branch in properties["models"]["oneOf"] if "items" in branch)
     listed["items"] = {"anyOf": names}

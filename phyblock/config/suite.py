@@ -474,7 +474,7 @@ class Suite(Section):
     def fields_of(self, factor: str) -> tuple[tuple[str, ...], ...]:
         """Return the paths of the fields that a factor gives values to; none for repeats."""
         if factor == "prompt":
-            return tuple(known_tracks()[name].prompt_field for name in self.tracks)
+            return tuple(known_track(name).prompt_field() for name in self.tracks)
         path = FACTORS[factor]
         return () if path is None else (path,)
 
@@ -489,7 +489,7 @@ class Suite(Section):
         if self._files is None or "prompt" not in self.vary.factors:
             return suite
         prompts = self._files.prompts
-        texts = {name: str(suite.read(known_track(name).prompt_field)) for name in suite.tracks}
+        texts = {name: str(suite.read(known_track(name).prompt_field())) for name in suite.tracks}
         templates = {name: prompts[text] for name, text in texts.items() if text in prompts}
         return suite.with_files(replace(self._files, templates=templates))
 
@@ -501,7 +501,7 @@ class Suite(Section):
         were run, about which items, and the hashes of what stands at the paths, which say more and
         survive a move.
         """
-        sections = {kind.section[0]: name for name, kind in known_tracks().items() if kind.section}
+        sections = {kind.section: name for name, kind in known_tracks().items() if kind.section}
         idle = {key for key, track in sections.items() if track not in self.tracks}
         unsaid = {
             "name",
@@ -611,14 +611,15 @@ class Suite(Section):
 
 def suite_model() -> type[Suite]:
     """Return the model of a suite file: `Suite` with the sections of all tracks."""
-    return _composed(tuple(kind.section for kind in known_tracks().values() if kind.section))
+    kinds = known_tracks().values()
+    return _composed(tuple((one.section, one.options) for one in kinds if one.options is not None))
 
 
 @functools.cache
-def _composed(sections: tuple[tuple[str, type[BaseModel], str], ...]) -> type[Suite]:
+def _composed(sections: tuple[tuple[str, type[BaseModel]], ...]) -> type[Suite]:
     fields: dict[str, Any] = {
-        key: (model, Field(default_factory=model, description=description))
-        for key, model, description in sections
+        key: (model, Field(default_factory=model, description=model.__doc__))
+        for key, model in sections
     }
     return create_model("Suite", __base__=Suite, __doc__=Suite.__doc__, **fields)
 
@@ -695,14 +696,15 @@ def _files_of(
     templates: dict[str, Path | None] = {}
     for name in suite.tracks:
         kind = known_track(name)
-        if (own := kind.data_folder(suite)) is not None:
-            folders[name] = data(*own)
-        prompt = str(suite.read(kind.prompt_field))
+        if kind.has_own_data():
+            own = getattr(suite, kind.section)
+            folders[name] = data(own.path, (kind.section, "path"), own.format == "builtin")
+        prompt_field = kind.prompt_field()
+        prompt = str(suite.read(prompt_field))
         if not varied and prompt not in PROMPT_WORDS:
-            templates[name] = existing(prompt, kind.prompt_field, os.path.isfile, "file")
+            templates[name] = existing(prompt, prompt_field, os.path.isfile, "file")
         elif prompt == "default" or "default" in varied:
-            in_text = suite.answer_format == "text"
-            templates[name] = own_template(kind.template if in_text else kind.json_template)
+            templates[name] = own_template(kind.template_for(suite.answer_format))
     prompts = {
         text: existing(text, ("vary", "prompt", place), os.path.isfile, "file")
         for place, text in enumerate(varied)

@@ -286,9 +286,9 @@ class BaselineModel:
 
     async def ask(self, request: Request) -> Reply:
         """Return the rule's answer; DataError when an oracle lacks a candidate, SpecError for a
-        subject that the baseline has no rule for.
+        track that the baseline has no rule for.
         """
-        rule = self._rules.get(type(request.subject))
+        rule = self._rules.get(request.track)
         if rule is None:
             problem = Problem(f"model {self.name}", "has no rule for this track")
             raise SpecError(problem)

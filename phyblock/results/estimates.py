@@ -271,7 +271,7 @@ def all_estimates(run: Run) -> pd.DataFrame:
 def track_notes(run: Run, track: str) -> tuple[str, ...]:
     """Return the sentences that say how the values of a track are counted."""
     kind, suite = kind_of(track), run.design.suite
-    spec = suite.section(kind.section[1]) if kind.section else None
+    spec = suite.section(kind.options) if kind.options else None
     facts = {"suite": suite, "spec": spec, "manifest": run.manifest}
     notes = (jinja2.Template(note).render(facts) for note in kind.report().notes)
     return tuple(filter(None, notes))

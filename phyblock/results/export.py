@@ -25,8 +25,8 @@ from phyblock.sim.pictures import PictureStyle
 from phyblock.tracks.pictures import Workshop
 from phyblock.tracks.questions import (
     AskedQuestion,
-    QuestionPictures,
     open_questions,
+    question_drawings,
     select_questions,
 )
 
@@ -200,16 +200,13 @@ def export_questions(
     write = _write_hugging_face if form == "hf" else _write_tsv
     try:
         with writing(folder), out.making() as made:
-            pictures = QuestionPictures(shop, PictureStyle(size_px=size_px), "images")
-            asyncio.run(write(tasks, pictures, made))
+            asyncio.run(write(_drawn(tasks, shop, PictureStyle(size_px=size_px)), made))
     finally:
         shop.close()
     return tuple(folder / name for name in EXPORT_FILES[form] if name != "README.md")
 
 
-async def _write_tsv(
-    tasks: Sequence[QuestionTask], pictures: QuestionPictures, folder: Path
-) -> None:
+async def _write_tsv(drawn: _Drawn, folder: Path) -> None:
     """Write pictures as base64; those of several are lists, with names in `image_path`."""
     opened = [(folder / name).open("w", newline="", encoding="utf-8") for name in
               (MCQ_FILE, ORDERING_FILE)]  # fmt: skip
@@ -217,7 +214,7 @@ async def _write_tsv(
         writers = [csv.writer(file, delimiter="\t", lineterminator="\n") for file in opened]
         for writer in writers:
             writer.writerow((*_COLUMNS, "image", "image_path"))
-        async for question, images in _drawn(tasks, pictures):
+        async for question, images in drawn:
             labels = [image.label for image in images]
             coded = [base64.b64encode(image.data).decode() for image in images]
             names = [f"{question.id}-{label}.png" for label in labels]
@@ -232,9 +229,7 @@ async def _write_tsv(
             writers[len(question.answer) > 1].writerow(row)
 
 
-async def _write_hugging_face(
-    tasks: Sequence[QuestionTask], pictures: QuestionPictures, folder: Path
-) -> None:
+async def _write_hugging_face(drawn: _Drawn, folder: Path) -> None:
     from datasets import Dataset, Features, Value, utils
     from datasets import Image as HfImage
 
@@ -251,7 +246,7 @@ async def _write_hugging_face(
             "labels": [image.label for image in images],
             "images": [{"bytes": image.data, "path": f"{image.label}.png"} for image in images],
         }
-        async for question, images in _drawn(tasks, pictures)
+        async for question, images in drawn
     ]
     lists = {"options": Value("string"), "levels": Value("int64"), "labels": Value("string")}
     features = {name: Value("string") for name in texts} | {n: [v] for n, v in lists.items()}
@@ -262,9 +257,10 @@ async def _write_hugging_face(
     (folder / "README.md").write_text(_CARD, encoding="utf-8")
 
 
-async def _drawn(
-    tasks: Sequence[QuestionTask], pictures: QuestionPictures
-) -> AsyncIterator[tuple[Question, tuple[Image, ...]]]:
+_Drawn = AsyncIterator[tuple[Question, tuple[Image, ...]]]
+
+
+async def _drawn(tasks: Sequence[QuestionTask], shop: Workshop, style: PictureStyle) -> _Drawn:
     """Yield questions with their pictures in the order in which models get them."""
     for task in tasks:
-        yield task.question, await pictures.of(AskedQuestion(task))
+        yield task.question, await shop.images(question_drawings(AskedQuestion(task), style))

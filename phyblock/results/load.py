@@ -295,7 +295,7 @@ class Run:
     def presentation(self, track: str) -> tuple[str, ...]:
         """Return, in words for captions, what is unusual about how items were shown and asked."""
         suite, kind = self.design.suite, kind_of(track)
-        held = self.manifest.suite.get(kind.section[0] if kind.section else "") or {}
+        held = self.manifest.suite.get(kind.section) or {}
         is_shuffled = "candidate_order" in kind.varies and suite.candidates.order == "shuffled"
         words = ["candidates shuffled"] * (
             is_shuffled and "candidate_order" not in suite.vary.factors

@@ -12,7 +12,15 @@ from pathlib import Path
 from phyblock.config.models import ModelConfig, Tariff
 from phyblock.config.suite import Variant
 from phyblock.models import Estimate as CallEstimate
-from phyblock.models import ReplyCache, Request, is_billed, reply_key, tariff_of, waiting_keys
+from phyblock.models import (
+    Image,
+    ReplyCache,
+    Request,
+    is_billed,
+    reply_key,
+    tariff_of,
+    waiting_keys,
+)
 from phyblock.models import estimate as estimate_call
 from phyblock.models.costs import is_free, most_usd, price_at
 from phyblock.records.files import BatchLines, run_records
@@ -126,7 +134,8 @@ def estimate(
                 row.done += 1
                 continue
             kind = _kind(sample.track.name, sample.variant)
-            for outline, is_known in outlines if row.model.kind == "litellm" else ():
+            for outline in outlines if row.model.kind == "litellm" else ():
+                is_known = has_all_pictures(outline)
                 asked = replace(outline, seed=sample.seed, params=row.model.params)
                 key = reply_key(row.model, sample.asking(asked)) if is_known else ""
                 kept = cache.get(key) if cache is not None and is_known else None
@@ -140,6 +149,12 @@ def estimate(
     return list(rows.values())
 
 
+def has_all_pictures(outline: Request) -> bool:
+    """True if an outline is what will be sent: one whose pictures are not known has empty ones."""
+    parts = (part for message in outline.messages for part in message.parts)
+    return all(part.data for part in parts if isinstance(part, Image))
+
+
 def may_bill(
     plan: RunPlan, folder: Path, *, use_cache: bool, retry_failed: bool = False
 ) -> list[Estimate]:
@@ -150,9 +165,10 @@ def may_bill(
     return rows if any(row.may_cost for row in rows) else []
 
 
-def _samples(plan: RunPlan) -> Iterator[tuple[Sample, Sequence[tuple[Request, bool]]]]:
-    """Yield all samples with their requests as far as they are known before any is answered, each
-    with True if its pictures are the real ones. What is shown alike is outlined once.
+def _samples(plan: RunPlan) -> Iterator[tuple[Sample, Sequence[Request]]]:
+    """Yield all samples with their requests as far as they are known before any is answered.
+
+    What is shown alike is outlined once.
     """
     for shown_in, tracks in plan.variants.items():
         repeats = [variant for variant in plan.variants if variant.shown == shown_in]

@@ -34,7 +34,7 @@ from phyblock.records.record import (
 )
 from phyblock.resources import bundled
 from phyblock.stable import plain_sum
-from phyblock.tracks import Episode, Item, Judgement, SingleTrack
+from phyblock.tracks import Item, Judgement, Track
 from phyblock.tracks.base import count_sample
 from phyblock.tracks.prompts import TemplatePrompt
 from phyblock.types import Outcome
@@ -88,28 +88,21 @@ def about_prompt(request: Request, template: str, digest: str) -> SentPrompt:
     )
 
 
-def judged(
-    fields: Mapping[str, Any],
-    item: Item,
-    judgement: Judgement | Episode,
-    asked: Sequence[Mapping[str, Any]] = (),
-) -> Record:
+def judged(fields: Mapping[str, Any], item: Item, judgement: Judgement) -> Record:
     """Return the record with its outcome and what the track says and counts of it.
 
-    `fields` are those of a record that was begun, or of one that was judged before; `asked` are
-    those of the turns of an episode that the track does not know.
+    `fields` are those of a record that was begun, or of one that was judged before.
     """
     outcome = _outcome(fields["reply"], fields["error"], judgement.is_read)
-    told = {**fields, "outcome": outcome, **judgement.fields()}
-    if "turns" in told:
-        told["turns"] = [{**one, **now} for one, now in zip(asked, told["turns"], strict=True)]
-    if counts := count_sample(fields["track"], item, judgement):
-        told["counts"] = {**fields.get("counts", {}), **counts}
-    return known_records().validate_python(told)
+    told = {**fields, "outcome": outcome, **judgement.fields}
+    record = known_records().validate_python(told)
+    if counts := count_sample(item, record):
+        record = record.model_copy(update={"counts": {**record.counts, **counts}})
+    return record
 
 
 async def judge_reply(
-    track: SingleTrack[Any],
+    track: Track,
     item: Item,
     fields: Mapping[str, Any],
     earlier: Record | None = None,
@@ -207,7 +200,7 @@ class Extractor:
         self._config = config
         self._prompt = extraction_prompt()
 
-    async def read(self, track: SingleTrack[Any], item: Item, record: Record) -> Record:
+    async def read(self, track: Track, item: Item, record: Record) -> Record:
         """Return a record judged by what the model copied, if nothing was read in its reply.
 
         Where the model cannot be asked, the record stays as it is: its reply is paid for.

@@ -19,8 +19,8 @@ from phyblock.records.manifest import FORMAT, Manifest, ManifestModel
 from phyblock.run.judge import extraction_prompt
 from phyblock.sim.engine import ENGINES, described_engine
 from phyblock.stable import hex_digest
-from phyblock.tracks import AnyTrack, kind_of
-from phyblock.tracks.base import kinds_with_physics
+from phyblock.tracks import Track, kind_of
+from phyblock.tracks.base import simulating
 
 _ENGINES = (engine.distribution for engine in ENGINES.values())
 _LIBRARIES = ("litellm", *_ENGINES, "numpy", "pillow", "jinja2")
@@ -38,7 +38,7 @@ def make_manifest(
     suite: Suite,
     models: Sequence[ModelConfig],
     dataset: Dataset,
-    variants: Mapping[Variant, Sequence[AnyTrack]],
+    variants: Mapping[Variant, Sequence[Track]],
     limit: int | None,
     extractor: ModelConfig | None = None,
 ) -> Manifest:
@@ -71,8 +71,7 @@ def make_manifest(
             if variant == variant.shown
         }
     identity = hex_digest(json.dumps(inputs, sort_keys=True, separators=(",", ":")))
-    kinds = [kind_of(name) for name in suite.tracks]
-    engine = {"engine": described_engine()} if kinds_with_physics(suite.model_dump()) else {}
+    engine = {"engine": described_engine()} if simulating(suite.model_dump()) else {}
     fields = {
         "identity": identity,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -94,14 +93,23 @@ def make_manifest(
             "root": str(dataset.root),
         },
         **engine,
-        **{key: value for kind in kinds for key, value in kind.manifest(suite).items()},
+        **_questions(suite),
         **asked_counts(suite, dataset, variants[Variant()]),
         "versions": {"python": platform.python_version(), **_versions(), **code_versions()},
     }
     return Manifest.model_validate(fields)
 
 
-def asked_counts(suite: Suite, dataset: Dataset, tracks: Iterable[AnyTrack]) -> dict[str, Any]:
+def _questions(suite: Suite) -> dict[str, Any]:
+    """Return the set of questions of a run, for a track that brings data of its own."""
+    for name, root in suite.files.folders.items():
+        own = getattr(suite, kind_of(name).section)
+        about = {"format": own.format, "root": str(root), "version": read_version(root)}
+        return {"questions": about}
+    return {}
+
+
+def asked_counts(suite: Suite, dataset: Dataset, tracks: Iterable[Track]) -> dict[str, Any]:
     """Return how many items and scenes a run asks about, of what is selected of its data."""
     levels = [task.scene.levels for task in dataset.tasks]
     return {

@@ -21,9 +21,10 @@ from phyblock.resources import bundled, bundled_sets
 from phyblock.run.manifest import make_manifest
 from phyblock.stable import drawn_bytes
 from phyblock.text import did_you_mean
-from phyblock.tracks import AnyTrack, EpisodeTrack, Item, Opening, kind_of, open_tracks
+from phyblock.tracks import Item, Track, kind_of, open_tracks
 from phyblock.tracks.base import template_prompt
 from phyblock.tracks.items import interleaved, select_tasks
+from phyblock.tracks.pictures import Workshop
 from phyblock.types import AnswerFormat, CandidateOrder
 
 _SEEDS = 2**31
@@ -34,7 +35,7 @@ _SEEDS = 2**31
 class Sample:
     """One item of a track, asked of one model with one seed; `track` asks as the variant does."""
 
-    track: AnyTrack
+    track: Track
     model: str
     item: Item
     seed: int
@@ -52,7 +53,7 @@ class Sample:
         if repeat != 1:
             digest = drawn_bytes("repeat", request.seed, repeat)
             seed = int.from_bytes(digest[:8], "big") % _SEEDS
-        return replace(request, seed=seed, sample=self.id)
+        return replace(request, seed=seed, sample=self.id, track=self.track.name)
 
     def shown(self) -> Sample:
         """Return the sample with its item as its seed shows it."""
@@ -71,13 +72,13 @@ class RunPlan:
     suite: Suite
     models: tuple[ModelConfig, ...]
     dataset: Dataset
-    variants: Mapping[Variant, tuple[AnyTrack, ...]]
+    variants: Mapping[Variant, tuple[Track, ...]]
     manifest: Manifest
     arranged: Callable[[Sequence[Item]], Sequence[Item]] = interleaved
     extractor: ModelConfig | None = None
 
     @property
-    def tracks(self) -> tuple[AnyTrack, ...]:
+    def tracks(self) -> tuple[Track, ...]:
         """The tracks as the reference asks."""
         return next(iter(self.variants.values()))
 
@@ -134,12 +135,12 @@ def make_plan(
         suite = suite.model_copy(update={"models": with_members(suite.models, known)})
     limit = suite.limit if limit is None else limit
     asks = any(model.kind != "replay" for model in models)
-    variants: dict[Variant, tuple[AnyTrack, ...]] = {}
-    opening = Opening(suite, dataset, limit, with_prompts=asks)
+    variants: dict[Variant, tuple[Track, ...]] = {}
+    shop = Workshop() if asks else None
     for variant in suite.vary.variants:
         # Repeats share their tracks.
-        at, shown = replace(opening, suite=suite.at(variant)), variants.get(variant.shown)
-        variants[variant] = shown or open_tracks(at, suite.tracks)
+        shown = variants.get(variant.shown)
+        variants[variant] = shown or open_tracks(suite.at(variant), dataset, limit, shop)
     tracks = variants[Variant()]
     _check_models(models, tracks, suite)
     if not any(track.items for track in tracks):
@@ -157,7 +158,7 @@ def make_plan(
     return RunPlan(suite, models, selected, variants, manifest, extractor=extractor)
 
 
-def _check_models(models: Sequence[ModelConfig], tracks: Sequence[AnyTrack], suite: Suite) -> None:
+def _check_models(models: Sequence[ModelConfig], tracks: Sequence[Track], suite: Suite) -> None:
     """Every model can answer what every track asks, means the numbers that are shown, and is not
     taken for another; a recording was asked in the form in which it is read.
     """
@@ -187,7 +188,7 @@ def _check_models(models: Sequence[ModelConfig], tracks: Sequence[AnyTrack], sui
                 message = f"is a recording of answers that were asked for as {form}"
                 refuse(model, message, "answer_format", suite.answer_format, form)
         for track in tracks:
-            plays, able = isinstance(track, EpisodeTrack), track_baselines(kind_of(track.name))
+            plays, able = track.plays, track_baselines(kind_of(track.name))
             if is_replay and plays:
                 refuse(model, f"is a recording, which cannot answer in {track.name}", "tracks")
             if model.batch and plays:

@@ -19,15 +19,16 @@ from phyblock.files import OutFolder
 from phyblock.parsing.plan import reader_version
 from phyblock.records.files import run_records
 from phyblock.records.manifest import MANIFEST, Manifest, read_manifest, suite_of
-from phyblock.records.record import Record, StoredError
+from phyblock.records.record import AskedTurn, Record, StoredError
 from phyblock.run.judge import about_item, judge_reply, judged
 from phyblock.run.manifest import asked_counts, code_versions
 from phyblock.run.plan import open_dataset
 from phyblock.run.store import check_place, locked, write_run
 from phyblock.text import counted
-from phyblock.tracks import AnyTrack, EpisodeTrack, Item, kind_of, open_tracks
-from phyblock.tracks.base import CARRYING, ENGINE, Opening
+from phyblock.tracks import Item, Track, kind_of, open_tracks
+from phyblock.tracks.base import CARRYING, ENGINE
 from phyblock.tracks.items import select_tasks
+from phyblock.tracks.pictures import Workshop
 from phyblock.types import Matcher, PlanParser
 
 _CHANGED = "is not the data set that the run was made on, or it was changed since"
@@ -159,18 +160,20 @@ def _asked_about(manifest: Manifest, dataset: Dataset) -> Dataset:
 
 def reopen_tracks(
     folder: Path, manifest: Manifest, suite: Suite, dataset: Dataset, *, with_prompts: bool = False
-) -> tuple[AnyTrack, ...]:
+) -> tuple[Track, ...]:
     """Return the tracks of the run in `folder`, known to ask what was asked; nobody is.
 
     `dataset` is the run's. With prompts, those of the bundled templates. Raises DataError for other
     data of a track than those that the run was made on.
     """
     path = folder / MANIFEST
-    roots = {name: kind_of(name).data_root(manifest) for name in suite.tracks}
-    folders = {name: Path(root) for name, root in roots.items() if root is not None}
+    folders: dict[str, Path] = {}
+    if manifest.questions is not None:
+        own = (name for name in suite.tracks if kind_of(name).has_own_data())
+        folders = dict.fromkeys(own, Path(manifest.questions.root))
     suite = suite.with_files(SuiteFiles(path, dataset.root, YamlSource(str(path)), folders))
-    opening = Opening(suite, dataset, manifest.limit, with_prompts=with_prompts)
-    tracks = open_tracks(opening, suite.tracks)
+    shop = Workshop() if with_prompts else None
+    tracks = open_tracks(suite, dataset, manifest.limit, shop)
     for track in tracks:
         stored = manifest.tracks.get(track.name, {})
         for key, value in track.identity().items():
@@ -184,7 +187,7 @@ def reopen_tracks(
 
 def _by_condition(
     folder: Path, manifest: Manifest, suite: Suite, dataset: Dataset
-) -> dict[str, dict[str, AnyTrack]]:
+) -> dict[str, dict[str, Track]]:
     """The tracks of a run by the key of the condition in which they asked, and by name."""
     conditions = dict.fromkeys(variant.shown for variant in suite.vary.variants)
     return {
@@ -198,7 +201,7 @@ def _by_condition(
 def _judged(
     folder: Path,
     manifest: Manifest,
-    tracks: Mapping[str, Mapping[str, AnyTrack]],
+    tracks: Mapping[str, Mapping[str, Track]],
     *,
     strict: bool,
 ) -> Iterator[tuple[Record, Record]]:
@@ -232,13 +235,13 @@ def _judged(
 
 
 async def _judged_again(
-    track: AnyTrack, item: Item, record: Record, where: str, *, strict: bool
+    track: Track, item: Item, record: Record, where: str, *, strict: bool
 ) -> Record:
     given = {**record.as_given(), **about_item(item), **track.about(item)}
     if "engine" in record.model_fields_set:
         # Nothing is let go again: what fell stands in the record, and so does what let it fall.
         given["engine"] = record.as_given()["engine"]
-    if not isinstance(track, EpisodeTrack):
+    if not track.plays:
         if record.is_judged:
             return await judge_reply(track, item, given, record)
         # No plan was carried out of which the record could tell.
@@ -248,13 +251,14 @@ async def _judged_again(
         request = await episode.request()
         if request is None:
             break
-        episode.take(request, turn.reply)
+        episode.take(request, turn.reply, turn.prompt)
     # What the last reply comes to shows when the next is asked for: blocks are let go.
     goes_on = await episode.request() is not None
-    turns, now = [turn.fields() for turn in asked], episode.fields()["turns"]
-    same = sum(1 for _ in takewhile(lambda pair: _led_on(*pair), zip(turns, now, strict=False)))
+    judgement = episode.judgement()
+    pairs = zip(asked, judgement.fields["turns"], strict=False)
+    same = sum(1 for _ in takewhile(lambda pair: _led_on(*pair), pairs))
     if same == len(asked) and not (goes_on and record.error is None):
-        return judged(given, item, episode, turns)
+        return judged(given, item, judgement)
     if strict:
         message = "goes otherwise than it did, in another version"
         hint = "the version of phyblock that made the run plays it as it went"
@@ -264,9 +268,11 @@ async def _judged_again(
     return record.model_copy(update={"error": error, "outcome": "api_error"})
 
 
-def _led_on(was: Mapping[str, Any], now: Mapping[str, Any]) -> bool:
+def _led_on(was: AskedTurn, now: Mapping[str, Any]) -> bool:
     """True if a stored turn came to what it comes to now, by whichever rule it was read."""
-    return all(_plain(was.get(name)) == _plain(value) for name, value in now.items())
+    stored = was.fields()
+    decided = {name: value for name, value in now.items() if name not in ("reply", "prompt")}
+    return all(_plain(stored.get(name)) == _plain(value) for name, value in decided.items())
 
 
 def _plain(value: object) -> object:

@@ -56,7 +56,6 @@ from phyblock.run.events import (
 from phyblock.run.judge import Extractor, about_prompt, begun, judge_reply, judged, pooled
 from phyblock.run.plan import RunPlan, Sample, provider_problem
 from phyblock.run.store import RunStore
-from phyblock.tracks import EpisodeTrack
 
 _Result = TypeVar("_Result")
 
@@ -392,7 +391,7 @@ class Session:
     async def _one(self, sample: Sample, config: ModelConfig) -> None:
         """Ask one sample, judge what came, and wait until its record is on disk."""
         sample, model = sample.shown(), self._models[sample.model]
-        if isinstance(sample.track, EpisodeTrack):
+        if sample.track.plays:
             record = await self._play(sample, model, config)
         else:
             record = await self._ask(sample, model, config)
@@ -416,21 +415,18 @@ class Session:
     ) -> Request:
         """Return the request of a sample that is asked once."""
         track, item = sample.track, sample.item
-        assert not isinstance(track, EpisodeTrack), "an episode has many requests"
         made = track.request(item, sample.seed, config.params, with_messages=with_messages)
-        return sample.asking(replace(await self._until_stopped(made), track=track.name))
+        return sample.asking(await self._until_stopped(made))
 
     async def _judged(self, sample: Sample, fields: Mapping[str, Any]) -> Record:
         track, item = sample.track, sample.item
-        assert not isinstance(track, EpisodeTrack)
         record = await judge_reply(track, item, fields)
         return await self._extractor.read(track, item, record) if self._extractor else record
 
     async def _play(self, sample: Sample, model: Model, config: ModelConfig) -> Record:
         track, item = sample.track, sample.item
-        assert isinstance(track, EpisodeTrack)
         episode = track.start(item, sample.seed, config.params, with_messages=model.needs_messages)
-        turns: list[dict[str, Any]] = []
+        replies: list[Reply] = []
         fields = self._fields(sample, None, None, config)
         while (wanted := await self._until_stopped(episode.request())) is not None:
             request = sample.asking(wanted)
@@ -438,13 +434,13 @@ class Session:
             fields = self._fields(sample, answer, request, config)
             if not isinstance(answer, Reply):
                 break
-            reply = answer.storable()
-            turns.append({"n": len(turns) + 1, "reply": reply, "prompt": fields["prompt"]})
-            episode.take(request, reply)
-        if turns:
-            whole = pooled([turn["reply"] for turn in turns]).storable()
-            fields |= {"reply": whole, "prompt": turns[0]["prompt"]}
-        return judged(fields, item, episode, turns)
+            replies.append(answer.storable())
+            episode.take(request, replies[-1], fields["prompt"])
+        judgement = episode.judgement()
+        if replies:
+            first = judgement.fields["turns"][0]["prompt"]
+            fields |= {"reply": pooled(replies).storable(), "prompt": first}
+        return judged(fields, item, judgement)
 
     async def _answer(self, model: Model, request: Request) -> Reply | ModelError | None:
         """Return the reply, or the error that is this sample's alone."""

@@ -3,31 +3,15 @@
 `phyblock.registry` lists the tracks. Outside this package only verbs that belong to one name it.
 """
 
-from phyblock.tracks.base import (
-    AnyTrack,
-    Episode,
-    EpisodeTrack,
-    Judgement,
-    Opening,
-    SceneTrack,
-    SingleTrack,
-    Track,
-    kind_of,
-    kinds,
-    open_tracks,
-)
+from phyblock.tracks.base import Episode, Judgement, SceneTrack, Track, kind_of, kinds, open_tracks
 from phyblock.tracks.items import Item
 from phyblock.tracks.prompts import TemplatePrompt
 
 __all__ = [
-    "AnyTrack",
     "Episode",
-    "EpisodeTrack",
     "Item",
     "Judgement",
-    "Opening",
     "SceneTrack",
-    "SingleTrack",
     "TemplatePrompt",
     "Track",
     "kind_of",

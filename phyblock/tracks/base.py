@@ -1,8 +1,8 @@
 """Tracks: what each declares, and how it asks and judges in a suite.
 
 A track is one class. Its class attributes declare it; an instance is the track as a suite opens
-it. Most tracks ask once a sample (`SingleTrack`), step planning plays episodes (`EpisodeTrack`);
-what those about scenes share is in `SceneTrack`.
+it. Most ask once a sample (`request`, `judge`); one that `plays` starts an episode of several turns
+instead (`start`). What those about scenes share is in `SceneTrack`.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import asyncio
 import importlib
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Protocol
+from typing import Any, ClassVar, Protocol
 
 from pydantic import BaseModel
 
@@ -24,23 +24,16 @@ from phyblock.data import AssemblyTask, Dataset
 from phyblock.errors import Problem, SpecError
 from phyblock.models.request import Image, Message, Request
 from phyblock.parsing.structured import AnswerForm
-from phyblock.records.manifest import Manifest
-from phyblock.records.record import Record, Reply
+from phyblock.records.record import Record, Reply, SentPrompt
 from phyblock.registry import added_measures, known_track, known_tracks
 from phyblock.sim.engine import REFERENCE_ENGINE, engine_version, physics_engine
 from phyblock.stable import hex_digest
 from phyblock.tracks.baselines import Picking
-from phyblock.tracks.items import (
-    Examples,
-    ItemT,
-    Presentation,
-    other_goals,
-    presentation_fields,
-    select_tasks,
-)
+from phyblock.tracks.items import Item, Others, Presentation, ShownTask, select_tasks
 from phyblock.tracks.measures import SampleCounts, TrackReport
-from phyblock.tracks.pictures import Pictures, ScenePictures, Workshop
+from phyblock.tracks.pictures import Drawing, Workshop, scene_drawings
 from phyblock.tracks.prompts import Prompt, TemplatePrompt, form_facts
+from phyblock.types import AnswerFormat
 
 ENGINE = "physics"
 """Key in a track's identity of the physics engine that decides its results, where that is not the
@@ -50,55 +43,31 @@ CARRYING = "carrying"
 """The same of the version of how plans are carried out and what stands is measured."""
 
 
-def engine_identity() -> dict[str, Any]:
-    """Return the part of a track's identity that names the physics engine, if not the reference."""
-    engine = physics_engine()
-    if engine.name == REFERENCE_ENGINE:
-        return {}
-    return {ENGINE: {"engine": engine.name, engine.name: engine_version(engine.name)}}
+@dataclass(frozen=True)
+class Judgement:
+    """A reply as it was read and scored: `fields` of its record, as `parse` and `scores`."""
+
+    is_read: bool
+    fields: Mapping[str, Any]
 
 
-class Judgement(Protocol):
-    """A reply as it was read, with its scores."""
-
-    @property
-    def is_read(self) -> bool:
-        """True if anything could be read."""
-
-    def fields(self) -> dict[str, Any]:
-        """Return `parse`, `scores` and what else the record says of it."""
-
-
-class Episode(Judgement, Protocol):
+class Episode(Protocol):
     """One sample of several turns, as a state machine that replies alone drive.
 
     The same replies lead to the same requests, so that a killed run goes on in the middle of it.
-    `fields` holds `turns` too, a mapping for each reply taken.
     """
 
     async def request(self) -> Request | None:
         """Return the next request, or None when the episode has ended."""
 
-    def take(self, request: Request, reply: Reply) -> None:
-        """Go on with the reply to the last request."""
+    def take(self, request: Request, reply: Reply, prompt: SentPrompt | None = None) -> None:
+        """Go on with the reply to the last request, which was sent with this prompt."""
+
+    def judgement(self) -> Judgement:
+        """Return what the replies came to; its fields hold `turns`, a mapping for each of them."""
 
 
-@dataclass(frozen=True)
-class Opening:
-    """The arguments that a track is opened with; without `with_prompts` nothing is asked of anyone.
-
-    `limit` is how many items the user wants at most, None for all. `shop` is where pictures
-    of all tracks are drawn.
-    """
-
-    suite: Suite
-    dataset: Dataset
-    limit: int | None
-    with_prompts: bool
-    shop: Workshop = field(default_factory=Workshop)
-
-
-class Track(ABC, Generic[ItemT]):
+class Track(ABC):
     """A track: its declaration, and its items in one suite, all of which every seed repeats."""
 
     name: ClassVar[str]
@@ -107,20 +76,14 @@ class Track(ABC, Generic[ItemT]):
     """Its name for people."""
     item: ClassVar[str] = "scene"
     """The noun for what it asks about."""
-    asks: ClassVar[str]
-    """A clause on what it asks, for the documentation of suites."""
-    section: ClassVar[tuple[str, type[BaseModel], str] | None] = None
-    """Key, model and description of the section of a suite that is its own."""
-    template: ClassVar[Path | None] = None
-    """The bundled prompt, None where it has none."""
-    json_template: ClassVar[Path | None] = None
-    """The prompt that asks for JSON, None where it asks for text alone."""
-    prompt_field: ClassVar[tuple[str, ...]] = ("prompt",)
-    """Path of keys to the prompt in a suite."""
-    subject: ClassVar[type[object]]
-    """The subject of its requests: the first argument of its rules."""
+    section: ClassVar[str] = ""
+    """The key of its own section of a suite, where it has one."""
+    options: ClassVar[type[BaseModel] | None] = None
+    """The model of that section."""
+    template: ClassVar[Path]
+    """The bundled prompt; one that asks for JSON lies beside it, and its name ends in _json.j2."""
     baselines: ClassVar[Mapping[str, Callable[..., str]]] = {}
-    """Rules that answer, given a subject and a random generator, by name of the baseline."""
+    """Rules that answer, given the subject of a request and a random generator, by name."""
     by_hand: ClassVar[Callable[..., Picking] | None] = None
     """How a person answers about a subject; None where nothing can be picked."""
     record: ClassVar[type[Record] | None] = None
@@ -131,26 +94,35 @@ class Track(ABC, Generic[ItemT]):
     """What its measures count of every sample as it is judged."""
     varies: ClassVar[tuple[str, ...]] = ("repeats",)
     """Factors of a suite's section `vary` that change what it asks."""
-    no_examples: ClassVar[str] = "it declares none"
-    """The reason why it shows no worked examples; "" where it does."""
+    shows_examples: ClassVar[bool] = False
+    """True if it can show worked examples."""
     plays: ClassVar[bool] = False
     """True if a sample is an episode of several turns."""
+    simulates: ClassVar[bool] = False
+    """True if blocks are let go in a physics engine, where its section does not say otherwise."""
 
-    items: Sequence[ItemT]
+    items: Sequence[Any]
+    drawn_seeds: Sequence[int]
+    """The seeds of the suite, of those that show the same only the first."""
 
-    def __init__(self, opening: Opening) -> None:
-        """Open the track; subclasses select its items.
+    def __init__(
+        self, suite: Suite, dataset: Dataset, limit: int | None = None, shop: Workshop | None = None
+    ) -> None:
+        """Open the track on at most `limit` items; without a shop for pictures nobody is asked.
 
         Raises SpecError, DataError or PromptError with what is wrong.
         """
-        self.suite = opening.suite
-        self.shop = opening.shop if opening.with_prompts else None
-        self.prompt: Prompt | None = None
-        self.pictures: Pictures | None = None
-        self.examples: Examples[ItemT] = Examples((), 0)
-        if self.shop is not None:
-            self.prompt = self.open_prompt()
-            self.pictures = self.open_pictures(self.shop)
+        self.suite, self.dataset, self.limit, self.shop = suite, dataset, limit, shop
+        self.spec: Any = None if self.options is None else suite.section(self.options)
+        self.drawn_seeds = suite.seeds[:1]
+        self.prompt = None if shop is None else self.open_prompt()
+        self.examples: Mapping[str, tuple[Any, ...]] = {}
+        self._drawings: dict[str, tuple[Drawing, ...]] = {}
+        self.open()
+
+    @abstractmethod
+    def open(self) -> None:
+        """Select its items, and worked examples where there are any."""
 
     @classmethod
     def report(cls) -> TrackReport:
@@ -159,78 +131,171 @@ class Track(ABC, Generic[ItemT]):
         return report
 
     @classmethod
-    def data_folder(cls, _suite: Any) -> tuple[str, tuple[str, ...], bool] | None:
-        """Return the folder of its own data: text, path of keys, True if it may be bundled."""
-        return None
+    def prompt_field(cls) -> tuple[str, ...]:
+        """Return the path of keys to its prompt in a suite."""
+        is_own = cls.options is not None and "prompt" in cls.options.model_fields
+        return (cls.section, "prompt") if is_own else ("prompt",)
 
     @classmethod
-    def data_root(cls, _manifest: Manifest) -> str | None:
-        """Return where a run found the data of its own."""
-        return None
-
-    @classmethod
-    def manifest(cls, _suite: Suite) -> Mapping[str, Any]:
-        """Return what the manifest of a run holds beyond what all tracks have."""
-        return {}
-
-    @classmethod
-    def physics(cls, _suite: Mapping[str, Any]) -> bool:
+    def lets_go(cls, suite: Mapping[str, Any]) -> bool:
         """True if a suite, as a manifest holds it, lets blocks go in a physics engine."""
-        return False
+        return cls.simulates and (suite.get(cls.section) or {}).get("physics") != "off"
 
-    def open_prompt(self) -> Prompt:
-        """Return the prompt of the suite; PromptError for a broken one."""
-        return template_prompt(self.suite, self.name)
+    @classmethod
+    def has_own_data(cls) -> bool:
+        """True if its section names data of its own, by `path` and `format`."""
+        return cls.options is not None and {"path", "format"} <= cls.options.model_fields.keys()
 
-    @abstractmethod
-    def open_pictures(self, shop: Workshop) -> Pictures:
-        """Return the pictures of its items, drawn in a shop."""
+    @classmethod
+    def template_for(cls, form: AnswerFormat) -> Path | None:
+        """Return the bundled prompt that asks for answers in a form, None where there is none."""
+        path = cls.template
+        if form != "text":
+            path = path.with_name(f"{path.stem}_json.j2")
+        return path if path.is_file() else None
 
     @property
     def prompt_name(self) -> str:
         """Name of the prompt; "" where every model is a recording."""
         return "" if self.prompt is None else self.prompt.name
 
-    def shown(self, item: ItemT, _seed: int) -> ItemT:
+    def open_prompt(self) -> Prompt:
+        """Return the prompt of the suite; PromptError for a broken one."""
+        return template_prompt(self.suite, self.name)
+
+    def shown(self, item: Any, _seed: int) -> Any:
         """Return the item as a seed shows it, by which it is asked, judged and counted."""
         return item
 
-    def each_shown(self) -> Sequence[ItemT]:
-        """Return all items, in every form in which they are shown."""
-        return self.items
-
-    def about(self, _item: ItemT) -> dict[str, Any]:
+    def about(self, _item: Any) -> dict[str, Any]:
         """Return the fields of records about an item besides its scene."""
         return {}
 
-    def drawn(self, item: ItemT, _seed: int | None = None) -> object | None:
-        """Return what its pictures are of, as a seed sends them; None where none is sent."""
-        return item
+    @abstractmethod
+    def draw(self, item: Any) -> tuple[Drawing, ...]:
+        """Return the pictures of an item as it is shown, in the order sent."""
 
-    def form(self, _item: ItemT) -> AnswerForm[Any] | None:
+    def drawings(self, item: Any) -> tuple[Drawing, ...]:
+        """Return what `draw` does, computed once for each form in which an item is shown."""
+        name = getattr(item, "shown_as", item.key)
+        if name not in self._drawings:
+            self._drawings[name] = self.draw(item)
+        return self._drawings[name]
+
+    @abstractmethod
+    def facts(self, item: Any, pictures: Sequence[Image]) -> dict[str, object]:
+        """Return what templates may use; nothing in it gives an answer away."""
+
+    def form(self, _item: Any) -> AnswerForm[Any] | None:
         """Return the form in which an answer is asked for; None where that is text."""
         return None
 
-    def identity(self) -> dict[str, Any]:
-        """Return what decides its results as JSON: the prompt, a digest of pictures, examples."""
-        if self.prompt is None or self.pictures is None:
-            return {"prompt": None, "pictures": None}
-        examples = self.examples.used(self.items)
-        drawn = map(self.drawn, (*self.each_shown(), *examples))
-        keys = [self.pictures.keys(one) for one in drawn if one is not None]
-        return {
-            "prompt": {"name": self.prompt.name, "version": self.prompt.version},
-            "pictures": hex_digest(json.dumps(keys)),
-            **({"examples": [example.key for example in examples]} if examples else {}),
-        }
+    def subject_of(self, item: Any) -> object:
+        """Return what baselines and people answer about."""
+        return item
 
-    @abstractmethod
-    def outlines(self, item: ItemT) -> Iterable[tuple[Request, bool]]:
+    def judge(self, item: Any, text: str | None) -> Judgement:
+        """Read and score a reply; None, where there is no reply, is scored as nothing said."""
+        raise NotImplementedError
+
+    async def judge_apart(self, item: Any, text: str | None, _earlier: Record | None) -> Judgement:
+        """Return what `judge` does; where that takes long, beside the calls of others.
+
+        Of an earlier record of the same sample it may take what replies alone do not decide.
+        """
+        return self.judge(item, text)
+
+    def start(
+        self, item: Any, seed: int, params: Mapping[str, object], *, with_messages: bool
+    ) -> Episode:
+        """Return an episode that has not begun."""
+        raise NotImplementedError
+
+    def again(self, item: Any, record: Record) -> Episode:
+        """Return the episode of a record before its first reply, to be judged again.
+
+        What replies alone do not decide, as what fell, is taken from the record.
+        """
+        raise NotImplementedError
+
+    def right_answer(self, item: Any) -> str:
+        """Return the answer of a worked example, in the form that is asked for."""
+        raise NotImplementedError
+
+    def identity(self) -> dict[str, Any]:
+        """Return what decides its results as JSON: prompt, pictures, examples, physics engine."""
+        identity: dict[str, Any] = {"prompt": None, "pictures": None}
+        if self.prompt is not None:
+            used = {one.key: one for examples in self.examples.values() for one in examples}
+            shown = [self.shown(item, s) for s in self.drawn_seeds for item in self.items]
+            drawn = map(self.drawings, (*shown, *(used[key] for key in sorted(used))))
+            keys = [[one.key for one in drawings] for drawings in drawn if drawings]
+            version = {"name": self.prompt.name, "version": self.prompt.version}
+            identity = {"prompt": version, "pictures": hex_digest(json.dumps(keys))}
+            if used:
+                identity["examples"] = sorted(used)
+        if self.simulates and getattr(self.spec, "physics", "") != "off":
+            engine = physics_engine()
+            if engine.name != REFERENCE_ENGINE:
+                about = {"engine": engine.name, engine.name: engine_version(engine.name)}
+                identity[ENGINE] = about
+        return identity
+
+    async def request(
+        self, item: Any, seed: int, params: Mapping[str, object], *, with_messages: bool
+    ) -> Request:
+        """Return the request of one sample; without messages for models that need none."""
+        if not with_messages or self.shop is None:
+            return Request(item.key, seed, (), params, "", self.subject_of(item))
+        shown = (*self.examples.get(item.key, ()), item)
+        images = [await self.shop.images(self.drawings(one)) for one in shown]
+        return self._request(shown, seed, params, images)
+
+    def outlines(self, item: Any) -> Iterator[Request]:
         """Yield the requests of an item as far as they are known before any is answered.
 
-        With seed 0 and no parameters, made without rendering; with each, True if its pictures are
-        the real ones.
+        With seed 0 and no parameters, made without rendering: a picture that is not at hand is
+        empty, and so is one that cannot be known.
         """
+        if self.shop is None:
+            yield Request(item.key, 0, (), {}, "", self.subject_of(item))
+            return
+        shown = (*self.examples.get(item.key, ()), item)
+        images = [self.shop.outlines(self.drawings(one)) for one in shown]
+        yield self._request(shown, 0, {}, images)
+
+    def _request(
+        self,
+        shown: Sequence[Any],
+        seed: int,
+        params: Mapping[str, object],
+        images: Sequence[tuple[Image, ...]],
+    ) -> Request:
+        """Return the request about the last item shown, after examples, with pictures of each."""
+        assert self.prompt is not None
+        *examples, item = shown
+        turns: list[Message] = []
+        for one, pictures in zip(examples, images, strict=False):
+            *_, asked = self.prompt.messages(pictures, self.facts(one, pictures))
+            parts = tuple(
+                replace(part, label=f"example {one.key}: {part.label}")
+                if isinstance(part, Image)
+                else part
+                for part in asked.parts
+            )
+            turns += [Message("user", parts), Message("assistant", (self.right_answer(one),))]
+        *first, question = self.prompt.messages(images[-1], self.facts(item, images[-1]))
+        form = self.form(item)
+        return Request(
+            item.key,
+            seed,
+            (*first, *turns, question),
+            params,
+            self.prompt.version,
+            self.subject_of(item),
+            None if form is None else form.response_format,
+            examples=tuple(one.key for one in examples),
+        )
 
     async def work_out(self, work: Callable[[], Any]) -> Any:
         """Return what `work`, a `partial`, gives in another process; without a shop in a thread."""
@@ -244,203 +309,92 @@ class Track(ABC, Generic[ItemT]):
             self.shop.close()
 
 
-class SingleTrack(Track[ItemT]):
-    """A track that asks once a sample."""
-
-    @abstractmethod
-    def subject_of(self, item: ItemT) -> object:
-        """Return what baselines answer about."""
-
-    @abstractmethod
-    def facts(self, item: ItemT, pictures: Sequence[Image]) -> dict[str, object]:
-        """Return what templates may use; nothing in it gives an answer away."""
-
-    @abstractmethod
-    def judge(self, item: ItemT, text: str | None) -> Judgement:
-        """Read and score a reply; None, where there is no reply, is scored as nothing said."""
-
-    async def judge_apart(
-        self, item: ItemT, text: str | None, _earlier: Record | None
-    ) -> Judgement:
-        """Return what `judge` does; where that takes long, beside the calls of others.
-
-        Of an earlier record of the same sample it may take what replies alone do not decide.
-        """
-        return self.judge(item, text)
-
-    def right_answer(self, item: ItemT) -> str:
-        """Return the answer of a worked example, in the form that is asked for."""
-        raise NotImplementedError(f"there is no worked example of {item.key}")
-
-    async def request(
-        self, item: ItemT, seed: int, params: Mapping[str, object], *, with_messages: bool
-    ) -> Request:
-        """Return the request of one sample; without messages for models that need none."""
-        if not with_messages or self.pictures is None:
-            return Request(item.key, seed, (), params, "", self.subject_of(item))
-        drawn = self._drawn_with_examples(item, seed)
-        images = [() if one is None else await self.pictures.of(one) for one in drawn]
-        return self._request(item, seed, params, images)
-
-    def outlines(self, item: ItemT) -> Iterator[tuple[Request, bool]]:
-        """Yield the one request, made without rendering, and True if its pictures are real."""
-        if self.pictures is None:
-            yield Request(item.key, 0, (), {}, "", self.subject_of(item)), True
-            return
-        found = [
-            ((), True) if one is None else self.pictures.outline(one)
-            for one in self._drawn_with_examples(item, 0)
-        ]
-        request = self._request(item, 0, {}, [images for images, _ in found])
-        yield request, all(are_real for _, are_real in found)
-
-    def _drawn_with_examples(self, item: ItemT, seed: int) -> list[object | None]:
-        return [*map(self.drawn, self.examples.of(item)), self.drawn(item, seed)]
-
-    def _request(
-        self,
-        item: ItemT,
-        seed: int,
-        params: Mapping[str, object],
-        images: Sequence[tuple[Image, ...]],
-    ) -> Request:
-        """Return the request with the pictures of each worked example, then of the item."""
-        assert self.prompt is not None
-        examples, turns = self.examples.of(item), list[Message]()
-        for one, pictures in zip(examples, images, strict=False):
-            *_, asked = self.prompt.messages(pictures, self.facts(one, pictures))
-            name = f"example {one.key}: "
-            parts = tuple(
-                replace(part, label=name + part.label) if isinstance(part, Image) else part
-                for part in asked.parts
-            )
-            turns += [Message("user", parts), Message("assistant", (self.right_answer(one),))]
-        *first, question = self.prompt.messages(images[-1], self.facts(item, images[-1]))
-        messages, version = (*first, *turns, question), self.prompt.version
-        asks = self.form(item)
-        form = None if asks is None else asks.response_format
-        keys = tuple(one.key for one in examples)
-        subject = self.subject_of(item)
-        return Request(item.key, seed, messages, params, version, subject, form, examples=keys)
-
-
-class EpisodeTrack(Track[ItemT]):
-    """A track whose samples are episodes."""
-
-    plays = True
-
-    @abstractmethod
-    def start(
-        self, item: ItemT, seed: int, params: Mapping[str, object], *, with_messages: bool
-    ) -> Episode:
-        """Return an episode that has not begun."""
-
-    @abstractmethod
-    def again(self, item: ItemT, record: Record) -> Episode:
-        """Return the episode of a record before its first reply, to be judged again.
-
-        What replies alone do not decide, as what fell, is taken from the record.
-        """
-
-
-class SceneTrack(Track[AssemblyTask]):
+class SceneTrack(Track):
     """A track about scenes, as a seed shows them; its section may hold `PictureControls`."""
 
-    drawn_here: ClassVar[str] = ""
-    """The reason why pictures of the data set will not do; "" where they will."""
+    draws: ClassVar[bool] = False
+    """True if its pictures are drawn here, so that those of a data set will not do."""
 
-    def __init__(self, opening: Opening) -> None:
-        """Select scenes evenly over levels. Raises SpecError where another goal is to be shown and
-        a scene has none.
-        """
-        suite, self.pool = opening.suite, opening.dataset.tasks
-        self.items = select_tasks(self.pool, suite.levels, opening.limit)
-        is_blind, elsewhere = False, None
-        if self.section is not None:
-            controls = suite.section(self.section[1])
-            if isinstance(controls, PictureControls):
-                is_blind = controls.blind
-                elsewhere = other_goals(self.pool) if controls.wrong_image else None
-            if elsewhere is not None:
-                elsewhere.check(self.items, "scene", f"{self.section[0]}.wrong_image")
-        self.presentation = Presentation(suite.candidates.order, is_blind, elsewhere, suite.seeds)
-        super().__init__(opening)
-
-    def open_pictures(self, shop: Workshop) -> Pictures:
-        """Return pictures of goals and candidates as a suite wants them."""
-        images = self.suite.images
-        if self.drawn_here and images.source == "dataset":
-            where = self.suite.where("images", "source")
+    def open(self) -> None:
+        """Select scenes evenly over levels."""
+        suite, pool = self.suite, self.dataset.tasks
+        self.items = select_tasks(pool, suite.levels, self.limit)
+        controls = self.spec if isinstance(self.spec, PictureControls) else PictureControls()
+        others: Others[AssemblyTask] | None = None
+        if controls.wrong_image:
+            others = Others(pool, lambda task: task.scene.level)
+            others.check(self.items, "scene", f"{self.section}.wrong_image")
+        self.presentation = Presentation(suite.candidates.order, controls.blind, others)
+        if not self.presentation.is_plain:
+            self.drawn_seeds = suite.seeds
+        if self.draws and self.shop is not None and suite.images.source == "dataset":
+            where, message = suite.where("images", "source"), f"{self.name} draws its own pictures"
             hint = "render the pictures: --set images.source=render"
-            raise SpecError(Problem(where, self.drawn_here, "images.source", "dataset", hint=hint))
-        return ScenePictures(shop, images)
+            raise SpecError(Problem(where, message, "images.source", "dataset", hint=hint))
+
+    def draw(self, item: AssemblyTask) -> tuple[Drawing, ...]:
+        """Return the pictures of goal and candidates as a suite wants them."""
+        return scene_drawings(item, self.suite.images)
 
     def shown(self, item: AssemblyTask, seed: int) -> AssemblyTask:
         """Return the scene as a seed shows it."""
         return self.presentation.of(item, seed)
 
-    def each_shown(self) -> Sequence[AssemblyTask]:
-        """Return all scenes, in every form in which they are shown."""
-        return [self.shown(task, s) for s in self.presentation.drawn_seeds for task in self.items]
-
     def about(self, item: AssemblyTask) -> dict[str, Any]:
         """Return how the scene is shown, where not as the file has it."""
-        return presentation_fields(item)
+        if not isinstance(item, ShownTask):
+            return {}
+        goal = None if item.goal is None else item.goal.key
+        return {"shown": {"order": list(item.order), "goal": goal}}
 
     def facts(self, item: AssemblyTask, pictures: Sequence[Image]) -> dict[str, object]:
         """Return what templates may use; nothing in it gives an answer away."""
-        scale = self.pictures.candidate_scale if isinstance(self.pictures, ScenePictures) else None
+        images = self.suite.images
         return {
             "pictures": [picture.label for picture in pictures],
             "n_candidates": len(item.candidates),
-            "candidate_scale": scale,
+            "candidate_scale": None if images.source == "dataset" else images.candidate_scale,
             "is_blind": self.presentation.blind,
             **form_facts(self.form(item)),
         }
 
 
-AnyTrack = SingleTrack[Any] | EpisodeTrack[Any]
-"""A track of either kind."""
 kinds, kind_of = known_tracks, known_track
 """All tracks by name, and the one of a name."""
 
 
-def kinds_with_physics(suite: Mapping[str, Any]) -> tuple[type[AnyTrack], ...]:
+def simulating(suite: Mapping[str, Any]) -> tuple[type[Track], ...]:
     """Return the tracks of a suite, as a manifest holds it, that use a physics engine."""
     asked = [kind for name, kind in kinds().items() if name in (suite.get("tracks") or ())]
-    return tuple(kind for kind in asked if kind.physics(suite))
+    return tuple(kind for kind in asked if kind.lets_go(suite))
 
 
-def count_sample(track: str, item: Any, judged: Any) -> Mapping[str, tuple[float, ...]]:
-    """Return the counts of one sample that the measures of a track need, by name of the counts.
+def count_sample(item: Item, record: Record) -> dict[str, tuple[float, ...]]:
+    """Return the counts of a sample that the measures of its track need, by name of the counts.
 
-    `judged` is the judgement of the reply, or the episode once it has ended. Counts are empty where
-    a measure does not count a sample.
+    They are empty where a measure does not count it.
     """
-    added: list[SampleCounts] = [measure.counted for measure in added_measures(track)]
+    added: list[SampleCounts] = [measure.counted for measure in added_measures(record.track)]
     return {
-        counted.name: tuple(map(float, counted.sample(item, judged) or ()))
-        for counted in (*kind_of(track).counted, *added)
+        counted.name: tuple(map(float, counted.sample(item, record) or ()))
+        for counted in (*kind_of(record.track).counted, *added)
         if counted.sample is not None
     }
 
 
-def open_tracks(opening: Opening, names: Sequence[str]) -> tuple[AnyTrack, ...]:
-    """Return the tracks of these names, in their order.
-
-    Raises SpecError, DataError or PromptError with what is wrong.
-    """
-    suite = opening.suite
-    for name in names:
+def open_tracks(
+    suite: Suite, dataset: Dataset, limit: int | None = None, shop: Workshop | None = None
+) -> tuple[Track, ...]:
+    """Return the tracks of a suite, in its order, as `Track` opens them."""
+    for name in suite.tracks:
         kind, field = kind_of(name), "answer_format"
-        if suite.answer_format == "json_schema" and kind.json_template is None:
+        if kind.template_for(suite.answer_format) is None:
             message, hint = f"{name} cannot be asked for as JSON", "use answer_format: text"
             raise SpecError(Problem(suite.where(field), message, field, "json_schema", hint=hint))
-        if suite.examples and kind.no_examples:
-            message = f"cannot be shown in {name}: {kind.no_examples}"
-            where = suite.where("examples")
+        if suite.examples and not kind.shows_examples:
+            where, message = suite.where("examples"), f"{name} shows no worked examples"
             raise SpecError(Problem(where, message, "examples", hint="leave them out"))
-    return tuple(kind_of(name)(opening) for name in names)
+    return tuple(kind_of(name)(suite, dataset, limit, shop) for name in suite.tracks)
 
 
 def template_prompt(suite: Suite, name: str) -> TemplatePrompt:
@@ -448,11 +402,7 @@ def template_prompt(suite: Suite, name: str) -> TemplatePrompt:
 
     Raises PromptError for a broken one.
     """
-    kind = kind_of(name)
-    own = kind.template if suite.answer_format == "text" else kind.json_template
-    default = None if own is None else TemplatePrompt(own, "default")
-    path = suite.files.templates.get(name)
-    if path is not None:
-        return TemplatePrompt(path, path.stem, default)
-    assert default is not None, f"{name} has no prompt of its own"
-    return default
+    bundled = kind_of(name).template_for(suite.answer_format)
+    assert bundled is not None, f"{name} has no prompt for {suite.answer_format}"
+    default, path = TemplatePrompt(bundled, "default"), suite.files.templates.get(name)
+    return default if path is None else TemplatePrompt(path, path.stem, default)

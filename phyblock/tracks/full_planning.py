@@ -21,13 +21,12 @@ from phyblock.resources import bundled
 from phyblock.scoring.counts import Floats, ratio_of
 from phyblock.scoring.plan import AssemblyScorer, Score
 from phyblock.stable import drawn_bytes
-from phyblock.tracks.base import Opening, SceneTrack, SingleTrack
+from phyblock.tracks.base import Judgement, SceneTrack
 from phyblock.tracks.baselines import Picking, candidate_choices
 from phyblock.tracks.goal_blind import BlindGuesses
 from phyblock.tracks.items import examples_of, file_plan
 from phyblock.tracks.measures import SampleCounts
 from phyblock.tracks.prompts import OfficialPrompt, Prompt
-from phyblock.types import PlanParser
 
 
 class PlanningSpec(PictureControls):
@@ -97,8 +96,6 @@ def plan_text(steps: Iterable[int]) -> str:
 
 _RANDOM_STEPS = 4
 """As in the paper's Random row."""
-_SHORT, _MOST_JUDGED = 1_000, 4_096
-"""Replies of so many characters are remembered with their judgements, and so many of them."""
 
 
 def _random_plan(subject: PlanSubject, rng: np.random.Generator) -> str:
@@ -174,23 +171,6 @@ def pick_plan(subject: PlanSubject) -> Picking:
     )
 
 
-def worked_plan(task: AssemblyTask, form: AnswerForm[list[int]] | None) -> str:
-    """Return a right answer in the form that is asked for, None for text.
-
-    Blocks are placed in a valid order that does not follow that of the file: the next is the ready
-    one whose digest is the least.
-    """
-    order: list[int] = []
-    while ready := task.scene.graph.ready(sum(1 << vertex for vertex in order)):
-        order.append(min(ready, key=lambda v: drawn_bytes("example plan", task.scene.id, v)))
-    subject = PlanSubject(task.scene, task.candidates)
-    steps = [needed_candidate(subject, task.scene.blocks[vertex]) for vertex in order]
-    if form is None:
-        return plan_text(steps)
-    reasoning = f"The goal has {len(steps)} blocks. Each is placed once all it rests on is there."
-    return form.write(steps, reasoning)
-
-
 def pose_choices(
     scene: Scene, candidates: CandidateSet, steps: Sequence[int]
 ) -> Iterator[tuple[bool, bool]]:
@@ -211,9 +191,9 @@ def pose_choices(
             yield right[0], chosen[kind]
 
 
-def pose_counts(item: Any, judged: Any) -> tuple[int, int, int, int]:
+def pose_counts(item: Any, record: Any) -> tuple[int, int, int, int]:
     """Return the numbers of `POSE_COUNTS` of a plan or an episode."""
-    choices = list(pose_choices(item.scene, item.candidates, judged.steps))
+    choices = list(pose_choices(item.scene, item.candidates, record.parse.plan))
     first = [is_right for is_first, is_right in choices if is_first]
     later = [is_right for is_first, is_right in choices if not is_first]
     return sum(first), len(first), sum(later), len(later)
@@ -229,81 +209,40 @@ POSE_COUNTS = SampleCounts(
 )
 
 
-@dataclass(frozen=True)
-class PlanJudgement:
-    """A reply as it was read and scored; `in_file` is the plan in the numbers of the file, where
-    others were shown.
-    """
-
-    parser: PlanParser
-    parsed: ParsedPlan
-    scores: tuple[Score, ...]
-    in_file: tuple[int, ...] | None = None
-
-    @property
-    def steps(self) -> tuple[int, ...]:
-        """The candidates that were named, in order."""
-        return self.parsed.plan.steps
-
-    @property
-    def is_read(self) -> bool:
-        """True if a rule matched."""
-        return self.parsed.rule is not None
-
-    def fields(self) -> dict[str, Any]:
-        """Return `parse` and `scores` of the record (docs/results.md)."""
-        return {
-            "parse": {
-                "parser": self.parser,
-                "rule": self.parsed.rule,
-                "plan": list(self.steps),
-                "file_plan": self.in_file,
-                "dropped": list(self.parsed.dropped),
-                "version": reader_version(self.parser),
-                "problem": self.parsed.problem,
-                "truncated": self.parsed.truncated,
-            },
-            "scores": [score_fields(score) for score in self.scores],
-        }
-
-
-class FullPlanning(SceneTrack, SingleTrack[AssemblyTask]):
+class FullPlanning(SceneTrack):
     """Asks for a whole plan in one reply."""
 
     name = "full_planning"
     title = "Full planning"
-    asks = "a whole plan in one reply"
-    section = (name, PlanningSpec, "How scenes are shown in the full_planning track.")
+    section = name
+    options = PlanningSpec
     template = bundled("prompts", "full_planning.j2")
-    json_template = bundled("prompts", "full_planning_json.j2")
     results = "phyblock.tracks.full_planning_results"
-    subject = PlanSubject
     baselines = PLAN_RULES
     by_hand = staticmethod(pick_plan)
     record = PlanRecord
     counted = (POSE_COUNTS,)
     varies = ("prompt", "background", "view", "candidate_order", "layout", "examples", "repeats")
-    no_examples = ""
+    shows_examples = True
 
-    def __init__(self, opening: Opening) -> None:
-        """Open the track; examples are shown as scenes are, with their own goals."""
-        super().__init__(opening)
-        suite = self.suite
-        self._guesses = BlindGuesses(suite.candidates.order, self.pool, suite.settings[0])
+    def open(self) -> None:
+        """Select scenes, and examples, which are shown as scenes are, with their own goals."""
+        super().open()
+        suite, dataset = self.suite, self.dataset
+        self._guesses = BlindGuesses(suite.candidates.order, dataset.tasks, suite.settings[0])
         self._scorers: dict[object, AssemblyScorer] = {}
-        self._judged: dict[object, PlanJudgement] = {}
-        is_drawn = suite.images.source == "render"
         if self.shop is None:
             return
+        is_drawn = suite.images.source == "render"
         if lacking := [task.key for task in self.items if not (is_drawn or task.composite)]:
             message = f"has no picture of {len(lacking)} of {len(self.items)} scenes"
             found = ", ".join(lacking[:8]) + (", ..." if len(lacking) > 8 else "")
-            hint, where = "render them: --set images.source=render", str(opening.dataset.root)
+            hint, where = "render them: --set images.source=render", str(dataset.root)
             raise DataError(Problem(where, message, "images.source", found, hint=hint))
-        own = replace(self.presentation, elsewhere=None)
+        own = replace(self.presentation, others=None)
         able = (
             own.of(task, suite.seeds[0])
-            for task in (self.pool if suite.examples else ())
+            for task in dataset.tasks
             if (is_drawn or task.composite)
             and all(task.candidates.index_of(block.look) for block in task.scene.blocks)
         )
@@ -329,26 +268,42 @@ class FullPlanning(SceneTrack, SingleTrack[AssemblyTask]):
         return PlanSubject(item.scene, item.candidates, partial(self._guesses.plan, item))
 
     def right_answer(self, item: AssemblyTask) -> str:
-        """Return the answer of a worked example."""
-        return worked_plan(item, self.form(item))
+        """Return the answer of a worked example.
 
-    def judge(self, item: AssemblyTask, text: str | None) -> PlanJudgement:
+        Blocks are placed in a valid order that does not follow that of the file: the next is the
+        ready one whose digest is the least.
+        """
+        order: list[int] = []
+        while ready := item.scene.graph.ready(sum(1 << vertex for vertex in order)):
+            order.append(min(ready, key=lambda v: drawn_bytes("example plan", item.scene.id, v)))
+        subject, form = self.subject_of(item), self.form(item)
+        steps = [needed_candidate(subject, item.scene.blocks[vertex]) for vertex in order]
+        if form is None:
+            return plan_text(steps)
+        reasoning = f"The goal has {len(steps)} blocks. Each is placed once all it rests on is "
+        return form.write(steps, f"{reasoning}there.")
+
+    def judge(self, item: AssemblyTask, text: str | None) -> Judgement:
         """Read and score a reply; None, where there is no reply, is scored as an empty plan."""
         suite, parsed, key = self.suite, ParsedPlan(Plan(), None), (item.key, item.candidates)
-        # Baselines that see no goal say the same with every seed.
-        if (known := self._judged.get((*key, text))) is not None:
-            return known
         if text is not None:
             parsed = parse_plan(text, len(item.candidates), suite.parser)
         if key not in self._scorers:
             self._scorers[key] = AssemblyScorer(item.scene, item.candidates, suite.settings)
         level1 = None if suite.scoring.level1 == "aov" else suite.scoring.level1
         scores = self._scorers[key].score(parsed.plan, suite.scoring.matchers, level1)
-        in_file = file_plan(item, parsed.plan.steps)
-        judged = PlanJudgement(suite.parser, parsed, scores, in_file)
-        if len(text or "") <= _SHORT and len(self._judged) < _MOST_JUDGED:
-            self._judged[*key, text] = judged
-        return judged
+        parse = {
+            "parser": suite.parser,
+            "rule": parsed.rule,
+            "plan": parsed.plan.steps,
+            "file_plan": file_plan(item, parsed.plan.steps),
+            "dropped": parsed.dropped,
+            "version": reader_version(suite.parser),
+            "problem": parsed.problem,
+            "truncated": parsed.truncated,
+        }
+        fields = {"parse": parse, "scores": [score_fields(score) for score in scores]}
+        return Judgement(parsed.rule is not None, fields)
 
 
 TRACK = FullPlanning

@@ -1,17 +1,18 @@
-"""Items: those that a run asks about, their order, and how a seed presents them.
+"""Items: those that a run asks about, their order, and how a seed shows them.
 
 A seed can show a scene with its candidates in another order, without its goal, or with the goal of
-another one. All that depends on the presentation (pictures, prompt, the reading of a reply, its
-scores) is made from a `ShownTask`, whose candidates are numbered as the model saw them. Only
-records know the numbers in the file. Worked examples are other items with right answers.
+another one. All that depends on it (pictures, prompt, the reading of a reply, its scores) is made
+from a `ShownTask`, whose candidates are numbered as the model saw them. Only records know the
+numbers in the file. Worked examples are other items with right answers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Generic, Protocol, TypeVar
+from functools import partial
+from typing import Generic, Protocol, TypeVar
 
 from phyblock.config.suite import Suite
 from phyblock.data import AssemblyTask
@@ -56,16 +57,21 @@ def interleaved(items: Sequence[ItemT]) -> list[ItemT]:
     return [items[position] for position in _fair_order([item.scene.level for item in items])]
 
 
-def spread(size: int, share: int) -> list[int]:
-    """Return `share` of the positions 0 to `size` - 1, evenly spread; more hold all of fewer."""
-    return sorted(_spread_out(size)[:share])
-
-
 def stratified(sizes: Sequence[int], limit: int) -> list[int]:
     """Return `limit` places shared among groups of the given sizes, as `_fair_order` shares."""
     groups = [group for group, size in enumerate(sizes) for _ in range(size)]
     chosen = [groups[position] for position in _fair_order(groups)[:limit]]
     return [chosen.count(group) for group in range(len(sizes))]
+
+
+def spread(size: int) -> list[int]:
+    """Return the positions 0 to `size` - 1, of which any first few are evenly spread.
+
+    They are taken at 0, 1/2, 1/4, 3/4, 1/8, ... of the size: the sequence of van der Corput (1935).
+    """
+    digits = max(1, (size - 1).bit_length())
+    parts = (int(f"{i:0{digits}b}"[::-1], 2) for i in range(2**digits))
+    return list(dict.fromkeys(part * size // 2**digits for part in parts))
 
 
 def _fair_order(strata: Sequence[int]) -> list[int]:
@@ -80,57 +86,40 @@ def _fair_order(strata: Sequence[int]) -> list[int]:
     places = sorted(
         (rank > 0, Fraction(2 * rank + 1, len(of_stratum)), stratum, of_stratum[place])
         for stratum, of_stratum in members.items()
-        for rank, place in enumerate(_spread_out(len(of_stratum)))
+        for rank, place in enumerate(spread(len(of_stratum)))
     )
     return [position for *_, position in places]
 
 
-def _spread_out(size: int) -> list[int]:
-    """Return the positions 0 to `size` - 1, of which any first few are evenly spread.
-
-    They are taken at 0, 1/2, 1/4, 3/4, 1/8, ... of the size: the sequence of van der Corput (1935).
-    """
-    digits = max(1, (size - 1).bit_length())
-    parts = (int(f"{i:0{digits}b}"[::-1], 2) for i in range(2**digits))
-    return list(dict.fromkeys(part * size // 2**digits for part in parts))
-
-
-def _bases(item: Item) -> set[str]:
-    return {item.scene.id, *item.scene.parents}
-
-
-class Elsewhere(Generic[ItemT]):
-    """Finds, for an item, another of its sort about a scene that shares no base scene with its own.
-
-    `pool` are those to take from, `sort_of` says what makes two stand in for one another.
-    """
+class Others(Generic[ItemT]):
+    """Items of a pool by their sort; they stand in for an item whose base scenes they share not."""
 
     def __init__(self, pool: Iterable[ItemT], sort_of: Callable[[ItemT], Hashable]) -> None:
         self._sort_of = sort_of
-        self._alike: dict[Hashable, list[ItemT]] = {}
+        self._by_sort: dict[Hashable, list[ItemT]] = {}
         for one in pool:
-            self._alike.setdefault(sort_of(one), []).append(one)
-        self._others_of: dict[str, list[ItemT]] = {}
+            self._by_sort.setdefault(sort_of(one), []).append(one)
 
-    def of(self, item: ItemT, seed: int) -> ItemT:
+    def of(self, item: ItemT) -> list[ItemT]:
+        """Return all that can stand in for an item, in the order of the pool."""
+        same_sort, own = self._by_sort.get(self._sort_of(item), ()), _bases(item)
+        return [one for one in same_sort if own.isdisjoint(_bases(one))]
+
+    def drawn(self, item: ItemT, seed: int) -> ItemT:
         """Return the one whose picture is shown, which depends on item and seed alone."""
-        others = self.others(item)
-        digest = drawn_bytes("wrong image", seed, item.key)
+        others, digest = self.of(item), drawn_bytes("wrong image", seed, item.key)
         return others[int.from_bytes(digest, "big") % len(others)]
 
-    def check(self, items: Sequence[ItemT], noun: str, field: str) -> None:
+    def check(self, items: Iterable[ItemT], noun: str, field: str) -> None:
         """Raise SpecError for the first item that has no other; `field` is that of the suite."""
-        lacking = next((item for item in items if not self.others(item)), None)
+        lacking = next((item for item in items if not self.of(item)), None)
         if lacking is not None:
             message = f"has no {noun} of the same kind about another scene to take pictures from"
             raise SpecError(Problem(f"{noun} {lacking.key}", message, field))
 
-    def others(self, item: ItemT) -> list[ItemT]:
-        """Return all that can stand in for an item, in the order of the pool."""
-        if item.key not in self._others_of:
-            alike, own = self._alike.get(self._sort_of(item), ()), _bases(item)
-            self._others_of[item.key] = [one for one in alike if own.isdisjoint(_bases(one))]
-        return self._others_of[item.key]
+
+def _bases(item: Item) -> set[str]:
+    return {item.scene.id, *item.scene.parents}
 
 
 @dataclass(frozen=True)
@@ -153,20 +142,16 @@ class ShownTask(AssemblyTask):
 
 @dataclass(frozen=True)
 class Presentation:
-    """The presentation of scenes in a suite; what is drawn is drawn again with each of the `seeds`.
-
-    `blind` leaves out the goal; with `elsewhere` that of another scene of its level is shown.
-    """
+    """How scenes are shown: without their goal where `blind`, with that of one of the `others`."""
 
     order: CandidateOrder = "file"
     blind: bool = False
-    elsewhere: Elsewhere[AssemblyTask] | None = None
-    seeds: tuple[int, ...] = (0,)
+    others: Others[AssemblyTask] | None = None
 
     @property
     def is_plain(self) -> bool:
         """True if scenes are shown as the file has them."""
-        return self.order == "file" and not self.blind and self.elsewhere is None
+        return self.order == "file" and not self.blind and self.others is None
 
     def of(self, task: AssemblyTask, seed: int) -> AssemblyTask:
         """Return the task as a seed shows it; itself where that is as the file has it."""
@@ -176,22 +161,24 @@ class Presentation:
         if self.order == "shuffled":
             numbers = shown_order(task, seed)
         goal = None if self.blind else task
-        if self.elsewhere is not None:
-            goal = self.elsewhere.of(task, seed)
-        return replace(in_order(task, numbers, goal), seed=seed)
-
-    @property
-    def drawn_seeds(self) -> tuple[int, ...]:
-        """The seeds, of those that show the same only the first."""
-        return self.seeds[:1] if self.is_plain else self.seeds
+        if self.others is not None:
+            goal = self.others.drawn(task, seed)
+        return in_order(task, numbers, goal, seed)
 
 
-def other_goals(pool: Iterable[AssemblyTask]) -> Elsewhere[AssemblyTask]:
-    """Return the goals that can stand in for one another: those of one level."""
-    return Elsewhere(pool, lambda task: task.scene.level)
+def shown_order(task: AssemblyTask, seed: int) -> tuple[int, ...]:
+    """Return the candidates' numbers in the file, in the order that a seed draws for the scene.
+
+    It is sorted by digests, so that it is the same on every machine and with every library.
+    """
+    numbers = range(1, len(task.candidates) + 1)
+    place = partial(drawn_bytes, "candidate order", seed, task.scene.id)
+    return tuple(sorted(numbers, key=place))
 
 
-def in_order(task: AssemblyTask, numbers: Sequence[int], goal: AssemblyTask | None) -> ShownTask:
+def in_order(
+    task: AssemblyTask, numbers: Sequence[int], goal: AssemblyTask | None, seed: int = 0
+) -> ShownTask:
     """Return the task with the candidates of these numbers in the file, in this order, and a goal.
 
     Raises DataError for a number that no candidate has, and for one that is there twice.
@@ -202,7 +189,7 @@ def in_order(task: AssemblyTask, numbers: Sequence[int], goal: AssemblyTask | No
         found, allowed = ", ".join(map(str, numbers)), f"the numbers 1 to {n}, each once"
         raise DataError(Problem(where, message, "shown.order", found, allowed))
     shown = CandidateSet(tuple(task.candidates[number] for number in numbers))
-    return ShownTask(task.scene, shown, task.composite, tuple(numbers), goal)
+    return ShownTask(task.scene, shown, task.composite, tuple(numbers), goal, seed)
 
 
 def as_recorded(task: AssemblyTask, record: Record) -> AssemblyTask:
@@ -210,16 +197,9 @@ def as_recorded(task: AssemblyTask, record: Record) -> AssemblyTask:
     return task if record.shown is None else in_order(task, record.shown.order, task)
 
 
-def shown_order(task: AssemblyTask, seed: int) -> tuple[int, ...]:
-    """Return the candidates' numbers in the file, in the order that a seed draws for the scene.
-
-    It is sorted by digests, so that it is the same on every machine and with every library.
-    """
-
-    def place(number: int) -> bytes:
-        return drawn_bytes("candidate order", seed, task.scene.id, number)
-
-    return tuple(sorted(range(1, len(task.candidates) + 1), key=place))
+def goal_of(task: AssemblyTask) -> AssemblyTask | None:
+    """Return the task whose goal is shown, None where none is."""
+    return task.goal if isinstance(task, ShownTask) else task
 
 
 def file_plan(task: AssemblyTask, steps: Sequence[int]) -> tuple[int, ...] | None:
@@ -233,76 +213,27 @@ def file_plan(task: AssemblyTask, steps: Sequence[int]) -> tuple[int, ...] | Non
     return tuple(task.order[step - 1] if 1 <= step <= n else step for step in steps)
 
 
-def presentation_fields(task: AssemblyTask) -> dict[str, Any]:
-    """Return the fields of records on how a task was shown; none where as the file has it."""
-    if not isinstance(task, ShownTask):
-        return {}
-    goal = None if task.goal is None else task.goal.key
-    return {"shown": {"order": list(task.order), "goal": goal}}
-
-
-class Examples(Generic[ItemT]):
-    """Chooses `n` worked examples for an item out of a pool.
-
-    They are tried in one order for all items, so that requests begin alike: those about the scenes
-    `named` first, then as `seed` draws; no two are about one scene. None is of another sort than
-    the item, shares a base scene with it, or has its goal, be it turned, mirrored or shifted.
-    """
-
-    def __init__(
-        self,
-        pool: Iterable[ItemT],
-        n: int,
-        named: Sequence[str] = (),
-        seed: int = 0,
-        sort_of: Callable[[ItemT], Hashable] = lambda _: None,
-    ) -> None:
-        def place(one: ItemT) -> tuple[int, bytes]:
-            # Sorted by digests, the order is the same on every machine.
-            at = named.index(one.scene.id) if one.scene.id in named else len(named)
-            return at, drawn_bytes("example", seed, one.key)
-
-        self._n = n
-        self._pool = Elsewhere(sorted(pool, key=place) if n else (), sort_of)
-        self._goals: dict[str, bytes] = {}
-
-    def of(self, item: ItemT) -> tuple[ItemT, ...]:
-        """Return the examples of an item, fewer than `n` where there are no more."""
-        found: dict[str, ItemT] = {}
-        for one in self._pool.others(item) if self._n else ():
-            if len(found) == self._n:
-                break
-            if one.scene.id not in found and self._goal(one) != self._goal(item):
-                found[one.scene.id] = one
-        return tuple(found.values())
-
-    def used(self, items: Iterable[ItemT]) -> tuple[ItemT, ...]:
-        """Return all that are examples of any of the items, by key."""
-        by_key = {one.key: one for item in items for one in self.of(item)}
-        return tuple(by_key[key] for key in sorted(by_key))
-
-    def _goal(self, item: ItemT) -> bytes:
-        if item.key not in self._goals:
-            self._goals[item.key] = fingerprint(item.scene.blocks)
-        return self._goals[item.key]
-
-
 def examples_of(
     suite: Suite,
     pool: Iterable[ItemT],
     items: Sequence[ItemT],
     noun: str,
     sort_of: Callable[[ItemT], Hashable] = lambda _: None,
-) -> Examples[ItemT]:
-    """Return the examples that a suite wants, drawn from a pool by the least of its seeds.
+) -> Mapping[str, tuple[ItemT, ...]]:
+    """Return the worked examples that a suite wants of each item, by its key.
 
-    `sort_of` says what an item and its examples share. Raises SpecError for a scene that the pool
-    has not, and where an item has too few others.
+    They are tried in one order for all items, so that requests begin alike: those about the scenes
+    that the suite names first, then as the least of its seeds draws; no two are about one scene.
+    None is of another sort than the item, shares a base scene with it, or has its goal, be it
+    turned, mirrored or shifted. Raises SpecError for a scene that the pool has not, and where an
+    item has too few others.
     """
     wanted = suite.examples
+    if not wanted:
+        return {}
     n, named = (wanted, ()) if isinstance(wanted, int) else (len(wanted), wanted)
-    kept = list(pool) if n else []
-    known = sorted({one.scene.id for one in kept})
+    pool = list(pool)
+    known = sorted({one.scene.id for one in pool})
     problems = []
     for at, name in enumerate(named):
         if name not in known:
@@ -312,11 +243,29 @@ def examples_of(
             problems.append(Problem(where, message, f"examples[{at}]", name, allowed, hint))
     if problems:
         raise SpecError(problems)
-    examples = Examples(kept, n, named, min(suite.seeds), sort_of)
-    for item in items if n else ():
-        if (offered := len(examples.of(item))) < n:
-            where, message = suite.where("examples"), "has fewer others to be shown as examples"
+    seed, goals = min(suite.seeds), dict[str, bytes]()
+
+    def place(one: ItemT) -> tuple[int, bytes]:
+        at = named.index(one.scene.id) if one.scene.id in named else len(named)
+        return at, drawn_bytes("example", seed, one.key)
+
+    def goal(one: ItemT) -> bytes:
+        if one.scene.id not in goals:
+            goals[one.scene.id] = fingerprint(one.scene.blocks)
+        return goals[one.scene.id]
+
+    others, examples = Others(sorted(pool, key=place), sort_of), dict[str, tuple[ItemT, ...]]()
+    for item in items:
+        found: dict[str, ItemT] = {}
+        for one in others.of(item):
+            if one.scene.id not in found and goal(one) != goal(item):
+                found[one.scene.id] = one
+                if len(found) == n:
+                    break
+        if len(found) < n:
+            message = f"{noun} {item.key} has fewer others to be shown as examples"
             allowed = "others of its kind that share neither base scene nor goal with it"
-            message = f"{noun} {item.key} {message}"
-            raise SpecError(Problem(where, message, "examples", str(offered), allowed))
+            where = suite.where("examples")
+            raise SpecError(Problem(where, message, "examples", str(len(found)), allowed))
+        examples[item.key] = tuple(found.values())
     return examples

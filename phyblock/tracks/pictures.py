@@ -5,13 +5,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-from abc import ABC, abstractmethod
-from collections import OrderedDict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from phyblock.config.suite import ImagesSpec
 from phyblock.data import AssemblyTask
@@ -39,8 +37,8 @@ from phyblock.sim.pictures import (
     to_png,
 )
 from phyblock.stable import hex_digest
-from phyblock.tracks.items import ShownTask
-from phyblock.types import BACKGROUNDS, CandidateScale
+from phyblock.tracks.items import ShownTask, goal_of
+from phyblock.types import BACKGROUNDS
 from phyblock.workers import WorkerDiedError, WorkerPool
 
 _Result = TypeVar("_Result")
@@ -80,7 +78,7 @@ class Workshop:
         self._pool: WorkerPool | None = None
         self._alone = asyncio.Lock()
         self._making: dict[str, asyncio.Task[bytes]] = {}
-        self._recent: OrderedDict[tuple[str, str], Image] = OrderedDict()
+        self._recent: dict[tuple[str, str], Image] = {}
 
     async def work_out(self, work: Callable[[], _Result]) -> _Result:
         """Return what `work`, a `partial` of a function of a module, gives in a worker process.
@@ -99,13 +97,29 @@ class Workshop:
                 message = "a process that draws and simulates was killed twice"
                 raise SimulationError(message) from error
 
-    async def image(self, drawing: Drawing) -> Image:
-        """Return a picture from memory, from the cache, or made now.
+    async def images(self, drawings: Sequence[Drawing]) -> tuple[Image, ...]:
+        """Return pictures from memory, from the cache, or made now, all at the same time.
 
         Raises DataError for a file that is no picture, StoreError when the cache folder cannot be
         written, SimulationError when a worker was killed.
         """
-        if (kept := self.kept(drawing)) is not None:
+        return tuple(await asyncio.gather(*map(self._image, drawings)))
+
+    def outlines(self, drawings: Sequence[Drawing]) -> tuple[Image, ...]:
+        """Return pictures as far as they are at hand, of others empty ones of their sizes.
+
+        Raises DataError for a file that is no picture.
+        """
+        return tuple(self._kept(one) or Image(b"", one.label, *one.size_px) for one in drawings)
+
+    def close(self) -> None:
+        """Stop the worker processes."""
+        if self._pool is not None:
+            self._pool.shutdown(wait=True, cancel_futures=True)
+            self._pool = None
+
+    async def _image(self, drawing: Drawing) -> Image:
+        if (kept := self._kept(drawing)) is not None:
             return kept
         key = drawing.key
         if key not in self._making:
@@ -116,15 +130,10 @@ class Workshop:
         data = await asyncio.shield(self._making[key])
         return self._remembered(drawing, data)
 
-    def kept(self, drawing: Drawing) -> Image | None:
-        """Return a picture at hand; None where it is not there, not whole, or no picture.
-
-        Raises DataError for a file that is no picture.
-        """
-        name = (drawing.key, drawing.label)
-        if name in self._recent:
-            self._recent.move_to_end(name)
-            return self._recent[name]
+    def _kept(self, drawing: Drawing) -> Image | None:
+        """Return a picture at hand; None where it is not there, not whole, or no picture."""
+        if (image := self._recent.get((drawing.key, drawing.label))) is not None:
+            return image
         if drawing.is_file:
             return self._remembered(drawing, drawing.make())
         # One that is not whole, or no picture, is drawn again.
@@ -134,17 +143,11 @@ class Workshop:
                 return self._remembered(drawing, data)
         return None
 
-    def close(self) -> None:
-        """Stop the worker processes."""
-        if self._pool is not None:
-            self._pool.shutdown(wait=True, cancel_futures=True)
-            self._pool = None
-
     def _remembered(self, drawing: Drawing, data: bytes) -> Image:
         image = Image(data, drawing.label, *picture_size(data, f"picture {drawing.label}"))
         self._recent[drawing.key, drawing.label] = image
         if len(self._recent) > _KEPT:
-            self._recent.popitem(last=False)
+            del self._recent[next(iter(self._recent))]
         return image
 
     async def _draw(self, drawing: Drawing) -> bytes:
@@ -163,49 +166,6 @@ class Workshop:
         return self._folder / key[:2] / f"{key}.png"
 
 
-class Pictures(ABC):
-    """The pictures of a track's items; a track says how an item is drawn."""
-
-    def __init__(self, shop: Workshop) -> None:
-        self.shop = shop
-        self._drawings: dict[str, tuple[Drawing, ...]] = {}
-
-    @abstractmethod
-    def draw(self, item: Any) -> tuple[Drawing, ...]:
-        """Return the pictures of an item as it is shown, in the order sent."""
-
-    def drawings(self, item: Any) -> tuple[Drawing, ...]:
-        """Return what `draw` does, computed once for each name of what is shown."""
-        name = getattr(item, "shown_as", item.key)
-        if name not in self._drawings:
-            self._drawings[name] = self.draw(item)
-        return self._drawings[name]
-
-    async def of(self, item: Any) -> tuple[Image, ...]:
-        """Return the pictures of an item, drawn at the same time; raises as `Workshop.image`."""
-        return tuple(await asyncio.gather(*map(self.shop.image, self.drawings(item))))
-
-    def outline(self, item: Any) -> tuple[tuple[Image, ...], bool]:
-        """Return the pictures as far as they are at hand, and True if all are; none is rendered.
-
-        Where one is not made yet, empty ones of their sizes stand in for all.
-        """
-        return outlined(self.shop, self.drawings(item))
-
-    def keys(self, item: Any) -> tuple[str, ...]:
-        """Return what decides the pixels: digests of content, style and renderer."""
-        return tuple(drawing.key for drawing in self.drawings(item))
-
-
-def outlined(shop: Workshop, drawings: Iterable[Drawing]) -> tuple[tuple[Image, ...], bool]:
-    """Return pictures as `Pictures.outline` does."""
-    wanted = tuple(drawings)
-    kept = [image for drawing in wanted if (image := shop.kept(drawing)) is not None]
-    if len(kept) == len(wanted):
-        return tuple(kept), True
-    return tuple(Image(b"", drawing.label, *drawing.size_px) for drawing in wanted), False
-
-
 def picture_style(images: ImagesSpec) -> PictureStyle:
     """Return the style in which a suite wants pictures drawn."""
     ground = images.background or BACKGROUNDS[0]
@@ -213,74 +173,47 @@ def picture_style(images: ImagesSpec) -> PictureStyle:
     return replace(seen, candidate_scale=images.candidate_scale)
 
 
-class ScenePictures(Pictures):
-    """The goal and the candidates of a scene, as the section `images` of a suite says."""
+def scene_drawings(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, ...]:
+    """Return the goal and the candidates of a scene: one composite, or two pictures apart.
 
-    def __init__(self, shop: Workshop, images: ImagesSpec) -> None:
-        super().__init__(shop)
-        self._images = images
-        self._style = picture_style(images)
-
-    @property
-    def candidate_scale(self) -> CandidateScale | None:
-        """The scale of candidates, for the prompt; None where pictures are the data set's."""
-        return None if self._images.source == "dataset" else self._style.candidate_scale
-
-    def style_of(self, task: AssemblyTask) -> PictureStyle:
-        """Return how the pictures of a task are drawn: larger than usual where its goal is wide."""
-        return goal_style(task.scene, self._style)
-
-    def keys(self, item: AssemblyTask) -> tuple[str, ...]:
-        """Return what decides the pixels; of the data set's own pictures, digests of the files."""
-        if self._images.source != "dataset":
-            return super().keys(item)
-        of = dict.fromkeys(one.composite for one in (item, goal_of(item)) if one is not None)
-        parts = (b"" if path is None else read_picture(path) for path in of)
-        return tuple(hex_digest(data) for data in parts)
-
-    def draw(self, item: AssemblyTask) -> tuple[Drawing, ...]:
-        """Return one composite, or the two pictures apart; DataError where the data set has none.
-
-        A goal that is not shown has no part in the size of what is.
-        """
-        if self._images.source == "dataset":
-            return self._files(item)
-        shown = goal_of(item)
-        style = self._style if shown is None else self.style_of(shown)
-        side = (style.size_px, style.size_px)
-        key = candidates_key(item.candidates, style)
-        grid = Drawing("candidates", key, partial(candidates_png, item.candidates, style), side)
-        if shown is None:
-            return (grid,)
-        key, make = goal_key(shown.scene, style), partial(goal_png, shown.scene, style)
-        goal = Drawing("goal", key, make, side)
-        if self._images.layout == "separate":
-            apart = {"goal": goal, "candidates": grid}
-            return tuple(apart[label] for label in self._images.order)
-        key = hex_digest(f"composite {goal.key} {grid.key}")
-        join = partial(_joined, goal.make, grid.make)
-        return (Drawing("composite", key, join, joined_size_px(style.size_px)),)
-
-    def _files(self, task: AssemblyTask) -> tuple[Drawing, ...]:
-        """Return the data set's own composite, or what is cut out of it."""
-        shown, own = goal_of(task), _composite(task)
-        grid: Callable[[], bytes] = partial(_half, own, is_goal=False)
-        makes = {"candidates": grid}
-        if shown is not None:
-            goal = partial(_half, _composite(shown), is_goal=True)
-            makes = {"goal": goal, "candidates": grid}
-            if self._images.layout == "composite":
-                is_whole = not isinstance(task, ShownTask)
-                whole = partial(read_picture, own) if is_whole else partial(_joined, goal, grid)
-                makes = {"composite": whole}
-        labels = self._images.order if len(makes) == 2 else makes
-        name = getattr(task, "shown_as", task.key)
-        return tuple(Drawing(label, name, makes[label], is_file=True) for label in labels)
+    A goal that is not shown has no part in the size of what is. DataError where the data set is to
+    bring the picture and has none.
+    """
+    if images.source == "dataset":
+        return _dataset_drawings(task, images)
+    shown, style = goal_of(task), picture_style(images)
+    style = style if shown is None else goal_style(shown.scene, style)
+    side = (style.size_px, style.size_px)
+    key = candidates_key(task.candidates, style)
+    grid = Drawing("candidates", key, partial(candidates_png, task.candidates, style), side)
+    if shown is None:
+        return (grid,)
+    key = goal_key(shown.scene, style)
+    goal = Drawing("goal", key, partial(goal_png, shown.scene, style), side)
+    if images.layout == "separate":
+        return (goal, grid) if images.order[0] == "goal" else (grid, goal)
+    key = hex_digest(f"composite {goal.key} {grid.key}")
+    join = partial(_joined, goal.make, grid.make)
+    return (Drawing("composite", key, join, joined_size_px(style.size_px)),)
 
 
-def goal_of(task: AssemblyTask) -> AssemblyTask | None:
-    """Return the task whose goal is shown, None where none is."""
-    return task.goal if isinstance(task, ShownTask) else task
+def _dataset_drawings(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, ...]:
+    """Return the data set's own composite, or what is cut out of it."""
+    shown, own = goal_of(task), _composite(task)
+    grid = partial(_half, own, is_goal=False)
+    key = hex_digest(read_picture(own))
+    candidates = Drawing("candidates", key, grid, is_file=True)
+    if shown is None:
+        return (candidates,)
+    other = _composite(shown)
+    goal, of_goal = partial(_half, other, is_goal=True), hex_digest(read_picture(other))
+    if images.layout == "separate":
+        apart = (Drawing("goal", of_goal, goal, is_file=True), candidates)
+        return apart if images.order[0] == "goal" else apart[::-1]
+    if isinstance(task, ShownTask):
+        joined = partial(_joined, goal, grid)
+        return (Drawing("composite", f"{key} {of_goal}", joined, is_file=True),)
+    return (Drawing("composite", key, partial(read_picture, own), is_file=True),)
 
 
 def _composite(task: AssemblyTask) -> Path:

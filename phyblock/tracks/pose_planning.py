@@ -42,7 +42,7 @@ from phyblock.parsing.text import READER_VERSION
 from phyblock.records.line import Amount, Line, Whole
 from phyblock.records.record import Course, Record
 from phyblock.resources import bundled
-from phyblock.scoring.plan import AssemblyScorer, Score
+from phyblock.scoring.plan import AssemblyScorer
 from phyblock.scoring.pose import (
     POSE_ERRORS,
     POSE_FRAMES,
@@ -50,7 +50,6 @@ from phyblock.scoring.pose import (
     Piece,
     PoseError,
     PoseFit,
-    PoseScore,
     PoseScorer,
     blocks_reached,
     pose_errors,
@@ -69,15 +68,15 @@ from phyblock.sim.geometry import (
     put,
     upright,
 )
-from phyblock.sim.pictures import PictureStyle, goal_style
+from phyblock.sim.pictures import goal_style
 from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
 from phyblock.stable import plain_sum
-from phyblock.tracks.base import CARRYING, ENGINE, Opening, SceneTrack, SingleTrack, engine_identity
+from phyblock.tracks.base import CARRYING, ENGINE, Judgement, SceneTrack
 from phyblock.tracks.baselines import NumberField, Pick, Picking, candidate_choices
 from phyblock.tracks.full_planning import PlanParse, score_fields
-from phyblock.tracks.items import ShownTask, file_plan
+from phyblock.tracks.items import ShownTask, file_plan, goal_of
 from phyblock.tracks.measures import ListedScore, Listing, SampleCounts
-from phyblock.tracks.pictures import Drawing, Pictures, Workshop, goal_of, picture_style
+from phyblock.tracks.pictures import Drawing, picture_style
 from phyblock.types import SETTINGS, STEP_ENDS, Matcher, PoseRotation, Setting, StepEnd, View
 
 CARRY_VERSION = 3
@@ -280,34 +279,34 @@ class PoseRecord(Record):
         return Course(tuple(zip(names, errors, strict=True)), blocks - self.pose.reached)
 
 
-def _right(_: Any, judged: Any) -> tuple[int, ...]:
-    by_frame = {score.frame: score.right for score in judged.poses}
-    right = (count for frame in POSE_FRAMES for count in by_frame[frame])
-    return (*right, len(judged.kept), judged.poses[0].n_blocks)
+def _right(_: Any, record: Any) -> tuple[int, ...]:
+    right = (count for frame in POSE_FRAMES for count in record.pose.right[frame])
+    score = record.scores[0]
+    return (*right, score.tp + score.fp, score.tp + score.fn)
 
 
-def _fits(_: Any, judged: Any) -> tuple[float, ...]:
-    fits = [fit for fit in judged.fits if fit is not None]
+def _fits(_: Any, record: Any) -> tuple[float, ...]:
+    fits = [step for step in record.pose.steps if step.vertex is not None]
     parts = ("position_cm", "turn_deg", "iou")
     return (*(plain_sum(getattr(fit, part) for fit in fits) for part in parts), len(fits))
 
 
-def _carried_counts(_: Any, judged: Any) -> tuple[float, ...]:
-    ends, whole = Counter(step["end"] for step in judged.ended), judged.whole
-    of_plan = (whole["reached"], judged.poses[0].n_blocks, whole["iou"], whole["completed"], 1)
-    return (*(ends[name] for name in STEP_ENDS), len(judged.ended), *of_plan)
+def _carried_counts(_: Any, record: Any) -> tuple[float, ...]:
+    pose, score = record.pose, record.scores[0]
+    ends = Counter(step.end for step in pose.steps)
+    of_plan = (pose.reached, score.tp + score.fn, pose.iou, pose.completed, 1)
+    return (*(ends[name] for name in STEP_ENDS), len(pose.steps), *of_plan)
 
 
-def _errors(_: Any, judged: Any) -> tuple[int, ...]:
-    counts = Counter(error for error in judged.errors if error is not None)
-    return (*(counts[name] for name in POSE_ERRORS), len(judged.errors))
+def _errors(_: Any, record: Any) -> tuple[int, ...]:
+    counts = Counter(step.error for step in record.pose.steps)
+    return (*(counts[name] for name in POSE_ERRORS), len(record.pose.steps))
 
 
-def _plan(setting: Setting, _: Any, judged: Any) -> tuple[int, int, int] | None:
+def _plan(setting: Setting, _: Any, record: Any) -> tuple[int, int, int] | None:
     """Count the plan without its poses under a setting, by the headline matcher."""
-    scores = (score for score in judged.scores if score.setting == setting)
-    counts = next((score.counts for score in scores), None)
-    return None if counts is None else (counts.tp, counts.fp, counts.fn)
+    found = next((score for score in record.scores if score.setting == setting), None)
+    return None if found is None else (found.tp, found.fp, found.fn)
 
 
 _ALIKE = tuple(f"tracks.pose_planning.{key}" for key in (CARRYING, ENGINE))
@@ -391,77 +390,8 @@ def worlds_of(
     return tuple(worlds)
 
 
-@dataclass(frozen=True)
-class PoseJudgement:
-    """A reply as it was read and scored.
-
-    `fits`, `ended` (how its execution ended, as records say it) and `errors` have an entry for each
-    step that was read, `kept` are those that name a candidate, `in_file` is the plan in the numbers
-    of the file, where others were shown; `whole` is what the record says of the world in the end.
-    """
-
-    parsed: ParsedPoses
-    kept: tuple[PoseStep, ...]
-    in_file: tuple[int, ...] | None
-    scores: tuple[Score, ...]
-    poses: tuple[PoseScore, ...]
-    fits: tuple[PoseFit | None, ...]
-    errors: tuple[PoseError | None, ...]
-    ended: tuple[Mapping[str, Any], ...]
-    whole: Mapping[str, Any]
-    spec: PoseSpec
-
-    @property
-    def steps(self) -> tuple[int, ...]:
-        """The candidates that were named, in order."""
-        return tuple(step.candidate for step in self.kept)
-
-    @property
-    def is_read(self) -> bool:
-        """True if a rule matched."""
-        return self.parsed.rule is not None
-
-    def fields(self) -> dict[str, Any]:
-        """Return `parse`, `scores` and `pose` of the record (docs/results.md)."""
-        given, motion = self.parsed.plan.steps, self.poses[-1].motion
-        kept = set(self.kept)
-        steps = zip(self.fits, self.ended, self.errors, strict=True)
-        return {
-            "parse": {
-                "parser": "poses",
-                "rule": self.parsed.rule,
-                "plan": list(self.steps),
-                "file_plan": self.in_file,
-                "dropped": [step.candidate for step in given if step not in kept],
-                "version": READER_VERSION,
-                "problem": self.parsed.problem,
-                "steps": [_given(step) for step in given],
-            },
-            "scores": [score_fields(score) for score in self.scores],
-            "pose": {
-                "rotation": self.spec.rotation,
-                "right": {score.frame: list(score.right) for score in self.poses},
-                "shift_cm": [round(part, _DIGITS) + 0.0 for part in motion.shift_cm],
-                "turn_deg": round(math.degrees(motion.turn_rad), _DIGITS) + 0.0,
-                "steps": [{**_fit(fit), **end, "error": error} for fit, end, error in steps],
-                "limits": self.spec.tolerances,
-                **self.whole,
-            },
-        }
-
-
-def _given(step: PoseStep) -> dict[str, Any]:
-    turned = {} if step.euler_deg is None else {"euler_deg": list(step.euler_deg)}
-    return {"block": step.candidate, "center_cm": list(step.center_cm), **turned}
-
-
-_FIT = ("vertex", "position_cm", "sideways_cm", "up_cm", "turn_deg", "iou")
 _END = ("end", "moved_cm", "turned_deg", "gap_cm", "overlap_cm", "knocked", "rests")
 _WHOLE = ("reached", "iou", "completed", "engine")
-
-
-def _fit(fit: PoseFit | None) -> dict[str, Any]:
-    return {"vertex": None} if fit is None else {name: getattr(fit, name) for name in _FIT}
 
 
 def judge_poses(
@@ -471,7 +401,7 @@ def judge_poses(
     settings: tuple[Setting, ...],
     matchers: tuple[Matcher, ...],
     earlier: PoseRecord | None = None,
-) -> PoseJudgement:
+) -> Judgement:
     """Read, score and carry out a reply; None, where there is no reply, is an empty plan.
 
     A plan that an `earlier` record holds, executed with the same tolerances, ended as it did.
@@ -480,23 +410,54 @@ def judge_poses(
     if text is not None:
         parsed = parse_poses(text, n, free=spec.is_free)
     given = parsed.plan.steps
-    kept = tuple(step for step in given if 1 <= step.candidate <= n)
+    kept = [step for step in given if 1 <= step.candidate <= n]
     scorer = _scorer(item.scene, item.candidates, "B" if spec.is_free else "A")
     poses = scorer.score([_laid(step, item.candidates[step.candidate]) for step in kept])
     ended, whole = _ended_before(earlier, given, spec) or _carried(item, given, spec)
     found = iter(poses[0].fits)
-    fits = tuple(next(found) if 1 <= step.candidate <= n else None for step in given)
+    fits = [next(found) if 1 <= step.candidate <= n else None for step in given]
     numbers, ends = [step.candidate for step in given], [step["end"] for step in ended]
+    errors = pose_errors(scorer.goal, numbers, fits, ends)
+    # The plan without its poses, under every setting and matcher.
     named, candidates = [step.candidate for step in kept], item.candidates
-    in_file = file_plan(item, named)
     if spec.is_free:
         named, candidates = _as_candidates(item, kept)
-    # The plan without its poses, under every setting and matcher.
-    scores = AssemblyScorer(item.scene, candidates, settings).score(
-        Plan(tuple(named)), matchers, None
-    )
-    errors = pose_errors(scorer.goal, numbers, fits, ends)
-    return PoseJudgement(parsed, kept, in_file, scores, poses, fits, errors, ended, whole, spec)
+    plan_scorer = AssemblyScorer(item.scene, candidates, settings)
+    scores = plan_scorer.score(Plan(tuple(named)), matchers, None)
+    motion, plan = poses[-1].motion, [step.candidate for step in kept]
+    parse = {
+        "parser": "poses",
+        "rule": parsed.rule,
+        "plan": plan,
+        "file_plan": file_plan(item, plan),
+        "dropped": [number for number in numbers if not 1 <= number <= n],
+        "version": READER_VERSION,
+        "problem": parsed.problem,
+        "steps": [_given(step) for step in given],
+    }
+    pose = {
+        "rotation": spec.rotation,
+        "right": {score.frame: list(score.right) for score in poses},
+        "shift_cm": [round(part, _DIGITS) + 0.0 for part in motion.shift_cm],
+        "turn_deg": round(math.degrees(motion.turn_rad), _DIGITS) + 0.0,
+        "steps": [
+            {**_fit(fit), **end, "error": error}
+            for fit, end, error in zip(fits, ended, errors, strict=True)
+        ],
+        "limits": spec.tolerances,
+        **whole,
+    }
+    fields = {"parse": parse, "scores": [score_fields(score) for score in scores], "pose": pose}
+    return Judgement(parsed.rule is not None, fields)
+
+
+def _given(step: PoseStep) -> dict[str, Any]:
+    turned = {} if step.euler_deg is None else {"euler_deg": step.euler_deg}
+    return {"block": step.candidate, "center_cm": step.center_cm, **turned}
+
+
+def _fit(fit: PoseFit | None) -> dict[str, Any]:
+    return {"vertex": None} if fit is None else asdict(fit)
 
 
 Ended = tuple[tuple[Mapping[str, Any], ...], Mapping[str, Any]]
@@ -764,69 +725,41 @@ def pick_poses(subject: PoseSubject) -> Picking:
     )
 
 
-class PosePictures(Pictures):
-    """Pictures of scenes: the goal from every view, then the sheet of the candidates."""
-
-    def __init__(self, shop: Workshop, style: PictureStyle, views: tuple[View, ...]) -> None:
-        super().__init__(shop)
-        # The prompt says that the sheet has one scale, whatever other pictures of candidates have.
-        style = replace(style, candidate_scale="common")
-        self._seen = [
-            (view, replace(style, azimuth_deg=VIEWS[view][0], elevation_deg=VIEWS[view][1]))
-            for view in views
-        ]
-
-    def draw(self, item: AssemblyTask) -> tuple[Drawing, ...]:
-        """Return the goal, where it is shown, from every view, and the sheet from the first."""
-        drawings = []
-        if (goal := goal_of(item)) is not None:
-            for name, seen in self._seen:
-                style = written_style(goal_style(goal.scene, seen))
-                key, make = ruled_key(goal.scene, style), partial(ruled_png, goal.scene, style)
-                drawings.append(Drawing(f"goal, {name}", key, make, (style.size_px, style.size_px)))
-        style = written_style(self._seen[0][1])
-        key, make = kit_key(item.candidates, style), partial(kit_png, item.candidates, style)
-        return (*drawings, Drawing(KIT_LABEL, key, make, (style.size_px, style.size_px)))
-
-
-class PosePlanning(SceneTrack, SingleTrack[AssemblyTask]):
-    """Asks for a plan with the place of every block, and carries it out."""
+class PosePlanning(SceneTrack):
+    """Asks for a whole plan with the place of every block, and carries it out."""
 
     name = "pose_planning"
     title = "Pose planning"
-    asks = "a whole plan with the place of every block"
-    section = (
-        "pose",
-        PoseSpec,
-        "How poses are asked for in the pose_planning track, and how plans are carried out.",
-    )
+    section = "pose"
+    options = PoseSpec
     template = bundled("prompts", "pose_planning.j2")
-    json_template = bundled("prompts", "pose_planning_json.j2")
-    prompt_field = ("pose", "prompt")
     results = "phyblock.tracks.pose_planning_results"
-    subject = PoseSubject
     baselines = POSE_RULES
     by_hand = staticmethod(pick_poses)
     record = PoseRecord
     counted = COUNTS
     varies = ("prompt", "background", "candidate_order", "repeats")
-    no_examples = "one would need the floor and the sheet of blocks of a scene of its own"
-    drawn_here = "the floor is ruled in pictures that are drawn here"
+    simulates = True
+    draws = True
+    spec: PoseSpec
 
-    def __init__(self, opening: Opening) -> None:
-        """Open the track."""
-        self.spec = opening.suite.section(PoseSpec)
-        super().__init__(opening)
-
-    @classmethod
-    def physics(cls, _suite: Mapping[str, Any]) -> bool:
-        """True: every plan is carried out."""
-        return True
-
-    def open_pictures(self, shop: Workshop) -> Pictures:
-        """Return the pictures of goals and sheets of blocks."""
-        super().open_pictures(shop)
-        return PosePictures(shop, picture_style(self.suite.images), self.spec.views)
+    def draw(self, item: AssemblyTask) -> tuple[Drawing, ...]:
+        """Return the goal, where it is shown, from every view, and the sheet from the first."""
+        # The prompt says that the sheet has one scale, whatever other pictures of candidates have.
+        style = replace(picture_style(self.suite.images), candidate_scale="common")
+        seen = {
+            view: replace(style, azimuth_deg=VIEWS[view][0], elevation_deg=VIEWS[view][1])
+            for view in self.spec.views
+        }
+        drawings = []
+        if (goal := goal_of(item)) is not None:
+            for name, view_style in seen.items():
+                style = written_style(goal_style(goal.scene, view_style))
+                key, make = ruled_key(goal.scene, style), partial(ruled_png, goal.scene, style)
+                drawings.append(Drawing(f"goal, {name}", key, make, (style.size_px, style.size_px)))
+        style = written_style(seen[self.spec.views[0]])
+        key, make = kit_key(item.candidates, style), partial(kit_png, item.candidates, style)
+        return (*drawings, Drawing(KIT_LABEL, key, make, (style.size_px, style.size_px)))
 
     def shown(self, item: AssemblyTask, seed: int) -> AssemblyTask:
         """Return the scene as a seed shows it; with a free rotation each kind once, upright."""
@@ -840,10 +773,8 @@ class PosePlanning(SceneTrack, SingleTrack[AssemblyTask]):
         return ShownTask(shown.scene, kit, shown.composite, numbers, shown, seed)
 
     def identity(self) -> dict[str, Any]:
-        """Return what decides its results, with the version of how plans are carried out, and the
-        physics engine where it is another one than PyBullet.
-        """
-        return {**super().identity(), CARRYING: CARRY_VERSION, **engine_identity()}
+        """Return what decides its results, with the version of how plans are carried out."""
+        return {**super().identity(), CARRYING: CARRY_VERSION}
 
     def form(self, item: AssemblyTask) -> AnswerForm[Any] | None:
         """Return the form in which a plan is asked for; None where that is text."""
@@ -859,21 +790,21 @@ class PosePlanning(SceneTrack, SingleTrack[AssemblyTask]):
         """Return what baselines answer about."""
         return PoseSubject(item.scene, item.candidates, self.spec.is_free)
 
-    def judge(self, item: AssemblyTask, text: str | None) -> PoseJudgement:
+    def judge(self, item: AssemblyTask, text: str | None) -> Judgement:
         """Read, score and carry out a reply; None, where there is none, is an empty plan."""
         suite = self.suite
         return judge_poses(item, text, self.spec, suite.settings, suite.scoring.matchers)
 
     async def judge_apart(
         self, item: AssemblyTask, text: str | None, earlier: Record | None
-    ) -> PoseJudgement:
+    ) -> Judgement:
         """Return what `judge` does, computed in another process, or in a thread without one.
 
         A plan that an earlier record holds is not carried out again.
         """
         known = earlier if isinstance(earlier, PoseRecord) else None
         rules = (self.spec, self.suite.settings, self.suite.scoring.matchers, known)
-        found: PoseJudgement = await self.work_out(partial(judge_poses, item, text, *rules))
+        found: Judgement = await self.work_out(partial(judge_poses, item, text, *rules))
         return found
 
 

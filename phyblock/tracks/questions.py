@@ -14,7 +14,6 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from phyblock.config.suite import Suite
 from phyblock.config.validation import (
     Count,
     Flag,
@@ -30,7 +29,6 @@ from phyblock.data import (
     QuestionTask,
     read_official_questions,
     read_questions,
-    read_version,
 )
 from phyblock.domain import LETTERS, SUBTASKS, Question, Scene, Subtask, is_picture_option
 from phyblock.domain.question import rotated, rotated_label
@@ -40,7 +38,6 @@ from phyblock.models.request import Image
 from phyblock.parsing.answer import ParsedAnswer, choice_form, parse_answer
 from phyblock.parsing.structured import AnswerForm
 from phyblock.records.line import Line, Whole
-from phyblock.records.manifest import Manifest
 from phyblock.records.record import Record
 from phyblock.resources import bundled, bundled_sets
 from phyblock.sim.pictures import PictureStyle
@@ -52,10 +49,10 @@ from phyblock.sim.question_pictures import (
     sheet_size_px,
 )
 from phyblock.stable import hex_digest
-from phyblock.tracks.base import Opening, SingleTrack
+from phyblock.tracks.base import Judgement, Track
 from phyblock.tracks.baselines import Choice, Guesses, Picking, Spot
-from phyblock.tracks.items import Elsewhere, examples_of, spread, stratified
-from phyblock.tracks.pictures import Drawing, Pictures, Workshop, picture_style
+from phyblock.tracks.items import Others, examples_of, spread, stratified
+from phyblock.tracks.pictures import Drawing, picture_style
 from phyblock.tracks.prompts import form_facts
 from phyblock.types import Background, DataFormat
 
@@ -236,38 +233,30 @@ def pick_answer(subject: ChoiceSubject) -> Picking:
 
 @dataclass(frozen=True)
 class AskedQuestion:
-    """A question with its options in one order; `rotation` 0 is that of the data set."""
+    """A question with its options in one order; `rotation` 0 is that of the data set.
+
+    Where `seen` is given, the pictures of that question are shown.
+    """
 
     task: QuestionTask
     rotation: int = 0
     is_one_of_many: bool = False
+    seen: QuestionTask | None = None
 
     @functools.cached_property
     def question(self) -> Question:
         """The question as it is shown."""
         return rotated(self.task.question, self.rotation)
 
-    @functools.cached_property
-    def files(self) -> Mapping[str, Path]:
-        """Picture files that its data set brings, by the labels under which they are shown."""
-        n = len(self.task.question.options)
-        return {rotated_label(at, self.rotation, n): path for at, path in self.task.files.items()}
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Labels of its pictures in the order sent: the scene, the block, then the options."""
-        known = {picture.label for picture in self.question.pictures} | set(self.files)
-        return tuple(label for label in ("scene", "block", *LETTERS) if label in known)
-
     @property
     def key(self) -> str:
         """The question's id, with the rotation where all are asked."""
-        return self.shown_as if self.is_one_of_many else self.task.key
+        return f"{self.task.key}-r{self.rotation}" if self.is_one_of_many else self.task.key
 
     @property
     def shown_as(self) -> str:
         """A name that tells apart what can be shown of the question."""
-        return f"{self.task.key}-r{self.rotation}"
+        return f"{self.key} {self.seen and self.seen.key}"
 
     @property
     def scene(self) -> Scene:
@@ -280,103 +269,71 @@ SHEET = "options"
 _MOST_CELL_PX = 1024
 
 
-class QuestionPictures(Pictures):
-    """The pictures of questions: the scene, one block by itself where there is one, the options.
+def question_drawings(
+    item: AskedQuestion,
+    style: PictureStyle,
+    options_as: OptionsAs = "images",
+    background: Background | None = None,
+) -> tuple[Drawing, ...]:
+    """Return the pictures of a question: scene, one block alone where there is one, options.
 
     Options that are pictures are sent apart (`images`), or all on one sheet (`letters`). Questions
     bring backgrounds of their own, which `background` overrides; those that bring none have the
-    style's.
+    style's. DataError for a picture that is not there.
     """
-
-    def __init__(
-        self,
-        shop: Workshop,
-        style: PictureStyle,
-        options_as: OptionsAs,
-        background: Background | None = None,
-    ) -> None:
-        super().__init__(shop)
-        self._style, self._options_as, self._background = style, options_as, background
-
-    def draw(self, item: AskedQuestion) -> tuple[Drawing, ...]:
-        """Return the pictures of a question; DataError for a picture that is not there."""
-        drawings = {label: self._drawing(item, label) for label in item.labels}
-        options = [drawing for label, drawing in drawings.items() if label in LETTERS]
-        if not options or self._options_as == "images":
-            return tuple(drawings.values())
-        cell_px = min(self._style.size_px, _MOST_CELL_PX)
-        letters = "".join(drawing.label for drawing in options)
-        parts = " ".join(drawing.key for drawing in options)
-        key = hex_digest(f"sheet {LETTERED_VERSION} {cell_px} {letters} {parts}")
-        make = partial(_sheet, tuple(drawing.make for drawing in options), letters, cell_px)
-        sheet = Drawing(SHEET, key, make, sheet_size_px(len(options), cell_px))
-        return (*(one for label, one in drawings.items() if label not in LETTERS), sheet)
-
-    def _drawing(self, item: AskedQuestion, label: str) -> Drawing:
-        if label in item.files:
-            path = item.files[label]
-            make = partial(read_picture, path)
-            return Drawing(label, hex_digest(make()), make, is_file=True)
-        recipe = next(one for one in item.question.pictures if one.label == label)
-        recipe = replace(recipe, background=self._background or recipe.background)
-        key, make = question_key(recipe, self._style), partial(question_png, recipe, self._style)
-        return Drawing(label, key, make, (self._style.size_px, self._style.size_px))
+    recipes = {recipe.label: recipe for recipe in item.question.pictures}
+    n, files = len(item.question.options), item.task.files
+    paths = {rotated_label(at, item.rotation, n): path for at, path in files.items()}
+    drawings = {}
+    for label in ("scene", "block", *LETTERS):
+        if label in paths:
+            read = partial(read_picture, paths[label])
+            drawings[label] = Drawing(label, hex_digest(read()), read, is_file=True)
+        elif label in recipes:
+            recipe = recipes[label]
+            recipe = replace(recipe, background=background or recipe.background)
+            key, make = question_key(recipe, style), partial(question_png, recipe, style)
+            drawings[label] = Drawing(label, key, make, (style.size_px, style.size_px))
+    options = [drawing for label, drawing in drawings.items() if label in LETTERS]
+    if not options or options_as == "images":
+        return tuple(drawings.values())
+    cell_px, letters = min(style.size_px, _MOST_CELL_PX), "".join(one.label for one in options)
+    parts = " ".join(drawing.key for drawing in options)
+    key = hex_digest(f"sheet {LETTERED_VERSION} {cell_px} {letters} {parts}")
+    make = partial(_sheet, tuple(drawing.make for drawing in options), letters, cell_px)
+    sheet = Drawing(SHEET, key, make, sheet_size_px(len(options), cell_px))
+    return (*(one for label, one in drawings.items() if label not in LETTERS), sheet)
 
 
 def _sheet(makes: Sequence[Callable[[], bytes]], letters: str, side_px: int) -> bytes:
     return lettered_sheet_png([make() for make in makes], letters, side_px)
 
 
-@dataclass(frozen=True)
-class ChoiceJudgement:
-    """A reply as it was read, and the right letters."""
-
-    parsed: ParsedAnswer
-    right: str
-
-    @property
-    def is_read(self) -> bool:
-        """True if a rule matched."""
-        return self.parsed.rule is not None
-
-    def fields(self) -> dict[str, Any]:
-        """Return `parse`, `scores` (none: there are no steps) and `answer` of the record."""
-        given = self.parsed.letters
-        problem = {"problem": self.parsed.problem} if self.parsed.problem else {}
-        return {
-            "parse": {"rule": self.parsed.rule, "letters": given, **problem},
-            "scores": [],
-            "answer": {"right": self.right, "given": given, "correct": given == self.right},
-        }
-
-
-class Vqa(SingleTrack[AskedQuestion]):
-    """Asks questions with four options."""
+class Vqa(Track):
+    """Asks multiple-choice questions."""
 
     name = "vqa"
     title = "VQA"
     item = "question"
-    asks = "multiple-choice questions"
-    section = (name, VqaSpec, "The questions of the vqa track, and how they are shown.")
+    section = name
+    options = VqaSpec
     template = bundled("prompts", "vqa.j2")
-    json_template = bundled("prompts", "vqa_json.j2")
-    prompt_field = (name, "prompt")
     results = "phyblock.tracks.vqa_results"
-    subject = ChoiceSubject
     baselines = CHOICE_RULES
     by_hand = staticmethod(pick_answer)
     record = ChoiceRecord
     varies = ("prompt", "background", "examples", "repeats")
-    no_examples = ""
+    shows_examples = True
+    spec: VqaSpec
 
-    def __init__(self, opening: Opening) -> None:
+    def open(self) -> None:
         """Select questions; SpecError where there is none, or wrong pictures cannot be had."""
-        suite = opening.suite
-        self.spec = spec = suite.section(VqaSpec)
-        folder = suite.files.folders[self.name]
-        self.questions = known = open_questions(spec.format, folder, opening.dataset)
+        suite, spec = self.suite, self.spec
+        self.questions = known = open_questions(
+            spec.format, suite.files.folders[self.name], self.dataset
+        )
         tasks = select_questions(
-            known.tasks, spec.subtasks, suite.levels, spec.per_subtask, opening.limit
+            known.tasks, spec.subtasks, suite.levels, spec.per_subtask, self.limit
         )
         if not tasks:
             where = suite.where("vqa", "subtasks")
@@ -389,39 +346,32 @@ class Vqa(SingleTrack[AskedQuestion]):
             for rotation in range(spec.rotations)
         )
         self._guesses = Guesses([task.question for task in known.tasks])
-        self._elsewhere = Elsewhere(known.tasks, _sort_of) if spec.wrong_image else None
-        if self._elsewhere is not None:
-            self._elsewhere.check(tasks, "question", "vqa.wrong_image")
-        super().__init__(opening)
+        self._others = Others(known.tasks, _sort_of) if spec.wrong_image else None
+        if self._others is not None:
+            self._others.check(tasks, "question", "vqa.wrong_image")
+            self.drawn_seeds = suite.seeds
         if self.shop is not None:
-            pool, asked = map(AskedQuestion, known.tasks), [*map(AskedQuestion, tasks)]
-            sort_of = lambda item: item.task.question.subtask  # noqa: E731
-            self.examples = examples_of(suite, pool, asked, "question", sort_of)
+            pool = map(AskedQuestion, known.tasks)
+            self.examples = examples_of(suite, pool, self.items, "question", _subtask_of)
 
-    @classmethod
-    def data_folder(cls, suite: Suite) -> tuple[str, tuple[str, ...], bool] | None:
-        """Return the folder of the question set, which may be a bundled one."""
-        spec = suite.section(VqaSpec)
-        return spec.path, ("vqa", "path"), spec.format == "builtin"
+    def shown(self, item: AskedQuestion, seed: int) -> AskedQuestion:
+        """Return the question, with pictures of another scene where a suite wants them.
 
-    @classmethod
-    def data_root(cls, manifest: Manifest) -> str | None:
-        """Return where a run found its questions."""
-        return None if manifest.questions is None else manifest.questions.root
+        Which other one depends on the question and the seed alone, so it is the same for all
+        models and for all rotations.
+        """
+        if self._others is None:
+            return item
+        return replace(item, seen=self._others.drawn(item.task, seed))
 
-    @classmethod
-    def manifest(cls, suite: Suite) -> Mapping[str, Any]:
-        """Return the question set of a run."""
-        spec, root = suite.section(VqaSpec), suite.files.folders[cls.name]
-        about = {"format": spec.format, "root": str(root), "version": read_version(root)}
-        return {"questions": about}
-
-    def open_pictures(self, shop: Workshop) -> Pictures:
-        """Return the pictures of questions as a suite wants them."""
+    def draw(self, item: AskedQuestion) -> tuple[Drawing, ...]:
+        """Return the pictures of a question as a suite wants them."""
+        if self.spec.blind:
+            return ()
+        seen = item if item.seen is None else AskedQuestion(item.seen, item.rotation)
         images = self.suite.images
-        return QuestionPictures(
-            shop, picture_style(images), self.spec.options_as, images.background
-        )
+        style, ground = picture_style(images), images.background
+        return question_drawings(seen, style, self.spec.options_as, ground)
 
     def about(self, item: AskedQuestion) -> dict[str, Any]:
         """Return the question and how it is shown."""
@@ -437,18 +387,6 @@ class Vqa(SingleTrack[AskedQuestion]):
             "by_subtask": dict(Counter(item.question.subtask for item in self.items)),
             **super().identity(),
         }
-
-    def drawn(self, item: AskedQuestion, seed: int | None = None) -> AskedQuestion | None:
-        """Return the question with its own pictures, or with those of another scene.
-
-        Which other one depends on the question and the seed alone, so it is the same for all
-        models and for all rotations.
-        """
-        if self.spec.blind:
-            return None
-        if self._elsewhere is None or seed is None:
-            return item
-        return AskedQuestion(self._elsewhere.of(item.task, seed), item.rotation)
 
     def form(self, item: AskedQuestion) -> AnswerForm[str] | None:
         """Return the form in which an answer is asked for; None where that is text."""
@@ -485,12 +423,23 @@ class Vqa(SingleTrack[AskedQuestion]):
         value = list(letters) if item.question.subtask == "OR" else letters
         return form.write(value, f"The right answer is {', '.join(letters)}.")
 
-    def judge(self, item: AskedQuestion, text: str | None) -> ChoiceJudgement:
+    def judge(self, item: AskedQuestion, text: str | None) -> Judgement:
         """Read and score a reply; None, where there is no reply, is no answer."""
         question, parsed = item.question, ParsedAnswer(None, None)
         if text is not None:
             parsed = parse_answer(text, question.options, question.subtask == "OR")
-        return ChoiceJudgement(parsed, question.answer_letters)
+        given, right = parsed.letters, question.answer_letters
+        problem = {"problem": parsed.problem} if parsed.problem else {}
+        fields = {
+            "parse": {"rule": parsed.rule, "letters": given, **problem},
+            "scores": [],
+            "answer": {"right": right, "given": given, "correct": given == right},
+        }
+        return Judgement(parsed.rule is not None, fields)
+
+
+def _subtask_of(item: AskedQuestion) -> Subtask:
+    return item.task.question.subtask
 
 
 def _sort_of(task: QuestionTask) -> tuple[object, ...]:
@@ -499,7 +448,7 @@ def _sort_of(task: QuestionTask) -> tuple[object, ...]:
         (picture.label, *sorted(mark.letter for mark in picture.marks))
         for picture in task.question.pictures
     )
-    return (task.question.subtask, AskedQuestion(task).labels, *marks)
+    return (task.question.subtask, frozenset(task.files), *marks)
 
 
 def open_questions(format_name: str, path: Path, dataset: Dataset) -> QuestionSet:
@@ -536,7 +485,7 @@ def select_questions(
     kept = {
         group[place].key
         for group, share in zip(found, shares, strict=True)
-        for place in spread(len(group), share)
+        for place in spread(len(group))[:share]
     }
     return tuple(task for task in tasks if task.key in kept)
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections import Counter, OrderedDict
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import accumulate
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
@@ -18,20 +19,21 @@ from phyblock.models.request import Image, Message, Request
 from phyblock.parsing.move import MoveProblem, ParsedMove, move_form, parse_move
 from phyblock.parsing.structured import AnswerForm
 from phyblock.records.line import Line, Whole
-from phyblock.records.record import AskedTurn, Course, Record, Reply
+from phyblock.records.record import AskedTurn, Course, Record, Reply, SentPrompt
 from phyblock.resources import bundled
 from phyblock.scoring.plan import ERROR_TYPES
 from phyblock.scoring.steps import Assembly, MoveOutcome, attempted_counts, placed_counts
-from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, Settled, settle
+from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, settle
 from phyblock.sim.engine import described_engine
+from phyblock.sim.pictures import goal_style
 from phyblock.sim.question_pictures import question_key, question_png, state_picture
-from phyblock.tracks.base import EpisodeTrack, Opening, SceneTrack, engine_identity
+from phyblock.tracks.base import Judgement, SceneTrack
 from phyblock.tracks.baselines import Choice, Pick, Picking, candidate_choices
 from phyblock.tracks.full_planning import POSE_COUNTS, PlanParse
 from phyblock.tracks.goal_blind import BlindGuesses
 from phyblock.tracks.items import file_plan
-from phyblock.tracks.pictures import Drawing, ScenePictures, outlined
-from phyblock.tracks.prompts import Prompt, TemplatePrompt
+from phyblock.tracks.pictures import Drawing, picture_style
+from phyblock.tracks.prompts import TemplatePrompt
 from phyblock.types import Gating, Physics, Setting
 
 PositiveUsd = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
@@ -202,15 +204,14 @@ class Tally:
             self.last_failed = None
             return
         self.failures += 1
-        is_repeat = move is not None and move == self.last_failed
-        self.repeats = self.repeats + 1 if is_repeat else 1
+        self.repeats = self.repeats + 1 if move == self.last_failed else 1
+        self.repeats = 0 if move is None else self.repeats
         self.last_failed = move
 
     def ending(self, spec: StepsSpec, n_blocks: int) -> Ending | None:
         """Return the first limit of a suite that is reached, or None."""
-        repeats = self.repeats if self.last_failed is not None else 0
         reached: tuple[tuple[Ending, float, float | None], ...] = (
-            ("max_repeats", repeats, spec.max_repeats),
+            ("max_repeats", self.repeats, spec.max_repeats),
             ("max_failures", self.failures, spec.max_failures),
             ("max_steps", self.steps, spec.most_steps(n_blocks)),
             ("max_tokens", self.tokens, spec.max_episode_tokens),
@@ -354,8 +355,6 @@ _REASONS: Mapping[str, str] = {
 _NO_TEXT = "(no answer)"
 _NOT_TRIED = ("done", *get_args(MoveProblem))
 """Outcomes of steps in which no move was attempted."""
-_KEPT = 4096
-"""States whose fall or stand is remembered."""
 
 
 @dataclass(frozen=True)
@@ -384,63 +383,41 @@ class PastStep:
 _LIKELY = PastStep("Move(1)", "placed", "Next plan: Move(1)", None)
 
 
-class StepPlanning(SceneTrack, EpisodeTrack[AssemblyTask]):
-    """Plays episodes of one operation a step; see `StepEpisode`."""
+class StepPlanning(SceneTrack):
+    """Asks for one operation after another; see `StepEpisode`."""
 
     name = "step_planning"
     title = "Step planning"
     item = "episode"
-    asks = "step by step in the simulator"
-    section = ("steps", StepsSpec, "The rules of the step_planning track.")
+    section = "steps"
+    options = StepsSpec
     template = bundled("prompts", "step_planning.j2")
-    json_template = bundled("prompts", "step_planning_json.j2")
-    prompt_field = ("steps", "prompt")
     results = "phyblock.tracks.step_planning_results"
-    subject = StepSubject
     baselines = STEP_RULES
     by_hand = staticmethod(pick_step)
     record = EpisodeRecord
     counted = (POSE_COUNTS,)
     varies = ("prompt", "background", "view", "candidate_order", "layout", "repeats")
-    no_examples = "one would be an episode of several turns, each with a picture of its own"
-    drawn_here = "step planning draws every state, so the goal must be drawn as well"
+    plays = True
+    simulates = True
+    draws = True
+    spec: StepsSpec
 
-    def __init__(self, opening: Opening) -> None:
-        """Open the track."""
-        self.spec = opening.suite.section(StepsSpec)
-        super().__init__(opening)
+    def open(self) -> None:
+        """Select scenes; PromptError where the prompt has no text for turns of a conversation."""
+        super().open()
+        if self.spec.history == "turns" and isinstance(self.prompt, TemplatePrompt):
+            self.prompt.require("turn", "for the later messages of history: turns")
         self.accepts = self.spec.setting or self.suite.settings[0]
-        self._guesses = BlindGuesses(self.suite.candidates.order, self.pool, self.accepts)
-        self._settled: OrderedDict[tuple[Block, ...], Settled] = OrderedDict()
-
-    @classmethod
-    def physics(cls, suite: Mapping[str, Any]) -> bool:
-        """True if a suite, as a manifest holds it, simulates states."""
-        section = suite.get("steps")
-        return not isinstance(section, Mapping) or section.get("physics") != "off"
-
-    def open_prompt(self) -> Prompt:
-        """Return the template; PromptError where it has no text for the turns of a conversation."""
-        prompt = super().open_prompt()
-        if self.spec.history == "turns" and isinstance(prompt, TemplatePrompt):
-            prompt.require("turn", "for the later messages of history: turns")
-        return prompt
+        self._guesses = BlindGuesses(self.suite.candidates.order, self.dataset.tasks, self.accepts)
+        self._fallen: dict[tuple[Block, ...], tuple[int, ...]] = {}
 
     def about(self, item: AssemblyTask) -> dict[str, Any]:
         """Return the most steps that an episode of it can take, the physics engine, where there is
         one, and how the scene is shown.
         """
         engine = {} if self.spec.physics == "off" else {"engine": described_engine()}
-        return {
-            "max_steps": self.spec.most_steps(len(item.scene)),
-            **engine,
-            **super().about(item),
-        }
-
-    def identity(self) -> dict[str, Any]:
-        """Return what decides its results, with the physics engine where that is not PyBullet."""
-        engine = {} if self.spec.physics == "off" else engine_identity()
-        return {**super().identity(), **engine}
+        return {"max_steps": self.spec.most_steps(len(item.scene)), **engine, **super().about(item)}
 
     def form(self, item: AssemblyTask) -> AnswerForm[ParsedMove] | None:
         """Return the form in which an operation is asked for; None where that is text."""
@@ -464,40 +441,36 @@ class StepPlanning(SceneTrack, EpisodeTrack[AssemblyTask]):
         fell = {turn.world: turn.fallen for turn in turns if turn.outcome == "placed"}
         return StepEpisode(self, item, record.seed, {}, with_messages=False, fell=fell)
 
-    def outlines(self, item: AssemblyTask) -> Iterator[tuple[Request, bool]]:
+    def outlines(self, item: AssemblyTask) -> Iterator[Request]:
         """Yield as many requests as an episode can have, made without rendering.
 
         Each step is taken to have placed a block. Only the first request can be a real one, and
         with several samples none, since their seeds are not those of the run.
         """
-        samples = self.spec.samples
-        right = Assembly(item.scene, item.candidates, self.accepts, self.spec.gating).right_moves()
-        guess = partial(self.guess, item)
-        subject = StepSubject(item.scene, item.candidates, right, (), guess=guess)
         for step in range(self.spec.most_steps(len(item.scene))):
-            request = Request(f"{item.key}/{step + 1}", 0, (), {}, "", subject)
-            is_real = step == 0 and samples == 1
-            if self.pictures is not None and self.prompt is not None:
-                fixed, is_known = self.pictures.outline(item)
-                drawing = self._drawing(item, ())
-                (current,), is_kept = outlined(self.pictures.shop, (drawing,))
-                form, is_real = self.form(item), is_real and is_known and is_kept
-                request = replace(
-                    request,
-                    messages=self.messages(item, fixed, current, [_LIKELY] * step),
-                    prompt_version=self.prompt.version,
-                    response_format=None if form is None else form.response_format,
-                )
-            yield from ((replace(request, seed=sample), is_real) for sample in range(samples))
+            messages: tuple[Message, ...] = ()
+            if self.shop is not None:
+                fixed = self.shop.outlines(self.drawings(item))
+                (current,) = self.shop.outlines((self.draw_state(item, ()),))
+                if step or self.spec.samples > 1:
+                    current = replace(current, data=b"")
+                messages = self.messages(item, fixed, current, [_LIKELY] * step)
+            request = self.asked(item, step, {}, messages, None)
+            yield from (replace(request, seed=sample) for sample in range(self.spec.samples))
 
-    async def next_messages(
-        self, item: AssemblyTask, past: Sequence[PastStep], blocks: Sequence[Block]
-    ) -> tuple[tuple[Message, ...], Image]:
-        """Return the messages of the step after `past`, and the picture of the blocks."""
-        assert self.pictures is not None
-        fixed = await self.pictures.of(item)
-        current = await self.pictures.shop.image(self._drawing(item, blocks))
-        return self.messages(item, fixed, current, past), current
+    def asked(
+        self,
+        item: AssemblyTask,
+        step: int,
+        params: Mapping[str, object],
+        messages: tuple[Message, ...],
+        subject: StepSubject | None,
+    ) -> Request:
+        """Return the request of the step after so many, with seed 0."""
+        version = self.prompt.version if messages and self.prompt is not None else ""
+        form, key = self.form(item), f"{item.key}/{step + 1}"
+        wanted = None if form is None else form.response_format
+        return Request(key, 0, messages, params, version, subject, wanted)
 
     def messages(
         self,
@@ -546,19 +519,16 @@ class StepPlanning(SceneTrack, EpisodeTrack[AssemblyTask]):
             messages.append(Message("user", (picture, text)))
         return tuple(messages)
 
-    async def settle(self, blocks: Sequence[Block]) -> Settled:
-        """Return the fate of blocks that are let go at their goal poses."""
-        state = tuple(blocks)
-        if state not in self._settled:
+    async def fallen(self, blocks: tuple[Block, ...]) -> tuple[int, ...]:
+        """Return the orders of blocks that fall when all are let go at their goal poses."""
+        if blocks not in self._fallen:
             trial = DEFAULT_TRIAL if self.spec.physics == "strict" else ONE_SETTING
-            self._settled[state] = await self.work_out(partial(settle, state, trial))
-            if len(self._settled) > _KEPT:
-                self._settled.popitem(last=False)
-        return self._settled[state]
+            self._fallen[blocks] = (await self.work_out(partial(settle, blocks, trial))).fallen
+        return self._fallen[blocks]
 
-    def _drawing(self, item: AssemblyTask, blocks: Sequence[Block]) -> Drawing:
-        assert isinstance(self.pictures, ScenePictures)
-        style = self.pictures.style_of(item)
+    def draw_state(self, item: AssemblyTask, blocks: Sequence[Block]) -> Drawing:
+        """Return the picture of blocks, seen as the goal is."""
+        style = goal_style(item.scene, picture_style(self.suite.images))
         recipe = state_picture(item.scene, blocks, style)
         key, make = question_key(recipe, style), partial(question_png, recipe, style)
         return Drawing(recipe.label, key, make, (style.size_px, style.size_px))
@@ -585,7 +555,7 @@ class StepEpisode:
         self.ending: Ending | None = None
         self._track, self._spec, self._task = track, track.spec, task
         self._seed, self._params, self._fell = seed, params, fell
-        self._is_shown = with_messages and track.pictures is not None
+        self._shop = track.shop if with_messages else None
         self._assembly = Assembly(task.scene, task.candidates, track.accepts, self._spec.gating)
         self._tally = Tally()
         self._past: list[PastStep] = []
@@ -600,90 +570,66 @@ class StepEpisode:
             await self._settle()
         if self.ending is not None:
             return None
-        track, task, assembly = self._track, self._task, self._assembly
+        track, task, assembly, tally = self._track, self._task, self._assembly, self._tally
         messages: tuple[Message, ...] = ()
-        if self._is_shown:
-            messages, self._seen = await track.next_messages(task, self._past, self._blocks())
-        sample, samples = len(self._votes), self._spec.samples
-        key = f"{task.key}/{self._tally.steps + 1}"
-        form = track.form(task)
+        if self._shop is not None:
+            drawings = (*track.drawings(task), track.draw_state(task, self._blocks()))
+            *fixed, self._seen = await self._shop.images(drawings)
+            messages = track.messages(task, fixed, self._seen, self._past)
         subject = StepSubject(
             task.scene,
             task.candidates,
             assembly.right_moves(),
             assembly.exact_moves(),
-            self._tally.last_failed,
-            self._tally.steps,
+            tally.last_failed,
+            tally.steps,
             partial(track.guess, task),
         )
-        return Request(
-            key if samples == 1 else f"{key}.{sample + 1}",
-            self._seed * samples + sample,
-            messages,
-            self._params,
-            track.prompt.version if self._is_shown and track.prompt else "",
-            subject,
-            None if form is None else form.response_format,
-        )
+        request = track.asked(task, tally.steps, self._params, messages, subject)
+        sample, samples = len(self._votes), self._spec.samples
+        key = request.key if samples == 1 else f"{request.key}.{sample + 1}"
+        return replace(request, key=key, seed=self._seed * samples + sample)
 
-    def take(self, request: Request, reply: Reply) -> None:
+    def take(self, request: Request, reply: Reply, prompt: SentPrompt | None = None) -> None:
         """Go on with the reply to the last request."""
         parsed = parse_move(reply.text)
-        usage = reply.usage
-        self._tally.tokens += (usage.prompt_tokens or 0) + (usage.completion_tokens or 0)
+        self._tally.tokens += reply.tokens
         self._tally.usd += reply.cost_usd or 0.0
         move = "Done" if parsed.is_done else parsed.move
-        self._turns.append(
-            {
-                "key": request.key,
-                "seed": request.seed,
-                "step": self._tally.steps + 1,
-                "parse": {"rule": parsed.rule, "move": move, "problem": parsed.problem},
-                "outcome": None,
-                "placed": None,
-            }
-        )
+        turn = {
+            "n": len(self._turns) + 1,
+            "reply": reply,
+            "prompt": prompt,
+            "key": request.key,
+            "seed": request.seed,
+            "step": self._tally.steps + 1,
+            "parse": {"rule": parsed.rule, "move": move, "problem": parsed.problem},
+            "outcome": None,
+            "placed": None,
+        }
+        self._turns.append(turn)
         self._votes.append((parsed, reply.text))
         if len(self._votes) == self._spec.samples:
             self._step()
 
-    @property
-    def is_read(self) -> bool:
-        """True if an operation could be read in any reply."""
-        return any(turn["parse"]["problem"] is None for turn in self._turns)
-
-    @property
-    def outcomes(self) -> list[StepOutcome]:
-        """The outcome of every step, in order."""
-        return [step.outcome for step in self._past]
-
-    @property
-    def steps(self) -> list[int]:
-        """The candidates of all moves that were attempted, in order."""
+    def judgement(self) -> Judgement:
+        """Return the record's fields about the episode; read where any operation could be read."""
+        outcomes = [step.outcome for step in self._past]
+        progress = accumulate(outcome == "placed" for outcome in outcomes)
         tried = (turn for turn in self._turns if turn["outcome"] not in (None, *_NOT_TRIED))
-        return [turn["parse"]["move"] for turn in tried]
-
-    def fields(self) -> dict[str, Any]:
-        """Return the fields of the record about the episode (docs/results.md)."""
-        placed = [outcome == "placed" for outcome in self.outcomes]
-        plan = self.steps
-        return {
-            "parse": {
-                "parser": "move",
-                "rule": None,
-                "plan": plan,
-                "file_plan": file_plan(self._task, plan),
-                "dropped": [],
-            },
-            "scores": [
-                one for setting in self._track.suite.settings for one in self._scores(setting)
-            ],
+        plan = [turn["parse"]["move"] for turn in tried]
+        parse = {"parser": "move", "rule": None, "plan": plan}
+        settings = self._track.suite.settings
+        fields = {
+            "parse": {**parse, "file_plan": file_plan(self._task, plan), "dropped": []},
+            "scores": [one for setting in settings for one in self._scores(setting, len(plan))],
             "setting": self._track.accepts,
             "ending": self.ending or "unanswered",
-            "outcomes": self.outcomes,
-            "progress": [sum(placed[: count + 1]) for count in range(len(placed))],
+            "outcomes": outcomes,
+            "progress": [int(count) for count in progress],
             "turns": list(self._turns),
         }
+        return Judgement(any(turn["parse"]["problem"] is None for turn in self._turns), fields)
 
     def _step(self) -> None:
         """Take the step that the votes name, and end where a limit is reached."""
@@ -719,7 +665,7 @@ class StepEpisode:
     async def _settle(self) -> None:
         """Let the assembly go; what falls is put back, or ends the episode."""
         if self._fell is None:
-            fallen = (await self._track.settle(self._blocks())).fallen
+            fallen = await self._track.fallen(self._blocks())
         else:
             fallen = self._fell.get(tuple(self._assembly.vertices), ())
         self._is_settled = True
@@ -731,31 +677,22 @@ class StepEpisode:
     def _blocks(self) -> tuple[Block, ...]:
         return tuple(self._task.scene.blocks[vertex] for vertex in self._assembly.vertices)
 
-    def _scores(self, setting: Setting) -> list[dict[str, Any]]:
-        """Return counts over the blocks in the world, and over every move that was attempted."""
+    def _scores(self, setting: Setting, n_tried: int) -> Iterator[dict[str, Any]]:
+        """Yield counts over the blocks in the world, and over every move that was attempted."""
         scene, assembly = self._task.scene, self._assembly
         on_ground: list[int] = []
         if self.ending == "collapsed":
             fell = next(turn["fallen"] for turn in reversed(self._turns) if turn.get("fallen"))
             on_ground = [v for v in assembly.vertices if scene.blocks[v].order in fell]
         placed = placed_counts(scene, self._task.candidates, setting, assembly.chosen, on_ground)
-        attempted = attempted_counts(placed, len(self.steps))
-        errors = {name: self.outcomes.count(name) for name in ERROR_TYPES}
-        return [
-            {
-                "criterion": criterion,
-                "matcher": None,
-                "setting": setting,
-                "tp": counts.tp,
-                "fp": counts.fp,
-                "fn": counts.fn,
-                "errors": wrong,
-            }
-            for criterion, counts, wrong in (
-                ("placed", placed, None),
-                ("attempted", attempted, errors),
-            )
-        ]
+        happened = Counter(step.outcome for step in self._past)
+        errors = {name: happened[name] for name in ERROR_TYPES}
+        for criterion, counts, wrong in (
+            ("placed", placed, None),
+            ("attempted", attempted_counts(placed, n_tried), errors),
+        ):
+            of = {"tp": counts.tp, "fp": counts.fp, "fn": counts.fn, "errors": wrong}
+            yield {"criterion": criterion, "matcher": None, "setting": setting, **of}
 
 
 TRACK = StepPlanning

@@ -265,7 +265,7 @@ def board_of(
         about["errors"] = [name.removeprefix("wrong_") for name in wrong]
         floor = headline_floors(run, track).get(heading)
         about["floor"] = floor and {"name": floor.name, "value": round(floor.value, 4)}
-        tracks.append({**about, "physics": kind.physics(run.manifest.suite)})
+        tracks.append({**about, "physics": kind.lets_go(run.manifest.suite)})
         measures = {one.name: one for one in track_measures(track)}
         for setting in values[place, track].values:
             for column in headline_columns(run, track):

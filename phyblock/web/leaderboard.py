@@ -243,8 +243,9 @@ def _facts(run: Run, shared: Sequence[str]) -> Iterator[tuple[str, Any]]:
         held: list[tuple[str, BaseModel, frozenset[str]]] = []
         if identity.get("pictures") is not None:
             held.append(("images", run.design.suite.images, frozenset({"size_px"})))
-        if (section := kind_of(track).section) is not None:
-            held.append((section[0], run.design.suite.section(section[1]), _CONTROLS))
+        kind = kind_of(track)
+        if kind.options is not None:
+            held.append((kind.section, run.design.suite.section(kind.options), _CONTROLS))
         for name, values, without in held:
             for key in type(values).model_fields.keys() - without:
                 yield f"{name}.{key}", str(getattr(values, key))

@@ -40,7 +40,7 @@ from phyblock.run.runner import RunResult, Session
 from phyblock.stable import drawn_bytes, hex_digest
 from phyblock.text import one_line
 from phyblock.tracks import Item
-from phyblock.tracks.base import kind_of, kinds
+from phyblock.tracks.base import kind_of
 from phyblock.tracks.baselines import Pick, Picking
 
 _ItemT = TypeVar("_ItemT", bound=Item)
@@ -142,11 +142,10 @@ def picking_of(request: Request, suite: Suite) -> Picking:
 
     Nothing tells how grids are cut in pictures that a data set brings: they are not clicked in.
     """
-    for kind in kinds().values():
-        if type(request.subject) is kind.subject and kind.by_hand is not None:
-            picking = kind.by_hand(request.subject)
-            return picking if suite.images.source == "render" else picking.without_cells()
-    raise AssertionError("a plan has only tracks that can be answered by hand")
+    by_hand = kind_of(request.track).by_hand
+    assert by_hand is not None, "a plan has only tracks that can be answered by hand"
+    picking = by_hand(request.subject)
+    return picking if suite.images.source == "render" else picking.without_cells()
 
 
 class PersonModel:

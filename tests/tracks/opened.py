@@ -12,7 +12,7 @@ import yaml
 from phyblock.config.suite import Suite, load_suite
 from phyblock.data import AssemblyTask, Dataset, read_builtin
 from phyblock.resources import bundled
-from phyblock.tracks import Opening, open_tracks
+from phyblock.tracks import open_tracks
 from phyblock.tracks.pictures import Workshop
 
 DATA = bundled("benchmarks", "data")
@@ -39,6 +39,5 @@ def track_of(
     """A track about these scenes; with prompts and pictures where there is a shop to draw them."""
     suite = suite_of(tracks=[name], **fields)
     dataset = Dataset("test", Path("."), tuple(tasks))
-    opening = Opening(suite, dataset, limit, shop is not None, shop or Workshop(1))
-    (track,) = open_tracks(opening, [name])
+    (track,) = open_tracks(suite, dataset, limit, shop)
     return track

@@ -30,9 +30,9 @@ from tests.web.factory import manifest, record, write_run
 from tests.workspace import Workspace
 
 
-def needless_steps(task: Any, judged: Any) -> tuple[float, float]:
+def needless_steps(task: Any, record: Any) -> tuple[float, float]:
     """Steps that name a block more often than the goal has it, and all steps."""
-    plan = judged.parsed.plan.steps
+    plan = record.parse.plan
     needed = Counter(block.look for block in task.scene.blocks)
     named = Counter(task.candidates[step].look for step in plan)
     return (named - needed).total(), len(plan)
@@ -130,12 +130,12 @@ def test_scoring_again_fills_in_what_older_records_lack(
         )
 
 
-def first_is_placed(_: Any, episode: Any) -> tuple[float, float]:
-    return episode.fields()["outcomes"][:1] == ["placed"], 1
+def first_is_placed(_: Any, record: Any) -> tuple[float, float]:
+    return record.outcomes[:1] == ("placed",), 1
 
 
-def is_right(_: Any, judged: Any) -> tuple[float, float]:
-    return judged.fields()["answer"]["correct"], 1
+def is_right(_: Any, record: Any) -> tuple[float, float]:
+    return record.answer.correct, 1
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import math
 import re
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -19,11 +19,12 @@ from phyblock import registry
 from phyblock.cli.main import phyblock
 from phyblock.data import AssemblyTask
 from phyblock.errors import SpecError
+from phyblock.records.record import Record
 from phyblock.results.compare import comparable, compare_models
 from phyblock.results.estimates import main_column
 from phyblock.results.load import Run, load_run
 from phyblock.scoring.counts import mean_of, ratio_of
-from phyblock.tracks import SceneTrack, SingleTrack
+from phyblock.tracks import Judgement, SceneTrack
 from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts, TrackReport
 from phyblock.web.board import SiteRun, all_values, board_of, entries_of, values_of
 from phyblock.web.pack import Sources
@@ -32,25 +33,8 @@ from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
 
 
-@dataclass(frozen=True)
-class CountSubject:
-    right: int
-
-
-@dataclass(frozen=True)
-class Said:
-    number: int | None
-
-    @property
-    def is_read(self) -> bool:
-        return self.number is not None
-
-    def fields(self) -> dict[str, Any]:
-        return {"parse": {"rule": "number" if self.is_read else None, "number": self.number}}
-
-
-def count(item: AssemblyTask, said: Said) -> tuple[float, float, float]:
-    off = abs((said.number or 0) - len(item.scene))
+def count(item: AssemblyTask, record: Record) -> tuple[float, float, float]:
+    off = abs((record.parse["number"] or 0) - len(item.scene))
     return off, off == 0, 1
 
 
@@ -62,14 +46,14 @@ ERROR = Measure(
 EXACT = Measure("exact", "Exact", COUNTS, lambda s: ratio_of(s[..., 1:]), "right counts")
 
 
-class Counting(SceneTrack, SingleTrack[AssemblyTask]):
+class Counting(SceneTrack):
+    """Asks how many blocks a goal has."""
+
     name = "counting"
     title = "Counting"
-    asks = "how many blocks a goal has"
     template = Path(__file__).with_name("counting.j2")
-    subject = CountSubject
     baselines: ClassVar = {
-        "oracle": lambda subject, _: str(subject.right),
+        "oracle": lambda task, _: str(len(task.scene)),
         "random": lambda _, rng: str(np.random.Generator.integers(rng, 5, 9)),
     }
     counted = (COUNTS,)
@@ -78,13 +62,12 @@ class Counting(SceneTrack, SingleTrack[AssemblyTask]):
     def report(cls) -> TrackReport:
         return TrackReport((ERROR, EXACT), short="count_error")
 
-    def subject_of(self, item: AssemblyTask) -> CountSubject:
-        return CountSubject(len(item.scene))
-
-    def judge(self, item: AssemblyTask, text: str | None) -> Said:
+    def judge(self, item: AssemblyTask, text: str | None) -> Judgement:
         del item
         found = re.findall(r"\d+", text or "")
-        return Said(int(found[-1]) if found else None)
+        number = int(found[-1]) if found else None
+        parse = {"rule": "number" if found else None, "number": number}
+        return Judgement(bool(found), {"parse": parse})
 
 
 class Counter(OpenAIChat):

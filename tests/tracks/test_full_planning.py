@@ -48,24 +48,25 @@ def steps(*numbers: int) -> str:
 def test_a_reply_is_scored_under_every_setting_and_matcher(
     track: Any, text: str | None, counts: tuple[int, int, int]
 ) -> None:
-    judged = track.judge(track.items[0], text)
-    aov = [score for score in judged.scores if score.criterion == "aov"]
-    assert {(s.setting, s.matcher) for s in aov} == {
+    scores = track.judge(track.items[0], text).fields["scores"]
+    aov = [score for score in scores if score["criterion"] == "aov"]
+    assert {(s["setting"], s["matcher"]) for s in aov} == {
         (setting, matcher) for setting in "AB" for matcher in ("optimal", "paper")
     }
-    assert {(s.counts.tp, s.counts.fp, s.counts.fn) for s in aov} == {counts}
-    level1 = [s for s in judged.scores if s not in aov]
-    assert [(s.criterion, s.setting) for s in level1] == [("selection", "A"), ("selection", "B")]
+    assert {(s["tp"], s["fp"], s["fn"]) for s in aov} == {counts}
+    level1 = [(s["criterion"], s["setting"]) for s in scores if s not in aov]
+    assert level1 == [("selection", "A"), ("selection", "B")]
 
 
 @given(st.text(max_size=300) | st.lists(st.integers(-2, 20), max_size=8).map(lambda n: steps(*n)))
 def test_any_reply_is_judged_and_every_goal_block_accounted_for(track: Any, text: str) -> None:
     task = track.items[0]
-    judged = track.judge(task, text)
-    for score in judged.scores:
-        assert score.counts.tp + score.counts.fn == len(task.scene)
-        assert score.counts.tp + score.counts.fp == len(judged.parsed.plan.steps)
-    assert all(1 <= step <= len(task.candidates) for step in judged.parsed.plan.steps)
+    fields = track.judge(task, text).fields
+    plan = fields["parse"]["plan"]
+    for score in fields["scores"]:
+        assert score["tp"] + score["fn"] == len(task.scene)
+        assert score["tp"] + score["fp"] == len(plan)
+    assert all(1 <= step <= len(task.candidates) for step in plan)
 
 
 def test_facts_hold_what_is_shown_alone(track: Any) -> None:
@@ -73,7 +74,7 @@ def test_facts_hold_what_is_shown_alone(track: Any) -> None:
         assert track.facts(task, [SimpleNamespace(label="goal")]) == {
             "pictures": ["goal"],
             "n_candidates": len(task.candidates),
-            "candidate_scale": None,
+            "candidate_scale": "common",
             "is_blind": False,
             "answer_format": "text",
             "answer_schema": None,
@@ -89,7 +90,7 @@ def test_learned_plans_are_those_of_the_order_shown(tasks: tuple[AssemblyTask, .
             [one.scene for one in shown], {one.key: one.candidates for one in shown}, "A"
         )
         for task in track.items:
-            ((request, _),) = track.outlines(track.shown(task, seed))
+            (request,) = track.outlines(track.shown(task, seed))
             assert request.subject.guess() == plans[task.key] != Plan()
 
 
@@ -131,7 +132,7 @@ def test_the_first_pose_named_of_a_kind_counts(
     plan: list[int], counts: tuple[int, int, int, int]
 ) -> None:
     task = AssemblyTask(SCENE, CANDIDATES)
-    assert pose_counts(task, SimpleNamespace(steps=plan)) == counts
+    assert pose_counts(task, SimpleNamespace(parse=SimpleNamespace(plan=plan))) == counts
 
 
 @given(plans, st.permutations(range(1, 8)))

@@ -17,8 +17,8 @@ from phyblock.data import AssemblyTask, read_builtin, read_official
 from phyblock.errors import DataError, StoreError
 from phyblock.models.request import Image
 from phyblock.sim.pictures import candidates_png, goal_png
-from phyblock.tracks.items import Presentation, ShownTask, other_goals
-from phyblock.tracks.pictures import ScenePictures, Workshop, picture_style
+from phyblock.tracks.items import Others, Presentation, ShownTask
+from phyblock.tracks.pictures import Workshop, picture_style, scene_drawings
 from tests.data.broken import write_scenes
 from tests.fuzz.strategies import png_header
 from tests.workspace import SCENES
@@ -46,14 +46,19 @@ def draw(
 ) -> tuple[list[tuple[Image, ...]], int]:
     """Pictures of all tasks, asked for at once, and how many were drawn for them."""
 
-    async def ask(pictures: ScenePictures) -> list[tuple[Image, ...]]:
-        return list(await asyncio.gather(*(pictures.of(task) for task in tasks)))
+    async def ask() -> list[tuple[Image, ...]]:
+        wanted = (shop.images(scene_drawings(task, images)) for task in tasks)
+        return list(await asyncio.gather(*wanted))
 
     shop = Workshop(1, folder)
     try:
-        return asyncio.run(ask(ScenePictures(shop, images))), shop.rendered
+        return asyncio.run(ask()), shop.rendered
     finally:
         shop.close()
+
+
+def keys(images: ImagesSpec, task: AssemblyTask) -> list[str]:
+    return [drawing.key for drawing in scene_drawings(task, images)]
 
 
 def opened(image: Image) -> PillowImage.Image:
@@ -101,23 +106,19 @@ def test_an_outline_draws_nothing_and_has_the_real_sizes(
 ) -> None:
     for images in (COMPOSITE, GOAL_FIRST):
         shop = Workshop(1, tmp_path / images.layout)
-        pictures = ScenePictures(shop, images)
-        outlined, real = pictures.outline(tasks[0])
-        assert not real
+        drawings = scene_drawings(tasks[0], images)
+        outlined = shop.outlines(drawings)
         assert {picture.data for picture in outlined} == {b""}
         (made, *_), _ = draw(tmp_path / images.layout, images, tasks[:1])
         assert [(p.label, p.height_px) for p in outlined] == [(p.label, p.height_px) for p in made]
-        assert pictures.outline(tasks[0]) == (made, True)
+        assert shop.outlines(drawings) == made
         assert shop.rendered == 0
 
 
 def test_keys_follow_content_and_style_alone(tasks: tuple[AssemblyTask, ...]) -> None:
-    def keys(images: ImagesSpec, task: AssemblyTask) -> tuple[str, ...]:
-        return ScenePictures(Workshop(1), images).keys(task)
-
     larger = ImagesSpec(size_px=256)
     every = (COMPOSITE, larger, GOAL_FIRST, GOAL_LAST)
-    assert len({keys(images, task) for images in every for task in tasks[:2]}) == 8
+    assert len({tuple(keys(images, task)) for images in every for task in tasks[:2]}) == 8
     assert set(keys(GOAL_FIRST, tasks[0])) == set(keys(GOAL_LAST, tasks[0]))
 
 
@@ -126,17 +127,17 @@ def test_pictures_follow_what_is_shown(
     tasks: tuple[AssemblyTask, ...], layout: Any, shop: Workshop
 ) -> None:
     images = ImagesSpec(size_px=128, layout=layout)
-    style, pictures = picture_style(images), ScenePictures(shop, images)
+    style = picture_style(images)
 
     def sent(task: AssemblyTask) -> tuple[Image, ...]:
-        return asyncio.run(pictures.of(task))
+        return asyncio.run(shop.images(scene_drawings(task, images)))
 
     plain = sent(tasks[0])
     blind = Presentation("shuffled", blind=True).of(tasks[0], 1)
     (grid,) = sent(blind)
     assert grid.data == candidates_png(blind.candidates, style)
-    assert pictures.outline(blind) == ((grid,), True)
-    wrong = Presentation(elsewhere=other_goals(tasks)).of(tasks[0], 0)
+    assert shop.outlines(scene_drawings(blind, images)) == (grid,)
+    wrong = Presentation(others=Others(tasks, lambda task: task.scene.level)).of(tasks[0], 0)
     assert isinstance(wrong, ShownTask)
     assert wrong.goal is not None
     other = sent(wrong)
@@ -144,7 +145,7 @@ def test_pictures_follow_what_is_shown(
     if layout == "separate":
         assert other[0].data == goal_png(wrong.goal.scene, style) != plain[0].data
         assert other[1] == plain[1]
-    assert pictures.keys(wrong) != pictures.keys(tasks[0]) != pictures.keys(blind)
+    assert keys(images, wrong) != keys(images, tasks[0]) != keys(images, blind)
 
 
 @pytest.fixture
@@ -172,9 +173,9 @@ def test_the_data_sets_picture_is_sent_byte_for_byte_or_parted_in_two_halves(
     colors = {"goal": (255, 0, 0), "candidates": (0, 0, 255)}
     for picture in pair:
         assert opened(picture).getcolors() == [(255 * 256, colors[picture.label])]
-    before = ScenePictures(Workshop(1), OWN).keys(composite_task)
+    before = keys(OWN, composite_task)
     PillowImage.new("RGB", (514, 256), "green").save(composite_task.composite)
-    assert ScenePictures(Workshop(1), OWN).keys(composite_task) != before
+    assert keys(OWN, composite_task) != before
     with pytest.raises(DataError, match="has no picture of it"):
         draw(tmp_path, OWN, [replace(composite_task, composite=None)])
 
@@ -185,35 +186,32 @@ def test_pictures_of_the_data_set_can_leave_out_or_exchange_the_goal(
     pool = [one for one in read_official(official_checkout).tasks if one.composite is not None]
     task = pool[0]
     blind = Presentation(blind=True).of(task, 0)
-    wrong = Presentation(elsewhere=other_goals(pool)).of(task, 0)
+    wrong = Presentation(others=Others(pool, lambda task: task.scene.level)).of(task, 0)
     assert isinstance(wrong, ShownTask)
     assert wrong.goal is not None
     separate = ImagesSpec(source="dataset", layout="separate")
-    apart, joined = (ScenePictures(Workshop(1), images) for images in (separate, OWN))
 
-    def sent(pictures: ScenePictures, task: AssemblyTask) -> tuple[Image, ...]:
-        return asyncio.run(pictures.of(task))
+    def sent(images: ImagesSpec, task: AssemblyTask) -> tuple[Image, ...]:
+        return asyncio.run(Workshop(1).images(scene_drawings(task, images)))
 
-    goal, grid = sent(apart, task)
-    assert sent(apart, blind) == sent(joined, blind) == (grid,)
-    assert sent(apart, wrong) == (sent(apart, wrong.goal)[0], grid)
-    (composite,) = sent(joined, wrong)
+    goal, grid = sent(separate, task)
+    assert sent(separate, blind) == sent(OWN, blind) == (grid,)
+    assert sent(separate, wrong) == (sent(separate, wrong.goal)[0], grid)
+    (composite,) = sent(OWN, wrong)
     assert composite.label == "composite"
-    assert composite.data != sent(joined, task)[0].data
-    assert len(apart.keys(wrong)) == 2
-    assert goal != sent(apart, wrong)[0]
+    assert composite.data != sent(OWN, task)[0].data
+    assert goal != sent(separate, wrong)[0]
 
 
 @pytest.mark.parametrize("size", [(30_000, 30_000), (1, 1), (0, 9)])
 def test_what_is_no_picture_in_the_cache_is_drawn_anew(
     tasks: tuple[AssemblyTask, ...], tmp_path: Path, size: tuple[int, int]
 ) -> None:
-    pictures = ScenePictures(Workshop(1, tmp_path), COMPOSITE)
-    (key,) = pictures.keys(tasks[0])
+    (key,) = keys(COMPOSITE, tasks[0])
     (tmp_path / key[:2]).mkdir()
     (tmp_path / key[:2] / f"{key}.png").write_bytes(png_header(*size))
-    (outline,), are_real = pictures.outline(tasks[0])
-    assert (outline.data, are_real) == (b"", False)
+    (outline,) = Workshop(1, tmp_path).outlines(scene_drawings(tasks[0], COMPOSITE))
+    assert outline.data == b""
 
 
 def test_a_cache_that_cannot_be_written_is_said_so(

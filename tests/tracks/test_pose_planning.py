@@ -17,6 +17,7 @@ from phyblock.cli.main import phyblock
 from phyblock.data import AssemblyTask, read_builtin
 from phyblock.domain import Block, Candidate, CandidateSet, PoseStep
 from phyblock.errors import SpecError, StoreError
+from phyblock.parsing.poses import parse_poses
 from phyblock.records.files import known_records
 from phyblock.resources import bundled
 from phyblock.run.judge import begun, judged
@@ -94,14 +95,14 @@ def test_true_poses_in_a_random_valid_order_are_right_and_stand(
     for seed, item in enumerate(built_in):
         shown = track.shown(item, seed)
         subject = track.subject_of(shown)
-        found = track.judge(shown, POSE_RULES["oracle"](subject, np.random.default_rng(seed)))
-        n = len(item.scene)
-        assert [score.right for score in found.poses] == [(n,) * 4] * 2
-        assert {step["end"] for step in found.ended} == {"stands"}
-        assert (found.whole["reached"], found.whole["completed"]) == (n, True)
-        assert found.whole["iou"] >= 0.98
-        assert not any(found.errors)
-        assert all(score.counts.tp == n for score in found.scores)
+        text = POSE_RULES["oracle"](subject, np.random.default_rng(seed))
+        fields, n = track.judge(shown, text).fields, len(item.scene)
+        pose = fields["pose"]
+        assert pose["right"] == {"absolute": [n] * 4, "aligned": [n] * 4}
+        assert {(step["end"], step["error"]) for step in pose["steps"]} == {("stands", None)}
+        assert (pose["reached"], pose["completed"]) == (n, True)
+        assert pose["iou"] >= 0.98
+        assert all(score["tp"] == n for score in fields["scores"])
 
 
 @pytest.mark.parametrize(
@@ -134,10 +135,11 @@ def test_a_reply_is_read_scored_and_carried_out(
 ) -> None:
     track = poses()
     found = track.judge(task, text)
-    assert found.poses[0].right == right
-    assert [step["end"] for step in found.ended] == ends
-    assert list(found.errors) == errors
-    assert found.whole["reached"] == reached
+    pose = found.fields["pose"]
+    assert pose["right"]["absolute"] == list(right)
+    assert [step["end"] for step in pose["steps"]] == ends
+    assert [step["error"] for step in pose["steps"]] == errors
+    assert pose["reached"] == reached
     assert found.is_read == bool(ends)
     # Its record is written, read again and judged again, and says the same.
     fields = begun("s", track.name, "m", task, 0, None)
@@ -165,7 +167,8 @@ def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(
     subject = PoseSubject(item.scene, item.candidates, is_free=False)
     text = POSE_RULES[baseline](subject, np.random.default_rng(1))
     found = track.judge(item, text)
-    blocks = [put(step, item.candidates) for step in found.parsed.plan.steps]
+    steps = parse_poses(text, len(item.candidates), free=False).plan.steps
+    blocks = [put(step, item.candidates) for step in steps]
     worlds = execute(blocks, PoseSpec().limits).worlds
     record = judged(begun("s", track.name, "m", item, 0, None), item, found)
     assert isinstance(record, PoseRecord)
@@ -190,9 +193,9 @@ def test_without_poses_a_plan_is_scored_as_full_planning_scores_it(numbers: list
     steps = [PoseStep(n, (20.0 * place, 0.0, 2.5)) for place, n in enumerate(numbers)]
     plain = "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(numbers, 1))
     full = track_of("full_planning", BUILT_IN.tasks[:1])
-    found = full.judge(task, plain if numbers else None).fields()["scores"]
+    found = full.judge(task, plain if numbers else None).fields["scores"]
     wanted = [score for score in found if score["criterion"] == "aov"]
-    assert poses().judge(task, written(steps)).fields()["scores"] == wanted
+    assert poses().judge(task, written(steps)).fields["scores"] == wanted
 
 
 @pytest.fixture(autouse=True)

@@ -26,8 +26,8 @@ from phyblock.tracks.questions import (
     CHOICE_RULES,
     AskedQuestion,
     ChoiceSubject,
-    QuestionPictures,
     Vqa,
+    question_drawings,
     select_questions,
 )
 from tests.tracks.opened import track_of
@@ -68,7 +68,8 @@ def of_tasks(found: QuestionSet, tasks: Sequence[QuestionTask]) -> QuestionSet:
 def ask(track: Vqa, *keys: str, seed: int = 0) -> list[Request]:
     async def all_of_them() -> list[Request]:
         items = [item for item in track.items if not keys or item.key in keys]
-        return [await track.request(item, seed, {}, with_messages=True) for item in items]
+        shown = [track.shown(item, seed) for item in items]
+        return [await track.request(item, seed, {}, with_messages=True) for item in shown]
 
     return asyncio.run(all_of_them())
 
@@ -163,7 +164,7 @@ def test_wrong_pictures_have_the_marks_that_the_text_speaks_of(
 
 
 def test_questions_keep_their_background_unless_a_suite_gives_one(
-    question_set: QuestionSet, shop: Workshop
+    question_set: QuestionSet,
 ) -> None:
     asked = next(task.question for task in question_set.tasks if task.key == "vp-000")
     lawn = replace(asked, pictures=tuple(replace(p, background="lawn") for p in asked.pictures))
@@ -174,10 +175,10 @@ def test_questions_keep_their_background_unless_a_suite_gives_one(
         (lawn, "white", "white"),
         (asked, "white", "white"),
     ):
-        pictures = QuestionPictures(shop, STYLE, "images", ground)  # type: ignore[arg-type]
         style = replace(STYLE, background=drawn)
-        wanted = tuple(question_key(picture, style) for picture in bare)
-        assert pictures.keys(AskedQuestion(QuestionTask(question))) == wanted
+        item = AskedQuestion(QuestionTask(question))
+        drawn = question_drawings(item, STYLE, "images", ground)  # type: ignore[arg-type]
+        assert [one.key for one in drawn] == [question_key(picture, style) for picture in bare]
 
 
 def test_a_reply_that_cannot_be_read_is_wrong(question_set: QuestionSet) -> None:
@@ -185,7 +186,7 @@ def test_a_reply_that_cannot_be_read_is_wrong(question_set: QuestionSet) -> None
     for item, text in itertools.product(track.items[:3], (None, "I cannot tell.")):
         bad, right = track.judge(item, text), item.question.answer_letters
         assert not bad.is_read
-        assert bad.fields()["answer"] == {"right": right, "given": None, "correct": False}
+        assert bad.fields["answer"] == {"right": right, "given": None, "correct": False}
 
 
 def test_random_answers_are_spread_over_all_that_can_be_given(question_set: QuestionSet) -> None:
