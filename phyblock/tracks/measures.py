@@ -75,8 +75,9 @@ class SampleCounts:
     """Counts of samples, one for each of the `columns`, from which measures are made.
 
     `sample` counts when a reply is judged: it is given the item that was asked about and the
-    record, in which its numbers are kept; None: the sample is not counted. Instead of it, `rows` takes them from a record as it is
-    read, once for each way of scoring it. `cells` are its own where they are not the track's.
+    record, in which its numbers are kept; None: the sample is not counted. Instead of it, `rows`
+    takes them from a record as it is read, once for each way of scoring it. `cells` are its own
+    where they are not the track's.
 
     With `parts`, the samples of one group, as the rotations of a question, count as one, right only
     if all of so many are. `alike` names fields of `run.yaml` that decide the counts: runs that
