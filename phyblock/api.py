@@ -17,16 +17,24 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, ParamSpec, TypeVar
 
-from pydantic import ConfigDict, Field, InstanceOf, SkipValidation, ValidationError, validate_call
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    InstanceOf,
+    SkipValidation,
+    ValidationError,
+    validate_call,
+)
 
 from phyblock.config.models import load_models
 from phyblock.config.suite import Suite as ConfigSuite
 from phyblock.config.suite import load_suite as read_suite
+from phyblock.config.validation import problems_of
 from phyblock.data import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.files import write_named
 from phyblock.parsing.plan import parse_plan
-from phyblock.records.line import problems_of, worded
 from phyblock.resources import bundled
 from phyblock.results.load import Run, load_run
 from phyblock.run.estimate import may_bill
@@ -56,14 +64,12 @@ __all__ = [
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 _Text = Annotated[str, Field(min_length=1)]
-Place = Annotated[
-    _Text | Path, worded("is no path: is a variable not set?", "a text or a pathlib.Path")
-]
+Place = _Text | Path
 
 
 def _checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
     """Raise SpecError for all arguments that are not of the types that the function declares."""
-    check = validate_call(config=ConfigDict(strict=True))(function)
+    check: Callable[..., _T] = validate_call(config=ConfigDict(strict=True))(function)
     names = list(inspect.signature(function).parameters)
 
     @functools.wraps(function)
@@ -71,7 +77,9 @@ def _checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
         try:
             return check(*args, **kwargs)
         except ValidationError as error:
-            raise SpecError(map(named, problems_of(error, function.__name__))) from None
+            given: dict[Any, Any] = dict(enumerate(args)) | dict(kwargs)
+            problems = problems_of(error, BaseModel, given, function.__name__)
+            raise SpecError(map(named, problems)) from None
 
     def named(problem: Problem) -> Problem:
         found = re.match(r"\[(\d+)\](.*)", problem.field)
@@ -255,7 +263,7 @@ def score(
 
 @_checked
 def run_suite(
-    suite: Annotated[Suite | str | Path, worded("is no suite", "a suite, its name or its path")],
+    suite: Suite | str | Path,
     *,
     models: Annotated[Sequence[str], Field(min_length=1)] | None = None,
     limit: Annotated[int, Field(ge=1)] | None = None,

@@ -17,10 +17,11 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from phyblock.config.validation import models_in
 from phyblock.data.questions import StoredQuestion
 from phyblock.data.scenes import StoredScene
 from phyblock.records.files import known_records, record_types
-from phyblock.records.line import Line, parts
+from phyblock.records.line import Line
 from phyblock.records.manifest import Manifest
 from phyblock.records.record import BatchLine, Call, Prompt
 
@@ -64,7 +65,8 @@ def _with_parts(kinds: Sequence[type[Line]]) -> list[type[Line]]:
         kind = waiting.pop(0)
         if kind not in listed:
             listed.append(kind)
-            waiting += [part for f in kind.model_fields.values() for part in parts(f.annotation)]
+            below = [one for f in kind.model_fields.values() for one in models_in(f.annotation)]
+            waiting += [one for one in below if issubclass(one, Line)]
     return listed
 
 

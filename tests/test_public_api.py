@@ -85,7 +85,7 @@ def test_what_is_wrong_is_named() -> None:
     scene = next(iter(suite.scenes.values()))
     wrong: dict[str, typing.Callable[[], object]] = {
         "there is no such suite": lambda: phyblock.load_suite("quik"),
-        "load_suite: suite: is no path": lambda: phyblock.load_suite(""),
+        "load_suite: suite: is too short": lambda: phyblock.load_suite(""),
         "--set limit=0": lambda: phyblock.load_suite("quick", "limit=0"),
         "has no such scene": lambda: suite.scenes["l9"],
         "render: show": lambda: phyblock.render(scene, show="all"),  # type: ignore[arg-type]
@@ -94,12 +94,10 @@ def test_what_is_wrong_is_named() -> None:
         "score: setting": lambda: phyblock.score("", scene, setting="C"),  # type: ignore[arg-type]
         "score: reply": lambda: phyblock.score(None, scene),  # type: ignore[arg-type]
         "run_suite: limit": lambda: phyblock.run_suite(suite, limit=0),
-        "run_suite: models: is of the wrong type": lambda: phyblock.run_suite(
-            suite, models="random"
-        ),
+        "run_suite: models: has the wrong type": lambda: phyblock.run_suite(suite, models="random"),
         "run_suite: models[0]": lambda: phyblock.run_suite(suite, models=[1]),  # type: ignore[list-item]
-        "run_suite: models: is not a non-empty list": lambda: phyblock.run_suite(suite, models=[]),
-        "is a variable not set": lambda: phyblock.run_suite(suite, out=""),
+        "run_suite: models: has too few items": lambda: phyblock.run_suite(suite, models=[]),
+        "run_suite: out: is too short": lambda: phyblock.run_suite(suite, out=""),
         'found: "x"': lambda: phyblock.run_suite(suite, limit="x"),  # type: ignore[arg-type]
         "found: true": lambda: phyblock.run_suite(suite, limit=True),
         "score: scene": lambda: phyblock.score("", "l1-001-animal"),  # type: ignore[arg-type]

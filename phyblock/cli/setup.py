@@ -13,7 +13,8 @@ import click
 from phyblock.cli.console import make_console, print_path, print_rows, shown_path
 from phyblock.cli.options import UserPath, models_file_option, sets_option
 from phyblock.config.models import RECORDED, ModelConfig, load_models
-from phyblock.config.suite import load_suite, suite_model, suite_tracks
+from phyblock.config.suite import load_suite, suite_model
+from phyblock.config.yaml import read_yaml
 from phyblock.data import SCENES_FILE, read_builtin, read_official
 from phyblock.errors import InputError, Problem, SpecError
 from phyblock.files import check_free, read_bytes, writing
@@ -58,7 +59,8 @@ def init(folder: Path, suite: str) -> None:
 
     Never writes over files that are already there.
     """
-    templates = [kind_of(name).template for name in suite_tracks(find_suite(suite))]
+    tracks = read_yaml(find_suite(suite)).data.get("tracks", ["full_planning"])
+    templates = [kind_of(name).template for name in tracks]
     prompts = [
         ("prompts", path.name)
         for template in templates

@@ -3,48 +3,42 @@
 from __future__ import annotations
 
 import ipaddress
-import json
 import os
 import re
 import urllib.parse
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    Field,
-    JsonValue,
-    TypeAdapter,
-    ValidationError,
-    model_validator,
-)
+from pydantic import BeforeValidator, ConfigDict, Field, JsonValue, RootModel
+from pydantic.json_schema import SkipJsonSchema
 
 from phyblock.config.validation import (
+    HYPHENATED,
+    Cost,
     Count,
+    Fault,
     Flag,
     ModelName,
     Section,
     Temperature,
+    Text,
     TimeoutS,
     TopP,
     Unique,
-    check,
-    check_unique,
-    joined,
-    refuse,
+    checked,
+    fault,
+    form,
+    read_section,
 )
-from phyblock.config.yaml import YamlSource, expand, read_yaml, show
+from phyblock.config.yaml import expand, read_yaml
 from phyblock.errors import Problem, SpecError
 from phyblock.registry import baseline_names
 from phyblock.text import did_you_mean
 from phyblock.types import BATCH_PROVIDERS, ImageDetail, SendMode, TransportName
 
 Kind = Literal["litellm", "replay", "baseline", "human"]
-Text = Annotated[str, Field(min_length=1)]
-UsdPerMillion = Annotated[float, Field(strict=True, ge=0, le=1e9, allow_inf_nan=False)]
 
 RECORDED = "recorded"
 """The word that stands for every folder of recorded replies."""
@@ -58,6 +52,8 @@ OWN_SERVER = "a server of one's own"
 """Stands for an address where it decides nothing but that it is no provider's."""
 LARGEST_REPLY_BYTES = 32 * 1024 * 1024
 """Default limit of a reply's body [bytes]: a hundred times what the longest thoughts take."""
+
+ADDRESS_ALLOWED = "http://... or https://..., without user, password, query and fragment"
 
 _SELF_HOSTED = (
     "hosted_vllm", "lm_studio", "llamafile", "custom_openai", "xinference", "litellm_proxy",
@@ -81,44 +77,36 @@ _OWN_BODY = (
 """Fields of a request's body that phyblock writes, or that multiply what is billed."""
 
 
-def address_fault(url: str) -> tuple[str, str] | None:
-    """Return why a model cannot be called at this address, and a way out; None where it can.
+def is_address(url: str) -> bool:
+    """True if a model can be called at this address, which holds no user, query or fragment.
 
     An address stands in run folders, in the reply cache and in messages. So it may hold nothing
-    that is worth hiding, and no fault of one is described by showing it.
+    that is worth hiding, and what is refused is not shown.
     """
-    scheme, mark, rest = url.partition("://")
-    host = re.split(r"[/?#\\]", rest if mark else url, maxsplit=1)[0]
-    hint = "put the key alone into an environment variable and name that in api_key_env"
-    if "@" in host:
-        return "holds a user name or a password", hint
-    if "?" in url or "#" in url:
-        return "holds a query or a fragment, where keys are often written", hint
-    hint = "for example http://localhost:8000/v1"
-    if not mark or scheme.lower() not in ("http", "https"):
-        return "is not the address of a server", hint
-    if len(url) > 1_000 or "\\" in url or any(not "!" <= c <= "~" for c in rest[len(host) :]):
-        return "is too long, or holds characters that must be escaped in an address", hint
+    if len(url) > 1000 or not url.isprintable() or set(url) & set("?#\\"):
+        return False
+    if not re.fullmatch(r"(?i)https?://[^\s/@]+(/[!-~]*)?", url):
+        return False
     try:
-        parts = urllib.parse.urlsplit(f"//{host}")
-        name = parts.hostname or ""
-        is_host = parts.port != 0 and host.isprintable() and not re.search(r"\s", host)
-        if ":" in name or host.startswith("["):
-            is_host &= bool(ipaddress.IPv6Address(name.partition("%")[0]))
-        else:
-            is_host &= bool(name.encode("idna"))
+        parts = urllib.parse.urlsplit(url)
+        host = parts.hostname or ""
+        if "[" in parts.netloc:
+            ipaddress.IPv6Address(host.partition("%")[0])
+        return (
+            bool(host.encode("idna" if host.isascii() or "[" not in host else "ascii"))
+            and parts.port != 0
+        )
     except ValueError:
-        is_host = False
-    return None if is_host else ("names no host, or one that cannot be read", hint)
+        return False
 
 
 def host_of(url: str) -> str:
     """Return host and port alone; "an unreadable address" where there are none."""
     try:
         parts = urllib.parse.urlsplit(url)
-        host, port = parts.hostname or "", parts.port
+        host, port = parts.hostname, parts.port
     except ValueError:
-        host, port = "", None
+        host = None
     if not host:
         return "an unreadable address"
     shown = f"[{host}]" if ":" in host else host
@@ -126,28 +114,26 @@ def host_of(url: str) -> str:
 
 
 def _one_or_list(value: object) -> object:
-    if value == []:
-        raise refuse("is empty", allowed="at least one")
     return () if value is None else value if isinstance(value, list | tuple) else (value,)
 
 
-def _say_one_or_list(schema: dict[str, Any]) -> None:
-    """Say in a JSON Schema that one item may stand without brackets."""
-    several = {key: schema.pop(key) for key in ("type", "items", "uniqueItems") if key in schema}
-    schema.pop("default", None)
-    schema["anyOf"] = [several["items"], {**several, "minItems": 1}, {"type": "null"}]
+def _rising(tiers: tuple[Tier, ...]) -> Iterator[Fault]:
+    for n, (one, following) in enumerate(pairwise(tiers), start=1):
+        if following.above <= one.above:
+            message = "is not above that of the one before"
+            yield Fault(message, f"more than {one.above}", at=(n, "above"))
 
 
 class Price(Section):
     """Prices of tokens [USD per million]."""
 
-    input: UsdPerMillion
+    input: Cost
     """Prompt tokens [USD per million]."""
-    output: UsdPerMillion
+    output: Cost
     """Reply tokens [USD per million]."""
-    cached: UsdPerMillion | None = None
+    cached: Cost | None = None
     """Prompt tokens that the provider has in its cache [USD per million]; null: as the others."""
-    cache_write: UsdPerMillion | None = None
+    cache_write: Cost | None = None
     """Prompt tokens that it puts into its cache [USD per million]; null: as the others."""
 
 
@@ -166,49 +152,38 @@ class Tier(Rate):
     """Prompts of more tokens than this."""
 
 
-def _check_rising(tiers: tuple[Tier, ...]) -> tuple[Tier, ...]:
-    for index, (tier, following) in enumerate(pairwise(tiers), start=1):
-        if following.above <= tier.above:
-            message, allowed = "is not above the one before it", f"more than {tier.above}"
-            raise refuse(message, at=(index, "above"), allowed=allowed)
-    return tiers
-
-
 class Tariff(Rate):
     """The price of a model, where litellm's price map does not know it or is wrong."""
 
-    tiers: Annotated[tuple[Tier, ...], AfterValidator(_check_rising)] = ()
+    tiers: Annotated[tuple[Tier, ...], checked(_rising)] = ()
     """Other prices of calls with long prompts, by rising `above`."""
 
 
-def _check_id(model_id: str) -> str:
-    provider, slash, rest = model_id.partition("/")
-    if slash and provider and rest and " " not in model_id:
-        return model_id
-    owner = next((who for start, who in _OWNERS if model_id.lower().startswith(start)), None)
-    own = f", behind a server of your own hosted_vllm/{model_id}" if " " not in model_id else ""
-    hint = f"for example openai/gpt-4o-2024-08-06{own}"
-    hint = f"did you mean {owner}/{model_id}?" if owner else hint
-    raise refuse("is not a litellm id", allowed="provider/model", hint=hint)
+def _id_faults(model_id: str) -> Iterator[Fault]:
+    if not re.fullmatch(r"[^/ ]+/[^ ]+", model_id):
+        owner = next((who for start, who in _OWNERS if model_id.lower().startswith(start)), None)
+        hint = f"did you mean {owner}/{model_id}?" if owner else ""
+        hint = hint or f"behind a server of your own it is hosted_vllm/{model_id}"
+        yield Fault("is not a litellm id", "provider/model", hint=hint)
 
 
-def _check_address(url: str) -> str:
-    if (fault := address_fault(url)) is None:
-        return url
-    allowed = "http://... or https://..., without user, password, query and fragment"
-    raise refuse(fault[0], allowed=allowed, hint=fault[1], hides=True)
+def _address_faults(url: str) -> Iterator[Fault]:
+    if not is_address(url):
+        hint = "for example http://localhost:8000/v1; keys go into a variable: api_key_env"
+        yield Fault("is not an address that can be used", ADDRESS_ALLOWED, "", hint=hint)
 
 
-def _check_body(body: dict[str, JsonValue]) -> dict[str, JsonValue]:
-    for key in body:
-        if key in _OWN_BODY:
-            hint = "set max_tokens beside extra_body" if "tokens" in key else "take it out"
-            raise refuse("is not for extra_body to say", at=(key,), key=True, hint=hint)
-    try:
-        json.dumps(body, allow_nan=False)
-    except ValueError:
-        raise refuse("holds a number that JSON cannot carry") from None
-    return body
+def _body_faults(body: dict[str, JsonValue]) -> Iterator[Fault]:
+    for key in sorted(body.keys() & set(_OWN_BODY)):
+        yield Fault("cannot be set in extra_body", at=(key,), key=True)
+
+
+_Variable = Annotated[str, form(r"^[A-Za-z_][A-Za-z0-9_]*$", "a name such as MY_KEY")]
+_Group = Annotated[str, form(r"^[a-z0-9][a-z0-9-]{0,39}$", f"up to 40 {HYPHENATED}")]
+_Id = Annotated[str, checked(_id_faults), Field(json_schema_extra={"pattern": r"^[^/ ]+/[^ ]+$"})]
+_Address = Annotated[
+    str, checked(_address_faults), Field(json_schema_extra={"pattern": "^https?://"})
+]
 
 
 class SamplingSpec(Section):
@@ -230,33 +205,27 @@ class ModelConfig(Section):
     null is not sent.
     """
 
-    name: str = Field(default="", exclude=True)
-    most_body_bytes: int = Field(default=LARGEST_REPLY_BYTES, exclude=True)
-    id: Annotated[
-        str,
-        AfterValidator(_check_id),
-        Field(json_schema_extra={"pattern": r"^[A-Za-z0-9_.-]+/\S+$"}),
-    ] = ""
+    model_config = ConfigDict(
+        json_schema_extra={"oneOf": [{"required": ["id"]}, {"required": ["replay"]}]}
+    )
+
+    name: SkipJsonSchema[str] = Field(default="", exclude=True)
+    most_body_bytes: SkipJsonSchema[int] = Field(default=LARGEST_REPLY_BYTES, exclude=True)
+    id: _Id = ""
     """litellm id with its provider: openai/gpt-4o-2024-08-06."""
     addresses: Annotated[
-        tuple[
-            Annotated[
-                str,
-                AfterValidator(_check_address),
-                Field(json_schema_extra={"pattern": "^https?://"}),
-            ],
-            ...,
-        ],
-        AfterValidator(check_unique),
-        BeforeValidator(_one_or_list),
-    ] = Field(default=(), alias="api_base", json_schema_extra=_say_one_or_list)
+        Unique[_Address],
+        BeforeValidator(_one_or_list, json_schema_input_type=_Address | list[_Address] | None),
+    ] = Field(default=(), alias="api_base")
     """Address of an OpenAI-compatible server (vLLM, Ollama, LM Studio), such as
     http://localhost:8000/v1; a list where several serve the same model. The one with the least to
     do is asked, one that is gone is left out and tried again."""
     revision: Annotated[str, Field(min_length=1, max_length=100)] | None = None
     """Which weights answer, where the id does not say it. An address does not tell models apart:
     one id on two servers is one model, unless revisions differ."""
-    api_key_env: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")] | None = None
+    api_key_env: (
+        Annotated[str, form(r"^[A-Za-z_][A-Za-z0-9_]*$", "a name such as MY_KEY")] | None
+    ) = None
     """Name of the environment variable that holds the key, where it is not the provider's usual
     one. Never the key itself."""
     transport: TransportName = "auto"
@@ -286,14 +255,12 @@ class ModelConfig(Section):
     """How closely pictures are looked at: the `detail` of OpenAI and compatible servers (auto, low,
     high, original), the media resolution of Gemini (low, medium, high, ultra_high); null: as the
     provider does where nothing is said."""
-    extra_body: Annotated[dict[str, JsonValue], AfterValidator(_check_body)] = Field(
-        default_factory=dict
-    )
+    extra_body: Annotated[dict[str, JsonValue], checked(_body_faults)] = Field(default_factory=dict)
     """Further fields of the request body, sent as they are; not model, messages, n, best_of,
     stream, max_tokens, max_completion_tokens."""
     price: Tariff | None = None
     """Price; null: that of litellm's price map, or unknown."""
-    max_cost_usd: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] | None = None
+    max_cost_usd: Cost | None = None
     """The model is asked no more before it costs more than this in a run [USD]; null: the run's
     limit alone."""
     seed: SendMode = "auto"
@@ -307,45 +274,42 @@ class ModelConfig(Section):
     """Longest wait for one reply, to the last of its bytes [s]. Left out: the suite's."""
     published: Text | None = None
     """Name of its row in the paper's tables."""
-    size_b: Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)] | None = None
+    size_b: TimeoutS | None = None
     """Parameters [billions], where known."""
-    groups: Unique[Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]{0,39}$")]] = ()
+    groups: Unique[
+        Annotated[str, form(r"^[a-z0-9][a-z0-9-]{0,39}$", f"up to 40 {HYPHENATED}")]
+    ] = ()
     """Groups that it belongs to: group:NAME in a suite or after --models stands for all of a group,
     in the order of this file."""
     replay: Text | None = None
     """Folder of recorded replies that stands in for the model (then no id), relative to this
     file."""
 
-    @model_validator(mode="after")
-    def _check_fields(self) -> Self:
-        provider = self.provider
+    def faults(self) -> Iterator[Fault]:
+        """Yield fields that others, or the provider, leave no room for."""
+        provider, known = self.provider, _DETAILS.get(self.provider)
         if self.replay is not None:
             with_replay = ("groups", "published", "replay", "size_b")
             for key in sorted(self.model_fields_set - {"name", *with_replay}):
-                at = (type(self).model_fields[key].alias or key,)
-                message, hint = "has no meaning for a replay", "keep either id or replay"
-                raise refuse(message, at=at, key=True, allowed=", ".join(with_replay), hint=hint)
-        elif self.transport == "direct" and not self.has_address and provider != "openai":
+                at, allowed = (type(self).model_fields[key].alias or key,), ", ".join(with_replay)
+                yield Fault("has no meaning for a replay", allowed, at=at, key=True)
+            return
+        if self.transport == "direct" and not self.has_address and provider != "openai":
             # A direct call would take the provider's key to OpenAI.
-            message = f"needs the address of the server that speaks for {provider}"
-            allowed = "direct with an api_base, else auto or litellm"
-            hint = "add api_base, or take the line out"
-            raise refuse(message, at=("transport",), allowed=allowed, hint=hint)
-        known = _DETAILS.get(provider)
+            message = f"needs api_base, the address of the server that speaks for {provider}"
+            yield Fault(message, at=("transport",))
         if self.image_detail is not None and known is not None and self.image_detail not in known:
             # It would be ignored, or refused with every request.
-            allowed = ", ".join(known) or f"none: {provider} has no such choice"
-            raise refuse(f"is not known to {provider}", at=("image_detail",), allowed=allowed)
+            allowed = ", ".join(known) or "none"
+            yield Fault(f"is not known to {provider}", allowed, at=("image_detail",))
         if self.batch and provider not in BATCH_PROVIDERS:
             message = f"is not possible: phyblock does not speak the batches of {provider}"
             allowed = ", ".join(f"{name}/..." for name in BATCH_PROVIDERS)
             hint = "where the provider has the /files and /batches of OpenAI, use openai/... with "
-            hint += "its api_base; else take the line out"
-            raise refuse(message, at=("batch",), allowed=allowed, hint=hint)
+            yield Fault(message, allowed, at=("batch",), hint=f"{hint}its api_base")
         if self.batch and len(self.addresses) > 1:
             message = "is not possible with a list of servers: a batch lies at one"
-            raise refuse(message, at=("batch",), hint="give one api_base, or take the line out")
-        return self
+            yield Fault(message, at=("batch",))
 
     @property
     def kind(self) -> Kind:
@@ -439,80 +403,65 @@ class ModelConfig(Section):
         return identity
 
 
+def _entry(value: object) -> object:
+    if isinstance(value, Mapping):
+        for key in value.keys() & {"name", "most_body_bytes"}:
+            raise fault(Fault("is not a known key", found="", at=(key,), key=True))
+    return {"id": value} if isinstance(value, str) else value
+
+
+def _entry_faults(config: ModelConfig) -> Iterator[Fault]:
+    variable = f"{config.provider.upper()}_API_BASE"
+    if not config.id and config.replay is None:
+        yield Fault("needs an id, or a replay folder", hint="for example id: openai/gpt-4o")
+    elif config.provider in _SELF_HOSTED and not (config.has_address or os.environ.get(variable)):
+        # litellm would send prompts to a public provider.
+        message = "is behind a server of your own: it needs an address"
+        hint = f"add api_base: http://localhost:8000/v1, or set {variable}"
+        yield Fault(message, found=config.id, at=("id",), hint=hint)
+
+
+def _name_faults(name: str) -> Iterator[Fault]:
+    own = (*baseline_names(), RECORDED)
+    if name in own:
+        yield Fault("is a name of phyblock's own", f"not {', '.join(own)}", "", key=True)
+    if name.startswith((GROUP, HUMAN)):
+        yield Fault("begins with a word of phyblock's own", f"not {GROUP}, {HUMAN}", "", key=True)
+
+
+_Entry = Annotated[
+    ModelConfig,
+    BeforeValidator(_entry, json_schema_input_type=_Id | ModelConfig),
+    checked(_entry_faults),
+]
+
+
+class ModelsFile(RootModel[dict[Annotated[ModelName, checked(_name_faults)], _Entry]]):
+    """Models by the name that suites use."""
+
+    model_config = ConfigDict(json_schema_extra={"additionalProperties": False})
+
+
 def load_models(path: Path) -> dict[str, ModelConfig]:
     """Read a models file: each name maps to a litellm id or to a mapping.
 
     Paths of replay folders come out absolute. Raises SpecError with all that is wrong.
     """
     source = read_yaml(path)
-    data = {} if source.data is None else source.data
-    if not isinstance(data, dict):
-        wrong = Problem(source.where(()), "has the wrong type", "", show(data),
-                        "a mapping: name: provider/model")  # fmt: skip
-        raise SpecError([*source.problems, wrong])
-    models: dict[str, ModelConfig] = {}
-    problems: list[Problem] = []
-    for name, entry in data.items():
-        config, of_entry = _read_entry(name, entry, source)
-        problems += [*_check_name(name, source), *of_entry]
-        if config is not None:
-            models[name] = config
-    if problems or source.problems:
-        raise SpecError(joined(source, problems))
+    source.data = {} if source.data is None else source.data
+    models = dict(read_section(ModelsFile, source).root)
+    for name, config in models.items():
+        update = {"name": name}
+        if config.replay is not None:
+            try:
+                update["replay"] = str(expand(config.replay, path.parent))
+            except ValueError as error:
+                where = source.where((name, "replay"))
+                raise SpecError(
+                    Problem(where, str(error), f"{name}.replay", config.replay)
+                ) from error
+        models[name] = config.model_copy(update=update)
     return models
-
-
-def _read_entry(
-    name: str, entry: Any, source: YamlSource
-) -> tuple[ModelConfig | None, list[Problem]]:
-    if not isinstance(entry, str | dict):
-        wrong = Problem(source.where((name,)), "has the wrong type", name, show(entry),
-                        "a litellm id (provider/model), or a mapping")  # fmt: skip
-        return None, [wrong]
-    fields = {"id": entry} if isinstance(entry, str) else entry
-    if unknown := [key for key in ("name", "most_body_bytes") if key in fields]:
-        where = source.where((name, unknown[0]), key=True)
-        return None, [Problem(where, "is not a known key", f"{name}.{unknown[0]}")]
-    config, problems = check(ModelConfig, fields, source, (name,))
-    if config is None:
-        return None, problems
-    where = source.where((name,))
-    if not config.id and config.replay is None:
-        message, hint = "needs an id (or a replay folder)", "for example id: openai/gpt-4o"
-        return None, [Problem(where, message, name, show(entry), hint=hint)]
-    variable = f"{config.provider.upper()}_API_BASE"
-    if config.provider in _SELF_HOSTED and not (config.has_address or os.environ.get(variable)):
-        # litellm would send prompts to a public provider.
-        message = "is behind a server of your own: it needs an address"
-        hint = f"add api_base: http://localhost:8000/v1, or set {variable}"
-        where = source.where((name, "id"))
-        return None, [Problem(where, message, f"{name}.id", config.id, hint=hint)]
-    if config.replay is None:
-        return config.model_copy(update={"name": name}), []
-    try:
-        replay = str(expand(config.replay, Path(source.label).parent))
-    except ValueError as error:
-        where = source.where((name, "replay"))
-        return None, [Problem(where, str(error), f"{name}.replay", config.replay)]
-    return config.model_copy(update={"name": name, "replay": replay}), []
-
-
-def _check_name(name: str, source: YamlSource) -> list[Problem]:
-    own = (*baseline_names(), RECORDED)
-    if name in own:
-        message, allowed = "is a name of phyblock's own", f"not {', '.join(own)}"
-    elif prefix := next((one for one in (GROUP, HUMAN) if name.startswith(one)), ""):
-        message, allowed = f"begins with {prefix}, which names others", ""
-    else:
-        try:
-            TypeAdapter(ModelName).validate_python(name)
-        except ValidationError:
-            message = "is not a usable name"
-            allowed = "up to 80 letters, digits and . _ : + -, starting with a letter or digit"
-        else:
-            return []
-    where = source.where((name,), key=True)
-    return [Problem(where, message, name, show(name), allowed, "choose another name")]
 
 
 def group_names(known: Mapping[str, ModelConfig]) -> tuple[str, ...]:
@@ -538,8 +487,8 @@ def resolve_models(
     Raises SpecError for each name that is neither a model, a group nor a built-in baseline, at the
     place of its index.
     """
-    built_in = {name: ModelConfig(name=name) for name in baseline_names()}
-    allowed = [*built_in, *known, *(GROUP + name for name in group_names(known))]
+    named = {**{name: ModelConfig(name=name) for name in baseline_names()}, **known}
+    allowed = [*named, *(GROUP + name for name in group_names(known))]
     problems = []
     for index, name in enumerate(names):
         if name in allowed:
@@ -550,10 +499,9 @@ def resolve_models(
         elif name.startswith(HUMAN):
             message = "is a person, who answers in `phyblock play`"
         hint = did_you_mean(name, allowed) or "list them: phyblock models"
-        shown = ", ".join(allowed) if len(allowed) <= 12 else ""
         place = where(index)
         field = "" if place == "--models" else f"models[{index}]"
-        problems.append(Problem(place, message, field, name, shown, hint))
+        problems.append(Problem(place, message, field, name, hint=hint))
     if problems:
-        raise SpecError(problems[:100])
-    return {name: {**built_in, **known}[name] for name in with_members(names, known)}
+        raise SpecError(problems)
+    return {name: named[name] for name in with_members(names, known)}

@@ -9,60 +9,37 @@ import filecmp
 import functools
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import product
-from math import prod
 from pathlib import Path, PurePath
 from typing import Annotated, Any, Literal, Self, TypeVar
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    Discriminator,
-    Field,
-    PrivateAttr,
-    Tag,
-    ValidationError,
-    create_model,
-    model_validator,
-)
-from pydantic_core import InitErrorDetails
+from pydantic import BaseModel, Field, PrivateAttr, ValidationError, create_model
 
-from phyblock.config.models import (
-    RECORDED,
-    SamplingSpec,
-)
+from phyblock.config.models import RECORDED, SamplingSpec
 from phyblock.config.validation import (
+    HYPHENATED,
     BackgroundName,
+    Cost,
     Count,
+    Fault,
     ModelName,
+    OneOf,
     Section,
+    Template,
+    Text,
     TimeoutS,
     Unique,
     UniqueSome,
-    check,
-    check_unique,
-    joined,
-    prompt_check,
-    refuse,
+    checked,
+    form,
+    problems_of,
+    read_section,
 )
-from phyblock.config.yaml import (
-    FieldPath,
-    YamlSource,
-    apply_overrides,
-    dotted,
-    expand,
-    read_yaml,
-    show,
-)
+from phyblock.config.yaml import FieldPath, YamlSource, apply_overrides, dotted, expand, read_yaml
 from phyblock.errors import Problem, SpecError
-from phyblock.registry import (
-    baseline_names,
-    known_track,
-    known_tracks,
-)
+from phyblock.registry import baseline_names, known_track, known_tracks
 from phyblock.text import did_you_mean
 from phyblock.types import (
     AnswerFormat,
@@ -100,47 +77,10 @@ FACTORS: Mapping[str, tuple[str, ...] | None] = {
 """Factors of `vary` with the path of the field that each gives values to; every track names its
 prompt in a field of its own."""
 
-Prompt = Annotated[
-    str,
-    AfterValidator(prompt_check(*PROMPT_WORDS)),
-    Field(json_schema_extra={"pattern": r"^(default|official|.*\.j2)$"}),
-]
+Prompt = Literal["default", "official"] | Template
 ExampleCount = Annotated[int, Field(strict=True, ge=0, le=16)]
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)]
-
-
-def _check_whole(level: object) -> object:
-    if type(level) is int:
-        return level
-    raise refuse("is not a whole number", allowed="1, 2, 3, 4")
-
-
-Level = Annotated[Literal[1, 2, 3, 4], BeforeValidator(_check_whole)]
-
-
-def _one_of(names: Callable[[], Sequence[str]]) -> AfterValidator:
-    def check_name(name: str) -> str:
-        known = tuple(names())
-        if name in known:
-            return name
-        raise refuse("is not one of the choices", allowed=", ".join(known), words=known)
-
-    return AfterValidator(check_name)
-
-
-def _list_tag(value: object) -> str:
-    return "list" if isinstance(value, list | tuple) else "one"
-
-
-ModelNames = Annotated[
-    Annotated[UniqueSome[ModelName], Tag("list")] | Annotated[Literal["recorded"], Tag("word")],
-    Discriminator(lambda value: "word" if isinstance(value, str) else "list"),
-]
-Examples = Annotated[
-    Annotated[ExampleCount, Tag("one")]
-    | Annotated[UniqueSome[Annotated[str, Field(min_length=1)]], Tag("list")],
-    Discriminator(_list_tag),
-]
+Level = Annotated[int, Field(strict=True), OneOf(lambda: (1, 2, 3, 4))]
 
 
 class DatasetSpec(Section):
@@ -149,7 +89,7 @@ class DatasetSpec(Section):
     format: DataFormat = "builtin"
     """builtin: the project's own format. official: a checkout of the official PhyBlock
     repository."""
-    path: str | None = Field(default=None, min_length=1)
+    path: Text | None = None
     """builtin: the name of a bundled data set (phyblock-400 when left out) or a folder that holds
     scenes.jsonl (write ./name for a folder beside the suite). official: the checkout's folder.
     Relative to the suite file, or to the working directory when given by --set; ~ and $VARIABLES
@@ -164,11 +104,10 @@ class ImagesSpec(Section):
     scene without one is an error."""
     layout: PictureLayout = "composite"
     """composite: goal and candidates in one picture. separate: two pictures."""
-    order: Annotated[
-        tuple[PictureName, ...],
-        Field(min_length=2, max_length=2, json_schema_extra={"uniqueItems": True}),
-        AfterValidator(check_unique),
-    ] = ("goal", "candidates")
+    order: Annotated[Unique[PictureName], Field(min_length=2, max_length=2)] = (
+        "goal",
+        "candidates",
+    )
     """Order in which separate pictures are sent."""
     candidate_scale: CandidateScale = "common"
     """common: all rendered candidates of a grid are drawn at one scale. fit: each fills its cell.
@@ -215,7 +154,7 @@ class LimitsSpec(Section):
     max_attempts: Count = 8
     """Requests that must have failed before a sample is given up. More are sent until retry_for_s
     is over, but for answers that were paid for and cannot be read."""
-    retry_for_s: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] = 300.0
+    retry_for_s: Annotated[float, Field(strict=True, ge=0)] = 300.0
     """Outage that is outlasted [s]: a sample is not given up sooner after its first failure, and a
     model whose server cannot be reached for longer is stopped."""
     max_connection_failures: Count = 20
@@ -224,9 +163,9 @@ class LimitsSpec(Section):
     has not given one."""
     timeout_s: TimeoutS = 300.0
     """Longest wait for one reply [s]."""
-    batch_poll_s: Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)] = 60.0
+    batch_poll_s: TimeoutS = 60.0
     """Longest pause between two looks at a batch [s], for models with batch: true."""
-    max_cost_usd: Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)] | None = None
+    max_cost_usd: Cost | None = None
     """The run stops before it costs more than this [USD]; null: no bound."""
 
 
@@ -256,18 +195,12 @@ class Variant:
         return Variant(tuple(pair for pair in self.levels if pair[0] != REPEAT))
 
 
-def _check_levels(levels: tuple[LevelT, ...]) -> tuple[LevelT, ...]:
+def _lone_level(levels: tuple[object, ...]) -> Iterator[Fault]:
     if len(levels) == 1:
-        raise refuse("needs levels to compare", allowed="two or more, the reference first")
-    return levels
+        yield Fault("needs levels to compare", "two or more, the reference first")
 
 
-Levels = Annotated[
-    tuple[LevelT, ...],
-    AfterValidator(check_unique),
-    AfterValidator(_check_levels),
-    Field(json_schema_extra={"uniqueItems": True}),
-]
+Levels = Annotated[Unique[LevelT], checked(_lone_level)]
 
 
 class VarySpec(Section):
@@ -292,13 +225,12 @@ class VarySpec(Section):
     """crossed: every level with every level of the others. one_at_a_time: each factor alone, the
     others at their reference; both ask each repeatedly."""
 
-    @model_validator(mode="after")
-    def _check_names(self) -> Self:
-        names = list(self.names("prompt"))
+    def faults(self) -> Iterator[Fault]:
+        """Yield that two templates would have the same name in tables."""
+        names = self.names("prompt")
         if twice := sorted({name for name in names if names.count(name) > 1}):
             allowed = "templates of different names"
-            raise refuse(f"has two templates called {twice[0]}", at=("prompt",), allowed=allowed)
-        return self
+            yield Fault(f"has two templates called {twice[0]}", allowed, at=("prompt",))
 
     @property
     def factors(self) -> tuple[str, ...]:
@@ -315,28 +247,20 @@ class VarySpec(Section):
         texts = map(str, self.values(factor))
         return tuple(PurePath(text).stem if text.endswith(".j2") else text for text in texts)
 
-    def value(self, factor: str, level: str) -> Any:
-        """Return the value of a level; ValueError for one that there is not."""
-        return self.values(factor)[self.names(factor).index(level)]
-
     @property
     def n_variants(self) -> int:
-        """The number of ways of asking."""
-        sizes = [len(self.values(name)) for name in self.factors if name != REPEAT]
-        crossed = self.design == "crossed"
-        return (prod(sizes) if crossed else 1 + sum(n - 1 for n in sizes)) * self.repeats
+        """The number of variants."""
+        return len(self.variants)
 
     @property
     def variants(self) -> tuple[Variant, ...]:
-        """All ways of asking, the reference first, repeats of one behind one another."""
-        levels = [
-            [(name, level) for level in self.names(name)] for name in self.factors if name != REPEAT
-        ]
+        """All combinations of levels, the reference first, repeats of one behind one another."""
+        shown = [name for name in self.factors if name != REPEAT]
+        levels = [[(name, level) for level in self.names(name)] for name in shown]
         first = tuple(of_factor[0] for of_factor in levels)
-        if self.design == "crossed":
-            chosen = list(product(*levels))
-        else:
-            chosen = [first] + [(pair,) for of_factor in levels for pair in of_factor[1:]]
+        chosen: Sequence[tuple[tuple[str, str], ...]] = list(product(*levels))
+        if self.design == "one_at_a_time":
+            chosen = [first, *((pair,) for of_factor in levels for pair in of_factor[1:])]
         again = [((REPEAT, name),) if n else () for n, name in enumerate(self.names(REPEAT))]
         return tuple(
             Variant((*(pair for pair in one if pair not in first), *repeat))
@@ -345,43 +269,38 @@ class VarySpec(Section):
         )
 
 
-def with_values(spec: SectionT, values: Mapping[tuple[str, ...], Any]) -> SectionT:
-    """Return a validated suite or section with other values at these paths of fields."""
-    for path, value in values.items():
-        name, below = path[0], path[1:]
-        inner = with_values(getattr(spec, name), {below: value}) if below else value
-        spec = spec.model_copy(update={name: inner})
-    return spec
+def _with_value(spec: SectionT, path: tuple[str, ...], value: Any) -> SectionT:
+    """Return a suite or section with another value at a path of fields."""
+    name, *below = path
+    if below:
+        value = _with_value(getattr(spec, name), tuple(below), value)
+    return spec.model_copy(update={name: value})
 
 
 @dataclass(frozen=True)
 class SuiteFiles:
     """The files that a suite was read from and names.
 
-    `path` is the suite's own; `dataset` the absolute folder of the data set; by track, `folders`
-    are those of data of its own, and `templates` the absolute paths of prompts that are files.
-    Where prompts vary, `templates` are those of the reference, and `prompts` has the paths of all
-    by their texts.
+    `path` is the suite's own; `dataset` the absolute folder of the data set; `folders` are those of
+    data of their own by track, and `templates` prompts that are files, by track and the prompt's
+    text in the suite.
     """
 
     path: Path
     dataset: Path
     source: YamlSource = field(repr=False, compare=False)
     folders: Mapping[str, Path] = field(default_factory=dict)
-    templates: Mapping[str, Path] = field(default_factory=dict)
-    prompts: Mapping[str, Path] = field(default_factory=dict)
+    templates: Mapping[tuple[str, str], Path] = field(default_factory=dict)
 
 
 class Suite(Section):
     """A suite: which models are asked about which scenes, how, and what is made of the replies."""
 
-    name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]{0,63}$")]
+    name: Annotated[str, form(r"^[a-z0-9][a-z0-9-]{0,63}$", f"up to 64 {HYPHENATED}")]
     """Short name: small letters, digits and hyphens; runs are filed under it."""
     description: str = ""
     """One line on what the suite is for."""
-    tracks: UniqueSome[Annotated[str, _one_of(lambda: tuple(known_tracks()))]] = Field(
-        default_factory=lambda: tuple(known_tracks())[:1]
-    )
+    tracks: UniqueSome[Annotated[str, OneOf(known_tracks)]] = ("full_planning",)
     """What is asked."""
     dataset: DatasetSpec = DatasetSpec()
     """The scenes of a run."""
@@ -394,10 +313,10 @@ class Suite(Section):
     """A compares type, color and orientation, B type and color. One call is scored under each."""
     seeds: UniqueSome[Seed] = (0,)
     """Each seed repeats every question."""
-    models: ModelNames
+    models: Literal["recorded"] | UniqueSome[ModelName]
     """Names from models.yaml or built-in baselines, group:NAME for all models of a group; or the
     word recorded: every folder of recorded replies in the official data."""
-    baselines: Unique[Annotated[str, _one_of(baseline_names)]] = ("goal-blind", "random")
+    baselines: Unique[Annotated[str, OneOf(baseline_names)]] = ("goal-blind", "random")
     """Built-in baselines that are scored beside models and recordings of full_planning, where every
     track has them; they cost nothing. []: none."""
     prompt: Prompt = "default"
@@ -406,7 +325,7 @@ class Suite(Section):
     answer_format: AnswerFormat = "text"
     """text: lines of text. json_schema: one JSON object, of which the prompt says the schema; it is
     sent as response_format too where the provider takes one."""
-    examples: Examples = 0
+    examples: ExampleCount | UniqueSome[Text] = 0
     """Worked examples that are shown before each question, with a right answer: a number (drawn by
     the least of seeds, never a scene that shares a base scene or its goal with the one asked
     about), or names of scenes (where one may not be shown, a drawn one stands in)."""
@@ -428,17 +347,12 @@ class Suite(Section):
 
     _files: SuiteFiles | None = PrivateAttr(default=None)
 
-    @model_validator(mode="after")
-    def _check_rules(self) -> Self:
-        faults: list[dict[str, Any]] = []
-        for fields, message, hint in self._conflicts():
-            paths = [tuple(name.split(".")) for name in fields.split()]
-            faults.append({"message": message, "hint": hint, "at": paths[0], "reads": paths})
-        faults += (fault for factor in self.vary.factors for fault in self._vary_faults(factor))
-        if faults:
-            lines = [InitErrorDetails(type=refuse(**fault), loc=(), input=None) for fault in faults]
-            raise ValidationError.from_exception_data("suite", lines)
-        return self
+    def faults(self) -> Iterator[Fault]:
+        """Yield the rules between fields that are broken."""
+        conflicts = list(self._conflicts())
+        yield from conflicts
+        for factor in self.vary.factors if not conflicts else ():
+            yield from self._vary_faults(factor)
 
     @property
     def files(self) -> SuiteFiles:
@@ -464,12 +378,10 @@ class Suite(Section):
                 return value
         raise LookupError(f"the suite has no section of {model.__name__}")
 
-    def read(self, path: FieldPath) -> Any:
-        """Return the value of a field by its path."""
-        value: Any = self
-        for name in path:
-            value = getattr(value, str(name))
-        return value
+    def template(self, track: str) -> Path | None:
+        """Return the file that a track's prompt is read from; None for one that is bundled."""
+        text = functools.reduce(getattr, known_track(track).prompt_field(), self)
+        return self.files.templates.get((track, str(text)))
 
     def fields_of(self, factor: str) -> tuple[tuple[str, ...], ...]:
         """Return the paths of the fields that a factor gives values to; none for repeats."""
@@ -480,18 +392,13 @@ class Suite(Section):
 
     def at(self, variant: Variant) -> Self:
         """Return the suite as a variant asks, its other factors at their reference."""
+        suite = self
         levels = {name: self.vary.names(name)[0] for name in self.vary.factors}
-        values: dict[tuple[str, ...], Any] = {}
         for factor, level in {**levels, **dict(variant.levels)}.items():
-            value = self.vary.value(factor, level)
-            values |= dict.fromkeys(self.fields_of(factor), value)
-        suite = with_values(self, values)
-        if self._files is None or "prompt" not in self.vary.factors:
-            return suite
-        prompts = self._files.prompts
-        texts = {name: str(suite.read(known_track(name).prompt_field())) for name in suite.tracks}
-        templates = {name: prompts[text] for name, text in texts.items() if text in prompts}
-        return suite.with_files(replace(self._files, templates=templates))
+            value = self.vary.values(factor)[self.vary.names(factor).index(level)]
+            for path in self.fields_of(factor):
+                suite = _with_value(suite, path, value)
+        return suite
 
     def identity(self) -> dict[str, Any]:
         """Return what determines the results, as JSON-able data, whatever the order of lists.
@@ -523,90 +430,66 @@ class Suite(Section):
         spec["vary"]["prompt"] = list(self.vary.names("prompt"))
         return spec
 
-    def _conflicts(self) -> Iterator[tuple[str, str, str]]:
-        """Give the rules between fields that are broken: fields, message and hint.
-
-        The first field is the one to fix; the error points at the first that is written.
-        """
-        official = self.dataset.format == "official"
-        recorded, as_json = self.models == RECORDED, self.answer_format == "json_schema"
-        shuffled = self.candidates.order == "shuffled"
-        set_official = "set dataset.format to official and dataset.path to a checkout"
+    def _conflicts(self) -> Iterator[Fault]:
+        """Yield each rule between fields that is broken, at the field to change."""
+        official, recorded = self.dataset.format == "official", self.models == RECORDED
+        as_json, shuffled = self.answer_format == "json_schema", self.candidates.order == "shuffled"
+        official_prompt, own_pictures = self.prompt == "official", self.images.source == "dataset"
         if official and self.dataset.path is None:
-            message = (
-                "the official format needs the folder of a checkout of the official repository"
-            )
-            yield (
-                "dataset.path dataset.format",
-                message,
-                ("give it on the command line: --set dataset.path=FOLDER"),
-            )
-        if recorded and not official:
-            message = "recorded replies come with the official data set only"
-            yield "models dataset.format", message, f"{set_official}, or list the models"
-        if self.prompt == "official" and not official:
-            message = "the official prompt is read out of a checkout of the official repository"
-            yield "prompt dataset.format", message, f"{set_official}, or use prompt: default"
-        if self.prompt == "official" and as_json:
-            message = "the official prompt asks for lines of text"
-            yield "answer_format prompt", message, "use prompt: default, or answer_format: text"
-        if recorded and as_json:
-            message = "recorded replies were asked for in text"
-            yield "answer_format models", message, "use answer_format: text, or list the models"
-        if self.parser == "official" and as_json:
-            message = "the official expression reads no JSON"
-            yield "parser answer_format", message, "use parser: steps, or answer_format: text"
-        if self.images.source == "dataset" and not official:
-            message = "only the official data set has pictures of its own"
-            hint = f"{set_official}, or use images.source: render"
-            yield "images.source dataset.format", message, hint
-        if self.images.source == "dataset" and shuffled:
-            message = "the data set's own pictures show the candidates in the order of the file"
-            hint = "use images.source: render, or candidates.order: file"
-            yield "candidates.order images.source", message, hint
-        if recorded and shuffled:
-            message = "recorded replies name candidates by the numbers of the file"
-            hint = "use candidates.order: file, or list the models"
-            yield "candidates.order models", message, hint
+            message = "must be the folder of a checkout of the official repository"
+            hint = "give it on the command line: --set dataset.path=FOLDER"
+            yield Fault(message, found="", at=("dataset", "path"), hint=hint)
+        other = "set dataset.format to official and dataset.path to a checkout, or this to another"
+        needs_official = (
+            (recorded, "models", "recorded replies come with the official data set only"),
+            (official_prompt, "prompt", "the official prompt is read out of an official checkout"),
+            (own_pictures, "images.source", "only the official data set has pictures of its own"),
+        )
+        for is_set, name, message in needs_official:
+            if is_set and not official:
+                yield Fault(message, at=tuple(name.split(".")), hint=other)
+        own_order = "the data set's own pictures show the candidates in the order of the file"
+        recorded_order = "recorded replies name candidates by the numbers of the file"
+        clashes = (
+            (as_json and recorded, "answer_format", "recorded replies were asked for in text"),
+            (as_json and official_prompt, "answer_format", "the official prompt asks for text"),
+            (as_json and self.parser == "official", "parser", "this parser reads no JSON"),
+            (shuffled and own_pictures, "candidates.order", own_order),
+            (shuffled and recorded, "candidates.order", recorded_order),
+        )
+        for is_broken, name, message in clashes:
+            if is_broken:
+                yield Fault(message, at=tuple(name.split(".")))
 
-    def _vary_faults(self, factor: str) -> Iterator[dict[str, Any]]:
-        """Give what is wrong with a factor: its tracks must know it, other fields allow it."""
-        at = ("vary", factor)
-        paths = self.fields_of(factor)
-        unknown = [name for name in self.tracks if factor not in known_tracks()[name].varies]
-        if unknown:
-            allowed = ", ".join(known_tracks()[unknown[0]].varies)
-            message = f"has no meaning in {unknown[0]}"
-            yield {"message": message, "at": at, "key": True, "allowed": allowed}
-            return
-        if factor == "prompt" and len(self.tracks) > 1:
+    def _vary_faults(self, factor: str) -> Iterator[Fault]:
+        """Yield what is wrong with a factor: its tracks must know it, other fields allow it."""
+        at, paths = ("vary", factor), self.fields_of(factor)
+        for kind in map(known_track, self.tracks):
+            if factor not in kind.varies:
+                message = f"has no meaning in {kind.name}"
+                yield Fault(message, ", ".join(kind.varies), at=at, key=True)
+                return
+        if len(paths) > 1:
             message = "is varied in a suite of several tracks, each of which has its own"
-            yield {"message": message, "at": at, "key": True, "hint": "run one track at a time"}
+            yield Fault(message, at=at, key=True, hint="run one track at a time")
             return
         if factor in ("background", "view") and self.images.source == "dataset":
-            message, hint = (
-                "cannot be varied in the data set's own pictures",
-                "use images.source: render",
-            )
-            yield {"message": message, "at": at, "key": True, "hint": hint}
+            message = "cannot be varied in the data set's own pictures"
+            yield Fault(message, at=at, key=True, hint="use images.source: render")
             return
         first = self.vary.values(factor)[0]
         for path in paths:
-            section = self.read(path[:-1])
-            if path[-1] in section.model_fields_set and self.read(path) != first:
+            section = functools.reduce(getattr, path[:-1], self)
+            if path[-1] in section.model_fields_set and getattr(section, path[-1]) != first:
                 message = f"is varied by vary.{factor}, whose first level is the reference"
-                hint = "leave it out, or change vary"
-                yield {"message": message, "at": path, "allowed": str(first), "hint": hint}
-        before = set(self._conflicts())
+                yield Fault(message, str(first), at=path, hint="leave it out, or change vary")
         for place, level in enumerate(self.vary.names(factor)):
-            if level == "official" and paths != (("prompt",),):
-                allowed = "default, or the path of a .j2 file"
-                message = "is no prompt of this track"
-                yield {"message": message, "at": (*at, place), "allowed": allowed}
-                continue
-            one = self.at(Variant(((factor, level),)))
-            for _, message, hint in (rule for rule in one._conflicts() if rule not in before):
-                yield {"message": message, "at": (*at, place), "hint": hint}
+            one = self.at(Variant(((factor, level),))).model_dump(exclude={"vary"})
+            try:
+                self.model_validate(one)
+            except ValidationError as error:
+                problem = problems_of(error, type(self), one, "")[0]
+                yield Fault(problem.message, problem.allowed, at=(*at, place), hint=problem.hint)
 
 
 def suite_model() -> type[Suite]:
@@ -639,15 +522,12 @@ def load_suite(
     the order of the file.
     """
     source = read_yaml(path)
-    apply_overrides(source, overrides)
+    problems = apply_overrides(source, overrides)
     if source.data is None:
-        raise SpecError([*source.problems, Problem(str(path), "is empty", allowed="a suite")])
-    suite, problems = check(suite_model(), source.data, source)
-    if suite is None or source.problems:
-        raise SpecError(joined(source, problems))
+        raise SpecError([*problems, Problem(str(path), "is empty", allowed="a suite")])
     # What varies has the values of the reference, wherever one value alone is asked for.
-    suite = suite.at(Variant())
-    return suite.with_files(_files_of(suite, path, source, data_dir, prompt_dirs)).at(Variant())
+    suite = read_section(suite_model(), source, problems).at(Variant())
+    return suite.with_files(_files_of(suite, path, source, data_dir, prompt_dirs))
 
 
 def _files_of(
@@ -656,69 +536,52 @@ def _files_of(
     """Resolve the paths of a suite; SpecError for all that lead nowhere."""
     problems: list[Problem] = []
 
-    def complain(
-        at: FieldPath, message: str, found: str, allowed: str = "", hint: str = ""
-    ) -> None:
-        problems.append(Problem(source.where(at), message, dotted(at), found, allowed, hint))
-
-    def existing(text: str, at: FieldPath, is_there: Callable[[Path], bool], kind: str) -> Path:
+    def existing(text: str, at: FieldPath, *, is_folder: bool = False) -> Path:
         base = Path.cwd() if source.is_overridden(at) else path.parent
         try:
             found = expand(text, base)
         except ValueError as error:
-            complain(at, str(error), show(text))
+            problems.append(Problem(source.where(at), str(error), dotted(at), text))
             return path
-        if not is_there(found):
-            complain(at, f"no such {kind}", str(found))
+        if not (os.path.isdir if is_folder else os.path.isfile)(found):
+            message = f"no such {'folder' if is_folder else 'file'}"
+            problems.append(Problem(source.where(at), message, dotted(at), str(found)))
         return found
 
     def data(text: str, at: FieldPath, may_be_bundled: bool) -> Path:
         if not (may_be_bundled and re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", text)):
-            return existing(text, at, os.path.isdir, "folder")
+            return existing(text, at, is_folder=True)
         folder = data_dir.absolute() / text
         if not os.path.isdir(folder):
             names = sorted(known.name for known in data_dir.glob("*/"))
+            message = "is not a bundled data set"
             allowed = f"a bundled data set ({', '.join(names)}), or the path of a folder"
             hint = did_you_mean(text, names) or f"for a folder beside the suite write ./{text}"
-            complain(at, "is not a bundled data set", show(text), allowed, hint)
+            problems.append(Problem(source.where(at), message, dotted(at), text, allowed, hint))
         return folder
-
-    def own_template(bundled: Path | None) -> Path | None:
-        names = [folder.absolute() / bundled.name for folder in prompt_dirs] if bundled else []
-        own = next((name for name in names if os.path.isfile(name)), None)
-        is_same = own is not None and filecmp.cmp(own, str(bundled), shallow=False)
-        return None if is_same else own
 
     is_builtin = suite.dataset.format == "builtin"
     dataset = data(suite.dataset.path or BUILTIN_DATASET, ("dataset", "path"), is_builtin)
-    varied = suite.vary.prompt
     folders: dict[str, Path] = {}
-    templates: dict[str, Path | None] = {}
+    templates: dict[tuple[str, str], Path] = {}
     for name in suite.tracks:
         kind = known_track(name)
         if kind.has_own_data():
             own = getattr(suite, kind.section)
             folders[name] = data(own.path, (kind.section, "path"), own.format == "builtin")
-        prompt_field = kind.prompt_field()
-        prompt = str(suite.read(prompt_field))
-        if not varied and prompt not in PROMPT_WORDS:
-            templates[name] = existing(prompt, prompt_field, os.path.isfile, "file")
-        elif prompt == "default" or "default" in varied:
-            templates[name] = own_template(kind.template_for(suite.answer_format))
-    prompts = {
-        text: existing(text, ("vary", "prompt", place), os.path.isfile, "file")
-        for place, text in enumerate(varied)
-        if text not in PROMPT_WORDS
-    }
-    there = {name: template for name, template in templates.items() if template is not None}
-    if "default" in varied and there:
-        prompts["default"] = next(iter(there.values()))
+        prompts: dict[str, FieldPath] = {
+            text: ("vary", "prompt", n) for n, text in enumerate(suite.vary.prompt)
+        }
+        own_prompt = str(functools.reduce(getattr, kind.prompt_field(), suite))
+        for text, at in (prompts or {own_prompt: kind.prompt_field()}).items():
+            bundled = kind.template_for(suite.answer_format)
+            if text not in PROMPT_WORDS:
+                templates[name, text] = existing(text, at)
+            elif text == "default" and bundled is not None:
+                near = (folder.absolute() / bundled.name for folder in prompt_dirs)
+                custom = next((file for file in near if os.path.isfile(file)), None)
+                if custom and not filecmp.cmp(custom, str(bundled), shallow=False):
+                    templates[name, text] = custom
     if problems:
         raise SpecError(source.in_order(problems))
-    return SuiteFiles(path, dataset, source, folders, there, prompts)
-
-
-def suite_tracks(path: Path) -> tuple[str, ...]:
-    """Return the tracks of a suite that is known to be sound, whatever else it needs to run."""
-    default = suite_model().model_fields["tracks"].get_default(call_default_factory=True)
-    return tuple(read_yaml(path).data.get("tracks", default))
+    return SuiteFiles(path, dataset, source, folders, templates)

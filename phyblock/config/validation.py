@@ -1,26 +1,39 @@
-"""Validation against pydantic models, with every error in plain words and at its place."""
+"""Validation against pydantic models: every error in plain words and at its place.
+
+Types say what a single value may be; relations between values are functions that yield `Fault`s.
+`problems_of` puts what pydantic found into words, for YAML as for lines of JSON.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, Self, TypeVar, get_args
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Self, TypeVar, get_args
 
 from pydantic import (
     AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
-    PlainValidator,
+    GetCoreSchemaHandler,
+    RootModel,
     ValidationError,
     model_validator,
 )
-from pydantic_core import ErrorDetails, PydanticCustomError, PydanticKnownError
+from pydantic_core import (
+    CoreSchema,
+    ErrorDetails,
+    InitErrorDetails,
+    PydanticCustomError,
+    core_schema,
+)
 
-from phyblock.config.yaml import FieldPath, YamlSource, dotted, looks_secret, show
+from phyblock.config.yaml import FieldPath, YamlSource, dotted, secrets, shown
 from phyblock.domain.blocks import BLOCK_TYPES, BlockType
 from phyblock.domain.question import SUBTASKS, Subtask
-from phyblock.errors import Problem
+from phyblock.errors import Problem, SpecError
 from phyblock.text import did_you_mean
 from phyblock.types import BACKGROUNDS, Background
 
@@ -28,96 +41,124 @@ ModelT = TypeVar("ModelT", bound=BaseModel)
 ItemT = TypeVar("ItemT", bound=Hashable)
 
 _MOST = 100
-"""Problems of one mapping that are told."""
-_SECRET_KEYS = frozenset(
-    {"api_key", "apikey", "api-key", "token", "secret", "password", "authorization",
-     "x-api-key"}
-)  # fmt: skip
-"""Keys under which only a secret would be written."""
-_KEY_HINT = "name an environment variable with api_key_env, and keep the key in it"
-_WANTED = {
-    "int_type": "a whole number",
-    "int_from_float": "a whole number",
-    "float_type": "a number",
-    "string_type": "text",
-    "bool_type": "true or false",
-    "tuple_type": "a list, such as [a, b]",
-    "dict_type": "a mapping (key: value)",
-    "model_type": "a mapping (key: value)",
-    "finite_number": "a finite number",
+"""Problems of one value that are reported."""
+_FAULT = "fault"
+_TYPE, _RANGE = "has the wrong type", "is out of range"
+_CHOICE = "is not one of the choices"
+_MESSAGES: dict[str, tuple[str, str]] = {
+    "missing": ("is missing", ""),
+    "extra_forbidden": ("is not a known key", ""),
+    "literal_error": (_CHOICE, "{expected}"),
+    "union_tag_invalid": (_CHOICE, "{expected_tags}"),
+    "union_tag_not_found": ("is missing", ""),
+    "int_type": (_TYPE, "a whole number"),
+    "int_from_float": (_TYPE, "a whole number"),
+    "float_type": (_TYPE, "a number"),
+    "sequence_str": (_TYPE, "a list, such as [a, b]"),
+    "string_type": (_TYPE, "a text"),
+    "bool_type": (_TYPE, "true or false"),
+    "tuple_type": (_TYPE, "a list, such as [a, b]"),
+    "list_type": (_TYPE, "a list, such as [a, b]"),
+    "dict_type": (_TYPE, "a mapping (key: value)"),
+    "model_type": (_TYPE, "a mapping (key: value)"),
+    "path_type": (_TYPE, "a path"),
+    "is_instance_of": (_TYPE, "a {class}"),
+    "finite_number": (_RANGE, "a finite number"),
+    "greater_than": (_RANGE, "above {gt}"),
+    "greater_than_equal": (_RANGE, "at least {ge}"),
+    "less_than": (_RANGE, "below {lt}"),
+    "less_than_equal": (_RANGE, "at most {le}"),
+    "too_short": ("has too few items", "at least {min_length}"),
+    "too_long": ("has too many items", "at most {max_length}"),
+    "string_too_short": ("is too short", "at least {min_length}"),
+    "string_too_long": ("is too long", "at most {max_length}"),
+    "string_pattern_mismatch": ("has the wrong form", "{pattern}"),
 }
-_BOUNDS = {
-    "greater_than": ("gt", "above"),
-    "greater_than_equal": ("ge", "at least"),
-    "less_than": ("lt", "below"),
-    "less_than_equal": ("le", "at most"),
-}
-_PATTERNS = {
-    "name": "1 to 64 small letters, digits and hyphens",
-    "groups": "1 to 40 small letters, digits and hyphens",
-    "models": "up to 80 letters, digits and . _ : + -, starting with a letter or digit",
-    "api_key_env": "the name of an environment variable, such as MY_KEY",
-}
+"""What is wrong and what is allowed, by pydantic's types of errors."""
+_FORMS: dict[str, str] = {}
+"""Regular expressions of texts in words."""
+
+
+class Fault(NamedTuple):
+    """One thing that is wrong; `at` is its place inside the value that was checked.
+
+    `found` is shown as it is; None shows the value at the place. `key` says that the key is meant.
+    """
+
+    message: str
+    allowed: str = ""
+    found: str | None = None
+    at: FieldPath = ()
+    hint: str = ""
+    key: bool = False
+
+
+def fault(*faults: Fault) -> ValidationError:
+    """Return what a validator raises to report these faults."""
+    lines = [
+        InitErrorDetails(
+            type=PydanticCustomError(_FAULT, "{message}", one._asdict()), loc=one.at, input=None
+        )
+        for one in faults
+    ]
+    return ValidationError.from_exception_data(_FAULT, lines)
+
+
+def form(pattern: str, words: str) -> Any:
+    """Return the bound of a text to a regular expression, which errors put into words."""
+    _FORMS[pattern] = words
+    return Field(pattern=pattern)
+
+
+def checked(find: Callable[[Any], Iterable[Fault]]) -> AfterValidator:
+    """Return a check that `find` finds nothing in a value, whose parts are valid."""
+
+    def check(value: Any) -> Any:
+        if faults := tuple(find(value)):
+            raise fault(*faults)
+        return value
+
+    return AfterValidator(check)
 
 
 class Section(BaseModel):
     """Base of all that is written in YAML: no unknown keys, no changes after reading."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False
+    )
+
+    def faults(self) -> Iterator[Fault]:
+        """Yield what is wrong between fields, each of which is valid."""
+        yield from ()
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if faults := tuple(self.faults()):
+            raise fault(*faults)
+        return self
 
 
-def refuse(message: str, **context: Any) -> PydanticCustomError:
-    """Make a validation error in plain words.
+@dataclass(frozen=True)
+class OneOf:
+    """The check of a value that is in a list when it is read: plugins add words to it."""
 
-    `context` may hold `allowed`, `hint` and `words` (close ones are proposed), `at`, the path below
-    the validated value where the fault stands, `key`, that its key is meant, `reads`, other fields
-    that it may stand at, and `hides`: that the value must not be shown.
-    """
-    return PydanticCustomError("refused", "{message}", {"message": message, **context})
+    choices: Callable[[], Iterable[Any]]
 
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.no_info_after_validator_function(self._check, handler(source))
 
-def check_unique(items: tuple[ItemT, ...]) -> tuple[ItemT, ...]:
-    """Return the items as they are; a refusal when one stands twice."""
-    seen: set[ItemT] = set()
-    for index, item in enumerate(items):
-        if item in seen:
-            raise refuse("stands twice in this list", at=(index,), hint="keep one of them")
-        seen.add(item)
-    return items
+    def __get_pydantic_json_schema__(self, *_: object) -> dict[str, Any]:
+        return {"enum": [*self.choices()]}
 
-
-Unique = Annotated[
-    tuple[ItemT, ...], AfterValidator(check_unique), Field(json_schema_extra={"uniqueItems": True})
-]
-"""A list whose items all differ."""
-UniqueSome = Annotated[
-    tuple[ItemT, ...],
-    Field(min_length=1, json_schema_extra={"uniqueItems": True}),
-    AfterValidator(check_unique),
-]
-"""A list with at least one item, whose items all differ."""
-Count = Annotated[int, Field(strict=True, ge=1, le=10**9)]
-Flag = Annotated[bool, Field(strict=True)]
-Temperature = Annotated[float, Field(strict=True, ge=0, le=2, allow_inf_nan=False)]
-TopP = Annotated[float, Field(strict=True, gt=0, le=1, allow_inf_nan=False)]
-TimeoutS = Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)]
-ModelName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._:+-]{0,79}$")]
-"""Names of models become names of folders and rows of tables, hence the narrow alphabet."""
-
-
-def one_of(words: Sequence[str], built_in: Any) -> PlainValidator:
-    """Return the check of a word that is in a list when it is read: plugins add words to it.
-
-    JSON Schemas name the built-in ones.
-    """
-
-    def checked(word: object) -> object:
-        if word in words:
-            return word
-        expected = " or ".join(f"'{each}'" for each in words)
-        raise PydanticKnownError("literal_error", {"expected": expected})
-
-    return PlainValidator(checked, json_schema_input_type=built_in)
+    def _check(self, value: object) -> object:
+        known = tuple(self.choices())
+        if value in known:
+            return value
+        words = [one if isinstance(one, str) else shown(one) for one in known]
+        raise fault(Fault(_CHOICE, ", ".join(words), hint=did_you_mean(str(value), words)))
 
 
 if TYPE_CHECKING:
@@ -125,29 +166,37 @@ if TYPE_CHECKING:
     BackgroundName = Background
     SubtaskName = Subtask
 else:
-    ShapeName = Annotated[str, one_of(BLOCK_TYPES, BlockType)]
-    BackgroundName = Annotated[str, one_of(BACKGROUNDS, Background)]
-    SubtaskName = Annotated[str, one_of(SUBTASKS, Subtask)]
+    ShapeName = Annotated[str, OneOf(lambda: BLOCK_TYPES)]
+    BackgroundName = Annotated[str, OneOf(lambda: BACKGROUNDS)]
+    SubtaskName = Annotated[str, OneOf(lambda: SUBTASKS)]
 
 
-def prompt_check(*words: str) -> Callable[[str], str]:
-    """Return the check of a prompt: one of these words, or the path of a template."""
-    allowed = f"{', '.join(words)}, or the path of a .j2 file"
-
-    def checked(prompt: str) -> str:
-        if prompt in words or prompt.endswith(".j2"):
-            return prompt
-        message = "is neither a known prompt nor a template"
-        raise refuse(message, allowed=allowed, words=words)
-
-    return checked
+def _repeated(items: tuple[Hashable, ...]) -> Iterator[Fault]:
+    seen: set[Hashable] = set()
+    for index, item in enumerate(items):
+        if item in seen:
+            yield Fault("stands twice in this list", at=(index,), hint="keep one of them")
+        seen.add(item)
 
 
-TemplateName = Annotated[
-    str,
-    AfterValidator(prompt_check("default")),
-    Field(json_schema_extra={"pattern": r"^(default|.*\.j2)$"}),
-]
+_DISTINCT = Field(json_schema_extra={"uniqueItems": True})
+Unique = Annotated[tuple[ItemT, ...], checked(_repeated), _DISTINCT]
+"""A list whose items all differ."""
+UniqueSome = Annotated[tuple[ItemT, ...], Field(min_length=1), checked(_repeated), _DISTINCT]
+"""A list with at least one item, whose items all differ."""
+Count = Annotated[int, Field(strict=True, ge=1, le=10**9)]
+Flag = Annotated[bool, Field(strict=True)]
+Temperature = Annotated[float, Field(strict=True, ge=0, le=2)]
+TopP = Annotated[float, Field(strict=True, gt=0, le=1)]
+TimeoutS = Annotated[float, Field(strict=True, gt=0, le=1e9)]
+Cost = Annotated[float, Field(strict=True, ge=0, le=1e9)]
+Text = Annotated[str, Field(min_length=1)]
+HYPHENATED = "small letters, digits and hyphens"
+_NAMED = "up to 80 letters, digits and . _ : + -, a letter or digit first"
+ModelName = Annotated[str, form(r"^[A-Za-z0-9][A-Za-z0-9._:+-]{0,79}$", _NAMED)]
+"""Names of models become names of folders and rows of tables, hence the narrow alphabet."""
+Template = Annotated[str, form(r"\.j2$", "the path of a .j2 file")]
+TemplateName = Literal["default"] | Template
 
 
 class PictureControls(Section):
@@ -163,201 +212,148 @@ class PictureControls(Section):
         description="Show another scene, which the seed draws; candidates stay the right ones.",
     )
 
-    @model_validator(mode="after")
-    def _check_controls(self) -> Self:
+    def faults(self) -> Iterator[Fault]:
+        """Yield that both are set."""
         if self.blind and self.wrong_image:
             message = "shows another scene, where blind shows none"
-            raise refuse(message, at=("wrong_image",), hint="set one of them")
-        return self
+            yield Fault(message, at=("wrong_image",), hint="set one of them")
 
 
-def check(
-    model: type[ModelT], data: object, source: YamlSource, base: FieldPath = ()
-) -> tuple[ModelT | None, list[Problem]]:
-    """Validate `data`, which stands at `base` in the source; return the instance, or all problems.
+def read_section(model: type[ModelT], source: YamlSource, more: Sequence[Problem] = ()) -> ModelT:
+    """Return a document that people write, as its model.
 
-    A value that looks like a key is a problem too, and is not shown, so that none reaches a run
-    folder.
+    Raises SpecError with everything that is wrong, `more` included, in the order of the file. A
+    text that looks like a key is wrong and is not shown, so that none reaches a run folder.
     """
-    secrets = list(_secrets(data, source, base))
+    problems = [*more, *secrets(source)]
+    instance = None
     try:
-        instance = model.model_validate(data)
-        details: list[ErrorDetails] = []
+        instance = model.model_validate(source.data)
     except ValidationError as error:
-        instance, details = None, error.errors(include_url=False)
-    hidden = {problem.field for problem in secrets}
-    faults = []
-    for detail in details:
-        path, found = _locate(detail, data)
-        least = detail.get("ctx", {}).get("min_length", 0)
-        is_echo = detail["type"] == "too_short" and isinstance(found, list) and len(found) >= least
-        # A list is called too short for items that are faulty and have errors of their own.
-        if not is_echo and dotted((*base, *path)) not in hidden:
-            faults.append((detail, path, found))
-    problems = [
-        _problem(model, detail, path, found, source, base) for detail, path, found in faults[:_MOST]
-    ]
-    if len(faults) > _MOST:
-        message = f"and {len(faults) - _MOST:,} more problems"
-        problems.append(Problem(problems[-1].where, message))
-    return (None if secrets else instance), [*secrets, *problems]
+        hidden = {problem.field for problem in problems}
+        problems += [
+            one for one in problems_of(error, model, source.data, source) if one.field not in hidden
+        ]
+    if instance is None or problems:
+        raise SpecError(source.in_order(problems))
+    return instance
 
 
-def joined(source: YamlSource, problems: list[Problem]) -> list[Problem]:
-    """Return problems of the YAML and others in order, but others of what YAML could not read."""
-    places = {problem.where for problem in source.problems if not problem.where.startswith("--")}
-    rest = [problem for problem in problems if problem.where not in places]
-    return source.in_order([*source.problems, *rest])
+def problems_of(
+    error: ValidationError,
+    model: type[BaseModel],
+    data: object,
+    source: YamlSource | str,
+    base: FieldPath = (),
+) -> list[Problem]:
+    """Return what pydantic found wrong with `data`, in words.
+
+    The data stands at `base` of a YAML source, or all at one place. What the members of a union
+    have against the same value is one problem, and none where a part of the value is at fault.
+    """
+    problems: dict[tuple[FieldPath, str], Problem] = {}
+    above: set[FieldPath] = set()
+    for detail in islice(error.errors(include_url=False), _MOST):
+        path, value = _located(detail, data)
+        is_ours = detail["type"] == _FAULT
+        one = Fault(**detail["ctx"]) if is_ours else _fault(detail, path, value, model)
+        key = (path, one.message if is_ours else "")
+        if first := problems.get(key):
+            both = dict.fromkeys(filter(None, (first.allowed, one.allowed)))
+            problems[key] = replace(first, allowed=" or ".join(both), hint=first.hint or one.hint)
+            continue
+        at = (*base, *(path[:-1] if one.message == "is missing" else path))
+        where = source if isinstance(source, str) else source.where(at, key=one.key)
+        found = shown(value) if one.found is None else one.found
+        problems[key] = Problem(where, one.message, dotted(path), found, one.allowed, one.hint)
+        above.update(path[:end] for end in range(len(path)))
+    return [one for (path, kind), one in problems.items() if kind or path not in above]
 
 
-def _secrets(data: object, source: YamlSource, path: FieldPath) -> Iterator[Problem]:
-    if isinstance(data, dict):
-        for key, value in data.items():
-            yield from _secrets(value, source, (*path, key))
-            is_named = isinstance(value, str) and path and key.lower() in _SECRET_KEYS
-            if is_named and not looks_secret(value):
-                yield _secret(source, (*path, key))
-    elif isinstance(data, list):
-        for index, value in enumerate(data):
-            yield from _secrets(value, source, (*path, index))
-    elif isinstance(data, str) and looks_secret(data):
-        yield _secret(source, path)
-
-
-def _secret(source: YamlSource, path: FieldPath) -> Problem:
-    message = "looks like a key, which must not stand in a file"
-    return Problem(source.where(path), message, dotted(path), hint=_KEY_HINT)
-
-
-def _locate(detail: ErrorDetails, data: object) -> tuple[FieldPath, Any]:
+def _located(detail: ErrorDetails, data: object) -> tuple[FieldPath, Any]:
     """Return the path of an error in the data, without pydantic's names of union members."""
     path: list[str | int] = []
-    here: Any = data
-    for part in detail["loc"]:
-        absent = detail["type"] == "missing" and part == detail["loc"][-1]
-        if isinstance(here, Mapping) and (part in here or absent):
-            here = here.get(part)
-        elif isinstance(here, list) and isinstance(part, int):
-            here = here[part]
+    kind, tag = detail["type"], detail.get("ctx", {}).get("discriminator", "")
+    loc = (*detail["loc"], tag.strip("'")) if kind.startswith("union_tag") else detail["loc"]
+    for n, part in enumerate(loc, 1):
+        may_lack = kind == _FAULT or (kind in ("missing", "union_tag_not_found") and n == len(loc))
+        is_field = isinstance(part, str) and part != "[key]" and may_lack
+        if isinstance(data, Mapping) and (part in data or is_field):
+            data = data.get(part)
+        elif isinstance(data, list) and isinstance(part, int) and part < len(data):
+            data = data[part]
         else:
             continue
         path.append(part)
-    for part in detail.get("ctx", {}).get("at", ()):
-        if isinstance(here, Mapping):
-            here = here.get(part)
-        else:
-            here = here[part] if isinstance(here, list) else None
-        path.append(part)
-    return tuple(path), here
+    return tuple(path), data
 
 
-def _problem(
-    root: type[BaseModel],
-    detail: ErrorDetails,
-    path: FieldPath,
-    found: Any,
-    source: YamlSource,
-    base: FieldPath,
-) -> Problem:
-    """Word one error of pydantic's."""
+def _fault(detail: ErrorDetails, path: FieldPath, value: Any, model: type[BaseModel]) -> Fault:
+    """Return an error of pydantic's in our words."""
     kind, context = detail["type"], detail.get("ctx", {})
-    whole = (*base, *path)
-    name = next((str(part) for part in reversed(path) if isinstance(part, str)), "")
-    message, allowed, hint = detail["msg"].lower(), "", ""
+    message, allowed = _MESSAGES.get(kind, (detail["msg"].lower(), ""))
+    name = str(path[-1]) if path else ""
+    if kind == "missing" and isinstance(detail["loc"][-1], int):
+        return Fault("has too few items")
     if kind == "missing":
-        where = source.where(whole[:-1], key=True)
-        return Problem(where, "is missing", dotted(whole), hint=f"add {name}: ...")
+        return Fault(message, found="", hint=f"add {name}: ...", key=True)
     if kind == "extra_forbidden":
-        return _unknown_key(root, path, source, whole)
-    if kind == "refused":
-        message, allowed = context["message"], context.get("allowed", "")
-        hint = context.get("hint") or did_you_mean(str(found), context.get("words", ()))
-        written = next((at for at in context.get("reads", ()) if at in source.values), whole)
-        where = source.where(written, key=bool(context.get("key")))
-        seen = "" if context.get("hides") or found is None else show(found)
-        return Problem(where, message, dotted(whole), seen, allowed, hint)
+        section = _section(model, path[:-1])
+        known = _fields(section)
+        homes = [
+            f"it belongs at {at}.{name}"
+            for at, below in _parts(section)
+            for one in below
+            if name in _fields(one)
+        ]
+        hint = next(iter(homes), "") or did_you_mean(name, known)
+        return Fault(message, ", ".join(known), "", hint=hint, key=True)
+    hint = ""
     if kind == "literal_error":
-        choices = re.findall(r"[^\s',]+", context["expected"].replace(" or ", " "))
-        message, allowed = "is not one of the choices", ", ".join(choices)
-        hint = did_you_mean(found, choices) if isinstance(found, str) else ""
-        if path == ("models",):
-            message, allowed = "is one name where a list belongs", "a list of models, or recorded"
-            hint = hint or f"write a list: [{found}]"
-        if isinstance(found, list) and len(found) == 1:
-            hint = f"take the brackets off: {found[0]}"
-    elif kind in _WANTED:
-        message, allowed = "has the wrong type", _WANTED[kind]
-        hint = _type_hint(kind, name, found, root, path)
-    elif kind in _BOUNDS:
-        bound, word = _BOUNDS[kind]
-        message, allowed = "is out of range", f"{word} {context[bound]}"
-    elif kind in ("too_short", "string_too_short"):
-        least = context.get("min_length", 1)
-        message = "is empty" if least == 1 else "is too short"
-        allowed = "at least one" if least == 1 else f"{least} items"
-    elif kind == "too_long":
-        message, allowed = "has too many items", f"{context['max_length']} items at most"
+        words = re.findall(r"[^\s',]+", context["expected"].replace(" or ", " "))
+        allowed = ", ".join(words)
+        hint = did_you_mean(value, words) if isinstance(value, str) else ""
     elif kind == "string_pattern_mismatch":
-        message, allowed = "has characters that are not allowed", _PATTERNS.get(name, "")
-    return Problem(source.where(whole), message, dotted(whole), show(found), allowed, hint)
+        allowed = _FORMS.get(context["pattern"], context["pattern"])
+    elif kind in ("int_type", "float_type") and shown(value).strip('"').isdecimal():
+        hint = "take the quotes off"
+    elif kind == "string_type" and isinstance(value, int | float):
+        hint = f'put it in quotes: "{value}"'
+    elif kind == "tuple_type" and isinstance(value, str) and re.search("[A-Za-z]", value):
+        hint = f"write a list: [{value}]"
+    elif (
+        kind == "model_type" and isinstance(value, str) and "path" in _fields(_section(model, path))
+    ):
+        hint = f"write {name}: {{path: {value}}}"
+    else:
+        allowed = allowed.format_map(context)
+    if "[key]" in detail["loc"]:
+        return Fault(message, allowed, shown(name), key=True)
+    return Fault(message, allowed, hint=hint)
 
 
-def _type_hint(kind: str, name: str, value: object, root: type[BaseModel], path: FieldPath) -> str:
-    """Return how a value of the wrong type was probably meant."""
-    if not isinstance(value, str | int | float):
-        return ""
-    text = str(value)
-    if kind in ("int_type", "float_type") and re.fullmatch(r"[-+\d.eE]+", text):
-        return "take the quotes off" if isinstance(value, str) else ""
-    if kind == "string_type":
-        return f'put it in quotes: "{text}"'
-    if kind == "model_type" and "path" in _section(root, path).model_fields:
-        return f"write {name}: {{path: {text}}}"
-    if kind != "tuple_type":
-        return ""
-    if span := re.fullmatch(r"(\d{1,3})\s*(?:-|\.\.|:|to)\s*(\d{1,3})", text):
-        several = list(range(int(span[1]), int(span[2]) + 1))
-        return f"write a list: {several}" if several else ""
-    if name == "seeds" and isinstance(value, int) and 0 < value <= 20:
-        return f"write a list: {list(range(value))}"
-    return f"write a list: [{text}]"
-
-
-def _unknown_key(
-    root: type[BaseModel], path: FieldPath, source: YamlSource, whole: FieldPath
-) -> Problem:
-    name = str(path[-1])
-    known = _fields(_section(root, path[:-1]))
-    hint = did_you_mean(name, known)
-    homes = [home for home, section in _sections(root).items() if name in _fields(section)]
-    if name.lower() in _SECRET_KEYS and "api_key_env" in known:
-        hint = _KEY_HINT
-    elif homes:
-        hint = f"it belongs at {'.'.join((*homes[0], name))}"
-    where = source.where(whole, key=True)
-    return Problem(where, "is not a known key", dotted(whole), "", ", ".join(known), hint)
-
-
-def _sections(
-    root: type[BaseModel], above: tuple[str, ...] = ()
-) -> dict[tuple[str, ...], type[BaseModel]]:
-    """Return the models that describe a document, by the path of the fields that hold them."""
-    sections = {above: root}
-    for name, field in root.model_fields.items():
-        parts: list[Any] = [field.annotation]
-        for part in parts:
-            parts.extend(get_args(part))
-            if isinstance(part, type) and issubclass(part, BaseModel):
-                sections |= _sections(part, (*above, field.alias or name))
-                break
-    return sections
-
-
-def _section(root: type[BaseModel], path: FieldPath) -> type[BaseModel]:
+def _section(model: type[BaseModel], path: FieldPath) -> type[BaseModel]:
     """Return the model that describes what stands at `path`, or the nearest around it."""
-    sections = _sections(root)
-    names = tuple(part for part in path if isinstance(part, str))
-    return next(sections[names[:n]] for n in range(len(names), -1, -1) if names[:n] in sections)
+    if issubclass(model, RootModel):
+        ((_, (model,)),), path = _parts(model), path[1:]
+    for part in path:
+        model = next((below[0] for name, below in _parts(model) if name == part and below), model)
+    return model
+
+
+def _parts(model: type[BaseModel]) -> list[tuple[str, list[type[BaseModel]]]]:
+    """Return the fields of a model, each with the models that its type is made of."""
+    return [
+        (field.alias or name, models_in(field.annotation))
+        for name, field in model.model_fields.items()
+    ]
+
+
+def models_in(hint: Any) -> list[type[BaseModel]]:
+    """Return the models that a type is made of."""
+    if isinstance(hint, type) and issubclass(hint, BaseModel):
+        return [hint]
+    return [part for argument in get_args(hint) for part in models_in(argument)]
 
 
 def _fields(section: type[BaseModel]) -> list[str]:

@@ -11,23 +11,23 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
+from phyblock.config.validation import Fault
+from phyblock.config.yaml import dotted
 from phyblock.domain import CandidateSet, Question, Scene
 from phyblock.errors import DataError, Problem, reason_of
-from phyblock.files import LARGEST_PICTURE_BYTES, RepeatedFieldError, load_json, read_bytes
+from phyblock.files import LARGEST_PICTURE_BYTES, read_bytes
 from phyblock.stable import hex_digest
 
 VERSION_FILE = "VERSION"
 UNNUMBERED = 1
 """Version of a set without such a file: ours had none in their first version."""
-_MOST_DIGITS = 6
 _LARGEST_BYTES = 1024**3
-_LONGEST_LINE = 2**20
 _MOST_OF_ALL = 1000
 """Faults of a data set that are reported."""
-_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 _T = TypeVar("_T")
 
 
@@ -114,64 +114,28 @@ def read_version(folder: Path) -> int:
     path = folder / VERSION_FILE
     if not path.exists():
         return UNNUMBERED
-    text = read_text(path).strip()
-    if not (text.isascii() and text.isdigit() and len(text) <= _MOST_DIGITS and int(text)):
+    found = read_data(path).strip()
+    if not re.fullmatch(rb"[1-9][0-9]{0,5}", found):
         allowed = "a whole number from 1"
-        raise DataError(Problem(str(path), "holds no version", "", repr(text[:20]), allowed))
-    return int(text)
+        raise DataError(Problem(str(path), "holds no version", "", repr(found[:20]), allowed))
+    return int(found)
 
 
-def read_text(path: Path, allowed: str = "") -> str:
-    """Return the text of a file; DataError when it cannot be read, is too large or not UTF-8."""
+def read_data(path: Path, allowed: str = "") -> bytes:
+    """Return the bytes of a file; DataError when it cannot be read or is too large."""
     try:
-        return read_bytes(path, _LARGEST_BYTES).decode("utf-8")
-    except OSError as error:
+        return read_bytes(path, _LARGEST_BYTES)
+    except (OSError, ValueError) as error:
         message = f"cannot be read: {reason_of(error)}"
-    except UnicodeDecodeError as error:
-        message = f"is not UTF-8 text: {error.reason}"
-    except ValueError as error:
-        message = str(error)
-    raise DataError(Problem(str(path), message, allowed=allowed))
+        raise DataError(Problem(str(path), message, allowed=allowed)) from error
 
 
-def read_json(path: Path) -> Any:
-    """Return the JSON value in a file; DataError, with line and column, when there is none."""
-    return parse_json(read_text(path), path)
-
-
-def parse_json(text: str, path: Path, line: int | None = None) -> Any:
-    """Return the JSON value in `text`: all of the file, or its line number `line`.
-
-    Raises DataError for bad syntax, an object that holds a field twice, a number of hundreds of
-    digits, nesting that is too deep, half of a character, or a line of more than a million
-    characters. Numbers that are not finite pass: the field they stand in is checked.
-    """
-    where = str(path) if line is None else f"{path}:{line}"
-    field = found = allowed = ""
-    try:
-        if line is not None and len(text) > _LONGEST_LINE:
-            found, allowed = f"{len(text):,} characters", f"{_LONGEST_LINE:,} at most"
-            raise ValueError("is too long a line")
-        value = load_json(text, finite=False, unique=True)
-        if _SURROGATE.search(text):
-            json.dumps(value, ensure_ascii=False).encode()
-        return value
-    except json.JSONDecodeError as error:
-        where += f":{error.colno}" if line is not None else f":{error.lineno}:{error.colno}"
-        message = f"is not valid JSON: {error.msg}"
-    except RepeatedFieldError as error:
-        message, field = "stands twice in one object", error.field
-    except UnicodeEncodeError:
-        message = "holds half of a character (a lone surrogate)"
-    except ValueError as error:
-        message = str(error)
-    raise DataError(Problem(where, message, field, found, allowed))
-
-
-def lines_of(text: str) -> list[str]:
-    """Return the lines of a text of JSON lines."""
-    # Not splitlines(): a JSON string may hold U+2028 and other line ends of Unicode.
-    return text.removesuffix("\n").split("\n") if text else []
+def report(faults: Iterable[Fault], where: str) -> None:
+    """Raise DataError with these faults of what stands at a place, if there are any."""
+    if problems := [
+        Problem(where, f.message, dotted(f.at), f.found or "", f.allowed) for f in faults
+    ]:
+        raise DataError(problems[:100])
 
 
 def read_each(
@@ -203,18 +167,16 @@ def read_each(
 
 
 def read_lines(
-    path: Path, text: str, noun: str, read: Callable[[Any, str], _T], name: Callable[[_T], str]
+    path: Path, noun: str, read: Callable[[bytes, str], _T], name: Callable[[_T], str]
 ) -> list[_T]:
-    """Return what `read` makes of the JSON value of every line of a file's `text` and its place.
+    """Return what `read` makes of every line of a file and its place.
 
     Raises DataError with everything that is wrong: what `read` raises, a name that stands twice, a
     file of no `noun`.
     """
-    if not text:
+    allowed = f"a folder with {path.name}, or the name of a bundled set"
+    data = read_data(path, allowed).removesuffix(b"\n")
+    if b"\0" in data or not data:
         raise DataError(Problem(str(path), f"holds no {noun}s", allowed=f"one {noun} a line"))
-
-    def entry(number: int, line: str) -> tuple[str, Callable[[], _T]]:
-        where = f"{path}:{number}"
-        return where, lambda: read(parse_json(line, path, number), where)
-
-    return read_each((entry(number, line) for number, line in enumerate(lines_of(text), 1)), name)
+    places = ((f"{path}:{n}", line) for n, line in enumerate(data.split(b"\n"), 1))
+    return read_each(((where, partial(read, line, where)) for where, line in places), name)

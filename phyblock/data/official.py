@@ -17,28 +17,32 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, TypeAdapter
 
+from phyblock.config.validation import Fault, checked, form
+from phyblock.config.yaml import shown
 from phyblock.data.base import (
     AssemblyTask,
     Dataset,
     QuestionSet,
     QuestionTask,
+    read_data,
     read_each,
-    read_json,
+    report,
 )
 from phyblock.data.questions import Options, scene_of
 from phyblock.data.scenes import (
+    NAME,
     NAME_ALLOWED,
     Name,
+    Order,
     Position,
     SceneBlocks,
     StoredCandidate,
     Text,
     candidate_set,
-    is_name,
     look_faults,
     task_of,
     triple,
@@ -56,7 +60,8 @@ from phyblock.domain import (
     is_picture_option,
 )
 from phyblock.errors import DataError, Problem
-from phyblock.records.line import Fault, Line, checked, refuse, shown, validated, worded
+from phyblock.files import load_json
+from phyblock.records.line import Line, decode
 
 _GOALS = Path("data", "SCENEs_400_Goal_Jsons")
 _CANDIDATES = Path("data", "SCENEs_400_Cand_Jsons")
@@ -71,20 +76,11 @@ _GOAL_VIEW = (45.0, 22.0)
 class _Goal(Line, extra="ignore"):
     """A goal file; other fields are not read."""
 
-    level: Annotated[
-        int,
-        Field(strict=True, ge=1, le=4),
-        worded("is not an allowed number", "an integer 1 to 4"),
-    ]
+    level: Annotated[int, Field(strict=True, ge=1, le=4)]
     # Declared layers differ from the longest path in 70 of the 400 released scenes.
     blocks: SceneBlocks
     lookat_pos: Position | None = None
-    combined: (
-        Annotated[
-            str, Field(pattern=_PARENTS), worded("is not allowed", "base scenes joined by '_'")
-        ]
-        | None
-    ) = None
+    combined: Annotated[str, form(_PARENTS, "base scenes joined by '_'")] | None = None
 
     def scene(self, name: str) -> Scene:
         """Return the goal structure; a base scene is its own parent."""
@@ -96,23 +92,23 @@ class _Goal(Line, extra="ignore"):
 
 
 class _Numbered(StoredCandidate):
-    position: Any = None
+    position: Order
+    """Its number, from 1, which the picture shows."""
 
 
 def _number_faults(candidates: Sequence[_Numbered]) -> Iterator[Fault]:
-    for i, candidate in enumerate(candidates):
-        if candidate.position != i + 1:
-            allowed = f"{i + 1}: candidates are numbered from 1 in file order"
-            yield Fault("is wrong", allowed, shown(candidate.position), (i, "position"))
+    for i, candidate in enumerate(candidates, 1):
+        if candidate.position != i:
+            allowed = f"{i}: candidates are numbered from 1 in file order"
+            yield Fault("is wrong", allowed, str(candidate.position), (i - 1, "position"))
 
 
-class _CandidateFile(Line):
-    # `position` is the number, from 1, that the picture shows.
-    candidates: Annotated[
-        tuple[_Numbered, ...],
-        Field(min_length=1, max_length=MAX_CANDIDATES),
-        checked(_number_faults, look_faults),
-    ]
+_CandidateFile = Annotated[
+    tuple[_Numbered, ...],
+    Field(min_length=1, max_length=MAX_CANDIDATES),
+    checked(_number_faults),
+    checked(look_faults),
+]
 
 
 def read_official(root: Path) -> Dataset:
@@ -122,14 +118,16 @@ def read_official(root: Path) -> Dataset:
         allowed = f"a checkout of the official PhyBlock repository, with {_GOALS.as_posix()}/*.json"
         raise DataError(Problem(str(root), "holds no official scenes", allowed=allowed))
 
+    adapter = TypeAdapter(_Goal)
+
     def read(goal: Path) -> AssemblyTask:
-        name = goal.stem
-        if not is_name(name):
+        name, picture = goal.stem, root / _PICTURES / f"{goal.stem}.png"
+        if not re.fullmatch(NAME, name):
             raise DataError(Problem(str(goal), "is not a name", "the file", name, NAME_ALLOWED))
-        path, picture = root / _CANDIDATES / f"{name}_16_cand_blocks.json", root / _PICTURES
-        scene = validated(_Goal, read_json(goal), str(goal)).scene(name)
-        own = picture / f"{name}.png"
-        return task_of(scene, read_candidates(path), str(path), own if own.is_file() else None)
+        scene = decode(adapter, read_data(goal), str(goal), _Goal).scene(name)
+        path = root / _CANDIDATES / f"{name}_16_cand_blocks.json"
+        own = picture if picture.is_file() else None
+        return task_of(scene, read_candidates(path), str(path), own)
 
     tasks = read_each(((str(goal), partial(read, goal)) for goal in goals), lambda task: task.key)
     return Dataset("official", root, tuple(tasks))
@@ -137,8 +135,7 @@ def read_official(root: Path) -> Dataset:
 
 def read_candidates(path: Path) -> CandidateSet:
     """Return the candidate set in a file; DataError with everything that is wrong in it."""
-    file = validated(_CandidateFile, {"candidates": read_json(path)}, str(path))
-    return candidate_set(file.candidates)
+    return candidate_set(decode(TypeAdapter(_CandidateFile), read_data(path), str(path)))
 
 
 def recorded_models(root: Path) -> dict[str, Path]:
@@ -161,7 +158,11 @@ def official_prompt(root: Path) -> str:
     """
     models_by_text: dict[str, list[str]] = {}
     for name, folder in recorded_models(root).items():
-        raw = read_json(min(folder.glob("*.json")))
+        path = min(folder.glob("*.json"))
+        try:
+            raw = load_json(read_data(path))
+        except ValueError as error:
+            raise DataError(Problem(str(path), f"is not JSON: {error}")) from error
         instruction = raw.get("instruction") if isinstance(raw, dict) else None
         if isinstance(instruction, str):
             models_by_text.setdefault(_PICTURE_MARKS.sub("", instruction), []).append(name)
@@ -179,11 +180,11 @@ def official_prompt(root: Path) -> str:
 
 
 class _Question(Line, extra="ignore"):
-    id: Name
+    id: Name | None = None
     scene_id: str
     question: Text
     options: Options
-    answer: Any
+    answer: str | tuple[str, ...]
 
 
 def read_official_questions(folder: Path, scenes: Dataset) -> QuestionSet:
@@ -193,86 +194,63 @@ def read_official_questions(folder: Path, scenes: Dataset) -> QuestionSet:
         allowed = "question files such as SH.json, one a subtask"
         raise DataError(Problem(str(folder), "holds no question files", allowed=allowed))
     known = {task.scene.id: task.scene for task in scenes.tasks}
-    entries = [entry for path in files for entry in _entries(path, known)]
+    adapter: TypeAdapter[tuple[_Question, ...]] = TypeAdapter(tuple[_Question, ...])
+    names = {name: s for s in SUBTASKS for name in (s.lower(), SUBTASK_NAMES[s].replace(" ", ""))}
+    entries = []
+    for path in files:
+        subtask = names.get(re.sub(r"[^a-z]+", "", path.stem.lower()))
+        if subtask is None:
+            allowed = ", ".join(SUBTASKS)
+            raise DataError(Problem(str(path), "names no subtask", "the file", path.stem, allowed))
+        lines = decode(adapter, read_data(path), str(path))
+        for n, line in enumerate(lines):
+            read = partial(_question_task, line, n, f"{path}[{n}]", subtask, folder, known)
+            entries.append((f"{path}[{n}]", read))
     return QuestionSet(folder.name, folder, tuple(read_each(entries, lambda task: task.key)))
 
 
-def _entries(path: Path, scenes: Mapping[str, Scene]) -> Iterator[tuple[str, Any]]:
-    """Yield the place of each question of a file, and the function that reads it."""
-    name = re.sub(r"[^a-z]+", "", path.stem.lower())
-    subtask = next((s for s in SUBTASKS if name in (s.lower(), SUBTASK_NAMES[s].replace(" ", ""))),
-                   None)  # fmt: skip
-    if subtask is None:
-        allowed = ", ".join(SUBTASKS)
-        raise DataError(Problem(str(path), "names no subtask", "the file", path.stem, allowed))
-    raws = read_json(path)
-    if not isinstance(raws, list):
-        raise DataError(Problem(str(path), "is not an array", allowed="an array of questions"))
-    answers = [raw.get("answer") for raw in raws if isinstance(raw, dict)]
-    flat = [part for one in answers for part in (one if isinstance(one, list) else [one])]
-    indices = {part for part in flat if type(part) is int}
-    # Indices count from 0 where some answer is 0, from 1 where some answer is 4.
-    base = 0 if 0 in indices else 1 if len(LETTERS) in indices else None
-    for number, raw in enumerate(raws):
-        where = f"{path}[{number}]"
-        if isinstance(raw, dict):
-            raw = {"id": f"{subtask.lower()}-{number + 1:03d}", **raw}
-        yield where, partial(_read_question, raw, where, subtask, path.parent, scenes, base)
-
-
-def _read_question(
-    raw: Any,
+def _question_task(
+    line: _Question,
+    n: int,
     where: str,
     subtask: Subtask,
     folder: Path,
     scenes: Mapping[str, Scene],
-    base: int | None,
 ) -> QuestionTask:
-    line = validated(_Question, raw, where)
+    name = line.id or f"{subtask.lower()}-{n + 1:03d}"
     scene = scene_of(line.scene_id, scenes, where)
     wanted = {"scene": f"images/{scene.id}"}
     for letter, option in zip(LETTERS, line.options, strict=True):
         if is_picture_option(option):
-            wanted[letter] = f"images/{line.id}/{option.strip('<>')}"
+            wanted[letter] = f"images/{name}/{option.strip('<>')}"
     files: dict[str, Path] = {}
-    for label, name in wanted.items():
-        paths = [folder / f"{name}{ending}" for ending in (".png", ".jpg", ".jpeg")]
+    for label, picture in wanted.items():
+        paths = [folder / f"{picture}{ending}" for ending in (".png", ".jpg", ".jpeg")]
         path = next((path for path in paths if path.is_file()), None)
         if path is not None:
             files[label] = path
         elif label != "scene":
-            refuse([Fault("the file is missing", str(paths[0]), "", ("options",))], where)
-    drawn = ("scene" not in files and subtask != "OR") * (
-        QuestionPicture("scene", scene.blocks, _GOAL_VIEW),
-    )
-    answer = _answer(line, subtask, base, where)
-    question = Question(line.id, subtask, scene, line.question, line.options, answer, drawn)
-    return QuestionTask(question, files)
-
-
-def _answer(line: _Question, subtask: Subtask, base: int | None, where: str) -> tuple[int, ...]:
-    """Return the indices from 0 of the right options: letters, texts or indices in the file."""
+            report([Fault("the file is missing", str(paths[0]), at=("options",))], where)
     is_order = subtask == "OR"
-    parts = line.answer if isinstance(line.answer, list) else [line.answer]
+    parts = [line.answer] if isinstance(line.answer, str) else list(line.answer)
     if is_order and isinstance(line.answer, str):
         parts = [letter for letter in line.answer if letter.isalnum()]
-    indices: list[int] = []
-    for part in parts:
-        text = part.strip() if isinstance(part, str) else ""
+    answer: list[int] = []
+    for text in map(str.strip, parts):
         letter = text.strip("().").upper()
-        if type(part) is int and base is not None and 0 <= part - base < len(LETTERS):
-            indices.append(part - base)
-        elif letter and letter in tuple(LETTERS):
-            indices.append(LETTERS.index(letter))
+        if letter in tuple(LETTERS):
+            answer.append(LETTERS.index(letter))
         elif text in line.options:
-            indices.append(line.options.index(text))
-    if not len(set(indices)) == len(parts) == (len(LETTERS) if is_order else 1):
-        allowed = "a permutation of the options" if is_order else "a letter, option or index"
-        if base is None and any(type(part) is int for part in parts):
-            allowed = "letters: the indices of this file do not tell whether they begin at 0"
+            answer.append(line.options.index(text))
+    if not len(set(answer)) == len(parts) == (len(LETTERS) if is_order else 1):
+        allowed = "all four letters or options" if is_order else "a letter or an option"
         fault = Fault("is none of the options", allowed, shown(line.answer), ("answer",))
-        refuse([fault], where)
-    return tuple(indices)
+        report([fault], where)
+    drawn = ("scene" not in files and not is_order) * (
+        QuestionPicture("scene", scene.blocks, _GOAL_VIEW),
+    )
+    question = Question(name, subtask, scene, line.question, line.options, tuple(answer), drawn)
+    return QuestionTask(question, files)
 
 
 _SPELLINGS: dict[str, tuple[str, ...]] = {

@@ -10,10 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Discriminator, Field, StrictInt, Tag
+from pydantic import Field, StrictInt, TypeAdapter
 
-from phyblock.config.validation import BackgroundName, ShapeName, SubtaskName
-from phyblock.data.base import Dataset, QuestionSet, QuestionTask, read_lines, read_text
+from phyblock.config.validation import BackgroundName, Fault, ShapeName, SubtaskName, checked
+from phyblock.config.yaml import shown
+from phyblock.data.base import Dataset, QuestionSet, QuestionTask, read_lines, report
 from phyblock.data.scenes import (
     MAX_BLOCKS,
     Angles,
@@ -23,7 +24,6 @@ from phyblock.data.scenes import (
     StoredBlock,
     Text,
     View,
-    plain,
     triple,
 )
 from phyblock.domain.blocks import Color
@@ -38,7 +38,7 @@ from phyblock.domain.question import (
 )
 from phyblock.domain.scene import Block, Scene
 from phyblock.errors import DataError, Problem
-from phyblock.records.line import Fault, Line, checked, refuse, shown, validated
+from phyblock.records.line import Line, decode
 from phyblock.types import Background
 
 QUESTIONS_FILE = "questions.jsonl"
@@ -76,7 +76,6 @@ class StoredMark(Line, extra="ignore"):
     """Its place [m]."""
 
 
-_Whole = Annotated[Literal[True], Tag("true")]
 # The blocks of several outcomes, so that all of their pictures are framed alike.
 _Framed = Annotated[tuple[StoredBlock, ...], Field(min_length=1, max_length=4 * MAX_BLOCKS)]
 
@@ -98,10 +97,7 @@ class StoredPicture(Line, extra="forbid"):
     """Whole blocks that the scene does not have."""
     marks: Annotated[tuple[StoredMark, ...], Field(min_length=1, max_length=MAX_BLOCKS)] = ()
     """Places."""
-    framed: Annotated[
-        _Whole | Annotated[_Framed, Tag("")],
-        Discriminator(lambda value: "true" if value is True else ""),
-    ] = ()
+    framed: Literal[True] | _Framed = ()
     """Blocks that the camera is framed on: true, the whole scene; left out: all that are drawn."""
 
     @classmethod
@@ -113,7 +109,7 @@ class StoredPicture(Line, extra="forbid"):
         recipe: dict[str, Any] = {
             "without": [order for order in known if order not in drawn],
             "poses": {
-                str(new.order): {"position": plain(new.position_m), "euler": plain(new.euler_deg)}
+                str(new.order): {"position": new.position_m, "euler": new.euler_deg}
                 for old, new in kept
                 if (old.position_m, old.euler_deg) != (new.position_m, new.euler_deg)
             },
@@ -123,13 +119,11 @@ class StoredPicture(Line, extra="forbid"):
                 if old.kind != new.kind
             },
             "add": [StoredBlock.of(block) for order, block in drawn.items() if order not in known],
-            "marks": [{"letter": m.letter, "position": plain(m.position_m)} for m in picture.marks],
+            "marks": [{"letter": m.letter, "position": m.position_m} for m in picture.marks],
             "framed": picture.framed == scene.blocks or [*map(StoredBlock.of, picture.framed)],
         }
         given = {name: part for name, part in recipe.items() if part}
-        return cls.model_validate(
-            {"label": picture.label, "view": plain(picture.view_deg), **given}
-        )
+        return cls.model_validate({"label": picture.label, "view": picture.view_deg, **given})
 
     def picture(self, scene: Scene, background: Background | None) -> QuestionPicture:
         """Return the picture that it makes of a scene."""
@@ -301,7 +295,7 @@ def scene_of(name: str, scenes: Mapping[str, Scene], where: str) -> Scene:
     """Return the scene that a question names; DataError where the data set has none such."""
     if name not in scenes:
         allowed = f"one of the {len(scenes)} scenes of the data set"
-        refuse([_wrong("scene_id", _NO_SCENE, allowed, name)], where)
+        report([_wrong("scene_id", _NO_SCENE, allowed, name)], where)
     return scenes[name]
 
 
@@ -312,16 +306,17 @@ def read_questions(folder: Path, scenes: Dataset) -> QuestionSet:
     """
     known = {task.scene.id: task.scene for task in scenes.tasks}
 
-    def read(raw: Any, where: str) -> QuestionTask:
-        line = validated(StoredQuestion, raw, where)
-        scene = scene_of(line.scene_id, known, where)
-        refuse(line.faults(scene), where)
-        return QuestionTask(line.about(scene))
+    adapter = TypeAdapter(StoredQuestion)
+
+    def read(line: bytes, where: str) -> QuestionTask:
+        stored = decode(adapter, line, where, StoredQuestion)
+        scene = scene_of(stored.scene_id, known, where)
+        report(stored.faults(scene), where)
+        return QuestionTask(stored.about(scene))
 
     path = folder / QUESTIONS_FILE
-    text = read_text(path, f"a folder with {QUESTIONS_FILE}, or a bundled set of questions")
     try:
-        tasks = read_lines(path, text, "question", read, lambda task: task.key)
+        tasks = read_lines(path, "question", read, lambda task: task.key)
     except DataError as error:
         elsewhere = [one for one in error.problems if one.message == _NO_SCENE]
         if len(elsewhere) < max(_FEW, len(error.problems) / 2):

@@ -7,92 +7,55 @@ every layout that is read.
 from __future__ import annotations
 
 import functools
-import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import (
-    AliasChoices,
-    Field,
-    StrictInt,
-    WithJsonSchema,
-)
+from pydantic import AfterValidator, AliasChoices, Field, StrictInt, TypeAdapter
 
-from phyblock.config.validation import ShapeName
-from phyblock.data.base import AssemblyTask, Dataset, read_lines, read_text
+from phyblock.config.validation import Fault, OneOf, ShapeName, checked, form
+from phyblock.config.yaml import shown
+from phyblock.data.base import AssemblyTask, Dataset, read_lines, report
 from phyblock.domain.aov import AOVGraph, CycleError
 from phyblock.domain.blocks import Color
 from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, CandidateSet, Scene
-from phyblock.records.line import Fault, Line, checked, refuse, shown, validated, worded
+from phyblock.records.line import Line, decode
 
 SCENES_FILE = "scenes.jsonl"
 MAX_BLOCKS = 22
+NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
 NAME_ALLOWED = "up to 100 letters, digits, '.', '_' or '-', a letter or digit first"
-_NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
-_MOST_PARENTS = 100
-_MOST_ORDER = 9999
-_LEVELS = ([1], [2], [3], [4], [1, 2])
-_NO_LEVELS = ("are not allowed", "one level 1 to 4, or [1, 2]")
-_NO_NUMBER = "is not an allowed number"
-_NO_TEXT = ("is no text", "a text that is not blank")
-_NO_VECTOR = "is not a vector in range"
+_LEVELS = ((1,), (2,), (3,), (4,), (1, 2))
 Vector = tuple[float, float, float]
 
 
-# Bounds are far above any use, and near enough to zero for geometry to be exact. Numbers stay
-# integers or floats as they were given, so that a line is written as it was read.
-_Number = Annotated[int, Field(strict=True)] | Annotated[float, Field(strict=True)]
-_Meters = Annotated[
-    _Number,
-    Field(ge=-100, le=100),
-    WithJsonSchema({"type": "number", "minimum": -100, "maximum": 100}),
-]
-_Degrees = Annotated[
-    _Number,
-    Field(ge=-36_000, le=36_000),
-    WithJsonSchema({"type": "number", "minimum": -36_000, "maximum": 36_000}),
-]
-_Elevation = Annotated[
-    _Number,
-    Field(ge=1, le=90),
-    WithJsonSchema({"type": "number", "minimum": 1, "maximum": 90}),
-]
+def plain(number: float) -> float:
+    """Return a whole number as an integer, which reads better in a file."""
+    return int(number) if float(number).is_integer() else number
 
-Position = Annotated[
-    tuple[_Meters, _Meters, _Meters],
-    worded(_NO_VECTOR, "three finite numbers of -100 to 100 m"),
-]
+
+# Bounds are far above any use, and near enough to zero for geometry to be exact.
+_PLAIN = AfterValidator(plain)
+_Length = Annotated[float, Field(strict=True, ge=-100, le=100, allow_inf_nan=False)]
+_Meters = Annotated[_Length, _PLAIN]
+_Degrees = Annotated[float, Field(strict=True, ge=-36_000, le=36_000, allow_inf_nan=False), _PLAIN]
+_Elevation = Annotated[float, Field(strict=True, ge=1, le=90, allow_inf_nan=False), _PLAIN]
+Position = tuple[_Meters, _Meters, _Meters]
 """A point [m]."""
-Angles = Annotated[
-    tuple[_Degrees, _Degrees, _Degrees],
-    worded(_NO_VECTOR, "three finite numbers of -36000 to 36000 degrees"),
-]
+Angles = tuple[_Degrees, _Degrees, _Degrees]
 """Three angles [degrees]."""
-View = Annotated[
-    tuple[_Degrees, _Elevation],
-    worded("is no view", "azimuth, and elevation 1 to 90 [degrees]"),
-]
+View = tuple[_Degrees, _Elevation]
 """Azimuth and elevation of a camera [degrees]."""
-Format = Annotated[int, Field(strict=True, ge=1, le=1), worded("is not known", "1")]
+Format = Literal[1]
 """Version of a line of data; a newer one may mean something else."""
-Order = Annotated[
-    int,
-    Field(strict=True, ge=1, le=_MOST_ORDER),
-    worded(_NO_NUMBER, f"an integer of at least 1, at most {_MOST_ORDER}"),
-]
+Order = Annotated[int, Field(strict=True, ge=1, le=9999)]
 """Number of a block or of a layer."""
-OrderOrGround = Annotated[
-    int,
-    Field(strict=True, ge=0, le=_MOST_ORDER),
-    worded(_NO_NUMBER, f"an integer of at least 0, at most {_MOST_ORDER}"),
-]
+OrderOrGround = Annotated[int, Field(strict=True, ge=0, le=9999)]
 """Number of a block, 0 for the ground."""
-Name = Annotated[str, Field(pattern=_NAME), worded("is not a name", NAME_ALLOWED)]
+Name = Annotated[str, form(NAME, NAME_ALLOWED)]
 """A name that is safe in file names and tables."""
-Text = Annotated[
-    str, worded(*_NO_TEXT), checked(lambda text: () if text.strip() else [Fault(*_NO_TEXT)])
-]
+Text = Annotated[str, form(r"\S", "a text that is not blank")]
 """A text that is not blank."""
 # The paper's text calls the field `orientation`, the released files `euler`.
 EITHER_NAME = Field(validation_alias=AliasChoices("euler", "orientation"))
@@ -103,16 +66,6 @@ def triple(numbers: Vector) -> Vector:
     """Return floats, without -0.0, so that equal scenes have equal digests."""
     x, y, z = numbers
     return float(x) + 0.0, float(y) + 0.0, float(z) + 0.0
-
-
-def plain(vector: tuple[float, ...]) -> Any:
-    """Return whole numbers as integers, which read better in a file."""
-    return tuple(int(number) if float(number).is_integer() else number for number in vector)
-
-
-def is_name(text: str) -> bool:
-    """True if a text is a `Name`."""
-    return re.fullmatch(_NAME, text) is not None
 
 
 class StoredBlock(Line, extra="ignore"):
@@ -134,16 +87,16 @@ class StoredBlock(Line, extra="ignore"):
     """Extrinsic x-y-z angles [degrees]: R = Rz·Ry·Rx (scipy's `'xyz'`)."""
 
     @classmethod
-    def of(cls, block: Block, position: Vector | None = None) -> Self:
-        """Return a block as it is written; `position` where that is written in another way."""
+    def of(cls, block: Block) -> Self:
+        """Return a block as it is written."""
         return cls(
             order=block.order,
             type=block.type,
             color=block.color,
             layer=block.layer,
             depend=block.depend or (0,),
-            position=plain(block.position_m) if position is None else position,
-            euler=plain(block.euler_deg),
+            position=block.position_m,
+            euler=block.euler_deg,
         )
 
     def block(self) -> Block:
@@ -151,6 +104,13 @@ class StoredBlock(Line, extra="ignore"):
         depend = tuple(order for order in self.depend if order)
         position_m, euler_deg = triple(self.position), triple(self.euler)
         return Block(self.order, self.type, self.color, position_m, euler_deg, depend, self.layer)
+
+
+class SceneBlock(StoredBlock):
+    """A block of a scene, whose lengths are written as decimals."""
+
+    position: tuple[_Length, _Length, _Length]
+    """Origin of the body frame in the world [m], z up, the ground at z = 0."""
 
 
 class StoredCandidate(Line, extra="ignore"):
@@ -174,25 +134,24 @@ class StoredCandidate(Line, extra="ignore"):
 def _block_faults(blocks: Sequence[StoredBlock]) -> Iterator[Fault]:
     """Yield orders that are used twice, else dependencies that name no block, else a cycle."""
     orders = [block.order for block in blocks]
-    twice = [i for i, order in enumerate(orders) if order in orders[:i]]
-    yield from (
-        Fault("is used twice", "unique orders", str(orders[i]), (i, "order")) for i in twice
-    )
+    if twice := [i for i, order in enumerate(orders) if order in orders[:i]]:
+        for i in twice:
+            yield Fault("is used twice", "unique orders", str(orders[i]), (i, "order"))
+        return
     known = "0 (the ground) or an order of the scene: " + ", ".join(map(str, sorted(orders)))
-    unknown = [
-        Fault("names no block", known, str(order), (i, "depend"))
-        for i, block in enumerate(blocks)
-        for order in block.depend
-        if order and order not in orders
-    ]
-    yield from () if twice else unknown
-    if not twice and not unknown:
-        try:
+    unknown = False
+    for i, block in enumerate(blocks):
+        for order in block.depend:
+            if order and order not in orders:
+                unknown = True
+                yield Fault("names no block", known, str(order), (i, "depend"))
+    try:
+        if not unknown:
             _graph(blocks)
-        except CycleError as error:
-            cycle = " -> ".join(str(orders[v]) for v in (*error.vertices, error.vertices[0]))
-            at = (error.vertices[0], "depend")
-            yield Fault("is part of a cycle", "dependencies without a cycle", cycle, at)
+    except CycleError as error:
+        cycle = " -> ".join(str(orders[v]) for v in (*error.vertices, error.vertices[0]))
+        at = (error.vertices[0], "depend")
+        yield Fault("is part of a cycle", "dependencies without a cycle", cycle, at)
 
 
 def _layer_faults(blocks: Sequence[StoredBlock]) -> Iterator[Fault]:
@@ -220,7 +179,7 @@ def look_faults(candidates: Sequence[StoredCandidate]) -> Iterator[Fault]:
 
 
 SceneBlocks = Annotated[
-    tuple[StoredBlock, ...],
+    tuple[SceneBlock, ...],
     Field(min_length=1, max_length=MAX_BLOCKS),
     checked(_block_faults),
 ]
@@ -231,12 +190,7 @@ CandidateList = Annotated[
     checked(look_faults),
 ]
 """Candidates of which no two look the same."""
-Levels = Annotated[
-    tuple[StrictInt, ...],
-    worded(*_NO_LEVELS),
-    checked(lambda levels: () if list(levels) in _LEVELS else [Fault(*_NO_LEVELS)]),
-    WithJsonSchema({"enum": list(_LEVELS)}),
-]
+Levels = Annotated[tuple[StrictInt, ...], OneOf(lambda: _LEVELS)]
 """The levels that a scene counts in."""
 
 
@@ -247,7 +201,7 @@ class StoredScene(Line, extra="ignore"):
     """Unique in the file; up to 100 letters, digits, `.`, `_`, `-`, a letter or digit first."""
     levels: Levels
     """The levels that the scene counts in: `[1]`, `[2]`, `[3]`, `[4]` or `[1, 2]`."""
-    parents: Annotated[tuple[Name, ...], Field(min_length=1, max_length=_MOST_PARENTS)]
+    parents: Annotated[tuple[Name, ...], Field(min_length=1, max_length=100)]
     """The base scenes that it was made from, one at least; a base scene names itself. Statistics
     cluster by them."""
     blocks: Annotated[SceneBlocks, checked(_layer_faults)]
@@ -263,15 +217,13 @@ class StoredScene(Line, extra="ignore"):
         """Return a scene as it is written: lengths to a micrometer."""
         looks = {block.look for block in scene.blocks}
         offered = [
-            StoredCandidate(
-                type=c.type, color=c.color, euler=plain(c.euler_deg), required=c.look in looks
-            )
+            StoredCandidate(type=c.type, color=c.color, euler=c.euler_deg, required=c.look in looks)
             for c in candidates.candidates
         ]
         blocks = []
         for block in scene.blocks:
             x, y, z = (round(length, 6) + 0.0 for length in block.position_m)
-            blocks.append(StoredBlock.of(block, (x, y, z)))
+            blocks.append(SceneBlock.of(replace(block, position_m=(x, y, z))))
         about: dict[str, Any] = {"id": scene.id, "levels": scene.levels, "parents": scene.parents}
         return cls(**about, blocks=tuple(blocks), candidates=tuple(offered))
 
@@ -298,24 +250,17 @@ def task_of(
             message = f"hold nothing that block {block.order} of scene {scene.id} needs"
             found = shown([block.type, block.color, block.euler_deg])
             faults.append(Fault(message, allowed, found, ("candidates",)))
-    refuse(faults, where)
+    report(faults, where)
     return AssemblyTask(scene, candidates, composite)
 
 
 def read_builtin(folder: Path) -> Dataset:
     """Return all scenes of a data set folder; DataError with everything that is wrong in it."""
-    path = folder / SCENES_FILE
-    allowed = f"a folder with {SCENES_FILE}, or the name of a bundled data set"
-    return Dataset(folder.name, folder, _tasks(path, read_text(path, allowed)))
+    adapter = TypeAdapter(StoredScene)
 
+    def read(line: bytes, where: str) -> AssemblyTask:
+        stored = decode(adapter, line, where, StoredScene)
+        return task_of(stored.scene(), candidate_set(stored.candidates), where)
 
-@functools.lru_cache(maxsize=1)
-def _tasks(path: Path, text: str) -> tuple[AssemblyTask, ...]:
-    """The scenes in a file's text, which a run reads again for its report."""
-
-    def read(raw: Any, where: str) -> AssemblyTask:
-        line = validated(StoredScene, raw, where)
-        return task_of(line.scene(), candidate_set(line.candidates), where)
-
-    tasks = read_lines(path, text, "scene", read, lambda task: task.key)
-    return tuple(sorted(tasks, key=lambda task: task.key))
+    tasks = read_lines(folder / SCENES_FILE, "scene", read, lambda task: task.key)
+    return Dataset(folder.name, folder, tuple(sorted(tasks, key=lambda task: task.key)))

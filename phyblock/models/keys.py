@@ -12,7 +12,7 @@ import urllib.parse
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from phyblock.config.models import ModelConfig, address_fault
+from phyblock.config.models import ADDRESS_ALLOWED, ModelConfig, is_address
 from phyblock.errors import Problem, SpecError, UnavailableError
 
 _KEY_VARIABLES: Mapping[str, tuple[str, ...]] = {
@@ -117,9 +117,10 @@ def server_address(model_id: str) -> str | None:
     usual = f"{provider.upper().replace('-', '_')}_API_BASE"
     for name in _ADDRESS_VARIABLES.get(provider, (usual,)):
         if value := os.environ.get(name):
-            if (fault := address_fault(value)) is not None:
-                message, hint = fault
-                raise SpecError(Problem(f"environment variable {name}", message, hint=hint))
+            if not is_address(value):
+                message = "is not an address that can be used"
+                where = f"environment variable {name}"
+                raise SpecError(Problem(where, message, allowed=ADDRESS_ALLOWED))
             return value
     return None
 

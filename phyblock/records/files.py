@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
 
-from pydantic import Field, TypeAdapter, ValidationError, create_model
+from pydantic import Field, TypeAdapter, create_model
 
-from phyblock.errors import Problem, StoreError, reason_of
+from phyblock.errors import DataError, Problem, StoreError, reason_of
 from phyblock.files import NotRegularError, open_regular, read_bytes
-from phyblock.records.line import Line, decode, problems_of
+from phyblock.records.line import Line, decode, not_a
 from phyblock.records.manifest import Manifest, read_manifest
 from phyblock.records.record import BatchLine, Call, Prompt, PromptMessage, Record, Stopped
 from phyblock.registry import known_tracks
@@ -90,8 +90,6 @@ class Lines(Generic[LineT]):
     noun: ClassVar[str]
     hint: ClassVar[str]
     kind: ClassVar[type[Line]]
-    skip: ClassVar[int] = 0
-    """Parts of a place in a line that name the model by which it was read."""
 
     def __init__(self, folder: Path, validation: Validation | None = None) -> None:
         """Without a `validation` lines of any run are taken."""
@@ -115,9 +113,8 @@ class Lines(Generic[LineT]):
                 while data := file.readline(_LONGEST_LINE_BYTES + 1):
                     number += 1
                     where = f"{self.path}:{number}"
-                    if b"\0" in data or data.endswith(b"\r\n"):
-                        what = "zero bytes" if b"\0" in data else "a line end of CR LF"
-                        message = f"is not a {self.noun}: it holds {what}"
+                    if b"\0" in data:
+                        message = f"is not a {self.noun}: it holds zero bytes"
                         raise StoreError(Problem(where, message, hint=self.hint))
                     self.lacks_newline = not data.endswith(b"\n")
                     if self.lacks_newline and _is_cut(data):
@@ -149,23 +146,13 @@ class Lines(Generic[LineT]):
                     yield self._read(f"{self.path} (byte {start})", file.readline())
 
     def _read(self, where: str, data: bytes) -> LineT:
-        is_not = f"is not a {self.noun}"
         if len(data) > _LONGEST_LINE_BYTES:
-            message = f"{is_not}: longer than {_LONGEST_LINE_BYTES // 1024**2} MB"
+            message = f"is longer than {_LONGEST_LINE_BYTES // 1024**2} MB"
             raise StoreError(Problem(where, message, hint=self.hint))
         try:
-            read: LineT = decode(self._adapter, data)
-        except json.JSONDecodeError as error:
-            problem = Problem(f"{where}:{error.colno}", f"{is_not}: {error.msg}", hint=self.hint)
-            raise StoreError(problem) from error
-        except UnicodeDecodeError as error:
-            raise StoreError(Problem(where, f"{is_not}: not UTF-8", hint=self.hint)) from error
-        except ValidationError as error:
-            problems = problems_of(error, where, Record, is_not, self.hint, self.skip)
-            raise StoreError(next(problems)) from error
-        except ValueError as error:
-            raise StoreError(Problem(where, f"{is_not}: it {error}", hint=self.hint)) from error
-        return read
+            return decode(self._adapter, data, where, self.kind)
+        except DataError as error:
+            raise not_a(self.noun, error, self.hint) from error
 
 
 def _is_cut(line: bytes) -> bool:
@@ -184,9 +171,9 @@ class RecordLines(Lines[Record]):
     """The records of a run folder, each read by the model of its track."""
 
     file = RECORDS
+    kind = Record
     noun = "record"
     hint = "restore the file from a copy, or remove this line: its sample is then run again"
-    skip = 1
 
     def adapter(self) -> TypeAdapter[Any]:
         """Return what reads a record by the model of its track."""

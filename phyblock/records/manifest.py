@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import functools
-import json
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, ValidationError, field_validator
+from pydantic import Field, ValidationError
 
 from phyblock.config.suite import Suite, suite_model
+from phyblock.config.validation import Fault, checked, problems_of
 from phyblock.config.yaml import parse_yaml
-from phyblock.errors import Problem, SpecError, StoreError
+from phyblock.errors import InputError, Problem, StoreError, reason_of
 from phyblock.files import read_text
-from phyblock.records.line import Line, encodable, problems_of
+from phyblock.records.line import Line, not_a, validated
 
 FORMAT = 1
 """Version of run folders; one that adds fields alone stays the same."""
@@ -25,26 +26,15 @@ _LARGEST_BYTES = 2 * 1024 * 1024
 """Far above what a suite of the largest allowed size comes to."""
 
 
-def _encodable(suite: dict[str, Any]) -> dict[str, Any]:
-    # It came from a UTF-8 file; what was edited since could be drawn nowhere.
-    try:
-        json.dumps(suite, ensure_ascii=False).encode()
-    except UnicodeEncodeError:
-        raise ValueError("no half of a character (a lone surrogate)") from None
-    return suite
-
-
-Text = Annotated[str, AfterValidator(encodable)]
-"""Any text but a path, which may be of bytes that are not UTF-8."""
 Version = Annotated[int, Field(ge=1)]
 
 
 class ManifestModel(Line):
     """A model of the run; what decides its replies stands beside it."""
 
-    name: Text
+    name: str
     """Its name in the run."""
-    published: Text | None = None
+    published: str | None = None
     """Its name in the paper."""
     size_b: float | None = None
     """Its size [billion parameters]."""
@@ -60,10 +50,17 @@ class ManifestModel(Line):
         return self.kind == "baseline"
 
 
+def _same_names(models: tuple[ManifestModel, ...]) -> Iterator[Fault]:
+    names = [model.name for model in models]
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            yield Fault("stands twice in this list", found=name, at=(index, "name"))
+
+
 class ManifestDataset(Line):
     """The data set."""
 
-    name: Text
+    name: str
     """Its name."""
     sha256: str
     """Digest of the scenes that were asked about."""
@@ -95,9 +92,9 @@ class Manifest(Line):
     """The time when it was begun, UTC."""
     format: Annotated[int, Field(ge=1, le=FORMAT)] = FORMAT
     """Version of the run folder."""
-    suite: Annotated[dict[str, Any], AfterValidator(_encodable)] = Field(default_factory=dict)
+    suite: dict[str, Any] = Field(default_factory=dict)
     """The suite with everything that it left out."""
-    models: tuple[ManifestModel, ...] = ()
+    models: Annotated[tuple[ManifestModel, ...], checked(_same_names)] = ()
     """The models as they are called."""
     others: tuple[ManifestModel, ...] = ()
     """Models that were asked in this folder before, and that the command did not name this time:
@@ -124,14 +121,6 @@ class Manifest(Line):
     versions: dict[str, str] = Field(default_factory=dict)
     """Versions of Python, of libraries, and of the readers that read the replies."""
 
-    @field_validator("models")
-    @classmethod
-    def _differ(cls, models: tuple[ManifestModel, ...]) -> tuple[ManifestModel, ...]:
-        names = [model.name for model in models]
-        if twice := sorted({name for name in names if names.count(name) > 1}):
-            raise ValueError(f"models of different names, not {', '.join(twice)} twice")
-        return models
-
     @property
     def run(self) -> str:
         """The digest by which its records show that they are its own."""
@@ -148,21 +137,23 @@ class Manifest(Line):
 def read_manifest(folder: Path) -> Manifest:
     """Return the run's manifest; StoreError when there is none or it cannot be read."""
     path = folder / MANIFEST
-    where = str(path)
     try:
         return _manifest(read_text(path, _LARGEST_BYTES), str(path))
     except (FileNotFoundError, NotADirectoryError) as error:
         allowed = "a folder that phyblock run wrote"
         raise StoreError(Problem(str(folder), f"holds no {MANIFEST}", allowed=allowed)) from error
-    except OSError as error:
-        raise StoreError(Problem(where, f"cannot be read: {error.strerror}")) from error
-    except SpecError as error:
-        raise StoreError(replace(problem, hint=_HINT) for problem in error.problems) from error
-    except ValidationError as error:
-        is_not = "is not a run manifest"
-        raise StoreError(problems_of(error, where, Manifest, is_not, _HINT)) from error
-    except ValueError as error:
-        raise StoreError(Problem(where, str(error), hint=_HINT)) from error
+    except (OSError, ValueError) as error:
+        message = f"cannot be read: {reason_of(error)}"
+        raise StoreError(Problem(str(path), message, hint=_HINT)) from error
+    except InputError as error:
+        raise not_a("run manifest", error, _HINT) from error
+
+
+@functools.lru_cache(maxsize=2)
+def _manifest(text: str, where: str) -> Manifest:
+    """Return a manifest, which one command reads several times."""
+    source = parse_yaml(text, where, _LARGEST_BYTES)
+    return validated(Manifest, source.data, source)
 
 
 def suite_of(manifest: Manifest, where: str) -> Suite:
@@ -170,14 +161,7 @@ def suite_of(manifest: Manifest, where: str) -> Suite:
     try:
         return suite_model().model_validate(manifest.suite)
     except ValidationError as error:
-        problems = problems_of(error, where, suite_model(), "is not the suite of a run", _HINT)
-        raise StoreError(replace(one, field=f"suite.{one.field}") for one in problems) from error
-
-
-@functools.lru_cache(maxsize=2)
-def _manifest(text: str, where: str) -> Manifest:
-    """Return a manifest, which one command reads several times; SpecError for what is not YAML."""
-    source = parse_yaml(text, where, most_bytes=_LARGEST_BYTES, halves=True)
-    if source.problems:
-        raise SpecError(source.problems)
-    return Manifest.model_validate(source.data)
+        problems = problems_of(error, suite_model(), manifest.suite, where)
+        raise StoreError(
+            replace(one, field=f"suite.{one.field}", hint=_HINT) for one in problems
+        ) from error

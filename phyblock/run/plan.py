@@ -390,7 +390,9 @@ def asking_remarks(suite: Suite, plan: RunPlan) -> list[str]:
         return []
     remarks: dict[str, None] = {}
     for asked in (suite.at(variant) for variant in plan.variants):
-        for track, path in asked.files.templates.items():
+        for track in asked.tracks:
+            if (path := asked.template(track)) is None:
+                continue
             prompt = template_prompt(asked, track)
             files = ", ".join(map(str, (path, *(file.name for file in prompt.included))))
             line = prompt.unsent_line

@@ -404,5 +404,5 @@ def template_prompt(suite: Suite, name: str) -> TemplatePrompt:
     """
     bundled = kind_of(name).template_for(suite.answer_format)
     assert bundled is not None, f"{name} has no prompt for {suite.answer_format}"
-    default, path = TemplatePrompt(bundled, "default"), suite.files.templates.get(name)
+    default, path = TemplatePrompt(bundled, "default"), suite.template(name)
     return default if path is None else TemplatePrompt(path, path.stem, default)

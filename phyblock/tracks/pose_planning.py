@@ -12,9 +12,15 @@ from functools import partial
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
-from phyblock.config.validation import PictureControls, TemplateName, UniqueSome, refuse
+from phyblock.config.validation import (
+    Fault,
+    PictureControls,
+    TemplateName,
+    UniqueSome,
+    checked,
+)
 from phyblock.data import AssemblyTask
 from phyblock.domain import (
     Block,
@@ -98,15 +104,11 @@ _STILL_M, _STILL_DEG = 0.001, 1.0
 _ONE_AT_A_TIME = threading.Lock()
 
 
-def _oblique_first(views: tuple[View, ...]) -> tuple[View, ...]:
-    if views[0] == "oblique":
-        return views
-    message = "begins with a view in which blocks of the sheet look alike: it is seen as the goal "
-    message += "is first"
-    others = [view for view in views if view != "oblique"]
-    raise refuse(
-        message, allowed="oblique first", hint=f"views: [{', '.join(['oblique', *others])}]"
-    )
+def _oblique_first(views: tuple[View, ...]) -> Iterator[Fault]:
+    if views[0] != "oblique":
+        # Blocks of the sheet, seen as the goal is first, look alike from any other side.
+        order = ["oblique", *(view for view in views if view != "oblique")]
+        yield Fault("must begin with oblique", f"[{', '.join(order)}]")
 
 
 Tolerance = Annotated[float, Field(strict=True, gt=0, le=10, allow_inf_nan=False)]
@@ -119,7 +121,7 @@ class PoseSpec(PictureControls):
     rotation: PoseRotation = "candidate"
     """candidate: blocks keep the orientation in which they are shown, and steps give a number and a
     place. free: each kind is shown once, upright, and steps give a rotation as well."""
-    views: Annotated[UniqueSome[View], AfterValidator(_oblique_first)] = ("oblique", "top")
+    views: Annotated[UniqueSome[View], checked(_oblique_first)] = ("oblique", "top")
     """Where the goal is seen from, a picture each: oblique, and any of front, side, top after it.
     Blocks are shown from where the first one is."""
     overlap_cm: Tolerance = _LIMITS.overlap_cm

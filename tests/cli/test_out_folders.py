@@ -304,11 +304,11 @@ def test_a_name_that_no_terminal_can_print_is_no_traceback(suite: Workspace) -> 
     assert "Traceback" not in said
 
 
-def test_a_data_set_and_a_run_in_folders_that_are_not_utf_8(suite: Workspace) -> None:
+def test_a_data_set_in_a_folder_that_is_not_utf_8_is_refused(suite: Workspace) -> None:
     place = Path(os.fsdecode(bytes(suite.root) + b"/r\xffn"))
     place.mkdir()
     for name in ("data", "suite.yaml"):
         (suite.root / name).rename(place / name)
-    call("run", place / "suite.yaml", "--out", place / "out", "--no-report")
-    call("score", place / "out", "--parser", "official")
-    assert (place / "out" / "scores").is_dir()
+    code, said = refused(suite, subprocess.DEVNULL, "run", place / "suite.yaml")
+    assert code == 2
+    assert "Traceback" not in said

@@ -15,8 +15,8 @@ from phyblock.config.models import (
     ModelConfig,
     SamplingSpec,
     Tariff,
-    address_fault,
     host_of,
+    is_address,
     load_models,
     resolve_models,
 )
@@ -221,16 +221,14 @@ MALFORMED = [
 
 @pytest.mark.parametrize("url", GOOD)
 def test_an_address_is_one(url: str) -> None:
-    assert address_fault(url) is None
+    assert is_address(url)
 
 
 @pytest.mark.parametrize("url", [*SECRETIVE, *MALFORMED])
 def test_what_is_none_is_refused_without_being_shown(
     url: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    fault = address_fault(url)
-    assert fault is not None
-    assert SECRET not in "".join(fault)
+    assert not is_address(url)
     if url and "\x00" not in url and "\ud800" not in url:
         says = told(tmp_path, "models", f"m: {{id: openai/m, api_base: {json.dumps(url)}}}\n")
         assert "m.api_base" in says
@@ -244,12 +242,12 @@ def test_what_is_none_is_refused_without_being_shown(
 @given(st.text(min_size=1), st.text(), st.sampled_from(["http", "https"]))
 def test_no_user_gets_through(user: str, rest: str, scheme: str) -> None:
     url = f"{scheme}://{user.translate({ord(c): 'x' for c in '/?#'})}@host/{rest}"
-    assert address_fault(url) is not None
+    assert not is_address(url)
 
 
 @given(st.text())
 def test_any_text_is_an_address_or_refused(url: str) -> None:
-    assert address_fault(url) is not None or url.lower().startswith(("http://", "https://"))
+    assert not is_address(url) or url.lower().startswith(("http://", "https://"))
     assert "/" not in host_of(url)
 
 

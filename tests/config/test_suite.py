@@ -47,16 +47,12 @@ def test_all_that_is_wrong_is_told_in_the_order_of_the_file(
     assert not re.search(JARGON, says)
 
 
-def test_many_problems_are_told_in_part(tmp_path: Path) -> None:
+def test_many_problems_are_reported_in_part(tmp_path: Path) -> None:
     says = told(tmp_path, "suite", HEAD + "".join(f"sede{i}: 1\n" for i in range(3_000)))
     assert says.count("is not a known key") == 100
-    assert "suite.yaml:102:1: and 2,900 more problems" in says
-    says = told(
-        tmp_path, "suite", HEAD + "? " + "k" * 90_000 + "\n: 1\n", ["seeds=" + "x" * 90_000]
-    )
-    assert len(says) < 9_000
-    says = told(tmp_path, "suite", HEAD + '"\\e[2J\\u202e": 1\n')
-    assert not re.search("[\x1b\u202e]", says)
+    text = HEAD + "? " + "k" * 90_000 + "\n: 1\n"
+    assert len(told(tmp_path, "suite", text, ["seeds=" + "x" * 90_000])) < 9_000
+    assert not re.search("[\x1b\u202e]", told(tmp_path, "suite", HEAD + '"\\e[2J\\u202e": 1\n'))
 
 
 @pytest.fixture(scope="module")
@@ -146,7 +142,7 @@ def test_paths_start_at_the_file_or_for_overrides_at_the_working_directory(
     text = "dataset: {format: official, path: ./official}\nprompt: brief.j2\n"
     suite = load(folder, HEAD + text)
     assert suite.files.dataset == folder / "official"
-    assert suite.files.templates == {"full_planning": folder / "brief.j2"}
+    assert suite.template("full_planning") == folder / "brief.j2"
     assert suite.where("dataset", "path") == f"{folder / 's.yaml'}:3:35"
     monkeypatch.chdir(folder / "data")
     assert load(folder, HEAD, official, "dataset.path=../official").files.dataset == (
@@ -205,12 +201,12 @@ def test_a_variant_is_the_suite_with_other_values_in_its_fields(folder: Path) ->
         "  prompt: [brief.j2, default]\n  repeats: 2\n"
     )
     suite = load(folder, text)
-    assert suite.files.templates == {"full_planning": folder / "brief.j2"}
+    assert suite.template("full_planning") == folder / "brief.j2"
     for variant in suite.vary.variants:
         one, chosen = suite.at(variant), dict(variant.levels)
         assert one.images.background == chosen.get("background", "lawn")
         assert one.candidates.order == chosen.get("candidate_order", "file")
-        assert bool(one.files.templates) == ("prompt" not in chosen)
+        assert bool(one.template("full_planning")) == ("prompt" not in chosen)
     plain = load(folder, HEAD)
     assert plain.at(Variant()) == plain
 

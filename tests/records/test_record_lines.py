@@ -102,7 +102,7 @@ def test_a_line_without_end_is_refused_and_not_taken_for_a_cut_one(
     monkeypatch.setattr(files, "_LONGEST_LINE_BYTES", 3000)
     folder = folder_with(tmp_path, lines_before()[0], b'"' + b"x" * 5000, lines_before()[0])
     found = RecordLines(folder)
-    with pytest.raises(StoreError, match=r"records\.jsonl:2: is not a record: longer than"):
+    with pytest.raises(StoreError, match=r"records\.jsonl:2: is longer than"):
         list(found)
     assert not found.is_cut
 

@@ -86,8 +86,8 @@ def test_a_run_whose_records_are_taken_away_asks_no_more_and_says_so(workspace: 
     assert len(workspace.records()) == 100
 
 
-@pytest.mark.parametrize("line", [b"\0" * 40, b"\0" * 40 + b"\n", b"{}\r\n"])
-def test_zero_bytes_and_foreign_line_ends_are_named(tmp_path: Path, line: bytes) -> None:
+@pytest.mark.parametrize("line", [b"\0" * 40, b"\0" * 40 + b"\n"])
+def test_zero_bytes_are_named(tmp_path: Path, line: bytes) -> None:
     (tmp_path / "prompts.jsonl").write_bytes(line)
     with pytest.raises(StoreError, match=r"prompts\.jsonl:1: is not a prompt: it holds"):
         list(PromptLines(tmp_path))

@@ -8,14 +8,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, TypeAdapter
 
 from phyblock.config.validation import ShapeName
-from phyblock.config.yaml import YamlSource, read_yaml
-from phyblock.data.base import lines_of, parse_json, read_json, read_text
+from phyblock.config.yaml import FieldPath, read_yaml
+from phyblock.data.base import read_data
 from phyblock.data.scenes import (
     EITHER_NAME,
     MAX_BLOCKS,
+    NAME,
     NAME_ALLOWED,
     Angles,
     CandidateList,
@@ -25,7 +26,6 @@ from phyblock.data.scenes import (
     Order,
     Position,
     candidate_set,
-    is_name,
     triple,
 )
 from phyblock.domain.aov import CycleError
@@ -34,11 +34,10 @@ from phyblock.domain.scene import Block, CandidateSet, Scene
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.making.checks import LEVEL_LIMITS, OURS_IN_HASTE, CheckName, SceneFacts, findings_of
 from phyblock.making.scenes.sketch import Palette, scene_of
-from phyblock.records.line import Line, validated
+from phyblock.records.line import Line, decode, validated
 
 _SUFFIXES = (".yaml", ".yml", ".json", ".jsonl")
 _ALLOWED = f"a file of scenes ({', '.join(_SUFFIXES)}), or a folder of such files"
-_PART = re.compile(r"\[(\d+)\]|([^.\[\]]+)")
 
 
 class GivenBlock(Line, extra="forbid"):
@@ -189,38 +188,25 @@ def _files(path: Path) -> list[Path]:
 
 def _read(file: Path) -> Iterator[ReadScene]:
     if file.suffix == ".jsonl":
-        for number, line in enumerate(lines_of(read_text(file, _ALLOWED)), 1):
-            raw = parse_json(line, file, number)
-            yield _scene(raw, f"{file.stem}-{number}", f"{file}:{number}")
+        adapter = TypeAdapter(GivenScene)
+        for number, line in enumerate(read_data(file, _ALLOWED).splitlines(), 1):
+            where = f"{file}:{number}"
+            yield _named(decode(adapter, line, where, GivenScene), f"{file.stem}-{number}", where)
         return
-    source = None if file.suffix == ".json" else read_yaml(file)
-    if source and source.problems:
-        raise SpecError(source.problems)
-    data = source.data if source else read_json(file)
-    at: tuple[str | int, ...] = ()
+    source = read_yaml(file)
+    data: Any = source.data
+    at: FieldPath = ()
     if isinstance(data, dict) and "scenes" in data:
         at, data = ("scenes",), data["scenes"]
     is_list = isinstance(data, list)
     for number, raw in enumerate(data if is_list else [data]):
         name = f"{file.stem}-{number + 1}" if is_list else file.stem
         here = (*at, number) if is_list else at
-        try:
-            yield _scene(raw, name, source.where(here) if source else str(file))
-        except DataError as error:
-            raise DataError([_placed(one, source, here) for one in error.problems]) from None
+        yield _named(validated(GivenScene, raw, source, here), name, source.where(here))
 
 
-def _scene(raw: Any, name: str, where: str) -> ReadScene:
-    given = validated(GivenScene, raw, where)
-    if given.id is None and not is_name(name):
+def _named(given: GivenScene, name: str, where: str) -> ReadScene:
+    if given.id is None and not re.fullmatch(NAME, name):
         message, hint = "has no id, and cannot be called as its file", "give it an id"
         raise DataError(Problem(where, message, "id", name, NAME_ALLOWED, hint))
     return ReadScene(given.id or name, given, where)
-
-
-def _placed(problem: Problem, source: YamlSource | None, at: tuple[str | int, ...]) -> Problem:
-    """A problem with the line of its field, where the file tells lines."""
-    if source is None:
-        return problem
-    parts = [int(n) if n else name for n, name in _PART.findall(problem.field)]
-    return replace(problem, where=source.where((*at, *parts)))
