@@ -7,17 +7,15 @@ tables, which are data: `read_report` joins it with the counts.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import yaml
 
 from phyblock.scoring.counts import mean_of, ratio_of
-from phyblock.scoring.plan import ERROR_TYPES
 
 if TYPE_CHECKING:
     from phyblock.config.suite import Suite
@@ -185,45 +183,6 @@ def mean_per(columns: Sequence[str], part: Sequence[str], whole: Sequence[str]) 
     return lambda sums: mean_of(sums[..., places])
 
 
-class ListedScore(NamedTuple):
-    """The counts behind F1 of a sample, and the types of its wrong steps."""
-
-    tp: float
-    fp: float
-    fn: float
-    errors: Collection[str] = ()
-
-
-@dataclass(frozen=True)
-class Listing:
-    """A score that the page of a run lists samples by.
-
-    `name` is what people choose, as the name of a setting. `errors` are the types that its wrong
-    steps may have. `score` is of a record, None where it was not scored so. Its parts are counts of
-    steps that people read, unless it is not `is_counted`.
-    """
-
-    name: str
-    errors: tuple[str, ...]
-    score: Callable[[Record], ListedScore | None]
-    is_counted: bool = True
-
-
-def by_settings(suite: Suite) -> tuple[Listing, ...]:
-    """Return the settings of a suite, the headline's first, each by the headline matcher."""
-    matcher = suite.scoring.matchers[0]
-    return tuple(Listing(name, ERROR_TYPES, partial(_listed, name, matcher))
-                 for name in suite.settings)  # fmt: skip
-
-
-def _listed(setting: str, matcher: str, record: Record) -> ListedScore | None:
-    scores = [score for score in record.scores if score.setting == setting]
-    for score in [score for score in scores if score.matcher == matcher] or scores:
-        errors = [name for name, count in (score.errors or {}).items() if count]
-        return ListedScore(score.tp, score.fp, score.fn, errors)
-    return None
-
-
 @dataclass(frozen=True)
 class LayoutColumn:
     """Columns of a table: a measure each, in one cell or in several.
@@ -289,7 +248,7 @@ class TrackReport:
     folder, what was asked about where that is more than scenes, and gives of a record what has a
     `question` as it was shown; it raises DataError where that is not what the run was made on.
     `film` shows a record step by step: a frame for the start, one a step, and one for the end,
-    without blocks where no task is given. `listings` are scores beside those by settings.
+    without blocks where no task is given.
     """
 
     measures: tuple[Measure, ...]
@@ -302,7 +261,6 @@ class TrackReport:
     part_names: Mapping[str, str] = field(default_factory=dict)
     items: Callable[[Path, Manifest, Dataset], Callable[[Record], Any | None]] | None = None
     film: Callable[[Any, AssemblyTask | None], Iterator[FilmStep]] | None = None
-    listings: tuple[Listing, ...] = ()
 
     def heading(self, kind: str, name: str) -> str:
         """Return the heading of the measure `<kind>_<name>`, of none the name in plain words."""

@@ -81,7 +81,7 @@ from phyblock.tracks.base import CARRYING, ENGINE, Judgement, SceneTrack
 from phyblock.tracks.baselines import NumberField, Pick, Picking, candidate_choices
 from phyblock.tracks.full_planning import PlanParse, score_fields
 from phyblock.tracks.items import ShownTask, file_plan, goal_of
-from phyblock.tracks.measures import ListedScore, Listing, SampleCounts
+from phyblock.tracks.measures import SampleCounts
 from phyblock.tracks.pictures import Drawing, picture_style
 from phyblock.types import SETTINGS, STEP_ENDS, Matcher, PoseRotation, Setting, StepEnd, View
 
@@ -332,20 +332,6 @@ COUNTS = (
         for setting in SETTINGS
     ),
 )
-
-
-def _in_c(record: Record) -> ListedScore | None:
-    """Return right steps as a mean over the tolerances, which gives the mean of their F1."""
-    if RIGHT.name not in record.counts:
-        return None
-    counts = dict(zip(RIGHT.columns, record.counts[RIGHT.name], strict=True))
-    right = sum(counts[f"absolute_{cm:g}"] for cm in TOLERANCES_CM) / len(TOLERANCES_CM)
-    pose = record.pose if isinstance(record, PoseRecord) else None
-    errors = {step.error for step in pose.steps if step.error is not None} if pose else ()
-    return ListedScore(right, counts["steps"] - right, counts["blocks"] - right, errors)
-
-
-LISTED_IN_C = Listing("C", POSE_ERRORS, _in_c, is_counted=False)
 
 
 def rests_of(

@@ -19,7 +19,6 @@ from phyblock.text import counted
 from phyblock.tracks.measures import level_cells, read_report
 from phyblock.tracks.pose_planning import (
     COUNTS,
-    LISTED_IN_C,
     POSE_FLOORS,
     RIGHT,
     GivenStep,
@@ -101,5 +100,4 @@ REPORT = read_report(
     cells=level_cells,
     floors=POSE_FLOORS,
     film=_film,
-    listings=(LISTED_IN_C,),
 )

@@ -1,18 +1,21 @@
-"""The data of a ranking: models with values, ranks and facts, and the finding in words."""
+"""Runs as numbers of a page: models with values, ranks and facts, and the finding in words."""
 
 from __future__ import annotations
 
 import json
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from phyblock.bundle import portable_manifest
+from phyblock.data import AssemblyTask
+from phyblock.errors import DataError
 from phyblock.records.files import read_stopped
 from phyblock.records.manifest import ManifestModel
 from phyblock.records.record import Record
@@ -32,17 +35,46 @@ from phyblock.results.estimates import (
 from phyblock.results.load import Run, track_measures
 from phyblock.results.tables import coverage_frame
 from phyblock.results.text import number as rounded
+from phyblock.run.rescore import recorded_dataset
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of
 from phyblock.tracks.measures import Measure
 from phyblock.types import WITHOUT_REPLY
-from phyblock.web.pack import Sources
 
 _LABELS = ("published", "size_b", "served_at")
 """Parts of a manifest's model that do not decide its replies."""
 _MOST_CHARACTERS = 160
-_TELLING_BLOCKS = 6
-"""A failure tells most where its goal has about so many blocks."""
+
+
+@dataclass(frozen=True)
+class Sources:
+    """Tasks by scene id, and items that are more than scenes by track; where there are none,
+    `lacking` says why.
+    """
+
+    tasks: Mapping[str, AssemblyTask] = field(default_factory=dict)
+    items: Mapping[str, Callable[[Record], Any]] = field(default_factory=dict)
+    lacking: str = ""
+
+
+def open_sources(run: Run, data: Path | None) -> Sources:
+    """Return the scenes of a run, from `data` or from where the run found them, and what else
+    its tracks asked about. Without them a page shows every reply and score, but cannot draw.
+
+    Raises DataError when `data` is given and is not what the run was made on.
+    """
+    try:
+        dataset = recorded_dataset(run.path, run.manifest, data)
+        openers = {name: kind_of(name).report().items for name in run.design.suite.tracks}
+        facts = (run.path, run.manifest, dataset)
+        items = {name: opener(*facts) for name, opener in openers.items() if opener}
+        return Sources({task.scene.id: task for task in dataset.tasks}, items)
+    except DataError as error:
+        if data is not None:
+            raise
+        said = f"{error.problems[0].where}: {error.problems[0].message}"
+        how = "phyblock report RUN --data FOLDER draws it from where it is now"
+        return Sources(lacking=f"Nothing can be drawn without the data set ({said}); {how}.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +88,6 @@ class SiteRun:
     run: Run
     sources: Sources
     unverified: tuple[str, ...] | None = None
-
-    @property
-    def is_verified(self) -> bool:
-        """True if it came in a bundle and was scored again."""
-        return self.unverified is not None
 
     @property
     def date(self) -> str:
@@ -159,8 +186,7 @@ def values_of(run: Run, track: str) -> TrackValues:
     values: dict[str, Mapping[tuple[str, str], Value]] = {}
     for setting in design.suite.settings if shown["setting"].astype(bool).any() else ("",):
         suite = design.suite.model_copy(update={"settings": (setting,)} if setting else {})
-        in_setting = replace(design, suite=suite)
-        values[setting] = headline_of(run, track, in_setting)
+        values[setting] = headline_of(run, track, replace(design, suite=suite))
     return TrackValues(values, samples, _facts_of(run, track, samples, what.measure.best))
 
 
@@ -170,7 +196,8 @@ def _facts_of(
     """Return by model what its samples of a track took and came to; None where it is not known.
 
     `solved` samples are worth all that a sample can be; None where a sample may always be worth
-    more. Costs [US dollars] are at the prices of the replies, cached ones included.
+    more. `errors` are shares of wrong steps [%]. Costs [US dollars] are at the prices of the
+    replies, cached ones included.
     """
     table = coverage_frame(run)
     outcomes = table[table["track"] == track].set_index("model").to_dict("index")
@@ -180,7 +207,15 @@ def _facts_of(
             return value
         return None if math.isnan(value) else float(f"{value:.6g}")
 
-    errors, found = _error_shares(run, track), {}
+    errors: dict[str, dict[str, float]] = {}
+    rows = headline_rows(track_estimates(run, track), run.design)
+    rows = rows[rows["cell"] == run.cells(track)[-1].name]
+    for row in rows[rows["value"].notna()].to_dict("records"):
+        name = str(row["measure"])
+        if name.startswith("wrong_"):
+            of_model = errors.setdefault(str(row["model"]), {})
+            of_model[name.removeprefix("wrong_")] = round(100 * float(row["value"]), 2)
+    found = {}
     for model, row in outcomes.items():
         solved, whole = None, None
         if not math.isnan(best):
@@ -200,18 +235,6 @@ def _facts_of(
             "errors": errors.get(str(model), {}),
         }
         found[str(model)] = {name: known(value) for name, value in facts.items()}
-    return found
-
-
-def _error_shares(run: Run, track: str) -> dict[str, dict[str, float]]:
-    """Return the share [%] of each type of wrong step by model, in the headline setting."""
-    cell = run.cells(track)[-1].name
-    rows = headline_rows(track_estimates(run, track), run.design)
-    wanted = rows["measure"].str.startswith("wrong_") & (rows["cell"] == cell)
-    found: dict[str, dict[str, float]] = {}
-    for row in rows[wanted & rows["value"].notna()].to_dict("records"):
-        name = str(row["measure"]).removeprefix("wrong_")
-        found.setdefault(str(row["model"]), {})[name] = round(100 * float(row["value"]), 2)
     return found
 
 
@@ -241,7 +264,7 @@ def rank_ranges_of(
 def board_of(
     runs: Sequence[SiteRun], entries: Sequence[Entry], values: AllValues
 ) -> dict[str, Any]:
-    """Return what the first page shows, plain values.
+    """Return the numbers that a page shows, as plain values.
 
     Raises SpecError for runs that cannot be compared.
     """
@@ -252,11 +275,23 @@ def board_of(
     ranges: dict[str, Mapping[str, tuple[int, int]]] = {}
     tracks: list[dict[str, Any]] = []
     columns: list[dict[str, Any]] = []
-    about: dict[str, Any]
-    told: dict[str, Any]
     for track, place in first.items():
-        kind, run, measure = kind_of(track), runs[place].run, main_measure(runs[place].run, track)
+        run, of = runs[place].run, {one.name: one for one in track_measures(track)}
+        columns += [
+            {
+                "id": _id(track, setting, column.heading),
+                "track": track,
+                "setting": setting,
+                "heading": column.heading,
+                "unit": of[column.measure].unit,
+                "better": of[column.measure].better,
+                "cell": column.cell,
+            }
+            for setting in values[place, track].values
+            for column in headline_columns(run, track)
+        ]
         heading = main_column(run, track).heading
+<<<<<<< HEAD
         about = {"name": track, "title": kind.title, "item": kind.item, "main": heading}
         about |= {"unit": measure.unit, "better": measure.better}
         about["best"] = None if math.isnan(measure.best) else measure.best
@@ -273,11 +308,13 @@ def board_of(
                 told = {"track": track, "setting": setting, "heading": column.heading}
                 told |= {"unit": of.unit, "better": of.better, "cell": column.cell}
                 columns.append({"id": _id(track, setting, column.heading), **told})
+=======
+>>>>>>> 80a12f72 (Pages: report and leaderboard are one page with one index of samples, one view of a sample, one table and one sheet)
         main = _id(track, next(iter(values[place, track].values)), heading)
         ranked = [entry for entry in entries if main in numbers[entry.name]]
-        models = [entry.name for entry in ranked if not entry.model.is_baseline]
-        tracks[-1]["finding"] = _finding(floor, measure, [numbers[name][main] for name in models])
+        models = [numbers[e.name][main] for e in ranked if not e.model.is_baseline]
         ranges[track] = rank_ranges_of(track, ranked, runs, values)
+        tracks.append(_track(track, run, models))
     lacking = {key: shortfalls(runs[key[0]].run, key[1]) for key in values}
     rows = []
     for entry in entries:
@@ -295,8 +332,41 @@ def board_of(
                 "facts": {key[1]: values[key].facts[name] for key in of_tracks},
             }
         )
-    told = {"tracks": tracks, "columns": columns, "rows": rows}
-    return {**told, "runs": [_run(one) for one in runs]}
+    return {
+        "tracks": tracks,
+        "columns": columns,
+        "rows": rows,
+        "runs": [_run(one) for one in runs],
+    }
+
+
+def _track(track: str, run: Run, models: Sequence[Sequence[float | None]]) -> dict[str, Any]:
+    """Return a track of a page; `models` are the values and intervals of those that are ranked."""
+    kind, measure = kind_of(track), main_measure(run, track)
+    report, heading = kind.report(), main_column(run, track).heading
+    floor = headline_floors(run, track).get(heading)
+    names = (one.name for one in track_measures(track))
+    parts = report.part_names
+    return {
+        "name": track,
+        "title": kind.title,
+        "item": kind.item,
+        "main": heading,
+        "unit": measure.unit,
+        "better": measure.better,
+        "best": None if math.isnan(measure.best) else measure.best,
+        "notes": list(track_notes(run, track)),
+        "errors": [name.removeprefix("wrong_") for name in names if name.startswith("wrong_")],
+        "floor": floor and {"name": floor.name, "value": round(floor.value, 4)},
+        "physics": kind.physics(run.manifest.suite),
+        "finding": _finding(floor, measure, models),
+        "parts": dict(parts),
+        "groups": {
+            cell.name: {"title": cell.heading, "of": list(cell.of)}
+            for cell in run.cells(track)
+            if cell.of and all(name in parts for name in cell.of)
+        },
+    }
 
 
 def _finding(
@@ -307,9 +377,8 @@ def _finding(
     """
     if floor is None or not values:
         return ""
-    place = 1 if measure.better == "higher" else 2
+    sign, place = (1, 1) if measure.better == "higher" else (-1, 2)
     ends = [value[place] for value in values]
-    sign = 1 if measure.better == "higher" else -1
     above = sum(end is not None and sign * (end - floor.value) > 0 for end in ends)
     rule = f"a rule that never sees the goal ({floor.name}, {rounded(floor.value)})"
     if not above:
@@ -342,67 +411,13 @@ def _run(one: SiteRun) -> dict[str, Any]:
         "suite": run.design.suite.name,
         "id": manifest.identity[:12],
         "date": one.date,
-        "verified": one.is_verified,
+        "verified": one.unverified is not None,
         "unverified": one.unverified or (),
         "seeds": len(run.design.suite.seeds),
         "data": data.name if data else "",
         "version": data.version if data else None,
         "asked": list(dict.fromkeys(words)),
-        "phyblock": manifest.versions.get("phyblock", ""),
     }
-
-
-class Failures:
-    """Finds samples that tell how models fail: of every type of error one, of other models where
-    there are some.
-    """
-
-    def __init__(self, run: Run, known: frozenset[str]) -> None:
-        """Take failures of models of a run in scenes that can be drawn, `known` by name."""
-        self._run, self._known = run, known
-        self._rules = {model.name for model in run.manifest.models if model.is_baseline}
-        self.found: list[tuple[str, float, int, str]] = []
-
-    def see(self, record: Record, row: int) -> None:
-        """Take up a record that stands at a row of a page's samples."""
-        if record.model not in self._rules and record.scene in self._known:
-            for error, told in _failure(record, self._run):
-                self.found.append((error, told, row, record.model))
-
-
-def telling(failures: Sequence[Failures], most: int) -> list[dict[str, Any]]:
-    """Return the samples that tell most: `row` and `error` of each."""
-    found = [one for of_run in failures for one in of_run.found]
-    frequent = Counter(error for error, *_ in found)
-    chosen: dict[int, str] = {}
-    models: set[str] = set()
-    errors = sorted(frequent, key=lambda error: (frequent[error], error))
-    while found and len(chosen) < most:
-        before = len(chosen)
-        for error in errors[: most - len(chosen)]:
-            rest = [one for one in found if one[0] == error and one[2] not in chosen]
-            if rest:
-                _, _, row, model = min(rest, key=lambda one: (one[3] in models, -one[1], one[2]))
-                chosen[row] = error
-                models.add(model)
-        if len(chosen) == before:
-            break
-    return [{"row": row, "error": error} for row, error in chosen.items()]
-
-
-def _failure(record: Record, run: Run) -> Iterator[tuple[str, float]]:
-    """Yield the type of a sample's first wrong step, and how much the sample tells: it goes well
-    for some steps first, and its goal is neither tiny nor large.
-    """
-    design = run.design
-    for score in record.scores:
-        wanted = score.setting == design.setting and score.matcher in (None, design.matcher)
-        if not wanted or score.why is None:
-            continue
-        first = next((n for n, why in enumerate(score.why) if why is not None), None)
-        if first is not None and first >= 2:
-            yield str(score.why[first]), min(first, 4) - abs(record.n_blocks - _TELLING_BLOCKS)
-        return
 
 
 def shortfalls(run: Run, track: str) -> Mapping[str, str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 import os
 import re
@@ -21,46 +20,15 @@ from phyblock.errors import DataError, Problem, SpecError, StoreError
 from phyblock.files import LIST, OutFolder, digest_of_file, writing
 from phyblock.records.files import RECORDS
 from phyblock.records.manifest import MANIFEST
-from phyblock.records.record import Record
 from phyblock.results.load import Run, load_run
 from phyblock.sim.pictures import PictureStyle, goal_png, to_png
 from phyblock.tracks.base import CARRYING, kind_of
-from phyblock.web.board import (
-    AllValues,
-    Entry,
-    Failures,
-    SiteRun,
-    all_values,
-    board_of,
-    entries_of,
-    telling,
-)
-from phyblock.web.pack import (
-    IN_INDEX,
-    Columns,
-    Numbers,
-    Pack,
-    asset,
-    build_of,
-    fill,
-    kit,
-    open_sources,
-    pack_scenes,
-    places_of,
-    records_at,
-    write_script,
-    write_three,
-)
+from phyblock.web.board import SiteRun, all_values, board_of, entries_of, open_sources
+from phyblock.web.pack import build_of, pack_samples, write_page
 
 INDEX = "index.html"
 _DATA = "data/"
 _PARTIAL = re.compile(r"\.[0-9a-f]{32}\.part")
-_SCRIPTS = (
-    *("dom.js", "chunks.js", "solid.js", "steps.js", "poses.js", "runs.js", "stage.js"),
-    *("quotes.js", "overlay.js", "why.js", "store.js", "table.js", "chart.js", "ranking.js"),
-    *("board.js", "views.js", "replay.js", "site.js"),
-)
-_STYLES = ("base.css", "samples.css", "reply.css", "site.css", "ranking.css")
 _MAY_DIFFER = ("pictures",)
 """Parts of a track's identity: digests of pictures, which change with their size."""
 _CONTROLS = frozenset({"blind", "wrong_image", "prompt", "path"})
@@ -71,27 +39,22 @@ _HINTS = {
     "or make a site of each",
 }
 """Hints by the last part of the name of what differs."""
-_LONGEST = {"text": 6000, "reasoning": 2000}
-"""Characters of a reply that a site shows; the bundle has all of it."""
-_LEFT_OUT = IN_INDEX | {"reply", "scores", "turns", "prompt", "asked", "time", "counts"}
-"""Fields of records that a replay needs otherwise or not at all; those that tracks add, it has."""
 _FAILURES = 4
 _ABOUT = (
     "A vision-language model sees a picture of a structure and sixteen numbered blocks, and says "
     "which blocks to place, in which order."
 )
-_REPLY = ("text", "reasoning", "finish", "cost_usd", "usage", "latency_s")
 
 
-@dataclass(frozen=True)
+@dataclass
 class SiteWritten:
-    """A site: its page, how many models and samples it shows, and its size without pictures."""
+    """A site: its page, models, samples and size, and why it draws nothing ("": it does)."""
 
     path: Path
     models: int
-    samples: int
-    size_bytes: int
-    lacking: str
+    samples: int = 0
+    size_bytes: int = 0
+    lacking: str = ""
 
 
 def write_site(
@@ -112,34 +75,32 @@ def write_site(
         runs = open_runs(paths, data, kept)
         check_runs_alike(runs)
         entries, values = entries_of(runs), all_values(runs)
-        board = board_of(runs, entries, values)
-        told: list[Any] = [title]
-        for one in runs:
-            # The manifest of a bundle names this machine's data.
-            manifest = one.run.manifest.identity if one.is_verified else None
-            manifest = manifest or digest_of_file(one.run.path / MANIFEST)
-            records = digest_of_file(one.run.path / RECORDS)
-            told.append([manifest, records, one.is_verified, bool(one.sources.lacking)])
-        build = build_of(*told)
-        own = f"{_DATA}{build}/"
-        with folder.alone(), writing(out):
-            with folder.making(own) as new:
-                samples = _write_samples(new, build, runs, entries, values)
-                write_script(new, "board", build, {**board, "title": title})
-                write_script(new, "samples", build, {**samples, "kit": kit()})
-                write_three(new)
-                finding = board["tracks"][0]["finding"]
-                image = _card(title, finding, runs, samples)
-                (new / "card.png").write_bytes(image)
-                size = sum(path.stat().st_size for path in new.iterdir())
-            facts = {"title": title, "folder": f"{_DATA}{build}", "build": build}
-            facts |= {"description": f"{_ABOUT} {finding}".strip(), "image": f"{own}card.png"}
-            facts["icon"] = base64.b64encode(asset("icon.svg")).decode()
-            page = fill("site.html.j2", _SCRIPTS, _STYLES, **facts)
-            (path,) = folder.write({INDEX: page})
-            folder.remove(name for name in folder.names(_DATA) if not name.startswith(own))
-    n_samples, lacking = len(samples["rows"]["entry"]), str(samples["lacking"])
-    return SiteWritten(path, len(entries), n_samples, size + len(page.encode()), lacking)
+        board = board_of(runs, entries, values) | {"title": title, "about": _ABOUT}
+        finding = board["tracks"][0]["finding"]
+        build = build_of(title, [_digests(one) for one in runs])
+        facts = {"title": title, "description": f"{_ABOUT} {finding}".strip(), "board": board}
+        facts["image"] = f"{_DATA}{build}/card.png"
+        made = SiteWritten(out / INDEX, len(entries))
+
+        def make(new: Path) -> dict[str, Any]:
+            index = pack_samples(new, build, runs, entries, values, failures=_FAILURES, is_cut=True)
+            (new / "card.png").write_bytes(_card(title, finding, runs, index))
+            made.size_bytes = sum(path.stat().st_size for path in new.iterdir())
+            made.samples, made.lacking = len(index["rows"]["entry"]), index["lacking"]
+            return facts
+
+        write_page(folder, INDEX, _DATA, build, make)
+    made.size_bytes += made.path.stat().st_size
+    return made
+
+
+def _digests(one: SiteRun) -> list[Any]:
+    """Return what makes another page where it is another."""
+    is_verified = one.unverified is not None
+    # The manifest of a bundle names this machine's data.
+    manifest = one.run.manifest.identity if is_verified else digest_of_file(one.run.path / MANIFEST)
+    records = digest_of_file(one.run.path / RECORDS)
+    return [manifest, records, is_verified, bool(one.sources.lacking)]
 
 
 def _check_place(folder: OutFolder) -> None:
@@ -251,19 +212,16 @@ def _facts(run: Run, shared: Sequence[str]) -> Iterator[tuple[str, Any]]:
                 yield f"{name}.{key}", str(getattr(values, key))
 
 
-def _card(title: str, finding: str, runs: Sequence[SiteRun], samples: Mapping[str, Any]) -> bytes:
+def _card(title: str, finding: str, runs: Sequence[SiteRun], index: Mapping[str, Any]) -> bytes:
     """Return the picture of a site for links to it: its title and finding, and a goal, as PNG of
     1200 x 630 pixels.
     """
     card = Image.new("RGB", (1200, 630), "#ffffff")
-    scenes = samples["scenes"]
-    for failure in samples["telling"]:
-        scene = scenes[samples["items"]["scene"][samples["rows"]["item"][failure["row"]]]]
-        tasks = (one.sources.tasks.get(scene) for one in runs)
-        if (task := next(filter(None, tasks), None)) is not None:
-            goal = goal_png(task.scene, PictureStyle(size_px=560))
-            card.paste(Image.open(io.BytesIO(goal)).convert("RGB"), (605, 35))
-            break
+    for row in index["telling"][:1]:
+        scene = index["scenes"][index["items"]["scene"][index["rows"]["item"][row]]]
+        task = next(one.sources.tasks[scene] for one in runs if scene in one.sources.tasks)
+        goal = goal_png(task.scene, PictureStyle(size_px=560))
+        card.paste(Image.open(io.BytesIO(goal)).convert("RGB"), (605, 35))
     draw, top = ImageDraw.Draw(card), 110
     for text, size, color, width in ((title, 58, "#16181d", 18), (finding, 36, "#3a4cc4", 30)):
         for line in textwrap.wrap(text, width):
@@ -271,104 +229,3 @@ def _card(title: str, finding: str, runs: Sequence[SiteRun], samples: Mapping[st
             top += round(1.25 * size)
         top += 36
     return to_png(card)
-
-
-def _write_samples(
-    folder: Path,
-    build: str,
-    runs: Sequence[SiteRun],
-    entries: Sequence[Entry],
-    values: AllValues,
-) -> dict[str, Any]:
-    """Write the scripts of single samples; return the index of all samples and items as columns.
-
-    Raises OSError where the disk refuses, StoreError for a record that cannot be read.
-    """
-    packs = {kind: Pack(folder, kind, build) for kind in ("replays", "scenes", "questions")}
-    failures = [Failures(one.run, frozenset(one.sources.tasks)) for one in runs]
-    scenes, numbered, tracks, outcomes, ways = (Numbers() for _ in range(5))
-    items = Columns("track", "key", "scene", "levels", "part", "question")
-    rows = Columns("entry", "item", "seed", "way", "outcome", "score")
-    owner = {
-        (number, track, entry.model.name): place
-        for place, entry in enumerate(entries)
-        for track, number in entry.runs.items()
-    }
-    for number, one in enumerate(runs):
-        # Model by model: what one model says packs best together.
-        order = Numbers(one.run.design.model_names)
-        places = [p for p in places_of(one.run) if p.track in one.tracks]
-        places.sort(key=lambda place: order.of(place.model))
-        for record in records_at(one.run.path, places):
-            track, item = record.track, record.item
-            if (track, item) not in numbered:
-                items.add(
-                    track=tracks.of(track),
-                    key=item,
-                    scene=scenes.of(record.scene),
-                    levels=list(record.levels),
-                    part=record.part,
-                    question=one.sources.question(record, packs["questions"]),
-                )
-            worth = values[number, track].samples.get(record.model, {})
-            score = worth.get((record.scene, item, record.seed, record.way.key))
-            rows.add(
-                entry=owner[number, track, record.model],
-                item=numbered.of((track, item)),
-                seed=record.seed,
-                way=ways.of(record.way.key),
-                outcome=outcomes.of(record.outcome),
-                score=None if score is None else round(score * 10),
-            )
-            failures[number].see(record, packs["replays"].add(_replay(record, one.run)))
-    is_drawn = pack_scenes(scenes, [one.sources for one in runs], packs["scenes"])
-    for pack in packs.values():
-        pack.close()
-    parts: dict[str, str] = {}
-    for track in tracks:
-        parts |= kind_of(track).report().part_names
-    return {
-        "telling": telling(failures, _FAILURES),
-        "tracks": list(tracks),
-        "items": items,
-        "outcomes": list(outcomes),
-        "ways": list(ways),
-        "rows": rows,
-        "scenes": list(scenes),
-        "starts": {kind: pack.starts for kind, pack in packs.items()},
-        "parts": parts,
-        "lacking": "" if is_drawn else runs[0].sources.lacking,
-    }
-
-
-def _replay(record: Record, run: Run) -> dict[str, Any]:
-    """Return what a page shows of a record."""
-    fields = record.fields()
-    entry = {
-        name: value for name, value in fields.items() if name not in _LEFT_OUT and value is not None
-    }
-    if record.asked_turns:
-        entry["turns"] = [
-            {
-                **{name: turn[name] for name in turn if name != "prompt"},
-                "reply": _cut(turn["reply"]),
-            }
-            for turn in fields["turns"]
-        ]
-    elif record.reply is not None:
-        entry["reply"] = _cut(fields["reply"])
-    entry["scores"] = [
-        {name: score.get(name) for name in ("setting", "tp", "fp", "fn", "placed", "why")}
-        for score in fields["scores"]
-        if score.get("matcher") in (None, run.design.matcher) and score.get("placed") is not None
-    ]
-    return entry
-
-
-def _cut(reply: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what is shown of a reply, long texts cut."""
-    kept = {name: reply[name] for name in _REPLY if reply.get(name) not in (None, "")}
-    for name, most in _LONGEST.items():
-        if len(text := kept.get(name, "")) > most:
-            kept |= {name: text[:most], f"{name}_characters": len(text)}
-    return kept

@@ -1,4 +1,4 @@
-"""Runs as data of pages: records, scenes and questions as JSON in scripts, and pictures as sent.
+"""Files of a page: its HTML, and beside it data as scripts, three.js, and pictures as sent.
 
 A page that was opened from disk may load scripts, but not fetch files. A script calls
 `phyblockTake(build, name, text)`; the text is JSON, deflated, in base 64, so that nothing that a
@@ -13,8 +13,8 @@ import json
 import os
 import re
 import zlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from importlib.metadata import version
 from importlib.resources import files
@@ -24,36 +24,40 @@ from typing import Any, NamedTuple
 import jinja2
 
 from phyblock.data import AssemblyTask
-from phyblock.domain import BLOCK_TYPES, Block, CandidateSet, Question, Scene
-from phyblock.errors import DataError
-from phyblock.files import atomic_write, digest_of_file
+from phyblock.domain import BLOCK_TYPES, Block, Question
+from phyblock.files import OutFolder, atomic_write, digest_of_file, writing
 from phyblock.records.files import PromptLines, RecordLines
-from phyblock.records.record import Record, Score, SentPrompt
+from phyblock.records.record import Record, SentPrompt
 from phyblock.resources import cache_dir
-from phyblock.results.load import Design, Run
-from phyblock.run.rescore import recorded_dataset
+from phyblock.results.load import Run
 from phyblock.sim.geometry import solid_mesh
 from phyblock.sim.pictures import COLOR_RGB
 from phyblock.stable import hex_digest
-from phyblock.tracks.base import kind_of, kinds
-from phyblock.tracks.measures import by_settings
+from phyblock.web.board import AllValues, Entry, SiteRun, Sources
 
-_LAYOUT = 6
+_LAYOUT = 7
 """Version of the scripts."""
 _CHUNK_CHARACTERS = 400_000
 _DIGITS = 24
-PICTURES = "report/pictures/"
-"""The folder of pictures that were sent, below that of a run."""
 _DECIMALS = 6
 """Decimals of numbers that pages draw by."""
-_ONLY_IN_TABLES = ("errors", "blocks", *Score.FURTHER)
-IN_INDEX = frozenset(
+PICTURES = "report/pictures/"
+"""The folder of pictures that were sent, below that of a run."""
+_SCRIPTS = (
+    *("dom.js", "data.js", "solid.js", "steps.js", "poses.js", "stage.js", "quotes.js"),
+    *("sample.js", "list.js", "table.js", "charts.js", "results.js", "views.js", "app.js"),
+)
+_LEFT_OUT = frozenset(
     {
         *("sample", "track", "model", "key", "scene", "levels", "parents", "n_blocks", "seed"),
-        *("variant", "outcome", "run"),
+        *("variant", "outcome", "run", "time", "counts", "prompt", "turns", "reply", "scores"),
     }
 )
-"""Fields of records that an index has, or that are of no use on a page."""
+"""Fields of records that the index has, that a page does not show, or shows in another form."""
+_LONGEST = {"text": 6000, "reasoning": 2000}
+"""Characters of a reply that a site shows; the bundle has all of it."""
+_TELLING_BLOCKS = 6
+"""A failure tells most where its goal has about so many blocks."""
 
 
 class Pack:
@@ -88,17 +92,21 @@ class Pack:
             self._entries, self._size = [], 0
 
 
-def write_script(folder: Path, name: str, build: str, data: Mapping[str, object]) -> None:
-    """Write one object as the script `<name>.js`; raises OSError where the disk refuses."""
-    _write(folder, name, build, _to_json(data))
+def _to_json(data: object) -> str:
+    return json.dumps(data, ensure_ascii=True, separators=(",", ":"), allow_nan=False)
 
 
-def write_three(folder: Path) -> None:
+def _write(folder: Path, name: str, build: str, text: str) -> None:
+    packed = base64.b64encode(zlib.compress(text.encode("ascii"), 9)).decode("ascii")
+    script = f"phyblockTake('{build}','{name}','{packed}')\n"
+    (folder / f"{name}.js").write_text(script, encoding="ascii")
+
+
+def _write_three(folder: Path) -> None:
     """Write three.js as the script `three.js`, which names it `THREE`.
 
     Its published build is of two modules, which a page that was opened from disk may not load; what
-    they import and export becomes what functions take and return. Raises OSError where the disk
-    refuses.
+    they import and export becomes what functions take and return.
     """
 
     def exported(match: re.Match[str]) -> str:
@@ -119,16 +127,6 @@ def write_three(folder: Path) -> None:
     )
     script = f"window.THREE=(core=>{{{module}}})((()=>{{{core}}})());\n"
     (folder / "three.js").write_text(script, encoding="utf-8")
-
-
-def _to_json(data: object) -> str:
-    return json.dumps(data, ensure_ascii=True, separators=(",", ":"), allow_nan=False)
-
-
-def _write(folder: Path, name: str, build: str, text: str) -> None:
-    packed = base64.b64encode(zlib.compress(text.encode("ascii"), 9)).decode("ascii")
-    script = f"phyblockTake('{build}','{name}','{packed}')\n"
-    (folder / f"{name}.js").write_text(script, encoding="ascii")
 
 
 def build_of(*told: object) -> str:
@@ -154,168 +152,205 @@ def places_of(run: Run) -> list[Place]:
     models = {name: n for n, name in enumerate(run.design.model_names)}
 
     def order(place: Place) -> tuple[int, str, int, str, int]:
-        track, model = tracks.get(place.track, len(tracks)), models.get(place.model, len(models))
-        return track, place.key, model, place.model, place.seed
+        model = models.get(place.model, len(models))
+        return tracks[place.track], place.key, model, place.model, place.seed
 
-    return sorted(places, key=order)
-
-
-def records_at(folder: Path, places: Iterable[Place]) -> Iterable[Record]:
-    """Read the records at these places, one at a time."""
-    return RecordLines(folder).at(place.start for place in places)
+    return sorted((place for place in places if place.track in tracks), key=order)
 
 
-class Numbers(dict[Any, int]):
+class _Numbers(dict[Any, int]):
     """Distinct values, numbered from 0 in the order in which they come."""
-
-    def __init__(self, values: Iterable[Any] = ()) -> None:
-        super().__init__({value: n for n, value in enumerate(dict.fromkeys(values))})
 
     def of(self, value: Any) -> int:
         """Return the number of a value, the next one where it is new."""
         return self.setdefault(value, len(self))
 
 
-class Columns(dict[str, list[Any]]):
-    """Lists of one length, by name."""
-
-    def __init__(self, *names: str) -> None:
-        super().__init__({name: [] for name in names})
-
-    def add(self, **row: Any) -> None:
-        """Append a value to each list."""
-        for name, value in row.items():
-            self[name].append(value)
-
-
-class SampleIndex:
-    """Columns over all samples of a run, and over the items that they are about."""
-
-    def __init__(self, design: Design) -> None:
-        tracks = design.suite.tracks
-        self._matcher = design.matcher
-        self._listings = {
-            name: (*kind_of(name).report().listings, *by_settings(design.suite)) for name in tracks
-        }
-        # A model and a track without any record are in the run as well.
-        self._tracks, self._models = Numbers(tracks), Numbers(design.model_names)
-        self.scenes, self.items = Numbers(), Numbers()
-        self._outcomes, self._subtasks, self._variants = Numbers(), Numbers(), Numbers()
-        self._about = Columns("scene", "levels", "subtask", "question")
-        self._rows = Columns("track", "model", "item", "seed", "variant", "outcome", "correct")
-        names = {listing.name: None for group in self._listings.values() for listing in group}
-        self._scores = {name: Columns("tp", "fp", "fn", "wrong") for name in names}
-
-    def add(self, record: Record, question: Callable[[Record], int]) -> None:
-        """Append the sample of a record; of a new item, the number of its `question`."""
-        item = (record.track, record.item)
-        if item not in self.items:
-            part = None if record.part is None else self._subtasks.of(record.part)
-            about = {"scene": self.scenes.of(record.scene), "levels": record.levels}
-            self._about.add(**about, subtask=part, question=question(record))
-        self._rows.add(
-            track=self._tracks.of(record.track),
-            model=self._models.of(record.model),
-            item=self.items.of(item),
-            seed=record.seed,
-            variant=self._variants.of(record.way.key),
-            outcome=self._outcomes.of(record.outcome),
-            correct=None if record.is_correct is None else int(record.is_correct),
-        )
-        listings = {listing.name: listing for listing in self._listings.get(record.track, ())}
-        for name, columns in self._scores.items():
-            listing = listings.get(name)
-            listed = listing.score(record) if listing else None
-            if listing is None or listed is None:
-                columns.add(tp=None, fp=None, fn=None, wrong=None)
-                continue
-            # A bit for each type of wrong step.
-            wrong = sum(1 << n for n, name in enumerate(listing.errors) if name in listed.errors)
-            columns.add(tp=listed.tp, fp=listed.fp, fn=listed.fn, wrong=wrong)
-
-    def columns(self) -> dict[str, Any]:
-        """Return the index as the page takes it."""
-        return {
-            "tracks": list(self._tracks),
-            "track_titles": [kinds()[name].title for name in self._tracks],
-            "track_items": [kinds()[name].item for name in self._tracks],
-            "models": list(self._models),
-            "outcomes": list(self._outcomes),
-            "subtasks": list(self._subtasks),
-            "scenes": list(self.scenes),
-            "seeds": sorted(set(self._rows["seed"])),
-            "variants": list(self._variants),
-            "listings": [
-                [
-                    {"name": one.name, "errors": one.errors, "is_counted": one.is_counted}
-                    for one in self._listings.get(track, ())
-                ]
-                for track in self._tracks
-            ],
-            "matcher": self._matcher,
-            "items": {
-                "key": [key for _, key in self.items],
-                **self._about,
-            },
-            "rows": {**self._rows, "scores": self._scores},
-        }
-
-
 def pack_samples(
     folder: Path,
-    places: Iterable[Place],
-    index: SampleIndex,
-    packs: Mapping[str, Pack],
-    sources: Sources,
-    picture: Callable[[str], str | None],
-    see: Callable[[Record, int], None],
-) -> None:
-    """Pack the newest record of every sample, its question and the prompts as sent; add it to the
-    index.
+    build: str,
+    runs: Sequence[SiteRun],
+    entries: Sequence[Entry],
+    values: AllValues,
+    *,
+    failures: int,
+    sent: SentPictures | None = None,
+    is_cut: bool = False,
+) -> dict[str, Any]:
+    """Write the scripts of single samples and three.js; return the index of all samples and items
+    as columns, which is the script `samples`.
 
-    `picture` gives the address of a picture as seen from the page by the digest of its bytes. `see`
-    is called with every record and its number.
+    Every sample has its newest record, with the prompt as sent where there is `sent`, and with long
+    replies cut where it `is_cut`. Of `failures` samples the index says that they tell how models
+    fail. Raises OSError where the disk refuses, StoreError for a record that cannot be read.
     """
-    sent_as = {
-        line.sha256: packs["prompts"].add([message.fields() for message in line.messages])
-        for _, line in PromptLines(folder)
+    packs = {
+        kind: Pack(folder, kind, build) for kind in ("records", "scenes", "questions", "prompts")
     }
-
-    def sent(prompt: SentPrompt | None) -> dict[str, Any] | None:
-        if prompt is None:
-            return None
-        images = []
-        for image in prompt.images:
-            size = {"width_px": image.width_px, "height_px": image.height_px}
-            images.append({"label": image.label, **size, "file": picture(image.sha256)})
-        return {"template": prompt.template, "n": sent_as.get(prompt.messages), "images": images}
-
-    for record in records_at(folder, places):
-        index.add(record, lambda record: sources.question(record, packs["questions"]))
-        entry = {name: value for name, value in record.fields().items() if name not in IN_INDEX}
-        entry["prompt"] = sent(record.prompt)
-        entry["scores"] = [
-            {name: value for name, value in score.fields().items() if name not in _ONLY_IN_TABLES}
-            for score in record.scores
-        ]
-        if record.asked_turns:
-            turns = record.asked_turns
-            entry["turns"] = [{**turn.fields(), "prompt": sent(turn.prompt)} for turn in turns]
-        see(record, packs["records"].add(entry))
-
-
-def pack_scenes(scenes: Iterable[str], sources: Sequence[Sources], pack: Pack) -> bool:
-    """Pack the scenes of these names from the first source that has each; False if none has any."""
+    tracks, scenes, numbered, outcomes, ways, errors = (_Numbers() for _ in range(6))
+    items: list[tuple[Any, ...]] = []
+    rows: list[tuple[Any, ...]] = []
+    found: list[_Failure] = []
+    owner = {
+        (number, track, entry.model.name): place
+        for place, entry in enumerate(entries)
+        for track, number in entry.runs.items()
+    }
+    for number, one in enumerate(runs):
+        design, prompts = one.run.design, {}
+        if sent:
+            for _, line in PromptLines(one.run.path):
+                messages = [message.fields() for message in line.messages]
+                prompts[line.sha256] = packs["prompts"].add(messages)
+        starts = (place.start for place in places_of(one.run))
+        for record in RecordLines(one.run.path).at(starts):
+            track, item = record.track, record.item
+            if (track, item) not in numbered:
+                asked = opener(record) if (opener := one.sources.items.get(track)) else None
+                question = packs["questions"].add(_question(asked.question)) if asked else -1
+                about = (tracks.of(track), item, scenes.of(record.scene), record.levels)
+                items.append((*about, record.part, question))
+            worth = values[number, track].samples.get(record.model, {})
+            score = worth.get((record.scene, item, record.seed, record.way.key))
+            course = record.course(design.matcher)
+            wrong = [why for _, why in course.steps] if course else []
+            rows.append(
+                (
+                    owner[number, track, record.model],
+                    numbered.of((track, item)),
+                    record.seed,
+                    ways.of(record.way.key),
+                    outcomes.of(record.outcome),
+                    None if score is None else round(score, 1),
+                    # A bit for each type of wrong step.
+                    sum(1 << errors.of(why) for why in set(filter(None, wrong))),
+                )
+            )
+            if record.scene in one.sources.tasks and not _is_rule(one.run, record.model):
+                found += _failure(record, wrong, len(rows) - 1)
+            packs["records"].add(_entry(record, design.matcher, prompts, sent, is_cut))
     is_drawn = False
     for scene in scenes:
-        tasks = (source.tasks.get(scene) for source in sources)
-        task = next((task for task in tasks if task is not None), None)
+        tasks = (one.sources.tasks.get(scene) for one in runs)
+        task = next(filter(None, tasks), None)
         is_drawn |= task is not None
-        pack.add(task and scene_entry(task.scene, task.candidates))
-    return is_drawn
+        packs["scenes"].add(task and _scene(task))
+    for pack in packs.values():
+        pack.close()
+    starts_of = {kind: pack.starts for kind, pack in packs.items()}
+    index = {
+        "tracks": list(tracks),
+        "scenes": list(scenes),
+        "ways": list(ways),
+        "outcomes": list(outcomes),
+        "errors": list(errors),
+        "items": _columns("track key scene levels part question", items),
+        "rows": _columns("entry item seed way outcome score wrong", rows),
+        "starts": {**starts_of, "scenes": starts_of["scenes"] if is_drawn else []},
+        "lacking": "" if is_drawn or not runs else runs[0].sources.lacking,
+        "telling": _telling(found, failures),
+        "kit": _kit(),
+    }
+    _write(folder, "samples", build, _to_json(index))
+    _write_three(folder)
+    return index
 
 
-def kit() -> dict[str, Any]:
+def _columns(names: str, rows: Sequence[tuple[Any, ...]]) -> dict[str, list[Any]]:
+    return {name: [row[n] for row in rows] for n, name in enumerate(names.split())}
+
+
+def _is_rule(run: Run, name: str) -> bool:
+    return any(model.name == name and model.is_baseline for model in run.manifest.models)
+
+
+def _entry(
+    record: Record,
+    matcher: str,
+    prompts: Mapping[str, int],
+    sent: SentPictures | None,
+    is_cut: bool,
+) -> dict[str, Any]:
+    """Return a record as pages take it."""
+
+    def prompt(one: SentPrompt | None) -> dict[str, Any]:
+        if one is None or sent is None:
+            return {}
+        images = [
+            {
+                "label": image.label,
+                "width_px": image.width_px,
+                "height_px": image.height_px,
+                "file": sent.name(image.sha256),
+            }
+            for image in one.images
+        ]
+        number = prompts.get(one.messages)
+        return {"prompt": {"template": one.template, "n": number, "images": images}}
+
+    def reply(one: Mapping[str, Any]) -> dict[str, Any]:
+        kept = {name: value for name, value in one.items() if value not in (None, "")}
+        for name, most in _LONGEST.items():
+            if is_cut and len(text := kept.get(name, "")) > most:
+                kept |= {name: text[:most], f"{name}_characters": len(text)}
+        return kept
+
+    fields = record.fields()
+    left = ((name, value) for name, value in fields.items() if name not in _LEFT_OUT)
+    entry = {name: value for name, value in left if value is not None} | prompt(record.prompt)
+    if record.asked_turns:
+        turns = zip(fields["turns"], record.asked_turns, strict=True)
+        entry["turns"] = [
+            {**told, "reply": reply(told["reply"]), "prompt": None, **prompt(turn.prompt)}
+            for told, turn in turns
+        ]
+    if record.reply is not None:
+        # An episode's replies stand in its turns.
+        own = reply(fields["reply"])
+        entry["reply"] = {**own, "text": "", "reasoning": ""} if record.asked_turns else own
+    entry["scores"] = [
+        {name: score[name] for name in ("setting", "tp", "fp", "fn", "placed", "why")}
+        for score in fields["scores"]
+        if score.get("matcher") in (None, matcher) and score.get("placed") is not None
+    ]
+    return entry
+
+
+class _Failure(NamedTuple):
+    error: str
+    model: str
+    tells: float
+    row: int
+
+
+def _failure(record: Record, wrong: Sequence[str | None], row: int) -> Iterator[_Failure]:
+    """Yield the first wrong step of a sample that tells something: it goes well for some steps
+    first, and tells more where its goal is neither tiny nor large.
+    """
+    first = next((n for n, why in enumerate(wrong) if why), 0)
+    if first >= 2:
+        tells = min(first, 4) - abs(record.n_blocks - _TELLING_BLOCKS)
+        yield _Failure(str(wrong[first]), record.model, tells, row)
+
+
+def _telling(found: list[_Failure], most: int) -> list[int]:
+    """Return rows of samples that tell most: of every type of error, and of other models."""
+    errors: Counter[str] = Counter()
+    models: Counter[str] = Counter()
+    chosen: list[_Failure] = []
+
+    def order(one: _Failure) -> tuple[int, int, float, int]:
+        return errors[one.error], models[one.model], -one.tells, one.row
+
+    while len(chosen) < min(most, len(found)):
+        best = min((one for one in found if one not in chosen), key=order)
+        errors[best.error] += 1
+        models[best.model] += 1
+        chosen.append(best)
+    return [one.row for one in chosen]
+
+
+def _kit() -> dict[str, Any]:
     """Return shapes (vertices [m] and triangles in the body frame) and colors of all blocks."""
     shapes = {}
     for name in BLOCK_TYPES:
@@ -325,17 +360,21 @@ def kit() -> dict[str, Any]:
     return {"shapes": shapes, "colors": COLOR_RGB}
 
 
-def scene_entry(scene: Scene, candidates: CandidateSet) -> dict[str, Any]:
+def _scene(task: AssemblyTask) -> dict[str, Any]:
     """Return a scene with its candidates, as pages take it.
 
     `depend` holds positions of blocks in the list, from 0; `candidate` is the number of the
     candidate that stands for the block in setting A, null where there is none.
     """
-    blocks = []
-    for vertex, block in enumerate(scene.blocks):
-        depend, number = sorted(scene.graph.depends_on[vertex]), candidates.index_of(block.look)
-        more = {"order": block.order, "depend": depend, "candidate": number}
-        blocks.append({**_block_entry(block), **more})
+    scene, candidates = task.scene, task.candidates
+    blocks = [
+        {
+            **_block(block),
+            "depend": sorted(scene.graph.depends_on[vertex]),
+            "candidate": candidates.index_of(block.look),
+        }
+        for vertex, block in enumerate(scene.blocks)
+    ]
     offered = [
         {"type": one.type, "color": one.color, "euler": _rounded(one.euler_deg)}
         for one in candidates.candidates
@@ -343,14 +382,14 @@ def scene_entry(scene: Scene, candidates: CandidateSet) -> dict[str, Any]:
     return {"blocks": blocks, "candidates": offered}
 
 
-def question_entry(question: Question) -> dict[str, Any]:
+def _question(question: Question) -> dict[str, Any]:
     """Return a question with the recipes of its pictures, as pages take it."""
     pictures = [
         {
             "label": picture.label,
             "view": list(picture.view_deg),
-            "blocks": [_block_entry(block) for block in picture.blocks],
-            "framed": [_block_entry(block) for block in picture.framed],
+            "blocks": [_block(block) for block in picture.blocks],
+            "framed": [_block(block) for block in picture.framed],
             "marks": [
                 {"letter": mark.letter, "position": _rounded(mark.position_m)}
                 for mark in picture.marks
@@ -359,7 +398,6 @@ def question_entry(question: Question) -> dict[str, Any]:
         for picture in question.pictures
     ]
     return {
-        "id": question.id,
         "subtask": question.subtask,
         "text": question.text,
         "options": list(question.options),
@@ -369,50 +407,13 @@ def question_entry(question: Question) -> dict[str, Any]:
     }
 
 
-def _block_entry(block: Block) -> dict[str, Any]:
+def _block(block: Block) -> dict[str, Any]:
     pose = {"position": _rounded(block.position_m), "euler": _rounded(block.euler_deg)}
     return {"type": block.type, "color": block.color, **pose}
 
 
 def _rounded(values: Iterable[float]) -> list[float]:
     return [round(float(value), _DECIMALS) for value in values]
-
-
-@dataclass(frozen=True)
-class Sources:
-    """Tasks by scene id, and items that are more than scenes by track; where there are none,
-    `lacking` says why.
-    """
-
-    tasks: Mapping[str, AssemblyTask] = field(default_factory=dict)
-    items: Mapping[str, Callable[[Record], Any]] = field(default_factory=dict)
-    lacking: str = ""
-
-    def question(self, record: Record, pack: Pack) -> int:
-        """Pack the question that a record is about, as it was shown; -1 where there is none."""
-        opener = self.items.get(record.track)
-        shown = opener(record) if opener else None
-        return pack.add(question_entry(shown.question)) if shown else -1
-
-
-def open_sources(run: Run, data: Path | None) -> Sources:
-    """Return the scenes of a run, from `data` or from where the run found them, and what else
-    its tracks asked about. Without them a page shows every reply and score, but cannot draw.
-
-    Raises DataError when `data` is given and is not what the run was made on.
-    """
-    try:
-        dataset = recorded_dataset(run.path, run.manifest, data)
-        openers = {name: kind_of(name).report().items for name in run.design.suite.tracks}
-        facts = (run.path, run.manifest, dataset)
-        items = {name: opener(*facts) for name, opener in openers.items() if opener}
-        return Sources({task.scene.id: task for task in dataset.tasks}, items)
-    except DataError as error:
-        if data is not None:
-            raise
-        said = f"{error.problems[0].where}: {error.problems[0].message}"
-        how = "phyblock report RUN --data FOLDER draws it from where it is now"
-        return Sources(lacking=f"Nothing can be drawn without the data set ({said}); {how}.")
 
 
 class SentPictures:
@@ -454,24 +455,47 @@ def asset(name: str) -> bytes:
     return (files("phyblock.web") / "assets" / name).read_bytes()
 
 
-def fill(template: str, scripts: Iterable[str], styles: Iterable[str], **facts: Any) -> str:
-    """Return a page out of a template that is given `script`, `style`, the content security
-    `policy` that lets these alone run, and `facts`; every text in it is escaped.
+def write_page(
+    out: OutFolder,
+    name: str,
+    below: str,
+    build: str,
+    make: Callable[[Path], Mapping[str, Any]],
+    *,
+    lasting: Sequence[str] = (),
+) -> Path:
+    """Write a page `name` and its data in the folder `below`/`build`/; return the page.
+
+    `make` writes the data into a folder that it is given and returns what the page shows: `title`,
+    `description`, the address of an `image` for links to it ("" for none) and the `board`. The page
+    is written last and whole; data of earlier builds go, but for those `lasting`. An earlier page
+    that is still open says that it was written again.
     """
+    own = f"{below}{build}/"
+    with out.alone(), writing(out.path / name):
+        with out.making(own) as new:
+            facts = make(new)
+        (path,) = out.write({name: _filled(**facts, folder=own.rstrip("/"), build=build)})
+        kept = (own, *lasting)
+        out.remove(one for one in out.names(below) if not one.startswith(kept))
+    return path
+
+
+def _filled(**facts: Any) -> str:
+    """Return the HTML of a page; every text in it is escaped, and only our own scripts may run."""
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    script, style = (
-        "\n".join(asset(name).decode() for name in names) for names in (scripts, styles)
-    )
+    script = "\n".join(asset(name).decode() for name in _SCRIPTS)
+    style = asset("style.css").decode()
     digests = (
         base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
         for text in (script, style)
     )
-    # `data:` lets the empty icon in that keeps browsers from asking for one.
     policy = (
         "default-src 'none'; script-src 'sha256-{}' 'self'; style-src 'sha256-{}'; "
         "img-src 'self' data:; base-uri 'none'; form-action 'none'"
     ).format(*digests)
-    page = environment.from_string(asset(template).decode())
-    return page.render(**facts, script=script, style=style, policy=policy)
+    icon = base64.b64encode(asset("icon.svg")).decode()
+    page = environment.from_string(asset("page.html.j2").decode())
+    return page.render(**facts, script=script, style=style, policy=policy, icon=icon)

@@ -28,10 +28,7 @@ from phyblock.tracks.baselines import Pick, picks_of
 from phyblock.web.pack import asset
 from phyblock.web.session import NotNowError, PlaySession
 
-_SHARED = (
-    *("base.css", "dom.js", "play.css", "icon.svg", "picks.js", "fields.js", "picker.js"),
-    *("ending.js", "play.js"),
-)
+_FILES = ("style.css", "icon.svg", "dom.js", "picker.js", "play.js")
 _KINDS = {"css": "text/css", "js": "text/javascript", "html": "text/html", "svg": "image/svg+xml"}
 HOST = "127.0.0.1"
 LARGEST_BODY_BYTES = 16 * 1024
@@ -59,8 +56,7 @@ _PICTURE = re.compile(r"picture/(\d{1,9})/(\d{1,3})")
 
 def assets() -> dict[str, tuple[str, bytes]]:
     """Return type and content of every file of the page by name; the page itself has none."""
-    found = {one: asset(one) for one in _SHARED}
-    found |= {"source.js": asset("served.js"), "": asset("play.html")}
+    found = {"": asset("play.html"), **{one: asset(one) for one in _FILES}}
     return {
         one: (_KINDS[(one or "play.html").rpartition(".")[2]], data) for one, data in found.items()
     }

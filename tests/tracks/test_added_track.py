@@ -26,8 +26,7 @@ from phyblock.results.load import Run, load_run
 from phyblock.scoring.counts import mean_of, ratio_of
 from phyblock.tracks import Judgement, SceneTrack
 from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts, TrackReport
-from phyblock.web.board import SiteRun, all_values, board_of, entries_of, values_of
-from phyblock.web.pack import Sources
+from phyblock.web.board import SiteRun, Sources, all_values, board_of, entries_of, values_of
 from tests.servers.chassis import Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,74 +25,47 @@ HOSTILE = (
     "</pre></script><!--<script>\u2028'\\');window.hacked = 3//\ud83d\n"
     "Step1: Move block with index 1"
 )
-MARKUP = """# Plan
-Look [here](javascript:window.hacked=4) and ![x](http://127.0.0.1/p.png): **first** `3`.
-
-> <b onmouseover="window.hacked=5">quote</b>
-
-1. Move block with index 9. It is green.
-2. Move block with index 3
-
-| block | why |
-|---|---|
-| 3 | *base* |
-"""
+PLAN = "1. Move block with index 9. It is green.\n2. Move block with index 3"
 NAME = "<img src=x onerror='window.hacked=1'>\"&"
 """What a model and a scene of the site are called."""
 SUBTASKS = ("SH", "OR", "AD")
 VIEWPORT = {"width": 1400, "height": 1000}
 
 
-class ReportVisit(Visit):
-    """A report's page, by its file."""
+class PageVisit(Visit):
+    """A report's or a site's page, by its file."""
 
     def __init__(self, page: Page, path: Path) -> None:
         super().__init__(page)
         self.path = path
 
-    def open(self, view: str = "results") -> Page:
-        self.page.goto(f"{self.path.as_uri()}#{view}")
-        if view.startswith("samples"):
-            self.page.wait_for_selector("#list [role=option]")
-        return self.page
-
-    def show(self, sample: str, **words: str) -> Page:
-        more = "".join(f"&{name}={word}" for name, word in words.items())
-        self.page.goto(f"{self.path.as_uri()}#samples?s={sample.replace('/', '%2F')}{more}")
-        self.page.wait_for_selector("#detail .tabs")
-        return self.page
-
-    def count(self) -> str:
-        return self.page.inner_text("#list-status")
-
-    @property
-    def hash(self) -> str:
-        """The part of the address behind `#`."""
-        found: str = self.page.evaluate("location.hash")
-        return found.removeprefix("#")
-
-
-class SiteVisit(Visit):
-    """A site's page, by its file."""
-
-    def __init__(self, page: Page, path: Path) -> None:
-        super().__init__(page)
-        self.path = path
-
-    def open(self, view: str = "", **words: str) -> Page:
+    def open(self, view: str = "results", **words: str) -> Page:
         """Open a view and wait until it is shown."""
         query = f"?{urlencode(words, quote_via=quote)}" if words else ""
         self.page.goto("about:blank")
         self.page.goto(f"{self.path.as_uri()}#{view}{query}")
-        expect(self.page.locator("html")).to_have_attribute("data-shown", view or "board")
+        expect(self.page.locator("html")).to_have_attribute("data-shown", view)
         return self.page
+
+    def show(self, sample: str, **words: str) -> Page:
+        return self.open("samples", s=sample, **words)
+
+    def count(self, text: str) -> None:
+        """Wait until the list says this of itself."""
+        expect(self.page.locator("aside [role=status]")).to_have_text(text)
+
+    @property
+    def words(self) -> set[str]:
+        """The view, and what else the address says."""
+        found: str = self.page.evaluate("location.hash")
+        return set(re.split("[#?&]", found)) - {""}
 
 
 @pytest.fixture(scope="session")
 def made(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
     """A run, with its report, of two baselines on five scenes and six questions, two seeds each.
 
-    One reply says `HOSTILE`, one `MARKUP`, which plans 9, 3; one is missing. No test changes it.
+    One reply says `HOSTILE`, one plans 9, 3; one is missing. No test changes it.
     """
     made = Workspace(tmp_path_factory.mktemp("page"), pictures_dir)
     made.write_scenes()
@@ -111,7 +85,7 @@ def made(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Worksp
             record["reply"]["text"] = record["reply"]["reasoning"] = HOSTILE
             record["parse"]["rule"] = HOSTILE
         if record["sample"] == "full_planning/oracle/t5/s1":
-            record["reply"]["text"] = MARKUP
+            record["reply"]["text"] = PLAN
             record["parse"]["plan"] = [9, 3]
             for score in record["scores"]:
                 if score.get("placed"):
@@ -196,13 +170,13 @@ def site(runs: Workspace) -> Path:
 
 
 @pytest.fixture
-def visiting(browser: Browser) -> Iterator[Callable[[Path], ReportVisit]]:
-    """Visits to reports by their paths, which may complain of nothing and ask for nothing else."""
-    visits: list[ReportVisit] = []
+def visiting(browser: Browser) -> Iterator[Callable[[Path], PageVisit]]:
+    """Visits to pages by their paths, which may complain of nothing and ask for nothing else."""
+    visits: list[PageVisit] = []
 
-    def visit(path: Path) -> ReportVisit:
+    def visit(path: Path) -> PageVisit:
         page = browser.new_page(viewport=VIEWPORT, color_scheme="light")  # type: ignore[arg-type]
-        visits.append(ReportVisit(page, path))
+        visits.append(PageVisit(page, path))
         return visits[-1]
 
     yield visit
@@ -210,26 +184,19 @@ def visiting(browser: Browser) -> Iterator[Callable[[Path], ReportVisit]]:
         assert one.page.evaluate("window.hacked") is None
         one.page.close()
         assert one.complaints == []
-        assert one.asked_elsewhere("file://") == []
+        assert one.asked_elsewhere(one.path.parent.as_uri(), "about:") == []
 
 
 @pytest.fixture
-def visit(visiting: Callable[[Path], ReportVisit], made: Workspace) -> ReportVisit:
+def visit(visiting: Callable[[Path], PageVisit], made: Workspace) -> PageVisit:
     return visiting(made.out / "report.html")
 
 
 @pytest.fixture
-def trouble(visiting: Callable[[Path], ReportVisit], troubled: Workspace) -> ReportVisit:
+def trouble(visiting: Callable[[Path], PageVisit], troubled: Workspace) -> PageVisit:
     return visiting(troubled.out / "report.html")
 
 
 @pytest.fixture
-def site_visit(browser: Browser, site: Path) -> Iterator[SiteVisit]:
-    page = browser.new_page(viewport=VIEWPORT, color_scheme="light")  # type: ignore[arg-type]
-    visit = SiteVisit(page, site)
-    yield visit
-    hacked = page.evaluate("window.hacked")
-    page.close()
-    assert visit.complaints == []
-    assert visit.asked_elsewhere(site.parent.as_uri()) == []
-    assert hacked is None
+def site_visit(visiting: Callable[[Path], PageVisit], site: Path) -> PageVisit:
+    return visiting(site)

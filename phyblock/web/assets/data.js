@@ -1,71 +1,138 @@
-/* The run's data: an index of all samples, and what is brought of each when it is looked at. */
+/* The page's data: the numbers that are in it, and beside it, in scripts that are loaded when they
+   are needed, the index of all samples and what is shown of each. A page that was opened from disk
+   may not fetch. Scripts that were not used for long are dropped. */
 "use strict";
 
 const Data = (() => {
-  const chunks = chunksOf({ noun: "report", most: 24 });
+  const MOST_KEPT = 24;
+  const { folder, build } = document.documentElement.dataset;
+  const board = JSON.parse(document.getElementById("board").textContent);
+  const isSite = !board.tables;
+  const waiting = new Map();
+  const kept = new Map();
   let index = null;
 
+  window.phyblockTake = (builtAs, name, data) => {
+    const waiter = waiting.get(name);
+    if (!waiter) return;
+    if (builtAs === build) waiter.settle(unpacked(data));
+    else waiter.fail(new Error("The page was written again since it was opened: reload it."));
+  };
+
+  /** JSON, deflated, in base 64. */
+  async function unpacked(packed) {
+    const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+    return JSON.parse(await new Response(stream).text());
+  }
+
+  function load(name) {
+    // A script that was dropped while it is under way is waited for together.
+    const found = kept.get(name) || waiting.get(name)?.found || fetched(name);
+    // The last one is the one that was used last.
+    kept.delete(name);
+    kept.set(name, found);
+    if (kept.size > MOST_KEPT) kept.delete(kept.keys().next().value);
+    return found;
+  }
+
+  function fetched(name) {
+    const waiter = {};
+    waiter.found = new Promise((settle, fail) => Object.assign(waiter, { settle, fail }));
+    waiting.set(name, waiter);
+    const script = document.createElement("script");
+    script.src = `${folder}/${name}.js`;
+    script.onload = script.onerror = () => {
+      script.remove();
+      waiting.delete(name);
+      waiter.fail(new Error(`${folder}/${name}.js is not there: the folder ${folder}/ belongs beside this page.`));
+    };
+    document.head.append(script);
+    waiter.found.catch(() => kept.delete(name));
+    return waiter.found;
+  }
+
   /** Number `n` of the records, scenes, questions or prompts. */
-  const entry = (kind, n) => chunks.entry(index.starts[kind], kind, n);
+  async function entry(kind, n) {
+    const starts = index.starts[kind];
+    let low = 0, high = starts.length - 1;
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (starts[middle] <= n) low = middle;
+      else high = middle - 1;
+    }
+    return (await load(`${kind}-${low}`))[n - starts[low]];
+  }
 
-  const chunk = (kind, n) => chunks.load(`${kind}-${n}`);
-
+  /** The index of all samples; read when it is first needed. */
   async function open() {
-    index = await chunks.load("index");
+    if (index) return index;
+    index = await load("samples");
     Solid.setKit(index.kit.shapes, index.kit.colors);
+    index.rowsOfItem = grouped(index.rows.item, index.items.key.length);
+    index.rowsOfEntry = grouped(index.rows.entry, board.rows.length);
     return index;
   }
 
-  /** What the index knows of sample `row`. */
+  function grouped(column, count) {
+    const found = Array.from({ length: count }, () => []);
+    column.forEach((value, row) => found[value].push(row));
+    return found;
+  }
+
+  /** The facts of sample `row` that the index has. */
   function sample(row) {
     const { rows, items } = index;
-    const item = rows.item[row];
-    const scores = {};
-    for (const [setting, columns] of Object.entries(rows.scores)) {
-      if (columns.tp[row] === null) continue;
-      const [tp, fp, fn] = [columns.tp[row], columns.fp[row], columns.fn[row]];
-      const whole = 2 * tp + fp + fn;
-      scores[setting] = { tp, fp, fn, wrong: columns.wrong[row], f1: whole ? (2 * tp) / whole : null };
-    }
-    const found = {
-      row, item, scores,
-      track: index.tracks[rows.track[row]], model: index.models[rows.model[row]],
-      key: items.key[item], scene: index.scenes[items.scene[item]], levels: items.levels[item],
-      sceneNumber: items.scene[item], question: items.question[item], subtask: items.subtask[item],
-      seed: rows.seed[row], outcome: index.outcomes[rows.outcome[row]], correct: rows.correct[row],
+    const item = rows.item[row], entry = board.rows[rows.entry[row]];
+    const track = board.tracks.find(({ name }) => name === index.tracks[items.track[item]]);
+    const [seed, way] = [rows.seed[row], index.ways[rows.way[row]]];
+    const asked = [board.runs[entry.runs[track.name]].seeds > 1 && `seed ${seed}`, way];
+    return {
+      row, item, track, entry, seed, way, key: items.key[item], sceneNumber: items.scene[item],
+      scene: index.scenes[items.scene[item]], levels: items.levels[item], part: items.part[item],
+      question: items.question[item], outcome: index.outcomes[rows.outcome[row]], score: rows.score[row],
+      id: [track.name, entry.name, items.key[item], `s${seed}`, way].filter(Boolean).join("/"),
+      name: [entry.name, ...asked.filter(Boolean)].join(" · "),
     };
-    found.variant = index.variants[rows.variant[row]];
-    found.id = `${found.track}/${found.model}/${found.key}/s${found.seed}${found.variant && `/${found.variant}`}`;
-    const said = [index.seeds.length > 1 && `seed ${found.seed}`, found.variant];
-    found.asked = [found.model, ...said.filter(Boolean)].join(" · ");
-    return found;
   }
 
   /** The number of the sample with this id, or -1. */
   function find(id) {
-    const { items, rows, scenes } = index;
-    const n = rows.item.length;
-    for (let row = 0; row < n; row++) {
-      // Most rows are told apart by their item, which is quicker than the whole name.
-      if (id.includes(items.key[rows.item[row]] || scenes[items.scene[rows.item[row]]]) && sample(row).id === id) return row;
-    }
-    return -1;
+    const { items, rows } = index;
+    // Most rows are told apart by their item, which is quicker than the whole name.
+    return rows.item.findIndex((item, row) => id.includes(items.key[item]) && sample(row).id === id);
   }
 
+  const scene = (n) => (index.starts.scenes.length ? entry("scenes", n) : null);
+
   /** Why a track, or a model in it, has no sample at all; "" where there is one. */
-  function lacking(track, model) {
-    const { rows, models, cautions, shortfalls } = index;
-    if (rows.track.some((of, row) => of === track && (model === undefined || rows.model[row] === model))) return "";
-    if (model === undefined) return ["There is no sample here.", ...cautions].join(" ");
-    const why = shortfalls[index.tracks[track]]?.[models[model]];
-    return `There is no sample of ${models[model]} here${why ? `: ${why}` : ""}.`;
+  function lacking(track, place = -1) {
+    const { rows, items, tracks } = index;
+    const isOf = (row) => tracks[items.track[rows.item[row]]] === track.name;
+    const all = place < 0 ? rows.item.map((_, row) => row) : index.rowsOfEntry[place];
+    if (all.some(isOf)) return "";
+    if (place < 0) return ["There is no sample here.", ...(board.cautions || [])].join(" ");
+    const { name, lacking: why } = board.rows[place];
+    return `There is no sample of ${name} here${why[track.name] ? `: ${why[track.name]}` : ""}.`;
+  }
+
+  const isModel = (row) => row.kind !== "baseline";
+  const trackOf = (name) => board.tracks.find((one) => one.name === name) || board.tracks[0];
+  /** The column that models are ranked by in a track, and those of single levels beside it. */
+  const mainOf = (track) => board.columns.find((one) => one.track === track.name && one.heading === track.main);
+  const levelsOf = (track) => board.columns.filter((one) => one.track === track.name
+    && one.setting === mainOf(track).setting && /^Level \d$/.test(one.heading));
+
+  /** For sorting by scores of a track, the worst first: none, then what its measure calls worse. */
+  function worse(a, b, track) {
+    if (a === null || b === null) return (a !== null) - (b !== null);
+    return track.better === "lower" ? b - a : a - b;
   }
 
   return {
-    open, sample, find, entry, chunk, lacking,
+    board, isSite, open, load, entry, scene, sample, find, lacking, isModel, trackOf, mainOf, levelsOf, worse,
     get index() {
       return index;
     },
-    chunksKept: chunks.count,
   };
 })();

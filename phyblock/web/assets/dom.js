@@ -1,12 +1,22 @@
-/* Small helpers. Every text goes in as a text node: nothing a model said is ever read as markup. */
+/* Elements, words and numbers. Every text goes in as a text node: nothing a model said is ever read
+   as markup. */
 "use strict";
 
 /** An element with attributes (on* are listeners) and children; text stays text. */
 function el(tag, attributes = {}, ...children) {
-  const made = document.createElement(tag);
+  return filled(document.createElement(tag), attributes, children);
+}
+
+/** An element of a drawing. */
+function svg(tag, attributes = {}, ...children) {
+  return filled(document.createElementNS("http://www.w3.org/2000/svg", tag), attributes, children);
+}
+
+function filled(made, attributes, children) {
   for (const [name, value] of Object.entries(attributes)) {
     if (value === null || value === undefined || value === false) continue;
     if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+    else if (name === "style") Object.assign(made.style, value);
     else made.setAttribute(name, value === true ? "" : value);
   }
   // One by one: a call takes only so many arguments.
@@ -14,7 +24,24 @@ function el(tag, attributes = {}, ...children) {
   return made;
 }
 
+/** A labelled choice of [value, text] pairs. */
+function choice(id, label, options, now, act) {
+  return el("label", { class: "choice" }, el("span", {}, label),
+    el("select", { id, onchange: (event) => act(event.target.value) },
+      options.map(([value, text]) => el("option", { value, selected: value === now }, text))));
+}
+
+/** A part that is scrolled sideways, by keyboard too. */
+const scrolled = (label, ...children) =>
+  el("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": label }, children);
+
+/** Names and values side by side; those without a value are left out. */
+const listOf = (pairs, kind = "about") => el("dl", { class: kind },
+  pairs.filter(([, value]) => value !== null && value !== undefined && value !== "")
+    .map(([name, value]) => el("div", {}, el("dt", {}, name), el("dd", { class: "number" }, value))));
+
 const Words = (() => {
+  const DASH = "–";
   const names = {
     ok: "OK", parse_failure: "Unparsed", refusal: "Refusal", truncated: "Truncated",
     api_error: "API error", missing: "Missing",
@@ -30,7 +57,7 @@ const Words = (() => {
     semi_cylinder: "semi-cylinder",
     cuboid1: "cuboid 1", cuboid2: "cuboid 2", cuboid3: "cuboid 3",
   };
-  /** What people call a name of the data. */
+  /** The name that people use for a name of the data. */
   const named = (name) => names[name] || String(name).replaceAll("_", " ");
   const reasons = {
     shape_not_in_gt: (block) => `the goal has no ${block}`,
@@ -39,8 +66,8 @@ const Words = (() => {
     dependency_not_met: (block, turned, below) => `too early: ${below || "what it rests on"} must come first`,
   };
   /**
-   * Why a step was wrong, as a part of a sentence: `turned` are the candidates that are turned as
-   * the goal needs, `below` what must be placed before; all of them in words.
+   * The reason why a step was wrong, as a part of a sentence: `turned` are the candidates that are
+   * turned as the goal needs, `below` those that must be placed before; all of them in words.
    */
   const reason = (why, block = "such block", turned = "", below = "") =>
     (reasons[why] ? reasons[why](block, turned, below) : named(why));
@@ -51,8 +78,12 @@ const Words = (() => {
     const below = Math.floor(Math.abs(value) * 10 ** digits);
     return isTie && below % 2 === 0 ? (Math.sign(value) * (below / 10 ** digits)).toFixed(digits) : value.toFixed(digits);
   };
-  const percent = (share) => (share === null || share === undefined ? "–" : fixed(100 * share));
+  /** A number with so many decimals and commas; a dash for none. */
+  const number = (value, digits = 1) => (value === null || value === undefined ? DASH
+    : Number(fixed(value, digits)).toLocaleString("en", { minimumFractionDigits: digits, maximumFractionDigits: digits }));
+  const dollars = (value) => (value === null || value === undefined ? DASH
+    : value === 0 ? "0" : value >= 1 ? number(value, 2) : value.toPrecision(2));
   const count = (n, noun) => `${n.toLocaleString("en")} ${noun}${n === 1 ? "" : "s"}`;
   const block = (one) => `${one.color} ${named(one.type)}`;
-  return { named, reason, fixed, percent, count, block };
+  return { DASH, named, reason, fixed, number, dollars, count, block };
 })();

@@ -1,4 +1,5 @@
-/* A session from the first page to the last: its state is shown, one question at a time. */
+/* A session from the first page to the last: its state is shown, one question at a time. The server is
+   asked for what is next, and told what was answered. */
 "use strict";
 
 (() => {
@@ -8,17 +9,23 @@
   const pause = document.getElementById("pause");
   const RETRY_MS = 1500;
   const shown = { change: -1, phase: "", keys: null, since: null, number: 0, notice: "" };
+  const { number } = Words;
 
-  const time = (seconds) => {
-    const whole = Math.max(0, Math.floor(seconds));
-    return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")}`;
-  };
+  async function checked(answer) {
+    if (!answer.ok) throw new Error(String(answer.status));
+    return answer.json();
+  }
+  const next = async (change) => checked(await fetch(change < 0 ? "state" : `state?after=${change}`));
+  const send = async (name, body = {}) => checked(await fetch(name, {
+    method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) }));
+  const post = (name) => send(name).catch(() => {});
+
   const tick = () => {
-    clock.textContent = shown.since === null ? "" : time((performance.now() - shown.since) / 1000);
+    const whole = Math.floor((performance.now() - shown.since) / 1000);
+    clock.textContent = shown.since === null ? "" : `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")}`;
   };
-  const post = (name, body = {}) => Session.post(name, body).catch(() => {});
   const card = (...children) => main.replaceChildren(el("section", { class: "card" }, children));
-  const primary = (text, act) => el("button", { type: "button", class: "primary", onclick: act }, text);
+  const button = (text, act) => el("button", { type: "button", onclick: act }, text);
 
   const views = {
     consent({ about }) {
@@ -32,72 +39,110 @@
         el("div", { class: "consent", tabindex: "0", role: "region", "aria-label": "What you agree to" },
           about.consent.split(/\n{2,}/).map((text) => el("p", {}, text))),
         el("h2", {}, "How it works"),
-        el("ul", {},
-          el("li", {}, "You see the pictures that models are sent. Their exact prompt is one click away; it asks for a written form, which is written for you from your clicks."),
-          el("li", {}, "Click a numbered block or an option to pick it. Where places are asked for as well, type the numbers. All can be undone until you submit; then it is kept, and the next task comes."),
-          el("li", {}, "Without a mouse: type the number or letter (Enter where a longer number might follow), Backspace takes back, Ctrl+Enter submits."),
-          el("li", {}, "The time you take is written down. Pause stops it and hides the task.")),
-        primary("I agree, begin", () => post("agree")),
+        el("ul", {}, [
+          "You see the pictures that models are sent. Their exact prompt is one click away; it asks for a written form, which is written for you from your clicks.",
+          "Click a numbered block or an option to pick it. Where places are asked for as well, type the numbers. All can be undone until you submit; then it is kept, and the next task comes.",
+          "Without a mouse: type the number or letter (Enter where a longer number might follow), Backspace takes back, Ctrl+Enter submits.",
+          "The time you take is written down. Pause stops it and hides the task.",
+        ].map((text) => el("li", {}, text))),
+        button("I agree, begin", () => post("agree")),
       );
     },
     waiting() {
       card(el("p", { class: "lead", role: "status" }, "One moment …"));
     },
-    question(state) {
-      const { question } = state;
+    question({ question, change, elapsed_s: elapsed, exact }) {
       progress.textContent = `Task ${question.number} of ${question.of}`;
-      shown.since = performance.now() - 1000 * state.elapsed_s;
-      shown.keys = Picker.show(main, question, (answer) => submit(state.change, answer), state.exact);
+      shown.since = performance.now() - 1000 * elapsed;
+      shown.keys = Picker.show(main, question, (answer) => submit(change, answer), exact);
       if (shown.notice) main.prepend(el("p", { class: "notice", role: "alert" }, shown.notice));
       if (shown.number !== question.number) scrollTo(0, 0);
       shown.number = question.number;
     },
     paused() {
-      card(
-        el("h1", {}, "Paused"),
+      card(el("h1", {}, "Paused"),
         el("p", {}, "The clock stands still. All that you submitted is kept; you may also close this page and go on another day."),
-        primary("Go on", () => post("resume")),
-      );
+        button("Go on", () => post("resume")));
     },
     closed() {
       card(el("h1", {}, "The session was closed"), el("p", {}, "All that you submitted is kept."));
     },
     lost() {
-      card(
-        el("h1", {}, "The program behind this page has stopped"),
-        el("p", {}, "All that you submitted is kept. Start it again with the same command, and open the address that it prints."),
-      );
+      card(el("h1", {}, "The program behind this page has stopped"),
+        el("p", {}, "All that you submitted is kept. Start it again with the same command, and open the address that it prints."));
     },
     done({ results }) {
       progress.textContent = "Done";
-      main.replaceChildren(Results.page(results, () => post("finish")));
+      main.replaceChildren(el("div", { class: "results" }, el("h1", {}, "How it went"),
+        results.notes.map((note) => el("p", { class: "notice" }, note)),
+        results.tracks.filter((track) => track.rows.length).map(ofTrack),
+        el("p", {}, el("a", { href: "report.html", target: "_blank" }, "The whole report, with replays"), " (opens beside this page)"),
+        button("Finish", (event) => {
+          event.target.disabled = true;
+          event.target.textContent = "You can close this page";
+          post("finish");
+        })));
     },
   };
+
+  // ---- the end
+
+  const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
+
+  /** Means of the person and of others over the same items, the best first, and every item. */
+  function ofTrack(track) {
+    const all = new Map([["You", track.rows.map(({ value }) => value).filter((value) => value !== null)]]);
+    for (const { others } of track.rows) for (const { name, value } of others) all.set(name, [...(all.get(name) || []), value]);
+    const lines = [...all].filter(([, values]) => values.length).map(([name, values]) => [name, mean(values), values.length])
+      .sort((a, b) => (track.better === "higher" ? b[1] - a[1] : a[1] - b[1]));
+    return el("section", {}, el("h2", {}, track.title),
+      el("p", { class: "finding" }, lines.slice(0, 4).map(([name, value]) => `${name} ${number(value)}`).join(" · ")),
+      el("p", { class: "muted" }, `${track.measure}, mean over ${Words.count(track.rows.length, track.item)}${track.unit && ` [${track.unit}]`}`),
+      scrolled(`${track.title}: means`, el("table", {}, el("tbody", {}, lines.map(([name, value, n]) => el("tr", { class: name === "You" ? "own" : null },
+        el("th", { scope: "row", class: "text" }, name), el("td", {}, number(value)), el("td", { class: "muted" }, `n = ${n}`)))))),
+      el("ol", { class: "cards" }, track.rows.map((row) => item(row, track))));
+  }
+
+  function item(row, track) {
+    const others = row.others.map(({ name, value }) => `${name} ${number(value)}`).join(", ");
+    return el("li", { class: "card" }, el("h3", {}, `${row.key}: ${number(row.value)} ${track.unit}`), given(row),
+      el("p", { class: "muted" }, row.took_s === null ? null : `You took ${Math.round(row.took_s)} s. `, others && `Others: ${others}. `,
+        el("a", { href: `report.html#samples?s=${encodeURIComponent(row.sample)}`, target: "_blank", "aria-label": `Replay ${row.key}` }, "Replay")));
+  }
+
+  function given({ right, given: answer, correct, steps, missing }) {
+    if (right !== undefined) {
+      return el("p", {}, correct ? `You answered ${answer}, which is right.` : `You answered ${answer || "nothing"}; ${right} is right.`);
+    }
+    if (!steps) return null;
+    const first = steps.findIndex((step) => step.why);
+    const said = [first >= 0 && `It first broke at step ${first + 1}: ${Words.reason(steps[first].why)}.`,
+      missing && `${Words.count(missing, "block")} of the goal ${missing === 1 ? "is" : "are"} missing.`].filter(Boolean);
+    return [
+      el("ol", { class: "strip", tabindex: 0, "aria-label": "Your steps" }, steps.map((step, n) => el("li", { class: step.why ? "wrong" : "right" },
+        `${n + 1} ${step.why ? "✗" : "✓"} `, el("b", { class: "number" }, step.name), step.why ? ` ${Words.reason(step.why)}` : null))),
+      el("p", {}, said.join(" ") || "Every step is right, and nothing is missing."),
+    ];
+  }
+
+  // ---- the session
 
   async function submit(change, answer) {
     shown.notice = "";
     try {
-      await Session.post("answer", { change, ...answer });
+      await send("answer", { change, ...answer });
     } catch (error) {
-      // 409: what the page showed is not what is asked now.
+      // 409: the page showed another task than the one that is asked now.
       shown.notice = error.message === "409"
         ? "That answer was not kept: the task was answered in another tab. This is the next one."
         : "That answer could not be kept. Please submit it again.";
-      take(await Session.next(-1).catch(() => ({ change: -1, phase: "lost" })));
+      show(await next(-1).catch(() => ({ change: -1, phase: "lost" })));
     }
   }
 
-  function take(state) {
-    shown.change = state.change;
-    show(state);
-  }
-
   function show(state) {
-    shown.keys = null;
-    shown.since = null;
-    shown.phase = state.phase;
+    Object.assign(shown, { change: state.change, phase: state.phase, keys: null, since: null });
     pause.hidden = state.phase !== "question";
-    main.className = "";
     views[state.phase](state);
     tick();
     main.focus({ preventScroll: true });
@@ -106,12 +151,12 @@
   async function follow() {
     for (;;) {
       try {
-        const state = await Session.next(shown.change);
+        const state = await next(shown.change);
         if (state.change === shown.change) continue;
-        take(state);
+        show(state);
         if (["closed", "done"].includes(state.phase)) return;
       } catch {
-        if (shown.phase !== "lost") take({ change: -1, phase: "lost" });
+        if (shown.phase !== "lost") show({ change: -1, phase: "lost" });
         await new Promise((go) => setTimeout(go, RETRY_MS));
       }
     }

@@ -16,7 +16,6 @@ const Poses = (() => {
   const cm = (value) => `${value.toFixed(value < 10 ? 1 : 0)} cm`;
   const inMeters = (center) => center.map((value) => value / CM);
   const distance = (a, b) => Math.hypot(...a.position.map((x, i) => x - b.position[i]));
-
   const sizeOf = ({ scores: [{ tp, fn }] }) => tp + fn;
 
   /** The block that a step puts, or null for a number that no candidate has. */
@@ -51,48 +50,37 @@ const Poses = (() => {
     });
   }
 
-  /** What the stage shows of a record. */
+  /** The run of a record; see Steps.of. Where resting poses were kept, the world is a second picture. */
   function of(scene, record) {
-    const { pose, parse } = record;
-    const outcomes = pose.steps;
-    const given = parse.steps;
-    const steps = given.map((step, i) => describe(scene, step, outcomes[i], i + 1));
-    const end = `${pose.reached} of ${Words.count(sizeOf(record), "block")} reached, IoU with the goal ${pose.iou.toFixed(2)}.`;
-    if (!scene) return Steps.run(scene, ["Planned"], steps, [], end, "");
+    const { pose: { steps: outcomes, reached, iou, limits }, parse: { steps: given } } = record;
+    const steps = given.map((step, i) => described(scene, step, outcomes[i], i + 1));
+    const end = `${reached} of ${Words.count(sizeOf(record), "block")} reached, IoU with the goal ${iou.toFixed(2)}.`;
+    if (!scene) return { titles: ["Planned"], steps, states: [], end, ghosts: "" };
     const blocks = given.map((step, i) => put(scene, step, i + 1));
     const isKept = outcomes.every((outcome) => outcome.rests);
     const after = isKept ? worlds(blocks, outcomes) : [];
-    const limit = pose.limits.reached_cm;
+    const last = Object.values(after.at(-1) || {});
     const so = (i) => blocks.slice(0, i + 1).filter(Boolean);
     const states = given.map((_, i) => {
-      const ghosts = ghostOf(scene, outcomes[i]);
+      const ghosts = ghostOf(scene, outcomes[i]), fresh = after[i]?.[i + 1] || null;
       const planned = { blocks: so(i), fresh: blocks[i], ghosts, arrow: arrowOf(blocks[i], ghosts[0], outcomes[i]) };
-      return isKept ? [planned, carried(after[i], blocks[i], i + 1)] : [planned];
+      if (!isKept) return [planned];
+      // What was refused is outlined.
+      return [planned, { blocks: Object.values(after[i]), fresh, ghosts: fresh || !blocks[i] ? [] : [blocks[i]] }];
     });
-    const whole = [{ blocks: so(given.length), ghosts: missed(scene, outcomes) }];
-    const last = after.length ? Object.values(after[after.length - 1]) : [];
-    if (isKept) whole.push({ blocks: last, ghosts: lacking(scene, last, limit / CM) });
-    const nothing = whole.map(() => ({ blocks: [] }));
+    const right = new Set(outcomes.filter(isThere).map(({ vertex }) => vertex));
+    const missed = scene.blocks.filter((_, v) => !right.has(v));
+    const whole = [{ blocks: so(given.length), ghosts: missed }];
+    if (isKept) whole.push({ blocks: last, ghosts: lacking(scene, last, limits.reached_cm / CM) });
     const all = [...scene.blocks, ...so(given.length), ...after.flatMap(Object.values)];
-    const far = farAway(scene, all);
-    const out = far.size ? " Some blocks lie outside the picture." : "";
-    const note = isKept ? `Outlined: where blocks should be; goal blocks of whose kind none came to lie within ${limit} cm.${out}`
-      : `Outlined: where blocks should be.${out} Where blocks came to lie was not kept in this run.`;
-    const titles = isKept ? ["Planned", "Built"] : ["Planned"];
-    return Steps.run(scene, titles, steps.map((step, i) => ({ ...step, thumb: thumbOf(scene, given[i], states[i]) })),
-      [nothing, ...states, whole], end, note, all.filter((block) => !far.has(block)));
-  }
-
-  /** After a step; what was refused is outlined. */
-  function carried(world, block, number) {
-    const fresh = world[number] || null;
-    return { blocks: Object.values(world), fresh, ghosts: fresh || !block ? [] : [block] };
-  }
-
-  function thumbOf(scene, given, state) {
-    const { blocks, fresh } = state[state.length - 1];
-    return fresh ? { blocks, fresh, framed: [...scene.blocks, fresh].filter((one) => !farAway(scene, [one]).size) }
-      : Steps.alone(scene.candidates[given.block - 1]);
+    const framed = all.filter((block) => scene.blocks.some((one) => distance(one, block) <= FAR_M));
+    const out = framed.length < all.length ? " Some blocks lie outside the picture." : "";
+    return {
+      titles: isKept ? ["Planned", "Built"] : ["Planned"], steps, end, framed,
+      states: [whole.map(() => ({ blocks: [] })), ...states, whole],
+      ghosts: `Outlined: where blocks should be${isKept ? `; goal blocks of whose kind none came to lie within ${limits.reached_cm} cm`
+        : ". Where blocks came to lie was not kept in this run"}.${out}`,
+    };
   }
 
   const isThere = ({ vertex, position_cm: off, turn_deg: turned }) =>
@@ -103,30 +91,15 @@ const Poses = (() => {
     (outcome.vertex === null || isThere(outcome) ? [] : [scene.blocks[outcome.vertex]]);
 
   /** From where a block was put to where it should be, with the distance. */
-  const arrowOf = (block, ghost, outcome) =>
-    (block && ghost && outcome.position_cm > SLIGHT_CM ? { from: block.position, to: ghost.position, text: cm(outcome.position_cm) } : null);
+  const arrowOf = (block, ghost, { position_cm: off }) =>
+    (block && ghost && off > SLIGHT_CM ? { from: block.position, to: ghost.position, text: cm(off) } : null);
 
-  /** Blocks of the goal where no step puts theirs. */
-  function missed(scene, outcomes) {
-    const right = new Set(outcomes.filter(isThere).map(({ vertex }) => vertex));
-    return scene.blocks.filter((_, v) => !right.has(v));
-  }
-
-  function farAway(scene, blocks) {
-    const middle = { position: [0, 1, 2].map((i) => {
-      const along = scene.blocks.map((block) => block.position[i]);
-      return (Math.min(...along) + Math.max(...along)) / 2;
-    }) };
-    return new Set(blocks.filter((block) => distance(block, middle) > FAR_M));
-  }
-
-  function describe(scene, given, outcome, number) {
+  function described(scene, given, outcome, number) {
     const verdict = outcome.error ? Words.named(outcome.error) : "Correct";
     const end = ENDS[outcome.end];
-    const isSaid = !outcome.error || PHYSICAL.includes(outcome.error);
     return {
       number: given.block, name: Steps.nameOf(scene, given.block), why: outcome.error, verdict: `${verdict}, ${end}`,
-      label: isSaid ? end : `${verdict}, ${end}`,
+      label: !outcome.error || PHYSICAL.includes(outcome.error) ? end : `${verdict}, ${end}`,
       text: [placeOf(given), offOf(scene, outcome), endOf(outcome, number)].filter(Boolean).join(" "),
       note: scene && ghostOf(scene, outcome).length ? "Outlined: where it should be." : "",
     };
@@ -148,16 +121,14 @@ const Poses = (() => {
   }
 
   function endOf(outcome, number) {
-    const { end } = outcome;
-    if (end === "no_block") return "There is no such block.";
-    if (end === "under_floor") return `Refused: it would be ${cm(outcome.overlap_cm)} under the floor.`;
-    if (end === "overlaps") return `Refused: it would share space with others, ${cm(outcome.overlap_cm)} deep.`;
-    if (end === "falls") return `Let go, it falls: it comes to lie ${cm(outcome.moved_cm)} from there.`;
-    if (end === "knocks_over") {
-      const steps = outcome.knocked.filter((one) => one !== number);
-      return `Let go, it knocks over what step${steps.length > 1 ? "s" : ""} ${steps.join(", ")} put.`;
-    }
-    return "Let go, it stands.";
+    const others = (outcome.knocked || []).filter((one) => one !== number);
+    return {
+      no_block: "There is no such block.",
+      under_floor: `Refused: it would be ${cm(outcome.overlap_cm)} under the floor.`,
+      overlaps: `Refused: it would share space with others, ${cm(outcome.overlap_cm)} deep.`,
+      falls: `Let go, it falls: it comes to lie ${cm(outcome.moved_cm)} from there.`,
+      knocks_over: `Let go, it knocks over what step${others.length > 1 ? "s" : ""} ${others.join(", ")} put.`,
+    }[outcome.end] || "Let go, it stands.";
   }
 
   /** Facts of a record in one line: [[name, value], ...]. */
@@ -166,7 +137,7 @@ const Poses = (() => {
     const right = pose.right.absolute;
     const whole = parse.plan.length + sizeOf(record);
     const f1 = right.reduce((sum, n) => sum + (2 * n) / whole, 0) / right.length;
-    return [["F1 in C", Words.percent(whole ? f1 : null)],
+    return [["F1 in C", Words.number(whole ? 100 * f1 : null)],
       ["Reached", `${pose.reached} of ${sizeOf(record)}`], ["IoU", pose.iou.toFixed(2)]];
   }
 

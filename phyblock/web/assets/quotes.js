@@ -5,7 +5,6 @@ const Quotes = (() => {
   const MOST_TRIES = 400;
   const LONGEST = 240;
   const LABEL = /^[\s>*_#|([{"'-]*(?:(?:step|move|action)[\s_]*#?)?\d{1,3}["'\s]*[.):|\]*]+/i;
-
   const NAMED = /(?:\bindex|\bmove\()[\s"'#:=]*(\d{1,6})/gi;
 
   /** Numbers that a text calls an index or moves, with their places. */
@@ -18,8 +17,7 @@ const Quotes = (() => {
     let at = 0;
     for (const line of text.split("\n")) {
       const label = line.match(LABEL)?.[0].length || 0;
-      const rest = line.slice(label);
-      const skipped = /\d/.test(rest) ? label : 0;
+      const skipped = /\d/.test(line.slice(label)) ? label : 0;
       for (const one of line.slice(skipped).matchAll(/\d{1,6}/g)) {
         found.push({ n: Number(one[0]), at: at + skipped + one.index });
       }
@@ -56,22 +54,19 @@ const Quotes = (() => {
     const end = text.indexOf("\n", at);
     const line = text.slice(from, end < 0 ? text.length : end);
     const label = line.match(LABEL)?.[0].length || 0;
-    let start = 0;
-    for (const stop of line.matchAll(/[.!?]\s+(?=[A-Z*"“(])/g)) {
+    let start = 0, stop = line.length;
+    for (const found of line.matchAll(/[.!?]\s+(?=[A-Z*"“(])/g)) {
       // The full stop behind a number of a list ends nothing.
-      if (stop.index < label) continue;
-      const next = stop.index + stop[0].length;
-      if (from + next > at) return cut(line.slice(start, next), at - from - start);
+      if (found.index < label) continue;
+      const next = found.index + found[0].length;
+      if (from + next > at) {
+        stop = next;
+        break;
+      }
       start = next;
     }
-    return cut(line.slice(start), at - from - start);
-  }
-
-  function cut(said, place) {
-    const whole = said.trim();
-    if (whole.length <= LONGEST) return whole;
-    const from = Math.max(0, Math.min(place - LONGEST / 2, said.length - LONGEST));
-    return `${from ? "… " : ""}${said.slice(from, from + LONGEST).trim()}${from + LONGEST < said.length ? " …" : ""}`;
+    const said = line.slice(start, stop).trim();
+    return said.length <= LONGEST ? said : `… ${text.slice(Math.max(from, at - LONGEST / 2), at + LONGEST / 2).split("\n")[0]} …`;
   }
 
   /**
@@ -85,11 +80,12 @@ const Quotes = (() => {
     return plan.map((_, i) => (found ? sentence(text, found[i]) : null));
   }
 
-  /** The last sentence that names a move. */
-  function ofMove(text, move) {
-    const [quote] = Number.isInteger(move) ? ofPlan(text || "", [move]) : [null];
-    return quote;
+  /** The sentences behind the steps of a record. */
+  function of({ reply, parse, turns, pose }, steps) {
+    if (!turns) return ofPlan(reply?.text || "", parse?.plan || [], !pose);
+    return steps.map(({ turn, number }) =>
+      (Number.isInteger(number) ? ofPlan(turn.reply?.text || "", [number])[0] : null));
   }
 
-  return { ofPlan, ofMove };
+  return { of };
 })();

@@ -1,4 +1,4 @@
-/* The assembly step by step: drawings that turn together, a timeline, a filmstrip. */
+/* A goal and a build side by side, step by step: drawings that turn together, and a timeline. */
 "use strict";
 
 const Stage = (() => {
@@ -6,16 +6,13 @@ const Stage = (() => {
   const DROP_MS = 250;
   const FALL_MS = 600;
   const DROP_M = 0.05;
-  const THUMB_PX = 76;
   const BADGES_FROM_PX = 500;
   const HOME = [45, 22];
   const DEGREES_PER_PX = 0.5;
   const DEGREES_PER_KEY = 10;
 
-  const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  const rgb = (name) => style(name).split(",").map(Number);
+  const rgb = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).match(/\d+/g).map(Number);
   const isStill = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
-  const colors = () => ({ accent: rgb("--accent-rgb"), triedColor: rgb("--tried-rgb") });
 
   /** One clock and one camera for all drawings of a sample: position 0 is nothing, `last` the end. */
   class Player {
@@ -33,6 +30,13 @@ const Stage = (() => {
       this.tell();
     }
 
+    /** Go to a step because somebody wants to see it. */
+    stopAt(at) {
+      clearInterval(this.timer);
+      this.timer = null;
+      this.seek(at);
+    }
+
     look(azimuth, elevation) {
       this.view = [azimuth, Math.max(2, Math.min(89, elevation))];
       this.tell();
@@ -42,24 +46,15 @@ const Stage = (() => {
       this.listeners.forEach((listener) => listener(this));
     }
 
-    get isPlaying() {
-      return this.timer !== null;
+    get isHome() {
+      return this.view.every((angle, i) => angle === HOME[i]);
     }
 
     toggle() {
-      if (this.isPlaying) return this.stop();
+      if (this.timer) return this.stopAt(this.at);
       if (this.at >= this.last) this.at = 0;
-      this.timer = setInterval(() => {
-        if (this.at >= this.last) this.stop();
-        else this.seek(this.at + 1);
-      }, PLAY_MS);
+      this.timer = setInterval(() => (this.at >= this.last ? this.stopAt(this.at) : this.seek(this.at + 1)), PLAY_MS);
       return this.tell();
-    }
-
-    stop() {
-      clearInterval(this.timer);
-      this.timer = null;
-      this.tell();
     }
   }
 
@@ -70,104 +65,86 @@ const Stage = (() => {
   /** Buttons and timeline of a player; a tick stands under each step that went wrong. */
   function controls(player, noun) {
     const button = (text, name, act, more = {}) => el("button", { type: "button", class: "quiet", "aria-label": name, title: name, onclick: act, ...more }, text);
-    const to = (at) => {
-      player.stop();
-      player.seek(at);
-    };
     const play = button("Play", null, () => player.toggle(), { class: "play", id: "play" });
     const slider = el("input", {
       type: "range", min: 0, max: player.last, step: 1, id: "scrub", "aria-label": noun,
-      // Stopping tells all listeners, who put the slider back to where the player is.
-      oninput: () => to(Number(slider.value)),
+      // All listeners are told, who put the slider to where the player is.
+      oninput: () => player.stopAt(Number(slider.value)),
     });
-    const ticks = el("div", { class: "ticks", "aria-hidden": "true" }, player.wrong.map(() =>
-      el("i", { class: "wrong-step" })));
-    [...ticks.children].forEach((tick, i) => tick.style.setProperty("left", `${(100 * player.wrong[i]) / player.last}%`));
+    const ticks = el("div", { class: "ticks", "aria-hidden": "true" }, player.wrong.map((at) =>
+      el("i", { class: "wrong-step", style: { left: `${(100 * at) / player.last}%` } })));
     const where = el("output", { class: "number" });
     const home = button("Reset view", "Turn back to the first view", () => player.look(...HOME));
     player.listeners.push(() => {
-      play.textContent = player.isPlaying ? "Pause" : "Play";
+      play.textContent = player.timer ? "Pause" : "Play";
       slider.value = player.at;
-      const steps = player.last - 1;
-      where.textContent = player.at > steps ? "End" : `${noun} ${player.at} of ${steps}`;
-      home.hidden = player.view.every((angle, i) => angle === HOME[i]);
+      where.textContent = player.at === player.last ? "End" : `${noun} ${player.at} of ${player.last - 1}`;
+      home.hidden = player.isHome;
     });
-    return el("div", { class: "controls" }, button("‹", "One step back", () => to(player.at - 1)), play,
-      button("›", "One step on", () => to(player.at + 1)), el("div", { class: "timeline" }, slider, ticks), where, home);
+    return el("div", { class: "controls" }, button("‹", "One step back", () => player.stopAt(player.at - 1)), play,
+      button("›", "One step on", () => player.stopAt(player.at + 1)), el("div", { class: "timeline" }, slider, ticks), where, home);
   }
 
-  /** The parts of one sample's panel: drawings with titles, what the step did, filmstrip. */
-  function panel(run, player, noun, scene) {
-    const pictures = run.titles.map((title) => ({
+  /** The parts of one run's panel: drawings with titles, what the step did, all steps as buttons. */
+  function panel(run, player, noun, scene, quotes) {
+    const pictures = (run.framed ? run.titles : []).map((title) => ({
       title, at: null, moving: 0, canvas: el("canvas", { class: "stage", role: "img", tabindex: 0 }) }));
     const said = el("div", { class: "said", "aria-live": "polite" });
-    const strip = el("ol", { class: "strip" });
+    const strip = el("ol", { class: "strip" }, run.steps.map((step, i) => el("li", {}, el("button", {
+      type: "button", class: step.why ? "wrong" : "right", "data-step": i + 1, onclick: () => player.stopAt(i + 1),
+      title: `${noun} ${i + 1}: candidate ${step.number}${step.name && `, ${step.name}`}, ${step.verdict}`,
+    }, `${i + 1} ${step.why ? "✗" : "✓"} `, el("b", {}, step.number ?? Words.DASH),
+    el("span", { class: "muted" }, ` ${step.why ? step.label : step.name}`)))));
     const end = run.steps.length + 1;
-    run.steps.forEach((step, i) => strip.append(frame(step, i, player, noun)));
     pictures.forEach(({ canvas }) => turnable(canvas, player));
     player.listeners.push(() => {
       const at = player.at >= player.last ? end : Math.min(player.at, end);
-      strip.querySelectorAll("button").forEach((button, i) =>
-        button.setAttribute("aria-current", String(i + 1 === at)));
-      follow(strip, at);
-      say(said, run, at, noun);
+      strip.querySelectorAll("button").forEach((button, i) => button.setAttribute("aria-current", String(i + 1 === at)));
+      said.replaceChildren(...sayings(run, at, noun, quotes));
       pictures.forEach((picture, i) => show(picture, run, i, at, player, scene));
     });
-    lazily(strip, run.steps);
-    return { pictures: run.framed ? pictures : [], said, strip };
+    return { pictures, said, strip };
   }
 
-  function frame(step, i, player, noun) {
-    const mark = step.why ? "✗" : "✓";
-    const name = step.name ? `, ${step.name}` : "";
-    return el("li", {}, el("button", {
-      type: "button", class: step.why ? "wrong" : "right", "data-step": i + 1,
-      title: `${noun} ${i + 1}: candidate ${step.number}${name}, ${step.verdict}`,
-      onclick: () => {
-        player.stop();
-        player.seek(i + 1);
-      },
-    },
-    step.thumb ? el("canvas", { class: "thumb", "aria-hidden": "true" }) : null,
-    el("span", { class: "strip-head" }, el("span", { class: "number" }, String(i + 1)),
-      el("span", { class: "mark" }, mark)),
-    el("span", { class: "strip-what" }, step.label),
-    el("span", { class: "unseen" }, `, candidate ${step.number}${name}, ${step.verdict}`)));
-  }
-
-  /** Frames are drawn when they come into sight. */
-  function lazily(strip, steps) {
-    const watch = new IntersectionObserver((seen) => {
-      for (const { target, isIntersecting } of seen) if (isIntersecting) target.draw();
-    }, { rootMargin: "200px" });
-    strip.querySelectorAll("button").forEach((button, i) => {
-      if (!steps[i].thumb) return;
-      button.draw = () => {
-        watch.unobserve(button);
-        const { blocks, ...options } = steps[i].thumb;
-        Solid.draw(button.querySelector("canvas"), blocks, { ...options, view: HOME, size: THUMB_PX, ...colors() });
-      };
-      watch.observe(button);
-    });
+  /** What became of a step, why, and the sentence of the reply behind it. */
+  function sayings(run, at, noun, quotes) {
+    const line = (text, kind = null) => (text ? el("p", { class: kind }, text) : "");
+    if (at === 0) return [line("Nothing is placed yet.", "muted")];
+    const step = run.steps[at - 1];
+    if (!step) return [el("p", {}, el("strong", {}, "End"), ` ${run.end}`), line(run.ghosts, "muted")];
+    const candidate = step.name ? `${step.number} (${step.name})` : step.number;
+    return [
+      el("p", {}, el("strong", {}, `${noun} ${at}`), candidate === null ? " " : ` Candidate ${candidate} `,
+        el("span", { class: `verdict ${step.why ? "wrong" : "right"}` }, `${step.why ? "✗" : "✓"} ${step.verdict}`)),
+      line(step.text), line(step.note, "muted"), line(step.where, "muted"),
+      quotes[at - 1] ? el("blockquote", { class: "quote" }, quotes[at - 1]) : "",
+    ];
   }
 
   /** Draw where the player stands; a step forward moves from the state before it. */
   function show(picture, run, place, at, player, scene) {
-    const state = run.states[at]?.[place];
-    if (!state || !picture.canvas.isConnected || !picture.canvas.clientWidth) return;
-    const { canvas, title } = picture;
+    const state = run.states[at]?.[place], { canvas, title } = picture;
+    if (!state || !canvas.isConnected || !canvas.clientWidth) return;
     canvas.setAttribute("aria-label", `${title}: ${Words.count(state.blocks.length, "block")}. Drag or use the arrow keys to turn it.`);
-    const before = picture.at !== null && at === picture.at + 1 ? run.states[picture.at]?.[place] : null;
+    const before = picture.at !== null && at === picture.at + 1 ? run.states[picture.at][place] : null;
     const isTurned = picture.at === at;
     picture.at = at;
-    const step = run.steps[at - 1];
-    const draw = (blocks, isDone) => paint(canvas, run, { ...state, blocks }, isDone ? step : null, player.view, scene);
     if (isTurned && picture.moving) return;
     cancelAnimationFrame(picture.moving);
     picture.moving = 0;
+    const draw = (blocks, isDone) => {
+      const step = isDone ? run.steps[at - 1] : null;
+      const numbers = scene ? blocks.map((block) => Steps.badge(scene, block)) : [];
+      Solid.draw(canvas, blocks, {
+        ...looks(), ...state, view: player.view, framed: run.framed, tried: step?.tried, triedBadge: String(step?.number),
+        badges: canvas.clientWidth >= BADGES_FROM_PX ? numbers : numbers.map((one, i) => (blocks[i] === state.fresh ? one : "")),
+      });
+    };
     if (!before || !Solid.ready || isStill()) draw(state.blocks, true);
     else move(picture, before.blocks, state, draw);
   }
+
+  const looks = () => ({ accent: rgb("--accent"), triedColor: rgb("--tried"), grid: rgb("--grid") });
 
   function move(picture, before, state, draw) {
     const began = performance.now();
@@ -183,58 +160,19 @@ const Stage = (() => {
       }
       const dropped = Math.min(1, past / DROP_MS), fallen = Math.max(0, past - DROP_MS) / FALL_MS;
       const lift = DROP_M * (1 - dropped) ** 2;
-      const blocks = Solid.between(before, state.blocks, fallen ** 2)
-        .map((block, i) => (isNew(state.blocks[i])
-          ? { ...block, position: [block.position[0], block.position[1], block.position[2] + lift] } : block));
-      draw(blocks, false);
+      draw(Solid.between(before, state.blocks, fallen ** 2).map((block, i) => {
+        const [x, y, z] = block.position;
+        return isNew(state.blocks[i]) ? { ...block, position: [x, y, z + lift] } : block;
+      }), false);
       picture.moving = requestAnimationFrame(tick);
     };
     tick();
   }
 
-  function paint(canvas, run, state, step, view, scene) {
-    const tried = step && scene ? Overlay.block(scene, step) : null;
-    const isLarge = canvas.clientWidth >= BADGES_FROM_PX;
-    const numbers = scene && Overlay.hasNumbers ? state.blocks.map((block) => Overlay.number(scene, block)) : [];
-    const badges = isLarge ? numbers : numbers.map((number, i) => (state.blocks[i] === state.fresh ? number : ""));
-    Solid.draw(canvas, state.blocks, {
-      ...state, view, framed: run.framed, ...colors(), grid: rgb("--grid-rgb"), badges, tried,
-      triedBadge: tried && Overlay.hasNumbers ? String(step.number) : "",
-    });
-  }
-
-  function say(said, run, at, noun) {
-    if (at === 0) {
-      said.replaceChildren(el("p", { class: "muted" }, "Nothing is placed yet."));
-      return;
-    }
-    if (at > run.steps.length) {
-      said.replaceChildren(el("p", {}, el("strong", {}, "End"), ` ${run.end}`));
-      if (run.ghosts) said.append(el("p", { class: "muted" }, run.ghosts));
-      return;
-    }
-    const step = run.steps[at - 1];
-    const candidate = step.name ? `${step.number} (${step.name})` : step.number;
-    const rows = [el("p", {}, el("strong", {}, `${noun} ${at}`),
-      step.number === null || step.number === undefined ? " " : ` Candidate ${candidate} `,
-      el("span", { class: step.why ? "verdict wrong" : "verdict right" }, `${step.why ? "✗" : "✓"} ${step.verdict}`))];
-    if (step.text) rows.push(el("p", {}, step.text));
-    if (step.note) rows.push(el("p", { class: "muted" }, step.note));
-    said.replaceChildren(...rows);
-  }
-
-  function follow(strip, at) {
-    const frame = strip.children[at - 1];
-    if (!frame) return;
-    const left = frame.offsetLeft;
-    if (left < strip.scrollLeft || left + frame.offsetWidth > strip.scrollLeft + strip.clientWidth) {
-      strip.scrollLeft = left - strip.clientWidth / 2;
-    }
-  }
-
   /** Drag, touch or the arrow keys turn all drawings of a player; a double click turns back. */
   function turnable(canvas, player) {
     let from = null;
+    canvas.classList.add("turnable");
     canvas.addEventListener("pointerdown", (event) => {
       from = [event.clientX, event.clientY, ...player.view];
       canvas.setPointerCapture(event.pointerId);
@@ -260,40 +198,47 @@ const Stage = (() => {
     });
   }
 
-  /** A canvas that is drawn once it is in the page; see `draw`. With a player it turns with the others. */
-  function picture(label, blocks, options, kind = "goal", player = null) {
-    const canvas = el("canvas", { class: `picture ${kind}`, role: "img", "aria-label": label });
-    canvas.drawing = [blocks, options];
+  // ---- single pictures
+
+  /**
+   * A canvas that is drawn when it comes into sight. `drawing` is [blocks, options], or a function
+   * that promises it, and null where there is nothing. With a player it turns with the others.
+   */
+  function picture(label, drawing, player = null) {
+    const canvas = el("canvas", { class: "picture", role: "img", "aria-label": label });
+    canvas.drawing = drawing;
     if (player) {
-      canvas.classList.add("turns");
       turnable(canvas, player);
       player.listeners.push(() => {
-        canvas.drawing[1] = { ...options, view: player.view };
-        if (canvas.clientWidth) once(canvas);
+        canvas.view = player.view;
+        if (canvas.clientWidth) drawn(canvas);
       });
-    }
+    } else inSight.observe(canvas);
     return canvas;
   }
 
-  function once(canvas) {
-    const [blocks, options] = canvas.drawing;
-    const badges = canvas.clientWidth >= BADGES_FROM_PX || !options.badges ? options.badges : [];
-    Solid.draw(canvas, blocks, { view: HOME, ...options, badges, grid: options.grid ? rgb("--grid-rgb") : null, ...colors() });
+  /** A candidate alone. */
+  const candidate = (one, n) => picture(`Candidate ${n}: ${Words.block(one)}`,
+    [[Solid.onTheFloor(one)], { minDistance: 0, grid: null }]);
+
+  async function drawn(canvas) {
+    if (typeof canvas.drawing === "function") canvas.drawing = await canvas.drawing();
+    if (!canvas.drawing || !canvas.isConnected) return;
+    const [blocks, options = {}] = canvas.drawing;
+    const badges = canvas.clientWidth >= BADGES_FROM_PX ? options.badges : [];
+    Solid.draw(canvas, blocks, { ...looks(), view: canvas.view || HOME, ...options, badges });
   }
 
   const inSight = new IntersectionObserver((seen) => {
-    for (const { target, isIntersecting } of seen) if (isIntersecting) once(target);
-  }, { rootMargin: "400px" });
+    for (const { target, isIntersecting } of seen) if (isIntersecting) drawn(target);
+  }, { rootMargin: "300px" });
 
-  /** Draw every picture of a place when it comes into sight, again after a change of size or colors;
-   *  at once where it goes on paper. */
-  function draw(place, isPrinted = false) {
-    for (const canvas of place?.querySelectorAll("canvas.picture:not(.turns)") || []) {
-      inSight.unobserve(canvas);
-      if (isPrinted) once(canvas);
-      else inSight.observe(canvas);
+  /** Draw all pictures that were drawn again, after a change of size or colors; all that go on paper. */
+  function redraw(place, isPrinted = false) {
+    for (const canvas of place.querySelectorAll("canvas.picture")) {
+      if (isPrinted || canvas.dataset.drawn) drawn(canvas);
     }
   }
 
-  return { Player, wrongSteps, controls, panel, picture, draw, HOME };
+  return { Player, wrongSteps, controls, panel, picture, candidate, draw: drawn, redraw, isStill };
 })();

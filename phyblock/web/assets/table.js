@@ -1,131 +1,124 @@
-/* The ranked table: which columns it has, in which order its rows stand, and how a cell reads. */
+/* The one table of a page: columns with headings above them, rows in any order, sorted by a click. */
 "use strict";
 
 const Table = (() => {
-  const DASH = "–";
-  const FACTS = [
-    ["solved", "Solved", (fact, track) => [fact.solved, `of ${fact.done.toLocaleString("en")}`, track]],
-    ["usd_per_solved", "USD a solved {item}", (fact) => [fact.usd_per_solved, "", null, "usd"]],
-    ["usd_per_100", "USD for 100 replies", (fact) => [fact.usd_per_100, "", null, "usd"]],
-    ["prompt_tokens", "Tokens in", (fact) => [fact.prompt_tokens]],
-    ["completion_tokens", "Tokens out", (fact) => [fact.completion_tokens]],
-    ["latency_s", "Seconds", (fact) => [fact.latency_s, "", null, "s"]],
-    ["done", "Samples done", (fact) => [fact.done, fact.done < fact.expected ? `of ${fact.expected.toLocaleString("en")}` : ""]],
-    ["failed", "Not read or failed", (fact) => [fact.failed]],
-  ];
-  /** What no scoring can tell. */
-  const RECORDED = ["usd_per_solved", "usd_per_100", "prompt_tokens", "completion_tokens", "latency_s"];
-  /** What there is only where a sample can be worth all that there is. */
-  const OF_SOLVED = ["solved", "usd_per_solved"];
-  const LOWER_FIRST = [...RECORDED, "failed", "rank"];
+  const { DASH, number, dollars } = Words;
 
-  const text = (value, digits = 1) => (value === null || value === undefined ? DASH
-    : Number(Words.fixed(value, digits)).toLocaleString("en", { minimumFractionDigits: digits, maximumFractionDigits: digits }));
-  const dollars = (value) => (value === null || value === undefined ? DASH
-    : value === 0 ? "0" : value >= 1 ? text(value, 2) : value.toPrecision(2));
-
-  /** A value column: what stands in a row, and how it is sorted. */
-  function valueColumn(column, track) {
-    const share = column.unit ? `${column.unit === "%" ? "%" : column.unit}` : "";
-    return {
-      id: column.id, heading: column.heading, part: column.cell, 
-      about: [track.title, column.setting && `setting ${column.setting}`, share && `in ${share}`].filter(Boolean).join(", "),
-      isMain: column.heading === track.main, better: column.better,
-      value: (row) => (row.values[column.id] ? row.values[column.id][0] : null),
-      cell: (row) => {
-        const found = row.values[column.id];
-        if (!found) return { text: DASH };
-        const [value, lo, hi] = found;
-        return { text: text(value), below: lo === null ? "" : `${text(lo)} to ${text(hi)}` };
-      },
+  /**
+   * A table with a caption.
+   *
+   * A column is {heading, over, isText, about, cell(row)}, where a cell is {text, below, href}; one
+   * with `value(row)` sorts the rows, beginning with what is `better`. `sorting` is the column that
+   * it is sorted by at first. `name(row)` is the heading of a row.
+   */
+  function made({ caption, columns, rows, name, head = "Model", sorting = null, down = null }) {
+    const isDown = down ?? sorting?.better !== "lower";
+    const ordered = sorting ? sorted(rows, sorting.value, isDown) : rows;
+    const sort = (column) => {
+      const isAgain = column === sorting;
+      const again = made({ caption, columns, rows, name, head, sorting: column, down: isAgain ? !isDown : null });
+      whole.replaceWith(again);
+      again.querySelectorAll("thead button")[columns.indexOf(column)].focus();
     };
-  }
-
-  function factColumn([name, heading, of], track) {
-    return {
-      id: `${track.name}/${name}`, heading: heading.replace("{item}", track.item), about: track.title + (RECORDED.includes(name) ? ", as the records say" : ""), better: LOWER_FIRST.includes(name) ? "lower" : "higher",
-      value: (row) => (row.facts[track.name] ? of(row.facts[track.name])[0] ?? null : null),
-      cell: (row) => {
-        if (!row.facts[track.name]) return { text: DASH };
-        const [value, below = "", , form] = of(row.facts[track.name]);
-        const shown = form === "usd" ? dollars(value) : text(value, form === "s" ? 2 : 0);
-        return { text: shown, below };
-      },
+    const spans = [];
+    for (const { over = "" } of columns) {
+      if (spans.at(-1)?.over === over) spans.at(-1).span += 1;
+      else spans.push({ over, span: 1 });
+    }
+    const groups = spans.some(({ over }) => over) ? el("tr", {}, name ? el("td") : null, spans.map(({ over, span }) =>
+      (over ? el("th", { scope: "colgroup", colspan: span, class: "over" }, over) : el("td", { colspan: span })))) : null;
+    const heading = (column) => el("th", {
+      scope: "col", class: column.isText ? "text" : null, title: column.about || null,
+      "aria-sort": column === sorting ? (isDown ? "descending" : "ascending") : null,
+    }, column.value ? el("button", { type: "button", onclick: () => sort(column) }, column.heading) : column.heading);
+    const cell = (column, row) => {
+      const { text, below, href } = column.cell(row);
+      return el("td", { class: [column.isMain && "main", column.isText && "text"].filter(Boolean).join(" ") || null },
+        href ? el("a", { href }, text) : text, below ? el("small", {}, below) : null);
     };
+    const whole = scrolled(caption, el("table", {}, el("caption", { class: "unseen" }, caption),
+      el("thead", {}, groups, el("tr", {}, name ? el("th", { scope: "col", class: "text" }, head) : null, columns.map(heading))),
+      el("tbody", {}, ordered.map((row) => el("tr", { class: row.kind || null },
+        name ? el("th", { scope: "row", class: "text name" }, name(row)) : null, columns.map((column) => cell(column, row)))))));
+    return whole;
   }
 
-  function rowColumns(board) {
-    const plain = (id, heading, value, shown = value, about = "") => ({
-      id, heading, about, better: "higher", value,
-      cell: (row) => ({ text: shown(row) || DASH, isText: true }) });
-    const of = (row, what) => [...new Set(Object.values(row.runs).map((n) => what(board.runs[n])).filter(Boolean))].join(", ");
-    return [
-      plain("size", "Size (B)", (row) => row.size_b, (row) => (row.size_b === null ? DASH : String(row.size_b))),
-      plain("date", "Run begun", (row) => of(row, (run) => run.date), (row) => of(row, (run) => run.date),
-        "The day on which the run was begun, UTC: recorded replies were scored then"),
-      plain("seeds", "Seeds", (row) => board.runs[Object.values(row.runs)[0]].seeds, (row) => of(row, (run) => String(run.seeds))),
-      plain("asked", "Asked how", (row) => of(row, (run) => run.asked.join(", ")), (row) => of(row, (run) => run.asked.join(", ")) || DASH),
-      plain("run", "Run", (row) => of(row, (run) => run.id), (row) => of(row, (run) => run.id)),
-      plain("verified", "Independently re-scored", (row) => of(row, (run) => (run.verified ? "yes" : "no")),
-        (row) => of(row, (run) => (run.verified ? "yes" : "no"))),
-    ];
-  }
-
-  const factsOf = (track) => FACTS.filter(([name]) => track.best !== null || !OF_SOLVED.includes(name));
-
-  /** Every column of a track, its main one first, then what its samples took, then the run. */
-  function columns(board, track) {
-    const mine = board.columns.filter((column) => column.track === track.name);
-    const settings = [...new Set(mine.map((column) => column.setting))];
-    const values = settings.flatMap((setting) => mine.filter((column) => column.setting === setting)
-      .sort((a, b) => (b.heading === track.main) - (a.heading === track.main))
-      .map((column) => ({ ...valueColumn(column, track), over: setting && `Setting ${setting}` })));
-    const facts = factsOf(track).map((fact) => ({ ...factColumn(fact, track), over: "Samples and cost" }))
-      .filter((column) => board.rows.some((row) => column.value(row) !== null));
-    return [...values, ...facts, ...rowColumns(board).map((column) => ({ ...column, over: "Model and run" }))];
-  }
-
-  /** Rows by a column, those without a value last, then by name. */
-  function sorted(rows, column, descending) {
-    const sign = descending ? -1 : 1;
+  /** Rows by a value, those without one last, then by name. */
+  function sorted(rows, value, isDown = true) {
+    const sign = isDown ? -1 : 1;
+    const isNone = (one) => one === null || one === undefined || one === "";
     return [...rows].sort((a, b) => {
-      const [x, y] = [column.value(a), column.value(b)];
-      const none = [x, y].map((value) => value === null || value === undefined || value === "");
-      if (none[0] || none[1]) return none[0] - none[1] || a.name.localeCompare(b.name);
+      const [x, y] = [value(a), value(b)];
+      if (isNone(x) || isNone(y)) return isNone(x) - isNone(y) || a.name.localeCompare(b.name);
       const by = typeof x === "number" ? x - y : String(x).localeCompare(String(y));
       return sign * by || a.name.localeCompare(b.name);
     });
   }
 
+  /** Facts of a model's samples: name, heading, digits or dollars, and the sense in which less is better. */
+  const FACTS = [
+    ["solved", "Solved", (n) => number(n, 0)], ["usd_per_solved", "USD a solved {item}", dollars, "lower"],
+    ["usd_per_100", "USD for 100 replies", dollars, "lower"], ["prompt_tokens", "Tokens in", (n) => number(n, 0), "lower"],
+    ["completion_tokens", "Tokens out", (n) => number(n, 0), "lower"], ["latency_s", "Seconds", (n) => number(n, 2), "lower"],
+    ["done", "Samples done", (n) => number(n, 0)], ["failed", "Not read or failed", (n) => number(n, 0), "lower"],
+  ];
+
+  /** All numbers of a track: values by setting, then what its samples took, then the run. */
+  function numbers(track) {
+    const { board } = Data, main = Data.mainOf(track);
+    const values = board.columns.filter((column) => column.track === track.name).map((column) => ({
+      ...column, over: column.setting && `Setting ${column.setting}`, isMain: column === main,
+      about: `${track.title}${column.unit && `, in ${column.unit}`}`, value: (row) => row.values[column.id]?.[0] ?? null,
+      cell: (row) => {
+        const [value, lo, hi] = row.values[column.id] || [null, null, null];
+        const href = value === null ? null : App.address("samples", { track: track.name, model: row.name, ...partOf(track, column.cell) });
+        return { text: number(value), below: lo === null ? "" : `${number(lo)} to ${number(hi)}`, href };
+      },
+    }));
+    const facts = FACTS.map(([name, heading, text, better = "higher"]) => {
+      const value = (row) => row.facts[track.name]?.[name] ?? null;
+      return { heading: heading.replace("{item}", track.item), over: "Samples and cost", better, value, cell: (row) => ({ text: text(value(row)) }) };
+    }).filter(({ value }) => board.rows.some((row) => value(row) !== null));
+    const columns = [...values, ...facts, ...ofRuns()];
+    return made({ caption: `All numbers of ${track.title}`, columns, rows: board.rows.filter((row) => row.facts[track.name]), name: named,
+      sorting: values.find(({ isMain }) => isMain) });
+  }
+
+  /** Facts of models and runs, where they are not the same for all. */
+  function ofRuns() {
+    const { board } = Data;
+    const of = (what) => (row) => [...new Set(Object.values(row.runs).map((n) => what(board.runs[n])))].filter(Boolean).join(", ");
+    return [
+      ["Size (B)", (row) => row.size_b], ["Run begun", of((run) => run.date)], ["Asked how", of((run) => run.asked.join(", "))],
+      ["Run", of((run) => run.id)], ["Independently re-scored", of((run) => (run.verified ? "yes" : "no"))],
+    ].map(([heading, value]) => ({ heading, over: "Model and run", isText: true, better: "higher", value, cell: (row) => ({ text: value(row) || DASH }) }))
+      .filter(({ value }) => new Set(board.rows.map(value)).size > 1);
+  }
+
+  /** The filter that a cell of the tables stands for: a level, a subtask or a group of them. */
+  const partOf = (track, cell) => (/^\d$/.test(cell) ? { level: cell } : track.parts[cell] || track.groups[cell] ? { part: cell } : {});
+
+  const named = (row) => [el("a", { href: App.address("model", { m: row.name }) }, row.name),
+    Data.isModel(row) ? null : el("small", {}, "baseline")];
+
+  /** A table of a run as it was written. */
+  const written = ({ caption, columns, rows, notes }) => [
+    made({ caption, rows, columns: columns.map(([heading, over, isText], n) => ({ heading, over, isText, cell: (row) => ({ text: row[n] }) })) }),
+    notes.map((note) => el("p", { class: "muted" }, note))];
+
   /** The ranks that a row may have, as text. */
   function rank(row, track) {
-    const range = row.ranks[track];
-    if (!range) return DASH;
-    return range[0] === range[1] ? String(range[0]) : `${range[0]}–${range[1]}`;
+    const [best, worst] = row.ranks[track.name] || [];
+    if (!best) return DASH;
+    return best === worst ? String(best) : `${best}–${worst}`;
   }
 
-  /** How many samples of how many were answered and why no more, where some were not; and whether
-      that leaves the row without a rank. */
+  /** The share of samples that were answered, why no more, and whether that leaves the row without a rank. */
   function lacking(row, track) {
-    const [fact, why] = [row.facts[track], row.lacking[track]];
-    const said = (number) => number.toLocaleString("en");
-    const counted = why || (isCut(row, track) ? `${said(fact.done)} of ${said(fact.expected)} samples` : "");
-    return counted && isCut(row, track) ? `${counted}; no rank` : counted;
+    const fact = row.facts[track.name], isCut = fact.done < fact.expected;
+    const counted = row.lacking[track.name] || (isCut ? `${number(fact.done, 0)} of ${number(fact.expected, 0)} samples` : "");
+    return isCut ? `${counted}; no rank` : counted;
   }
 
-  /** Whether a row was not asked everything that its run holds. */
-  function isCut(row, track) {
-    const fact = row.facts[track];
-    return Boolean(fact) && fact.done < fact.expected;
-  }
-
-  return { columns, sorted, rank, lacking, isCut, text, dollars, DASH };
+  return { made, sorted, numbers, written, rank, lacking };
 })();
-
-/** An element of a drawing. */
-function svg(tag, attributes, ...children) {
-  const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
-  for (const [name, value] of Object.entries(attributes)) if (value !== null) made.setAttribute(name, value);
-  made.append(...children.flat());
-  return made;
-}
