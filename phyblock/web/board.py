@@ -291,25 +291,6 @@ def board_of(
             for column in headline_columns(run, track)
         ]
         heading = main_column(run, track).heading
-<<<<<<< HEAD
-        about = {"name": track, "title": kind.title, "item": kind.item, "main": heading}
-        about |= {"unit": measure.unit, "better": measure.better}
-        about["best"] = None if math.isnan(measure.best) else measure.best
-        about["notes"] = list(track_notes(run, track))
-        wrong = [one.name for one in track_measures(track) if one.name.startswith("wrong_")]
-        about["errors"] = [name.removeprefix("wrong_") for name in wrong]
-        floor = headline_floors(run, track).get(heading)
-        about["floor"] = floor and {"name": floor.name, "value": round(floor.value, 4)}
-        tracks.append({**about, "physics": kind.lets_go(run.manifest.suite)})
-        measures = {one.name: one for one in track_measures(track)}
-        for setting in values[place, track].values:
-            for column in headline_columns(run, track):
-                of = measures[column.measure]
-                told = {"track": track, "setting": setting, "heading": column.heading}
-                told |= {"unit": of.unit, "better": of.better, "cell": column.cell}
-                columns.append({"id": _id(track, setting, column.heading), **told})
-=======
->>>>>>> 80a12f72 (Pages: report and leaderboard are one page with one index of samples, one view of a sample, one table and one sheet)
         main = _id(track, next(iter(values[place, track].values)), heading)
         ranked = [entry for entry in entries if main in numbers[entry.name]]
         models = [numbers[e.name][main] for e in ranked if not e.model.is_baseline]
@@ -358,7 +339,7 @@ def _track(track: str, run: Run, models: Sequence[Sequence[float | None]]) -> di
         "notes": list(track_notes(run, track)),
         "errors": [name.removeprefix("wrong_") for name in names if name.startswith("wrong_")],
         "floor": floor and {"name": floor.name, "value": round(floor.value, 4)},
-        "physics": kind.physics(run.manifest.suite),
+        "physics": kind.lets_go(run.manifest.suite),
         "finding": _finding(floor, measure, models),
         "parts": dict(parts),
         "groups": {
