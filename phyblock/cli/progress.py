@@ -132,9 +132,7 @@ class ProgressView:
             tally.last_retry = f"{event.message}; waiting {event.wait_s:.0f} s"
             self._progress.update(tally.task.id, facts=tally.facts)
         elif isinstance(event, ModelEvent):
-            # Where it ends for a model, another event says so.
-            if event.kind != "unavailable":
-                self._print(f"{event.model}: {event.message}")
+            self._print(f"{event.model}: {event.message}")
         elif isinstance(event, ModelStopped):
             task = self._tallies[event.model].task
             # Samples that nobody will ask about are no part of the whole.

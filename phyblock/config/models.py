@@ -264,8 +264,9 @@ class ModelConfig(Section):
     """The model is asked no more before it costs more than this in a run [USD]; null: the run's
     limit alone."""
     seed: SendMode = "auto"
-    """auto: seeds are sent until the provider refuses one, then repeats are independent. always: a
-    refused seed is an error. never: none is sent."""
+    """auto: seeds are sent where litellm knows the provider to take them, and to OpenAI-compatible
+    servers named by api_base. always, never: whatever is known. Without seeds, repeats are
+    independent."""
     response_format: SendMode = "auto"
     """With answer_format: json_schema in the suite. auto: the schema is sent where litellm knows
     the model to take one, and to OpenAI-compatible servers named by api_base. always, never:

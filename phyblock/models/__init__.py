@@ -3,7 +3,7 @@
 Importing this package imports neither litellm nor aiohttp: the first call through one of them does.
 """
 
-from phyblock.models.batch import BatchFiles, under_way, waiting_keys
+from phyblock.models.batch import BatchFiles, under_way
 from phyblock.models.build import build_model
 from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.costs import Budget, Estimate, ends_on, estimate, is_billed, tariff_of
@@ -11,8 +11,6 @@ from phyblock.models.keys import api_key_status, server_address
 from phyblock.models.litellm_client import known_providers
 from phyblock.models.model import ModelEvent, RetryPolicy, takes_format
 from phyblock.models.request import (
-    AskLaterError,
-    GatheringModel,
     HaltedError,
     Image,
     Message,
@@ -22,8 +20,8 @@ from phyblock.models.request import (
 from phyblock.records.record import Reply, Usage
 
 __all__ = [
-    "AskLaterError", "BatchFiles", "Budget", "Estimate", "GatheringModel", "HaltedError", "Image",
+    "BatchFiles", "Budget", "Estimate", "HaltedError", "Image",
     "Message", "Model", "ModelEvent", "Reply", "ReplyCache", "Request", "RetryPolicy", "Usage",
     "api_key_status", "build_model", "ends_on", "estimate", "is_billed", "known_providers",
-    "reply_key", "server_address", "takes_format", "tariff_of", "under_way", "waiting_keys",
+    "reply_key", "server_address", "takes_format", "tariff_of", "under_way",
 ]  # fmt: skip

@@ -1,9 +1,9 @@
 """A model asked in a provider's batches: slower, cheaper where the provider says so, never twice.
 
-A request is in the draft of a batch, or in the newest batch that the ledger has it in. Between the
-call that makes a batch and its id on disk nobody knows whether there is one. It is looked for under
-our name; where the provider tells no names, among the batches of that time with as many requests,
-by the names of requests in their answers.
+A request waits in the draft of a batch, which is sent when nothing more comes, or in the newest
+batch that the ledger has it in. Between the call that makes a batch and its id on disk nobody knows
+whether there is one. It is looked for under our name; where the provider tells no names, among the
+batches of that time with as many requests, by the names of requests in their answers.
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ from __future__ import annotations
 import asyncio
 import secrets
 import time
-from collections import Counter
-from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import partial
@@ -24,22 +23,18 @@ from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.files import atomic_write, load_json, writing
 from phyblock.models.batch_providers import PROVIDERS, UNREADABLE, BatchProvider, BatchStatus
 from phyblock.models.cache import ReplyCache, reply_key
-from phyblock.models.client import Answer, Client, HttpClient, SeedRefusedError
-from phyblock.models.costs import (
-    ModelBudget,
-    cost_usd,
-    counted,
-    estimate,
-    may_be_billed,
-)
-from phyblock.models.model import EventKind, ModelEvent, Observer, RetryPolicy
-from phyblock.models.request import AskLaterError, Request
+from phyblock.models.client import Answer, Client, HttpClient
+from phyblock.models.costs import ModelBudget, cost_usd, counted, estimate, may_be_billed
+from phyblock.models.model import ModelEvent, Observer, RetryPolicy
+from phyblock.models.request import Request
 from phyblock.records.files import BATCHES
 from phyblock.records.record import BatchEvent, BatchLine, Reply
 
 T = TypeVar("T")
 
 _FIRST_PAUSE_S = 5.0
+_QUIET_S = 30.0
+"""A draft that nothing came into for so long is sent, though more was expected."""
 _CLOCKS_APART_S = 3600.0
 _TIME = "%Y-%m-%dT%H:%M:%SZ"
 
@@ -51,13 +46,17 @@ class UnsureError(UnavailableError):
 @dataclass(frozen=True)
 class BatchFiles:
     """Batches of a run as they are kept: the lines written so far, oldest first, and a callback
-    that appends one and returns when it is on disk. A batch is looked at every `poll_s` at least.
+    that appends one and returns when it is on disk. A batch is looked at every `poll_s` at least;
+    `recorded` are the samples that had a record when the run was opened, and `expected` is how many
+    are going to be asked.
     """
 
     earlier: tuple[BatchLine, ...]
     put: Callable[[BatchLine], Awaitable[None]]
     run_folder: Path
     poll_s: float = 60.0
+    recorded: Collection[str] = ()
+    expected: int = 0
 
     def answers(self, token: str) -> Path:
         """Return the file of a batch's answers, which is there once it has ended."""
@@ -69,21 +68,22 @@ class Batch:
     """A batch, from its draft, with `lines` to send, to its answers by request.
 
     `most_usd` are its requests by their keys in the reply cache, with the most that each can cost
-    [US dollars], None where no price is known; `held` are their reservations in the budget. `token`
-    is our name for it, `id` the provider's. `following` is the work that ends when it has ended.
+    [US dollars], None where no price is known; `held` are their reservations in the budget, and
+    `unheld` those of an earlier command, which held nothing in this one's yet. `token` is our name
+    for it, `id` the provider's. `work` is done when its answers are here, or when it is lost.
     """
 
     # What the providers allow in names and boundaries.
     token: str = field(default_factory=lambda: f"pb{secrets.token_hex(12)}")
-    seeded: bool = True
     most_usd: dict[str, float | None] = field(default_factory=dict)
     created: datetime = field(default_factory=lambda: datetime.now(UTC))
     event: BatchEvent | None = None
     id: str = ""
     held: dict[str, int] = field(default_factory=dict)
+    unheld: set[str] = field(default_factory=set)
     lines: list[bytes] = field(default_factory=list)
-    size: int = 0
-    following: asyncio.Future[None] | None = None
+    grown_s: float = 0.0
+    work: asyncio.Future[None] | None = None
     answers: dict[str, Answer | str] | None = None
     is_blank: bool = False
 
@@ -92,49 +92,32 @@ class Batch:
         """Its name for people."""
         return self.id or self.token
 
+    def take(self, line: BatchLine) -> None:
+        """Take in a line about it."""
+        if line.event == "intended":
+            costs = line.most_usd or [None] * len(line.keys)
+            self.most_usd = dict(zip(line.keys, costs, strict=True))
+            self.created = datetime.strptime(line.time, _TIME).replace(tzinfo=UTC)
+        self.event, self.id = line.event, line.id or self.id
 
-class Ledger:
-    """The batches of one model; every change is on disk when `note` returns."""
 
-    def __init__(
-        self, model: str, lines: Iterable[BatchLine], put: Callable[[BatchLine], Awaitable[None]]
-    ) -> None:
-        self._model = model
-        self._put = put
-        self.batches: dict[str, Batch] = {}
-        for line in lines:
-            if line.model == model and line.event == "intended":
-                costs = line.most_usd or [None] * len(line.keys)
-                created = datetime.strptime(line.time, _TIME).replace(tzinfo=UTC)
-                most_usd = dict(zip(line.keys, costs, strict=True))
-                self._take(Batch(line.batch, line.seeded, most_usd, created), line)
-            elif line.model == model:
-                self._take(self.batches[line.batch], line)
+def read_batches(lines: Iterable[BatchLine], model: str) -> list[Batch]:
+    """Return the batches of a model that are not lost, as its lines say, in their order."""
+    batches: dict[str, Batch] = {}
+    for line in lines:
+        if line.model == model:
+            batches.setdefault(line.batch, Batch(line.batch)).take(line)
+    return [batch for batch in batches.values() if batch.event != "lost"]
 
-    def newest(self, key: str) -> Batch | None:
-        """Return the last batch that a request went out in, or is about to."""
-        return next((b for b in reversed(self.batches.values()) if key in b.most_usd), None)
 
-    async def note(self, batch: Batch, event: BatchEvent, **fields: object) -> None:
-        """Write the newest state of a batch; one that is `intended` counts as under way."""
-        batch.created = datetime.now(UTC) if event == "intended" else batch.created
-        known = {"batch": batch.token, "model": self._model, "event": event}
-        now = datetime.now(UTC).strftime(_TIME)
-        line = BatchLine.model_validate({**known, "time": now, **fields})
-        await self._put(line)
-        self._take(batch, line)
-
-    def _take(self, batch: Batch, line: BatchLine) -> None:
-        self.batches[batch.token] = batch
-        batch.event, batch.id = line.event, line.id or batch.id
-        if line.event == "lost":
-            # Its requests count as not sent in it.
-            del self.batches[batch.token]
+def under_way(lines: Iterable[BatchLine], model: str) -> list[Batch]:
+    """Return the batches of a model that have not ended, as its lines say."""
+    return [batch for batch in read_batches(lines, model) if batch.event != "ended"]
 
 
 @dataclass(eq=False, kw_only=True)
 class BatchModel:
-    """A GatheringModel over a provider's batches.
+    """A Model over a provider's batches: a batch is sent when nothing has been asked for a while.
 
     `client` makes a client that sends through an HTTP client: by it requests are written and
     answers are read as those of direct calls.
@@ -152,167 +135,117 @@ class BatchModel:
     def __post_init__(self) -> None:
         self.name = self.config.name
         self._provider = PROVIDERS[self.config.provider](self.config)
-        self._ledger = Ledger(self.name, self.files.earlier, self.files.put)
-        self._earlier = {key for batch in self._ledger.batches.values() for key in batch.most_usd}
-        self._drafting = asyncio.Lock()
+        self._batches = read_batches(self.files.earlier, self.name)
+        for batch in self._batches:
+            batch.unheld = set(batch.most_usd)
+        self._ended_before = [batch for batch in self._batches if batch.event == "ended"]
+        # By request: the batch, or the draft of one, in which it has not failed.
+        self._newest = {key: batch for batch in self._batches for key in batch.most_usd}
+        self._asked = 0
+        self._adding = asyncio.Lock()
+        self._is_writing = False
         self._draft: Batch | None = None
         self._refusal: UnavailableError | None = None
-        self._has_begun = False
-        self._takes_seed = self.config.seed != "never"
-        # Requests whose newest answer failed, how often, and those whose answer a sample has.
-        self._again: set[str] = set()
-        self._failures: Counter[str] = Counter()
         self._given: set[str] = set()
         self._billed_usd: dict[str, float] = {}
 
-    # A round: begin, gather, dispatch, ask.
-
-    async def begin(self) -> None:
-        """See GatheringModel; the first round takes up the batches of earlier commands."""
-        if self._refusal is not None:
-            raise self._refusal
-        if self._has_begun:
-            return
-        self._has_begun = True
-        for batch in tuple(self._ledger.batches.values()):
-            if batch.event == "intended":
-                # A call that was cut off may still be worked on over there.
-                status = await self._find(batch, time.time() + 2 * self.files.poll_s)
-                if status is None:
-                    await self._ledger.note(batch, "lost", words="not found at the provider")
-                else:
-                    await self._ledger.note(batch, "created", id=status.id)
-            if batch.event == "created":
-                self._following(batch)
-
-    async def gather(self, request: Request, *, anew: bool = False) -> bool:
-        """See GatheringModel."""
-        key = reply_key(self.config, request)
-        async with self._drafting:
-            is_drafted = self._draft is not None and key in self._draft.most_usd
-            if is_drafted or await self._is_answered(key, request, anew=anew):
-                return True
-            return self._refusal is None and await self._add(key, request)
-
-    async def dispatch(self) -> None:
-        """See GatheringModel. What keeps a batch from being sent is raised by the next `begin`."""
-        async with self._drafting:
-            await self._send_draft()
-
     async def ask(self, request: Request) -> Reply:
-        """Return the answer of the newest batch with the request, else the cached reply.
+        """Return the cached reply, or the answer of the newest batch with the request.
 
-        Raises what the model seam says, AskLaterError where the request belongs to the next round.
+        Raises what the model seam says. Cancelled, it gives up, and the batch goes on.
         """
-        key = reply_key(self.config, request)
-        batch = self._ledger.newest(key)
-        if batch is None or batch.event == "intended" or key in self._again:
-            kept = None if self.cache is None else self.cache.get(key)
-            if kept is None:
-                raise AskLaterError
-            return kept.model_copy(update={"cost_usd": cost_usd(self.budget.tariff, kept)})
-        try:
-            await asyncio.shield(self._following(batch))
-            if batch.answers is None:
-                raise AskLaterError
-            reply = await self._read(key, request, batch)
-        except UnavailableError:
-            # No more is heard in this command of what is under way: it counts as spent.
-            for each in self._ledger.batches.values():
-                self._settle_all(each, None)
-            raise
-        except ModelError as error:
-            self._settle(key, batch, None if may_be_billed(error) else 0.0)
-            error.billed_usd = self._billed_usd.get(key)
-            if isinstance(error, RetryableError):
-                self._again.add(key)
-                self._failures[key] += 1
-                if self._failures[key] < self.policy.attempts or self._refusal is not None:
-                    raise AskLaterError from None
-            raise
-        paid_usd = cost_usd(self.budget.tariff, reply)
-        reply = reply.model_copy(update={"cost_usd": paid_usd})
-        if key in self._given:
-            # A second sample that asks the same.
-            return reply.model_copy(update={"cached": True, "attempts": 0})
-        self._given.add(key)
-        self._settle(key, batch, paid_usd)
-        self.budget.learn(estimate(self.config, request), reply.usage)
-        update = {"billed_usd": self._billed_usd.get(key), "attempts": self._failures[key] + 1}
-        reply = reply.model_copy(update=update)
-        if self.cache is not None:
-            self.cache.put(key, self.config.id, reply)
-        return reply
+        key, failures = reply_key(self.config, request), 0
+        self._asked += 1
+        while True:
+            if (batch := self._newest.get(key)) is None:
+                if self.cache is not None and (kept := self.cache.get(key)) is not None:
+                    return kept.model_copy(update={"cost_usd": cost_usd(self.budget.tariff, kept)})
+                async with self._adding:
+                    # Another sample may have asked the same meanwhile.
+                    batch = self._newest.get(key) or await self._add(key, request)
+            if key in batch.unheld:
+                batch.unheld.discard(key)
+                if (usd := batch.most_usd[key]) is not None:
+                    batch.held[key] = self.budget.hold(usd)
+            if batch.work is None:
+                batch.work = asyncio.ensure_future(self._take_through(batch))
+            try:
+                await asyncio.shield(batch.work)
+                if batch.answers is None:
+                    continue
+                reply = await self._read(key, request, batch)
+            except UnavailableError:
+                # No more is heard in this command of what is under way: it counts as spent.
+                for each in self._batches:
+                    self._settle_all(each, None)
+                raise
+            except ModelError as error:
+                if self._newest.get(key) is batch:
+                    del self._newest[key]
+                if batch in self._ended_before and request.sample in self.files.recorded:
+                    # It was recorded, and counted.
+                    self._settle(key, batch, 0.0)
+                    continue
+                self._settle(key, batch, None if may_be_billed(error) else 0.0)
+                error.billed_usd = self._billed_usd.get(key)
+                failures += 1
+                if isinstance(error, RetryableError) and failures < self.policy.attempts:
+                    continue
+                raise
+            if key in self._given:
+                # A second sample that asks the same.
+                return reply.model_copy(update={"cached": True, "attempts": 0})
+            self._given.add(key)
+            self._settle(key, batch, reply.cost_usd)
+            self.budget.learn(estimate(self.config, request), reply.usage)
+            update = {"billed_usd": self._billed_usd.get(key), "attempts": failures + 1}
+            reply = reply.model_copy(update=update)
+            if self.cache is not None:
+                self.cache.put(key, self.config.id, reply)
+            return reply
 
     async def aclose(self) -> None:
         """Release connections; batches go on at the provider."""
-        followings = [b.following for b in self._ledger.batches.values() if b.following is not None]
-        for following in followings:
-            following.cancel()
-        await asyncio.gather(*followings, return_exceptions=True)
+        works = [batch.work for batch in self._batches if batch.work is not None]
+        for work in works:
+            work.cancel()
+        await asyncio.gather(*works, return_exceptions=True)
         await self._provider.aclose()
 
-    # The draft, and what it holds of the budget.
-
-    async def _is_answered(self, key: str, request: Request, *, anew: bool) -> bool:
-        """Return True if `ask` has an answer to a request, or will have when a batch ends."""
-        batch = self._ledger.newest(key)
-        if batch is not None and key not in self._again:
-            if key in self._earlier:
-                # Held once, however often it is gathered.
-                self._earlier.discard(key)
-                batch.held[key] = self.budget.hold(batch.most_usd[key] or 0.0)
-            if batch.event != "ended":
-                return True
-            await asyncio.shield(self._following(batch))
-            try:
-                await self._read(key, request, batch)
-                return True
-            except ModelError as error:
-                if not anew and not isinstance(error, RetryableError):
-                    return True
-                # Where it was recorded, it was counted, too.
-                self._settle(key, batch, None if may_be_billed(error) and not anew else 0.0)
-                self._again.add(key)
-        return self.cache is not None and self.cache.get(key) is not None
-
-    async def _add(self, key: str, request: Request) -> bool:
-        """Put a request into the draft, or a new one; False where the budget has no room for it."""
-        http, seeded = await self._written(request)
-        expected = estimate(self.config, request)
-        usd = self.budget.most_usd(expected, batched=True)
-        # Under a limit prices are known.
-        most = usd or 0.0
-        if self.budget.fits(most):
-            held = self.budget.hold(most)
-        elif self._draft or any(b.event == "created" for b in self._ledger.batches.values()):
-            return False
-        else:
-            held = await self.budget.reserve(lambda: most)
-        for draft in (self._draft, Batch(seeded=seeded)):
-            if draft is None:
-                continue
-            line = self._provider.line(custom_id(draft, len(draft.lines)), http.body, http.headers)
-            fits = len(draft.lines) < self._provider.most_requests
-            fits = fits and draft.size + len(line) < self._provider.most_bytes
-            if not draft.lines or (fits and seeded == draft.seeded):
-                break
-            sending = asyncio.ensure_future(self._send_draft())
-            try:
-                await asyncio.shield(sending)
-            except asyncio.CancelledError:
-                await sending
+    async def _add(self, key: str, request: Request) -> Batch:
+        """Put a request into the draft, or a new one, once the budget has room for it."""
+        self._is_writing, http = True, _NoConnection()
+        try:
+            await self.client(http).complete(request)
+        except ModelError:
+            if not http.body:
                 raise
-            if self._refusal is not None:
+        finally:
+            self._is_writing = False
+        usd, held = self.budget.most_usd(estimate(self.config, request), batched=True), None
+        if usd is not None:
+            held = await self.budget.reserve(partial(float, usd), together=True)
+        if self._refusal is not None:
+            if held is not None:
                 self.budget.settle(held, 0.0)
-                return False
-        self._draft = draft
-        assert draft is not None
-        draft.lines.append(line)
-        draft.size += len(line) + 1
+            raise self._refusal
+        draft = self._draft
+        if draft is not None and (
+            len(draft.lines) >= self._provider.most_requests
+            or sum(map(len, draft.lines)) + len(http.body) > self._provider.most_bytes
+        ):
+            draft = None
+        if draft is None:
+            draft = self._draft = Batch()
+            self._batches.append(draft)
+        name = custom_id(draft, len(draft.lines))
+        draft.lines.append(self._provider.line(name, http.body, http.headers))
+        draft.grown_s = time.monotonic()
         draft.most_usd[key] = usd
-        draft.held[key] = held
-        return True
+        if held is not None:
+            draft.held[key] = held
+        self._newest[key] = draft
+        return draft
 
     def _settle(self, key: str, batch: Batch, usd: float | None) -> None:
         """Count the cost of a request, once; None is all that it can have cost."""
@@ -324,28 +257,68 @@ class BatchModel:
         while batch.held:
             self.budget.settle(batch.held.popitem()[1], usd)
 
-    # Sending, and finding again what an earlier process was sending.
+    async def _note(self, batch: Batch, event: BatchEvent, **fields: object) -> None:
+        """Write the newest state of a batch; requests of a lost one count as not sent in it."""
+        known = {"batch": batch.token, "model": self.name, "event": event}
+        now = datetime.now(UTC).strftime(_TIME)
+        line = BatchLine.model_validate({**known, "time": now, **fields})
+        await self.files.put(line)
+        batch.take(line)
+        if event == "lost":
+            self._forget(batch)
 
-    async def _send_draft(self) -> None:
-        draft, self._draft = self._draft, None
-        if draft is None:
+    def _forget(self, batch: Batch) -> None:
+        for key in batch.most_usd:
+            if self._newest.get(key) is batch:
+                del self._newest[key]
+
+    # A batch from its draft to its answers.
+
+    async def _take_through(self, batch: Batch) -> None:
+        """Send a draft that grows no more, or find what an earlier command was sending; then wait
+        for the answers. A batch that is lost or refused ends without.
+        """
+        short_s = min(1.0, 4 * self.files.poll_s)
+        if batch.event is None:
+            while self._is_writing or time.monotonic() < batch.grown_s + (
+                _QUIET_S if self._asked < self.files.expected else short_s
+            ):
+                await asyncio.sleep(short_s / 4)
+            self._draft = None if self._draft is batch else self._draft
+            sending = asyncio.ensure_future(self._send(batch))
+            try:
+                await asyncio.shield(sending)
+            except asyncio.CancelledError:
+                await sending
+                raise
+        elif batch.event == "intended":
+            # A call that was cut off may still be worked on over there.
+            status = await self._find(batch, time.time() + 2 * self.files.poll_s)
+            if status is None:
+                await self._note(batch, "lost", words="not found at the provider")
+                self._settle_all(batch, 0.0)
+            else:
+                await self._note(batch, "created", id=status.id)
+        path = self.files.answers(batch.token)
+        if batch.event == "created":
+            lines = await self._answered(batch, path)
+        elif batch.event != "ended":
             return
-        try:
-            await self._send(draft)
-        except UnavailableError as error:
-            # Whether one was sent of which that is not known, the next command finds out.
-            self._refusal = error
-            self._settle_all(draft, None if isinstance(error, UnsureError) else 0.0)
-            return
-        self._again.difference_update(draft.most_usd)
-        self._tell(f"sent batch {draft.shown} of {len(draft.most_usd):,}")
-        self._following(draft)
+        elif path.exists():
+            lines = await asyncio.to_thread(path.read_bytes)
+        else:
+            raise UnavailableError(
+                f"the answers of batch {batch.shown} are gone ({path}): without its lines in "
+                f"{BATCHES} its questions are asked again"
+            )
+        if lines is not None:
+            batch.is_blank = not lines.strip()
+            batch.answers = await asyncio.to_thread(answers_of, lines, self._provider, batch)
 
     async def _send(self, batch: Batch) -> None:
-        """Send a draft and note its id; UnsureError where it is not known if it was sent."""
+        """Send a draft; where that fails, nothing more is sent."""
         costs = [] if None in batch.most_usd.values() else list(batch.most_usd.values())
-        fields = {"keys": tuple(batch.most_usd), "most_usd": costs, "seeded": batch.seeded}
-        await self._ledger.note(batch, "intended", **fields)
+        await self._note(batch, "intended", keys=tuple(batch.most_usd), most_usd=costs)
 
         async def create() -> BatchStatus:
             try:
@@ -353,44 +326,40 @@ class BatchModel:
             except RetryableError as error:
                 if error.sent == "no" or error.status == 429:
                     raise
-                known = await self._find(batch, time.time() + self.files.poll_s)
-                if known is None:
+                if (known := await self._find(batch, time.time() + self.files.poll_s)) is None:
                     raise
                 return known
 
         try:
             status = await self._patiently(create)
-        except UnsureError:
+        except UnsureError as error:
+            # The next command finds it, if it is there.
+            self._refusal = error
             raise
         except UnavailableError as error:
-            await self._ledger.note(batch, "lost", words=str(error))
             why = f"a batch could not be sent: {error}"
-            raise UnavailableError(why, status=error.status, sent=error.sent) from None
-        await self._ledger.note(batch, "created", id=status.id)
+            self._refusal = UnavailableError(why, status=error.status, sent=error.sent)
+            self._settle_all(batch, 0.0)
+            await self._note(batch, "lost", words=str(error))
+            return
+        await self._note(batch, "created", id=status.id)
         batch.lines.clear()
+        self._tell(f"sent batch {batch.shown} of {len(batch.most_usd):,}")
 
     async def _find(self, batch: Batch, until_s: float) -> BatchStatus | None:
         """Return the batch that was being sent, None where there is none; raises UnsureError."""
-        strangers = {one.id for one in self._ledger.batches.values()}
-        earliest_s = batch.created.timestamp() - _CLOCKS_APART_S
-
-        async def candidates() -> list[BatchStatus]:
-            found = []
-            async for status in self._provider.listed():
-                if status.created_s is not None and status.created_s < earliest_s:
-                    break
-                is_like = status.total in (None, 0, len(batch.most_usd))
-                is_like = is_like and status.state != "refused" and status.id not in strangers
-                if status.token == batch.token or (status.token is None and is_like):
-                    found.append(status)
-            return sorted(found, key=lambda status: status.token is None)
-
+        strangers = {one.id for one in self._batches}
+        since_s = batch.created.timestamp() - _CLOCKS_APART_S
         try:
             while True:
+                found = await self._patiently(partial(self._provider.listed, since_s))
+                if (ours := [one for one in found if one.token == batch.token]) != []:
+                    return ours[0]
                 is_running = False
-                for status in await self._patiently(candidates):
-                    if status.token == batch.token:
-                        return status
+                for status in found:
+                    is_like = status.token is None and status.total in (0, len(batch.most_usd))
+                    if not is_like or status.id in strangers or status.state == "refused":
+                        continue
                     if status.state == "running":
                         is_running = True
                         continue
@@ -420,53 +389,36 @@ class BatchModel:
             raise UnavailableError(str(error), status=error.status, sent=error.sent) from None
         raise AssertionError("tenacity neither returned nor raised")
 
-    # Following a batch to its end.
+    async def _answered(self, batch: Batch, path: Path) -> bytes | None:
+        """Wait for a batch and keep its answers; None where it was refused as a whole."""
+        try:
+            status = await self._last_status(batch)
+            if status.state == "refused":
+                self._refusal = UnavailableError(f"batch {batch.shown} was refused: {status.words}")
+                self._settle_all(batch, 0.0)
+                await self._note(batch, "lost", words=status.words)
+                return None
+            lines = await self._patiently(partial(self._provider.results, status))
+        except ModelError as error:
+            # An error of its requests is another thing: these are asked again, or recorded.
+            why = f"no answers of batch {batch.shown}, which stays at the provider: {error}"
+            raise UnavailableError(why, status=error.status, sent=error.sent) from None
+        with writing(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            await asyncio.to_thread(atomic_write, path, lines, sync=True)
+        await self._note(batch, "ended", words=status.words)
+        if status.state == "cancelled":
+            why = f"batch {batch.shown} was cancelled; the same command asks the rest"
+            self._refusal = UnavailableError(why)
+        return lines
 
-    def _following(self, batch: Batch) -> asyncio.Future[None]:
-        if batch.following is None:
-            batch.following = asyncio.ensure_future(self._follow(batch))
-        return batch.following
-
-    async def _follow(self, batch: Batch) -> None:
-        """Return when the answers are here, or when the batch was refused as a whole."""
-        path = self.files.answers(batch.token)
-        if batch.event == "created":
-            try:
-                status = await self._end(batch)
-                words = self._provider.shown(status.words)
-                if status.state == "refused":
-                    await self._ledger.note(batch, "lost", words=words)
-                    self._refusal = UnavailableError(f"batch {batch.shown} was refused: {words}")
-                    self._settle_all(batch, 0.0)
-                    return
-                lines = await self._patiently(lambda: self._provider.results(status))
-            except ModelError as error:
-                # An error of its requests is another thing: these are asked again, or recorded.
-                why = f"no answers of batch {batch.shown}, which stays at the provider: {error}"
-                raise UnavailableError(why, status=error.status, sent=error.sent) from None
-            with writing(path):
-                path.parent.mkdir(parents=True, exist_ok=True)
-                await asyncio.to_thread(atomic_write, path, lines, sync=True)
-            await self._ledger.note(batch, "ended", words=words)
-            if status.state == "cancelled":
-                why = f"batch {batch.shown} was cancelled; the same command asks the rest"
-                self._refusal = UnavailableError(why)
-        if not path.exists():
-            raise UnavailableError(
-                f"the answers of batch {batch.shown} are gone ({path}): without its lines in "
-                f"{BATCHES} its questions are asked again"
-            )
-        lines = await asyncio.to_thread(path.read_bytes)
-        batch.is_blank = not lines.strip()
-        batch.answers = await asyncio.to_thread(answers_of, lines, self._provider, batch)
-
-    async def _end(self, batch: Batch) -> BatchStatus:
+    async def _last_status(self, batch: Batch) -> BatchStatus:
         """Look at a batch now and then; return its last state."""
         pause_s, failures, told = min(_FIRST_PAUSE_S, self.files.poll_s), 0, ""
         while True:
             try:
                 status = await self._provider.status(batch.id)
-                failures, said = 0, self._provider.shown(status.words)
+                failures, said = 0, status.words
                 if status.state != "running":
                     self._tell(f"batch {batch.shown} has ended: {said}")
                     return status
@@ -482,21 +434,6 @@ class BatchModel:
             await asyncio.sleep(pause_s)
             pause_s = min(self.files.poll_s, 1.5 * pause_s)
 
-    # Requests as lines and answers as replies, by the client of direct calls.
-
-    async def _written(self, request: Request) -> tuple[_NoConnection, bool]:
-        """Return what a direct call would send, and True if it has a seed; raises as that."""
-        while True:
-            http, with_seed = _NoConnection(), self._takes_seed
-            try:
-                await self.client(http).complete(request, with_seed=with_seed)
-            except SeedRefusedError:
-                self._go_without_seed()
-            except ModelError:
-                if not http.body:
-                    raise
-                return http, with_seed
-
     async def _read(self, key: str, request: Request, batch: Batch) -> Reply:
         """Return the reply that a direct call would have made of the answer; raises as that."""
         assert batch.answers is not None, "the batch has ended"
@@ -506,25 +443,14 @@ class BatchModel:
             raise RetryableError(why, **{"sent": "no"} if batch.is_blank else {"status": 200})
         if isinstance(answer, str):
             why = f"batch {batch.shown} ended before this was asked: {answer}"
-            raise RetryableError(self._provider.shown(why), sent="no")
-        client = self.client(_NoConnection(answer))
-        try:
-            reply = await client.complete(request, with_seed=batch.seeded)
-        except SeedRefusedError:
-            self._go_without_seed()
-            raise RetryableError("the provider takes no seed", sent="answered") from None
+            raise RetryableError(why, sent="no")
+        reply = await self.client(_NoConnection(answer)).complete(request)
         reply = counted(reply, estimate(self.config, request))
-        return reply.model_copy(update={"latency_s": 0.0, "batched": True})
+        reply = reply.model_copy(update={"latency_s": 0.0, "batched": True})
+        return reply.model_copy(update={"cost_usd": cost_usd(self.budget.tariff, reply)})
 
-    def _go_without_seed(self) -> None:
-        if self.config.seed == "always":
-            raise UnavailableError("the provider takes no seed, and seed is `always`")
-        if self._takes_seed:
-            self._takes_seed = False
-            self._tell("takes no seed: seeds are independent repeats", "seed_unsupported")
-
-    def _tell(self, text: str, kind: EventKind = "batch") -> None:
-        self.observer(ModelEvent(self.name, kind, text))
+    def _tell(self, text: str) -> None:
+        self.observer(ModelEvent(self.name, "batch", text))
 
 
 class _NoConnection(HttpClient):
@@ -541,9 +467,6 @@ class _NoConnection(HttpClient):
         if self._answer is None:
             raise RetryableError(f"a request to {url} is kept for a batch", sent="no")
         return self._answer
-
-    async def aclose(self) -> None:
-        """Nothing is open."""
 
 
 def custom_id(batch: Batch, place: int) -> str:
@@ -566,36 +489,3 @@ def answers_of(lines: bytes, provider: BatchProvider, batch: Batch) -> dict[str,
         if key is not None:
             found.setdefault(key, answer)
     return found
-
-
-def under_way(lines: Iterable[BatchLine]) -> dict[str, str]:
-    """Return batches that have not ended, by the name of their model: one of each."""
-    newest = {line.batch: line for line in lines}
-    return {
-        line.model: line.id or line.batch
-        for line in newest.values()
-        if line.event in ("intended", "created")
-    }
-
-
-def waiting_keys(
-    config: ModelConfig, lines: Sequence[BatchLine], run_folder: Path
-) -> frozenset[str]:
-    """Return the requests that are not asked again, by their keys in the reply cache: of batches
-    that have not ended all, of others those that were answered.
-    """
-
-    async def put(line: BatchLine) -> None:
-        raise AssertionError(f"only read here: {line.event}")
-
-    files, waiting = BatchFiles((), put, run_folder), set[str]()
-    provider = PROVIDERS[config.provider](config)
-    for batch in Ledger(config.name, lines, put).batches.values():
-        path = files.answers(batch.token)
-        # Without its answers a batch stops its model: nothing of it is asked again.
-        if batch.event != "ended" or not path.is_file():
-            waiting |= batch.most_usd.keys()
-            continue
-        found = answers_of(path.read_bytes(), provider, batch)
-        waiting |= {k for k, one in found.items() if isinstance(one, Answer) and one.is_success}
-    return frozenset(waiting)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 from abc import ABC, abstractmethod
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, ClassVar, Literal, TypeVar
@@ -25,11 +25,13 @@ from phyblock.models.client import OPENAI_API_BASE, Answer, HttpClient, error_of
 from phyblock.models.keys import api_key, hidden, secrets_of
 
 T = TypeVar("T")
+Post = tuple[str, bytes, Mapping[str, str]]
+"""Address, body and headers of a call."""
 
 UNREADABLE = (AttributeError, KeyError, TypeError, ValueError)
 """Errors of reading what does not have the form that its provider documents."""
 
-_CALL_S = 60.0
+_LOOK_S = 60.0
 _TRANSFER_S = 3600.0
 _LARGEST_RESULTS_BYTES = 1024**3
 
@@ -38,19 +40,19 @@ _LARGEST_RESULTS_BYTES = 1024**3
 class BatchStatus:
     """The state of a batch, as its provider says.
 
-    A `refused` batch asked nothing of anyone, of a `cancelled` one some was not asked. `token` is
-    the name that we gave it, None where the provider does not tell. `total` counts requests, None
-    where it does not say, `created_s` is a Unix time. `results` are the addresses of the answers,
-    `words` its own, with counts and errors.
+    A `refused` batch asked nothing of anyone, of a `cancelled` one some was not asked. `words` are
+    its own, with counts and errors; `results` are the addresses of the answers. `token` is the name
+    that we gave it, None where the provider does not tell. `total` counts requests, 0 where it does
+    not say; `created_s` is a Unix time.
     """
 
     id: str
     state: Literal["running", "ended", "cancelled", "refused"]
     words: str
-    token: str | None
-    total: int | None
-    created_s: float | None
     results: tuple[str, ...]
+    token: str | None
+    total: int
+    created_s: float
 
 
 class BatchProvider(ABC):
@@ -74,33 +76,42 @@ class BatchProvider(ABC):
         self._first_page = first_page
         self._secrets = secrets_of(config)
         limits = {"timeout_s": _TRANSFER_S, "most_body_bytes": _LARGEST_RESULTS_BYTES}
-        self._calls = HttpClient(config.model_copy(update={"timeout_s": _CALL_S}))
+        self._looks = HttpClient(config.model_copy(update={"timeout_s": _LOOK_S}))
         self._transfers = HttpClient(config.model_copy(update=limits))
 
     @abstractmethod
     def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:
         """Return the line of a request with the body, and of the headers, of a direct call."""
 
-    @abstractmethod
     async def create(self, token: str, lines: Sequence[bytes]) -> BatchStatus:
         """Begin a batch. After an error that was not `sent="no"` it may have begun all the same."""
+        try:
+            post = await self._prepare(token, lines)
+        except ModelError as error:
+            error.sent = "no"
+            raise
+        return await self._call(self._status_in, *post)
 
     async def status(self, batch_id: str) -> BatchStatus:
         """Ask how a batch is now."""
-        return await self._call(self._read_status, f"{self._url}/{batch_id}")
+        return await self._call(self._status_in, f"{self._url}/{batch_id}")
 
-    async def listed(self) -> AsyncIterator[BatchStatus]:
-        """Yield all batches of the account, the newest first."""
+    async def listed(self, since_s: float) -> list[BatchStatus]:
+        """Return the batches of the account since a time, the newest first."""
+        found: list[BatchStatus] = []
         url = self._first_page
-        while url:
-            batches, url = await self._call(self._read_page, url)
-            for batch in batches:
-                yield batch
+        while url and (not found or found[-1].created_s >= since_s):
+            batches, url = await self._call(lambda answer: self._read_page(_object(answer)), url)
+            found += batches
+        return [status for status in found if status.created_s >= since_s]
 
     async def results(self, status: BatchStatus) -> bytes:
         """Return the lines of a batch's results, without keys."""
-        answers = [await self._send(self._transfers, url) for url in status.results]
-        text = b"\n".join(answer.body for answer in answers).decode("utf-8", "surrogateescape")
+        bodies = [
+            await self._call(lambda answer: answer.body, url, is_large=True)
+            for url in status.results
+        ]
+        text = b"\n".join(bodies).decode("utf-8", "surrogateescape")
         return hidden(text, self._secrets, guess=False).encode("utf-8", "surrogateescape")
 
     @abstractmethod
@@ -109,52 +120,60 @@ class BatchProvider(ABC):
         reason why it was never asked. Raises one of UNREADABLE for what is no line of results.
         """
 
-    def shown(self, text: str) -> str:
-        """Return a text for messages and files, without keys."""
-        return shown(text, self._secrets)
-
     async def aclose(self) -> None:
         """Close all connections."""
-        await self._calls.aclose()
+        await self._looks.aclose()
         await self._transfers.aclose()
+
+    @abstractmethod
+    async def _prepare(self, token: str, lines: Sequence[bytes]) -> Post:
+        """Return the call that begins a batch; nothing is begun."""
 
     @abstractmethod
     def _read_status(self, batch: Any) -> BatchStatus:
         """Read what the provider says of a batch; raises one of UNREADABLE."""
 
-    def _read_page(self, page: Any) -> tuple[Sequence[BatchStatus], str]:
+    def _read_page(self, page: Any) -> tuple[list[BatchStatus], str]:
         """Return the batches on a page of the list, and the address of the next one or ""."""
         batches = [self._read_status(batch) for batch in page["data"]]
         more = page.get("has_more") and batches
         return batches, f"{self._first_page}&{self.after}={batches[-1].id}" if more else ""
 
-    async def _call(
-        self, read: Callable[[Any], T], url: str, body: Any = None, **options: Any
-    ) -> T:
-        """Send an object as JSON, or bytes as they are; read the object that is answered."""
-        http = self._transfers if isinstance(body, bytes) else self._calls
-        data = body if body is None or isinstance(body, bytes) else json.dumps(body).encode()
-        answer = await self._send(http, url, data, **options)
-        try:
-            found: Any = load_json(answer.body)
-            # A batch that failed holds its error beside its name.
-            if found.get("error") and not found.keys() & {"id", "name"}:
-                raise self._masked(error_of(answer), **options)
-            return read(found)
-        except UNREADABLE as error:
-            why = f"{type(error).__name__}: {error}"
-            raise self._masked(malformed(answer.status, why), **options) from None
-
-    async def _send(
+    def _status(
         self,
-        http: HttpClient,
+        name: Any,
+        state: Any,
+        words: Sequence[Any],
+        results: Sequence[str] = (),
+        *,
+        token: str | None = None,
+        total: Any = 0,
+        created: str | float | None = None,
+    ) -> BatchStatus:
+        """Return a status; `words` are a state, the number of answered requests, and errors. A
+        batch whose age is not told counts as new.
+        """
+        if not (isinstance(name, str) and name):
+            raise ValueError("a batch without a name")
+        word, answered, errors = words
+        said = "; ".join(f"{error.get('code')} {error.get('message')}" for error in errors or ())
+        text = f"{word}, {answered or 0} answered{': ' if said else ''}{said}"
+        if isinstance(created, str):
+            created = datetime.fromisoformat(created).timestamp()
+        created_s = float("inf") if created is None else float(created)
+        text = shown(text, self._secrets)
+        return BatchStatus(name, state, text, tuple(results), token, int(total or 0), created_s)
+
+    async def _call(
+        self,
+        read: Callable[[Answer], T],
         url: str,
         body: bytes | None = None,
         headers: Mapping[str, str] | None = None,
         *,
-        begins: bool = True,
-    ) -> Answer:
-        """Send once; what does not begin a batch was not sent, whatever failed."""
+        is_large: bool = False,
+    ) -> T:
+        """Send once and read the answer; a body and an answer that `is_large` take their time."""
         try:
             if urlsplit(url)[:2] != urlsplit(self._base)[:2]:
                 why = f"nothing is sent to {host_of(url)}, which is not the model's server"
@@ -162,18 +181,21 @@ class BatchProvider(ABC):
             key = api_key(self._config) or ""
             own = {name: value.replace("{key}", key) for name, value in self.headers.items()}
             told = {"Content-Type": "application/json", **own, **(headers or {})}
+            http = self._transfers if is_large or body is not None else self._looks
             method = "GET" if body is None else "POST"
             answer = await http.send(url, body or b"", told, method=method)
             if answer.fault or not answer.is_success:
                 raise error_of(answer)
-            return answer
+            try:
+                return read(answer)
+            except UNREADABLE as error:
+                raise malformed(answer.status, f"{type(error).__name__}: {error}") from None
         except ModelError as error:
-            raise self._masked(error, begins=begins) from None
+            error.args = (shown(str(error), self._secrets),)
+            raise
 
-    def _masked(self, error: ModelError, *, begins: bool = True, **_: Any) -> ModelError:
-        error.args = (self.shown(str(error)),)
-        error.sent = error.sent if begins else "no"
-        return error
+    def _status_in(self, answer: Answer) -> BatchStatus:
+        return self._read_status(_object(answer))
 
 
 class _OpenAI(BatchProvider):
@@ -189,7 +211,7 @@ class _OpenAI(BatchProvider):
         fields = {"custom_id": custom_id, "method": "POST", "url": "/v1/chat/completions"}
         return _joined(fields, "body", body)
 
-    async def create(self, token: str, lines: Sequence[bytes]) -> BatchStatus:
+    async def _prepare(self, token: str, lines: Sequence[bytes]) -> Post:
         start = (
             f'--{token}\r\nContent-Disposition: form-data; name="purpose"\r\n\r\nbatch\r\n'
             f'--{token}\r\nContent-Disposition: form-data; name="file"; '
@@ -198,14 +220,14 @@ class _OpenAI(BatchProvider):
         data = b"".join((start.encode(), b"\n".join(lines), f"\r\n--{token}--\r\n".encode()))
         form = {"Content-Type": f"multipart/form-data; boundary={token}"}
         url = f"{self._base}/files"
-        file = await self._call(lambda f: str(f["id"]), url, data, headers=form, begins=False)
+        file = await self._call(lambda answer: str(_object(answer)["id"]), url, data, form)
         body = {
             "input_file_id": file,
             "endpoint": "/v1/chat/completions",
             "completion_window": "24h",
             "metadata": {"phyblock": token},
         }
-        return await self._call(self._read_status, self._url, body)
+        return self._url, json.dumps(body).encode(), {}
 
     def read(self, line: Any) -> tuple[str, Answer | str]:
         response, error = line.get("response") or {}, line.get("error") or {}
@@ -220,15 +242,14 @@ class _OpenAI(BatchProvider):
         files = [batch[name] for name in ("output_file_id", "error_file_id") if batch.get(name)]
         # Taken for empty, a batch whose files are not there yet would be asked again.
         ends = {"expired": "ended", "cancelled": "cancelled", "failed": "refused"}
-        state: Any = "ended" if word == "completed" and files else ends.get(word, "running")
-        return BatchStatus(
-            _name(batch["id"]),
-            state,
-            _words(word, counts.get("completed"), (batch.get("errors") or {}).get("data")),
-            (batch.get("metadata") or {}).get("phyblock"),
-            _count(counts.get("total")),
-            _count(batch.get("created_at")),
-            tuple(f"{self._base}/files/{file}/content" for file in files),
+        return self._status(
+            batch["id"],
+            "ended" if word == "completed" and files else ends.get(word, "running"),
+            (word, counts.get("completed"), (batch.get("errors") or {}).get("data")),
+            [f"{self._base}/files/{file}/content" for file in files],
+            token=(batch.get("metadata") or {}).get("phyblock"),
+            total=counts.get("total"),
+            created=batch.get("created_at"),
         )
 
 
@@ -252,10 +273,9 @@ class _Anthropic(BatchProvider):
         self._betas |= {name.strip() for name in betas.split(",") if name.strip()}
         return _joined({"custom_id": custom_id}, "params", body)
 
-    async def create(self, token: str, lines: Sequence[bytes]) -> BatchStatus:  # noqa: ARG002
+    async def _prepare(self, token: str, lines: Sequence[bytes]) -> Post:  # noqa: ARG002
         betas = {"anthropic-beta": ",".join(sorted(self._betas))} if self._betas else {}
-        data = b"".join((b'{"requests":[', b",".join(lines), b"]}"))
-        return await self._call(self._read_status, self._url, data, headers=betas)
+        return self._url, b"".join((b'{"requests":[', b",".join(lines), b"]}")), betas
 
     def read(self, line: Any) -> tuple[str, Answer | str]:
         result = line["result"]
@@ -270,17 +290,16 @@ class _Anthropic(BatchProvider):
 
     def _read_status(self, batch: Any) -> BatchStatus:
         word, counts = batch["processing_status"], batch["request_counts"]
-        state: Any = "cancelled" if counts.get("canceled") else "ended"
         has_ended = word == "ended"
-        return BatchStatus(
-            _name(batch["id"]),
+        state = "cancelled" if counts.get("canceled") else "ended"
+        return self._status(
+            batch["id"],
             state if has_ended else "running",
-            _words(word, counts.get("succeeded")),
-            None,
-            sum(int(number or 0) for number in counts.values()),
-            _unix_s(batch.get("created_at")),
+            (word, counts.get("succeeded"), ()),
             # Not `results_url`, which behind a gateway is the provider's own and out of reach.
-            (f"{self._url}/{batch['id']}/results",) if has_ended else (),
+            [f"{self._url}/{batch['id']}/results"] if has_ended else [],
+            total=sum(int(number or 0) for number in counts.values()),
+            created=batch.get("created_at"),
         )
 
 
@@ -298,7 +317,7 @@ class _Gemini(BatchProvider):
     def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:  # noqa: ARG002
         return _joined({"key": custom_id}, "request", body)
 
-    async def create(self, token: str, lines: Sequence[bytes]) -> BatchStatus:
+    async def _prepare(self, token: str, lines: Sequence[bytes]) -> Post:
         data = b"\n".join(lines)
         announced = {
             "X-Goog-Upload-Protocol": "resumable",
@@ -308,16 +327,13 @@ class _Gemini(BatchProvider):
         }
         named = json.dumps({"file": {"display_name": token}}).encode()
         url = f"{self._base}/upload/v1beta/files"
-        answer = await self._send(self._calls, url, named, announced, begins=False)
-        told = {name.lower(): value for name, value in answer.headers.items()}
-        url = told.get("x-goog-upload-url", "")
+        told = await self._call(lambda answer: answer.headers, url, named, announced)
+        url = next((v for name, v in told.items() if name.lower() == "x-goog-upload-url"), "")
         sent = {"X-Goog-Upload-Offset": "0", "X-Goog-Upload-Command": "upload, finalize"}
-        file = await self._call(
-            lambda made: str(made["file"]["name"]), url, data, headers=sent, begins=False
-        )
-        batch = {"display_name": token, "input_config": {"file_name": file}}
+        file = await self._call(lambda answer: _object(answer)["file"]["name"], url, data, sent)
+        batch = {"batch": {"display_name": token, "input_config": {"file_name": file}}}
         url = f"{self._url}/models/{self._config.provider_model}:batchGenerateContent"
-        return await self._call(self._read_status, url, {"batch": batch})
+        return url, json.dumps(batch).encode(), {}
 
     def read(self, line: Any) -> tuple[str, Answer | str]:
         if isinstance(line.get("response"), Mapping):
@@ -334,21 +350,20 @@ class _Gemini(BatchProvider):
         # BATCH_STATE_... or JOB_STATE_..., by version.
         word = (facts.get("state") or "").rpartition("STATE_")[2].lower()
         ends = {"succeeded": "ended", "expired": "ended", "cancelled": "cancelled"}
-        state: Any = {**ends, "failed": "refused"}.get(word, "running")
         stats = facts.get("batchStats") or {}
         file = (batch.get("response") or facts.get("output") or {}).get("responsesFile")
         error = batch.get("error")
-        return BatchStatus(
-            _name(batch["name"]),
-            state,
-            _words(word or "begun", stats.get("successfulRequestCount"), [error] if error else ()),
-            facts.get("displayName") or None,
-            _count(stats.get("requestCount")),
-            _unix_s(facts.get("createTime")),
-            (f"{self._base}/download/v1beta/{file}:download?alt=media",) if file else (),
+        return self._status(
+            batch["name"],
+            {**ends, "failed": "refused"}.get(word, "running"),
+            (word or "begun", stats.get("successfulRequestCount"), [error] if error else ()),
+            [f"{self._base}/download/v1beta/{file}:download?alt=media"] if file else [],
+            token=facts.get("displayName") or None,
+            total=stats.get("requestCount"),
+            created=facts.get("createTime"),
         )
 
-    def _read_page(self, page: Any) -> tuple[Sequence[BatchStatus], str]:
+    def _read_page(self, page: Any) -> tuple[list[BatchStatus], str]:
         token = page.get("nextPageToken")
         batches = [self._read_status(batch) for batch in page.get("operations") or ()]
         return batches, f"{self._first_page}&pageToken={token}" if token else ""
@@ -381,24 +396,10 @@ def _answer(status: int, body: Mapping[str, Any]) -> Answer:
     return Answer(status, {}, json.dumps(body).encode())
 
 
-def _name(value: Any) -> str:
-    """Return the name of a batch; ValueError where it has none."""
-    if not (isinstance(value, str) and value):
-        raise ValueError("a batch without a name")
-    return value
-
-
-def _count(value: Any) -> int | None:
-    """Return a number, also one that is written as a text, as Google does."""
-    return None if value is None else int(value)
-
-
-def _unix_s(time: str | None) -> float | None:
-    """Return a time as RFC 3339 writes it as Unix time."""
-    return None if time is None else datetime.fromisoformat(time).timestamp()
-
-
-def _words(state: str, answered: Any = None, errors: Sequence[Any] | None = None) -> str:
-    """Return state, number of answered requests and errors in words."""
-    said = "; ".join(f"{error.get('code')} {error.get('message')}" for error in errors or ())
-    return f"{state}, {answered or 0} answered{': ' if said else ''}{said}"
+def _object(answer: Answer) -> Any:
+    """Return the object that was answered; raises its error where it is one."""
+    found: Any = load_json(answer.body)
+    # A batch that failed holds its error beside its name.
+    if found.get("error") and not found.keys() & {"id", "name"}:
+        raise error_of(answer)
+    return found

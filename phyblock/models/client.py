@@ -63,10 +63,6 @@ _NEVER = re.compile(
 _THINKING = re.compile(r"\s*<(think|thinking)>(.*?)</\1>\s*(.*)", re.DOTALL)
 
 
-class SeedRefusedError(ModelError):
-    """The request failed with words about its seed: the provider may take none."""
-
-
 class Client(ABC):
     """Sends a request to one server, once: retries, limits and the cache are above.
 
@@ -80,15 +76,15 @@ class Client(ABC):
         self.http = http or HttpClient(config)
         self._secrets = secrets_of(config)
 
-    async def complete(self, request: Request, *, with_seed: bool = True) -> Reply:
+    async def complete(self, request: Request) -> Reply:
         """Return the validated reply, its cost not yet known; raises ModelError."""
+        seed = request.seed if self.takes_seed else None
         try:
-            reply = await self._complete(request, with_seed=with_seed)
+            reply = await self._complete(request, seed)
         except ModelError as error:
             said = shown(str(error), self._secrets)
-            may_refuse = error.status in (400, 422) or error.sent == "no"
-            if with_seed and may_refuse and re.search(r"\bseed\b", str(error)):
-                raise SeedRefusedError(said, status=error.status, sent=error.sent) from None
+            if seed is not None and error.status in (400, 422) and re.search(r"\bseed\b", said):
+                said += " (set seed: never for a provider that takes none)"
             error.args = (said,)
             raise
         texts = {
@@ -96,10 +92,15 @@ class Client(ABC):
             for name in ("text", "reasoning", "provider_model")
             if (text := getattr(reply, name))
         }
-        return reply.model_copy(update={**texts, "seed_sent": with_seed})
+        return reply.model_copy(update={**texts, "seed_sent": seed is not None})
+
+    @property
+    def takes_seed(self) -> bool:
+        """True if seeds are sent."""
+        return self.config.seed != "never"
 
     @abstractmethod
-    async def _complete(self, request: Request, *, with_seed: bool) -> Reply:
+    async def _complete(self, request: Request, seed: int | None) -> Reply:
         """Send once; keys may stand in what comes of it."""
 
     async def aclose(self) -> None:
@@ -236,7 +237,7 @@ class OpenAIClient(Client):
         super().__init__(config, http)
         self._url = f"{(config.api_base or OPENAI_API_BASE).rstrip('/')}/chat/completions"
 
-    async def _complete(self, request: Request, *, with_seed: bool) -> Reply:
+    async def _complete(self, request: Request, seed: int | None) -> Reply:
         params = wire_params(self.config, request)
         extra_body = params.pop("extra_body", {})
         headers = {
@@ -245,8 +246,8 @@ class OpenAIClient(Client):
             **params.pop("extra_headers", {}),
         }
         fields = {"model": self.config.provider_model, **params}
-        if with_seed:
-            fields["seed"] = request.seed
+        if seed is not None:
+            fields["seed"] = seed
         fields |= extra_body
         body = json_body(fields, request.messages, self.config.image_detail)
         started_s = time.perf_counter()

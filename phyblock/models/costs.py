@@ -245,13 +245,14 @@ class ModelBudget:
         prompt = expected.prompt_tokens * self._prompt_ratio
         return most_usd(self.tariff, prompt, longest, batched=batched)
 
-    async def reserve(self, most_usd: Callable[[], float]) -> int:
+    async def reserve(self, most_usd: Callable[[], float], *, together: bool = False) -> int:
         """Hold the most that a call can cost, waiting for calls under way to settle; return the
         reservation's number.
 
         `most_usd` is asked again whenever a call has settled, since more is known of the model
-        then. Raises BudgetReachedError when it does not fit into the run's limit although nothing
-        is under way, UnavailableError when it does not fit into the model's own.
+        then. Calls that go out `together` do not wait for the first ones to tell. Raises
+        BudgetReachedError when it does not fit into the run's limit although nothing is under way,
+        UnavailableError when it does not fit into the model's own.
         """
         run = self._run
         while True:
@@ -260,9 +261,10 @@ class ModelBudget:
                 spent = f"{self._spent_usd:.4f} spent, the next call can cost {usd:.4f}"
                 raise UnavailableError(f"its max_cost_usd {self._max_usd:g} is reached: {spent}")
             is_slow = self.is_limited and len(self._under_way) > self._settled
-            if self.fits(usd) and not is_slow:
+            if self._fits(usd) and (together or not is_slow):
                 number = self.hold(usd)
-                self._under_way.add(number)
+                if not together:
+                    self._under_way.add(number)
                 return number
             if not run.holds and run.spent_usd + usd > run.max_usd:
                 spent = f"{run.spent_usd:.4f} spent, the next call can cost {usd:.4f}"
@@ -270,7 +272,7 @@ class ModelBudget:
             run.changed.clear()
             await run.changed.wait()
 
-    def fits(self, usd: float) -> bool:
+    def _fits(self, usd: float) -> bool:
         """True if a further cost would stay within the limits."""
         is_own = self._spent_usd + self._held_usd + usd <= self._max_usd
         return is_own and self._run.spent_usd + self._run.held_usd + usd <= self._run.max_usd

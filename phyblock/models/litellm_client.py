@@ -16,7 +16,7 @@ import os
 import time
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
@@ -75,7 +75,14 @@ class LitellmClient(Client):
 
     _sender: Any = None
 
-    async def _complete(self, request: Request, *, with_seed: bool) -> Reply:
+    @cached_property
+    def takes_seed(self) -> bool:
+        """True if seeds are sent; left open, where litellm knows the provider to take them."""
+        if self.config.seed != "auto":
+            return self.config.seed == "always"
+        return "seed" in (_litellm().get_supported_openai_params(model=self.config.id) or ())
+
+    async def _complete(self, request: Request, seed: int | None) -> Reply:
         config = self.config
         litellm = _litellm()
         if self._sender is None:
@@ -91,7 +98,7 @@ class LitellmClient(Client):
             "no-log": True,
             "api_key": api_key(config),
             "api_base": config.api_base,
-            "seed": request.seed if with_seed else None,
+            "seed": seed,
         }
         given = {name: value for name, value in fields.items() if value is not None}
         exchange = _Exchange(self.http)

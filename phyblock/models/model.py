@@ -11,9 +11,8 @@ from typing import Literal
 from tenacity import AsyncRetrying, RetryCallState, retry_if_exception_type
 
 from phyblock.config.models import DIRECT_PROVIDERS, ModelConfig
-from phyblock.errors import BudgetReachedError, ModelError, RetryableError, UnavailableError
+from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.models.cache import ReplyCache, reply_key
-from phyblock.models.client import SeedRefusedError
 from phyblock.models.costs import (
     Estimate,
     ModelBudget,
@@ -31,7 +30,7 @@ from phyblock.records.record import Call, Reply
 _SCHEMA_PROVIDERS = ("predibase", "fireworks_ai", "lm_studio", "nebius", "databricks")
 """Providers of which litellm knows that all their models take a schema."""
 
-EventKind = Literal["retry", "seed_unsupported", "unavailable", "batch"]
+EventKind = Literal["retry", "batch"]
 
 
 @dataclass(frozen=True)
@@ -39,8 +38,7 @@ class ModelEvent:
     """Something a user may want to see while a model works.
 
     `retry`: a request failed, with `status` if the server gave one, and is sent again after
-    `wait_s`; `seed_unsupported`: from now on no seed is sent; `unavailable`: nothing more is sent;
-    `batch`: one was sent, is waited for or has ended. `message` is safe to show and store.
+    `wait_s`; `batch`: one was sent, is waited for or has ended. `message` is safe to show.
     """
 
     model: str
@@ -129,8 +127,8 @@ class RetryPolicy:
 
 @dataclass
 class _Call:
-    """A request with what it is expected to take, how often it was sent and what that cost, its
-    last failure that may pass and the server that failed. `is_cancelled`: it is not sent again.
+    """A request with what it is expected to take, how often it was sent, what that cost, and the
+    server that failed last. `is_cancelled`: it is not sent again.
     """
 
     request: Request
@@ -138,7 +136,6 @@ class _Call:
     expected: Estimate
     sent: int = 0
     billed_usd: float | None = None
-    failure: RetryableError | None = None
     failed_at: Server | None = None
     is_cancelled: bool = False
 
@@ -159,8 +156,6 @@ class ChatModel:
 
     def __post_init__(self) -> None:
         self.name = self.config.name
-        self._takes_seed = self.config.seed != "never"
-        self._is_told_unavailable = False
 
     async def ask(self, request: Request) -> Reply:
         """Return the cached reply, or a new one, which is then cached if it is whole.
@@ -208,19 +203,9 @@ class ChatModel:
             async for attempt in self.policy.retrying(on_retry, lambda: call.is_cancelled):
                 with attempt:
                     return await self._attempt(call)
-        except (UnavailableError, BudgetReachedError, asyncio.CancelledError) as error:
-            if isinstance(error, UnavailableError) and not self._is_told_unavailable:
-                self._is_told_unavailable = True
-                self.observer(ModelEvent(self.name, "unavailable", str(error)))
-            if not call.billed_usd or call.failure is None:
-                raise
-            # These leave no record. The attempt that was billed needs one, and the next request
-            # meets the same end.
-            call.failure.billed_usd = call.billed_usd
-            raise call.failure from None
         except ModelError as error:
-            if call.is_cancelled and isinstance(error, RetryableError) and not call.billed_usd:
-                # It would have been sent again, and nothing is known that a record could say.
+            if call.is_cancelled and isinstance(error, RetryableError):
+                # It would have been sent again.
                 raise asyncio.CancelledError from None
             error.billed_usd = call.billed_usd
             raise
@@ -235,10 +220,10 @@ class ChatModel:
             ) as slot:
                 server, began_s = self.servers.pick(call.failed_at), self.policy.clock.now()
                 try:
-                    reply = await self._send_as_taken(call, server)
+                    reply = await self._send(call, server)
                 except ModelError as error:
                     if isinstance(error, RetryableError):
-                        call.failure, call.failed_at = error, server
+                        call.failed_at = server
                     is_servers_fault = self.servers.failed(server, error, who, began_s)
                     self.servers.usable()
                     if is_servers_fault and not call.is_cancelled:
@@ -250,37 +235,19 @@ class ChatModel:
                     self.limits.settle(slot, prompt + completion)
                 return reply
 
-    async def _send_as_taken(self, call: _Call, server: Server) -> Reply:
-        """Send with the seed, or without, where only that is answered."""
-        try:
-            return await self._send(call, server, with_seed=self._takes_seed)
-        except SeedRefusedError as error:
-            call.sent -= error.sent == "no"
-            if self.config.seed == "always":
-                why = "the provider takes no seed, and seed is `always`"
-                raise UnavailableError(why) from None
-            reply = await self._send(call, server, with_seed=False)
-        if self._takes_seed:
-            self._takes_seed = False
-            why = "takes no seed: seeds are independent repeats"
-            self.observer(ModelEvent(self.name, "seed_unsupported", why))
-        return reply
-
-    async def _send(self, call: _Call, server: Server, *, with_seed: bool) -> Reply:
+    async def _send(self, call: _Call, server: Server) -> Reply:
         """Send with the call's greatest cost reserved in the budget."""
         held = None
         if self.budget.tariff is not None:
             held = await self.budget.reserve(lambda: self._most_usd(call) or 0.0)
-        exchange = asyncio.ensure_future(self._exchange(call, server, held, with_seed=with_seed))
+        exchange = asyncio.ensure_future(self._exchange(call, server, held))
         try:
             return await asyncio.shield(exchange)
         except asyncio.CancelledError:
             call.is_cancelled = True
             return await exchange
 
-    async def _exchange(
-        self, call: _Call, server: Server, held: int | None, *, with_seed: bool
-    ) -> Reply:
+    async def _exchange(self, call: _Call, server: Server, held: int | None) -> Reply:
         """Write that a call is sent, send it, and write what became of it.
 
         A failure that may have been billed counts in full; a model that is found unable before
@@ -300,7 +267,7 @@ class ChatModel:
             server.under_way += 1
             spent_usd = None
             try:
-                reply = await server.client.complete(call.request, with_seed=with_seed)
+                reply = await server.client.complete(call.request)
             finally:
                 server.under_way -= 1
             reply = counted(reply, call.expected)

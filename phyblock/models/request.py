@@ -14,7 +14,7 @@ import json
 import secrets
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import DataError, PhyblockError, Problem
@@ -94,8 +94,7 @@ class Model(Protocol):
 
         Raises RetryableError when all attempts failed, SampleError or RefusedError when this
         request cannot succeed, UnavailableError when the model cannot answer at all,
-        BudgetReachedError when the call does not fit; a person HaltedError, a model that gathers
-        requests AskLaterError.
+        BudgetReachedError when the call does not fit; a person HaltedError.
 
         Cancelled while it waits for its turn, it gives up at once. Cancelled while a request is
         under way, which is paid for, it returns the answer; a second cancellation gives it up too.
@@ -120,33 +119,6 @@ class Journal(Protocol):
 
 class HaltedError(PhyblockError):
     """The run was ended before this request was sent."""
-
-
-class AskLaterError(PhyblockError):
-    """The request has to be gathered once more: its answer failed, or it was not sent yet."""
-
-
-@runtime_checkable
-class GatheringModel(Model, Protocol):
-    """A model whose requests are gathered, sent together and only then asked for, in rounds.
-
-    A round is `begin`, `gather` of each request that is not answered yet, `dispatch`, `ask` of each
-    that was gathered; those whose `ask` raises AskLaterError belong to the next round.
-    """
-
-    async def begin(self) -> None:
-        """Begin a round. Raises UnavailableError where nothing more can be sent."""
-
-    async def gather(self, request: Request, *, anew: bool = False) -> bool:
-        """Take a request in, unless its answer is here or on its way; False where there is no room
-        for it in this round.
-
-        `anew` says that its failure has been recorded, so that it is asked again. Raises
-        BudgetReachedError where it alone could pass the cost limit.
-        """
-
-    async def dispatch(self) -> None:
-        """Send what was gathered."""
 
 
 def data_uri(image: Image) -> str:

@@ -434,8 +434,6 @@ class BatchLine(Line):
     """Requests of an intended batch in their order, by their keys in the reply cache."""
     most_usd: tuple[Usd, ...] = ()
     """Most that each request of an intended batch can cost; empty where no price is known."""
-    seeded: bool = True
-    """True if the requests of an intended batch carry seeds."""
     words: str = ""
     """The reason why it was lost, or how it ended."""
 

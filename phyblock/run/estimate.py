@@ -19,7 +19,7 @@ from phyblock.models import (
     is_billed,
     reply_key,
     tariff_of,
-    waiting_keys,
+    under_way,
 )
 from phyblock.models import estimate as estimate_call
 from phyblock.models.costs import is_free, most_usd, price_at
@@ -125,7 +125,8 @@ def estimate(
         lines = tuple(line for _, line in BatchLines(folder))
         for model in plan.models:
             if model.batch:
-                waiting[model.name] = waiting_keys(model, lines, folder)
+                batches = under_way(lines, model.name)
+                waiting[model.name] = frozenset(key for one in batches for key in one.most_usd)
     path = reply_cache_file()
     with ReplyCache(path) if use_cache and path.exists() else nullcontext() as cache:
         for sample, outlines in _samples(plan):

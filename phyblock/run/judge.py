@@ -20,7 +20,7 @@ from phyblock.errors import (
     SampleError,
     SimulationError,
 )
-from phyblock.models import AskLaterError, HaltedError, Image, Message, Model, Request
+from phyblock.models import HaltedError, Image, Message, Model, Request
 from phyblock.records.files import known_records
 from phyblock.records.record import (
     ErrorKind,
@@ -213,7 +213,7 @@ class Extractor:
         name, version = f"{track.name}/{item.key}", self._prompt.version
         try:
             reply = await self._model.ask(Request(name, 0, messages, params, version, None))
-        except (ModelError, BudgetReachedError, HaltedError, AskLaterError):
+        except (ModelError, BudgetReachedError, HaltedError):
             return record
         if reply is None:
             return record

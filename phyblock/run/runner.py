@@ -27,10 +27,8 @@ from phyblock.errors import (
     UnavailableError,
 )
 from phyblock.models import (
-    AskLaterError,
     BatchFiles,
     Budget,
-    GatheringModel,
     HaltedError,
     Model,
     ReplyCache,
@@ -176,7 +174,6 @@ class Session:
         stack.callback(plan.close)
         store = RunStore(self._folder, plan.manifest, plan.sample_ids())
         self._store = stack.enter_context(store)
-        self._open_models(stack)
         queues: dict[str, deque[Sample]] = {model.name: deque() for model in plan.models}
         earlier: dict[str, list[Summary]] = {name: [] for name in queues}
         for name, queue in queues.items():
@@ -187,24 +184,24 @@ class Session:
                     result.add(known)
                 else:
                     queue.append(sample)
+        self._open_models(stack, queues)
         result.unanswered = store.progress.unanswered_text
         self._watch(RunStarted(dict.fromkeys(earlier, plan.samples_per_model), earlier))
         if result.unanswered:
             self._watch(RunNotice(result.unanswered))
         return queues
 
-    def _open_models(self, stack: AsyncExitStack) -> None:
+    def _open_models(self, stack: AsyncExitStack, queues: Mapping[str, deque[Sample]]) -> None:
         """Build the models that are not present; SpecError for one with a batch under way that is
         asked singly now.
         """
         plan, store, limits = self._plan, self._store, self._plan.suite.limits
-        waiting = under_way(store.progress.batches)
         message = "has a batch under way, whose questions would be asked twice"
         hint = f"let it end with batch: true, or remove its lines from {BATCHES} to give it up"
         if problems := [
-            Problem(f"model {model.name}", message, "batch", waiting[model.name], hint=hint)
+            Problem(f"model {model.name}", message, "batch", waiting[0].shown, hint=hint)
             for model in plan.models
-            if model.name in waiting and not model.batch
+            if not model.batch and (waiting := under_way(store.progress.batches, model.name))
         ]:
             raise SpecError(problems)
 
@@ -218,8 +215,13 @@ class Session:
             stack.callback(cache.close)
         for file in (store.batches, store.calls):
             stack.push_async_callback(file.drain)
-        earlier = tuple(store.progress.batches)
-        batches = BatchFiles(earlier, store.batches.put, self._folder, limits.batch_poll_s)
+        batches = BatchFiles(
+            tuple(store.progress.batches),
+            store.batches.put,
+            self._folder,
+            limits.batch_poll_s,
+            frozenset(store.progress.samples),
+        )
         attempts = limits.max_attempts, limits.retry_for_s, limits.max_connection_failures
         build = partial(
             build_model,
@@ -235,7 +237,8 @@ class Session:
             if (present := self._present.get(planned.name)) is not None:
                 model: Model = _Journaled(present, planned, store)
             else:
-                model = build(planned, batches=batches if planned.batch else None)
+                of_model = replace(batches, expected=len(queues[planned.name]))
+                model = build(planned, batches=of_model if planned.batch else None)
             self._models[planned.name] = model
             stack.push_async_callback(model.aclose)
         if plan.extractor is not None:
@@ -251,12 +254,10 @@ class Session:
     async def _ask_all(self, queues: Mapping[str, deque[Sample]]) -> None:
         workers: list[asyncio.Task[None]] = []
         for planned in self._plan.models:
-            queue, model = queues[planned.name], self._models[planned.name]
-            if isinstance(model, GatheringModel):
-                workers.append(asyncio.create_task(self._in_rounds(planned, model, queue)))
-            else:
-                count = min(planned.max_concurrency, len(queue))
-                workers += [asyncio.create_task(self._work(planned, queue)) for _ in range(count)]
+            queue = queues[planned.name]
+            # What goes out in a batch is asked at once.
+            count = len(queue) if planned.batch else min(planned.max_concurrency, len(queue))
+            workers += [asyncio.create_task(self._work(planned, queue)) for _ in range(count)]
         try:
             # One worker's error must not end the others: they wait for what is paid for.
             ended = await asyncio.gather(*workers, return_exceptions=True)
@@ -280,86 +281,23 @@ class Session:
         await asyncio.gather(*workers, return_exceptions=True)
         await self._store.records.drain()
 
-    async def _work(
-        self, planned: ModelConfig, queue: deque[Sample], later: deque[Sample] | None = None
-    ) -> None:
-        """Ask until the queue is empty; what its model wants to be asked later goes to `later`, or
-        without one behind the others.
-        """
-        while queue and self._goes_on(planned):
-            sample = queue.popleft()
+    async def _work(self, planned: ModelConfig, queue: deque[Sample]) -> None:
+        """Ask until the queue is empty, the model is stopped, or the run."""
+        while queue and not (self.stopping or self._is_over or planned.name in self.result.stopped):
             try:
-                await self._guarded(planned, self._one(sample, planned))
-            except AskLaterError:
-                (queue if later is None else later).append(sample)
-
-    async def _in_rounds(
-        self, planned: ModelConfig, model: GatheringModel, queue: deque[Sample]
-    ) -> None:
-        """Ask a model that sends many requests together."""
-        while queue and self._goes_on(planned):
-            taken: deque[Sample] = deque()
-            later: deque[Sample] = deque()
-            await self._guarded(planned, self._gather(planned, model, queue, taken))
-            width = min(planned.max_concurrency, len(taken))
-            await asyncio.gather(*(self._work(planned, taken, later) for _ in range(width)))
-            queue.extendleft(reversed(later))
-
-    async def _gather(
-        self,
-        planned: ModelConfig,
-        model: GatheringModel,
-        queue: deque[Sample],
-        taken: deque[Sample],
-    ) -> None:
-        """Have a round's requests sent; those that belong to it are `taken` from the queue."""
-        await self._until_stopped(model.begin())
-        left: deque[Sample] = deque()
-        is_full = False
-
-        async def gather() -> None:
-            nonlocal is_full
-            while queue and not is_full and self._goes_on(planned):
-                sample = queue.popleft()
-                request = await self._request(sample.shown(), planned, with_messages=True)
-                known = sample.id in self._store.progress.samples
-                is_taken = await self._until_stopped(model.gather(request, anew=known))
-                is_full = is_full or not is_taken
-                (taken if is_taken else left).append(sample)
-
-        width = min(planned.max_concurrency, len(queue))
-        await asyncio.gather(*(self._guarded(planned, gather()) for _ in range(width)))
-        queue.extendleft(reversed(left))
-        if not self._goes_on(planned):
-            return
-        await self._guarded(planned, model.dispatch())
-        if not taken:
-            # Where it is the model that takes no more, it says so now.
-            await model.begin()
-            raise BudgetReachedError("what is left may cost more than is left of max_cost_usd")
-
-    def _goes_on(self, planned: ModelConfig) -> bool:
-        is_stopped = self.stopping or planned.name in self.result.stopped
-        return not (is_stopped or self._is_over)
-
-    async def _guarded(self, planned: ModelConfig, work: Coroutine[Any, Any, None]) -> None:
-        """Do a part of the work on a model; what keeps it from going on stops it, or the run."""
-        try:
-            await work
-        except UnavailableError as error:
-            if planned.name not in self.result.stopped:
-                self.result.stopped[planned.name] = str(error)
-                self._watch(ModelStopped(planned.name, str(error)))
-        except BudgetReachedError as error:
-            self._stop(Stopping("cost", str(error)))
-        except HaltedError:
-            return
-        except AskLaterError:
-            raise
-        except Exception as error:
-            # A mistake of our own is no reason to lose what others have paid for.
-            self._failure = self._failure or error
-            self._stop(Stopping("error", "an error that the run cannot go on with"))
+                await self._one(queue.popleft(), planned)
+            except UnavailableError as error:
+                if planned.name not in self.result.stopped:
+                    self.result.stopped[planned.name] = str(error)
+                    self._watch(ModelStopped(planned.name, str(error)))
+            except BudgetReachedError as error:
+                self._stop(Stopping("cost", str(error)))
+            except HaltedError:
+                return
+            except Exception as error:
+                # A mistake of our own is no reason to lose what others have paid for.
+                self._failure = self._failure or error
+                self._stop(Stopping("error", "an error that the run cannot go on with"))
 
     def _stop(self, stop: Stopping) -> None:
         if self.result.stop is None:

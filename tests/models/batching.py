@@ -1,11 +1,11 @@
-"""Models in batches without a run around them: a list for the disk, and a run's rounds."""
+"""Models in batches without a run around them: a list for the disk, and kills."""
 
 from __future__ import annotations
 
 import asyncio
 import itertools
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Coroutine, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,10 +13,8 @@ from typing import Any
 from phyblock.config.models import ModelConfig
 from phyblock.errors import BudgetReachedError, ModelError
 from phyblock.models import (
-    AskLaterError,
     BatchFiles,
     Budget,
-    GatheringModel,
     ModelEvent,
     Reply,
     ReplyCache,
@@ -48,8 +46,8 @@ class Disk:
         if self.moment is not None:
             await self.moment(f"after {line.event}")
 
-    def files(self) -> BatchFiles:
-        return BatchFiles(tuple(self.lines), self.put, self.folder, POLL_S)
+    def files(self, recorded: Collection[str], expected: int) -> BatchFiles:
+        return BatchFiles(tuple(self.lines), self.put, self.folder, POLL_S, recorded, expected)
 
     @property
     def events(self) -> list[str]:
@@ -66,7 +64,7 @@ async def command(
     policy: RetryPolicy = QUICK,
     anew: bool = False,
 ) -> list[Reply | Exception]:
-    """Ask as one command does, in rounds; what stops the model stands where it was met."""
+    """Ask all at once, as one command does; what stops the model stands where it was met."""
     cache = None if disk.cache is None else ReplyCache(disk.cache)
     model = build_model(
         config,
@@ -74,39 +72,26 @@ async def command(
         budget=budget,
         observer=(told if told is not None else []).append,
         policy=policy,
-        batches=disk.files(),
+        batches=disk.files({one.sample for one in requests} if anew else (), len(requests)),
     )
-    assert isinstance(model, GatheringModel)
-    ended: dict[int, Reply | Exception] = {}
-    left = list(range(len(requests)))
+
+    async def ask(request: Request) -> Reply | Exception:
+        try:
+            reply = await model.ask(request)
+            assert reply is not None
+            return reply
+        except (ModelError, BudgetReachedError) as error:
+            return error
+
     try:
-        while left:
-            await model.begin()
-            taken = [n for n in left if await model.gather(requests[n], anew=anew)]
-            await model.dispatch()
-            if not taken:
-                await model.begin()
-                raise BudgetReachedError("none fits")
-            for n in taken:
-                try:
-                    reply = await model.ask(requests[n])
-                    assert reply is not None
-                    ended[n] = reply
-                except AskLaterError:
-                    continue
-                except ModelError as error:
-                    ended[n] = error
-            left = [n for n in left if n not in ended]
-    except (ModelError, BudgetReachedError) as error:
-        ended |= dict.fromkeys(left, error)
-    else:
+        ended = await asyncio.gather(*map(ask, requests))
         # Or others would wait for it.
         assert budget is None or not budget.holds
+        return ended
     finally:
         await model.aclose()
         if cache is not None:
             cache.close()
-    return [ended[n] for n in range(len(requests))]
 
 
 def run_command(*args: Any, **options: Any) -> list[Reply | Exception]:
@@ -121,20 +106,23 @@ class Killing:
         self.count = itertools.count()
         self.names: list[str] = []
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._task: asyncio.Task[Any] | None = None
+        self._killed = asyncio.Event()
         self._over = threading.Event()
 
-    async def run(self, work: Any) -> bool:
+    async def run(self, work: Coroutine[Any, Any, Any]) -> bool:
         """True if the work came to its end."""
         self._loop = asyncio.get_running_loop()
-        self._task = asyncio.create_task(work)
-        try:
-            await self._task
-        except asyncio.CancelledError:
-            return False
-        finally:
-            self._over.set()
-        return True
+        task, killed = asyncio.create_task(work), asyncio.create_task(self._killed.wait())
+        await asyncio.wait([task, killed], return_when=asyncio.FIRST_COMPLETED)
+        is_over = task.done()
+        others = asyncio.all_tasks() - {asyncio.current_task()}
+        while others:
+            for other in others:
+                other.cancel()
+            await asyncio.wait(others)
+            others = asyncio.all_tasks() - {asyncio.current_task()}
+        self._over.set()
+        return is_over and not task.cancelled() and task.exception() is None
 
     def _is_now(self, name: str) -> bool:
         self.names.append(name)
@@ -143,14 +131,12 @@ class Killing:
     async def here(self, name: str) -> None:
         """A moment on the client's side."""
         if self._is_now(name):
-            assert self._task is not None
-            self._task.cancel()
+            self._killed.set()
             await asyncio.sleep(60)
 
     def there(self, _: int, name: str) -> None:
         """A moment on the server's side, which waits until the client is dead."""
         if self._is_now(name):
             assert self._loop is not None
-            assert self._task is not None
-            self._loop.call_soon_threadsafe(self._task.cancel)
+            self._loop.call_soon_threadsafe(self._killed.set)
             self._over.wait(10)

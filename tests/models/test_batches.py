@@ -17,14 +17,14 @@ from hypothesis import strategies as st
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import BudgetReachedError, SampleError, UnavailableError
-from phyblock.models import Budget, ModelEvent, Reply, ReplyCache, Request
+from phyblock.models import Budget, Reply, ReplyCache, Request
 from phyblock.models.batch import (
     Batch,
-    Ledger,
     UnsureError,
     answers_of,
     custom_id,
-    waiting_keys,
+    read_batches,
+    under_way,
 )  # fmt: skip
 from phyblock.models.batch_providers import PROVIDERS, UNREADABLE, _joined
 from phyblock.records.record import BatchLine
@@ -328,27 +328,6 @@ def test_rejected_requests_are_asked_again_only_when_that_is_wanted(disk: Disk) 
         assert len(running.server.made) == 2  # type: ignore[attr-defined]
 
 
-def test_a_provider_that_takes_no_seed_is_asked_again_without(disk: Disk) -> None:
-    class Seedless(OpenAIBatches):
-        def line(self, custom_id: str, seen: Any, ending: str) -> dict[str, Any]:
-            line = super().line(custom_id, seen, ending)
-            if seen.seed is not None:
-                error = self.error(400, "seed", "Unrecognized request argument supplied: seed")
-                line["response"] = {"status_code": 400, "body": error}
-            return line
-
-    with Running(Seedless()) as running:
-        told: list[ModelEvent] = []
-        config, requests = config_at("direct", running.url), requests_of(2)
-        ended = run_command(config, disk, requests, told=told)
-        assert {one.seed_sent for one in ended if isinstance(one, Reply)} == {False}
-        assert "seed_unsupported" in [one.kind for one in told]
-        always = with_fields(config, seed="always")
-        (refused,) = run_command(always, Disk(disk.folder / "always"), requests[:1])
-        assert isinstance(refused, UnavailableError)
-        assert "seed is `always`" in str(refused)
-
-
 TOKEN = "pb0"
 keys = st.lists(st.sampled_from("abcdef"), unique=True, min_size=1)
 fates = st.sampled_from(["intended", "created", "lost", "ended"])
@@ -372,41 +351,25 @@ json_values = st.recursive(
 def test_a_request_is_in_the_last_batch_that_was_not_lost(
     batches: list[tuple[list[str], str]],
 ) -> None:
-    """So a ledger says that goes on, and one that reads its lines again."""
-    lines: list[BatchLine] = []
+    def line(n: int, event: str, **fields: Any) -> BatchLine:
+        told = {"batch": f"t{n}", "model": "m", "event": event, "time": "2026-11-23T10:00:00Z"}
+        return BatchLine.model_validate({**told, **fields})
 
-    async def put(line: BatchLine) -> None:
-        lines.append(BatchLine.model_validate_json(line.as_json()))
-
-    async def write() -> Ledger:
-        ledger = Ledger("m", (), put)
-        made = [Batch(f"t{n}", most_usd=dict.fromkeys(of)) for n, (of, _) in enumerate(batches)]
-        for batch in made:
-            await ledger.note(batch, "intended", keys=tuple(batch.most_usd))
-        for batch, (_, fate) in zip(made, batches, strict=True):
-            if fate in ("created", "ended"):
-                await ledger.note(batch, "created", id=f"id-{batch.token}")
-            if fate in ("lost", "ended"):
-                await ledger.note(batch, fate)  # type: ignore[arg-type]
-        return ledger
-
-    async def nowhere(_: BatchLine) -> None: ...
-
-    written = asyncio.run(write())
-    read = Ledger("m", lines, nowhere)
-    others = Ledger("another", lines, nowhere)
-    for key in "abcdef":
-        holding = [n for n, (k, fate) in enumerate(batches) if key in k and fate != "lost"]
-        expected = f"t{holding[-1]}" if holding else None
-        for ledger in (written, read):
-            newest = ledger.newest(key)
-            assert (newest and newest.token) == expected
-        assert others.newest(key) is None
-        config = ModelConfig(name="m", id="openai/m")
-        assert (key in waiting_keys(config, lines, Path("nowhere"))) == bool(holding)
-    assert {b.token: (b.event, b.id) for b in written.batches.values()} == {
-        b.token: (b.event, b.id) for b in read.batches.values()
-    }
+    lines = [line(n, "intended", keys=tuple(of)) for n, (of, _) in enumerate(batches)]
+    for n, (_, fate) in enumerate(batches):
+        if fate in ("created", "ended"):
+            lines.append(line(n, "created", id=f"id-{n}"))
+        if fate in ("lost", "ended"):
+            lines.append(line(n, fate))
+    read = read_batches(lines, "m")
+    left = [n for n, (_, fate) in enumerate(batches) if fate != "lost"]
+    assert [(one.token, one.event, list(one.most_usd)) for one in read] == [
+        (f"t{n}", batches[n][1], batches[n][0]) for n in left
+    ]
+    assert [bool(one.id) for one in read] == [batches[n][1] != "intended" for n in left]
+    assert read_batches(lines, "another") == []
+    waits = [f"t{n}" for n in left if batches[n][1] != "ended"]
+    assert [one.token for one in under_way(lines, "m")] == waits
 
 
 @st.composite

@@ -50,8 +50,7 @@ class Outage:
     def is_away(self) -> bool:
         return self.begins_s <= self.time.now_s < self.ends_s
 
-    async def complete(self, _: Request, *, with_seed: bool) -> Reply:
-        assert with_seed
+    async def complete(self, _: Request) -> Reply:
         was_away = self.is_away()
         if not was_away:
             await self.time.sleep(self.takes_s)

@@ -156,7 +156,7 @@ def test_texts_count_as_the_public_vocabulary_does(workspace: Workspace, track: 
     texts = [
         part
         for item in opened.items
-        for request, _ in opened.outlines(item)
+        for request in opened.outlines(item)
         for message in request.messages
         for part in message.parts
         if isinstance(part, str)
