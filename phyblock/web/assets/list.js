@@ -47,7 +47,8 @@ const List = (() => {
         el("div", { class: "bar-top" }, button("‹ List", () => go({ s: "" }, true), { class: "quiet back" }), title, tools,
           button("‹ Previous", () => move(-1)), button("Next ›", () => move(1))), detail));
     list.addEventListener("scroll", () => requestAnimationFrame(paint), { passive: true });
-    new ResizeObserver(paint).observe(list);
+    // Once the list has a size, and again with another one.
+    new ResizeObserver(reveal).observe(list);
     return { frame, inner, list, find, form, status, title, tools, detail };
   }
 
