@@ -83,14 +83,6 @@ def read_text(path: Path, most_bytes: int = LARGEST_FILE_BYTES) -> str:
         raise ValueError(f"is not UTF-8: {error.reason} at byte {error.start}") from None
 
 
-class RepeatedFieldError(ValueError):
-    """A JSON object holds a field twice; `field` names it."""
-
-    def __init__(self, field: str) -> None:
-        self.field = field
-        super().__init__(f"holds the field {field[:80]!r} twice in one object")
-
-
 def digest_of_file(path: Path) -> str:
     """Return the SHA-256 of a file; empty where there is none. Raises OSError, NotRegularError."""
     digest = hashlib.sha256()
@@ -103,14 +95,13 @@ def digest_of_file(path: Path) -> str:
     return digest.hexdigest()
 
 
-def load_json(data: bytes | str, *, finite: bool = True, unique: bool = False) -> Any:
+def load_json(data: bytes | str, *, finite: bool = True) -> Any:
     """Decode JSON whose nesting, integers and floats are bounded.
 
     Raises ValueError (a JSONDecodeError for broken syntax) for NaN, Infinity, a float outside the
     range of doubles, an integer of more than 300 digits, or nesting of more than 64 levels. With
     `finite=False` numbers outside that range pass, up to 4,300 digits, for a reader that says which
-    field they stand in. With `unique` a field that stands twice in one object is refused too
-    (RepeatedFieldError).
+    field they stand in.
     """
 
     def integer(digits: str) -> int:
@@ -127,14 +118,6 @@ def load_json(data: bytes | str, *, finite: bool = True, unique: bool = False) -
     def constant(name: str) -> float:
         raise ValueError(f"holds {name}, which is no JSON")
 
-    def mapping(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        fields: dict[str, Any] = {}
-        for field, value in pairs:
-            if field in fields:
-                raise RepeatedFieldError(field)
-            fields[field] = value
-        return fields
-
     too_deep = ValueError(f"is nested more than {_DEEPEST_JSON} levels deep")
     try:
         value = json.loads(
@@ -142,7 +125,6 @@ def load_json(data: bytes | str, *, finite: bool = True, unique: bool = False) -
             parse_int=integer,
             parse_float=number if finite else None,
             parse_constant=constant if finite else None,
-            object_pairs_hook=mapping if unique else None,
         )
     except RecursionError:
         raise too_deep from None

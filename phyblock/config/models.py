@@ -223,9 +223,7 @@ class ModelConfig(Section):
     revision: Annotated[str, Field(min_length=1, max_length=100)] | None = None
     """Which weights answer, where the id does not say it. An address does not tell models apart:
     one id on two servers is one model, unless revisions differ."""
-    api_key_env: (
-        Annotated[str, form(r"^[A-Za-z_][A-Za-z0-9_]*$", "a name such as MY_KEY")] | None
-    ) = None
+    api_key_env: _Variable | None = None
     """Name of the environment variable that holds the key, where it is not the provider's usual
     one. Never the key itself."""
     transport: TransportName = "auto"
@@ -277,9 +275,7 @@ class ModelConfig(Section):
     """Name of its row in the paper's tables."""
     size_b: TimeoutS | None = None
     """Parameters [billions], where known."""
-    groups: Unique[
-        Annotated[str, form(r"^[a-z0-9][a-z0-9-]{0,39}$", f"up to 40 {HYPHENATED}")]
-    ] = ()
+    groups: Unique[_Group] = ()
     """Groups that it belongs to: group:NAME in a suite or after --models stands for all of a group,
     in the order of this file."""
     replay: Text | None = None

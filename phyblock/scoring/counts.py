@@ -55,22 +55,6 @@ def _ratio(part: int, whole: int) -> float | None:
     return part / whole if whole else None
 
 
-def precision_of(sums: Floats) -> Floats:
-    """TP / (TP + FP) of counts (..., [tp, fp, fn])."""
-    return ratio_of(np.stack([sums[..., 0], sums[..., 0] + sums[..., 1]], axis=-1))
-
-
-def recall_of(sums: Floats) -> Floats:
-    """TP / (TP + FN) of counts (..., [tp, fp, fn])."""
-    return ratio_of(np.stack([sums[..., 0], sums[..., 0] + sums[..., 2]], axis=-1))
-
-
-def f1_of(sums: Floats) -> Floats:
-    """2 TP / (2 TP + FP + FN) of counts (..., [tp, fp, fn])."""
-    twice = 2 * sums[..., 0]
-    return ratio_of(np.stack([twice, twice + sums[..., 1] + sums[..., 2]], axis=-1))
-
-
 def ratio_of(sums: Floats) -> Floats:
     """Part / whole of counts (..., [part, whole]), as right answers of answers.
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import functools
 from dataclasses import dataclass, replace
 
+import numpy as np
 from hypothesis import strategies as st
 
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
+from phyblock.scoring.counts import Floats, ratio_of
 from phyblock.types import Setting
 from tests.domain.graphs import acyclic
 
@@ -105,3 +107,19 @@ def renumbered(case: Case, data: st.DataObject) -> Case:
     candidates = CandidateSet(tuple(case.candidates.candidates[i] for i in order))
     steps = tuple(order.index(index - 1) + 1 for index in case.plan.steps)
     return Case(replace(case.scene, blocks=blocks), candidates, Plan(steps))
+
+
+def precision_of(sums: Floats) -> Floats:
+    """TP / (TP + FP) of counts (..., [tp, fp, fn])."""
+    return ratio_of(np.stack([sums[..., 0], sums[..., 0] + sums[..., 1]], axis=-1))
+
+
+def recall_of(sums: Floats) -> Floats:
+    """TP / (TP + FN) of counts (..., [tp, fp, fn])."""
+    return ratio_of(np.stack([sums[..., 0], sums[..., 0] + sums[..., 2]], axis=-1))
+
+
+def f1_of(sums: Floats) -> Floats:
+    """2 TP / (2 TP + FP + FN) of counts (..., [tp, fp, fn])."""
+    twice = 2 * sums[..., 0]
+    return ratio_of(np.stack([twice, twice + sums[..., 1] + sums[..., 2]], axis=-1))
