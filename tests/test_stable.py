@@ -22,7 +22,7 @@ from phyblock.scoring.pose import Piece, PoseFit, overlap_volume, placed
 from phyblock.sim.geometry import collision_pieces
 from phyblock.stable import plain_sum
 from phyblock.tracks.baselines import text_features
-from phyblock.tracks.pose_planning import FITS
+from phyblock.tracks.pose_planning_results import FITS
 
 DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
 ASKED = read_questions(bundled("benchmarks", "data", "phyblock-vqa"), DATA)
@@ -64,7 +64,8 @@ def solids() -> list[Any]:
 def fits() -> list[Any]:
     """Counts of how steps lie to goal blocks, as records hold them."""
     off = [PoseFit(n, 0.1 * n, 0.0, 0.0, 0.7 * n, 1 / (n + 1)) for n in range(30)]
-    return [FITS.sample(None, SimpleNamespace(fits=off[:n])) for n in range(30)]
+    records: list[Any] = [SimpleNamespace(pose=SimpleNamespace(steps=off[:n])) for n in range(30)]
+    return [list(FITS.of(record)) for record in records]
 
 
 @pytest.mark.parametrize("compute", [texts, solids, fits])

@@ -136,9 +136,9 @@ def _turned(subject: PlanSubject, block: Block, rng: np.random.Generator) -> int
     return wrong[int(rng.integers(len(wrong)))] if wrong else None
 
 
-def needed_candidate(subject: PlanSubject, block: Block) -> int:
+def needed_candidate(subject: Any, block: Block) -> int:
     """Return the number of the candidate that looks like a block; DataError for none."""
-    index = subject.candidates.index_of(block.look)
+    index: int | None = subject.candidates.index_of(block.look)
     if index is None:
         found = f"{block.color} {block.type} turned {block.euler_deg}"
         where, place = f"scene {subject.scene.id}", f"blocks[order={block.order}]"

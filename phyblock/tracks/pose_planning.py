@@ -5,8 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import threading
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Annotated, Any, Literal
@@ -34,7 +33,6 @@ from phyblock.domain import (
     euler_deg_to_matrix,
     turn_deg,
 )
-from phyblock.errors import DataError, Problem
 from phyblock.models.request import Image
 from phyblock.parsing.poses import (
     FARTHEST_PLACE_CM,
@@ -50,21 +48,18 @@ from phyblock.records.record import Course, Record
 from phyblock.resources import bundled
 from phyblock.scoring.plan import AssemblyScorer
 from phyblock.scoring.pose import (
-    POSE_ERRORS,
-    POSE_FRAMES,
     Laid,
     Piece,
     PoseError,
-    PoseFit,
     PoseScorer,
     blocks_reached,
     pose_errors,
 )
-from phyblock.scoring.pose_matching import TOLERANCES_CM, TURN_TOLERANCE_DEG
+from phyblock.scoring.pose_matching import TURN_TOLERANCE_DEG
 from phyblock.sim.balance import MARGIN_M, is_balanced
 from phyblock.sim.camera import VIEWS
 from phyblock.sim.contact import voxel_iou
-from phyblock.sim.dynamics import ExecutionLimits, execute, groups, settle
+from phyblock.sim.dynamics import ExecutionLimits, execute, groups
 from phyblock.sim.engine import Pose, described_engine
 from phyblock.sim.geometry import (
     box_height_cm,
@@ -76,14 +71,12 @@ from phyblock.sim.geometry import (
 )
 from phyblock.sim.pictures import goal_style
 from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
-from phyblock.stable import plain_sum
-from phyblock.tracks.base import CARRYING, ENGINE, Judgement, SceneTrack
+from phyblock.tracks.base import CARRYING, Judgement, SceneTrack
 from phyblock.tracks.baselines import NumberField, Pick, Picking, candidate_choices
-from phyblock.tracks.full_planning import PlanParse, score_fields
+from phyblock.tracks.full_planning import PlanParse, needed_candidate, score_fields
 from phyblock.tracks.items import ShownTask, file_plan, goal_of
-from phyblock.tracks.measures import SampleCounts
 from phyblock.tracks.pictures import Drawing, picture_style
-from phyblock.types import SETTINGS, STEP_ENDS, Matcher, PoseRotation, Setting, StepEnd, View
+from phyblock.types import REFUSED_ENDS, Matcher, PoseRotation, Setting, StepEnd, View
 
 CARRY_VERSION = 3
 """Version of the execution of plans and of how its end is measured; it goes up where some plan may
@@ -96,9 +89,6 @@ _LIMITS = ExecutionLimits()
 _DIGITS = 4
 _RANDOM_STEPS = 4
 _RANDOM_REACH_CM = 15.0
-_MOST_TRIED = 200
-_MOST_SETTLED = 16
-"""States that the physics engine is asked about, each of which may take a second."""
 _STILL_M, _STILL_DEG = 0.001, 1.0
 """A block that moved by no more lies where it did before."""
 _ONE_AT_A_TIME = threading.Lock()
@@ -176,21 +166,6 @@ class PoseParse(PlanParse):
     """The steps with their poses, those included that name no candidate."""
 
 
-class CarryTolerances(Line):
-    """By what a plan was judged when it was carried out."""
-
-    overlap_cm: Amount
-    """Farthest that a block was moved out of others [cm]."""
-    stand_cm: Amount
-    """Farthest that a block moved and still stood [cm]."""
-    stand_deg: Amount
-    """Farthest that it turned [degrees]."""
-    reached_cm: Amount
-    """Farthest from its place that a block of the goal was reached [cm]."""
-    reached_deg: Amount
-    """Farthest that it was turned [degrees]."""
-
-
 class RestingBlock(Line):
     """The place where a block came to lie."""
 
@@ -240,7 +215,7 @@ class PoseOutcome(Line):
     """The score of a plan with poses."""
 
     rotation: PoseRotation
-    """True if candidates keep their orientation or steps bring one."""
+    """As in the suite's section `pose`."""
     right: dict[str, tuple[Whole, ...]]
     """By frame, `absolute` or `aligned`: right steps within 0.5, 1, 2 and 4 cm."""
     shift_cm: tuple[Amount, Amount]
@@ -255,8 +230,8 @@ class PoseOutcome(Line):
     """Intersection over union of all that stands and the goal, in voxels of 5 mm by 64 points."""
     completed: bool
     """True if all of the goal was reached, and nothing else lies about."""
-    limits: CarryTolerances
-    """The tolerances."""
+    limits: dict[str, Amount]
+    """The tolerances of the suite's section `pose` by which the plan was carried out."""
     engine: str
     """The physics engine, with its version."""
 
@@ -279,59 +254,6 @@ class PoseRecord(Record):
         errors = (step.error for step in self.pose.steps)
         blocks = next((score.tp + score.fn for score in self.scores), self.pose.reached)
         return Course(tuple(zip(names, errors, strict=True)), blocks - self.pose.reached)
-
-
-def _right(_: Any, record: Any) -> tuple[int, ...]:
-    right = (count for frame in POSE_FRAMES for count in record.pose.right[frame])
-    score = record.scores[0]
-    return (*right, score.tp + score.fp, score.tp + score.fn)
-
-
-def _fits(_: Any, record: Any) -> tuple[float, ...]:
-    fits = [step for step in record.pose.steps if step.vertex is not None]
-    parts = ("position_cm", "turn_deg", "iou")
-    return (*(plain_sum(getattr(fit, part) for fit in fits) for part in parts), len(fits))
-
-
-def _carried_counts(_: Any, record: Any) -> tuple[float, ...]:
-    pose, score = record.pose, record.scores[0]
-    ends = Counter(step.end for step in pose.steps)
-    of_plan = (pose.reached, score.tp + score.fn, pose.iou, pose.completed, 1)
-    return (*(ends[name] for name in STEP_ENDS), len(pose.steps), *of_plan)
-
-
-def _errors(_: Any, record: Any) -> tuple[int, ...]:
-    counts = Counter(step.error for step in record.pose.steps)
-    return (*(counts[name] for name in POSE_ERRORS), len(record.pose.steps))
-
-
-def _plan(setting: Setting, _: Any, record: Any) -> tuple[int, int, int] | None:
-    """Count the plan without its poses under a setting, by the headline matcher."""
-    found = next((score for score in record.scores if score.setting == setting), None)
-    return None if found is None else (found.tp, found.fp, found.fn)
-
-
-_ALIKE = tuple(f"tracks.pose_planning.{key}" for key in (CARRYING, ENGINE))
-RIGHT = SampleCounts(
-    "poses",
-    (*(f"{frame}_{cm:g}" for frame in POSE_FRAMES for cm in TOLERANCES_CM), "steps", "blocks"),
-    sample=_right,
-)
-FITS = SampleCounts("fits", ("position_cm", "turn_deg", "iou", "n"), sample=_fits)
-CARRIED = SampleCounts(
-    "carried",
-    (*STEP_ENDS, "steps", "reached", "blocks", "iou", "completed", "plans"),
-    sample=_carried_counts,
-    alike=_ALIKE,
-)
-ERRORS = SampleCounts("pose_errors", (*POSE_ERRORS, "steps"), sample=_errors, alike=_ALIKE)
-COUNTS = (
-    *(RIGHT, FITS, CARRIED, ERRORS),
-    *(
-        SampleCounts(f"plan_{setting.lower()}", ("tp", "fp", "fn"), sample=partial(_plan, setting))
-        for setting in SETTINGS
-    ),
-)
 
 
 def rests_of(
@@ -360,17 +282,15 @@ def rests_of(
 
 
 def worlds_of(
-    put: Sequence[Block | None], stays: Sequence[bool], rests: Sequence[Sequence[RestingBlock]]
+    put: Sequence[Block | None], steps: Sequence[StepOutcome]
 ) -> tuple[tuple[Block, ...], ...]:
-    """Return the blocks after each step, to within 1 mm and 1 degree; `stays` says whose block was
-    not refused.
-    """
+    """Return the blocks after each step, to within 1 mm and 1 degree."""
     lying: dict[int, Block] = {}
     worlds = []
-    for number, (block, is_put, moved) in enumerate(zip(put, stays, rests, strict=True), 1):
-        if block is not None and is_put:
+    for number, (block, step) in enumerate(zip(put, steps, strict=True), 1):
+        if block is not None and step.end not in REFUSED_ENDS:
             lying[number] = replace(block, order=number)
-        for rest in moved:
+        for rest in step.rests:
             one = lying[rest.step]
             place = origin_m(one.type, rest.euler_deg, rest.center_cm)
             lying[rest.step] = replace(one, position_m=place, euler_deg=rest.euler_deg)
@@ -399,11 +319,17 @@ def judge_poses(
         parsed = parse_poses(text, n, free=spec.is_free)
     given = parsed.plan.steps
     kept = [step for step in given if 1 <= step.candidate <= n]
+    blocks = [put(step, item.candidates) for step in given]
     scorer = _scorer(item.scene, item.candidates, "B" if spec.is_free else "A")
-    poses = scorer.score([_laid(step, item.candidates[step.candidate]) for step in kept])
-    ended, whole = _ended_before(earlier, given, spec) or _carried(item, given, spec)
+    laid = (
+        Laid(step.candidate, block.position_m, block.euler_deg)
+        for step, block in zip(given, blocks, strict=True)
+        if block is not None
+    )
+    poses = scorer.score(list(laid))
+    ended, whole = _ended_before(earlier, given, spec) or _carried(item.scene, blocks, spec)
     found = iter(poses[0].fits)
-    fits = [next(found) if 1 <= step.candidate <= n else None for step in given]
+    fits = [None if block is None else next(found) for block in blocks]
     numbers, ends = [step.candidate for step in given], [step["end"] for step in ended]
     errors = pose_errors(scorer.goal, numbers, fits, ends)
     # The plan without its poses, under every setting and matcher.
@@ -421,7 +347,12 @@ def judge_poses(
         "dropped": [number for number in numbers if not 1 <= number <= n],
         "version": READER_VERSION,
         "problem": parsed.problem,
-        "steps": [_given(step) for step in given],
+        "steps": [
+            {"block": step.candidate, "center_cm": step.center_cm, "euler_deg": step.euler_deg}
+            if spec.is_free
+            else {"block": step.candidate, "center_cm": step.center_cm}
+            for step in given
+        ],
     }
     pose = {
         "rotation": spec.rotation,
@@ -429,7 +360,7 @@ def judge_poses(
         "shift_cm": [round(part, _DIGITS) + 0.0 for part in motion.shift_cm],
         "turn_deg": round(math.degrees(motion.turn_rad), _DIGITS) + 0.0,
         "steps": [
-            {**_fit(fit), **end, "error": error}
+            {**({"vertex": None} if fit is None else asdict(fit)), **end, "error": error}
             for fit, end, error in zip(fits, ended, errors, strict=True)
         ],
         "limits": spec.tolerances,
@@ -437,15 +368,6 @@ def judge_poses(
     }
     fields = {"parse": parse, "scores": [score_fields(score) for score in scores], "pose": pose}
     return Judgement(parsed.rule is not None, fields)
-
-
-def _given(step: PoseStep) -> dict[str, Any]:
-    turned = {} if step.euler_deg is None else {"euler_deg": step.euler_deg}
-    return {"block": step.candidate, "center_cm": step.center_cm, **turned}
-
-
-def _fit(fit: PoseFit | None) -> dict[str, Any]:
-    return {"vertex": None} if fit is None else asdict(fit)
 
 
 Ended = tuple[tuple[Mapping[str, Any], ...], Mapping[str, Any]]
@@ -460,19 +382,18 @@ def _ended_before(
         return None
     pose = record.pose
     known = [PoseStep(s.block, s.center_cm, s.euler_deg) for s in record.parse.steps]
-    is_same = (known, pose.limits.fields()) == (list(given), spec.tolerances)
+    is_same = (known, dict(pose.limits)) == (list(given), spec.tolerances)
     if not is_same or len(pose.steps) != len(given):
         return None
     steps = tuple({n: v for n, v in step.fields().items() if n in _END} for step in pose.steps)
     return steps, {name: getattr(pose, name) for name in _WHOLE}
 
 
-def _carried(item: AssemblyTask, given: Sequence[PoseStep], spec: PoseSpec) -> Ended:
-    blocks = [put(step, item.candidates) for step in given]
+def _carried(scene: Scene, blocks: Sequence[Block | None], spec: PoseSpec) -> Ended:
     # An engine has no more than one plan at a time, whichever thread asks.
     with _ONE_AT_A_TIME:
         done = execute(blocks, spec.limits)
-    goal, rests = item.scene.blocks, rests_of(blocks, done.worlds)
+    goal, rests = scene.blocks, rests_of(blocks, done.worlds)
     reached = blocks_reached(goal, done.blocks, spec.reached_cm, spec.reached_deg)
     steps = tuple(
         {**asdict(step), "rests": [rest.fields() for rest in moved]}
@@ -490,12 +411,6 @@ def _carried(item: AssemblyTask, given: Sequence[PoseStep], spec: PoseSpec) -> E
 def pieces_of(block_type: BlockType) -> tuple[Piece, ...]:
     """Return the convex pieces of a block in its body frame."""
     return tuple(Piece(p.vertices_m, p.face_normals) for p in collision_pieces(block_type))
-
-
-def _laid(step: PoseStep, candidate: Candidate) -> Laid:
-    """Return a step as a rigid body; without a rotation of its own it has its candidate's."""
-    euler = candidate.euler_deg if step.euler_deg is None else step.euler_deg
-    return Laid(step.candidate, origin_m(candidate.type, euler, step.center_cm), euler)
 
 
 @functools.lru_cache(maxsize=32)
@@ -530,51 +445,21 @@ def buildable_order(scene: Scene, wanted: Sequence[int]) -> list[int]:
     too, as balance lets it be.
 
     Each step takes the first block with which what stands is in balance with every weight off by
-    `MARGIN_M`, else the first with which it is in balance at all and stands in the physics engine;
-    where there is none, an earlier step is taken back. The wanted order where no other is found.
+    `MARGIN_M`, else the first with which it is in balance at all, else the first.
     """
-    blocks, needs = scene.blocks, scene.graph.depends_on
-    dead: set[frozenset[int]] = set()
-    left = {"tried": _MOST_TRIED, "settled": _MOST_SETTLED}
+    order: list[int] = []
 
-    def touched(order: tuple[int, ...]) -> tuple[Block, ...]:
-        """Return the blocks that hang together with the last one."""
-        placed = [replace(blocks[v], order=place) for place, v in enumerate(order)]
-        return next(group for group in groups(placed) if placed[-1] in group)
+    def is_steady(vertex: int, margin_m: float) -> bool:
+        placed = [replace(scene.blocks[v], order=n) for n, v in enumerate((*order, vertex))]
+        hanging = next(group for group in groups(placed) if placed[-1] in group)
+        return is_balanced(hanging, margin_m=margin_m)
 
-    def settles(order: tuple[int, ...]) -> bool:
-        left["settled"] -= 1
-        return left["settled"] >= 0 and settle(touched(order)).stands
-
-    def following(order: tuple[int, ...]) -> Iterator[int]:
-        """Yield the blocks that may come next, the surest first."""
-        doubtful = []
-        for vertex in wanted:
-            if vertex in order or not needs[vertex] <= set(order):
-                continue
-            if left["tried"] <= 0:
-                return
-            left["tried"] -= 1
-            hanging = touched((*order, vertex))
-            if is_balanced(hanging, margin_m=MARGIN_M):
-                yield vertex
-            elif is_balanced(hanging):
-                doubtful.append(vertex)
-        # So near to an edge engines differ, and a structure may stand while its mirror image falls.
-        yield from (vertex for vertex in doubtful if settles((*order, vertex)))
-
-    def found(order: tuple[int, ...] = ()) -> list[int]:
-        """Return the rest of an order that begins so; empty where there is none."""
-        if len(order) == len(blocks):
-            return list(order)
-        if frozenset(order) not in dead:
-            for vertex in following(order):
-                if whole := found((*order, vertex)):
-                    return whole
-            dead.add(frozenset(order))
-        return []
-
-    return found() or list(wanted)
+    needs = scene.graph.depends_on
+    while len(order) < len(scene):
+        ready = [v for v in wanted if v not in order and needs[v] <= set(order)]
+        steady = (v for margin_m in (MARGIN_M, 0.0) for v in ready if is_steady(v, margin_m))
+        order.append(next(steady, ready[0]))
+    return order
 
 
 @dataclass(frozen=True)
@@ -623,11 +508,7 @@ def _step(subject: PoseSubject, block: Block, center: Center) -> PoseStep:
         number, euler = candidates.first_of(block.kind), block.euler_deg
         if number is not None:
             return PoseStep(number, center, euler)
-    elif (number := candidates.index_of(block.look)) is not None:
-        return PoseStep(number, center)
-    where, field = f"scene {subject.scene.id}", f"blocks[order={block.order}]"
-    found = f"{block.color} {block.type} turned {block.euler_deg}"
-    raise DataError(Problem(where, "no candidate looks like this block", field, found))
+    return PoseStep(needed_candidate(subject, block), center)
 
 
 def _noisy(sigma_cm: float) -> Callable[[PoseSubject, np.random.Generator], str]:
@@ -725,7 +606,6 @@ class PosePlanning(SceneTrack):
     baselines = POSE_RULES
     by_hand = staticmethod(pick_poses)
     record = PoseRecord
-    counted = COUNTS
     varies = ("prompt", "background", "candidate_order", "repeats")
     simulates = True
     draws = True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from functools import partial
 from typing import TYPE_CHECKING
@@ -11,25 +12,85 @@ import numpy as np
 from phyblock.data import AssemblyTask
 from phyblock.domain import PoseStep
 from phyblock.scoring.counts import Floats, ratio_of
-from phyblock.scoring.pose import PoseFrame
+from phyblock.scoring.pose import POSE_ERRORS, POSE_FRAMES, PoseFrame
 from phyblock.scoring.pose_matching import TOLERANCES_CM
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.geometry import put, upright
+from phyblock.stable import plain_sum
 from phyblock.text import counted
-from phyblock.tracks.measures import level_cells, read_report
+from phyblock.tracks.base import CARRYING, ENGINE
+from phyblock.tracks.measures import (
+    SampleCounts,
+    Way,
+    level_cells,
+    read_report,
+)
 from phyblock.tracks.pose_planning import (
-    COUNTS,
     POSE_FLOORS,
-    RIGHT,
     GivenStep,
     PoseRecord,
     StepOutcome,
     worlds_of,
 )
-from phyblock.types import REFUSED_ENDS
+from phyblock.types import SETTINGS, STEP_ENDS, Setting
 
 if TYPE_CHECKING:
     from phyblock.domain import Block
+
+
+def _right(record: PoseRecord) -> Iterator[tuple[Way, tuple[float, ...]]]:
+    if (pose := record.pose) is not None:
+        right = (count for frame in POSE_FRAMES for count in pose.right[frame])
+        score = record.scores[0]
+        yield _ANY, (*right, score.tp + score.fp, score.tp + score.fn)
+
+
+def _fits(record: PoseRecord) -> Iterator[tuple[Way, tuple[float, ...]]]:
+    if (pose := record.pose) is not None:
+        fits = [step for step in pose.steps if step.vertex is not None]
+        parts = ("position_cm", "turn_deg", "iou")
+        sums = (plain_sum(getattr(fit, part) for fit in fits) for part in parts)
+        yield _ANY, (*sums, len(fits))
+
+
+def _carried(record: PoseRecord) -> Iterator[tuple[Way, tuple[float, ...]]]:
+    if (pose := record.pose) is not None:
+        ends, blocks = Counter(step.end for step in pose.steps), record.n_blocks
+        whole = (pose.reached, blocks, pose.iou, pose.completed, 1)
+        yield _ANY, (*(ends[name] for name in STEP_ENDS), len(pose.steps), *whole)
+
+
+def _errors(record: PoseRecord) -> Iterator[tuple[Way, tuple[float, ...]]]:
+    if (pose := record.pose) is not None:
+        errors = Counter(step.error for step in pose.steps)
+        yield _ANY, (*(errors[name] for name in POSE_ERRORS), len(pose.steps))
+
+
+def _plan(setting: Setting, record: PoseRecord) -> Iterator[tuple[Way, tuple[float, ...]]]:
+    """Count the plan without its poses under a setting, by the headline matcher."""
+    for score in [one for one in record.scores if one.setting == setting][:1]:
+        yield _ANY, (score.tp, score.fp, score.fn)
+
+
+_ANY: Way = ("", "", "")
+_ALIKE = tuple(f"tracks.pose_planning.{key}" for key in (CARRYING, ENGINE))
+RIGHT = SampleCounts(
+    "poses",
+    (*(f"{frame}_{cm:g}" for frame in POSE_FRAMES for cm in TOLERANCES_CM), "steps", "blocks"),
+    rows=_right,
+)
+CARRIED = (*STEP_ENDS, "steps", "reached", "blocks", "iou", "completed", "plans")
+FITS = SampleCounts("fits", ("position_cm", "turn_deg", "iou", "n"), rows=_fits)
+COUNTS = (
+    RIGHT,
+    FITS,
+    SampleCounts("carried", CARRIED, rows=_carried, alike=_ALIKE),
+    SampleCounts("pose_errors", (*POSE_ERRORS, "steps"), rows=_errors, alike=_ALIKE),
+    *(
+        SampleCounts(f"plan_{setting.lower()}", ("tp", "fp", "fn"), rows=partial(_plan, setting))
+        for setting in SETTINGS
+    ),
+)
 
 
 def _f1(frame: PoseFrame, sums: Floats) -> Floats:
@@ -52,8 +113,7 @@ def _film(record: PoseRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
         candidates = upright(task.candidates)[0] if pose.rotation == "free" else task.candidates
         steps = [PoseStep(one.block, one.center_cm, one.euler_deg) for one in given]
         blocks = [put(step, candidates) for step in steps]
-        stays = [step.end not in REFUSED_ENDS for step in pose.steps]
-        worlds = list(worlds_of(blocks, stays, [step.rests for step in pose.steps]))
+        worlds = list(worlds_of(blocks, pose.steps))
     first = tuple(block for block in blocks if block is not None)
     yield FilmStep(f"{record.model}, {record.scene}: the plan as given", "plain", None, first)
     for n, (one, step, world) in enumerate(zip(given, pose.steps, worlds, strict=True), 1):

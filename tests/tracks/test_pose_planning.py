@@ -39,7 +39,7 @@ from phyblock.tracks.pose_planning import (
     written,
 )
 from phyblock.tracks.pose_planning_results import REPORT
-from phyblock.types import REFUSED_ENDS, STEP_ENDS, StepEnd
+from phyblock.types import STEP_ENDS, StepEnd
 from tests.data.broken import write_scenes
 from tests.servers.chassis import Faults, Running, Seen
 from tests.servers.openai_chat import OpenAIChat
@@ -173,9 +173,7 @@ def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(
     record = judged(begun("s", track.name, "m", item, 0, None), item, found)
     assert isinstance(record, PoseRecord)
     assert record.pose is not None
-    kept = [step.rests or () for step in record.pose.steps]
-    stays = [step.end not in REFUSED_ENDS for step in record.pose.steps]
-    for world, again in zip(worlds, worlds_of(blocks, stays, kept), strict=True):
+    for world, again in zip(worlds, worlds_of(blocks, record.pose.steps), strict=True):
         assert [block.order for block in again] == [block.order for block in world]
         for one, other in zip(world, again, strict=True):
             start, end = Pose.goal(one), Pose.goal(other)
@@ -283,7 +281,7 @@ def test_a_run_with_faults_is_killed_resumed_and_scored_again(
     assert "Pose planning" in capsys.readouterr().out
 
     def by_sample(records: list[dict[str, Any]]) -> dict[str, Any]:
-        kept = ("parse", "scores", "pose", "counts")
+        kept = ("parse", "scores", "pose")
         return {one["sample"]: {name: one[name] for name in kept} for one in records}
 
     assert by_sample(workspace.records()) == by_sample(whole)
