@@ -26,7 +26,7 @@ SCENE_SET_VERSION = 2
 """Counts what makes other scenes or candidate sets out of the same seed: 2 offers distractors as
 often as goals need them, and shows at least 3 % of every block's outline.
 """
-QUESTION_SET_VERSION = 4
+QUESTION_SET_VERSION = 5
 """Raised whenever questions of a name ask something else, so that no results are mixed."""
 _QUANTITIES = ("blocks", "types", "colors", "layers")
 _Tasks = Sequence[tuple[Scene, CandidateSet]]

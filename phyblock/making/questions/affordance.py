@@ -8,7 +8,6 @@ places are found, or it meets a neighbor first.
 from __future__ import annotations
 
 import functools
-import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -20,13 +19,12 @@ from phyblock.domain.blocks import (
     SHAPES,
     BlockType,
     Euler,
-    euler_deg_to_quat_xyzw,
-    quat_xyzw_to_matrix,
+    euler_deg_to_matrix,
 )
 from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions import base
-from phyblock.making.questions.base import UnfairError
+from phyblock.making.questions import base, sight
+from phyblock.making.questions.base import Draft, Maker, UnfairError, View, draft, pick, shuffled
 from phyblock.making.questions.structures import (
     group_of,
     lowered,
@@ -38,8 +36,11 @@ from phyblock.making.questions.structures import (
 )
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim.balance import is_balanced, surely_stands
+from phyblock.sim.camera import view_axes
 from phyblock.sim.contact import bounds_m
 from phyblock.sim.dynamics import groups
+from phyblock.sim.geometry import drawn_mesh
+from phyblock.sim.pictures import drawn_m
 from phyblock.sim.question_pictures import (
     BLOCK_LABEL,
     Top,
@@ -55,176 +56,138 @@ Place = tuple[float, float, float]
 """A point of the world [m]."""
 RINGS_M = (0.00125, 0.0025, 0.005)
 """The verdict on a place holds all round it, this far off [m]."""
-_ANNEXED = 0.6
-_STRUCTURES_TRIED, _VIEWS_TRIED, _BLOCKS_TRIED, _FOURS_TRIED = 4, 3, 3, 4
-_STEP_PX, _APART_PX = 5, 18.0
-_FLAT_RISE = 0.99
-_OFF_CENTER_M = 0.001
-_ALL_SEEN = 0.12
-_PLACES_TRIED, _GIVEN_UP = 90, 24
-_MOST_STAYING, _MOST_FALLING, _MOST_HINDERED = 10, 10, 12
-_OFF_CENTER, _ROW = 0, 4
-"""Places of two of the measures of `_looks_of`."""
+_ANNEXED, _ALL_SEEN = 0.6, 0.12
+_STRUCTURES_TRIED, _BLOCKS_TRIED, _PROPOSED = 6, 3, 3
+_STEP_PX, _APART_PX, _FLAT_RISE = 5, 18.0, 0.99
+_OFF_CENTER_M, _MOST_OF_A_FACE = 0.001, 0.8
+_PLACES_TRIED, _GIVEN_UP, _SORT = 90, 24, 10
 _SAME_HEIGHT_M, _CLEARLY_HIGHER_M = 0.001, 0.01
 
 
-class AffordanceMaker(base.Maker):
+class AffordanceMaker(Maker):
     """Kind: `ad-place`."""
 
     subtask: Subtask = "AD"
-    scenes_tried = 160
 
-    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[base.Draft]:
-        """One draft: a block in a pose drawn, one place where it stays, and three where not."""
+    def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
+        """Propose a block in a pose drawn, one place where it stays, and three where not."""
         for _ in range(_STRUCTURES_TRIED):
-            plain = _pictured(scene, rng)
-            if plain is None:
+            blocks = (with_annex(scene, rng) if rng.random() < _ANNEXED else None) or scene.blocks
+            plain = QuestionPicture("scene", blocks, base.drawn_view(rng))
+            if not sight.are_seen(plain, sight.orders_of(blocks), _ALL_SEEN):
+                continue
+            if not all(map(surely_stands, groups(blocks))):
                 continue
             tops = visible_tops(plain, seen(plain), _STEP_PX, _FLAT_RISE)
             for _ in range(_BLOCKS_TRIED):
                 block = _drawn_block(plain, rng)
-                places = _alike_places(plain, block, base.shuffled(rng, tops), rng)
-                if places:
-                    alone = QuestionPicture(BLOCK_LABEL, (block,), plain.view_deg)
-                    marks = [Mark("A", top.position_m) for top in places]
-                    made = base.draft(
-                        *(scene, rng, "ad-place", marks, [plain, alone], {"size": _size(block)}),
-                        value=_sort_of(plain, places),
-                        block=block.type,
-                        euler=list(block.euler_deg),
-                    )
-                    yield replace(made, looks=tuple(_looks_of(plain, top) for top in places))
-                    return
+                staying, wrong = _by_statics(plain, block, shuffled(rng, tops))
+                both = [*staying, *wrong]
+                pixels = np.array([mark_pixel(plain, top.position_m) for top in both], dtype=float)
+                for _ in range(_PROPOSED if staying and wrong else 0):
+                    unlike = np.linalg.norm(pixels[:, None] - pixels, axis=2)
+                    measures = np.array([_looks_of(plain, top) for top in both])
+                    four = base.four_alike(measures, unlike, _APART_PX, rng, rights=len(staying))
+                    if four:
+                        alone = QuestionPicture(BLOCK_LABEL, (block,), plain.view_deg)
+                        marks = [Mark("A", both[i].position_m) for i in four]
+                        slots, looks = {"size": _size(block)}, measures[four].tolist()
+                        facts = {"block": block.type, "euler": list(block.euler_deg)}
+                        shown = [plain, alone]
+                        yield draft(
+                            scene, rng, "ad-place", marks, shown, slots, looks=looks, facts=facts
+                        )
 
     def rederive(self, question: Question) -> tuple[int, ...]:
-        """By statics and simulation of the block at every place, and by statics all round it."""
+        """Decide by statics and simulation of the block at every place, and statics all round."""
         slots = base.slots_of(question)
-        shown, alone = base.picture_of(question, "scene"), base.picture_of(question, BLOCK_LABEL)
+        shown, alone = sight.picture_of(question, "scene"), sight.picture_of(question, BLOCK_LABEL)
         if len(alone.blocks) != 1:
             raise UnfairError("the second picture is not of one block")
         block = alone.blocks[0]
-        if slots.get("size") != _size(block) or not base.shows_solid(block, alone.view_deg):
+        if slots.get("size") != _size(block) or not shows_solid(block, alone.view_deg):
             raise UnfairError("the block is not as large as told, or does not show its shape")
-        base.require_seen(shown, base.orders_of(shown.blocks), _ALL_SEEN)
-        shot, stays = seen(replace(shown, marks=())), []
+        sight.require_seen(shown, _ALL_SEEN)
+        plain, stays = replace(shown, marks=()), []
         for letter in LETTERS:
             places = [mark.position_m for mark in shown.marks if mark.letter == letter]
-            places = [at for at in places if seen_order(shown, shot, at) is not None]
+            places = [at for at in places if seen_order(plain, seen(plain), at) is not None]
             if not places:
                 raise UnfairError(f"no place {letter} is marked on a block")
-            found = stays_at(shown, block, places[0])
-            if found is None:
+            stays.append(stays_at(plain, block, places[0]))
+            if stays[-1] is None:
                 raise UnfairError(f"it is not sure whether the block stays at place {letter}")
-            stays.append(found)
         return base.only_index(stays)
 
 
-def _pictured(scene: Scene, rng: np.random.Generator) -> QuestionPicture | None:
-    """The scene, or a part of it with an annex, from where every block shows; None if unsure."""
-    blocks = (with_annex(scene, rng) if rng.random() < _ANNEXED else None) or scene.blocks
-    views = [base.drawn_view(rng) for _ in range(_VIEWS_TRIED)]
-    if not all(map(surely_stands, groups(blocks))):
-        return None
-    pictures = (QuestionPicture("scene", blocks, view) for view in views)
-    return next(
-        (one for one in pictures if base.are_seen(one, base.orders_of(blocks), _ALL_SEEN)), None
-    )
-
-
 def _drawn_block(plain: QuestionPicture, rng: np.random.Generator) -> Block:
-    """A block to put down, in a pose whose shape the picture's view shows."""
+    """Return a block to put down, in a pose whose shape the picture's view shows."""
     order = max(block.order for block in plain.blocks) + 1
     while True:
-        block_type, euler = base.pick(rng, _balanced_poses())
-        block = Block(order, block_type, base.pick(rng, COLORS), (0.0, 0.0, 0.0), euler, (), 1)
-        if base.shows_solid(block, plain.view_deg):
+        block_type, euler = pick(rng, _balanced_poses())
+        block = Block(order, block_type, pick(rng, COLORS), (0.0, 0.0, 0.0), euler, (), 1)
+        if shows_solid(block, plain.view_deg):
             return block
 
 
 @functools.cache
 def _balanced_poses() -> list[tuple[BlockType, Euler]]:
-    """Poses that stand, with the center of mass under the middle of what is seen from above."""
+    """Return poses that stand, with the center of mass under the middle seen from above."""
     poses = []
     for block_type in BLOCK_TYPES:
         for euler in POSES[block_type].values():
             block = lowered(Block(1, block_type, "red", (0.0, 0.0, 0.0), euler, (), 1), (), 0, 0)
-            rotation = quat_xyzw_to_matrix(euler_deg_to_quat_xyzw(euler))
-            center = block.position_m + rotation @ np.array(SHAPES[block_type].center_of_mass_m)
-            if np.abs(center[:2]).max() < _OFF_CENTER_M and surely_stands((block,)):
+            center = euler_deg_to_matrix(euler) @ np.array(SHAPES[block_type].center_of_mass_m)
+            is_central = np.abs(center[:2] + block.position_m[:2]).max() < _OFF_CENTER_M
+            if is_central and surely_stands((block,)):
                 poses.append((block_type, euler))
     return poses
 
 
+def shows_solid(block: Block, view: View) -> bool:
+    """True if a view shows its profile, and no one face is nearly all that shows of the block."""
+    along = view_axes(*view)[2]
+    corners = drawn_m(block)[drawn_mesh(block.type).triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    shown = np.maximum(-normals @ along, 0.0)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    _, faces = np.unique(np.round(normals / lengths, 2), axis=0, return_inverse=True)
+    largest = np.bincount(faces.ravel(), shown).max() / shown.sum()
+    return sight.shows_profile(block, view) and bool(largest <= _MOST_OF_A_FACE)
+
+
 def _size(block: Block) -> str:
-    """Length, width and height of a block as it is turned, to half a centimeter."""
+    """Return length, width and height of a block as it is turned, to half a centimeter."""
     *level, high = (round(float(side) * 200) / 2 for side in np.diff(bounds_m(block), axis=0)[0])
     return f"{max(level):g} cm by {min(level):g} cm, and {high:g} cm in height"
-
-
-def _alike_places(
-    plain: QuestionPicture, block: Block, tops: Sequence[Top], rng: np.random.Generator
-) -> list[Top]:
-    """The right place and three wrong ones, apart in the picture; none where there are too few."""
-    staying, wrong = _by_statics(plain, block, tops)
-    if not staying:
-        return []
-    together = [*staying, *wrong]
-    marks = [Mark("A", top.position_m) for top in together]
-    inside = np.array([is_inside(replace(plain, marks=(mark,))) for mark in marks])
-    apart = np.array([[is_apart(plain, a, [b], _APART_PX) for b in marks] for a in marks])
-    apart &= inside & inside[:, None]
-    measures = np.array([_looks_of(plain, top) for top in together])
-    pixels = np.array([mark_pixel(plain, mark.position_m) for mark in marks], dtype=np.float64)
-    unlike = np.linalg.norm(pixels[:, None] - pixels, axis=2)
-    is_sure: dict[int, bool] = {}
-    for _ in range(_FOURS_TRIED):
-        four = base.four_alike(measures, apart, rng, rights=len(staying), unlike=unlike).chosen
-        for place, i in enumerate(four):
-            if i not in is_sure:
-                is_sure[i] = stays_at(plain, block, together[i].position_m) is (place == 0)
-        unsure = [i for i in four if not is_sure[i]]
-        if four and not unsure:
-            return [together[i] for i in four]
-        apart[unsure] = apart[:, unsure] = False
-    return []
 
 
 def _by_statics(
     plain: QuestionPicture, block: Block, tops: Sequence[Top]
 ) -> tuple[list[Top], list[Top]]:
-    """Places, apart, where a block surely stays by statics on the face that is marked, and where
+    """Return places where a block surely stays by statics on the face that is marked, and where
     not: it falls off that face, or meets a neighbor first and falls.
-
-    What takes longer to find out is only asked where there may be enough of both.
     """
-    sorts: dict[tuple[bool, bool], list[tuple[Top, Block]]] = {
-        (on, stays): [] for on in (True, False) for stays in (True, False)
-    }
+    found: dict[bool, list[Top]] = {True: [], False: []}
     marks: list[Mark] = []
     for number, top in enumerate(tops[:_PLACES_TRIED]):
-        mark = Mark("A", top.position_m)
-        if number == _GIVEN_UP and not sorts[True, True]:
+        if number == _GIVEN_UP and not found[True]:
             break
+        mark = Mark("A", top.position_m)
         put = lowered(block, plain.blocks, *top.position_m[:2])
-        is_on = is_on_face(plain, put, top.position_m)
-        if is_on is not None and is_apart(plain, mark, marks, _APART_PX / 2):
+        blocks, is_on = (*plain.blocks, put), is_on_face(plain, put, top.position_m)
+        stays = is_balanced(group_of(blocks, put.order))
+        if is_on is None or (stays and not is_on) or len(found[stays]) == _SORT:
+            continue
+        if is_apart(plain, mark, marks, _APART_PX / 2) and is_inside(replace(plain, marks=(mark,))):
             marks.append(mark)
-            stays = is_balanced(group_of((*plain.blocks, put), put.order))
-            sorts[is_on, stays].append((top, put))
-
-    def sure(is_on: bool, stays: bool, most: int) -> list[Top]:
-        likely = ((top, (*plain.blocks, put)) for top, put in sorts[is_on, stays])
-        found = (top for top, all_of in likely if surely_stays(all_of, block.order) is stays)
-        return list(itertools.islice(found, most))
-
-    if not sorts[True, True]:
-        return [], []
-    wrong = [*sure(True, False, _MOST_FALLING), *sure(False, False, _MOST_HINDERED)]
-    return (sure(True, True, _MOST_STAYING) if len(wrong) >= base.WRONG else []), wrong
+            if surely_stays(blocks, put.order) is stays:
+                found[stays].append(top)
+    return found[True], found[False]
 
 
 def _looks_of(plain: QuestionPicture, top: Top) -> tuple[float, ...]:
-    """Measures of a place, in the world and in the picture, by which it might stand out."""
+    """Return measures of a place, in the world and the picture, by which it might stand out."""
     shot = seen(plain)
     row, column = mark_pixel(plain, top.position_m)
     under = shot.block == shot.block[row, column]
@@ -244,15 +207,7 @@ def _looks_of(plain: QuestionPicture, top: Top) -> tuple[float, ...]:
     )
 
 
-def _sort_of(plain: QuestionPicture, places: Sequence[Top]) -> str:
-    """By how many of the wrong places the right one, which is first, is outdone in three ways."""
-    looks = np.array([_looks_of(plain, top) for top in places])
-    pixels = np.array([mark_pixel(plain, top.position_m) for top in places], dtype=np.float64)
-    far = np.linalg.norm(pixels[:, None] - pixels, axis=2).sum(axis=1)
-    measured = (("central", looks[:, _OFF_CENTER]), ("up", looks[:, _ROW]), ("alone", far))
-    return ", ".join(f"{name} {int((one[1:] < one[0]).sum())}" for name, one in measured)
-
-
+@functools.lru_cache(maxsize=64)
 def stays_at(plain: QuestionPicture, block: Block, at: Place) -> bool | None:
     """True if the block stays at a place, by simulation too, and likewise up to 5 mm off.
 
@@ -271,13 +226,14 @@ def stays_at(plain: QuestionPicture, block: Block, at: Place) -> bool | None:
 
 
 def is_on_face(plain: QuestionPicture, put: Block, at: Place) -> bool | None:
-    """True if a block let down at a place came down on the marked face, as it would without the
-    other blocks; False if it met a neighbor clearly before; None where neither is so.
+    """True if a block let down at a place came down on the marked face, as without others.
+
+    False if it met a neighbor clearly before; None where neither is so.
     """
     is_as_high = _is_as_high(put, at)
     if not is_as_high:
         return is_as_high
-    under = seen_order(plain, seen(replace(plain, marks=())), at)
+    under = seen_order(plain, seen(plain), at)
     alone = [one for one in plain.blocks if one.order == under]
     return True if _is_as_high(lowered(put, alone, *at[:2]), at) else None
 

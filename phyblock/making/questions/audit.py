@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain.question import LETTERS, SUBTASKS, Question, QuestionPicture, Subtask
+from phyblock.making.questions.base import stem_of
 from phyblock.making.questions.selection import BALANCE
 from phyblock.sim.pictures import COLOR_RGB, Shot
 from phyblock.sim.question_pictures import changed_pixels, seen
@@ -147,7 +148,7 @@ def picture_probe(questions: Sequence[Question], folds: Folds) -> Probe | None:
     kinds: dict[object, list[Question]] = {}
     for question in questions:
         if len(features[question.id]):
-            kinds.setdefault(question.evidence.get("kind", ""), []).append(question)
+            kinds.setdefault(stem_of(question.wording), []).append(question)
     right = n = 0
     for members in kinds.values():
         for fold in range(FOLDS):

@@ -9,21 +9,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
 from phyblock.domain.blocks import COLORS, SHAPES, BlockType
 from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block
-from phyblock.making.questions.base import (
-    NAMED,
-    UnfairError,
-    outermost,
-    pick,
-    seen_blocks,
-    shows_profile,
-)
+from phyblock.making.questions.base import UnfairError, pick
+from phyblock.making.questions.sight import NAMED, outermost, seen_blocks, shows_profile
 from phyblock.sim.contact import bounds_m
 
 Feature = Literal["color", "type", "layer", "side", "support"]
@@ -46,35 +40,13 @@ _PATTERN = re.compile(
 )
 
 
-class _Words(NamedTuple):
-    noun: str
-    color: str | None = None
-    layer: str | None = None
-    side: str | None = None
-    support: str | None = None
-
-    @property
-    def text(self) -> str:
-        """Without an article."""
-        words = [word for word in (self.side, self.color, self.noun) if word]
-        words += [f"in layer {self.layer}"] if self.layer else []
-        words += [f"resting on the {self.support}"] if self.support else []
-        return " ".join(words)
-
-    def says_more_than(self, shorter: _Words) -> bool:
-        """True if these say what others do, and perhaps more."""
-        fits = set(_NOUNS[self.noun]) <= set(_NOUNS[shorter.noun])
-        pairs = zip(shorter[1:], self[1:], strict=True)
-        return fits and all(short is None or short == long for short, long in pairs)
-
-
 def shape_word(block_type: BlockType) -> str:
-    """The paper's word for a type; the three cuboids share one."""
+    """Return the paper's word for a type; the three cuboids share one."""
     return next(word for word, types in SHAPE_WORDS.items() if block_type in types)
 
 
 def resolve(text: str, picture: QuestionPicture, loosely: bool = False) -> tuple[int, ...]:
-    """Orders of the blocks that an expression fits, of those that stand in the picture.
+    """Return the orders of the blocks that an expression fits, of those that are in the picture.
 
     None when what it says is too close to call: two blocks about as far to the left, or two
     blocks of that color and type in one layer. `loosely` is how someone reads who takes cubes for
@@ -84,42 +56,42 @@ def resolve(text: str, picture: QuestionPicture, loosely: bool = False) -> tuple
     match = _PATTERN.fullmatch(text.removeprefix("the "))
     if match is None:
         raise UnfairError(f"{text!r} names no block")
-    words = _Words(**match.groupdict())
-    fitting = [block for block in picture.blocks if _fits(block, words, loosely, picture)]
-    if words.layer is not None:
+    side, color, noun, layer, support = match.group("side", "color", "noun", "layer", "support")
+    fitting = [
+        block
+        for block in picture.blocks
+        if color in (None, block.color) and _is_called(block, noun, loosely, picture)
+    ]
+    if layer is not None:
         layers = [block.layer for block in fitting]
         if len(set(layers)) < len(layers):
             return ()
-        fitting = [block for block in fitting if block.layer == int(words.layer)]
-    if words.support is not None:
-        below = resolve(words.support, picture, loosely)
+        fitting = [block for block in fitting if block.layer == int(layer)]
+    if support is not None:
+        below = resolve(support, picture, loosely)
         fitting = [b for b in fitting if len(below) == 1 and set(b.depend) == set(below)]
-    if words.side == "topmost":
-        top_m = {b.order: float(bounds_m(b)[1, 2]) for b in fitting}
-        ranked = sorted(fitting, key=lambda b: -top_m[b.order])
-        highest = [b for b in ranked if top_m[ranked[0].order] - top_m[b.order] < _TOP_GAP_M]
-        fitting = highest if len(highest) == 1 else []
-    elif words.side is not None and fitting:
-        orders = [block.order for block in fitting]
-        order = outermost(orders, picture, to_left=words.side == "leftmost")
-        fitting = [block for block in fitting if block.order == order]
+    if side == "topmost" and fitting:
+        tops_m = [float(bounds_m(block)[1, 2]) for block in fitting]
+        close = [b for b, m in zip(fitting, tops_m, strict=True) if max(tops_m) - m < _TOP_GAP_M]
+        fitting = close if len(close) == 1 else []
+    elif side is not None and fitting:
+        found = outermost(fitting, picture, to_left=side == "leftmost")
+        fitting = [found] if found else []
     return tuple(block.order for block in fitting)
 
 
-def _fits(block: Block, words: _Words, loosely: bool, picture: QuestionPicture) -> bool:
-    if words.color not in (None, block.color):
-        return False
-    types = set(_NOUNS[words.noun])
-    if loosely and words.noun != "block" and not shows_profile(block, picture.view_deg):
+def _is_called(block: Block, noun: str, loosely: bool, picture: QuestionPicture) -> bool:
+    types = set(_NOUNS[noun])
+    if not loosely or noun == "block":
+        return block.type in types
+    if not shows_profile(block, picture.view_deg):
         # Seen from this side, it may be taken for anything but what it is.
         return block.type not in types
-    if loosely:
-        types = types.union(*(SHAPES[one].mistaken_for for one in types))
-    return block.type in types
+    return block.type in types.union(*(SHAPES[one].mistaken_for for one in types))
 
 
 def resolve_one(text: str, picture: QuestionPicture) -> Block:
-    """The one block that an expression fits, even loosely; UnfairError otherwise."""
+    """Return the one block that an expression fits, even loosely; UnfairError otherwise."""
     orders = resolve(text, picture)
     if len(orders) != 1:
         raise UnfairError(f"{text!r} fits {len(orders)} blocks")
@@ -129,47 +101,58 @@ def resolve_one(text: str, picture: QuestionPicture) -> Block:
 
 
 def names(block: Block, picture: QuestionPicture, features: Sequence[Feature]) -> tuple[str, ...]:
-    """Expressions that fit this block alone and speak of these features only, shortest first."""
-    shortest: list[_Words] = []
+    """Return expressions that fit this block alone and speak of these features only, shortest
+    first; none that says more than another.
+    """
+    found: dict[str, Mapping[str, str]] = {}
     for words in _expressions(block, picture, features):
-        is_longer = any(words.says_more_than(shorter) for shorter in shortest)
-        readings = (resolve(words.text, picture, loosely) for loosely in (False, True))
+        text = _text_of(words)
+        is_longer = any(shorter.items() <= words.items() for shorter in found.values())
+        readings = (resolve(text, picture, loosely) for loosely in (False, True))
         if not is_longer and all(reading == (block.order,) for reading in readings):
-            shortest.append(words)
-    return tuple(words.text for words in shortest)
+            found[text] = words
+    return tuple(found)
+
+
+def _text_of(words: Mapping[str, str]) -> str:
+    simple = [words.get("side"), words.get("color"), words.get("noun", "block")]
+    layer = f"in layer {words['layer']}" if "layer" in words else ""
+    support = f"resting on the {words['support']}" if "support" in words else ""
+    return " ".join(filter(None, (*simple, layer, support)))
+
+
+def _expressions(
+    block: Block, picture: QuestionPicture, features: Sequence[Feature]
+) -> Iterator[dict[str, str]]:
+    """Yield all that is true of a block as words by feature, the simple before the long."""
+    true = {"color": block.color, "noun": shape_word(block.type)}
+    if "color" not in features:
+        del true["color"]
+    if "type" not in features:
+        del true["noun"]
+    simple: list[dict[str, str]] = [{}, *({name: word} for name, word in true.items())]
+    if len(true) > 1:
+        simple.append(true)
+    yield from simple
+    further = [{"side": side} for side in _SIDES] if "side" in features else []
+    further += [{"layer": str(block.layer)}] if "layer" in features else []
+    below = [other for other in picture.blocks if other.order in block.depend]
+    if "support" in features and len(below) == 1:
+        plain = [feature for feature in features if feature in ("color", "type")]
+        further += [{"support": name} for name in names(below[0], picture, plain)]
+    for words in simple:
+        yield from ({**words, **more} for more in further)
 
 
 def drawn_name(
     rng: np.random.Generator, block: Block, picture: QuestionPicture, features: Sequence[Feature]
 ) -> str | None:
-    """One of the shortest expressions that fit a block alone, or None when nothing does."""
+    """Return one of the shortest expressions that fit a block alone, or None."""
     expressions = names(block, picture, features)
     return pick(rng, expressions[:_NAMES_DRAWN_FROM]) if expressions else None
 
 
 def plain_names(picture: QuestionPicture) -> Mapping[int, str]:
-    """The shortest name by color and type of each block that shows enough, by order."""
+    """Return the shortest name by color and type of each block that shows enough, by order."""
     found = ((b.order, names(b, picture, ("color", "type"))) for b in seen_blocks(picture, NAMED))
     return {order: expressions[0] for order, expressions in found if expressions}
-
-
-def _expressions(
-    block: Block, picture: QuestionPicture, features: Sequence[Feature]
-) -> Iterator[_Words]:
-    """All that is true of a block, the simple before the long."""
-    colors = [block.color, None] if "color" in features else [None]
-    nouns = ["block", shape_word(block.type)] if "type" in features else ["block"]
-    simple = [_Words(noun, color) for noun in nouns for color in colors]
-    yield from sorted(simple, key=lambda one: len(one.text.split()))
-    for one in simple:
-        if "side" in features:
-            for side in _SIDES:
-                yield one._replace(side=side)
-        if "layer" in features:
-            yield one._replace(layer=str(block.layer))
-    below = [other for other in picture.blocks if other.order in block.depend]
-    if "support" in features and len(below) == 1:
-        plain = [f for f in features if f in ("color", "type")]
-        for name in names(below[0], picture, plain):
-            for one in simple:
-                yield one._replace(support=name)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import chain, islice
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -20,15 +20,12 @@ from phyblock.domain.question import (
 from phyblock.domain.scene import Block, Scene
 from phyblock.errors import DataError, PhyblockError, Problem
 from phyblock.making.questions.affordance import AffordanceMaker
-from phyblock.making.questions.base import Draft, Maker, pick, shuffled
-from phyblock.making.questions.dynamics import CounterfactualMaker, PredictiveMaker
-from phyblock.making.questions.properties import NumberMaker, PropertyMaker, SizeMaker, TallyMaker
-from phyblock.making.questions.relations import (
-    DependencyMaker,
-    DistanceMaker,
-    PositionMaker,
-    RotationMaker,
-)
+from phyblock.making.questions.base import Draft, Maker, StaticMaker, pick, shuffled
+from phyblock.making.questions.counterfactual import CounterfactualMaker
+from phyblock.making.questions.predictive import PredictiveMaker
+from phyblock.making.questions.properties import PropertyMaker, SizeMaker, TallyMaker
+from phyblock.making.questions.relations import DependencyMaker, DistanceMaker, PositionMaker
+from phyblock.making.questions.rotation import RotationMaker
 from phyblock.making.questions.selection import even_letters, select
 from phyblock.making.questions.views import OrderingMaker, ViewpointMaker
 from phyblock.making.workers import Workers
@@ -37,28 +34,17 @@ from phyblock.types import BACKGROUNDS, Background
 MAKERS: dict[Subtask, Maker] = {
     maker.subtask: maker
     for maker in (
-        PropertyMaker("SH"),
-        PropertyMaker("CO"),
-        SizeMaker(),
-        NumberMaker(),
-        PositionMaker(),
-        DistanceMaker(),
-        DependencyMaker(),
-        RotationMaker(),
-        TallyMaker("OC"),
-        TallyMaker("LC"),
-        TallyMaker("TC"),
-        ViewpointMaker(),
-        CounterfactualMaker(),
-        PredictiveMaker(),
-        OrderingMaker(),
-        AffordanceMaker(),
+        *(PropertyMaker("SH"), PropertyMaker("CO"), SizeMaker(), TallyMaker("NU")),
+        *(PositionMaker(), DistanceMaker(), DependencyMaker(), RotationMaker()),
+        *(TallyMaker("OC"), TallyMaker("LC"), TallyMaker("TC"), ViewpointMaker()),
+        *(CounterfactualMaker(), PredictiveMaker(), OrderingMaker(), AffordanceMaker()),
     )
 }
 """The makers of questions, by subtask; plugins add theirs."""
 PER_SUBTASK: Mapping[Subtask, int] = {s: 50 if s in ("OR", "AD") else 150 for s in SUBTASKS}
 """Questions of each subtask in the built-in set: 2,200 together, as in the paper."""
 _DIGITS = 6
+_PLACES = range(len(LETTERS))
 
 
 def make_questions(
@@ -78,10 +64,14 @@ def make_questions(
     questions: list[Question] = []
     short = []
     for subtask, count in wanted.items():
-        tasks = [(subtask, seed, scene) for scene in _tried(subtask, scenes, seed)]
-        drafts = track(workers.map(scene_drafts, tasks), len(tasks), f"Drafting {subtask}")
+        tasks = [(subtask, seed, scene) for scene in _by_levels(scenes, _rng(seed, subtask))]
+        pool: list[Draft] = []
+        for drafts in track(workers.map(scene_drafts, tasks), len(tasks), f"Drafting {subtask}"):
+            pool += drafts
+            if len(pool) >= MAKERS[subtask].spare * count:
+                break
         rng = _rng(seed, subtask, "choice")
-        taken = select(list(chain.from_iterable(drafts)), count, rng)
+        taken = select(pool, count, rng)
         if len(taken) < count:
             message = f"the scenes give no more than {len(taken)} of {count} questions"
             short.append(Problem(subtask, message, hint="ask for fewer, or give more scenes"))
@@ -95,37 +85,39 @@ def scene_drafts(task: tuple[Subtask, int, Scene]) -> list[Draft]:
     """Return the drafts of a subtask, by a seed, about a scene; they depend on nothing else."""
     subtask, seed, scene = task
     maker = MAKERS[subtask]
-    return list(islice(maker.drafts(scene, _rng(seed, subtask, scene.id)), maker.drafts_a_scene))
+    drafts = maker.drafts(scene, _rng(seed, subtask, scene.id))
+    if not isinstance(maker, StaticMaker):
+        drafts = (one for one in drafts if problem_of(_first(subtask, one)) is None)
+    return list(islice(drafts, maker.drafts_a_scene))
+
+
+def _first(subtask: Subtask, one: Draft) -> Question:
+    """Return a draft as the question whose first option is right, or which is in order."""
+    return as_question("", subtask, one, _PLACES, BACKGROUNDS[0])
 
 
 def _rng(seed: int, *parts: str) -> np.random.Generator:
     return np.random.default_rng(list("/".join((str(seed), *parts)).encode()))
 
 
-def _tried(subtask: Subtask, scenes: Sequence[Scene], seed: int) -> list[Scene]:
-    """The scenes that are asked: all, or as many of each level as there are to ask."""
+def _by_levels(scenes: Sequence[Scene], rng: np.random.Generator) -> list[Scene]:
+    """Return the scenes in an order drawn, one of each level in turn."""
     by_level: dict[int, list[Scene]] = {}
-    for scene in shuffled(_rng(seed, subtask, "scenes"), scenes):
+    for scene in shuffled(rng, scenes):
         by_level.setdefault(scene.level, []).append(scene)
-    in_turns = sorted(
-        ((i, level, scene) for level, group in by_level.items() for i, scene in enumerate(group)),
-        key=lambda entry: entry[:2],
-    )
-    return [scene for _, _, scene in in_turns[: MAKERS[subtask].scenes_tried]]
+    turns = [(i, level) for level, group in by_level.items() for i in range(len(group))]
+    return [by_level[level][i] for i, level in sorted(turns)]
 
 
 def _dealt(
     subtask: Subtask, taken: Sequence[Draft], rng: np.random.Generator
 ) -> Iterator[Question]:
-    """Questions in an order drawn, with letters that are drawn and about as often right."""
+    """Yield questions in an order drawn, with letters that are drawn and about as often right."""
     width = max(3, len(str(len(taken))))
     letters = even_letters(len(taken), rng)
     for number, (one, right) in enumerate(zip(shuffled(rng, taken), letters, strict=True), 1):
-        if subtask == "OR":
-            places = [int(i) for i in rng.permutation(len(LETTERS))]
-        else:
-            rest = [place for place in range(len(LETTERS)) if place != right]
-            places = [right, *shuffled(rng, rest)]
+        rest = shuffled(rng, [place for place in _PLACES if place != right])
+        places = shuffled(rng, _PLACES) if subtask == "OR" else [right, *rest]
         name = f"{subtask.lower()}-{number:0{width}d}"
         yield as_question(name, subtask, one, places, pick(rng, BACKGROUNDS))
 
@@ -165,7 +157,7 @@ def _rounded(vector: tuple[float, ...]) -> Any:
 
 
 def _tidy(picture: QuestionPicture) -> QuestionPicture:
-    """The picture with its numbers as the file holds them, and orders that rise."""
+    """Return the picture with its numbers as the file holds them, and orders that rise."""
 
     def tidy(block: Block) -> Block:
         place, angles = _rounded(block.position_m), _rounded(block.euler_deg)

@@ -10,33 +10,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from phyblock.domain.blocks import BLOCK_TYPES, COLORS, SHAPES
-from phyblock.domain.question import Question, QuestionPicture, Subtask
+from phyblock.domain.question import QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions import base
-from phyblock.making.questions.base import (
-    COUNTED,
-    NAMED,
-    STUDIED,
-    Draft,
-    Slots,
-    StaticMaker,
-    UnfairError,
-    View,
-    draft,
-    goal_picture,
-    index_of,
-    orders_of,
-    pick,
-    require_seen,
-    require_shapes_seen,
-    seen_blocks,
-    shuffled,
-)
+from phyblock.making.questions import base, sight
+from phyblock.making.questions.base import Asked, Slots, StaticMaker, UnfairError, View, pick
 from phyblock.making.questions.names import (
     SHAPE_WORDS,
     Feature,
@@ -49,9 +31,6 @@ from phyblock.sim.contact import GROUND, bounds_m, support_graph
 
 _LYING_M = 0.03
 """A half cylinder that lies on its flat face is lower than this."""
-_LEAST_RATIO = 1.3
-_EXACT = 0.01
-_TRIES = 6
 
 
 class PropertyMaker(StaticMaker):
@@ -60,57 +39,39 @@ class PropertyMaker(StaticMaker):
     def __init__(self, subtask: Literal["SH", "CO"]) -> None:
         self.subtask: Subtask = subtask
         self._is_shape = subtask == "SH"
-        self._least = STUDIED if self._is_shape else NAMED
-        self._allowed: Sequence[str] = list(SHAPE_WORDS) if self._is_shape else COLORS
         other: Feature = "color" if self._is_shape else "type"
         self._features: tuple[Feature, ...] = (other, "side", "layer", "support")
 
-    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-        """One a block that shows enough of itself and can be named."""
-        for one in shuffled(rng, seen_blocks(goal_picture(scene, view), self._least)):
-            if self._doubt(one, scene.blocks, view):
-                continue
-            shown = base.recolored(scene, rng)
-            picture = goal_picture(shown, view)
-            block = next(b for b in shown.blocks if b.order == one.order)
-            name = drawn_name(rng, block, picture, self._features)
-            if name is not None:
-                right = self._property(block)
-                options = [right, *shuffled(rng, [x for x in self._allowed if x != right])[:3]]
-                stem, slots = self.subtask.lower(), {"block": name}
-                yield draft(shown, rng, stem, options, [picture], slots, kind="", block=block.order)
+    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
+        """Ask about each block that can be named, in colors drawn anew."""
+        for order in base.shuffled(rng, sight.orders_of(scene.blocks)):
+            shown = sight.recolored(scene, rng)
+            picture = sight.goal_picture(shown, view)
+            block = next(b for b in shown.blocks if b.order == order)
+            if name := drawn_name(rng, block, picture, self._features):
+                yield Asked(self.subtask.lower(), shown, picture, {"block": name})
 
-    def answer(self, question: Question, picture: QuestionPicture, slots: Slots) -> tuple[int, ...]:
-        """The shape or color of the block that the text names."""
-        block = resolve_one(slots["block"], picture)
-        require_seen(picture, [block.order], self._least)
-        if doubt := self._doubt(block, picture.blocks, picture.view_deg):
-            raise UnfairError(doubt)
-        return index_of(question, self._property(block))
-
-    def _property(self, block: Block) -> str:
-        return shape_word(block.type) if self._is_shape else block.color
-
-    def _doubt(self, block: Block, blocks: Sequence[Block], view: View) -> str:
-        """The reason why a view does not tell a block's shape; empty where it does."""
+    def right(self, asked: Asked) -> str:
+        """Return the shape or color of the block that the text names."""
+        block = resolve_one(asked.slots["block"], asked.picture)
+        sight.require_seen(asked.picture, sight.STUDIED if self._is_shape else sight.NAMED, [block])
         if not self._is_shape:
-            return ""
-        if not base.shows_profile(block, view):
-            return "is seen from a side that does not tell its shape"
-        is_standing = block.type == "semi_cylinder" and _height_m(block) > _LYING_M
-        if is_standing and any(block.order in other.depend for other in blocks):
-            return "a half cylinder that stands and carries looks like a cylinder"
-        return ""
+            return block.color
+        if not sight.shows_profile(block, asked.picture.view_deg):
+            raise UnfairError("is seen from a side that does not tell its shape")
+        is_standing = block.type == "semi_cylinder" and sight.height_m(block) > _LYING_M
+        if is_standing and any(block.order in other.depend for other in asked.picture.blocks):
+            raise UnfairError("a half cylinder that stands and carries looks like a cylinder")
+        return shape_word(block.type)
 
-
-def _height_m(block: Block) -> float:
-    """From a block's lowest to its highest point [m]."""
-    low, high = bounds_m(block)[:, 2]
-    return float(high - low)
+    def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
+        """Return the right shape or color and three others."""
+        words: Sequence[str] = list(SHAPE_WORDS) if asked.stem == "sh" else COLORS
+        return [right, *base.shuffled(rng, [word for word in words if word != right])[:3]]
 
 
 def _length_m(block: Block) -> float:
-    """Length of the longest side of the box that a block fits in, however it lies [m]."""
+    """Return the longest side of the box that a block fits in, however it lies [m]."""
     shape = SHAPES[block.type]
     return max(high - low for low, high in zip(shape.low_m, shape.high_m, strict=True))
 
@@ -120,13 +81,15 @@ def _volume_m3(block: Block) -> float:
 
 
 _COMPARISONS: Mapping[str, tuple[str, Callable[[Block], float], int]] = {
-    "tallest": ("si-height", _height_m, 1),
-    "flattest": ("si-height", _height_m, -1),
+    "tallest": ("si-height", sight.height_m, 1),
+    "flattest": ("si-height", sight.height_m, -1),
     "longest": ("si-length", _length_m, 1),
     "largest": ("si-volume", _volume_m3, 1),
     "smallest": ("si-volume", _volume_m3, -1),
 }
 """Stems of wordings, measures, and whether most or least of them is asked for."""
+_LEAST_RATIO, _EXACT, _TRIES = 1.3, 0.01, 6
+_TIMES: Mapping[str, float] = base.WORDS["times_as_tall"]
 
 
 class SizeMaker(StaticMaker):
@@ -134,137 +97,60 @@ class SizeMaker(StaticMaker):
 
     subtask: Subtask = "SI"
 
-    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-        """Comparisons of four blocks, and of two, in turns."""
-        studied = seen_blocks(goal_picture(scene, view), STUDIED)
-        for _ in range(_TRIES):
-            for count, compare in ((4, _one_of_four), (2, _times_as_tall)):
-                if len(studied) >= count:
-                    chosen = shuffled(rng, studied)[:count]
-                    try:
-                        yield compare(view, scene, chosen, rng)
-                    except UnfairError:
-                        continue
+    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
+        """Compare four blocks, and two, in turns."""
+        studied = sight.seen_blocks(sight.goal_picture(scene, view), sight.STUDIED)
+        for number in range(2 * _TRIES):
+            chosen = base.shuffled(rng, studied)[: 2 if number % 2 else 4]
+            shown = sight.with_own_colors(scene, sight.orders_of(chosen), rng)
+            colors = {block.order: block.color for block in shown.blocks}
+            named = [f"{colors[block.order]} block" for block in chosen]
+            picture = sight.goal_picture(shown, view)
+            if len(chosen) == 4:
+                how, options = pick(rng, list(_COMPARISONS)), [f"the {name}" for name in named]
+                yield Asked(_COMPARISONS[how][0], shown, picture, {"comparison": how}, options, how)
+            elif len(chosen) == 2:
+                yield Asked("si-times", shown, picture, {"block": named[0], "other": named[1]})
 
-    def answer(self, question: Question, picture: QuestionPicture, slots: Slots) -> tuple[int, ...]:
-        """By the measures of the blocks that the text or the options name."""
-        compared = slots.get("comparison")
-        named = question.options if compared else (slots["block"], slots["other"])
-        blocks = [resolve_one(name, picture) for name in named]
-        require_seen(picture, orders_of(blocks), STUDIED)
-        if compared:
-            return (blocks.index(_extreme(blocks, compared)),)
-        return index_of(question, _times(*blocks))
+    def right(self, asked: Asked) -> str:
+        """Compare the blocks that the text or the options name."""
+        is_choice, pair = "comparison" in asked.slots, ("block", "other")
+        named = asked.options if is_choice else [asked.slots[name] for name in pair]
+        blocks = [resolve_one(name, asked.picture) for name in named]
+        sight.require_seen(asked.picture, sight.STUDIED, blocks)
+        if not is_choice:
+            ratio = sight.height_m(blocks[0]) / sight.height_m(blocks[1])
+            right = [word for word, known in _TIMES.items() if abs(ratio - known) < _EXACT]
+            if not right:
+                raise UnfairError(f"is {ratio:.2f} times as tall, which no option says")
+            return right[0]
+        if asked.slots["comparison"] not in _COMPARISONS:
+            raise UnfairError(f"{asked.slots['comparison']!r} is no comparison")
+        _, measure, sign = _COMPARISONS[asked.slots["comparison"]]
+        sizes = [measure(block) for block in blocks]
+        most, next_one = sorted(sizes, key=lambda size: -sign * size)[:2]
+        if max(most, next_one) < _LEAST_RATIO * min(most, next_one):
+            raise UnfairError(f"two of the blocks are about as {asked.slots['comparison']}")
+        return asked.options[sizes.index(most)]
 
-
-def _one_of_four(
-    view: View, scene: Scene, chosen: Sequence[Block], rng: np.random.Generator
-) -> Draft:
-    comparison = pick(rng, list(_COMPARISONS))
-    right = _extreme(chosen, comparison)
-    shown = base.with_own_colors(scene, orders_of(chosen), rng)
-    colors = {block.order: block.color for block in shown.blocks}
-    options = [f"the {colors[b.order]} block" for b in base.right_first(right, chosen)]
-    stem, measure, _ = _COMPARISONS[comparison]
-    sizes = {str(block.order): round(measure(block), 6) for block in chosen}
-    slots, pictures = {"comparison": comparison}, [goal_picture(shown, view)]
-    return draft(shown, rng, stem, options, pictures, slots, kind=comparison, measures=sizes)
-
-
-def _times_as_tall(
-    view: View, scene: Scene, pair: Sequence[Block], rng: np.random.Generator
-) -> Draft:
-    right = _times(*pair)
-    words = list(base.WORDS["times_as_tall"])
-    start = pick(rng, [i for i in (0, 1) if right in words[i : i + 4]])
-    shown = base.with_own_colors(scene, orders_of(pair), rng)
-    colors = {block.order: block.color for block in shown.blocks}
-    one, other = (f"{colors[block.order]} block" for block in pair)
-    options, slots = (
-        base.right_first(right, words[start : start + 4]),
-        {"block": one, "other": other},
-    )
-    heights = {str(block.order): round(_height_m(block), 6) for block in pair}
-    pictures = [goal_picture(shown, view)]
-    return draft(shown, rng, "si-times", options, pictures, slots, kind="times", measures=heights)
+    def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
+        """Return four neighbors of the five ratios."""
+        words = list(_TIMES) if asked.stem == "si-times" else []
+        start = pick(rng, [i for i in (0, 1) if right in words[i : i + 4]])
+        return words[start : start + 4]
 
 
-def _extreme(blocks: Sequence[Block], comparison: str) -> Block:
-    """The one that stands out by a clear margin; UnfairError when none does."""
-    if comparison not in _COMPARISONS:
-        raise UnfairError(f"{comparison!r} is no comparison")
-    _, measure, sign = _COMPARISONS[comparison]
-    ranked = sorted(blocks, key=lambda block: -sign * measure(block))
-    less, more = sorted(map(measure, ranked[:2]))
-    if more < _LEAST_RATIO * less:
-        raise UnfairError(f"two of the blocks are about as {comparison}")
-    return ranked[0]
-
-
-def _times(one: Block, other: Block) -> str:
-    """The words for how many times as tall one block is as another; UnfairError for others."""
-    ratio = _height_m(one) / _height_m(other)
-    for word, known in base.WORDS["times_as_tall"].items():
-        if abs(ratio - known) < _EXACT:
-            return str(word)
-    raise UnfairError(f"is {ratio:.2f} times as tall, which no option says")
-
-
-# NU, OC, LC, TC
+# Counts
 
 _TYPES_OF = {
     f"{word}es" if word == "arch" else f"{word}s": types for word, types in SHAPE_WORDS.items()
 }
 """The types that each plural names."""
-_MOST = 13
 _WEDGED_M = 0.005
 
 
-class NumberMaker(StaticMaker):
-    """NU: how many blocks there are of a color, a shape, or both."""
-
-    subtask: Subtask = "NU"
-    views_a_scene = 2
-
-    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-        """Of all that can be counted in a scene whose blocks all show enough."""
-        picture = goal_picture(scene, view)
-        if not base.are_seen(picture, orders_of(scene.blocks), COUNTED):
-            return
-        colors = [color for color in COLORS if any(b.color == color for b in scene.blocks)]
-        kinds = [(f"{color} blocks", "color") for color in colors]
-        try:
-            require_shapes_seen(picture)
-            kinds += [(word, "shape") for word in _TYPES_OF]
-            kinds += [(f"{color} {word}", "both") for color in colors for word in _TYPES_OF]
-        except UnfairError:
-            pass  # Colors can be counted where shapes cannot.
-        for what, kind in shuffled(rng, kinds):
-            counted = orders_of(_fitting(what, scene.blocks))
-            if options := base.window(rng, range(1, _MOST), len(counted)):
-                slots = {"what": what}
-                yield draft(scene, rng, "nu", options, [picture], slots, kind=kind, counted=counted)
-
-    def answer(self, question: Question, picture: QuestionPicture, slots: Slots) -> tuple[int, ...]:
-        """Count the blocks that fit the words."""
-        require_seen(picture, orders_of(picture.blocks), COUNTED)
-        if not slots["what"].endswith(" blocks"):
-            require_shapes_seen(picture)
-        return index_of(question, str(len(_fitting(slots["what"], picture.blocks))))
-
-
-def _fitting(what: str, blocks: Sequence[Block]) -> list[Block]:
-    """The blocks that `red blocks`, `cubes` or `red cubes` speaks of."""
-    first, _, rest = what.partition(" ")
-    color, noun = (first, rest) if first in COLORS else ("", what)
-    if noun not in (*_TYPES_OF, "blocks"):
-        raise UnfairError(f"{what!r} cannot be counted")
-    types = _TYPES_OF.get(noun, BLOCK_TYPES)
-    return [block for block in blocks if color in ("", block.color) and block.type in types]
-
-
 def layers_of(blocks: Sequence[Block]) -> Mapping[int, int]:
-    """The layer of each block, by order: one more than that of the highest block it rests on.
+    """Return the layer of each block, by order: one more than that of the highest block under it.
 
     UnfairError where that is not what the picture tells: a block that is wedged between two
     slopes rests on them, and yet it looks as if it were beside them.
@@ -300,26 +186,26 @@ def sure_blocks(picture: QuestionPicture) -> int:
     alone: without it, that block would float. UnfairError where more are hidden, or nothing tells
     of it.
     """
-    seen = base.shares(picture)
-    hidden = [order for order, share in seen.items() if share < COUNTED]
+    seen = sight.shares(picture)
+    hidden = [order for order, share in seen.items() if share < sight.COUNTED]
     if len(hidden) > 1:
         raise UnfairError("several blocks are hidden")
     below = support_graph(picture.blocks)
     for order in hidden:
-        if not any(seen[o] >= NAMED and below[o] == {order} for o in below):
+        if not any(seen[o] >= sight.NAMED and below[o] == {order} for o in below):
             raise UnfairError(f"nothing that can be seen rests on block {order} alone")
     return len(picture.blocks)
 
 
 def _all(picture: QuestionPicture) -> Sequence[Block]:
-    """The blocks, each of which shows enough to be counted; else UnfairError."""
-    require_seen(picture, orders_of(picture.blocks), COUNTED)
+    """Return the blocks, each of which shows enough to be counted; else UnfairError."""
+    sight.require_seen(picture, sight.COUNTED)
     return picture.blocks
 
 
 def _shaped(picture: QuestionPicture) -> Sequence[Block]:
-    """The blocks, each of which shows its shape; else UnfairError."""
-    require_shapes_seen(picture)
+    """Return the blocks, each of which shows its shape; else UnfairError."""
+    sight.require_shapes_seen(picture)
     return picture.blocks
 
 
@@ -328,19 +214,27 @@ def _on_ground(blocks: Sequence[Block]) -> list[Block]:
     return [block for block in blocks if GROUND in below[block.order]]
 
 
-def _of_colors(picture: QuestionPicture, *colors: str) -> int:
-    return sum(block.color in colors for block in _all(picture))
-
-
 def _types(blocks: Sequence[Block]) -> Counter[str]:
     return Counter(block.type for block in blocks)
 
 
+def _fitting(picture: QuestionPicture, slots: Slots) -> int:
+    """Count the blocks that `red blocks`, `cubes` or `red cubes` speaks of."""
+    first, _, rest = slots["what"].partition(" ")
+    color, noun = (first, rest) if first in COLORS else ("", slots["what"])
+    if noun not in (*_TYPES_OF, "blocks"):
+        raise UnfairError(f"{slots['what']!r} cannot be counted")
+    # Colors can be counted where shapes cannot.
+    blocks = _all(picture) if noun == "blocks" else _shaped(picture)
+    types = _TYPES_OF.get(noun, BLOCK_TYPES)
+    return sum(color in ("", block.color) and block.type in types for block in blocks)
+
+
 def _layer_of_block(picture: QuestionPicture, slots: Slots) -> int:
     block, layers = resolve_one(slots["block"], picture), layers_of(picture.blocks)
-    require_seen(picture, [block.order], NAMED)
-    under = [o for o in orders_of(picture.blocks) if layers[o] < layers[block.order]]
-    require_seen(picture, under, COUNTED)
+    sight.require_seen(picture, sight.NAMED, [block])
+    under = [one for one in picture.blocks if layers[one.order] < layers[block.order]]
+    sight.require_seen(picture, sight.COUNTED, under)
     return layers[block.order]
 
 
@@ -350,6 +244,12 @@ def _colors(picture: QuestionPicture) -> list[str]:
 
 def _layer_numbers(picture: QuestionPicture) -> list[Slots]:
     return [{"layer": str(n + 1)} for n in range(max(block.layer for block in picture.blocks))]
+
+
+def _sorts(picture: QuestionPicture) -> list[Slots]:
+    colors = _colors(picture)
+    words = [f"{color} {noun}" for color in colors for noun in ("blocks", *_TYPES_OF)]
+    return [{"what": word} for word in (*words, *_TYPES_OF)]
 
 
 @dataclass(frozen=True)
@@ -368,18 +268,19 @@ class Tally:
 
 
 TALLIES: Mapping[str, Tally] = {
+    "nu": Tally(_fitting, range(1, 13), _sorts),
     "oc-all": Tally(lambda p, _: len(_all(p)), range(2, 25)),
     "oc-hidden": Tally(lambda p, _: sure_blocks(p), range(2, 25)),
     "oc-ground": Tally(lambda p, _: len(_on_ground(_all(p))), range(1, 13)),
     "oc-raised": Tally(lambda p, _: len(_all(p)) - len(_on_ground(p.blocks)), range(1, 17)),
     "oc-other": Tally(
-        lambda p, s: len(p.blocks) - _of_colors(p, s["color"]),
+        lambda p, s: sum(block.color != s["color"] for block in _all(p)),
         range(1, 19),
         lambda p: [{"color": color} for color in _colors(p)],
         is_recolored=True,
     ),
     "oc-pair": Tally(
-        lambda p, s: _of_colors(p, s["color"], s["other"]),
+        lambda p, s: sum(block.color in (s["color"], s["other"]) for block in _all(p)),
         range(1, 15),
         lambda p: [{"color": a, "other": b} for a in _colors(p) for b in _colors(p) if a != b],
         is_recolored=True,
@@ -412,47 +313,41 @@ TALLIES: Mapping[str, Tally] = {
     ),
 }
 """By stem of the wordings."""
+_SLOTS_TRIED = {"nu": 12}
+"""Texts of a stem that are tried for a picture; one of the others."""
 
 
 class TallyMaker(StaticMaker):
-    """OC, LC or TC: the ways of counting whose stems begin with the subtask."""
+    """NU, OC, LC or TC: the ways of counting whose stems begin with the subtask."""
 
     views_a_scene = 2
-    drafts_a_view = 6
 
     def __init__(self, subtask: Subtask) -> None:
         self.subtask = subtask
-        self._stems = tuple(stem for stem in TALLIES if stem.startswith(f"{subtask.lower()}-"))
+        self._stems = [s for s in TALLIES if s.partition("-")[0] == subtask.lower()]
 
-    def seen_from(self, view: View, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-        """One way of counting after another, as far as the picture allows it."""
-        colored = base.recolored(scene, rng)
-        for stem in shuffled(rng, self._stems):
-            tally = TALLIES[stem]
-            shown = colored if tally.is_recolored else scene
-            picture = goal_picture(shown, view)
-            possible = tally.slots(picture)
-            if not possible:
-                continue
-            slots = pick(rng, possible)
-            try:
-                right = tally.count(picture, slots)
-            except UnfairError:
-                continue
-            options = base.window(rng, tally.values, right)
-            if not options:
-                continue
-            kind = stem
-            facts: dict[str, Any] = {"count": right}
+    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
+        """Ask for one count after another."""
+        colored = sight.recolored(scene, rng)
+        for stem in base.shuffled(rng, self._stems):
+            shown = colored if TALLIES[stem].is_recolored else scene
+            picture, kind = sight.goal_picture(shown, view), ""
             if stem == "oc-hidden":
-                in_sight = orders_of(seen_blocks(picture, COUNTED))
-                hidden = sorted(set(orders_of(shown.blocks)) - set(in_sight))
-                kind, facts["inferred"] = f"{stem}-{len(hidden)}", hidden
-            yield draft(shown, rng, stem, options, [picture], slots, kind=kind, **facts)
+                kind = f"{stem}-{sum(x < sight.COUNTED for x in sight.shares(picture).values())}"
+            texts = base.shuffled(rng, TALLIES[stem].slots(picture))
+            for slots in texts[: _SLOTS_TRIED.get(stem, 1)]:
+                if stem == "nu":
+                    first, _, rest = slots["what"].partition(" ")
+                    kind = "both" if first in COLORS else "shape"
+                    kind = "color" if rest == "blocks" else kind
+                yield Asked(stem, shown, picture, slots, kind=kind)
 
-    def answer(self, question: Question, picture: QuestionPicture, slots: Slots) -> tuple[int, ...]:
+    def right(self, asked: Asked) -> str:
         """Count again."""
-        stem = base.stem_of(question.wording)
-        if stem not in self._stems:
-            raise UnfairError(f"the wording {question.wording!r} counts nothing")
-        return index_of(question, str(TALLIES[stem].count(picture, slots)))
+        if asked.stem not in self._stems:
+            raise UnfairError(f"the wording {asked.stem!r} counts nothing")
+        return str(TALLIES[asked.stem].count(asked.picture, asked.slots))
+
+    def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
+        """Return four numbers that follow one another."""
+        return base.window(rng, TALLIES[asked.stem].values, int(right))

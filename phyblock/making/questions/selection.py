@@ -1,10 +1,10 @@
 """Choosing among drafts: answers are drawn, what a reader sees beside them is evened out.
 
-Drafts of each sort are taken in turns from all scenes, so that none counts for more than another.
+Drafts of each kind are taken in turns from all scenes, so that none counts for more than another.
 Of these, chance leaves out some until the texts of those kept tell nothing of what is right
 (`keeping_odds`). Of those the greedy choice takes, out of a hundred or so at a time, the one that
 evens out best what was taken so far. Where options are texts it goes by what the text itself says
-alone, sort, wording and set of options: to choose by the scene as well would choose answers, for
+alone, kind, wording and set of options: to choose by the scene as well would choose answers, for
 large scenes have larger numbers, and to even out answers would make what is right often in some
 questions rare in the others.
 """
@@ -14,26 +14,28 @@ from __future__ import annotations
 import math
 from collections import Counter, defaultdict
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from phyblock.domain.question import LETTERS
-from phyblock.making.questions.base import Draft
+from phyblock.making.questions.base import Draft, Floats
 from phyblock.tracks.baselines import text_features
 
 _LOOKED_AT = 100
 _SPREAD = 20
-"""So many times the drafts that are wanted of a sort are looked at, where the pool has them,"""
+"""So many times the drafts that are wanted of a kind are looked at, where the pool has them,"""
 _SPARE = 2
 """and so many times the drafts that are wanted are kept at the least."""
-_WEIGHTS = {"kind": 6.0, "wording": 2.0, "options": 0.2, "value": 4.0, "scene": 3.0, "level": 0.3}
+BALANCE = (0.22, 0.28)
+"""Shares of right answers that every letter is to stay within."""
 
 
 def select(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[Draft]:
-    """At most `count` drafts of the pool, no two the same question about the same scene."""
-    left = _kept(_spread(pool, count, rng), count, rng)
+    """Return at most `count` drafts, no two the same question about the same scene."""
+    left = _spread(pool, count, rng)
+    rank = rng.random(len(left)) / np.maximum(keeping_odds(left), 1e-9)
+    most = max(1.0, *np.sort(rank)[: _SPARE * count][-1:])
+    left = [one for one, place in zip(left, rank, strict=True) if place <= most]
     members: dict[Hashable, set[Hashable]] = defaultdict(set)
     for one in left:
         for group, member, _ in _even(one):
@@ -41,7 +43,7 @@ def select(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[
     counts: Counter[tuple[Hashable, Hashable]] = Counter()
 
     def cost(one: Draft) -> float:
-        """The unevenness that a further draft adds to those taken; the lower the better."""
+        """Return the unevenness that a further draft adds to those taken; the lower the better."""
         cost = 0.0
         for group, member, weight in _even(one):
             others = [counts[group, other] for other in members[group]]
@@ -52,10 +54,7 @@ def select(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[
     while left and len(taken) < count:
         size = min(_LOOKED_AT, len(left))
         drawn = rng.choice(len(left), size=size, replace=False).tolist()
-        best = min(drawn, key=lambda i: cost(left[i]))
-        chosen = left[best]
-        left[best] = left[-1]
-        left.pop()
+        chosen = left.pop(min(drawn, key=lambda i: cost(left[i])))
         if _identity(chosen) not in taken:
             taken[_identity(chosen)] = chosen
             counts.update((group, member) for group, member, _ in _even(chosen))
@@ -63,138 +62,113 @@ def select(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[
 
 
 def _spread(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[Draft]:
-    """Drafts of each sort, one of each scene in turns, several times as many as are wanted."""
-    turns: dict[str, list[tuple[int, int, Draft]]] = defaultdict(list)
+    """Return drafts of each kind, one of each scene in turns, several times those wanted."""
+    turns: dict[str, list[tuple[int, int]]] = defaultdict(list)
     of_scene: Counter[tuple[str, str]] = Counter()
-    for place, i in enumerate(rng.permutation(len(pool)).tolist()):
-        draft = pool[i]
-        turns[draft.kind].append((of_scene[draft.kind, draft.scene.id], place, draft))
-        of_scene[draft.kind, draft.scene.id] += 1
+    for i in rng.permutation(len(pool)).tolist():
+        about = (pool[i].kind, pool[i].scene.id)
+        of_scene[about] += 1
+        turns[pool[i].kind].append((of_scene[about], i))
     most = -(-_SPREAD * count // max(len(turns), 1))
-    ranked = (sorted(group, key=lambda entry: entry[:2])[:most] for group in turns.values())
-    return [one for group in ranked for _, _, one in group]
-
-
-def _kept(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[Draft]:
-    """The drafts that chance leaves; more likely ones as well where they would be too few."""
-    odds = np.array(keeping_odds(pool))
-    rank = rng.random(len(pool)) / np.maximum(odds, 1e-9)
-    least = float(np.sort(rank)[: _SPARE * count][-1]) if len(pool) else 0.0
-    return [one for one, place in zip(pool, rank, strict=True) if place <= max(1.0, least)]
+    ranked = (sorted(group, key=lambda entry: entry[0])[:most] for group in turns.values())
+    return [pool[i] for group in ranked for _, i in group]
 
 
 def _even(draft: Draft) -> Iterator[tuple[Hashable, Hashable, float]]:
-    """Groups, the draft's member of each, and weights: members should be equally frequent."""
-    yield "kind", draft.kind, _WEIGHTS["kind"]
-    yield ("wording", draft.kind), draft.wording, _WEIGHTS["wording"]
+    """Yield groups, the draft's member of each, and weights: members should be as frequent."""
+    yield "kind", draft.kind, 6.0
+    yield ("wording", draft.kind), draft.wording, 2.0
     if texts := _texts(draft):
-        yield ("options", draft.kind), frozenset(texts), _WEIGHTS["options"]
-        return
-    for place, part in enumerate(draft.value.split(", ")):
-        yield ("value", draft.kind, place), part, _WEIGHTS["value"]
-    yield "scene", draft.scene.id, _WEIGHTS["scene"]
-    yield "level", draft.scene.level, _WEIGHTS["level"]
+        yield ("options", draft.kind), frozenset(texts), 0.2
+    else:
+        yield "scene", draft.scene.id, 3.0
+        yield "level", draft.scene.level, 0.3
 
 
 def _texts(draft: Draft) -> tuple[str, ...]:
-    """The options as texts; of pictures and places, whose texts tell nothing, none."""
+    """Return the options as texts; of pictures and places, whose texts tell nothing, none."""
     return tuple(option for option in draft.options if isinstance(option, str))
 
 
 def _identity(draft: Draft) -> Hashable:
-    """Scene, colors, what is asked about and pictures, but not the words around them."""
+    """Return scene, colors, what is asked about and pictures, but not the words around them."""
     colors = tuple(block.color for block in draft.scene.blocks)
-    slots = sorted((name, str(slot)) for name, slot in draft.evidence.get("slots", {}).items())
+    slots = tuple(sorted(draft.evidence["slots"].items()))
     options = frozenset(option for option in draft.options if not isinstance(option, str))
-    return (draft.scene.id, colors, draft.kind, tuple(slots), draft.pictures, options)
-
-
-BALANCE = (0.22, 0.28)
-"""Shares of right answers that every letter is to stay within."""
+    return (draft.scene.id, colors, draft.kind, slots, draft.pictures, options)
 
 
 def even_letters(count: int, rng: np.random.Generator) -> list[int]:
-    """Indices of the letters that are right in so many questions, each share within `BALANCE`.
+    """Return indices of the letters that are right, each share within `BALANCE`.
 
     Of few questions the share that is nearest to it. Exactly equal shares would give the letters
     of some questions away by those of the others.
     """
     # Rounded, as 0.28 of 150 is a little more than 42 in floating point.
     low, high = (round(share * count, 6) for share in BALANCE)
-    low, high = math.floor(low), math.ceil(high)
     while True:
         drawn = rng.integers(len(LETTERS), size=count)
         shares = np.bincount(drawn, minlength=len(LETTERS))
-        if low <= shares.min() and shares.max() <= high:
+        if math.floor(low) <= shares.min() and shares.max() <= math.ceil(high):
             return [int(letter) for letter in drawn]
 
 
 _STEPS, _RATE, _PENALTY = 60, 0.3, 2.0
 _FITTED = 2000
 """So many drafts are learned from at most, spread over the pool."""
-Floats = NDArray[np.float64]
 
 
-class _Table(NamedTuple):
-    """Features of options as a sparse matrix: entry `values[i]` at `rows[i]`, `columns[i]`.
+def keeping_odds(drafts: Sequence[Draft]) -> Floats:
+    """Return the probability with which each draft is kept; 1 where there is nothing to guess by.
 
-    `starts` are the rows at which the options of each draft begin, the right one first.
+    A reader without pictures learns from half of the base scenes, and guesses at the other half: a
+    logistic regression of greatest penalized likelihood, by steps of AdaGrad (Duchi et al. 2011).
     """
+    # SciPy takes a while to import, which commands that choose nothing do without.
+    from scipy import sparse  # type: ignore[import-untyped]
 
-    rows: NDArray[np.int64]
-    columns: NDArray[np.int64]
-    values: Floats
-    starts: NDArray[np.int64]
-
-    def chances(self, weights: Floats) -> Floats:
-        """Probability of each option, one after the other."""
-        size = int(self.rows[-1]) + 1
-        scores = np.bincount(self.rows, self.values * weights[self.columns], size)
-        per_draft = np.diff(np.append(self.starts, size))
-        raised = np.exp(scores - np.repeat(np.maximum.reduceat(scores, self.starts), per_draft))
-        chances: Floats = raised / np.repeat(np.add.reduceat(raised, self.starts), per_draft)
-        return chances
-
-
-def keeping_odds(drafts: Sequence[Draft]) -> list[float]:
-    """The probability with which each draft is kept; 1 where there is nothing to guess by.
-
-    A reader without pictures learns from half of the base scenes, and guesses at the other half.
-    """
-    group_of = [(one.scene.parents or (one.scene.id,))[0] for one in drafts]
+    odds = np.ones(len(drafts))
     telling = [i for i, one in enumerate(drafts) if _texts(one) or one.looks]
-    half_of = {g: n % 2 for n, g in enumerate(sorted({group_of[i] for i in telling}))}
-    halves = [[i for i in telling if half_of[group_of[i]] == half] for half in (0, 1)]
-    odds = [1.0] * len(drafts)
+    base_of = {i: (drafts[i].scene.parents or (drafts[i].scene.id,))[0] for i in telling}
+    half_of = {base: n % 2 for n, base in enumerate(sorted(set(base_of.values())))}
+    halves = [[i for i in telling if half_of[base_of[i]] == half] for half in (0, 1)]
+
+    def table(chosen: Sequence[int], names: dict[str, int], grows: bool) -> sparse.csr_matrix:
+        """Return the features of all options, four rows a draft; new names are added or dropped."""
+        values, columns, starts = list[float](), list[int](), [0]
+        for features in (row for i in chosen for row in _features(drafts[i])):
+            known = {name: x for name, x in features.items() if grows or name in names}
+            values += known.values()
+            columns += (names.setdefault(name, len(names)) for name in known)
+            starts.append(len(values))
+        return sparse.csr_matrix((values, columns, starts), (len(starts) - 1, len(names)))
+
     for mine, known in (halves, halves[::-1]) if all(halves) else ():
         names: dict[str, int] = {}
-        learned = _table([drafts[i] for i in known[:: -(-len(known) // _FITTED)]], names, True)
-        weights = _fit(learned, len(names))
-        asked = _table([drafts[i] for i in mine], names, False)
-        of_each = np.split(asked.chances(weights), asked.starts[1:])
-        for i, chances in zip(mine, of_each, strict=True):
-            odds[i] = float(chances.min() / chances[0])
+        learned = table(known[:: -(-len(known) // _FITTED)], names, True)
+        weights, squares = np.zeros(len(names)), np.full(len(names), 1e-9)
+        is_right = np.zeros((learned.shape[0] // len(LETTERS), len(LETTERS)))
+        is_right[:, 0] = 1.0
+        for _ in range(_STEPS):
+            missed = (is_right - _chances(learned @ weights)).ravel()
+            slope = learned.T @ missed - _PENALTY * weights
+            squares += slope**2
+            weights += _RATE * slope / np.sqrt(squares)
+        chances = _chances(table(mine, names, False) @ weights)
+        odds[mine] = chances.min(axis=1) / chances[:, 0]
     return odds
 
 
-def _table(drafts: Sequence[Draft], names: dict[str, int], grows: bool) -> _Table:
-    """The features of all options; unknown ones are added to `names`, or dropped."""
-    rows, columns, values, starts = [], [], [], []
-    row = 0
-    for one in drafts:
-        starts.append(row)
-        for features in _features(one):
-            for name, value in features.items():
-                if grows or name in names:
-                    rows.append(row)
-                    columns.append(names.setdefault(name, len(names)))
-                    values.append(value)
-            row += 1
-    return _Table(np.array(rows), np.array(columns), np.array(values), np.array(starts))
+def _chances(scores: Floats) -> Floats:
+    """Return the probability of each of four options, shape (drafts, 4)."""
+    by_draft = scores.reshape(-1, len(LETTERS))
+    raised = np.exp(by_draft - by_draft.max(axis=1, keepdims=True))
+    chances: Floats = raised / raised.sum(axis=1, keepdims=True)
+    return chances
 
 
 def _features(one: Draft) -> Iterator[Mapping[str, float]]:
-    """Of each option, as they are and for its kind, with the others it stands beside."""
+    """Yield what a reader sees of each option, as it is and for its kind, beside the others."""
     if one.looks:
         # How far each measure is from the mean of the options, in standard deviations.
         values = np.array(one.looks)
@@ -209,17 +183,3 @@ def _features(one: Draft) -> Iterator[Mapping[str, float]]:
     for option, features in zip(options, text_features(one.text, options), strict=True):
         own = {f"{one.kind}: {name}": value for name, value in features.items()}
         yield {"": 1.0, **features, **own, f"{one.kind}: {option} of {together}": 1.0}
-
-
-def _fit(table: _Table, size: int) -> Floats:
-    """Weights of greatest penalized likelihood, by steps of AdaGrad (Duchi et al. 2011)."""
-    is_right = np.zeros(int(table.rows[-1]) + 1)
-    is_right[table.starts] = 1.0
-    weights, squares = np.zeros(size), np.full(size, 1e-9)
-    for _ in range(_STEPS):
-        missed = is_right - table.chances(weights)
-        gain = np.bincount(table.columns, table.values * missed[table.rows], size)
-        slope = gain - _PENALTY * weights
-        squares += slope**2
-        weights += _RATE * slope / np.sqrt(squares)
-    return weights

@@ -9,15 +9,14 @@ at random, it is a balance, a cantilever with a counterweight, or a bridge with 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from phyblock.domain.blocks import COLORS, SHAPES, BlockType, Euler
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.base import pick, shuffled
+from phyblock.making.questions.base import pick
 from phyblock.sim.balance import MARGIN_M, is_balanced, surely_falls, surely_stands
 from phyblock.sim.contact import bounds_m, drop_height_m, find_gaps, find_overlaps
 from phyblock.sim.dynamics import groups
@@ -26,178 +25,107 @@ from phyblock.sim.outcomes import holds
 from phyblock.stable import plain_sum
 
 _UNIT_M = 0.0125
-_PLANK_M = 0.025
-_CUBE_M = 0.05
-_TRIED = 16
-_PLANS_TRIED = 80
-_MOST_LEFT_OUT = 5
-_FLAT_M = 0.0005
-_LEAST_TOP_M = 0.045
-_HIGHEST_M = 0.2
+_TRIED, _PLANS_TRIED, _MOST_LEFT_OUT, _MOST_WEIGHTS = 16, 60, 5, 3
+_FLAT_M, _LEAST_TOP_M, _HIGHEST_M = 0.0005, 0.045, 0.2
 _PROPPED = 0.4
-_PLANKS: tuple[tuple[BlockType, float], ...] = (
-    ("cuboid3", 0.15),
-    ("cuboid3", 0.15),
-    ("cuboid2", 0.1),
+_PLANKS: tuple[BlockType, ...] = ("cuboid3", "cuboid3", "cuboid2")
+_FLAT: Euler = (0.0, 0.0, 0.0)
+_WEIGHTS: tuple[tuple[BlockType, Euler], ...] = (
+    *(("cube", _FLAT), ("cube", _FLAT), ("cuboid1", _FLAT), ("cylinder", _FLAT)),
+    *(("cuboid2", (0.0, 90.0, 0.0)), ("cuboid2", (0.0, 0.0, 90.0))),
 )
-"""Types of planks and their lengths [m]."""
-
-
-class _Weight(NamedTuple):
-    """A block put on a plank: across it, half its width along the plank, half its height [m]."""
-
-    type: BlockType
-    euler_deg: Euler
-    half_width_m: float
-    half_height_m: float
-
-
-_CUBE = _Weight("cube", (0.0, 0.0, 0.0), 0.025, 0.025)
-_WEIGHTS = (
-    _CUBE,
-    _CUBE,
-    _Weight("cuboid1", (0.0, 0.0, 0.0), 0.025, 0.0125),
-    _Weight("cuboid2", (0.0, 90.0, 0.0), 0.0125, 0.05),
-    _Weight("cuboid2", (0.0, 0.0, 90.0), 0.025, 0.0125),
-    _Weight("cylinder", (0.0, 0.0, 0.0), 0.025, 0.05),
-)
-_COLUMN: tuple[tuple[BlockType, float], ...] = (
-    ("cube", 0.05),
-    ("cuboid1", 0.025),
-    ("cylinder", 0.1),
-)
-"""Pieces of columns, and heights [m]."""
+_PIECES: tuple[BlockType, ...] = ("cylinder", "cube", "cuboid1")
+_LIFT_M, _DIRECTIONS = 0.6, 8
 
 
 def with_annex(scene: Scene, rng: np.random.Generator) -> tuple[Block, ...] | None:
-    """A structure nearly done, and a few blocks more on one of its tops; None where none fits.
+    """Return a structure nearly done, and a few blocks more on one of its tops, or None.
 
-    Nothing overlaps or hangs free. Blocks that are not of the scene have orders above its own.
+    Nothing overlaps or hangs free, and all is in balance. Blocks that are not of the scene have
+    orders above its own.
     """
     for _ in range(_TRIED):
         order = scene.graph.random_order(rng)
         kept = len(order) - int(rng.integers(min(_MOST_LEFT_OUT, len(order) - 1) + 1))
         base = tuple(scene.blocks[vertex] for vertex in sorted(order[:kept]))
-        tops = _free_tops(base)
-        added = _drawn(scene, pick(rng, tops), rng) if tops else []
-        blocks = (*base, *added)
-        if added and not find_overlaps(blocks) and not find_gaps(blocks):
+        carrying = {order for block in base for order in block.depend}
+        tops = [block for block in base if block.order not in carrying and _is_flat(block)]
+        if not tops:
+            continue
+        first = max(block.order for block in scene.blocks) + 1
+        added = _annex(pick(rng, tops), rng)
+        blocks = (*base, *(replace(block, order=first + i) for i, block in enumerate(added)))
+        is_sound = added and not find_overlaps(blocks) and not find_gaps(blocks)
+        if is_sound and is_balanced(blocks):
             return blocks
     return None
 
 
-def _free_tops(blocks: Sequence[Block]) -> list[Block]:
-    """Blocks with a flat top, square to the axes, that carries nothing."""
-    carrying = {order for block in blocks for order in block.depend}
-
-    def has_top(block: Block) -> bool:
-        corners = corners_m(block.type, block.position_m, block.euler_deg)
-        top = corners[corners[:, 2] > corners[:, 2].max() - _FLAT_M, :2]
-        is_square = all(abs(angle % 90.0) < 1e-6 for angle in block.euler_deg)
-        return is_square and bool(np.ptp(top, axis=0).min() >= _LEAST_TOP_M)
-
-    return [block for block in blocks if block.order not in carrying and has_top(block)]
+def _is_flat(block: Block) -> bool:
+    """True if a block has a flat top, square to the axes and not too high."""
+    corners = corners_m(block.type, block.position_m, block.euler_deg)
+    highest = float(corners[:, 2].max())
+    top = corners[corners[:, 2] > highest - _FLAT_M, :2]
+    is_square = all(abs(angle % 90.0) < 1e-6 for angle in block.euler_deg)
+    is_wide = bool(np.ptp(top, axis=0).min() >= _LEAST_TOP_M)
+    return is_square and is_wide and highest <= _HIGHEST_M
 
 
-class _Plan(NamedTuple):
-    """A plank, how far its middle is off that of the top along it [m], and what stands on it."""
+def _annex(top: Block, rng: np.random.Generator) -> list[Block]:
+    """Return a plank along x or y on a top, and weights on it of which one at least is needed.
 
-    type: BlockType
-    length_m: float
-    off_m: float
-    weights: list[tuple[float, _Weight]]
-    is_propped: bool
-
-
-def _drawn(scene: Scene, top: Block, rng: np.random.Generator) -> list[Block]:
-    """A plank along x or y on a top, with weights or a column; none on one that is too high."""
+    Or with a column under one end, where the weights may be any.
+    """
+    along = int(rng.integers(2))
     low, high = bounds_m(top)
-    height_m, along = float(high[2]), int(rng.integers(2))
-    plan = _planned(float(high[along] - low[along]) / 2, rng)
-    if height_m > _HIGHEST_M or plan is None:
-        return []
-    middle = [round(float(one), 6) for one in (low + high) / 2]
-    turn_deg = 90.0 * along
-    order = max(block.order for block in scene.blocks) + 1
-    blocks: list[Block] = []
+    middle, reach_m = (low + high) / 2, float(high[along] - low[along]) / 2
 
-    def put(block_type: BlockType, euler_deg: Euler, at_m: float, z_m: float) -> None:
-        x, y = (round(place + (at_m if i == along else 0), 6) for i, place in enumerate(middle[:2]))
-        number, color = order + len(blocks), pick(rng, COLORS)
-        blocks.append(Block(number, block_type, color, (x, y, round(z_m, 6)), euler_deg, (), 1))
+    def put(block_type: BlockType, euler_deg: Euler, steps: int, onto: Sequence[Block]) -> Block:
+        roll, pitch, yaw = euler_deg
+        turned = (roll, pitch, (yaw + 90.0 * along) % 180.0)
+        block = Block(0, block_type, pick(rng, COLORS), (0.0, 0.0, float(high[2])), turned, (), 1)
+        x, y = (float(middle[i]) + (_UNIT_M * steps if i == along else 0.0) for i in (0, 1))
+        return lowered(block, onto, x, y)
 
-    put(plan.type, (0.0, 0.0, turn_deg), plan.off_m, height_m + _PLANK_M / 2)
-    for at_m, weight in plan.weights:
-        x, y, yaw = weight.euler_deg
-        z_m = height_m + _PLANK_M + weight.half_height_m
-        put(weight.type, (x, y, (yaw + turn_deg) % 180.0), plan.off_m + at_m, z_m)
-    if plan.is_propped:
-        side = -1.0 if plan.off_m < 0 else 1.0
-        at_m, z_m = plan.off_m + side * (plan.length_m / 2 - _CUBE_M / 2), 0.0
-        for block_type, piece_m in _column(height_m, rng):
-            put(block_type, (0.0, 0.0, 0.0), at_m, z_m + piece_m / 2)
-            z_m += piece_m
-    return blocks
+    def leans_m(blocks: Sequence[Block]) -> float:
+        """Return how far the blocks' center is from the middle of the top, along the plank."""
+        masses = [SHAPES[block.type].mass_kg for block in blocks]
+        offs = [float(bounds_m(block).mean(axis=0)[along] - middle[along]) for block in blocks]
+        return abs(plain_sum(m * x for m, x in zip(masses, offs, strict=True)) / plain_sum(masses))
 
-
-def _planned(half_m: float, rng: np.random.Generator) -> _Plan | None:
-    """A plan whose balance hangs on something, for a top of that half width along the plank."""
     is_propped = rng.random() < _PROPPED
     for _ in range(_PLANS_TRIED):
-        plank, length_m = pick(rng, _PLANKS)
-        most = round((length_m / 2 + half_m - _CUBE_M / 2) / _UNIT_M)
-        off_m = _UNIT_M * int(rng.integers(-most, most + 1))
-        plan = _Plan(plank, length_m, off_m, _weights(length_m, rng), is_propped)
-        is_far = abs(off_m) + length_m / 2 - _CUBE_M > half_m
-        left = [[w for w in plan.weights if w is not one] for one in plan.weights]
-        hangs = any(_leans_m(plan._replace(weights=some)) > half_m + MARGIN_M for some in left)
-        if _leans_m(plan) <= half_m - MARGIN_M and (is_far if is_propped else hangs):
-            return plan
-    return None
+        kind = pick(rng, _PLANKS)
+        half = round(SHAPES[kind].sides_m[0] / _UNIT_M / 2)
+        off = int(rng.integers(-half, half + 1))
+        plank = put(kind, _FLAT, off, [top])
+        weights = [
+            put(*pick(rng, _WEIGHTS), off + int(rng.integers(2 - half, half - 1)), [plank])
+            for _ in range(int(rng.integers(_MOST_WEIGHTS + 1)))
+        ]
+        every = [plank, *weights]
+        if is_propped:
+            return [*every, *_column(plank, put, off + (half - 2 if off > 0 else 2 - half))]
+        fewer = ([one for one in every if one is not weight] for weight in weights)
+        is_needed = any(leans_m(some) > reach_m + MARGIN_M for some in fewer)
+        if is_needed and leans_m(every) <= reach_m - MARGIN_M:
+            return every
+    return []
 
 
-def _leans_m(plan: _Plan) -> float:
-    """Distance of the center of plank and weights from the middle of the top [m]."""
-    loads = [(plan.off_m, SHAPES[plan.type].mass_kg)]
-    loads += [(plan.off_m + at_m, SHAPES[w.type].mass_kg) for at_m, w in plan.weights]
-    moment = plain_sum(at_m * mass for at_m, mass in loads)
-    return abs(moment / plain_sum(mass for _, mass in loads))
-
-
-def _weights(length_m: float, rng: np.random.Generator) -> list[tuple[float, _Weight]]:
-    """None to three weights and where along the plank they stand, apart from one another."""
-    chosen: list[tuple[float, _Weight]] = []
-    for _ in range(int(rng.integers(4))):
-        weight = pick(rng, _WEIGHTS)
-        reach = round((length_m / 2 - weight.half_width_m) / _UNIT_M)
-        at_m = _UNIT_M * int(rng.integers(-reach, reach + 1))
-        if all(
-            abs(at_m - other_m) >= weight.half_width_m + other.half_width_m
-            for other_m, other in chosen
-        ):
-            chosen.append((at_m, weight))
-    return chosen
-
-
-def _column(height_m: float, rng: np.random.Generator) -> list[tuple[BlockType, float]]:
-    """Pieces, from below, that make up a height; none where they cannot."""
-    pieces: list[tuple[BlockType, float]] = []
-    left_m = height_m
-    while left_m > _FLAT_M:
-        fitting = [piece for piece in shuffled(rng, _COLUMN) if piece[1] < left_m + _FLAT_M]
-        if not fitting:
-            return []
-        pieces.append(fitting[0])
-        left_m -= fitting[0][1]
-    return pieces
-
-
-_LIFT_M = 0.6
-_DIRECTIONS = 8
+def _column(plank: Block, put: Callable[..., Block], steps: int) -> list[Block]:
+    """Return pieces from the floor up to a plank; they overlap it or leave a gap where none fit."""
+    column: list[Block] = []
+    left_m = float(bounds_m(plank)[0, 2])
+    for piece in _PIECES:
+        while left_m >= SHAPES[piece].sides_m[2] - _FLAT_M:
+            column.append(put(piece, _FLAT, steps, column))
+            left_m -= SHAPES[piece].sides_m[2]
+    return column
 
 
 def lowered(block: Block, onto: Sequence[Block], x_m: float, y_m: float) -> Block:
-    """The block let down, as it is turned, with the middle of its outline over a place (x, y) [m].
+    """Return the block let down, as it is turned, with the middle of its outline over (x, y) [m].
 
     It stops where it first touches one of the blocks, or the floor.
     """
@@ -210,7 +138,7 @@ def lowered(block: Block, onto: Sequence[Block], x_m: float, y_m: float) -> Bloc
 
 
 def lowered_round(put: Block, onto: Sequence[Block], rings_m: Sequence[float]) -> Iterator[Block]:
-    """The block let down anew all round where it is, in eight directions for each ring [m]."""
+    """Yield the block let down anew all round, in eight directions for each ring [m]."""
     x, y, _ = bounds_m(put).mean(axis=0).tolist()
     for radius_m in rings_m:
         for number in range(_DIRECTIONS):
@@ -244,7 +172,7 @@ def verdict(blocks: Sequence[Block], order: int) -> bool | None:
 
 
 def group_of(blocks: Sequence[Block], order: int) -> tuple[Block, ...]:
-    """The blocks in reach of one, itself among them."""
+    """Return the blocks in reach of one, itself among them."""
     return next(group for group in groups(blocks) if any(b.order == order for b in group))
 
 
