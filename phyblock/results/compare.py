@@ -70,29 +70,21 @@ _FLIPPED = ["a", "b", *_KEYS, "right", "value_a", "value_b"]
 def check_alike(run: Run, first: Run, cells: Sequence[str], track: str, measure: Measure) -> None:
     """Raise SpecError where `run` cannot be compared with `first` by a measure in these cells.
 
-    They must be scored by the same rules, agree in what the measure names in its counts, ask of the
-    same version of a set and in the same ways; scenes of a name must have the same blocks.
+    They must be of one version of a data set, scored by the same rules, asked in the same ways and
+    alike in the fields that the counts name; scenes of a name must have the same blocks.
     """
 
-    def differs(message: str, field: str, found: Any, allowed: Any = "", hint: str = "") -> None:
-        message = f"{message} {first.path}"
-        raise SpecError(Problem(str(run.path), message, field, str(found), str(allowed), hint))
+    def need(field: str, found: object, wanted: object, hint: str = "") -> None:
+        if found != wanted:
+            message = f"cannot be compared with {first.path}"
+            raise SpecError(Problem(str(run.path), message, field, str(found), str(wanted), hint))
 
-    sets = [(one.manifest.dataset, one.manifest.questions) for one in (run, first)]
-    for field, mine, other in zip(("dataset", "questions"), *sets, strict=True):
-        # Scenes and questions of two versions of a set may share a name and nothing else.
-        if mine is None or other is None or mine.version == other.version:
-            continue
-        names = [getattr(one, "name", "") or Path(one.root).name for one in (mine, other)]
-        if names[0] == names[1]:
-            hint, message = "run the suite again on the newer version", "is of another version of"
-            differs(f"{message} {names[0]} than", f"{field}.version", mine.version, other.version,
-                    hint)  # fmt: skip
-    suite, wanted = run.design.suite, first.design.suite
-    if suite.vary != wanted.vary:
-        varied = [", ".join(one.vary.factors) or "nothing" for one in (suite, wanted)]
-        hint = "compare runs that vary the same, in the same order"
-        differs("asks in other ways than", "vary", varied[0], varied[1], hint)
+    mine, other = run.manifest.dataset, first.manifest.dataset
+    if mine is not None and other is not None and mine.name == other.name:
+        need("dataset.version", mine.version, other.version, "run the suite on the newer version")
+    suite, vary, other_vary = run.design.suite, run.design.suite.vary, first.design.suite.vary
+    varied, other_varied = ({n: one.names(n) for n in one.factors} for one in (vary, other_vary))
+    need("vary", varied, other_varied)
     held = first.counts.get((track, measure.counted.name))
     scored = [set(names) - {""} for names in zip(*held.ways, strict=True)] if held else [set()] * 3
     criteria = {cell.criterion for cell in first.cells(track) if cell.name in cells} - {""}
@@ -103,20 +95,15 @@ def check_alike(run: Run, first: Run, cells: Sequence[str], track: str, measure:
     ]
     for (field, known, needed), is_scored in zip(rules, scored, strict=True):
         for name in sorted(needed.difference(known)) if is_scored else ():
-            hint = "phyblock score reads stored replies again under other rules"
-            differs(f"is not scored by {name}, as is", field, ", ".join(known), name, hint)
+            need(field, ", ".join(known), name, "phyblock score reads stored replies again")
     for path in measure.counted.alike:
-        found, other_found = (_field(one, path) for one in (run, first))
-        if found != other_found:
-            differs(f"differs in what decides {measure.name} from", path, found, other_found,
-                    "run the older one again, or compare by another measure")  # fmt: skip
+        need(path, _field(run, path), _field(first, path), "run the older one again")
     blocks = [
         one.records.drop_duplicates("scene").set_index("scene")["n_blocks"] for one in (first, run)
     ]
     both = pd.concat(blocks, axis=1, join="inner", keys=["first", "other"])
-    if len(differ := both[both["first"] != both["other"]]):
-        said_of = f"other blocks in {counted(len(differ), 'scene')}, the first {differ.index[0]}"
-        differs("is of other data than", "scenes", said_of)
+    for row in both[both["first"] != both["other"]].itertuples():
+        need(f"blocks of scene {row.Index}", row.other, row.first)
 
 
 def _field(run: Run, path: str) -> Any:

@@ -6,7 +6,7 @@ import asyncio
 import base64
 import csv
 import json
-from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from phyblock.data import Dataset, QuestionTask, find_questions
 from phyblock.domain import LETTERS, SUBTASKS, Question, is_picture_option
 from phyblock.files import OutFolder, writing
 from phyblock.models.request import Image
-from phyblock.records.files import read_prompts, read_records, record_types
+from phyblock.records.files import RecordLines, read_prompts, record_types
 from phyblock.records.record import PictureMark, PromptMessage, Record
 from phyblock.resources import needs
 from phyblock.results.load import TOKENS, Run, track_measures
@@ -30,103 +30,77 @@ from phyblock.tracks.questions import (
     select_questions,
 )
 
-_SAMPLE = ("sample", "track", "model", "scene", "seed")
-_REPLY = ("finish", "cost_usd", "latency_s", "provider_model", "attempts", "cached")
-_LISTS = ("levels", "parents", "plan")
 _TYPES = {
+    **dict.fromkeys(("sample", "track", "model", "scene"), "string"),
     "seed": "int64",
-    **dict.fromkeys(_LISTS, "object"),
-    **dict.fromkeys(("n_blocks", "attempts", *TOKENS), "Int64"),
-    "cached": "boolean",
+    **dict.fromkeys(("levels", "parents"), "object"),
+    "n_blocks": "Int64",
+    **dict.fromkeys(("outcome", "finish", "rule"), "string"),
     **dict.fromkeys(("cost_usd", "latency_s"), "Float64"),
+    **dict.fromkeys(("attempts", *TOKENS), "Int64"),
+    "cached": "boolean",
 }
-"""Types of columns; all others of a row are text."""
-_TYPES_OF_COUNTS = {"tp_": "Int64", "fp_": "Int64", "fn_": "Int64", "count_": "Float64"}
-"""Types of columns by the beginning of their names."""
+"""Columns that frames of records have as well."""
+_TEXTS = ("prompt", "reply", "reasoning", "provider_model", "error", "asked")
 
 
 def export_frame(run: Run) -> pd.DataFrame:
     """Return one row a sample: what was asked, of whom, the reply, what was read, and the counts.
 
     Counts are `tp_<setting>`, `fp_<setting>`, `fn_<setting>` of the headline matcher, all levels
-    by the `aov` criterion (of episodes: over placed blocks); `count_<name>_<column>` are those of
-    other measures. Columns have the same types whatever the rows are; what a track does not have
-    is missing. `levels`, `parents` and `plan` are lists.
+    by the `aov` criterion (of episodes: over placed blocks); `count_<name>_<column>` are those that
+    records keep. Columns have the same types whatever the rows are; what a track does not have is
+    missing. `levels`, `parents` and `plan` are lists.
     """
-    rows, known = list(_rows(run)), _TYPES | _track_columns()
-    data = {}
-    for name in rows[0] if rows else ():
-        counts = (kind for begin, kind in _TYPES_OF_COUNTS.items() if name.startswith(begin))
-        kind = known.get(name) or next(counts, "string")
-        data[name] = pd.Series([row[name] for row in rows], dtype=kind)
-    return pd.DataFrame(data)
-
-
-def _track_columns() -> dict[str, str]:
-    """Columns that tracks add, with their types in pandas."""
-    return {name: kind for record in record_types() for name, kind in record.exported.items()}
-
-
-def _rows(run: Run) -> Iterator[dict[str, Any]]:
-    """Rows of `export_frame`, by track and model."""
+    types = {**dict.fromkeys(_TEXTS, "string"), "plan": "object"}
+    types |= {name: kind for record in record_types() for name, kind in record.exported.items()}
+    for setting in run.design.suite.settings:
+        types |= {f"{name}_{setting.lower()}": "Int64" for name in ("tp", "fp", "fn")}
+    frame = run.records[list(_TYPES)].astype(_TYPES)
+    frame[["levels", "parents"]] = frame[["levels", "parents"]].map(list)
+    if run.design.suite.vary.factors:
+        frame.insert(5, "variant", run.records["variant"].astype("string"))
     prompts = read_prompts(run.path)
-    place = {name: n for n, name in enumerate(run.design.model_names)}
-    newest = sorted(
-        read_records(run.path), key=lambda r: (r.track, place.get(r.model, len(place)), r.sample)
-    )
-    for record in newest:
-        reply, error = record.reply, record.error
-        plan = getattr(record.parse, "plan", None)
-        yield {
-            **{name: getattr(record, name) for name in _SAMPLE},
-            **({"variant": record.way.key} if run.design.suite.vary.factors else {}),
-            "levels": list(record.levels),
-            "parents": list(record.parents),
-            "n_blocks": record.n_blocks,
-            "outcome": record.outcome,
-            "prompt": _prompt_text(record, prompts),
-            "reply": reply and reply.text,
-            "reasoning": reply and reply.reasoning,
-            **{name: getattr(reply, name, None) for name in _REPLY},
-            **{name: getattr(reply and reply.usage, name, None) for name in TOKENS},
-            "error": error and error.message,
-            "asked": record.asked,
-            "rule": getattr(record.parse, "rule", None),
-            "plan": None if plan is None else list(plan),
-            **dict.fromkeys(_track_columns()),
-            **record.export_row(),
-            **_counts(run, record),
-        }
-
-
-def _prompt_text(record: Record, prompts: Mapping[str, Sequence[PromptMessage]]) -> str | None:
-    """The prompt as it was sent, pictures by their labels; None where none was stored."""
-    messages = None if record.prompt is None else prompts.get(record.prompt.messages)
-    if messages is None:
-        return None
-    return "\n".join(
-        f"[picture: {part.image}]" if isinstance(part, PictureMark) else part
-        for message in messages
-        for part in message.parts
-    )
-
-
-def _counts(run: Run, record: Record) -> dict[str, float | None]:
-    """The counts of the headline scores, then those of the measures that have their own."""
-    counts, design = ("tp", "fp", "fn"), run.design
-    found: dict[str, float | None] = {
-        f"{name}_{setting.lower()}": None for setting in design.suite.settings for name in counts
-    }
-    for score in record.scores:
-        is_headline = score.matcher in (None, "", design.matcher)
-        if is_headline and score.criterion in ("aov", "placed"):
-            found |= {f"{name}_{score.setting.lower()}": getattr(score, name) for name in counts}
-    for track in design.suite.tracks:
+    rows = [_row(run, one, prompts) for one in RecordLines(run.path).at(run.records["start"])]
+    for name, kind in types.items():
+        frame[name] = pd.Series([row.get(name) for row in rows], frame.index, dtype=kind)
+    for track in run.design.suite.tracks:
         for counted in dict.fromkeys(measure.counted for measure in track_measures(track)):
-            if counted.sample is not None:
-                names = [f"count_{counted.name}_{column}" for column in counted.columns]
-                numbers = record.counts.get(counted.name, ()) if record.track == track else ()
-                found |= dict(zip(names, numbers or [None] * len(names), strict=True))
+            held = run.counts.get((track, counted.name))
+            for n, column in enumerate(counted.columns if counted.sample is not None else ()):
+                key = f"count_{counted.name}_{column}"
+                if key not in frame:
+                    frame[key] = pd.Series(pd.NA, frame.index, dtype="Float64")
+                if held is not None:
+                    frame.loc[frame.index[held.row], key] = held.numbers[:, n]
+    return frame
+
+
+def _row(
+    run: Run, record: Record, prompts: Mapping[str, Sequence[PromptMessage]]
+) -> dict[str, Any]:
+    """Return what a frame of records does not hold of one."""
+    reply, plan = record.reply, getattr(record.parse, "plan", None)
+    messages = None if record.prompt is None else prompts.get(record.prompt.messages)
+    parts = [part for message in messages or () for part in message.parts]
+    found: dict[str, Any] = {
+        # As it was sent, pictures by their labels; None where none was stored.
+        "prompt": None if messages is None else "\n".join(
+            f"[picture: {part.image}]" if isinstance(part, PictureMark) else part for part in parts
+        ),
+        "reply": reply and reply.text,
+        "reasoning": reply and reply.reasoning,
+        "provider_model": reply and reply.provider_model,
+        "error": record.error and record.error.message,
+        "asked": record.asked,
+        "plan": None if plan is None else list(plan),
+        **record.export_row(),
+    }  # fmt: skip
+    for score in record.scores:
+        is_headline = score.matcher in (None, "", run.design.matcher)
+        if is_headline and score.criterion in ("aov", "placed"):
+            counts = {"tp": score.tp, "fp": score.fp, "fn": score.fn}
+            found |= {f"{name}_{score.setting.lower()}": n for name, n in counts.items()}
     return found
 
 
@@ -145,7 +119,7 @@ def export_run(run: Run, form: str, folder: Path | None = None) -> tuple[Path, .
     with writing(target), out.making(below) as made:
         frame = export_frame(run)
         if form == "csv":
-            for name in set(_LISTS) & set(frame):
+            for name in ("levels", "parents", "plan"):
                 as_json = [json.dumps(v) if isinstance(v, list) else v for v in frame[name]]
                 frame[name] = pd.Series(as_json, dtype="object")
             (made / "records.csv").write_bytes(to_csv(frame).encode("utf-8", "replace"))

@@ -34,7 +34,7 @@ from phyblock.results.estimates import (
 )
 from phyblock.results.load import Run
 from phyblock.results.tables import coverage_frame, filled
-from phyblock.results.text import between, escape, level_name, number
+from phyblock.results.text import between, latex, level_name, number
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of
 from phyblock.tracks.measures import in_unit
@@ -375,15 +375,5 @@ def _captions(run: Run, name: str, figure: Figure) -> dict[str, str]:
     sentences += [", ".join(dict.fromkeys(words))]
     text = " ".join(f"{sentence}." for sentence in sentences if sentence)
     star = "*" if figure.get_figwidth() > COLUMN_IN + 0.1 else ""
-    lines = (
-        "% Needs \\usepackage{graphicx}.",
-        rf"\begin{{figure{star}}}[t]",
-        r"\centering",
-        r"\resizebox{!}{\ifdim\height>.85\textheight.85\textheight\else\height\fi}{%",
-        r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%",
-        rf"\includegraphics{{{name}.pdf}}}}}}",
-        rf"\caption{{{escape(text)}}}",
-        rf"\label{{fig:phyblock-{name}}}",
-        rf"\end{{figure{star}}}",
-    )
-    return {f"{name}.txt": text + "\n", f"{name}.tex": "\n".join(lines) + "\n"}
+    float_text = latex("figure.tex.j2", name=name, caption=text, star=star)
+    return {f"{name}.txt": text + "\n", f"{name}.tex": float_text}

@@ -8,24 +8,24 @@ from importlib.resources import files
 
 import numpy as np
 import pandas as pd
+import yaml
 
 from phyblock.results.estimates import headline_rows, pooled_in, track_estimates
 from phyblock.results.load import Run
-from phyblock.results.text import Column, Table, TextTable, number
+from phyblock.results.text import Table, number, texts, values
 from phyblock.tracks.measures import CELL, OVERALL
 
+_FOLDER = files("phyblock.results") / "published"
 _SETTING = "A"
 """The setting of every number in Table 1."""
 _OVERALL_LEVELS = frozenset({2, 3, 4})
 """Levels whose scenes the paper's overall numbers pool."""
+_COLUMNS = ["model", "published_name", CELL, "metric", "published", "ours", "difference", "n"]
 
 
 @dataclass(frozen=True)
 class _Published:
-    """A table of the paper: the track and way of counting that is ours, decimals, a note.
-
-    `columns` are those of estimates, by metric as it is printed, with their headings.
-    """
+    """A table of the paper, as `published/tables.yaml` describes it."""
 
     track: str
     columns: Mapping[str, tuple[str, str, str]]
@@ -35,34 +35,8 @@ class _Published:
 
 
 _TABLES = {
-    1: _Published(
-        "full_planning",
-        {
-            "precision": ("precision", "value", "Prec"),
-            "recall": ("recall", "value", "Rec"),
-            "f1": ("f1", "value", "F1"),
-        },
-        "Ours: setting A, micro averages. Published: micro averages of one run.",
-    ),
-    2: _Published(
-        "vqa",
-        {"accuracy": ("accuracy", "value", "Accuracy")},
-        "Averages are unweighted means. The questions are our own: the paper's are not published.",
-    ),
-    3: _Published(
-        "step_planning",
-        {"recall": ("recall", "value", "Rec")},
-        "Of the published numbers, of the paper's own scenes, recall alone stands beside ours: it "
-        "is of the goal's blocks, whatever was tried. Precision depends on which wrong blocks a "
-        "simulator lets stand, which the paper does not say.",
-        "placed",
-    ),
-    5: _Published(
-        "full_planning",
-        {"f1_mean": ("f1", "mean", "F1 mean"), "f1_sd": ("f1", "sd", "F1 sd")},
-        "Both: means over single seeds, sd with ddof = 1; all other tables pool the seeds.",
-        digits=2,
-    ),
+    n: _Published(**told)
+    for n, told in yaml.safe_load((_FOLDER / "tables.yaml").read_text(encoding="utf-8")).items()
 }
 PAPER_TABLES = tuple(_TABLES)
 """Numbers of the paper's tables of results."""
@@ -73,7 +47,7 @@ def published_table(table: int) -> pd.DataFrame:
 
     `published/README.md` says what the columns are and where the numbers come from.
     """
-    with (files("phyblock.results") / "published" / f"table{table}.csv").open("rb") as file:
+    with (_FOLDER / f"table{table}.csv").open("rb") as file:
         return pd.read_csv(file, dtype={"level": "object"})
 
 
@@ -85,6 +59,8 @@ def published_frame(run: Run, table: int) -> pd.DataFrame:
     not measure. Table 1 is compared in setting A by the `paper` matcher where the run has it.
     """
     paper, design = _TABLES[table], run.design
+    if paper.track not in design.suite.tracks or (table == 5 and len(design.suite.seeds) < 2):
+        return pd.DataFrame(columns=_COLUMNS)
     printed = published_table(table)
     if table == 2:
         is_average = printed["subtask"] == "average"
@@ -94,22 +70,14 @@ def published_frame(run: Run, table: int) -> pd.DataFrame:
     printed = printed.rename(
         columns={"model": "published_name", "value": "published", "level": CELL}
     )
-    names = pd.DataFrame(
-        [(m.name, m.published) for m in design.models if m.published],
-        columns=["model", "published_name"],
-    )
-    cells = names.astype("object").merge(printed, on="published_name")
-    rows = pd.DataFrame(columns=["model", CELL, "metric", "ours", "n"])
-    if paper.track in design.suite.tracks and (table != 5 or len(design.suite.seeds) > 1):
-        rows = _ours(run, table)
-    elif paper.track not in design.suite.tracks or table == 5:
-        cells = cells.iloc[:0]
-    found = cells.merge(rows, on=["model", CELL, "metric"], how="left")
+    known = [(model.name, model.published) for model in design.models if model.published]
+    names = pd.DataFrame(known, columns=["model", "published_name"], dtype="object")
+    found = names.merge(printed, on="published_name")
+    found = found.merge(_ours(run, table), on=["model", CELL, "metric"], how="left")
     found["ours"] = found["ours"].astype("float64")
     found["difference"] = found["ours"] - found["published"]
     found["n"] = found["n"].astype("float64").fillna(0).astype("int64")
-    columns = ["model", "published_name", CELL, "metric", "published", "ours", "difference", "n"]
-    return found[columns]
+    return found[_COLUMNS]
 
 
 def is_as_published(run: Run) -> bool:
@@ -124,14 +92,15 @@ def is_as_published(run: Run) -> bool:
 
 
 def _ours(run: Run, table: int) -> pd.DataFrame:
-    paper, design = _TABLES[table], run.design
+    """Return our numbers [%] by model, cell and metric, with the samples behind them."""
+    paper, suite = _TABLES[table], run.design.suite
     estimates = track_estimates(run, paper.track)
-    found = headline_rows(estimates, design)
+    found = headline_rows(estimates, run.design)
     if table == 1:
-        matcher = "paper" if "paper" in design.suite.scoring.matchers else design.matcher
-        is_a = estimates["setting"] == (_SETTING if _SETTING in design.suite.settings else None)
+        matcher = "paper" if "paper" in suite.scoring.matchers else run.design.matcher
+        is_a = (estimates["setting"] == _SETTING) & (_SETTING in suite.settings)
         found = estimates[is_a & estimates["matcher"].isin(["", matcher])]
-        if not set(design.suite.levels) >= _OVERALL_LEVELS:
+        if not set(suite.levels) >= _OVERALL_LEVELS:
             found = found[found[CELL] != OVERALL]
     if paper.criterion:
         found = found[found["criterion"] == paper.criterion]
@@ -145,39 +114,40 @@ def _ours(run: Run, table: int) -> pd.DataFrame:
         # A mean over a part of what the paper averages is not the same number.
         from phyblock.tracks.vqa_results import ALL_CELLS
 
-        cells = run.cells(paper.track)
-        asked = {cell.name: pooled_in(cell, cells) for cell in cells}
-        whole = {cell.name: pooled_in(cell, ALL_CELLS) for cell in ALL_CELLS}
-        rows.loc[rows[CELL].map(asked) != rows[CELL].map(whole), "ours"] = np.nan
+        asked, whole = (
+            rows[CELL].map({cell.name: pooled_in(cell, cells) for cell in cells})
+            for cells in (run.cells(paper.track), ALL_CELLS)
+        )
+        rows.loc[asked != whole, "ours"] = np.nan
     return rows
 
 
 def beside_paper(run: Run, table: int) -> Table | None:
     """Return our numbers beside a table of the paper; None where it has no model of the run."""
     frame, paper = published_frame(run, table), _TABLES[table]
-    if not len(frame):
+    if frame.empty:
         return None
-    cells = list(dict.fromkeys(frame[CELL]))
-    known = frame.set_index(["model", "metric", CELL]).to_dict("index")
-    kinds = {"Paper": ("published", paper.digits), "Ours": ("ours", 2), "Diff": ("difference", 2)}
-    rows = []
-    for model, name in dict(zip(frame["model"], frame["published_name"], strict=True)).items():
-        label = model if model == name else f"{model} ({name})"
-        for place, (metric, (_, _, heading)) in enumerate(paper.columns.items()):
-            found = [known.get((model, metric, cell), {}) for cell in cells]
-            texts = [
-                number(float(row.get(kind, np.nan)), digits, signed=kind == "difference")
-                for row in found
-                for kind, digits in kinds.values()
-            ]
-            rows.append((label if place == 0 else "", heading, *texts))
-    compared = frame["difference"].dropna()
-    notes = [paper.note]
+    rows: dict[tuple[str, str], dict[str, object]] = {}
+    for model in dict.fromkeys(frame["model"]):
+        for metric, (_, _, heading) in paper.columns.items():
+            rows[model, metric] = {"model": model, "metric": heading}
+    for row in frame.to_dict("records"):
+        shown = rows[row["model"], row["metric"]]
+        if row["published_name"] != row["model"]:
+            shown["model"] = f"{row['model']} ({row['published_name']})"
+        shown |= {f"{row[CELL]} {name}": row[name] for name in ("published", "ours", "difference")}
+    headings = {cell.name: cell.heading for cell in run.cells(paper.track)}
+    columns = [texts("model", "Model", once=True), texts("metric", "")]
+    for cell in dict.fromkeys(frame[CELL]):
+        group = headings.get(cell, cell)
+        columns += [
+            values(f"{cell} published", "Paper", group, paper.digits),
+            values(f"{cell} ours", "Ours", group, 2),
+            values(f"{cell} difference", "Diff", group, 2, signed=True),
+        ]
+    compared, notes = frame["difference"].dropna(), [paper.note]
     if len(compared):
         largest = number(compared.abs().max(), 3)
         notes.insert(0, f"Largest absolute difference of {len(compared)} cells: {largest}.")
-    headings = {cell.name: cell.heading for cell in run.cells(paper.track)}
-    columns = (Column(kind, headings.get(cell, cell)) for cell in cells for kind in kinds)
-    head = (Column("Model", is_text=True), Column("", is_text=True), *columns)
     caption = f"Our numbers beside the paper's Table {table}{run.design.of_suite} (%)"
-    return Table(frame, TextTable(caption, head, tuple(rows), tuple(notes)))
+    return Table(frame, Table.of(pd.DataFrame([*rows.values()]), caption, columns, notes).view)

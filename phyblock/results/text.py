@@ -7,7 +7,10 @@ import math
 import re
 from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import jinja2
 
 from phyblock.text import csv_cell, one_line
 
@@ -207,56 +210,28 @@ _ESCAPES_LATEX = str.maketrans(
     }
 )
 _LIGATURE = re.compile("-(?=-)")
-_FLOAT = r"""% Needs \usepackage{{booktabs}} and \usepackage{{graphicx}}.
-\begin{{table*}}[t]
-\centering\small
-\setlength{{\tabcolsep}}{{4pt}}
-\caption{{{caption}}}
-\label{{tab:{label}}}
-\resizebox{{!}}{{\ifdim\height>.8\textheight.8\textheight\else\height\fi}}{{%
-\resizebox{{\ifdim\width>\linewidth\linewidth\else\width\fi}}{{!}}{{%
-\begin{{tabular}}{{@{{}}{alignment}@{{}}}}
-\toprule
-{rows}
-\bottomrule
-\end{{tabular}}}}}}
-{notes}\end{{table*}}
-"""
-
-
-def to_latex(table: TextTable, label: str) -> str:
-    r"""Return a `table*` float that compiles by `\input`, made smaller only where it is too large.
-
-    `label` follows `tab:`. Needs booktabs and graphicx, and says so in its first line.
-    """
-    groups, rules, start, rows = [], "", 1, []
-    for group, members in itertools.groupby(table.columns, key=lambda column: column.group):
-        end = start + len(list(members)) - 1
-        groups += (
-            [rf"\multicolumn{{{end - start + 1}}}{{c}}{{{escape(group)}}}"]
-            if group
-            else ([""] * (end - start + 1))
-        )
-        rules += rf"\cmidrule(lr){{{start}-{end}}}" if group else ""
-        start = end + 1
-    if rules:
-        rows += [" & ".join(groups) + r" \\", rules]
-    names = [
-        escape(one.name) if one.is_text else rf"\multicolumn{{1}}{{c}}{{{escape(one.name)}}}"
-        for one in table.columns
-    ]
-    rows += [" & ".join(names) + r" \\", r"\midrule"]
-    rows += [" & ".join(map(escape, row)) + r" \\" for row in table.rows]
-    notes = "".join(rf"\par {escape(note)}" + "\n" for note in table.notes)
-    return _FLOAT.format(
-        caption=escape(table.caption),
-        label=label,
-        alignment="".join("l" if column.is_text else "r" for column in table.columns),
-        rows="\n".join(rows),
-        notes=f"\\par\\smallskip\\raggedright\\footnotesize\n{notes}" if notes else "",
-    )
 
 
 def escape(text: str) -> str:
     """Return text as LaTeX prints it literally."""
     return _LIGATURE.sub("-{}", text.translate(_ESCAPES_LATEX))
+
+
+def latex(template: str, **facts: Any) -> str:
+    """Return a float of a template of this package that compiles by `\\input`; `tex` escapes."""
+    marks = {"block_start_string": "<%", "block_end_string": "%>"}
+    marks |= {"variable_start_string": "<<", "variable_end_string": ">>"}
+    environment = jinja2.Environment(**marks, trim_blocks=True, keep_trailing_newline=True)  # type: ignore[arg-type]
+    environment.filters["tex"] = escape
+    text = Path(__file__).with_name(template).read_text(encoding="utf-8")
+    return environment.from_string(text).render(facts)
+
+
+def to_latex(table: TextTable, label: str) -> str:
+    """Return a `table*` float, made smaller only where it is too large; `label` follows `tab:`."""
+    groups, first = [], 1
+    for name, members in itertools.groupby(table.columns, key=lambda column: column.group):
+        size = len(list(members))
+        groups.append({"name": name, "size": size, "first": first})
+        first += size
+    return latex("table.tex.j2", table=table, label=label, groups=groups)

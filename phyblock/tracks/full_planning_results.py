@@ -74,7 +74,7 @@ def _film(record: PlanRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
 REPORT = read_report(
     "full_planning",
     COUNTS,
-    {"pose_gap": pose_gap},
+    {"pose_gap": {"value": pose_gap}},
     cells=level_cells,
     floors=PLAN_FLOORS,
     film=_film,

@@ -255,7 +255,7 @@ class TrackReport:
     cells: Callable[[Suite, Manifest], tuple[Cell, ...]] = lambda *_: (WHOLE,)
     headline: tuple[LayoutColumn, ...] = ()
     tables: Mapping[str, Layout] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    notes: Sequence[str] = ()
     floors: tuple[str, ...] = ()
     short: str = ""
     part_names: Mapping[str, str] = field(default_factory=dict)
@@ -271,31 +271,29 @@ class TrackReport:
 def read_report(
     track: str,
     counts: Iterable[SampleCounts],
-    values: Mapping[str, Metric] | None = None,
+    code: Mapping[str, Mapping[str, Any]] | None = None,
     **more: Any,
 ) -> TrackReport:
     """Return the report of a track: its YAML file, joined with what is code.
 
     Measures stand in groups that share fields. Each is the sum of the columns in `part` (by default
-    the column of its name) over that of `whole`, a mean where its unit is not "%" or it says so,
-    or one of the `values`.
+    the column of its name) over that of `whole`; a mean where its unit is not "%" or it says so.
+    `code` has the fields of measures, by name, that are functions.
     """
     told = yaml.safe_load(Path(__file__).with_name(f"{track}.yaml").read_text(encoding="utf-8"))
     by_name, measures = {counted.name: counted for counted in counts}, []
     for group in told.pop("measures"):
         for name, own in group.pop("of").items():
-            about = {**group, **own}
+            about = {**group, **own, **(code or {}).get(name, {})}
             counted, is_mean = by_name[about.pop("counts")], about.pop("mean", False)
             part, whole = ([n] if isinstance(n, str) else n or [] for n in
                            (about.pop("part", name), about.pop("whole", None)))  # fmt: skip
             about.setdefault("over", *whole[:1])
             if about.get("unit", "%") != "%":
                 is_mean, about = True, {"most": math.inf, **about}
-            value = (values or {}).get(name)
-            value = value or (mean_per if is_mean else share_of)(counted.columns, part, whole)
-            measures.append(Measure(name, counted=counted, value=value, **about))
-    for name in ("headline", "notes"):
-        told[name] = tuple(told[name])
+            if "value" not in about:
+                about["value"] = (mean_per if is_mean else share_of)(counted.columns, part, whole)
+            measures.append(Measure(name, counted=counted, **about))
     told["headline"] = tuple(LayoutColumn(**column) for column in told["headline"])
     told["tables"] = {
         name: Layout(**{**one, "columns": [LayoutColumn(**column) for column in one["columns"]]})

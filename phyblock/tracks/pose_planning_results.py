@@ -156,7 +156,10 @@ def _ended(step: StepOutcome) -> str:
 REPORT = read_report(
     "pose_planning",
     COUNTS,
-    {"f1_c": partial(_f1, "absolute"), "f1_c_aligned": partial(_f1, "aligned")},
+    {
+        "f1_c": {"value": partial(_f1, "absolute")},
+        "f1_c_aligned": {"value": partial(_f1, "aligned")},
+    },
     cells=level_cells,
     floors=POSE_FLOORS,
     film=_film,

@@ -85,5 +85,5 @@ def _film(record: EpisodeRecord, task: AssemblyTask | None) -> Iterator[FilmStep
 
 
 REPORT = read_report(
-    "step_planning", COUNTS, {"pose_gap": pose_gap}, floors=STEP_FLOORS, film=_film
+    "step_planning", COUNTS, {"pose_gap": {"value": pose_gap}}, floors=STEP_FLOORS, film=_film
 )

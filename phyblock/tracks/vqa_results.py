@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -114,12 +113,9 @@ def question_items(
 REPORT = read_report(
     "vqa",
     COUNTS,
+    {"accuracy": {"chance": _guessing}},
     cells=_run_cells,
     floors=("majority", "text-only", "random"),
     part_names={str(short): name for short, name in SUBTASK_NAMES.items()},
     items=question_items,
-)
-REPORT = replace(
-    REPORT,
-    measures=(replace(REPORT.measures[0], chance=_guessing), *REPORT.measures[1:]),
 )

@@ -67,7 +67,7 @@ def test_runs_in_two_engines_are_scored_anywhere_and_never_compared(
     scored = rescore(usual, None, None, None)
     assert (scored / "records.jsonl").read_text() == (usual / "records.jsonl").read_text()
     runs = [load_run(out) for out in (usual, other)]
-    with pytest.raises(SpecError, match="differs in what decides"):
+    with pytest.raises(SpecError, match="physics: cannot be compared"):
         compare_runs(*runs, ())
 
 
