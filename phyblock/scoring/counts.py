@@ -55,6 +55,12 @@ def _ratio(part: int, whole: int) -> float | None:
     return part / whole if whole else None
 
 
+def f1_of(sums: Floats) -> Floats:
+    """2 TP / (2 TP + FP + FN) of counts (..., [tp, fp, fn])."""
+    twice = 2 * sums[..., 0]
+    return ratio_of(np.stack([twice, twice + sums[..., 1] + sums[..., 2]], axis=-1))
+
+
 def ratio_of(sums: Floats) -> Floats:
     """Part / whole of counts (..., [part, whole]), as right answers of answers.
 

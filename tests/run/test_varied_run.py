@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import yaml
 
-from tests.scoring.cases import f1_of
+from phyblock.scoring.counts import f1_of
 from tests.servers.chassis import Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Raw, Workspace

@@ -117,9 +117,3 @@ def precision_of(sums: Floats) -> Floats:
 def recall_of(sums: Floats) -> Floats:
     """TP / (TP + FN) of counts (..., [tp, fp, fn])."""
     return ratio_of(np.stack([sums[..., 0], sums[..., 0] + sums[..., 2]], axis=-1))
-
-
-def f1_of(sums: Floats) -> Floats:
-    """2 TP / (2 TP + FP + FN) of counts (..., [tp, fp, fn])."""
-    twice = 2 * sums[..., 0]
-    return ratio_of(np.stack([twice, twice + sums[..., 1] + sums[..., 2]], axis=-1))

@@ -12,7 +12,7 @@ from hypothesis.extra import numpy as hnp
 from scipy import stats
 
 from phyblock.data import read_official
-from phyblock.scoring.counts import Floats, ratio_of
+from phyblock.scoring.counts import Floats, f1_of, ratio_of
 from phyblock.scoring.statistics import (
     POWER,
     Clusters,
@@ -22,7 +22,7 @@ from phyblock.scoring.statistics import (
     jackknife,
     rank_ranges,
 )
-from tests.scoring.cases import f1_of, precision_of, recall_of
+from tests.scoring.cases import precision_of, recall_of
 from tests.scoring.worlds import World
 
 NAMES = st.lists(st.sampled_from("abcdefg"), min_size=1, max_size=3)
