@@ -179,7 +179,7 @@ def test_scripts_that_we_did_not_write_stay_whatever_their_names(finished: Path)
     (second,) = set((finished / "report").iterdir()) - {theirs.parent, first}
     assert theirs.read_text() == "mine"
     assert [path.name for path in first.iterdir()] == ["records-7.js"]
-    assert (second / "index.js").is_file()
+    assert (second / "samples.js").is_file()
     assert not list(finished.glob("*.part"))
 
 
@@ -206,7 +206,7 @@ def test_reports_that_are_written_at_once_all_come_to_their_end(finished: Path) 
         pages = list(pool.map(write, range(5)))
     assert set(pages) == {finished / "report.html"}
     (build,) = (path for path in (finished / "report").iterdir())
-    assert {path.name for path in build.iterdir()} >= {"index.js", "records-0.js"}
+    assert {path.name for path in build.iterdir()} >= {"samples.js", "records-0.js"}
     assert f"report/{build.name}" in pages[0].read_text(encoding="utf-8")
 
 
