@@ -305,8 +305,8 @@ def test_a_run_with_faults_is_killed_resumed_and_scored_again(
     ("views", "told"),
     [
         (["abov"], "is not one of the choices"),
-        (["top"], "hint: views: [oblique, top]"),
-        (["front", "oblique"], "hint: views: [oblique, front]"),
+        (["top"], "allowed: [oblique, top]"),
+        (["front", "oblique"], "allowed: [oblique, front]"),
         (["oblique", "oblique"], "stands twice"),
     ],
 )
