@@ -348,7 +348,6 @@ def completed(
     async def run() -> RunResult:
         nonlocal whole
         whole = asyncio.current_task()
-        heed()
         try:
             return await session.run()
         except asyncio.CancelledError:
@@ -358,21 +357,13 @@ def completed(
         with asyncio.Runner(loop_factory=lambda: loop) as runner:
             return runner.run(run())
 
-    def heed() -> None:
-        nonlocal whole
-        if stops and whole is not None:
-            session.interrupt()
-        if stops > 1 and whole is not None:
-            whole.cancel()
-            # Once, as what is answered must be written.
-            whole = None
-
     def stop(*_: object) -> None:
         nonlocal stops
         stops += 1
-        # A loop that is closed has nothing to stop.
+        # Once, as what is answered must be written; a loop that is closed has nothing to stop.
+        give_up = whole.cancel if stops == 2 and whole is not None else session.interrupt
         with suppress(RuntimeError):
-            loop.call_soon_threadsafe(heed)
+            loop.call_soon_threadsafe(give_up)
 
     is_main = threading.current_thread() is threading.main_thread()
     before = {name: signal.getsignal(name) for name in signals if is_main}

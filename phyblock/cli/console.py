@@ -21,6 +21,8 @@ from phyblock.results.text import Column, TextTable
 from phyblock.text import one_line, plain_lines
 
 _PIPE_WIDTH = 160
+_TEXT_WIDTH = 24
+"""Characters after which a cell of text may go on in a new line."""
 
 
 class _PlainConsole(Console):
@@ -62,7 +64,7 @@ def print_table(console: Console, view: TextTable) -> None:
     endless = console.options.update(width=10_000)
     for column in range(len(names), len(texts)):
         wider = [*pieces[-1], column]
-        needed = Measurement.get(console, endless, _piece(view, wider)).minimum
+        needed = Measurement.get(console, endless, _piece(view, wider, _TEXT_WIDTH)).maximum
         if needed > console.width and pieces[-1] != names:
             pieces.append(names)
         pieces[-1] = [*pieces[-1], column]
@@ -74,7 +76,7 @@ def print_table(console: Console, view: TextTable) -> None:
     console.print()
 
 
-def _piece(view: TextTable, columns: Sequence[int]) -> Table:
+def _piece(view: TextTable, columns: Sequence[int], text_width: int | None = None) -> Table:
     """Return some of the columns; the name of a group stands above the first of it."""
     table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
     group = ""
@@ -88,6 +90,7 @@ def _piece(view: TextTable, columns: Sequence[int]) -> Table:
             justify="left" if column.is_text else "right",
             no_wrap=not column.is_text,
             overflow="fold",
+            max_width=text_width if column.is_text else None,
         )
         group = column.group
     for row in view.rows:

@@ -5,10 +5,8 @@ from __future__ import annotations
 import gc
 import importlib
 import os
-import re
 import sys
 import traceback
-from collections import Counter
 from importlib.metadata import entry_points
 
 import click
@@ -51,26 +49,24 @@ _ENTRY_POINTS = "phyblock.plugins"
 
 
 def _load_plugins(_: click.Context, __: click.Parameter, modules: tuple[str, ...]) -> None:
-    """Import plugins while the options of `phyblock` are read: before a command's own choices."""
-    named = {
-        entry.value.partition(":")[0]: entry.name for entry in entry_points(group=_ENTRY_POINTS)
-    }
-    for module in dict.fromkeys([*named, *modules]):
-        _load_plugin(module, f"plugin {named[module]}" if module in named else "--plugin")
+    """Import plugins while the options of `phyblock` are read: before a command's own choices.
 
-
-def _load_plugin(module: str, where: str) -> None:
-    """Import a module that registers what it adds; SpecError that names the line it fails in."""
-    if os.getcwd() not in sys.path:
+    Raises SpecError that names the line in which one fails.
+    """
+    entries = entry_points(group=_ENTRY_POINTS)
+    named = {entry.value.partition(":")[0]: f"plugin {entry.name}" for entry in entries}
+    if modules and os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())
-    try:
-        importlib.import_module(module)
+    for module in dict.fromkeys([*named, *modules]):
+        try:
+            importlib.import_module(module)
+        except Exception as error:
+            last = traceback.extract_tb(error.__traceback__)[-1]
+            place = "" if last.filename.startswith("<") else f" ({last.filename}:{last.lineno})"
+            message = f"cannot be imported: {type(error).__name__}: {error}{place}"
+            where = named.get(module, "--plugin")
+            raise SpecError(Problem(where, message, found=module)) from error
         PLUGINS.append(module)
-    except Exception as error:
-        last = traceback.extract_tb(error.__traceback__)[-1]
-        place = "" if last.filename.startswith("<") else f" ({last.filename}:{last.lineno})"
-        message = f"cannot be imported: {type(error).__name__}: {error}{place}"
-        raise SpecError(Problem(where, message, found=module)) from error
 
 
 @click.group(
@@ -109,12 +105,10 @@ def main() -> None:
         sys.exit(0)
     except click.ClickException as error:
         error.show()
-        # The shell took a value apart that has spaces: `KEY=[A, B]`, `A, B`.
-        has_values = any(re.search(r"=|,$", word) for word in sys.argv[1:])
-        if has_values and "unexpected extra argument" in error.format_message():
+        if "unexpected extra argument" in error.format_message():
             click.echo(f"Hint: {QUOTE_HINT}", err=True)
-        if isinstance(error, click.NoSuchOption):
-            _hint_at_field(error.option_name.lstrip("-").replace("-", "_"))
+        elif isinstance(error, click.NoSuchOption):
+            click.echo("Hint: fields of the suite are set with --set KEY=VALUE", err=True)
         sys.exit(2)
     except click.Abort:
         click.echo("Interrupted.", err=True)
@@ -137,15 +131,6 @@ def main() -> None:
     sys.exit(code if isinstance(code, int) else 0)
 
 
-def _hint_at_field(name: str) -> None:
-    """Say how a field of suites is set, where what was taken for an option is one."""
-    from phyblock.config.suite import Suite
-
-    if (field := Suite.model_fields.get(name)) is not None:
-        value = "[...]" if "tuple" in str(field.annotation) else "..."
-        click.echo(f"Hint: --set '{name}={value}' sets a field of the suite", err=True)
-
-
 def _drop_output() -> None:
     """Give up what standard output refuses to take, or the interpreter would try again."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
@@ -153,22 +138,10 @@ def _drop_output() -> None:
     os.close(nowhere)
 
 
-def show_problems(error: InputError, most: int = 25, most_alike: int = 5) -> None:
-    """Print `most` problems, of those with the same field and message the first `most_alike`."""
-    kinds = [(re.sub(r"\[\d+\]", "[]", p.field), p.message) for p in error.problems]
-    alike, shown, unshown = Counter(kinds), Counter[tuple[str, str]](), 0
-    for problem, kind in zip(error.problems, kinds, strict=True):
-        if shown[kind] == most_alike:
-            continue
-        if shown.total() == most:
-            unshown += 1
-            continue
-        shown[kind] += 1
-        click.echo(
-            click.style("error: ", fg="red", bold=True) + plain_lines(str(problem)), err=True
-        )
-        if shown[kind] == most_alike < alike[kind]:
-            more = f"... and {alike[kind] - most_alike:,} more like it"
-            click.echo(plain_lines(f"{more}: {': '.join(filter(None, kind))}"), err=True)
-    if unshown:
-        click.echo(f"... and {counted(unshown, 'more problem')}", err=True)
+def show_problems(error: InputError, most: int = 25) -> None:
+    """Print what is wrong, an entry a problem, the first ones of many."""
+    for problem in error.problems[:most]:
+        click.secho("error: ", fg="red", bold=True, nl=False, err=True)
+        click.echo(plain_lines(str(problem)), err=True)
+    if (more := len(error.problems) - most) > 0:
+        click.echo(f"... and {counted(more, 'more problem')}", err=True)

@@ -5,12 +5,9 @@ from __future__ import annotations
 import asyncio
 import io
 from collections.abc import Iterable, Mapping, Sequence
-from datetime import date, timedelta
-from importlib.metadata import version
 
 import click
 from PIL import Image as PillowImage
-from rich.console import Console
 
 from phyblock.cli.console import make_console, may_spend, print_rows, shown_path
 from phyblock.cli.options import models_file_option, yes_option
@@ -41,43 +38,33 @@ from phyblock.registry import baseline_names
 from phyblock.run.plan import find_models_file, to_config
 from phyblock.text import counted, did_you_mean
 
-_SOON_DAYS = 180
 _TIERS = " .. "
 
 
 @click.group(invoke_without_command=True)
 @models_file_option
-@click.option(
-    "--retiring",
-    is_flag=True,
-    help=f"List only those that their providers end within {_SOON_DAYS} days, or have ended.",
-)
 @click.pass_context
-def models(ctx: click.Context, models_file: str | None, retiring: bool) -> None:
+def models(ctx: click.Context, models_file: str | None) -> None:
     """List the models that suites may name, by groups; `check NAME` makes one tiny call."""
     path = find_models_file(models_file, None)
     known = ctx.obj = load_models(path)
     if ctx.invoked_subcommand is not None:
         return
     console = make_console()
-    if retiring:
-        _print_retiring(console, [_config(name, known) for name in known])
-        return
     groups: dict[str, Sequence[str]] = {"built in": baseline_names()}
     groups |= {
         f"{GROUP}{one}": with_members([f"{GROUP}{one}"], known) for one in group_names(known)
     }
-    others = [name for name, spec in known.items() if not spec.groups]
-    if others:
+    if others := [name for name, config in known.items() if not config.groups]:
         groups["in no group" if len(others) < len(known) else "models"] = others
-    has_tiers = False
     for title, names in groups.items():
         rows = [_row(name, _config(name, known)) for name in names]
-        has_tiers |= any(_TIERS in price for row in rows for price in row[-2:])
-        print_rows(console, (title, "id", "key", "$/M in", "$/M out"), rows, numbers=2)
+        headings = (title, "id", "key", "ends", "$/M in, out")
+        kept = [i for i in range(len(headings)) if i != 3 or any(row[3] for row in rows)]
+        cells = [[row[i] for i in kept] for row in rows]
+        print_rows(console, [headings[i] for i in kept], cells, numbers=1)
     console.print(f"{counted(len(known), 'model')} in {shown_path(path)}")
-    if has_tiers:
-        console.print(f"a{_TIERS}b: a for short prompts, b for the longest.", style="dim")
+    console.print(f"Of prices a{_TIERS}b, b is that of the longest prompts.", style="dim")
 
 
 def _config(name: str, known: Mapping[str, ModelConfig]) -> ModelConfig:
@@ -86,8 +73,9 @@ def _config(name: str, known: Mapping[str, ModelConfig]) -> ModelConfig:
 
 
 def _row(name: str, config: ModelConfig) -> tuple[str, ...]:
+    """Return name, id, key, the day on which its provider ends it, and its prices."""
     if config.kind != "litellm":
-        return (name, str(config.recording or config.kind), "", "0", "0")
+        return (name, str(config.recording or config.kind), "", "", "0, 0")
     status = api_key_status(config)
     if status.fault:
         key = "cannot be sent"
@@ -95,33 +83,16 @@ def _row(name: str, config: ModelConfig) -> tuple[str, ...]:
         key = "set"
     else:
         key = f"needs {status.variables[0]}" if status.is_needed else "not needed"
-    if (tariff := tariff_of(config)) is None:
-        return (name, config.id, key, "unknown", "unknown")
-    tiers = [tariff, *tariff.tiers]
-    return (
-        name,
-        config.id,
-        key,
-        _usd(p.input for p in tiers),
-        _usd(p.output for p in tiers),
-    )
+    tariff, ends = tariff_of(config), ends_on(config)
+    tiers = [] if tariff is None else [tariff, *tariff.tiers]
+    usd = f"{_usd(one.input for one in tiers)}, {_usd(one.output for one in tiers)}"
+    return (name, config.id, key, ends.isoformat() if ends else "", usd if tiers else "unknown")
 
 
 def _usd(dollars: Iterable[float]) -> str:
     """The price of short prompts, and that of the longest where it is another."""
     shown = [f"{usd:.3f}".rstrip("0").rstrip(".") for usd in dollars]
-    return _TIERS.join(dict.fromkeys((shown[0], shown[-1])))
-
-
-def _print_retiring(console: Console, configs: Sequence[ModelConfig]) -> None:
-    soon = date.today() + timedelta(days=_SOON_DAYS)
-    dated = sorted((day, c.name, c.id) for c in configs if (day := ends_on(c)) is not None)
-    rows = [(name, model_id, day.isoformat()) for day, name, model_id in dated if day <= soon]
-    if not rows:
-        console.print(f"No model here is known to end within {_SOON_DAYS} days.")
-        return
-    print_rows(console, ("model", "id", "ends"), rows, numbers=0)
-    console.print(f"By litellm {version('litellm')}, which may be behind.", style="dim")
+    return _TIERS.join(dict.fromkeys((*shown[:1], *shown[-1:])))
 
 
 @models.command()
@@ -169,7 +140,6 @@ def check(known: Mapping[str, ModelConfig], name: str, yes: bool) -> int:
 
 
 _SIDE_PX = 64
-_QUESTION = "What color is this picture? Answer with one word."
 
 
 async def _ask_tiny(config: ModelConfig) -> Reply:
@@ -180,15 +150,11 @@ async def _ask_tiny(config: ModelConfig) -> Reply:
     buffer = io.BytesIO()
     PillowImage.new("RGB", (_SIDE_PX, _SIDE_PX), (216, 49, 49)).save(buffer, "PNG")
     picture = Image(buffer.getvalue(), "check", _SIDE_PX, _SIDE_PX)
-    messages = (Message("user", (picture, _QUESTION)),)
-    request = Request("check", 0, messages, {}, "", None)
-    model = build_model(
-        config.model_copy(update={"seed": "never", "batch": False}),
-        cache=None,
-        policy=RetryPolicy(attempts=1, retry_for_s=0.0),
-    )
+    question = "What color is this picture? Answer with one word."
+    request = Request("check", 0, (Message("user", (picture, question)),), {}, "", None)
+    alone = config.model_copy(update={"seed": "never", "batch": False})
+    model = build_model(alone, cache=None, policy=RetryPolicy(attempts=1, retry_for_s=0.0))
     try:
-        reply = await model.ask(request)
+        return await model.ask(request) or Reply(text="")
     finally:
         await model.aclose()
-    return reply or Reply(text="")

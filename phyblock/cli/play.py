@@ -11,23 +11,27 @@ from pathlib import Path
 from threading import Thread
 
 import click
-from rich.console import Console
 
+from phyblock.api import load_suite
 from phyblock.cli.console import make_console, print_path
-from phyblock.cli.options import NAME_OR_PATH, UserPath, limit_option, sets_option
+from phyblock.cli.options import (
+    INTERRUPTED,
+    NAME_OR_PATH,
+    UserPath,
+    limit_option,
+    run_out_option,
+    sets_option,
+)
 from phyblock.cli.results import show_tables
-from phyblock.config.suite import load_suite
 from phyblock.errors import Problem, SpecError, reason_of
 from phyblock.files import OutFolder, read_text
-from phyblock.resources import bundled
-from phyblock.run.plan import RunPlan, bundled_suites, find_suite, prompt_dirs
+from phyblock.results.load import load_run
+from phyblock.run.plan import bundled_suites
 from phyblock.run.store import held_run
 from phyblock.web.report import files_of, report_files
 from phyblock.web.server import Server, default_consent
 from phyblock.web.session import Person, PlaySession, outcomes, plan_session
 
-_INTERRUPTED = 130
-_RUNS = Path("results")
 _LARGEST_CONSENT_BYTES = 64 * 1024
 
 
@@ -56,9 +60,7 @@ _LARGEST_CONSENT_BYTES = 64 * 1024
     metavar="RUN",
     help="Show what the models of this run folder did, after the end.",
 )
-@click.option(
-    "--out", type=UserPath(), metavar="DIR", help="Folder. [default: results/SUITE-DIGEST]"
-)
+@run_out_option
 @click.option("--port", type=click.IntRange(0, 65535), default=0, help="[default: any free one]")
 @click.option("--exact", is_flag=True, help="Show the models' prompt unfolded, as for a study.")
 @click.option("--no-browser", is_flag=True, help="Print the address and open nothing.")
@@ -82,48 +84,18 @@ def play(
     """
     text = default_consent() if consent is None else _consent(consent)
     person = Person(name, number, text, exact)
-    path = find_suite(suite)
-    data, prompts = bundled("benchmarks", "data"), prompt_dirs(path)
-    loaded = load_suite(path, sets, data_dir=data, prompt_dirs=prompts)
-    plan = plan_session(loaded, person, limit)
-    folder = out or plan.folder_in(_RUNS)
+    plan = plan_session(load_suite(suite, *sets).loaded, person, limit)
+    folder = out or plan.folder_in(Path("results"))
     if held_run(folder, plan.manifest) is not None:
         OutFolder(folder).check(files_of(page=True))
-    return _serve(make_console(), plan, person, folder, beside, port, opens=not no_browser)
-
-
-def _consent(path: Path) -> str:
-    try:
-        text = read_text(path, _LARGEST_CONSENT_BYTES).strip()
-    except OSError as error:
-        message = f"cannot be read: {reason_of(error)}"
-        raise SpecError(Problem(str(path), message, "--consent")) from error
-    except ValueError as error:
-        raise SpecError(Problem(str(path), str(error), "--consent")) from error
-    if not text:
-        raise SpecError(Problem(str(path), "is empty", "--consent"))
-    return text
-
-
-def _serve(
-    console: Console,
-    plan: RunPlan,
-    person: Person,
-    folder: Path,
-    beside: tuple[Path, ...],
-    port: int,
-    *,
-    opens: bool,
-) -> int:
-    from phyblock.results.load import load_run
-
     for other in beside:
         load_run(other)
+    console = make_console()
 
     def begun() -> None:
         print_path(console, f"Open {server.address}")
         console.print("Ctrl-C ends the session; the same command goes on.", style="dim")
-        if opens:
+        if not no_browser:
             # A browser for terminals would not come back before it is closed.
             Thread(target=webbrowser.open, args=(server.one_time_address,), daemon=True).start()
 
@@ -134,7 +106,7 @@ def _serve(
             console.print(f"{result.settled:,} of {result.samples:,} tasks are answered.")
             console.print("To go on, give the same command again:")
             print_path(console, f"  {shlex.join(['phyblock', *sys.argv[1:]])}")
-            return _INTERRUPTED
+            return INTERRUPTED
         made = show_tables(folder, page=True)
         server.show_files(report_files(folder))
         session.finish(outcomes(folder, person.model, beside))
@@ -143,3 +115,14 @@ def _serve(
         with contextlib.suppress(KeyboardInterrupt):
             server.finished.wait()
     return 0
+
+
+def _consent(path: Path) -> str:
+    try:
+        text = read_text(path, _LARGEST_CONSENT_BYTES).strip()
+    except (OSError, ValueError) as error:
+        message = f"cannot be read: {reason_of(error)}"
+        raise SpecError(Problem(str(path), message, "--consent")) from error
+    if not text:
+        raise SpecError(Problem(str(path), "is empty", "--consent"))
+    return text

@@ -18,8 +18,8 @@ from phyblock.cli.options import (
     UserPath,
     data_folders_option,
     data_option,
+    models_option,
     run_argument,
-    split_names,
 )
 from phyblock.errors import Problem, SpecError
 from phyblock.text import counted, one_line
@@ -125,12 +125,12 @@ def _print_summary(console: Console, summary: Summary) -> None:
 @click.command()
 @run_argument
 @click.argument("other", type=UserPath(), required=False)
-@click.option("--models", metavar="A,B", help="Only these models; of two runs, A of the first.")
+@models_option("Only these models; of two runs, A of the first.")
 @click.option("--track", metavar="NAME", default="", help="[default: the first that they have]")
 @click.option("--measure", metavar="NAME", default="", help="[default: the first of the track]")
 @click.option("--out", type=UserPath(), metavar="DIR", help="Folder for CSV, Markdown and LaTeX.")
 def compare(
-    run: Path, other: Path | None, models: str | None, track: str, measure: str, out: Path | None
+    run: Path, other: Path | None, models: Sequence[str], track: str, measure: str, out: Path | None
 ) -> None:
     """Compare the models of the folder RUN with one another, or those of RUN with OTHER's.
 
@@ -148,13 +148,12 @@ def compare(
     )
     from phyblock.results.load import load_run
 
-    names = split_names(models)
     first = load_run(run)
     if other is None:
-        comparison = compare_models(first, names, track, measure)
+        comparison = compare_models(first, models, track, measure)
     else:
         second = load_run(other)
-        comparison = compare_runs(first, second, names, track, measure)
+        comparison = compare_runs(first, second, models, track, measure)
     console = make_console()
     print_table(console, compare_view(comparison).view)
     if len(comparison.ranks) > 2:
@@ -173,7 +172,7 @@ _LEAST_MM, _MOST_MM, _MM = 60.0, 400.0, 25.4
 @click.command()
 @run_argument
 @click.option("--only", "names", multiple=True, metavar="NAME", help="Only this figure; repeat.")
-@click.option("--models", metavar="A,B", help="Only these models.")
+@models_option("Only these models.")
 @click.option(
     "--width",
     metavar="column|text|MM",
@@ -193,7 +192,7 @@ _LEAST_MM, _MOST_MM, _MM = 60.0, 400.0, 25.4
 def figures(
     run: Path,
     names: tuple[str, ...],
-    models: str | None,
+    models: Sequence[str],
     width: str,
     font: Literal["sans", "serif"],
     no_title: bool,
@@ -223,7 +222,7 @@ def figures(
         raise click.BadParameter(
             f"{width!r} is no width (allowed: {allowed})", param_hint="--width"
         )
-    loaded = of_models(load_run(run), split_names(models))
+    loaded = of_models(load_run(run), models)
     known = figures_of(loaded)
     if unknown := [name for name in names if name not in known]:
         found, allowed = ", ".join(unknown), ", ".join(known)

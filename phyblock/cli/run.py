@@ -16,14 +16,16 @@ from rich.console import Console
 from phyblock.api import completed, load_suite, remarks_on
 from phyblock.cli.console import make_console, may_spend, print_path, print_table, shown_path
 from phyblock.cli.options import (
+    INTERRUPTED,
     NAME_OR_PATH,
     UserPath,
     data_option,
     limit_option,
     models_file_option,
+    models_option,
     run_argument,
+    run_out_option,
     sets_option,
-    split_names,
     yes_option,
 )
 from phyblock.cli.progress import ProgressView
@@ -48,7 +50,6 @@ from phyblock.text import counted, one_line
 from phyblock.tracks import kind_of
 from phyblock.types import MATCHERS, PLAN_PARSERS, Matcher, PlanParser
 
-_INTERRUPTED = 130
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _LINE_EVERY_S = 2.0
 
@@ -56,19 +57,12 @@ _LINE_EVERY_S = 2.0
 @click.command(epilog=f"Bundled suites: {', '.join(bundled_suites())}.")
 @click.argument("suite", type=NAME_OR_PATH)
 @sets_option
-@click.option(
-    "--models",
-    metavar="A,B",
-    help="Run these models in place of the suite's: any of models.yaml, group:NAME for all of a "
-    "group, or the baselines.",
+@models_option(
+    "Run these models in place of the suite's: any of models.yaml, group:NAME for all of a group, "
+    "or the baselines."
 )
 @limit_option
-@click.option(
-    "--out",
-    type=UserPath(),
-    metavar="DIR",
-    help="Folder of the run. [default: results/SUITE-DIGEST]",
-)
+@run_out_option
 @models_file_option
 @click.option("--no-cache", is_flag=True, help="Neither read nor write the reply cache.")
 @click.option("--dry-run", is_flag=True, help="Print calls, tokens and dollars; call nothing.")
@@ -80,7 +74,7 @@ _LINE_EVERY_S = 2.0
 def run(
     suite: str,
     sets: tuple[str, ...],
-    models: str | None,
+    models: Sequence[str],
     limit: int | None,
     out: Path | None,
     models_file: str | None,
@@ -98,7 +92,7 @@ def run(
     console = make_console()
     loaded = load_suite(suite, *sets).loaded
     known = load_models(find_models_file(models_file, loaded.files.path))
-    plan = make_plan(loaded, known, only=split_names(models), limit=limit)
+    plan = make_plan(loaded, known, only=models, limit=limit)
     folder = out or plan.folder_in(Path("results"))
     if held_run(folder, plan.manifest) is not None:
         from phyblock.web.report import files_of
@@ -150,7 +144,7 @@ def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressV
         console.print(f"To go on, {how} the same command again:")
         print_path(console, f"  {shlex.join(['phyblock', *sys.argv[1:]])}")
     if cause == "interrupted" and result.left:
-        return _INTERRUPTED
+        return INTERRUPTED
     return 1 if result.left or result.failed or result.unjudged else 0
 
 

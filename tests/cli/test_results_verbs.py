@@ -74,8 +74,7 @@ def test_compare_says_the_verdict_and_what_flipped(folder: Path, tmp_path: Path)
         call("compare", folder, "--models", "alpha,delta")
     with pytest.raises(SpecError, match="a model twice"):
         call("compare", folder, "--models", "alpha,alpha")
-    with pytest.raises(SpecError, match="empty name"):
-        call("compare", folder, "--models", "alpha,")
+    assert "empty name" in call("compare", folder, "--models", "alpha,").output
     with pytest.raises(StoreError, match=r"holds no run\.yaml"):
         call("compare", folder, tmp_path)
 
