@@ -72,7 +72,11 @@ def _load_plugins(_: click.Context, __: click.Parameter, modules: tuple[str, ...
 @click.group(
     cls=Verbs,
     sections=_SECTIONS,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 80},
+    context_settings={
+        "help_option_names": ["-h", "--help"],
+        "max_content_width": 80,
+        "show_default": True,
+    },
     epilog="Start with: phyblock run quick",
 )
 @click.option(

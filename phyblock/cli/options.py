@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from phyblock.text import did_you_mean
+from phyblock.types import QUOTE_HINT
 
 INTERRUPTED = 130
 """The exit code after Ctrl-C."""
@@ -69,7 +70,7 @@ class Names(click.ParamType[Any]):
         """Return the names."""
         names = [name.strip() for name in value.split(",")] if isinstance(value, str) else value
         if not all(names):
-            self.fail(f"{value!r} holds an empty name (allowed: A,B,C)", param, ctx)
+            self.fail(f"{value!r} holds an empty name: {QUOTE_HINT}", param, ctx)
         return names
 
 

@@ -12,7 +12,6 @@ from threading import Thread
 
 import click
 
-from phyblock.api import load_suite
 from phyblock.cli.console import make_console, print_path
 from phyblock.cli.options import (
     INTERRUPTED,
@@ -25,7 +24,6 @@ from phyblock.cli.options import (
 from phyblock.cli.results import show_tables
 from phyblock.errors import Problem, SpecError, reason_of
 from phyblock.files import OutFolder, read_text
-from phyblock.results.load import load_run
 from phyblock.run.plan import bundled_suites
 from phyblock.run.store import held_run
 from phyblock.web.report import files_of, report_files
@@ -82,9 +80,11 @@ def play(
     Answers are records of the model human:NAME in a run folder. The same command again goes on
     where it stopped.
     """
+    from phyblock.api import load_run, load_suite
+
     text = default_consent() if consent is None else _consent(consent)
     person = Person(name, number, text, exact)
-    plan = plan_session(load_suite(suite, *sets).loaded, person, limit)
+    plan = plan_session(load_suite(Path(suite), *sets).loaded, person, limit)
     folder = out or plan.folder_in(Path("results"))
     if held_run(folder, plan.manifest) is not None:
         OutFolder(folder).check(files_of(page=True))

@@ -5,12 +5,11 @@ Each imports what it needs when it is called.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import click
-from rich.console import Console
 
 from phyblock.cli.console import make_console, print_path, print_table, shown_path
 from phyblock.cli.options import (
@@ -24,9 +23,6 @@ from phyblock.cli.options import (
 from phyblock.errors import Problem, SpecError
 from phyblock.text import counted, one_line
 
-if TYPE_CHECKING:
-    from phyblock.results.tables import Summary
-
 _MB = 1e6
 _FAILURES = 4
 """Messages of failed calls that are shown."""
@@ -38,11 +34,9 @@ _FAILURES = 4
 @click.option("--only", "names", multiple=True, metavar="NAME", help="With --print: this table.")
 @click.option("--paper", is_flag=True, help="With --print: published, ours and difference.")
 @click.option(
-    "--format",
-    "form",
+    *("--format", "form"),
     type=click.Choice(["text", "md", "tex"]),
     default="text",
-    show_default=True,
     help="With --print: how.",
 )
 @data_option
@@ -54,64 +48,48 @@ def report(
     Takes numbers from run.yaml and records.jsonl alone: no model, no network. Draws scenes from the
     data set, where it is at hand.
     """
-    if prints:
-        _print_tables(run, names, form, is_paper=paper)
-    elif names or paper or form != "text":
-        raise click.UsageError("--only, --paper and --format are for --print")
-    else:
-        print_path(make_console(), show_tables(run, data=data))
-
-
-def _print_tables(folder: Path, names: Sequence[str], form: str, *, is_paper: bool) -> None:
+    console = make_console()
+    if not prints:
+        print_path(console, show_tables(run, data))
+        return
     from phyblock.results.load import load_run
     from phyblock.results.paper import PAPER_TABLES, beside_paper
     from phyblock.results.tables import make_tables, table_names
     from phyblock.results.text import to_latex, to_markdown
 
-    run = load_run(folder)
-    if is_paper:
-        made = {f"paper{n}": beside_paper(run, n) for n in PAPER_TABLES}
+    loaded = load_run(run)
+    if paper:
+        made = {f"paper{n}": beside_paper(loaded, n) for n in PAPER_TABLES}
         tables = {name: table for name, table in made.items() if table is not None}
     else:
-        tables = make_tables(run, names or table_names(run))
-    if unknown := [name for name in names if name not in tables]:
-        allowed = ", ".join(tables if is_paper else table_names(run))
-        found = ", ".join(unknown)
-        raise SpecError(Problem(str(folder), "has no such table", "--only", found, allowed))
+        _check_names(run, names, table_names(loaded), "table")
+        tables = make_tables(loaded, names or table_names(loaded))
     if not tables:
-        click.echo("No model of the run has a row in the paper's tables.")
-    for name in names or tables:
-        view = tables[name].view
+        console.print("No model of the run has a row in the paper's tables.")
+    for name, table in tables.items():
         if form == "text":
-            print_table(make_console(), view)
+            print_table(console, table.view)
         elif form == "md":
-            click.echo(to_markdown(view))
+            click.echo(to_markdown(table.view))
         else:
-            click.echo(to_latex(view, f"phyblock-{name}"))
+            click.echo(to_latex(table.view, f"phyblock-{name}"))
 
 
-def show_tables(
-    folder: Path,
-    data: Path | None = None,
-    *,
-    page: bool = True,
-) -> Path:
+def _check_names(run: Path, names: Sequence[str], known: Iterable[str], noun: str) -> None:
+    if unknown := [name for name in names if name not in set(known)]:
+        found, allowed = ", ".join(unknown), ", ".join(known)
+        raise SpecError(Problem(str(run), f"has no such {noun}", "--only", found, allowed))
+
+
+def show_tables(folder: Path, data: Path | None = None, *, page: bool = True) -> Path:
     """Write the tables and the page of a run folder.
 
     Prints the summary; returns the page, or the folder of tables where no page is wanted.
     """
     from phyblock.results.tables import summary_of, write_tables
 
-    written = write_tables(folder)
-    _print_summary(make_console(), summary_of(written.run))
-    if not page:
-        return written.folder
-    from phyblock.web.report import write_report
-
-    return write_report(written, data)
-
-
-def _print_summary(console: Console, summary: Summary) -> None:
+    written, console = write_tables(folder), make_console()
+    summary = summary_of(written.run)
     for table in summary.tables:
         print_table(console, table)
     for model, message, times in summary.failures[:_FAILURES]:
@@ -120,6 +98,11 @@ def _print_summary(console: Console, summary: Summary) -> None:
         console.print(f"and {others:,} other messages", style="yellow")
     for sentence in summary.blind:
         console.print(sentence)
+    if not page:
+        return written.folder
+    from phyblock.web.report import write_report
+
+    return write_report(written, data)
 
 
 @click.command()
@@ -152,8 +135,7 @@ def compare(
     if other is None:
         comparison = compare_models(first, models, track, measure)
     else:
-        second = load_run(other)
-        comparison = compare_runs(first, second, models, track, measure)
+        comparison = compare_runs(first, load_run(other), models, track, measure)
     console = make_console()
     print_table(console, compare_view(comparison).view)
     if len(comparison.ranks) > 2:
@@ -166,34 +148,25 @@ def compare(
         print_path(console, out)
 
 
-_LEAST_MM, _MOST_MM, _MM = 60.0, 400.0, 25.4
-
-
 @click.command()
 @run_argument
 @click.option("--only", "names", multiple=True, metavar="NAME", help="Only this figure; repeat.")
 @models_option("Only these models.")
 @click.option(
     "--width",
-    metavar="column|text|MM",
-    default="text",
-    show_default=True,
-    help="Width: of a column, of the text, or millimeters.",
+    type=click.FloatRange(60, 400),
+    default=178,
+    metavar="MM",
+    help="Width in millimeters; a column of a two-column paper has 85.",
 )
-@click.option(
-    "--font",
-    type=click.Choice(["sans", "serif"]),
-    default="sans",
-    show_default=True,
-    help="Typeface.",
-)
+@click.option("--font", type=click.Choice(["sans", "serif"]), default="sans", help="Typeface.")
 @click.option("--no-title", is_flag=True, help="Leave the title to the caption.")
 @click.option("--out", type=UserPath(), metavar="DIR", help="Folder. [default: RUN/paper]")
 def figures(
     run: Path,
     names: tuple[str, ...],
     models: Sequence[str],
-    width: str,
+    width: float,
     font: Literal["sans", "serif"],
     no_title: bool,
     out: Path | None,
@@ -204,32 +177,13 @@ def figures(
     Draws all figures, unless you name some with --only. Leaves out figures that the run has no
     numbers for.
     """
-    from phyblock.results.figures import (
-        COLUMN_IN,
-        WIDTH_IN,
-        Look,
-        figures_of,
-        write_paper_figures,
-    )
+    from phyblock.results.figures import Look, figures_of, write_paper_figures
     from phyblock.results.load import load_run, of_models
 
-    try:
-        width_in = {"column": COLUMN_IN, "text": WIDTH_IN}.get(width) or float(width) / _MM
-    except ValueError:
-        width_in = 0.0
-    if not _LEAST_MM <= width_in * _MM <= _MOST_MM:
-        allowed = f"column, text, or {_LEAST_MM:g} to {_MOST_MM:g} millimeters"
-        raise click.BadParameter(
-            f"{width!r} is no width (allowed: {allowed})", param_hint="--width"
-        )
     loaded = of_models(load_run(run), models)
-    known = figures_of(loaded)
-    if unknown := [name for name in names if name not in known]:
-        found, allowed = ", ".join(unknown), ", ".join(known)
-        raise SpecError(Problem(str(run), "has no such figure", "--only", found, allowed))
-    look = Look(width_in, font, not no_title)
-    drawn = write_paper_figures(loaded, names, look, out)
-    console = make_console()
+    _check_names(run, names, figures_of(loaded), "figure")
+    look = Look(width / 25.4, font, not no_title)
+    drawn, console = write_paper_figures(loaded, names, look, out), make_console()
     for file in drawn:
         print_path(console, file)
     if not drawn:
@@ -242,8 +196,7 @@ _RUN_FORMS = ("hf", "csv", "parquet")
 @click.command()
 @click.argument("run", type=UserPath(), required=False)
 @click.option(
-    "--to",
-    "form",
+    *("--to", "form"),
     required=True,
     metavar="FORMAT",
     help=f"Of a run: {', '.join(_RUN_FORMS)}. Of questions: vlmevalkit, hf.",
@@ -260,18 +213,15 @@ _RUN_FORMS = ("hf", "csv", "parquet")
     "--data",
     type=NAME_OR_PATH,
     default="phyblock-400",
-    show_default=True,
     help="With --questions: the scenes they are about.",
 )
 @click.option(
     "--limit", type=click.IntRange(min=1), help="With --questions: N, spread over subtasks."
 )
 @click.option(
-    "--size",
-    "size_px",
+    *("--size", "size_px"),
     type=click.IntRange(128, 2048),
     default=512,
-    show_default=True,
     help="With --questions: edge of a picture in pixels.",
 )
 def export(
@@ -358,7 +308,7 @@ def verify(file: Path, data: tuple[Path, ...]) -> None:
 @click.argument("runs", nargs=-1, required=True, type=UserPath())
 @click.option("--out", type=UserPath(), required=True, metavar="DIR", help="Folder of the site.")
 @data_folders_option
-@click.option("--title", default="PhyBlock leaderboard", show_default=True, help="Its heading.")
+@click.option("--title", default="PhyBlock leaderboard", help="Its heading.")
 def site(runs: tuple[Path, ...], out: Path, data: tuple[Path, ...], title: str) -> None:
     """Put RUNS (run folders and bundles) into one static folder: a ranked table, cost against
     score, a page for every model and scene, replays.

@@ -13,7 +13,6 @@ from typing import Any, cast
 import click
 from rich.console import Console
 
-from phyblock.api import completed, load_suite, remarks_on
 from phyblock.cli.console import make_console, may_spend, print_path, print_table, shown_path
 from phyblock.cli.options import (
     INTERRUPTED,
@@ -89,8 +88,10 @@ def run(
     Keeps every record as it comes. Give the same command again to continue where it stopped;
     nothing is asked twice.
     """
+    from phyblock.api import completed, load_suite
+
     console = make_console()
-    loaded = load_suite(suite, *sets).loaded
+    loaded = load_suite(Path(suite), *sets).loaded
     known = load_models(find_models_file(models_file, loaded.files.path))
     plan = make_plan(loaded, known, only=models, limit=limit)
     folder = out or plan.folder_in(Path("results"))
@@ -127,6 +128,8 @@ def _is_agreed(console: Console, plan: RunPlan, folder: Path, **asks: bool) -> b
 
 def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressView) -> int:
     """Print how a run ended, what it cost and how to go on; return the exit code."""
+    from phyblock.api import remarks_on
+
     for remark in remarks_on(result, shown_path(folder)):
         console.print(one_line(remark), style="red")
     done = f"All {result.samples:,} samples are done"

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import os
-import re
 import shlex
-from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import click
 
 from phyblock.cli.console import make_console, print_path, print_rows, shown_path
 from phyblock.cli.options import UserPath, models_file_option, sets_option
-from phyblock.config.models import RECORDED, ModelConfig, load_models
-from phyblock.config.suite import load_suite, suite_model
+from phyblock.config.models import RECORDED, load_models
+from phyblock.config.suite import suite_model
 from phyblock.config.yaml import read_yaml
 from phyblock.data import SCENES_FILE, read_builtin, read_official
 from phyblock.errors import InputError, Problem, SpecError
-from phyblock.files import check_free, read_bytes, writing
+from phyblock.files import check_free, writing
 from phyblock.resources import bundled, reply_cache_file
 from phyblock.run.plan import (
     asking_remarks,
@@ -26,7 +24,6 @@ from phyblock.run.plan import (
     find_suite,
     make_plan,
     model_problems,
-    prompt_dirs,
 )
 from phyblock.text import counted
 from phyblock.tracks import kind_of
@@ -36,13 +33,6 @@ _FILES = (
     ("benchmarks", "schemas", "suite.schema.json"),
     ("benchmarks", "schemas", "models.schema.json"),
 )
-# A models file has model names at its top level, a suite has these.
-_SUITE_KEY = re.compile(rf"^(?:{'|'.join(suite_model().model_fields)})[ \t]*:", re.MULTILINE)
-# Keys that scenes have and neither suites nor models, in YAML and in JSON.
-_SCENE_KEYS = tuple(
-    re.compile(rf"""(?:^|[\s{{,"'-]){key}["']?[ \t]*:[ \t]*(?:[\[#]|$)""", re.MULTILINE)
-    for key in ("blocks", "position")
-)
 
 
 @click.command()
@@ -51,7 +41,6 @@ _SCENE_KEYS = tuple(
     "--suite",
     type=click.Choice(bundled_suites()),
     default="quick",
-    show_default=True,
     help="Bundled suite to begin with.",
 )
 def init(folder: Path, suite: str) -> None:
@@ -123,47 +112,33 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[s
         scenes = counted(len(dataset.tasks), "scene")
         return [f"data set {dataset.name}, {scenes} ({by_level})"]
     path = find_suite(str(path))
-    try:
-        if _has_keys(path, _SUITE_KEY):
-            return _check_suite(path, sets, models_file)
-        known = load_models(path)
-        _check_models(path, known, known)
-        if not known:
-            allowed = "a suite, or a models file with name: provider/model lines"
-            raise SpecError(Problem(str(path), "names nothing", allowed=allowed))
-        return [f"models file, {counted(len(known), 'model')}"]
-    except SpecError as error:
-        if not _has_keys(path, *_SCENE_KEYS):
-            raise
+    data = read_yaml(path).data
+    if isinstance(data, dict) and isinstance(data.get("blocks"), list):
         message, allowed = "holds scenes", "a suite, a models file, or the folder of a data set"
         hint = f"`phyblock scenes complete {shown_path(path)}` makes a data set of them"
-        raise SpecError(Problem(str(path), message, allowed=allowed, hint=hint)) from error
+        raise SpecError(Problem(str(path), message, allowed=allowed, hint=hint))
+    if isinstance(data, dict) and data.keys() & suite_model().model_fields.keys():
+        return _check_suite(path, sets, models_file)
+    known = load_models(path)
+    if problems := list(model_problems(path, known, known)):
+        raise SpecError(problems)
+    if not known:
+        allowed = "a suite, or a models file with name: provider/model lines"
+        raise SpecError(Problem(str(path), "names nothing", allowed=allowed))
+    return [f"models file, {counted(len(known), 'model')}"]
 
 
 def _check_suite(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[str]:
-    data = bundled("benchmarks", "data")
-    suite = load_suite(path, sets, data_dir=data, prompt_dirs=prompt_dirs(path))
+    from phyblock.api import load_suite
+
+    suite = load_suite(path, *sets).loaded
     named = find_models_file(models_file, path)
     known = load_models(named)
-    if suite.models != RECORDED:
-        _check_models(named, known, suite.models)
+    if suite.models != RECORDED and (problems := list(model_problems(named, known, suite.models))):
+        raise SpecError(problems)
     plan = make_plan(suite, known)
     models, samples = counted(len(plan.models), "model"), counted(plan.samples_per_model, "sample")
     return [f"suite {plan.suite.name}, {models}, {samples} a model", *asking_remarks(suite, plan)]
-
-
-def _check_models(path: Path, known: Mapping[str, ModelConfig], names: Collection[str]) -> None:
-    if problems := list(model_problems(path, known, names)):
-        raise SpecError(problems)
-
-
-def _has_keys(path: Path, *keys: re.Pattern[str]) -> bool:
-    """True if a file has such keys; False for what cannot be read, whose reader says why."""
-    try:
-        text = read_bytes(path).decode(errors="replace")
-    except (OSError, ValueError):
-        return False
-    return all(key.search(text) for key in keys)
 
 
 @click.group()

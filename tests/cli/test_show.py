@@ -92,9 +92,7 @@ def test_which_sample_is_meant_must_be_clear(played: Workspace, sample: str, mes
     done = played.phyblock("show", "out", sample)
     assert (done.code, len(done.errors)) == (2, 1)
     assert message in done.errors[0]
-    allowed = done.errors[0].partition("allowed")[2]
-    assert "step_planning/" in allowed
-    assert f"and {11 if sample == 'no-such' else 3} more" in allowed
+    assert done.errors[0].partition("allowed")[2].count("step_planning/") == 5
 
 
 def test_without_its_data_set_a_sample_is_shown_and_not_drawn(played: Workspace) -> None:
