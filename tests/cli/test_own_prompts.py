@@ -37,7 +37,7 @@ def test_a_prompt_beside_the_suite_is_used_and_said(asked: Workspace) -> None:
     assert texts == {"Which of the 16?"}
     assert "NOT sent" not in done.out
     own_prompt(asked).write_text(f"{{# mine #}}\n\nYou are a builder.\n{text}", encoding="utf-8")
-    told = asked.phyblock("validate", "suite.yaml").out.replace("\n", "")
+    told = " ".join(asked.phyblock("validate", "suite.yaml").out.split())
     assert "full_planning.j2; the text outside of its blocks (line 3) is NOT sent" in told
 
 
