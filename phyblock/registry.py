@@ -21,9 +21,6 @@ _MODULES = (
 )
 """Modules that hold a `TRACK`, in the order in which tracks are listed."""
 
-"""The comparison with the paper, which a suite has only if it asks for it."""
-
-
 _registered: dict[str, type[Track]] = {}
 _measures: dict[str, tuple[Any, ...]] = {}
 _baselines: dict[str, dict[str, Callable[..., str]]] = {}

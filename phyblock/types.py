@@ -40,7 +40,7 @@ Physics = Literal["off", "settle", "strict"]
 """What is simulated of every new state, and whether a collapse ends the episode."""
 
 PoseRotation = Literal["candidate", "free"]
-"""True if candidates keep the orientation in which they are shown, or steps bring one."""
+"""The source of a block's orientation: its candidate as it is shown, or the step."""
 StepEnd = Literal["stands", "falls", "knocks_over", "overlaps", "under_floor", "no_block"]
 """How a step that is carried out ends. `stands`: the block is where it was put, and so are the
 others. `falls`: it is not. `knocks_over`: others are not where they were. `overlaps`,
@@ -78,12 +78,11 @@ FAILURES: tuple[Outcome, ...] = tuple(outcome for outcome in OUTCOMES if outcome
 """Every outcome but `ok`."""
 WITHOUT_REPLY: tuple[Outcome, ...] = ("api_error", "missing")
 """Outcomes of samples that the model said nothing about; a refusal is an answer."""
-"""What became of a sample."""
 TransportName = Literal["auto", "litellm", "direct"]
 BATCH_PROVIDERS = ("openai", "hosted_vllm", "anthropic", "gemini")
 """Prefixes of model ids whose servers may take batches in a protocol that is spoken here."""
 SendMode = Literal["auto", "always", "never"]
-"""True if a field that not every provider takes is sent."""
+"""When a field is sent that not every provider takes."""
 ImageDetail = Literal["auto", "low", "medium", "high", "ultra_high", "original"]
 """How closely a provider looks at pictures; each knows some of these."""
 
