@@ -1,9 +1,13 @@
 """Read files within bounds; write them whole, and never over what the user made.
 
-No input may hang, exhaust memory or end the process: the limits are far above what an honest file
-needs. Readers raise OSError for what the disk refuses and ValueError, with a text that can be shown
-as it is, for contents that are refused. A file is written whole or not at all; `OutFolder` writes
-into folders that hold files of the user.
+What a user can rely on:
+
+* No input hangs, exhausts memory or ends the process: readers take regular files alone, within
+  limits far above what an honest file needs. They raise OSError for what the disk refuses and
+  ValueError, with a text that can be shown as it is, for contents that are refused.
+* A kill at any moment leaves the old file or the new one, whole (`atomic_write`).
+* In a folder that may hold files of the user (`OutFolder`), only what phyblock wrote is written
+  again or removed, and links are never followed.
 """
 
 from __future__ import annotations
@@ -16,7 +20,6 @@ import io
 import json
 import math
 import os
-import re
 import shutil
 import stat
 import warnings
@@ -95,17 +98,15 @@ def digest_of_file(path: Path) -> str:
     return digest.hexdigest()
 
 
-def load_json(data: bytes | str, *, finite: bool = True) -> Any:
+def load_json(data: bytes | str) -> Any:
     """Decode JSON whose nesting, integers and floats are bounded.
 
     Raises ValueError (a JSONDecodeError for broken syntax) for NaN, Infinity, a float outside the
-    range of doubles, an integer of more than 300 digits, or nesting of more than 64 levels. With
-    `finite=False` numbers outside that range pass, up to 4,300 digits, for a reader that says which
-    field they stand in.
+    range of doubles, an integer of more than 300 digits, or nesting of more than 64 levels.
     """
 
     def integer(digits: str) -> int:
-        if len(digits) > (LONGEST_INTEGER if finite else 4300):
+        if len(digits) > LONGEST_INTEGER:
             raise ValueError(f"holds a number of {len(digits):,} digits")
         return int(digits)
 
@@ -115,17 +116,9 @@ def load_json(data: bytes | str, *, finite: bool = True) -> Any:
             raise ValueError(f"holds {digits[:20]}, which is outside the range of numbers")
         return value
 
-    def constant(name: str) -> float:
-        raise ValueError(f"holds {name}, which is no JSON")
-
     too_deep = ValueError(f"is nested more than {_DEEPEST_JSON} levels deep")
     try:
-        value = json.loads(
-            data,
-            parse_int=integer,
-            parse_float=number if finite else None,
-            parse_constant=constant if finite else None,
-        )
+        value = json.loads(data, parse_int=integer, parse_float=number, parse_constant=number)
     except RecursionError:
         raise too_deep from None
     level = [value]
@@ -176,25 +169,21 @@ def _open_picture(data: bytes, where: str) -> Image:
     # Decoders of other formats start programs (EPS starts Ghostscript) or are seldom maintained.
     from PIL import Image, UnidentifiedImageError
 
-    too_large = "is a picture of a size that is not allowed"
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            # Sizes are checked below.
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             picture = Image.open(io.BytesIO(data), formats=_PICTURE_FORMATS)
     except UnidentifiedImageError as error:
         found = f"a file that begins with {data[:12]!r}" if data else "an empty file"
         raise DataError(Problem(where, "is no picture", "", found, _PICTURES_ALLOWED)) from error
-    except (Image.DecompressionBombWarning, Image.DecompressionBombError) as error:
-        pixels = re.search(r"\d+", str(error))
-        found = f"{int(pixels[0]):,} pixels" if pixels else reason_of(error)
-        raise DataError(Problem(where, too_large, "", found, _SIZES_ALLOWED)) from error
     except Exception as error:
         raise DataError(_damaged(where, reason_of(error))) from error
     width, height = picture.size
     small, large = min(width, height), max(width, height)
     if small < _LEAST_SIDE_PX or large > _MOST_SIDE_PX or small * large > _MOST_PIXELS:
         picture.close()
-        found = f"{width:,} x {height:,} pixels"
+        found, too_large = f"{width:,} x {height:,} pixels", "is a picture of a size not allowed"
         raise DataError(Problem(where, too_large, "", found, _SIZES_ALLOWED))
     return picture
 
@@ -308,7 +297,6 @@ LIST = ".generated"
 """The file that names what phyblock wrote into a folder."""
 _HEAD = "# What phyblock wrote here and may write again; all else is never touched."
 _LINK = "cannot be written: it is a link, and links are never followed or replaced"
-_CLOSED = "cannot be written in: permission denied"
 _MOVE = "move it away; phyblock writes over nothing that it did not make"
 
 
@@ -326,8 +314,7 @@ class OutFolder:
     def check(self, names: Iterable[str]) -> None:
         """Raise StoreError naming all that is in the way of writing `names`; nothing is written.
 
-        In the way are files that phyblock never wrote, links, and folders that cannot be written
-        in.
+        In the way are files that phyblock never wrote, and links.
         """
         names = list(names)
         # What is there is looked at first: another process lists a name before it writes the file.
@@ -338,28 +325,22 @@ class OutFolder:
             if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
                 problems[self.path / name] = "cannot be written: its name leads out of the folder"
         # The folder itself may be a link: a person named it.
-        for folder in (self.path, *(self.path / below for below in _folders(names))):
-            if folder.is_symlink() and folder != self.path:
+        for folder in (self.path / below for below in _folders(names)):
+            if folder.is_symlink():
                 problems[folder] = _LINK
-            elif folder.exists() and not folder.is_dir() and folder != self.path:
+            elif folder.exists() and not folder.is_dir():
                 problems[folder] = "cannot be written in: it is no folder"
-            elif folder.is_dir() and not os.access(folder, os.W_OK | os.X_OK):
-                problems[folder] = _CLOSED
         for name in there:
             path = self.path / name
             if any(above in problems for above in path.parents):
                 continue
             if path.is_symlink():
                 problems[path] = _LINK
-            elif not path.is_file():
-                problems[path] = "cannot be written: it is no file"
-            elif name not in known:
+            elif name not in known or not path.is_file():
                 problems[path] = "cannot be written: phyblock did not make what is there"
         if problems:
-            let_in = "let yourself write there, or choose another folder"
             raise StoreError(
-                Problem(str(path), message, hint=let_in if message == _CLOSED else _MOVE)
-                for path, message in problems.items()
+                Problem(str(path), message, hint=_MOVE) for path, message in problems.items()
             )
 
     def claim(self, names: Iterable[str]) -> None:

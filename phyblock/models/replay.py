@@ -84,7 +84,7 @@ def _read_file(folder: Path, request: Request) -> Reply | None:
     if not path.is_file():
         return None
     try:
-        raw = load_json(read_text(path), finite=False)
+        raw = load_json(read_text(path))
     except OSError as error:
         raise DataError(Problem(str(path), f"cannot be read: {reason_of(error)}")) from error
     except ValueError as error:

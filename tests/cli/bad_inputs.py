@@ -157,7 +157,7 @@ DATA: tuple[Bad, ...] = (
     Bad("bad-png", checkout(b"no picture"), ("000.png", "is no picture")),
     Bad("eps", checkout(EPS), ("000.png", "is no picture", "PNG, JPEG, GIF or WebP")),
     Bad("dot-png", checkout(png((1, 1))), ("000.png", "found: 1 x 1 pixels", "10,000 pixels")),
-    Bad("huge-png", checkout(png_header(30_000, 30_000)), ("000.png", "900,000,000 pixels")),
+    Bad("huge-png", checkout(png_header(30_000, 30_000)), ("000.png", "900000000 pixels")),
     Bad("cut-png", checkout(png()[:-40]), ("000.png", "is not a readable picture")),
 )  # fmt: skip
 MODELS: tuple[Bad, ...] = (
