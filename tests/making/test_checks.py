@@ -32,8 +32,7 @@ from phyblock.making.workers import open_workers
 from phyblock.sim.contact import GROUND
 from phyblock.sim.dynamics import Trial
 from phyblock.sim.engine import Physics
-from tests.designs.pad import Pad
-from tests.designs.scenes import designed_scene, designed_scenes
+from tests.designs import built, designed_scene, designed_scenes
 from tests.sim.test_geometry import FLOATING, OVERLAPPING
 
 BUILT_IN = Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400"
@@ -57,21 +56,13 @@ def lifted(rise_m: float) -> Scene:
 
 def cellar() -> Scene:
     """A block of cubes, the inner of which do not show."""
-    pad = Pad()
-    for x in (-2, 0, 2):
-        for y in (-2, 0, 2):
-            for _ in range(2):
-                pad.put("cube", y, x)
-    return make_scene("cellar", (4,), pad.blocks)
+    cubes = [f"cube {y},{x}" for x in (-2, 0, 2) for y in (-2, 0, 2) for _ in range(2)]
+    return make_scene("cellar", (4,), built("; ".join(cubes)).blocks)
 
 
 def beam() -> Scene:
     """It stands when finished, and falls before its second weight is there."""
-    pad = Pad()
-    pad.put("cube")
-    pad.put("cuboid3", pose="flat-y")
-    pad.pair("cube", 2.8)
-    return make_scene("beam", (1,), pad.blocks)
+    return make_scene("beam", (1,), built("cube; cuboid3:flat-y; 2 cube 2.8").blocks)
 
 
 def offering(change: object) -> SceneFacts:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from phyblock.domain import BLOCK_TYPES, KIT_PALETTE, Scene
 from phyblock.domain.symmetry import canonical_form
+from phyblock.making.checks import FORM, PHYSICS, SceneFacts, findings_of
 from phyblock.making.scenes.designs import BUILDINGS, COMPOSITIONS, CREATURES, beside
 from phyblock.making.scenes.production import (
     GROUP_LEVELS,
@@ -22,12 +23,10 @@ from phyblock.making.scenes.production import (
     produce,
     shares,
 )
-from phyblock.making.scenes.sketch import PALETTES, POSES, Draft
+from phyblock.making.scenes.sketch import PALETTES, POSES, Draft, Sketch
 from phyblock.making.workers import open_workers
 from phyblock.sim.contact import bounds_m, find_gaps, find_overlaps
 from phyblock.sim.pictures import hidden_blocks
-from tests.designs.acceptance import accept, form_problems
-from tests.designs.pad import Pad
 
 grid = st.integers(-3, 3)
 steps = st.lists(
@@ -44,7 +43,7 @@ steps = st.lists(
 @given(steps)
 @settings(max_examples=40, deadline=None)
 def test_whatever_is_put_down_neither_overlaps_nor_floats(drawn) -> None:
-    sketch = Pad()
+    sketch = Sketch()
     for block_type, y, x, pose in drawn:
         sketch.put(block_type, y, x, pose)
     assert find_overlaps(sketch.blocks, 1e-5) == ()
@@ -71,7 +70,8 @@ def test_what_the_grammar_draws_keeps_its_limits(request_: Request) -> None:
     scene = draw(request_)
     if scene is not None:
         assert scene.levels == GROUP_LEVELS[request_.group]
-        assert form_problems(scene, PALETTES[request_.palette]) == ()
+        facts = SceneFacts(scene, palette=PALETTES[request_.palette])
+        assert list(findings_of(facts, FORM)) == []
         assert find_overlaps(scene.blocks) == ()
         assert find_gaps(scene.blocks) == ()
         assert len({block.look for block in scene.blocks}) <= 14
@@ -160,7 +160,7 @@ def test_shares_add_up(count: int, levels: set[int]) -> None:
 @pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.slow)])
 def test_every_scene_is_accepted_again_with_the_long_trial(scenes: list[Scene], every: int) -> None:
     for scene in scenes[::every]:
-        accept(scene)
+        assert list(findings_of(SceneFacts(scene), (*FORM, *PHYSICS))) == []
         assert hidden_blocks(scene) == ()
 
 

@@ -12,7 +12,7 @@ from phyblock.domain.symmetry import SYMMETRIES, Symmetry, canonical_form
 from phyblock.making.scenes.sketch import POSES, transformed
 from phyblock.sim.contact import find_overlaps, support_graph
 from phyblock.sim.pictures import drawn_m
-from tests.designs.scenes import designed_scenes
+from tests.designs import designed_scenes
 
 SCENES = designed_scenes()
 EVERY_POSE = [(kind, euler) for kind in BLOCK_TYPES for euler in POSES[kind].values()]

@@ -28,8 +28,7 @@ from phyblock.sim.dynamics import (
 )
 from phyblock.sim.engine import ENGINES, Physics, Pose, World
 from phyblock.sim.outcomes import OUTCOME_SETTINGS, Push, after, after_removal, holds
-from tests.designs.pad import Pad
-from tests.designs.scenes import designed_scenes
+from tests.designs import built, designed_scenes
 from tests.sim.structures import block, counterweighted_beam, tower
 from tests.sim.test_geometry import FLOATING
 
@@ -128,17 +127,12 @@ def test_steps_stand_as_the_long_trial_says(name: str) -> None:
 
 
 def test_what_falls_midway_or_slowly_is_named_at_its_step() -> None:
-    sketch = Pad()
-    sketch.put("cube")
-    sketch.put("cuboid3", pose="flat-y")
-    sketch.pair("cube", 2.8)
+    sketch = built("cube; cuboid3:flat-y; 2 cube 2.8")
     steps = [(), (), (2, 3), ()]
     assert [step.fallen for step in check_steps(sketch.blocks, FIRST)] == steps
     assert [check(sketch.blocks[:n], FIRST).fallen for n in range(1, 5)] == steps
     # The load reaches 0.1 mm past the balance point: the slowest fall that a grid can hold.
-    slow = Pad()
-    slow.put("cube")
-    slow.put("cuboid3", 1.004, pose="flat-y")
+    slow = built("cube; cuboid3:flat-y 1.004")
     assert not check(slow.blocks, FIRST).stable
 
 

@@ -63,7 +63,7 @@ from phyblock.sim.question_pictures import (
 )
 from phyblock.sim.ruled import kit_key, ruled_key
 from phyblock.types import BACKGROUNDS, Background
-from tests.designs.scenes import designed_scene
+from tests.designs import designed_scene
 from tests.sim.structures import block, clouds, scene_of, tower
 
 DATA = Path(__file__).parents[2] / "benchmarks" / "data"
