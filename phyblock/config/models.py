@@ -114,6 +114,8 @@ def host_of(url: str) -> str:
 
 
 def _one_or_list(value: object) -> object:
+    if value == []:
+        raise fault(Fault("has too few items", "at least 1"))
     return () if value is None else value if isinstance(value, list | tuple) else (value,)
 
 

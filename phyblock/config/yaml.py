@@ -1,8 +1,8 @@
 """YAML with the place of every key and value, so that errors can point at them; --set overrides.
 
 Scalars follow YAML 1.2's core schema, not PyYAML's 1.1: `on`, `no` and dates are text, `1e-3` is
-a number, `010` is ten. Keys are always text, as written. Only plain data is read: no tags beyond
-the standard ones, anchors and merge keys (`<<`) yes, a key written twice no, no infinity.
+a number, `010` is ten. Keys are always text, as written. Only plain data is read: anchors, but no
+merge keys (`<<`), no tags beyond the standard ones, no key twice, no infinity.
 """
 
 from __future__ import annotations
@@ -249,26 +249,20 @@ class _Walker:
         raise self._error(node, path, "has a tag that is not allowed", node.tag)
 
     def _mapping(self, node: yaml.MappingNode, path: FieldPath) -> dict[str, Any]:
-        own: dict[str, Any] = {}
-        parts: list[yaml.Node] = []
+        data: dict[str, Any] = {}
         for key_node, value_node in node.value:
             if not isinstance(key_node, yaml.ScalarNode):
                 raise self._error(key_node, path, "has a key that is not plain text")
-            if key_node.tag == _TAG + "merge":
-                several = isinstance(value_node, yaml.SequenceNode)
-                parts += value_node.value if several else [value_node]
-                continue
             key = self._text(key_node, path)
             here = (*path, key)
-            if key in own:
+            if key_node.tag == _TAG + "merge":
+                hint = "repeat the keys, or name the whole mapping with *NAME"
+                raise self._error(key_node, here, "is not supported", hint=hint)
+            if key in data:
                 hint = f"the first is at {self.source.where(here, key=True)}"
                 raise self._error(key_node, here, "is written twice", hint=hint)
-            own[key] = self.build(value_node, key_node, here)
-        for part in parts:
-            if not isinstance(part, yaml.MappingNode):
-                raise self._error(part, path, "merges (<<) what is not a mapping")
-            own = {**self.build(part, part, path), **own}
-        return own
+            data[key] = self.build(value_node, key_node, here)
+        return data
 
     def _scalar(self, node: yaml.ScalarNode, kind: str, path: FieldPath) -> Any:
         text = self._text(node, path)
