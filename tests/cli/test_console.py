@@ -18,7 +18,7 @@ from phyblock.cli.progress import ProgressView
 from phyblock.results.export import export_run
 from phyblock.results.load import load_run
 from phyblock.results.tables import summary_of, write_tables
-from phyblock.results.text import Column, TextTable, to_csv, to_latex, to_markdown
+from phyblock.results.text import Column, TextTable, to_csv
 from phyblock.run.events import ModelStopped, RunStarted
 from tests.web.factory import LEVELS, manifest, record, score, write_run
 
@@ -78,17 +78,6 @@ def test_tables_show_names_as_they_are() -> None:
     assert shown.count(SHOWN) == 7
     assert "\x1b" not in shown
     assert any(SHOWN in line and line.rstrip().endswith("1.0") for line in shown.splitlines())
-
-
-def test_files_hold_names_on_one_line() -> None:
-    columns = (Column("Model", is_text=True), Column("F1"))
-    view = TextTable("caption", columns, ((NAME, "1.0"), ("b", "2.0")))
-    table_lines = [line for line in to_markdown(view).splitlines() if line.startswith("|")]
-    assert len(table_lines) == 4
-    assert all(line.count("|") - line.count("\\|") == 3 for line in table_lines)
-    rows = [line for line in to_latex(view, "x").splitlines() if line.endswith("\\\\")]
-    assert len(rows) == 3
-    assert all(row.count("&") - row.count("\\&") == 1 for row in rows)
 
 
 def test_no_cell_of_any_csv_is_a_formula(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -165,37 +166,6 @@ def test_a_run_writes_through_no_link(suite: Workspace) -> None:
     assert (suite.root / "theirs").read_text() == "mine"
 
 
-def test_scripts_that_we_did_not_write_stay_whatever_their_names(finished: Path) -> None:
-    theirs = finished / "report" / "0123456789ab" / "index.js"
-    put(theirs)
-    write_report(write_tables(finished))
-    (first,) = set((finished / "report").iterdir()) - {theirs.parent}
-    put(first / "records-7.js")
-    with (finished / "records.jsonl").open("a") as file:
-        file.write((finished / "records.jsonl").read_text().splitlines()[0] + "\n")
-    write_report(write_tables(finished))
-    (second,) = set((finished / "report").iterdir()) - {theirs.parent, first}
-    assert theirs.read_text() == "mine"
-    assert [path.name for path in first.iterdir()] == ["records-7.js"]
-    assert (second / "samples.js").is_file()
-    assert not list(finished.glob("*.part"))
-
-
-def test_a_link_in_the_place_of_a_build_is_not_followed(finished: Path, tmp_path: Path) -> None:
-    put(tmp_path / "theirs" / "index.js")
-    (finished / "report").mkdir()
-    (finished / "report" / "0123456789ab").symlink_to(tmp_path / "theirs")
-    page = write_report(write_tables(finished))
-    assert (finished / "report" / "0123456789ab").is_symlink()
-    (build,) = (path for path in (finished / "report").iterdir() if not path.is_symlink())
-    build.rename(tmp_path / "build")
-    (finished / "report" / build.name).symlink_to(tmp_path / "theirs")
-    with pytest.raises(StoreError, match="it is a link"):
-        write_report(write_tables(finished))
-    assert files(tmp_path / "theirs") == {"index.js": b"mine"}
-    assert page.is_file()
-
-
 def test_reports_that_are_written_at_once_all_come_to_their_end(finished: Path) -> None:
     def write(_: int) -> Path:
         return write_report(write_tables(finished))
@@ -220,30 +190,38 @@ def test_scores_go_to_no_folder_of_another(suite: Workspace) -> None:
     assert files(suite.root) == before
 
 
-def test_an_export_replaces_itself_and_nothing_else(finished: Path, tmp_path: Path) -> None:
-    for place in ((), ("--out", tmp_path / "mine")):
-        call("export", finished, "--to", "csv", *place)
-        call("export", finished, "--to", "csv", *place)
-    put(tmp_path / "theirs" / "records.csv")
-    with pytest.raises(StoreError, match=r"records\.csv: .*phyblock did not make"):
-        call("export", finished, "--to", "csv", "--out", tmp_path / "theirs")
-    assert files(tmp_path / "theirs").keys() == {"records.csv", LIST}
-    assert (tmp_path / "theirs" / "records.csv").read_text() == "mine"
+WRITING: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "export": (("export", "{run}", "--to", "csv"), "records.csv", "phyblock did not make"),
+    "compare": (("compare", "{run}"), "flipped.csv", "phyblock did not make"),
+    "figures": (("figures", "{run}", "--only", "errors"), "errors.pdf", "phyblock did not make"),
+    "scenes": (("scenes", "generate", "--jobs", "1"), "SHA256SUMS", "already there"),
+    "questions": (("questions", "generate", "--jobs", "1"), "SHA256SUMS", "already there"),
+    "render": (
+        ("scenes", "render", "phyblock-400", "l1-001-animal"),
+        "l1-001-animal-oblique-checkerboard.png",
+        "phyblock did not make",
+    ),
+}
 
 
-def test_a_comparison_replaces_itself_and_nothing_else(tmp_path: Path) -> None:
+@pytest.mark.parametrize("verb", WRITING)
+def test_a_verb_writes_over_its_own_files_and_no_others(tmp_path: Path, verb: str) -> None:
     records = [
         record(model, scene, scores=[score(1, 1, 1)])
         for model in ("alpha", "beta")
         for scene in LEVELS
     ]
-    folder = write_run(tmp_path / "run", records, manifest(seeds=[0]))
-    for _ in range(2):
-        call("compare", folder, "--out", tmp_path / "out")
-    put(tmp_path / "theirs" / "flipped.csv")
-    with pytest.raises(StoreError, match=r"flipped\.csv: .*phyblock did not make"):
-        call("compare", folder, "--out", tmp_path / "theirs")
-    assert (tmp_path / "theirs" / "flipped.csv").read_text() == "mine"
+    run = write_run(tmp_path / "run", records, manifest(seeds=[0]))
+    words, name, said = WRITING[verb]
+    called = [word.format(run=run) for word in words]
+    if "generate" not in words:
+        for _ in range(2):
+            call(*called, "--out", tmp_path / "ours")
+    put(tmp_path / "theirs" / name)
+    with pytest.raises(StoreError, match=f"{re.escape(name)}: .*{said}"):
+        call(*called, "--out", tmp_path / "theirs")
+    assert (tmp_path / "theirs" / name).read_text() == "mine"
+    assert set(files(tmp_path / "theirs")) <= {name, LIST}
 
 
 def test_init_writes_through_no_link(tmp_path: Path) -> None:
@@ -252,25 +230,6 @@ def test_init_writes_through_no_link(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match=r"models\.yaml: is already there"):
         call("init", tmp_path / "new")
     assert not (tmp_path / "elsewhere.yaml").exists()
-
-
-@pytest.mark.parametrize("verb", ["scenes", "questions"])
-def test_a_data_set_is_made_over_no_sums_of_another(tmp_path: Path, verb: str) -> None:
-    put(tmp_path / "SHA256SUMS")
-    with pytest.raises(StoreError, match="SHA256SUMS: is already there"):
-        call(verb, "generate", "--jobs", "1", "--out", tmp_path)
-    assert files(tmp_path) == {"SHA256SUMS": b"mine"}
-
-
-def test_pictures_are_drawn_over_none_of_another(suite: Workspace) -> None:
-    name = "t1-oblique-checkerboard.png"
-    words = ("scenes", "render", suite.root / "data", "t1", "--out")
-    for _ in range(2):
-        call(*words, suite.root / "pictures")
-    put(suite.root / "theirs" / name)
-    with pytest.raises(StoreError, match="phyblock did not make"):
-        call(*words, suite.root / "theirs")
-    assert (suite.root / "theirs" / name).read_text() == "mine"
 
 
 def refused(workspace: Workspace, output: int, *words: str | bytes) -> tuple[int, str]:
