@@ -30,7 +30,8 @@ const Charts = (() => {
     const at = (value) => `${Math.max(0, Math.min(100, (100 * value) / most))}%`;
     const hasSolved = track.best !== null;
     const columns = [["rank", "Rank"], ["text", "Model"], ["bar-head", el("span", { class: "labels" }, lines.map(([name, value, kind]) =>
-      el("span", { class: kind, style: { left: at(value) } }, `${name} ${number(value)}`)))],
+      // Moved by the same share of its width, a label stays within its column.
+      el("span", { class: kind, style: { left: at(value), transform: `translateX(-${at(value)})` } }, `${name} ${number(value)}`)))],
     ["", `${track.main}${track.unit ? ` (${track.unit})` : ""}`], hasSolved && ["", "Solved of all"],
     levels.length && ["text", "Levels 1 to 4"]].filter(Boolean);
     const bar = (row) => {

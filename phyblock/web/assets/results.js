@@ -96,7 +96,8 @@ const Results = (() => {
     const built = Stage.picture("What was built", null);
     hero.replaceChildren(
       el("figure", {}, el("figcaption", {}, "Goal"), Stage.picture("The goal", [scene.blocks])),
-      el("ol", {}, scene.candidates.map((one, i) => el("li", {}, el("span", { class: "number" }, String(i + 1)), Stage.candidate(one, i + 1)))),
+      el("figure", {}, el("figcaption", {}, "Candidates"), el("ol", {}, scene.candidates.map((one, i) =>
+        el("li", {}, el("span", { class: "number" }, String(i + 1)), Stage.candidate(one, i + 1))))),
       el("figure", {}, el("figcaption", {}, `Built by ${name}`), built, said));
     let at = Stage.isStill() ? end : 0;
     const tick = () => {
