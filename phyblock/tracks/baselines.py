@@ -10,7 +10,6 @@ in those held out. Only what lies above chance tells of a shortcut.
 from __future__ import annotations
 
 import itertools
-import math
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -228,12 +227,9 @@ class NumberField:
     leap: float
     start: float | None = None
 
-    def check(self, value: float) -> None:
-        """Raise ValueError for what is no such number."""
-        if not math.isfinite(value) or abs(value) > self.most:
-            raise ValueError(f"holds {self.name} {value:g} outside of ±{self.most:g} {self.unit}")
-        if abs(value - round(value, self.decimals)) > 1e-9:
-            raise ValueError(f"holds {self.name} {value!r} with more than {self.decimals} decimals")
+    def allows(self, value: float) -> bool:
+        """True for a number in these bounds; none is no finite number."""
+        return abs(value) <= self.most and abs(value - round(value, self.decimals)) <= 1e-9
 
 
 @dataclass(frozen=True)
@@ -242,20 +238,6 @@ class Pick:
 
     place: int
     numbers: tuple[float, ...] = ()
-
-
-def picks_of(places: Sequence[int], numbers: Sequence[Sequence[float]] = ()) -> tuple[Pick, ...]:
-    """Return picks by their places, and the numbers of each where there are any.
-
-    Raises ValueError where not every pick has its numbers, and for a number that fits no float.
-    """
-    own = numbers or [()] * len(places)
-    if len(own) != len(places):
-        raise ValueError(f"holds numbers of {len(own)} picks, and {len(places)} picks")
-    try:
-        return tuple(Pick(p, tuple(map(float, n))) for p, n in zip(places, own, strict=True))
-    except OverflowError:
-        raise ValueError("holds a number outside of the range of numbers") from None
 
 
 @dataclass(frozen=True)
@@ -288,19 +270,26 @@ class Picking:
         Raises ValueError for too few or many, places that there are not, repeats where none may
         be, and numbers that are lacking or not allowed.
         """
-        if not self.least <= len(picks) <= self.most:
-            raise ValueError(f"holds {len(picks)} picks in place of {self.least} to {self.most}")
         places = [pick.place for pick in picks]
-        if not all(0 <= place < len(self.choices) for place in places):
-            raise ValueError(f"holds picks outside of 0 to {len(self.choices) - 1}")
-        if not self.repeats and len(set(places)) < len(picks):
-            raise ValueError("holds a pick twice")
-        for pick in picks:
-            if len(pick.numbers) != len(self.fields):
-                found, wanted = len(pick.numbers), len(self.fields)
-                raise ValueError(f"holds {found} numbers with a pick in place of {wanted}")
-            for field, value in zip(self.fields, pick.numbers, strict=True):
-                field.check(value)
+        is_answer = (
+            self.least <= len(picks) <= self.most
+            and all(0 <= place < len(self.choices) for place in places)
+            and (self.repeats or len(set(places)) == len(places))
+            and all(len(pick.numbers) == len(self.fields) for pick in picks)
+            and all(
+                field.allows(value)
+                for pick in picks
+                for field, value in zip(self.fields, pick.numbers, strict=True)
+            )
+        )
+        if not is_answer:
+            rules = [f"{self.least} to {self.most} picks of 0 to {len(self.choices) - 1}"]
+            rules += [] if self.repeats else ["none twice"]
+            rules += [
+                f"{one.name} within ±{one.most:g} {one.unit} with at most {one.decimals} decimals"
+                for one in self.fields
+            ]
+            raise ValueError(f"holds picks that make no answer: it needs {', '.join(rules)}")
         return self.write(picks)
 
 

@@ -92,7 +92,15 @@ def goal_blind_plans(
         return {}
     kin = related(scenes)
     goals = [Goal(scene, candidates[scene.id], setting) for scene in scenes]
-    ways = list(_ways(scenes, goals, kin, candidates, setting, keys, repeats))
+    offered = [units(candidates[scene.id], setting) for scene in scenes]
+    heights = [of.tolist() for of in _heights(scenes, offered, goals, kin)]
+    ways = []
+    for key in keys:
+        likely = [of.tolist() for of in chances(offered, goals, kin, key)]
+        # By height; or all once by height, then all a second time.
+        for way in product(_THRESHOLDS, (False, True), {False, repeats}):
+            both = zip(offered, likely, heights, strict=True)
+            ways.append([_plan(*of_scene, *way) for of_scene in both])
 
     @functools.cache
     def score(place: int, plan: Plan) -> tuple[int, int]:
@@ -172,26 +180,6 @@ def _left_out(
     for place, others in enumerate(kin):
         rest = total - table[others].sum(axis=0)
         yield rest[rows[place]], rest.sum(axis=0)
-
-
-def _ways(
-    scenes: Sequence[Scene],
-    goals: Sequence[Goal],
-    kin: Sequence[Sequence[int]],
-    candidates: Mapping[str, CandidateSet],
-    setting: Setting,
-    keys: Sequence[Key],
-    repeats: bool,
-) -> Iterator[list[Plan]]:
-    """Yield plans for all scenes, made in one way after another."""
-    offered = [units(candidates[scene.id], setting) for scene in scenes]
-    heights = [of.tolist() for of in _heights(scenes, offered, goals, kin)]
-    for key in keys:
-        likely = [of.tolist() for of in chances(offered, goals, kin, key)]
-        # By height; or all once by height, then all a second time.
-        for way in product(_THRESHOLDS, (False, True), {False, repeats}):
-            both = zip(offered, likely, heights, strict=True)
-            yield [_plan(*of_scene, *way) for of_scene in both]
 
 
 def _plan(

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import accumulate
+from itertools import accumulate, takewhile
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
@@ -185,41 +185,6 @@ class EpisodeRecord(Record):
         return tuple(turn for turn in self.turns if turn.outcome is not None)
 
 
-@dataclass
-class Tally:
-    """The use of an episode's limits."""
-
-    steps: int = 0
-    failures: int = 0
-    repeats: int = 0
-    tokens: int = 0
-    usd: float = 0.0
-    last_failed: int | None = None
-
-    def count(self, move: int | None, *, is_placed: bool) -> None:
-        """Count a step: the candidate that was named, None for a reply that could not be read."""
-        self.steps += 1
-        if is_placed:
-            self.failures = self.repeats = 0
-            self.last_failed = None
-            return
-        self.failures += 1
-        self.repeats = self.repeats + 1 if move == self.last_failed else 1
-        self.repeats = 0 if move is None else self.repeats
-        self.last_failed = move
-
-    def ending(self, spec: StepsSpec, n_blocks: int) -> Ending | None:
-        """Return the first limit of a suite that is reached, or None."""
-        reached: tuple[tuple[Ending, float, float | None], ...] = (
-            ("max_repeats", self.repeats, spec.max_repeats),
-            ("max_failures", self.failures, spec.max_failures),
-            ("max_steps", self.steps, spec.most_steps(n_blocks)),
-            ("max_tokens", self.tokens, spec.max_episode_tokens),
-            ("max_cost", self.usd, spec.max_episode_usd),
-        )
-        return next((name for name, n, most in reached if most is not None and n >= most), None)
-
-
 def majority(replies: Sequence[ParsedMove]) -> int:
     """Place of the reply that speaks for all: the first with the operation named most often.
 
@@ -359,14 +324,15 @@ _NOT_TRIED = ("done", *get_args(MoveProblem))
 
 @dataclass(frozen=True)
 class PastStep:
-    """A step that was taken: the operation, what became of it, the reply that stands for it, and
-    the picture that it was chosen from (None where none is sent).
+    """A step that was taken: the operation, what became of it, the reply that stands for it, the
+    picture that it was chosen from (None where none is sent), and the candidate that was named.
     """
 
     operation: str
     outcome: StepOutcome
     reply: str
     seen: Image | None
+    move: int | None = None
 
     def report(self, feedback: Feedback) -> str:
         """Return the message to the model about it."""
@@ -557,8 +523,8 @@ class StepEpisode:
         self._seed, self._params, self._fell = seed, params, fell
         self._shop = track.shop if with_messages else None
         self._assembly = Assembly(task.scene, task.candidates, track.accepts, self._spec.gating)
-        self._tally = Tally()
         self._past: list[PastStep] = []
+        self._failed: list[PastStep] = []
         self._turns: list[dict[str, Any]] = []
         self._votes: list[tuple[ParsedMove, str]] = []
         self._seen: Image | None = None
@@ -570,7 +536,7 @@ class StepEpisode:
             await self._settle()
         if self.ending is not None:
             return None
-        track, task, assembly, tally = self._track, self._task, self._assembly, self._tally
+        track, task, assembly = self._track, self._task, self._assembly
         messages: tuple[Message, ...] = ()
         if self._shop is not None:
             drawings = (*track.drawings(task), track.draw_state(task, self._blocks()))
@@ -581,11 +547,11 @@ class StepEpisode:
             task.candidates,
             assembly.right_moves(),
             assembly.exact_moves(),
-            tally.last_failed,
-            tally.steps,
+            self._failed[-1].move if self._failed else None,
+            len(self._past),
             partial(track.guess, task),
         )
-        request = track.asked(task, tally.steps, self._params, messages, subject)
+        request = track.asked(task, len(self._past), self._params, messages, subject)
         sample, samples = len(self._votes), self._spec.samples
         key = request.key if samples == 1 else f"{request.key}.{sample + 1}"
         return replace(request, key=key, seed=self._seed * samples + sample)
@@ -593,8 +559,6 @@ class StepEpisode:
     def take(self, request: Request, reply: Reply, prompt: SentPrompt | None = None) -> None:
         """Go on with the reply to the last request."""
         parsed = parse_move(reply.text)
-        self._tally.tokens += reply.tokens
-        self._tally.usd += reply.cost_usd or 0.0
         move = "Done" if parsed.is_done else parsed.move
         turn = {
             "n": len(self._turns) + 1,
@@ -602,7 +566,7 @@ class StepEpisode:
             "prompt": prompt,
             "key": request.key,
             "seed": request.seed,
-            "step": self._tally.steps + 1,
+            "step": len(self._past) + 1,
             "parse": {"rule": parsed.rule, "move": move, "problem": parsed.problem},
             "outcome": None,
             "placed": None,
@@ -652,15 +616,30 @@ class StepEpisode:
             turn["swapped"] = [list(pair) for pair in move.swapped]
         turn["outcome"] = outcome
         turn["world"] = list(self._assembly.vertices)
-        self._past.append(PastStep(operation, outcome, reply, self._seen))
-        self._tally.count(parsed.move, is_placed=outcome == "placed")
+        step = PastStep(operation, outcome, reply, self._seen, parsed.move)
+        self._past.append(step)
+        self._failed = [] if outcome == "placed" else [*self._failed, step]
         self._is_settled = outcome != "placed" or self._spec.physics == "off"
         if self._assembly.is_complete:
             self.ending = "completed"
         elif outcome == "done":
             self.ending = "done"
         else:
-            self.ending = self._tally.ending(self._spec, len(self._task.scene))
+            self.ending = self._limit()
+
+    def _limit(self) -> Ending | None:
+        """Return the first limit of the suite that is reached, or None."""
+        spec, replies = self._spec, [turn["reply"] for turn in self._turns]
+        moves = [step.move for step in reversed(self._failed)]
+        same = takewhile(lambda move: move is not None and move == moves[0], moves)
+        reached: tuple[tuple[Ending, float, float | None], ...] = (
+            ("max_repeats", len(list(same)), spec.max_repeats),
+            ("max_failures", len(moves), spec.max_failures),
+            ("max_steps", len(self._past), spec.most_steps(len(self._task.scene))),
+            ("max_tokens", sum(reply.tokens for reply in replies), spec.max_episode_tokens),
+            ("max_cost", sum(reply.cost_usd or 0.0 for reply in replies), spec.max_episode_usd),
+        )
+        return next((name for name, n, most in reached if most is not None and n >= most), None)
 
     async def _settle(self) -> None:
         """Let the assembly go; what falls is put back, or ends the episode."""

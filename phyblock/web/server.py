@@ -24,7 +24,7 @@ from urllib.parse import urlsplit
 
 from phyblock.errors import Problem, SpecError, reason_of
 from phyblock.files import load_json
-from phyblock.tracks.baselines import Pick, picks_of
+from phyblock.tracks.baselines import Pick
 from phyblock.web.pack import asset
 from phyblock.web.session import NotNowError, PlaySession
 
@@ -158,7 +158,10 @@ def _answer(body: Mapping[str, Any]) -> tuple[int, tuple[Pick, ...]]:
         raise ValueError("holds picks that are no whole numbers")
     if not all(isinstance(own, list) and {*map(type, own)} <= {int, float} for own in numbers):
         raise ValueError("holds numbers that are none")
-    return change, picks_of(picks, numbers)
+    numbers = numbers or [()] * len(picks)
+    if len(numbers) != len(picks):
+        raise ValueError(f"holds numbers of {len(numbers)} picks, and {len(picks)} picks")
+    return change, tuple(map(Pick, picks, map(tuple, numbers)))
 
 
 class _Listener(ThreadingHTTPServer):

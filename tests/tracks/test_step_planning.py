@@ -30,7 +30,6 @@ from phyblock.tracks.step_planning import (
     Feedback,
     PastStep,
     StepPlanning,
-    Tally,
 )
 from phyblock.types import SETTINGS, Setting
 from tests.parsing.test_move import REPLIES
@@ -290,16 +289,29 @@ def test_several_samples_a_step_are_voted_on() -> None:
     assert scores(fields, "attempted") == (1, 0, 2)
 
 
-@settings(max_examples=50, deadline=None)
-@given(st.lists(st.tuples(st.integers(1, 3), st.booleans()), max_size=20))
-def test_a_tally_counts_runs_of_failures(steps: Sequence[tuple[int, bool]]) -> None:
-    tally = Tally()
-    for move, is_placed in steps:
-        tally.count(move, is_placed=is_placed)
-    ends = [place for place, (_, is_placed) in enumerate(steps) if is_placed]
-    tail = steps[ends[-1] + 1 :] if ends else steps
-    same = next((n for n, s in enumerate(reversed(tail)) if s[0] != tail[-1][0]), len(tail))
-    assert (tally.steps, tally.failures, tally.repeats) == (len(steps), len(tail), same)
+@settings(max_examples=25, deadline=None)
+@given(
+    st.lists(st.sampled_from([1, 2, 6, None]), min_size=1, max_size=12),
+    st.integers(1, 4),
+    st.integers(1, 4),
+)
+def test_runs_of_failures_end_an_episode(
+    moves: Sequence[int | None], most_failures: int, most_repeats: int
+) -> None:
+    """A move is named over and over until one of both limits is reached, as counted by hand."""
+    track = made(max_failures=most_failures, max_repeats=most_repeats, max_steps=99)
+    said = scripted(*("?" if move is None else f"Move({move})" for move in [*moves, *[6] * 4]))
+    fields, _ = play(tower("red", "blue", "red", "blue"), said, track)
+    outcomes, named = fields["outcomes"], [*moves, *[6] * 4]
+    failures = repeats = 0
+    for place, (move, outcome) in enumerate(zip(named, outcomes, strict=False)):
+        is_placed, is_same = outcome == "placed", place and failures and move == named[place - 1]
+        failures = 0 if is_placed else failures + 1
+        repeats = 0 if is_placed or move is None else repeats + 1 if is_same else 1
+        is_end = repeats >= most_repeats or failures >= most_failures
+        assert is_end == (place == len(outcomes) - 1) or fields["ending"] == "completed"
+    wanted = "max_repeats" if repeats >= most_repeats else "max_failures"
+    assert fields["ending"] in (wanted, "completed")
 
 
 def test_outlines_are_as_many_as_an_episode_can_have() -> None:

@@ -24,7 +24,7 @@ from phyblock.config.suite import load_suite
 from phyblock.errors import SpecError
 from phyblock.models import HaltedError, Image, Message, Request
 from phyblock.run.runner import RunResult
-from phyblock.tracks.baselines import Choice, Picking, Spot, picks_of
+from phyblock.tracks.baselines import Choice, Pick, Picking, Spot
 from phyblock.web.server import LARGEST_BODY_BYTES, Server
 from phyblock.web.session import (
     Given,
@@ -135,10 +135,10 @@ def test_the_clock_runs_from_the_first_look_and_stands_still_in_pauses() -> None
         clock.now = 401.0
         assert session.state(-1)["elapsed_s"] == 3.0
         clock.now = 403.5
-        session.answer(session.state(-1)["change"], picks_of([1, 0, 1]))
+        session.answer(session.state(-1)["change"], tuple(map(Pick, [1, 0, 1])))
         return await task
 
-    assert asyncio.run(play()) == Given(picks_of([1, 0, 1]), 5.5)
+    assert asyncio.run(play()) == Given(tuple(map(Pick, [1, 0, 1])), 5.5)
 
 
 def test_an_answer_counts_once_and_only_for_what_lies_there() -> None:
@@ -147,14 +147,14 @@ def test_an_answer_counts_once_and_only_for_what_lies_there() -> None:
         session.agree()
         change = session.state(-1)["change"]
         with pytest.raises(NotNowError):
-            session.answer(change - 1, picks_of([0]))
-        with pytest.raises(ValueError, match="holds 0 picks"):
+            session.answer(change - 1, [Pick(0)])
+        with pytest.raises(ValueError, match="needs 1 to"):
             session.answer(change, [])
-        session.answer(change, picks_of([0]))
+        session.answer(change, [Pick(0)])
         for late in (change, change + 1):
             with pytest.raises(NotNowError):
-                session.answer(late, picks_of([1]))
-        assert (await task).picks == picks_of([0])
+                session.answer(late, [Pick(1)])
+        assert (await task).picks == (Pick(0),)
         assert session.state(-1)["phase"] == "waiting"
 
     asyncio.run(play())
@@ -177,7 +177,7 @@ def played(suite: Path, picks: Sequence[int]) -> tuple[RunResult, list[str]]:
                 session.agree()
             elif told["phase"] == "question" and left:
                 shown.append(json.dumps(told["question"]["messages"]))
-                session.answer(told["change"], picks_of([left.pop(0)]))
+                session.answer(told["change"], [Pick(left.pop(0))])
             elif told["phase"] == "question":
                 session.close()
         return await run
