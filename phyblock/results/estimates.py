@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from phyblock.config.suite import Suite
 from phyblock.errors import Problem, StoreError
 from phyblock.records.files import RECORDS
 from phyblock.results.load import Design, Run, track_measures
@@ -374,32 +375,20 @@ class Floor:
         return value.lo > self.value if better == "higher" else value.hi < self.value
 
 
-def headline_floors(run: Run, track: str) -> dict[str, Floor]:
-    """Return the strongest blind baseline, or uniform guessing, of each headline column that has
-    one, by heading.
-    """
-    values, measures = headline_of(run, track), {one.name: one for one in track_measures(track)}
+def strongest_floor(run: Run, track: str) -> Floor | None:
+    """Return the strongest blind baseline, or uniform guessing, in the main column of a track."""
+    measure, values = main_measure(run, track), main_values(run, track)
     blind = run.design.baselines & set(kind_of(track).report().floors)
-    cells, found = {cell.name: cell for cell in run.cells(track)}, {}
+    cells = {cell.name: cell for cell in run.cells(track)}
+    known = [Floor(model, value.value) for model, value in values.items() if model in blind]
 
-    def guessing(measure: Measure, cell: Cell) -> float:
-        assert measure.chance is not None
+    def guessing(chance: Callable[[Suite, str], float], cell: Cell) -> float:
         if not cell.of:
-            return measure.chance(run.design.suite, cell.name)
-        return plain_sum(guessing(measure, cells[name]) for name in cell.of) / len(cell.of)
+            return chance(run.design.suite, cell.name)
+        return plain_sum(guessing(chance, cells[name]) for name in cell.of) / len(cell.of)
 
-    for column in headline_columns(run, track):
-        measure = measures[column.measure]
-        mine = {model: value for (model, of), value in values.items() if of == column.heading}
-        known = [
-            Floor(model, value.value)
-            for model, value in mine.items()
-            if model in blind and not math.isnan(value.value)
-        ]
-        if measure.chance is not None and mine:
-            worth = guessing(measure, cells[column.cell])
-            known.append(Floor("chance", measure.scale * worth))
-        if known:
-            best = max if measure.better == "higher" else min
-            found[column.heading] = best(known, key=lambda floor: floor.value)
-    return found
+    if measure.chance is not None and len(track_estimates(run, track)):
+        worth = guessing(measure.chance, cells[main_column(run, track).cell])
+        known.append(Floor("chance", measure.scale * worth))
+    best = max if measure.better == "higher" else min
+    return best(known, key=lambda floor: floor.value) if known else None

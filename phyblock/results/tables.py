@@ -19,12 +19,12 @@ from phyblock.results.estimates import (
     Value,
     all_estimates,
     headline_columns,
-    headline_floors,
     headline_of,
     headline_rows,
     main_column,
     main_measure,
     main_values,
+    strongest_floor,
     track_estimates,
     track_notes,
 )
@@ -417,7 +417,7 @@ def headline_table(run: Run, track: str, coverage: pd.DataFrame) -> TextTable:
 
 def blind_sentence(run: Run, track: str) -> str:
     """Say how many models are above the strongest blind baseline; "" where there is none."""
-    floor = headline_floors(run, track).get(main_column(run, track).heading)
+    floor = strongest_floor(run, track)
     if floor is None:
         return ""
     named, better = f"{floor.name} ({number(floor.value)})", main_measure(run, track).better

@@ -169,18 +169,10 @@ def in_unit(heading: str, unit: str) -> str:
     return f"{heading} ({unit})" if unit else heading
 
 
-def share_of(columns: Sequence[str], part: Sequence[str], whole: Sequence[str]) -> Metric:
+def _divided(by: Metric, columns: Sequence[str], *named: Sequence[str]) -> Metric:
     """Return the metric that divides the sum of some columns by that of others."""
-    parts, wholes = ([columns.index(name) for name in names] for names in (part, whole))
-    return lambda sums: ratio_of(
-        np.stack([sums[..., parts].sum(axis=-1), sums[..., wholes].sum(axis=-1)], axis=-1)
-    )
-
-
-def mean_per(columns: Sequence[str], part: Sequence[str], whole: Sequence[str]) -> Metric:
-    """Return the metric of a mean, which may be more than 1: one column by another."""
-    places = [columns.index(name) for name in (*part, *whole)]
-    return lambda sums: mean_of(sums[..., places])
+    places = [[columns.index(name) for name in names] for names in named]
+    return lambda sums: by(np.stack([sums[..., one].sum(axis=-1) for one in places], axis=-1))
 
 
 @dataclass(frozen=True)
@@ -292,7 +284,8 @@ def read_report(
             if about.get("unit", "%") != "%":
                 is_mean, about = True, {"most": math.inf, **about}
             if "value" not in about:
-                about["value"] = (mean_per if is_mean else share_of)(counted.columns, part, whole)
+                by = mean_of if is_mean else ratio_of
+                about["value"] = _divided(by, counted.columns, part, whole)
             measures.append(Measure(name, counted=counted, **about))
     told["headline"] = tuple(LayoutColumn(**column) for column in told["headline"])
     told["tables"] = {

@@ -24,11 +24,11 @@ from phyblock.results.estimates import (
     Floor,
     Value,
     headline_columns,
-    headline_floors,
     headline_of,
     headline_rows,
     main_column,
     main_measure,
+    strongest_floor,
     track_estimates,
     track_notes,
 )
@@ -325,7 +325,7 @@ def _track(track: str, run: Run, models: Sequence[Sequence[float | None]]) -> di
     """Return a track of a page; `models` are the values and intervals of those that are ranked."""
     kind, measure = kind_of(track), main_measure(run, track)
     report, heading = kind.report(), main_column(run, track).heading
-    floor = headline_floors(run, track).get(heading)
+    floor = strongest_floor(run, track)
     names = (one.name for one in track_measures(track))
     parts = report.part_names
     return {

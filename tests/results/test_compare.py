@@ -1,3 +1,5 @@
+"""Comparisons of models and runs, and tables of what the way of asking changes."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -9,14 +11,19 @@ import pandas as pd
 import pytest
 from hypothesis import given
 
+from phyblock.config.suite import VarySpec
 from phyblock.errors import SpecError
 from phyblock.results.compare import (
     compare_models,
     compare_runs,
     flipped_lines,
     ranks_view,
+    sensitivity_frame,
+    sensitivity_table,
 )
+from phyblock.results.figures import sensitivity
 from phyblock.results.load import Run
+from phyblock.results.text import number
 from tests.web.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
 
 Records = list[dict[str, Any]]
@@ -62,6 +69,9 @@ def test_only_samples_that_both_have_are_compared() -> None:
     assert (row["n_samples"], row["n_scenes"], row["n_clusters"]) == (2, 2, 2)
     assert (row["value_a"], row["value_b"], row["difference"]) == (25, 50, -25)
     assert (row["better"], row["worse"], row["same"]) == (0, 1, 1)
+    assert tuple(flipped_lines(compare_models(run))) == (
+        "beta is right where alpha is not, 1: 001",
+    )
 
 
 def test_a_model_without_any_reply_is_not_compared_though_empty_plans_count() -> None:
@@ -74,22 +84,6 @@ def test_a_model_without_any_reply_is_not_compared_though_empty_plans_count() ->
     run = one_seed(*plans("alpha", dict.fromkeys(LEVELS, 3)), some, *silent[1:], missing="count")
     row = compare_models(run).table.set_index("part").loc["overall"]
     assert (row["n_samples"], row["better"], row["same"]) == (5, 4, 1)
-
-
-def test_flipped_samples_are_those_that_one_side_alone_got_right() -> None:
-    run = one_seed(
-        *plans("alpha", {"000": 4, "001": 2, "002": 4, "003": 1}),
-        *plans("beta", {"000": 4, "001": 4, "002": 3, "003": 0}),
-    )
-    found = compare_models(run)
-    flipped = (
-        found.flipped[["scene", "right", "value_a", "value_b"]].to_records(index=False).tolist()
-    )
-    assert flipped == [("002", "alpha", 100, 75), ("001", "beta", 50, 100)]
-    assert tuple(flipped_lines(found)) == (
-        "alpha is right where beta is not, 1: 002",
-        "beta is right where alpha is not, 1: 001",
-    )
 
 
 def test_what_cannot_be_told_is_said() -> None:
@@ -153,36 +147,34 @@ def test_two_runs_are_compared_by_the_models_they_share_or_by_two_named() -> Non
         compare_runs(first, second, ["beta", "alpha"])
 
 
-def test_runs_that_cannot_be_compared_are_refused() -> None:
-    first = one_seed(*plans("alpha", {"000": 4}), models=["alpha"])
-    other = record("alpha", "000", scores=[score(4, 0, 5)]) | {"n_blocks": 9}
-    with pytest.raises(SpecError, match="blocks of scene 000"):
-        compare_runs(first, one_seed(other, models=["alpha"]))
-    with pytest.raises(SpecError, match=r"scoring\.matchers: cannot be compared with run"):
-        compare_runs(first, one_seed(models=["alpha"], matchers=["paper"]))
-    with pytest.raises(SpecError, match="no model in common"):
-        compare_runs(first, one_seed(models=["beta"]))
+def other_track() -> Run:
     facts = manifest(seeds=[0])
     facts["suite"]["tracks"] = ["vqa"]
-    with pytest.raises(SpecError, match="no such track to compare"):
-        compare_runs(first, run_of([], facts))
+    return run_of([], facts)
+
+
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [
+        (one_seed(record("alpha", "000") | {"n_blocks": 9}), "blocks of scene 000"),
+        (one_seed(matchers=["paper"]), r"scoring\.matchers: cannot be compared with run"),
+        (one_seed(level1="membership"), r"scoring\.level1: cannot be compared with run"),
+        (one_seed(models=["beta"]), "no model in common"),
+        (other_track(), "no such track to compare"),
+    ],
+)
+def test_runs_that_cannot_be_compared_are_refused(other: Run, said: str) -> None:
+    first = one_seed(*plans("alpha", {"000": 4}), models=["alpha"])
+    with pytest.raises(SpecError, match=said):
+        compare_runs(first, other)
+
+
+def test_what_a_run_lacks_is_named() -> None:
+    run = one_seed(*plans("alpha", {"000": 4}), models=["alpha"])
     with pytest.raises(SpecError, match=r"found: vqa(?s:.*)allowed: full_planning"):
         compare_models(run_of([], manifest()), track="vqa")
     with pytest.raises(SpecError, match="needs two models"):
-        compare_models(first)
-
-
-def test_level_1_is_compared_by_one_criterion_alone() -> None:
-    first = one_seed(*plans("alpha", {"001": 4, "002": 2}), models=["alpha"])
-    other = one_seed(
-        *plans("alpha", {"001": 4, "002": 4}), models=["alpha", "beta"], level1="membership"
-    )
-    with pytest.raises(SpecError, match=r"scoring\.level1: cannot be compared with run"):
-        compare_runs(first, other)
-    second = one_seed(*plans("alpha", {"001": 4, "002": 4}), models=["alpha"], levels=[2, 3])
-    table = compare_runs(first, second).table.set_index("part")
-    assert table.index.tolist() == ["2", "3", "overall"]
-    assert table.loc["overall", "difference"] == -25
+        compare_models(run)
 
 
 def test_the_first_runs_policy_on_missing_replies_holds_for_both() -> None:
@@ -195,3 +187,56 @@ def test_the_first_runs_policy_on_missing_replies_holds_for_both() -> None:
         other = of("count" if missing == "skip" else "skip", "001")
         row = compare_runs(of(missing, "000"), other).table.set_index("part").loc["overall"]
         assert (row["n_samples"], row["difference"]) == (samples, 0)
+
+
+VARY = {"background": ["lawn", "white"], "view": ["oblique", "front", "top"]}
+ITEMS = 12
+ASKED = {"alpha": ITEMS, "beta": ITEMS, "gamma": ITEMS}
+
+
+def varied(models: dict[str, int]) -> Run:
+    """Return a run of the first so many scenes of each model in every way, of others in one way."""
+    told = manifest(models=models, seeds=(0, 1), levels=(2,), settings=["A"], matchers=["optimal"])
+    told["suite"]["vary"] = VARY
+    rng = np.random.default_rng(3)
+    records: Records = []
+    variants = VarySpec(**VARY).variants
+    for model, n_items in models.items():
+        skill = 1 + len(records) % 3
+        for place in range(ITEMS):
+            for seed in (0, 1):
+                for variant in variants if place < n_items else variants[:1]:
+                    tp, fp = int(rng.integers(0, 2 + skill)), int(rng.integers(0, 4))
+                    one = record(model, f"s{place:02}", seed, [score(tp, fp, 4 - tp)])
+                    one["variant"] = dict(variant.levels)
+                    one["sample"] += f"/{variant.key}" if variant.key else ""
+                    records.append(one)
+    return run_of(records, told)
+
+
+def test_the_figure_and_the_table_show_the_same_components() -> None:
+    run = varied(ASKED)
+    table = sensitivity_frame(run).set_index(["factor", "model"])
+    figure = sensitivity(run, track="full_planning")
+    assert figure is not None
+    models = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    for ax, factor in zip(figure.axes, VARY, strict=True):
+        for line, part in zip(ax.lines, ("shift", "single"), strict=True):
+            drawn = dict(zip(models, line.get_xdata(), strict=True))
+            assert drawn == pytest.approx({m: table.loc[(factor, m), part] for m in models})
+    shown = sensitivity_table(run)
+    assert shown is not None
+    for row in shown.view.rows:
+        if row[1] in VARY:
+            wanted = table.loc[(row[1], row[0])]
+            assert (row[2], row[4]) == (number(wanted["shift"]), number(wanted["single"]))
+
+
+def test_a_model_that_was_barely_asked_changes_nothing_of_others() -> None:
+    run, alone = varied({**ASKED, "barely": 2}), varied(ASKED)
+    table = sensitivity_frame(run)
+    pd.testing.assert_frame_equal(table[table["model"] != "barely"], sensitivity_frame(alone))
+    assert set(table.loc[table["model"] == "barely", "n_items"]) == {2}
+    shown = sensitivity_table(run)
+    assert shown is not None
+    assert any("2 to 12 items" in note for note in shown.view.notes)

@@ -88,7 +88,9 @@ def test_a_forest_has_a_row_a_pair_or_of_two_models_a_row_a_part(run: Run) -> No
     assert forest(of_models(run, MODELS[:1]), track=TRACK) is None
 
 
-def test_files_are_the_same_each_time_and_known_beforehand(tmp_path: Path) -> None:
+def test_files_are_the_same_each_time_in_three_formats_with_captions(
+    tmp_path: Path,
+) -> None:
     folder = write_run(tmp_path / "run", records(), manifest(models=MODELS, seeds=[0]))
     run = load_run(folder)
     first = {file: file.read_bytes() for file in write_paper_figures(run, (), Look())}
@@ -97,11 +99,6 @@ def test_files_are_the_same_each_time_and_known_beforehand(tmp_path: Path) -> No
     }
     assert {file: file.read_bytes() for file in write_paper_figures(run, (), Look())} == first
     assert {file.stem for file in first} <= set(figures_of(run))
-
-
-def test_a_paper_gets_each_figure_in_three_formats_with_a_caption(tmp_path: Path) -> None:
-    folder = write_run(tmp_path / "run", records(), manifest(models=MODELS, seeds=[0]))
-    run = load_run(folder)
     files = write_paper_figures(run, ["errors"], Look(COLUMN_IN, "serif", titled=False))
     assert {file.name for file in files} == {
         f"errors.{ending}" for ending in ("pdf", "svg", "png", "txt", "tex")

@@ -24,7 +24,7 @@ from phyblock.results.tables import (
     table_files,
     write_tables,
 )
-from phyblock.results.text import NO_VALUE, number
+from phyblock.results.text import NO_VALUE, Column, TextTable, number, to_latex, to_markdown
 from phyblock.tracks.base import kind_of
 from phyblock.types import OUTCOMES
 from tests.results.test_estimates import complete, episode, episodes, questions
@@ -70,21 +70,6 @@ def test_tables_of_episodes_and_questions_show_estimates() -> None:
     )
     assert shown_numbers(ran, "step_planning") > 20
     assert shown_numbers(questions(complete({"SH": 3, "OR": 1})), "vqa") > 20
-
-
-def test_what_was_not_answered_and_seeds_that_were_refused_stand_under_tables() -> None:
-    records = [
-        record(scene="001", scores=[score(1, 0, 0)], seed_sent=False),
-        record(scene="001", seed=1, scores=[score(0, 0, 4)], outcome="api_error"),
-        record(scene="002", scores=[score(0, 0, 4)], outcome="missing"),
-    ]
-    for missing, how in (("count", "counted as wrong"), ("skip", "left out")):
-        notes = make_tables(run_of(records, manifest(missing=missing)), ["table1"])[
-            "table1"
-        ].view.notes
-        assert f"Without a reply, {how}: alpha 1 API errors and 1 missing replies." in notes
-        assert "alpha: seed unsupported, seeds are independent repeats." in notes
-        assert "Values pool the samples of 2 seeds." in notes
 
 
 @laws
@@ -222,3 +207,40 @@ def test_latex_compiles_inside_any_document(tmp_path: Path) -> None:
         assert done.returncode == 0, done.stdout
         assert "Overfull" not in done.stdout
         assert "too large" not in done.stdout
+
+
+TABLE = TextTable(
+    "Precision & recall (%)",
+    (Column("Model", is_text=True), Column("Prec", "Level-1"), Column("F1", "Level-1")),
+    (("gpt_4o|x", "9.5", "100.0 ± 12.5"), ("[b]*", NO_VALUE, "7.0 ± 0.5")),
+    ("100 % of <all>.",),
+)
+
+
+def test_markdown_by_hand() -> None:
+    assert to_markdown(TABLE) == (
+        "**Precision &amp; recall (%)**\n"
+        "\n"
+        "| Model      | Level-1 Prec |   Level-1 F1 |\n"
+        "| ---------- | -----------: | -----------: |\n"
+        "| gpt\\_4o\\|x |          9.5 | 100.0 ± 12.5 |\n"
+        "| \\[b\\]\\*    |            \N{EN DASH} |    7.0 ± 0.5 |\n"
+        "\n"
+        "- 100 % of \\<all\\>.\n"
+    )
+
+
+def test_latex_by_hand() -> None:
+    assert to_latex(TABLE, "x").splitlines()[8:-2] == [
+        r"\begin{tabular}{@{}lrr@{}}",
+        r"\toprule",
+        r" & \multicolumn{2}{c}{Level-1} \\",
+        r"\cmidrule(lr){2-3}",
+        r"Model & \multicolumn{1}{c}{Prec} & \multicolumn{1}{c}{F1} \\",
+        r"\midrule",
+        r"gpt\_4o\textbar{}x & 9.5 & 100.0 $\pm$ 12.5 \\",
+        r"{[}b{]}{*} & \textendash{} & 7.0 $\pm$ 0.5 \\",
+        r"\bottomrule",
+        r"\end{tabular}}}",
+        r"\par\smallskip\raggedright\footnotesize",
+    ]
