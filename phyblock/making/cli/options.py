@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeVar
 
 import click
@@ -12,12 +12,33 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from phyblock.cli.console import make_console
 from phyblock.cli.options import UserPath
 from phyblock.errors import Problem
+from phyblock.making.workers import open_workers
 from phyblock.sim.engine import other_engine
 from phyblock.text import counted
 
 T = TypeVar("T")
+R = TypeVar("R")
 Command = TypeVar("Command", bound=Callable[..., Any])
 _LINE_EVERY = 25
+
+
+class Several(click.ParamType[tuple[str, ...]]):
+    """Some of the known words, each once, with commas between them, or `all`."""
+
+    name = "words"
+
+    def __init__(self, known: Iterable[str]) -> None:
+        self._known = tuple(known)
+
+    def convert(
+        self, value: str, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, ...]:
+        """Return the words in the order given."""
+        words = self._known if value == "all" else tuple(value.upper().split(","))
+        if not set(self._known).issuperset(words) or len(set(words)) < len(words):
+            self.fail(f"{value!r}: give all, or some of {','.join(self._known)}", param, ctx)
+        return words
+
 
 jobs_option = click.option(
     *("--jobs", "-j"),
@@ -60,6 +81,14 @@ def tracked(items: Iterable[T], total: int, doing: str, noun: str = "scenes") ->
             if hidden and count % _LINE_EVERY == 0:
                 console.print(f"{count} of {total} {noun}")
             yield item
+
+
+def mapped(
+    function: Callable[[T], R], items: Sequence[T], jobs: int, doing: str, noun: str = "scenes"
+) -> list[R]:
+    """Return the function's answers for the items, from `jobs` processes, with progress shown."""
+    with open_workers(min(jobs, len(items) or 1)) as workers:
+        return list(tracked(workers.map(function, items), len(items), doing, noun))
 
 
 def print_engine() -> None:

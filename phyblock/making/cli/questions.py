@@ -6,7 +6,6 @@ import io
 import json
 from collections import Counter
 from pathlib import Path
-from typing import cast
 
 import click
 from PIL import Image
@@ -18,9 +17,11 @@ from phyblock.domain import LETTERS, SUBTASK_NAMES, SUBTASKS, Question, Subtask
 from phyblock.errors import DataError, Problem
 from phyblock.files import write_named
 from phyblock.making.cli.options import (
+    Several,
     conclude,
     jobs_option,
     making_options,
+    mapped,
     print_engine,
     tracked,
 )
@@ -56,17 +57,9 @@ def questions() -> None:
     """Make multiple-choice questions about scenes, check them, and look at them."""
 
 
-def _subtasks(ctx: click.Context, param: click.Parameter, value: str) -> tuple[Subtask, ...]:
-    words = SUBTASKS if value == "all" else tuple(value.upper().split(","))
-    if not set(SUBTASKS).issuperset(words) or len(set(words)) < len(words):
-        known = ",".join(SUBTASKS)
-        raise click.BadParameter(f"{value!r}: give all, or some of {known}", ctx, param)
-    return cast(tuple[Subtask, ...], words)
-
-
 @questions.command("generate")
 @_data_option
-@click.option("--subtasks", default="all", show_default=True, callback=_subtasks)
+@click.option("--subtasks", type=Several(SUBTASKS), default="all", show_default=True)
 @click.option(
     "--per-subtask",
     type=click.IntRange(1),
@@ -118,9 +111,7 @@ def verify(questions: str, data: str, jobs: int) -> None:
     read = _read(questions, data)
     # Questions about one scene follow one another, so that pictures are shared.
     asked = sorted((task.question for task in read.tasks), key=lambda question: question.scene.id)
-    with open_workers(jobs) as workers:
-        found = workers.map(problem_of, asked)
-        problems = list(tracked(found, len(asked), "Verifying", "questions"))
+    problems = mapped(problem_of, asked, jobs, "Verifying", "questions")
     counts = Counter(question.subtask for question in asked)
     failed = Counter(q.subtask for q, p in zip(asked, problems, strict=True) if p)
     files, changed = check_sums(read.root)

@@ -6,6 +6,7 @@ import shlex
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import cast
 
@@ -35,9 +36,11 @@ from phyblock.making.checks import (
     verify_scene,
 )
 from phyblock.making.cli.options import (
+    Several,
     conclude,
     jobs_option,
     making_options,
+    mapped,
     print_engine,
     tracked,
 )
@@ -72,16 +75,9 @@ def scenes() -> None:
     """Make data sets of scenes, check them against physics, and look at them."""
 
 
-def _levels(ctx: click.Context, param: click.Parameter, value: str) -> tuple[int, ...]:
-    words = value.split(",")
-    if not {"1", "2", "3", "4"}.issuperset(words) or len(set(words)) < len(words):
-        raise click.BadParameter(f"{value!r}: give levels like 1,2,3,4", ctx, param)
-    return tuple(sorted(map(int, words)))
-
-
 @scenes.command("generate")
 @click.option("--count", type=click.IntRange(1), default=400, show_default=True, metavar="N")
-@click.option("--levels", default="1,2,3,4", show_default=True, callback=_levels)
+@click.option("--levels", type=Several("1234"), default="1,2,3,4", show_default=True)
 @click.option(
     "--palette",
     type=click.Choice(["kit", "full"]),
@@ -92,7 +88,7 @@ def _levels(ctx: click.Context, param: click.Parameter, value: str) -> tuple[int
 @making_options
 def generate(
     count: int,
-    levels: tuple[int, ...],
+    levels: tuple[str, ...],
     palette: str,
     seed: int,
     jobs: int,
@@ -107,12 +103,12 @@ def generate(
     check_out(out, SCENE_FILES)
     kind = cast(Palette, palette)
     with open_workers(jobs, ray_address) as workers:
-        produced = produce(seed, kind, shares(count, levels), workers)
+        produced = produce(seed, kind, shares(count, list(map(int, levels))), workers)
         tasks = [
             (scene, make_candidates(scene, palette=PALETTES[kind]))
             for scene in tracked(produced, count, "Making")
         ]
-    chosen = ",".join(map(str, levels))
+    chosen = ",".join(sorted(levels))
     command = f"phyblock scenes generate --count {count} --seed {seed} --levels {chosen}"
     command += f" --palette {palette} --out {out.name}"
     write_scenes(out, tasks, scene_card(out.name, tasks, command, kind))
@@ -135,8 +131,7 @@ def complete_set(data: Path, jobs: int, out: Path | None) -> None:
     given = read_given(data)
     folder = out or Path(f"{data.resolve().stem}-set")
     check_out(folder, SCENE_FILES)
-    with open_workers(min(jobs, len(given))) as workers:
-        done = list(tracked(workers.map(_completed, given), len(given), "Completing"))
+    done = mapped(_completed, given, jobs, "Completing")
     if problems := [problem for one in done if isinstance(one, tuple) for problem in one]:
         raise DataError(problems)
     whole = [one for one in done if isinstance(one, Completed)]
@@ -182,9 +177,7 @@ def verify(data: str, jobs: int) -> None:
         raise DataError(Problem(data, f"has no {SCENES_FILE} to verify", hint=hint))
     tasks = [(task.scene, task.candidates) for task in read_builtin(where).tasks]
     found = list(check_set([scene for scene, _ in tasks]))
-    with open_workers(jobs) as workers:
-        for findings in tracked(workers.map(verify_scene, tasks), len(tasks), "Verifying"):
-            found += findings
+    found += chain.from_iterable(mapped(verify_scene, tasks, jobs, "Verifying"))
     files, changed = check_sums(where)
     checks = _counts(found, (*VERIFIED, "duplicate", "parents"))
     rows = [(check, str(len(tasks) - failed), str(len(tasks))) for check, failed, _ in checks]
@@ -220,29 +213,24 @@ def audit(data: str, table: Path | None, jobs: int) -> None:
             check_free([table], "name another place")
         make_folder(table.parent)
     tasks = [(task.scene, task.candidates) for task in read_data_set(data).tasks]
-    with open_workers(min(jobs, len(tasks))) as workers:
-        found = {
-            scene.id: findings
-            for (scene, _), findings in tracked(
-                zip(tasks, workers.map(audit_scene, tasks), strict=True), len(tasks), "Auditing"
-            )
-        }
-    twins = [one for one in check_set([scene for scene, _ in tasks]) if one.check == "duplicate"]
-    every = [*twins, *(finding for findings in found.values() for finding in findings)]
+    scenes = [scene for scene, _ in tasks]
+    findings = mapped(audit_scene, tasks, jobs, "Auditing")
+    found = {scene.id: some for scene, some in zip(scenes, findings, strict=True)}
+    twins = [one for one in check_set(scenes) if one.check == "duplicate"]
+    every = [*twins, *chain.from_iterable(findings)]
     console = make_console()
-    guilty = [scene for scene, _ in tasks if found[scene.id]]
+    guilty = [scene for scene in scenes if found[scene.id]]
     if worst := sorted(guilty, key=lambda scene: _badness(found[scene.id]), reverse=True)[:_WORST]:
         rows = [_worst_row(scene, found[scene.id]) for scene in worst]
         headings = ("scene", "level", "check", "first finding", "blocks", "findings")
         print_rows(console, headings, rows, numbers=1)
     counts = _counts(every, (*AUDITED, "duplicate"))
-    rows = [(check, str(scenes), str(findings)) for check, scenes, findings in counts]
+    rows = [(check, str(failed), str(number)) for check, failed, number in counts]
     print_rows(console, ("check", "scenes", "findings"), rows, numbers=2)
-    for line in _totals([scene for scene, _ in tasks], found, {check: n for check, _, n in counts}):
+    for line in _totals(scenes, found, {check: n for check, _, n in counts}):
         console.print(line, soft_wrap=True)
     if table is not None:
-        levels = {scene.id: scene.level for scene, _ in tasks}
-        write_named(table, findings_csv(every, levels))
+        write_named(table, findings_csv(every, {scene.id: scene.level for scene in scenes}))
         console.print(f"all findings in {shown_path(table)}")
 
 

@@ -1,0 +1,207 @@
+"""The verbs of `phyblock scenes` and `phyblock questions` as a person calls them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+from PIL import Image
+
+from phyblock.cli.main import phyblock
+from phyblock.errors import DataError, StoreError
+from phyblock.files import LIST
+from phyblock.resources import bundled
+from phyblock.sim.engine import other_engine
+from tests.workspace import SCENES, tower
+
+ALONE = ("--jobs", 1)
+SMALL = ("--subtasks", "CO,OC", "--per-subtask", 4, *ALONE)
+QUESTION_LINES = "questions.jsonl"
+
+
+def called(*args: object) -> Result:
+    """The command as it ends."""
+    return CliRunner(env={"COLUMNS": "160"}).invoke(
+        phyblock, [*map(str, args)], standalone_mode=False, catch_exceptions=False
+    )
+
+
+scenes, vqa = partial(called, "scenes"), partial(called, "questions")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three scenes that were made."""
+    out = tmp_path_factory.mktemp("made") / "few"
+    done = scenes("generate", "--count", 3, "--levels", 2, "--seed", 9, *ALONE, "--out", out)
+    assert "3 scenes, all checks passed" in done.stdout
+    with pytest.raises(StoreError, match="give another --out"):
+        scenes("generate", "--out", out)
+    return out
+
+
+def test_what_is_made_is_verified_and_a_changed_scene_is_named(
+    folder: Path, tmp_path: Path
+) -> None:
+    assert "few: all checks passed" in scenes("verify", *ALONE, folder).stdout
+    lines = (folder / "scenes.jsonl").read_text(encoding="utf-8").splitlines()
+    spoiled = json.loads(lines[0])
+    spoiled["blocks"][-1]["position"][2] += 0.01
+    (tmp_path / "scenes.jsonl").write_text(json.dumps(spoiled) + "\n", encoding="utf-8")
+    (tmp_path / "SHA256SUMS").write_text(f"{'0' * 64}  scenes.jsonl\n", encoding="utf-8")
+    done = scenes("verify", *ALONE, tmp_path)
+    assert done.return_value == 1
+    assert "scenes.jsonl: differs from its checksum" in done.output
+    assert f"failed: {spoiled['id']}" in done.output
+    assert "floats 10.00 mm above its support" in done.output
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("scenes", "--levels", "5"), "give all, or some of 1,2,3,4"),
+        (("scenes", "--levels", "1,1"), "give all, or some of 1,2,3,4"),
+        (("scenes", "--count", "0"), "0 is not in the range"),
+        (("scenes", "--palette", "wood"), "'wood' is not one of"),
+        *((("questions", "--subtasks", bad), "some of SH,CO,SI") for bad in ("XX", "CO,CO", "")),
+    ],
+)
+def test_bad_options_are_refused(words: tuple[str, ...], said: str, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    args = [words[0], "generate", "--out", str(out), *words[1:]]
+    done = CliRunner(env={"COLUMNS": "160"}).invoke(phyblock, args)
+    assert (done.exit_code, out.exists()) == (2, False)
+    assert said in done.output
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    """The five towers of a workspace, and one whose middle block is lifted and misdeclared."""
+    spoiled = tower("t6", [3], ("red", "blue", "green"))
+    spoiled["blocks"][2]["position"][2] += 0.02
+    spoiled["blocks"][1] |= {"depend": [0], "layer": 1}
+    spoiled["blocks"][2] |= {"depend": [1], "layer": 2}
+    folder = tmp_path / "data"
+    folder.mkdir()
+    text = "".join(json.dumps(scene) + "\n" for scene in (*SCENES, spoiled))
+    (folder / "scenes.jsonl").write_text(text, encoding="utf-8")
+    return folder
+
+
+def test_an_audit_lists_findings(data: Path, tmp_path: Path) -> None:
+    table = tmp_path / "found.csv"
+    told = scenes("audit", data, *ALONE, "--csv", table).stdout
+    assert "6 scenes read; 5 with no finding" in told
+    assert "5 stand when finished, 5 at every step as well" in told
+    assert "block 3 floats 20.00 mm above its support" in told
+    assert "3 green cube" in told
+    rows = list(csv.DictReader(io.StringIO(table.read_text(encoding="utf-8"))))
+    assert {row["check"] for row in rows if row["scene"] == "t6"} >= {"floating", "unstable"}
+    with (data / "scenes.jsonl").open("a", encoding="utf-8") as file:
+        file.write("{}\n")
+    with pytest.raises(DataError, match=r"scenes\.jsonl:7"):
+        scenes("audit", data, *ALONE)
+    with pytest.raises(StoreError, match=r"scenes\.jsonl: cannot be written"):
+        scenes("audit", data, "--csv", data / "scenes.jsonl" / "x")
+
+
+def test_show_prints_the_facts(data: Path) -> None:
+    told = scenes("show", data, "t3").stdout
+    assert "scene t3 · level 3 · 3 blocks · 3 layers" in told
+    assert "0 0 75" in told
+    with pytest.raises(DataError, match="no such scene"):
+        scenes("show", data, "t9")
+
+
+def test_render_names_views_backgrounds_and_kinds(data: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    scenes("render", data, "t1", "--out", out, "--composite", "--gif")
+    stem = "t1-oblique-checkerboard"
+    tails = (".png", "-composite.png", ".gif")
+    assert {path.name for path in out.iterdir()} == {LIST, *(stem + tail for tail in tails)}
+    for path in out.glob("t1*"):
+        with Image.open(path) as image:
+            assert image.format == path.suffix[1:].upper()
+    scenes("render", data, "t1", "--out", tmp_path / "all", "--view", "all")
+    assert len(list((tmp_path / "all").glob("*.png"))) == 4
+
+
+@pytest.fixture(scope="module")
+def asked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Eight questions about twelve scenes of the built-in set, which stand beside them."""
+    folder = tmp_path_factory.mktemp("vqa")
+    lines = bundled("benchmarks", "data", "phyblock-400", "scenes.jsonl").read_text("utf-8")
+    some = "".join(f"{line}\n" for line in lines.splitlines()[5::33])
+    (folder / "scenes.jsonl").write_text(some, encoding="utf-8")
+    told = vqa("generate", "--data", folder, "--out", folder / "q", *SMALL)
+    assert "8 questions in 2 subtasks" in told.stdout
+    assert ("made with" in told.stderr) == bool(other_engine())
+    return folder
+
+
+def questions_of(folder: Path) -> list[dict[str, Any]]:
+    text = (folder / QUESTION_LINES).read_text(encoding="utf-8")
+    return [json.loads(line) for line in text.splitlines()]
+
+
+def test_questions_are_written_with_card_and_checksums(asked: Path) -> None:
+    assert sorted(path.name for path in (asked / "q").iterdir()) == [
+        "CARD.md",
+        "SHA256SUMS",
+        "VERSION",
+        QUESTION_LINES,
+    ]
+    found = questions_of(asked / "q")
+    assert [one["id"] for one in found] == [
+        f"{s}-00{i}" for s in ("co", "oc") for i in (1, 2, 3, 4)
+    ]
+    card = (asked / "q" / "CARD.md").read_text(encoding="utf-8")
+    assert f"generate --data {asked}" in card
+    assert f"scenes of `{asked.name}`" in card
+
+
+def test_answers_are_derived_again_and_a_corrupted_one_is_named(
+    asked: Path, tmp_path: Path
+) -> None:
+    done = vqa("verify", asked / "q", "--data", asked, *ALONE)
+    assert "all checks passed" in done.stdout
+    found = questions_of(asked / "q")
+    right = found[2]["answer"]
+    found[2]["answer"] = "ABCD"["BCDA".index(right)]
+    text = "".join(json.dumps(one) + "\n" for one in found)
+    (tmp_path / QUESTION_LINES).write_text(text, encoding="utf-8")
+    for name in ("CARD.md", "SHA256SUMS"):
+        (tmp_path / name).write_bytes((asked / "q" / name).read_bytes())
+    done = vqa("verify", tmp_path, "--data", asked, *ALONE)
+    assert done.return_value == 1
+    assert f"failed: co-003: the answer is {right}, not {found[2]['answer']}" in done.output
+    assert "differs from its checksum" in done.output
+
+
+def test_a_question_is_shown_with_its_pictures(asked: Path, tmp_path: Path) -> None:
+    first = questions_of(asked / "q")[0]
+    where = ("--questions", asked / "q", "--data", asked)
+    done = vqa("show", "co-001", *where, "--out", tmp_path / "co.png")
+    assert first["question"] in done.stdout
+    assert f"answer: {first['answer']}" in done.stdout
+    with Image.open(io.BytesIO((tmp_path / "co.png").read_bytes())) as image:
+        assert image.size == (512, 512)
+    with pytest.raises(DataError, match="did you mean co-001"):
+        vqa("show", "co-0001", *where)
+
+
+def test_an_audit_says_what_it_finds(asked: Path, tmp_path: Path) -> None:
+    found = questions_of(asked / "q")
+    again = {**found[0], "id": "co-009"}
+    text = "".join(json.dumps(one) + "\n" for one in [*found, again])
+    (tmp_path / QUESTION_LINES).write_text(text, encoding="utf-8")
+    pytest.importorskip("sklearn")
+    done = vqa("audit", tmp_path, "--data", asked)
+    assert "co-009: asks what an earlier question asks" in done.stdout
+    assert "9 questions, " in done.stdout
