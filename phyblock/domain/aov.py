@@ -7,7 +7,7 @@ bit masks (bit v set: vertex v is in the set), which keeps the matchers small an
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,12 +50,13 @@ class AOVGraph:
     @functools.cached_property
     def layers(self) -> tuple[int, ...]:
         """Layer of each vertex: 1 on the ground, else 1 + the highest layer it depends on."""
-        layers: dict[int, int] = {}
-        for vertex in self._first_order():
-            layers[vertex] = 1 + max(
-                (layers[other] for other in self.depends_on[vertex]), default=0
-            )
-        return tuple(layers[vertex] for vertex in range(len(self)))
+        layers = [0] * len(self)
+        placed = 0
+        while choices := self.ready(placed):
+            vertex = choices[0]
+            layers[vertex] = 1 + max((layers[o] for o in self.depends_on[vertex]), default=0)
+            placed |= 1 << vertex
+        return tuple(layers)
 
     def is_ready(self, vertex: int, placed: int) -> bool:
         """True if `vertex` is unplaced and all it depends on is in the bit mask `placed`."""
@@ -85,12 +86,6 @@ class AOVGraph:
             order.append(vertex)
             placed |= 1 << vertex
         return tuple(order)
-
-    def _first_order(self) -> Iterator[int]:
-        placed = 0
-        while choices := self.ready(placed):
-            yield choices[0]
-            placed |= 1 << choices[0]
 
 
 def _check_acyclic(depends_on: tuple[frozenset[int], ...]) -> None:
