@@ -45,7 +45,6 @@ def test_a_log_tells_of_retries_servers_failures_and_models_that_are_stopped() -
         (1.0, RunNotice("http://host:1 cannot be reached [x] :b: no connection")),
         (2.0, retry(None, 9.0)),
         (11.0, done(outcome="api_error")),
-        (12.0, ModelEvent("alpha", "unavailable", "HTTP 401: no")),
         (12.0, ModelStopped("alpha", "HTTP 401: no")),
         (21.5, retry()),
     )
