@@ -15,7 +15,7 @@ from phyblock.config.models import HUMAN, ModelConfig
 from phyblock.config.suite import Suite, Variant
 from phyblock.data import UNNUMBERED, Dataset, read_version
 from phyblock.parsing.text import READER_VERSION
-from phyblock.records.manifest import FORMAT, Manifest, ManifestModel
+from phyblock.records.manifest import FORMAT, Manifest
 from phyblock.run.judge import extraction_prompt
 from phyblock.sim.engine import ENGINES, described_engine
 from phyblock.stable import hex_digest
@@ -25,7 +25,7 @@ from phyblock.tracks.base import simulating
 _ENGINES = (engine.distribution for engine in ENGINES.values())
 _LIBRARIES = ("litellm", *_ENGINES, "numpy", "pillow", "jinja2")
 """Of the physics engines, one or both may be there."""
-_LABELS = ("published", "served_at", "size_b")
+_LABELS = ("published", "served_at", "size_b", "pictures")
 _NOT_IDENTITY = {
     *("dataset.root", "suite.name", "suite.description", "suite.limit", "suite.limits"),
     *("suite.models", "suite.baselines", "suite.seeds", "suite.dataset"),
@@ -145,41 +145,41 @@ def _model(model: ModelConfig) -> dict[str, object]:
 
 def differences(found: Manifest, wanted: Manifest) -> list[str]:
     """Return what makes two manifests two runs, by dotted names; none where they are of one."""
-    asked = {model.name: _decisive(model) for model in (*found.models, *found.others)}
-    names = [
-        f"models.{model.name}.{key}"
-        for model in wanted.models
-        for was, now in [(asked.get(model.name, {}), _decisive(model))]
-        for key in sorted(now.keys() | was.keys())
-        if was and now.get(key) != was.get(key)
+    old, new = _parts(found), _parts(wanted)
+    differ = [
+        (
+            f"{part}.{key}".lstrip("."),
+            json.dumps(old[part].get(key)),
+            json.dumps(new[part].get(key)),
+        )
+        for part in new.keys() & old.keys()
+        for key in old[part].keys() | new[part].keys()
+        if old[part].get(key) != new[part].get(key)
     ]
     if found.identity == wanted.identity:
-        return names
-    old, new = _parts(found), _parts(wanted)
-    differ = [name for name in new | old if old.get(name) != new.get(name)]
-    if {"suite.levels", "limit"} & set(differ):
+        differ = [one for one in differ if one[0].startswith("models.")]
+    elif {"suite.levels", "limit"} & {name for name, *_ in differ}:
         # Other scenes of the same data have other digests, too.
-        differ = [name for name in differ if not name.endswith("sha256")]
-    shown = {name: tuple(json.dumps(one.get(name)) for one in (old, new)) for name in differ}
-    names += [
+        differ = [one for one in differ if not one[0].endswith("sha256")]
+    names = sorted(
         f"{name} ({was}, now {now})" if len(was + now) < _LONGEST_SHOWN else name
-        for name, (was, now) in shown.items()
-    ]
-    return names or ["how phyblock asks, draws or reads"]
+        for name, was, now in differ
+    )
+    is_same = found.identity == wanted.identity
+    return names or ([] if is_same else ["how phyblock asks, draws or reads"])
 
 
-def _decisive(model: ManifestModel) -> dict[str, Any]:
-    """Return what decides a model's replies."""
-    return {key: value for key, value in model.fields().items() if key not in _LABELS}
-
-
-def _parts(manifest: Manifest) -> dict[str, Any]:
-    """Return what a run is made of by dotted name, without digests of pictures."""
+def _parts(manifest: Manifest) -> dict[str, dict[str, Any]]:
+    """Return what decides the results of a run by part and name, without digests of pictures."""
     fields = manifest.fields()
-    parts = {"suite": fields["suite"], "dataset": fields.get("dataset") or {}, **manifest.tracks}
-    return {"limit": manifest.limit} | {
-        f"{part}.{key}": value
+    models = {f"models.{one.name}": one.fields() for one in (*manifest.models, *manifest.others)}
+    parts = {"": {"limit": manifest.limit}, "suite": fields["suite"], **models}
+    parts |= {"dataset": fields.get("dataset") or {}, **manifest.tracks}
+    return {
+        part: {
+            key: value
+            for key, value in about.items()
+            if key not in _LABELS and f"{part}.{key}" not in _NOT_IDENTITY
+        }
         for part, about in parts.items()
-        for key, value in about.items()
-        if key != "pictures" and f"{part}.{key}" not in _NOT_IDENTITY
     }

@@ -341,17 +341,15 @@ def find_suite(name: str) -> Path:
 
     Raises SpecError that lists the bundled suites when there is no such file, or for a prompt.
     """
-    path = Path(name)
-    inside = bundled("benchmarks", f"{path.stem}.yaml")
-    if os.path.isfile(path) and path.suffix != ".j2":
+    path, suites = Path(name), bundled_suites()
+    is_prompt = path.suffix == ".j2"
+    if os.path.isfile(path) and not is_prompt:
         return path
-    is_name = path.suffix in ("", ".yaml") and path.parent == Path() and path.stem
-    if is_name and os.path.isfile(inside):
-        return inside
-    message, hint = _not_found(path, "suite"), did_you_mean(path.stem, bundled_suites())
-    if os.path.isfile(path):
-        message, hint = "is a prompt, not a suite", "name the suite that uses it"
-    allowed = "a suite file, or a bundled suite: " + ", ".join(bundled_suites())
+    if name.removesuffix(".yaml") in suites:
+        return bundled("benchmarks", f"{path.stem}.yaml")
+    message = "is a prompt, not a suite" if is_prompt else "there is no such suite file"
+    hint = "name the suite that uses it" if is_prompt else did_you_mean(path.stem, suites)
+    allowed = "a suite file, or a bundled suite: " + ", ".join(suites)
     raise SpecError(Problem(name or "suite", message, allowed=allowed, hint=hint))
 
 
@@ -361,27 +359,15 @@ def find_models_file(named: str | None, suite: Path | None) -> Path:
     Raises SpecError when the one named is not there.
     """
     if named is not None and not os.path.isfile(named):
-        raise SpecError(Problem(named, _not_found(Path(named), "models file")))
-    near = [folder / "models.yaml" for folder in _near(suite)]
-    found = next((path for path in near if os.path.isfile(path)), bundled("models.yaml"))
-    return found if named is None else Path(named)
-
-
-def _not_found(path: Path, noun: str) -> str:
-    """Return why a path that is no file cannot be read."""
-    if os.path.isdir(path):
-        return "is a folder"
-    return "is not a regular file" if os.path.exists(path) else f"there is no such {noun}"
+        raise SpecError(Problem(named, "there is no such models file"))
+    near = prompt_dirs(suite or Path("suite.yaml"))
+    paths = [Path(named)] if named else [folder.parent / "models.yaml" for folder in near]
+    return next((path for path in paths if os.path.isfile(path)), bundled("models.yaml"))
 
 
 def prompt_dirs(suite: Path) -> list[Path]:
-    """Folders of custom prompts: where the models file is looked for, too."""
-    return [folder / "prompts" for folder in _near(suite)]
-
-
-def _near(suite: Path | None) -> list[Path]:
-    """Here, and near the suite."""
-    return [Path(), *([] if suite is None else [suite.parent, suite.parent.parent])]
+    """Folders of custom prompts, here and near the suite; a models file may stand beside each."""
+    return [folder / "prompts" for folder in (Path(), suite.parent, suite.parent.parent)]
 
 
 def asking_remarks(suite: Suite, plan: RunPlan) -> list[str]:

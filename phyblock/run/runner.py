@@ -103,38 +103,29 @@ def check_ready(plan: RunPlan) -> None:
         raise SpecError(problems)
 
 
+@dataclass(eq=False)
 class Session:
     """Runs one plan in one folder, once.
 
-    It asks every model about every sample that has no final record yet. `interrupt` may be called
-    at any time, before `run` too.
+    It asks every model about every sample that has no final record yet; with `retry_failed` also
+    where a request was rejected for good. `present` are models that answer here, by name; others
+    are built. `interrupt` may be called at any time, before `run` too.
     """
 
-    def __init__(
-        self,
-        plan: RunPlan,
-        folder: Path,
-        watch: Watcher,
-        *,
-        use_cache: bool,
-        retry_failed: bool = False,
-        present: Mapping[str, Model] | None = None,
-    ) -> None:
-        """`retry_failed` asks again also where a request was rejected for good; `present` are
-        models that answer here, by name; others are built.
-        """
-        self._plan = plan
-        self._folder = folder
-        self._watch = watch
-        self._use_cache = use_cache
-        self._retry_failed = retry_failed
-        self._present = present or {}
-        self._models: dict[str, Model] = {}
-        self._extractor: Extractor | None = None
-        self._waiting: set[asyncio.Task[Any]] = set()
-        self._is_over = False
-        self._failure: Exception | None = None
-        self.result = RunResult(plan.samples_per_model * len(plan.models))
+    plan: RunPlan
+    folder: Path
+    watch: Watcher
+    use_cache: bool
+    retry_failed: bool = False
+    present: Mapping[str, Model] = field(default_factory=dict)
+    _models: dict[str, Model] = field(init=False, default_factory=dict)
+    _extractor: Extractor | None = field(init=False, default=None)
+    _waiting: set[asyncio.Task[Any]] = field(init=False, default_factory=set)
+    _is_over: bool = field(init=False, default=False)
+    _failure: Exception | None = field(init=False, default=None)
+
+    def __post_init__(self) -> None:
+        self.result = RunResult(self.plan.samples_per_model * len(self.plan.models))
 
     @property
     def stopping(self) -> bool:
@@ -170,32 +161,32 @@ class Session:
         """Open store, cache and models until the stack is closed, and tell how far the run is;
         return what is left to ask of each model.
         """
-        plan, result = self._plan, self.result
+        plan, result = self.plan, self.result
         stack.callback(plan.close)
-        store = RunStore(self._folder, plan.manifest, plan.sample_ids())
+        store = RunStore(self.folder, plan.manifest, plan.sample_ids())
         self._store = stack.enter_context(store)
         queues: dict[str, deque[Sample]] = {model.name: deque() for model in plan.models}
         earlier: dict[str, list[Summary]] = {name: [] for name in queues}
         for name, queue in queues.items():
             for sample in plan.samples(name):
                 known = store.progress.samples.get(sample.id)
-                if known and (known.is_answered if self._retry_failed else known.is_final):
+                if known and (known.is_answered if self.retry_failed else known.is_final):
                     earlier[name].append(known)
                     result.add(known)
                 else:
                     queue.append(sample)
         self._open_models(stack, queues)
         result.unanswered = store.progress.unanswered_text
-        self._watch(RunStarted(dict.fromkeys(earlier, plan.samples_per_model), earlier))
+        self.watch(RunStarted(dict.fromkeys(earlier, plan.samples_per_model), earlier))
         if result.unanswered:
-            self._watch(RunNotice(result.unanswered))
+            self.watch(RunNotice(result.unanswered))
         return queues
 
     def _open_models(self, stack: AsyncExitStack, queues: Mapping[str, deque[Sample]]) -> None:
         """Build the models that are not present; SpecError for one with a batch under way that is
         asked singly now.
         """
-        plan, store, limits = self._plan, self._store, self._plan.suite.limits
+        plan, store, limits = self.plan, self._store, self.plan.suite.limits
         message = "has a batch under way, whose questions would be asked twice"
         hint = f"let it end with batch: true, or remove its lines from {BATCHES} to give it up"
         if problems := [
@@ -206,11 +197,11 @@ class Session:
             raise SpecError(problems)
 
         def tell(text: str) -> None:
-            self._watch(RunNotice(text))
+            self.watch(RunNotice(text))
 
         cache: ReplyCache | None = None
         asks = any(model.kind == "litellm" for model in plan.models)
-        if self._use_cache and (asks or plan.extractor):
+        if self.use_cache and (asks or plan.extractor):
             cache = ReplyCache(reply_cache_file(), tell)
             stack.callback(cache.close)
         for file in (store.batches, store.calls):
@@ -218,23 +209,24 @@ class Session:
         batches = BatchFiles(
             tuple(store.progress.batches),
             store.batches.put,
-            self._folder,
+            self.folder,
             limits.batch_poll_s,
             frozenset(store.progress.samples),
         )
-        attempts = limits.max_attempts, limits.retry_for_s, limits.max_connection_failures
         build = partial(
             build_model,
             cache=cache,
             overall=asyncio.Semaphore(limits.max_concurrency),
             budget=Budget(limits.max_cost_usd, store.progress.limit_usd),
             journal=store,
-            observer=self._watch,
+            observer=self.watch,
             tell=tell,
-            policy=RetryPolicy(*attempts),
+            policy=RetryPolicy(
+                limits.max_attempts, limits.retry_for_s, limits.max_connection_failures
+            ),
         )
         for planned in plan.models:
-            if (present := self._present.get(planned.name)) is not None:
+            if (present := self.present.get(planned.name)) is not None:
                 model: Model = _Journaled(present, planned, store)
             else:
                 of_model = replace(batches, expected=len(queues[planned.name]))
@@ -253,7 +245,7 @@ class Session:
 
     async def _ask_all(self, queues: Mapping[str, deque[Sample]]) -> None:
         workers: list[asyncio.Task[None]] = []
-        for planned in self._plan.models:
+        for planned in self.plan.models:
             queue = queues[planned.name]
             # What goes out in a batch is asked at once.
             count = len(queue) if planned.batch else min(planned.max_concurrency, len(queue))
@@ -289,7 +281,7 @@ class Session:
             except UnavailableError as error:
                 if planned.name not in self.result.stopped:
                     self.result.stopped[planned.name] = str(error)
-                    self._watch(ModelStopped(planned.name, str(error)))
+                    self.watch(ModelStopped(planned.name, str(error)))
             except BudgetReachedError as error:
                 self._stop(Stopping("cost", str(error)))
             except HaltedError:
@@ -305,7 +297,7 @@ class Session:
             self.result.stop = stop = replace(stop, in_flight=calls)
             for task in self._waiting:
                 task.cancel()
-            self._watch(stop)
+            self.watch(stop)
 
     async def _until_stopped(self, work: Coroutine[Any, Any, _Result]) -> _Result:
         """Return what work gives, which is cancelled once the run stops; then HaltedError is raised
@@ -335,10 +327,12 @@ class Session:
             record = await self._ask(sample, model, config)
         await self._store.records.put(record)
         self.result.add(record)
-        self._watch(SampleDone(record))
+        self.watch(SampleDone(record))
 
     async def _ask(self, sample: Sample, model: Model, config: ModelConfig) -> Record:
-        request = await self._request(sample, config, with_messages=model.needs_messages)
+        track, shows = sample.track, model.needs_messages
+        made = track.request(sample.item, sample.seed, config.params, with_messages=shows)
+        request = sample.asking(await self._until_stopped(made))
         answer = await self._answer(model, request)
         fields = self._fields(sample, answer, request, config)
         record, is_cancelled = await to_its_end(self._judged(sample, fields))
@@ -347,14 +341,6 @@ class Session:
             # It ends at its next wait, which is that for its record.
             task.cancel()
         return record
-
-    async def _request(
-        self, sample: Sample, config: ModelConfig, *, with_messages: bool
-    ) -> Request:
-        """Return the request of a sample that is asked once."""
-        track, item = sample.track, sample.item
-        made = track.request(item, sample.seed, config.params, with_messages=with_messages)
-        return sample.asking(await self._until_stopped(made))
 
     async def _judged(self, sample: Sample, fields: Mapping[str, Any]) -> Record:
         track, item = sample.track, sample.item
@@ -399,7 +385,7 @@ class Session:
         """Return the fields of a record before it is judged."""
         track, item = sample.track, sample.item
         fields = begun(sample.id, track.name, sample.model, item, sample.seed, answer)
-        fields |= {"run": self._plan.manifest.run, **track.about(item)}
+        fields |= {"run": self.plan.manifest.run, **track.about(item)}
         if sample.variant.levels:
             fields["variant"] = dict(sample.variant.levels)
         if request is not None and request.messages:

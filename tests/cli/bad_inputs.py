@@ -85,7 +85,7 @@ SUITES: tuple[Bad, ...] = (
     Bad("no-samples", suite_line("dataset: {path: ./low}\nlevels: [4]"), ("no samples", "1, 2")),
     Bad("variable", suite_line("dataset: {path: $NOWHERE/x}"), ("dataset.path", "NOWHERE")),
     Bad("absent", command("run", "quik"), ("quik: ", "allowed: ", "did you mean quick?")),
-    Bad("folder", command("run", "data"), ("data: is a folder",)),
+    Bad("folder", command("run", "data"), ("data: there is no such suite file",)),
 )
 OPTIONS: tuple[Bad, ...] = (
     Bad("set-key", options("--set", "limits.max=1"), ("--set limits.max=1: limits.max", "allowed")),
@@ -108,8 +108,8 @@ OPTIONS: tuple[Bad, ...] = (
     Bad("check", command("models", "check", "alpah"), ("alpah", "did you mean alpha?")),
     Bad("parser", command("score", "out", "--parser", "mine"), ("--parser", "steps", "official")),
     Bad("validate", many_files, (), messages=3),
-    Bad("validate-pipe", pipe("p.yaml", "validate", "p.yaml"), ("p.yaml: is not a regular file",)),
-    Bad("validate-device", command("validate", "/dev/zero"), ("/dev/zero: is not a regular",)),
+    Bad("validate-pipe", pipe("p.yaml", "validate", "p.yaml"), ("p.yaml: there is no such suite",)),
+    Bad("validate-device", command("validate", "/dev/zero"), ("/dev/zero: there is no such",)),
     # A file that is there and cannot be read, for root too.
     Bad("validate-locked", command("validate", "/proc/self/mem"), ("mem: cannot be read: ",)),
     Bad(
