@@ -115,7 +115,7 @@ def estimate(
     """
     rows = {m.name: Estimate(m, plan.samples_per_model, tariff_of(m)) for m in plan.models}
     settled: dict[str, bool] = {}
-    waiting: dict[str, frozenset[str]] = {}
+    waiting: set[str] = set()
     if held_run(folder, plan.manifest) is not None:
         for _, record in run_records(folder, plan.manifest, plan.sample_ids()):
             settled[record.sample] = record.is_answered if retry_failed else record.is_final
@@ -123,10 +123,8 @@ def estimate(
             for reply in record.replies:
                 rows[record.model].add_reply(reply.usage.completion_tokens, kind)
         lines = tuple(line for _, line in BatchLines(folder))
-        for model in plan.models:
-            if model.batch:
-                batches = under_way(lines, model.name)
-                waiting[model.name] = frozenset(key for one in batches for key in one.most_usd)
+        batches = [one for m in plan.models if m.batch for one in under_way(lines, m.name)]
+        waiting = {key for one in batches for key in one.most_usd}
     path = reply_cache_file()
     with ReplyCache(path) if use_cache and path.exists() else nullcontext() as cache:
         for sample, outlines in _samples(plan):
@@ -143,7 +141,7 @@ def estimate(
                 if kept is not None:
                     row.cached += 1
                     row.add_reply(kept.usage.completion_tokens, kind)
-                elif key in waiting.get(sample.model, ()):
+                elif key in waiting:
                     row.waiting += 1
                 else:
                     row.add_call(estimate_call(row.model, asked), kind)

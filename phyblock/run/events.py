@@ -29,7 +29,6 @@ class Summary:
     is_judged: bool
     counts: Counts | None
     cached: bool | None
-    tokens: int
     paid_usd: float | None
 
     @classmethod
@@ -45,7 +44,6 @@ class Summary:
             record.is_judged,
             None if headline is None else Counts(headline.tp, headline.fp, headline.fn),
             None if reply is None else reply.cached,
-            0 if reply is None else reply.tokens,
             record.paid_usd,
         )
 

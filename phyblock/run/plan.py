@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
+from operator import attrgetter
 from pathlib import Path
 
 from phyblock.config.models import RECORDED, ModelConfig, resolve_models, with_members
@@ -25,7 +26,6 @@ from phyblock.tracks import Item, Track, kind_of, open_tracks
 from phyblock.tracks.base import template_prompt
 from phyblock.tracks.items import interleaved, select_tasks
 from phyblock.tracks.pictures import Workshop
-from phyblock.types import AnswerFormat, CandidateOrder
 
 _SEEDS = 2**31
 """Providers take no larger ones."""
@@ -180,13 +180,11 @@ def _check_models(models: Sequence[ModelConfig], tracks: Sequence[Track], suite:
             refuse(model, message, "vary", ", ".join(suite.vary.factors))
             continue
         if model.recording is not None:
-            order, form = _recorded_as(model.recording)
-            if order != suite.candidates.order:
-                message = f"is a recording of candidates in the order {order}"
-                refuse(model, message, "candidates.order", suite.candidates.order, order)
-            if form != suite.answer_format:
-                message = f"is a recording of answers that were asked for as {form}"
-                refuse(model, message, "answer_format", suite.answer_format, form)
+            for field, was in _recorded_as(model.recording).items():
+                if was != (now := attrgetter(field)(suite)):
+                    refuse(
+                        model, f"is a recording that was made with {field}: {was}", field, now, was
+                    )
         for track in tracks:
             plays, able = track.plays, track_baselines(kind_of(track.name))
             if is_replay and plays:
@@ -204,14 +202,13 @@ def _check_models(models: Sequence[ModelConfig], tracks: Sequence[Track], suite:
         raise SpecError(problems)
 
 
-def _recorded_as(folder: Path) -> tuple[CandidateOrder, AnswerFormat]:
-    """Return the order in which candidates were shown to a recorded model, and the form in which it
-    was asked to answer: of a run of our own those of its suite, of raw replies those of the paper.
-    """
+def _recorded_as(folder: Path) -> dict[str, str]:
+    """Return the fields of a suite with which a recording was made: raw replies as in the paper."""
+    made = {"candidates.order": "file", "answer_format": "text"}
     if not (folder / MANIFEST).is_file():
-        return "file", "text"
+        return made
     suite = suite_of(read_manifest(folder), str(folder / MANIFEST)).at(Variant())
-    return suite.candidates.order, suite.answer_format
+    return {field: attrgetter(field)(suite) for field in made}
 
 
 def open_dataset(format_name: str, path: Path) -> Dataset:

@@ -33,7 +33,6 @@ from phyblock.types import Matcher, PlanParser
 
 _CHANGED = "is not the data set that the run was made on, or it was changed since"
 _MOVED = "name the folder where it is now with --data"
-_RESTORE = "restore the file from a copy"
 _NO_DATA = ("prompt", "pictures", "examples", CARRYING, ENGINE)
 """Parts of a track's identity that are not the data that it asks about."""
 
@@ -86,12 +85,11 @@ def rescore(
 
     with locked(folder):
         write_run(target, manifest.model_copy(update=changes), records())
-    for name, count in diverged.items():
-        if count:
-            tell(
-                f"{kind_of(name).title}: in {counted(count, 'episode')} this version would have "
-                "asked something else; phyblock run asks on from there"
-            )
+    for name, count in (+diverged).items():
+        tell(
+            f"{kind_of(name).title}: in {counted(count, 'episode')} this version would have asked "
+            "something else; phyblock run asks on from there"
+        )
     return target
 
 
@@ -215,15 +213,12 @@ def _judged(
         loop = asyncio.new_event_loop()
         try:
             for where, record in run_records(folder, manifest, whole=not strict):
-                condition = record.way.shown.key
-                if condition not in tracks:
-                    message = "was asked in a condition that the run does not have"
-                    raise StoreError(Problem(where, message, "variant", condition, hint=_RESTORE))
-                track = tracks[condition].get(record.track)
+                track = tracks.get(record.way.shown.key, {}).get(record.track)
                 item = items.get((record.track, record.item))
                 if track is None or item is None:
-                    message = "names an item that the run does not have"
-                    raise StoreError(Problem(where, message, "key", record.item, hint=_RESTORE))
+                    message = "names an item or a condition that the run does not have"
+                    hint = "restore the file from a copy"
+                    raise StoreError(Problem(where, message, "sample", record.sample, hint=hint))
                 shown = track.shown(item, record.seed)
                 work = _judged_again(track, shown, record, where, strict=strict)
                 yield record, thread.submit(loop.run_until_complete, work).result()

@@ -358,10 +358,8 @@ def held_run(folder: Path, manifest: Manifest) -> Manifest | None:
         )
     here = code_versions()
     if differ := [name for name in here if found.versions.get(name) != here[name]]:
-        made, now = (
-            ", ".join(f"{name} {one.get(name)}" for name in differ)
-            for one in (found.versions, here)
-        )
+        made = ", ".join(f"{name} {found.versions.get(name)}" for name in differ)
+        now = ", ".join(f"{name} {here[name]}" for name in differ)
         message = "was judged by another version of phyblock"
         hint = f"phyblock score {folder} first: it judges the replies again and asks nobody"
         raise StoreError(Problem(str(folder), message, found=made, allowed=now, hint=hint))

@@ -213,7 +213,7 @@ def test_a_recording_of_another_order_is_refused(workspace: Workspace) -> None:
     workspace.write_suite(models=["again"], levels=[4])
     done = workspace.phyblock(*again)
     assert done.code == 2
-    assert "is a recording of candidates in the order shuffled" in done.err
+    assert "is a recording that was made with candidates.order: shuffled" in done.err
     workspace.write_suite(models=["again"], candidates={"order": "shuffled"}, levels=[4])
     assert workspace.phyblock(*again).code == 0
     (line,) = workspace.records(workspace.root / "again")
