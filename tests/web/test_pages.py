@@ -241,7 +241,9 @@ def test_a_sample_is_drawn_played_and_turned(visit: PageVisit) -> None:
 def test_a_stage_opens_at_the_first_wrong_step_and_moves_but_for_those_who_want_it_still(
     visit: PageVisit,
 ) -> None:
-    page = visit.show("full_planning/oracle/t5/s1")
+    page = visit.page
+    page.clock.install()
+    visit.show("full_planning/oracle/t5/s1")
     assert page.locator(".controls output").inner_text() == "Step 1 of 2"
     assert page.locator(".wrong-step").count() == 1
     expect(page.locator("canvas.stage")).to_have_attribute("data-drawn", "0")
@@ -250,20 +252,22 @@ def test_a_stage_opens_at_the_first_wrong_step_and_moves_but_for_those_who_want_
     assert "Glowing: what was tried, on the floor, the first open place." in said.inner_text()
     assert said.locator(".quote").inner_text() == "1. Move block with index 9."
     # What is drawn while a block drops is another picture than the one it ends in.
-    drawn = """async (still) => {
-        const seen = new Set(), canvas = document.querySelector("canvas.stage");
+    page.clock.pause_at(page.evaluate("Date.now() / 1000 + 60"))
+    drawn = """() => {
         Sample.player.seek(2);
-        for (let i = 0; i < 40; i++) {
-            seen.add(canvas.toDataURL());
-            await new Promise(requestAnimationFrame);
-        }
-        return seen.size;
+        return document.querySelector("canvas.stage").toDataURL();
     }"""
-    assert page.evaluate(drawn) > 1
+    picture = "canvas => canvas.toDataURL()"
+    first = page.evaluate(drawn)
+    page.clock.run_for(1000)
+    assert page.eval_on_selector("canvas.stage", picture) != first
     assert said.locator(".quote").inner_text() == "2. Move block with index 3"
     page.emulate_media(reduced_motion="reduce")
     page.evaluate("() => Sample.player.seek(1)")
-    assert page.evaluate(drawn) == 1
+    first = page.evaluate(drawn)
+    page.clock.run_for(1000)
+    assert page.eval_on_selector("canvas.stage", picture) == first
+    page.clock.resume()
     visit.show("full_planning/random/t5/s0")
     page.locator(".strip button.wrong").first.click()
     assert "Possible here (outlined): 3 (blue cube)." in said.inner_text()
