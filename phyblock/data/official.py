@@ -282,23 +282,29 @@ _SPELLINGS: dict[str, tuple[str, ...]] = {
     "Qwen2.5-VL-72B-Instruct": ("qwen2.5-vl-72b",),
 }
 """Rows of the paper's Table 1, then those that Table 2 has beside them; other spellings of each."""
-_RELEASE = re.compile(
-    r"[-_./ @](?:latest|00[0-9]|(?:20[0-9]{2}[-_./ ]?)?[01][0-9][-_./ ]?[0-3][0-9])$"
-)
+_TOKEN = re.compile(r"[a-z]+|[0-9]+|[^\W_]+")
+_MONTH, _DAY = "(?:0[1-9]|1[0-2])", "(?:0[1-9]|[12][0-9]|3[01])"
+_DATE = re.compile(rf"(?<![0-9])20[0-9]{{2}}[-_./ ]?{_MONTH}(?:[-_./ ]?{_DAY})?(?![0-9])")
+_SHORT_DATE = re.compile(rf"(?<=[-_./ @]){_MONTH}[-_./ ]?{_DAY}$")
+_RELEASE = re.compile(r"(?<=[-_./ @])(?:latest|00[0-9])$")
 
 
 def match_published(name: str) -> str | None:
     """Return the row of Table 1 or 2 that a folder of recordings or a model name stands for.
 
-    Case, separators, a release at the end (a date, a number, `latest`) and folders before the last
-    slash make no difference; else it must be a known spelling. None where the name is unknown or
-    could mean more than one row: "claude-3-5" names two models, "gemini-2.0" four.
+    Case, separators, release dates and folders before the last slash make no difference; else all
+    tokens (runs of letters and of digits) must be those of a known spelling. None where the name is
+    unknown or could mean more than one row: "claude-3-5" names two models, "gemini-2.0" four.
     """
-    return _ROWS.get(_bare(name)) or _ROWS.get(_bare(_RELEASE.sub("", name.lower())))
+    return _ROWS.get(_tokens(name))
 
 
-def _bare(name: str) -> str:
-    return re.sub(r"[-_. ]", "", name.rpartition("/")[2].lower())
+def _tokens(name: str) -> tuple[str, ...]:
+    bare = name.strip().rstrip("/").rpartition("/")[2].lower()
+    bare = _DATE.sub(" ", bare).rstrip("-_. @")
+    for pattern in (_RELEASE, _SHORT_DATE, _RELEASE):
+        bare = pattern.sub("", bare).rstrip("-_. @")
+    return tuple(_TOKEN.findall(bare))
 
 
-_ROWS = {_bare(one): row for row, more in _SPELLINGS.items() for one in (row, *more)}
+_ROWS = {_tokens(one): row for row, more in _SPELLINGS.items() for one in (row, *more)}

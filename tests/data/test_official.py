@@ -297,7 +297,7 @@ SPELLINGS = {
     "anthropic/claude-3-5-haiku@20241022": "Claude-3.5 Haiku",
     "claude-3-5-sonnet-latest": "Claude-3.5 Sonnet",
     "claude-3-7": "Claude-3.7 Sonnet",
-    "claude-3-7-thinking": "Claude-3.7 Sonnet-Thinking",
+    "claude-3-7-sonnet-20250219-thinking": "Claude-3.7 Sonnet-Thinking",
     "gpt4o": "GPT-4o",
     "openai/gpt-4o-2024-08-06": "GPT-4o",
     "gpt-4o-mini-2024-07-18": "GPT-4o-mini",
