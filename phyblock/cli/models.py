@@ -33,6 +33,7 @@ from phyblock.models import (
     is_billed,
     tariff_of,
 )
+from phyblock.models.litellm_client import be_quiet
 from phyblock.registry import baseline_names
 from phyblock.run.plan import find_models_file, to_config
 from phyblock.text import counted, did_you_mean
@@ -115,6 +116,7 @@ def check(known: Mapping[str, ModelConfig], name: str, yes: bool) -> int:
     if not may_spend(billed, lambda: console.print(f"{name} may bill {calls} of some 100 tokens.")):
         console.print("Nothing was asked.")
         return 1
+    be_quiet()
     code = 0
     for address in addresses:
         server = f"{name} at {host_of(address)}" if address and len(addresses) > 1 else name

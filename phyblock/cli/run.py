@@ -32,6 +32,7 @@ from phyblock.cli.results import show_tables
 from phyblock.config.models import load_models
 from phyblock.files import OutFolder
 from phyblock.models.costs import price_source
+from phyblock.models.litellm_client import be_quiet
 from phyblock.results.text import NO_VALUE, Column, TextTable
 from phyblock.run.estimate import Estimate, estimate, may_bill
 from phyblock.run.plan import (
@@ -109,6 +110,7 @@ def run(
     if not yes and not _is_agreed(console, plan, folder, **asks):
         console.print("Nothing was asked.")
         return 1
+    be_quiet()
     with ProgressView(console) as view:
         result = completed(Session(plan, folder, view, **asks), _SIGNALS, view.tick)
     made = show_tables(folder, page=not no_report)

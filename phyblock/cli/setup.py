@@ -151,16 +151,15 @@ def stats() -> None:
     """Show how many replies the cache holds of each model, and how large its file is."""
     from phyblock.models import ReplyCache
 
-    console, path = make_console(), reply_cache_file()
-    with ReplyCache(path) as opened:
-        held = opened.counts()
-        size_bytes = sum(file.stat().st_size for file in path.parent.glob(f"{path.name}*"))
-    rows = [(model, f"{replies:,}") for model, replies in held.items()]
+    console = make_console()
+    with ReplyCache(reply_cache_file()) as opened:
+        held = opened.stats()
+    rows = [(model, f"{replies:,}") for model, replies in held.by_model.items()]
     if rows:
         print_rows(console, ("model", "replies"), rows, numbers=1)
-    replies = counted(sum(held.values()), "reply", "replies")
-    console.print(f"{replies}, {size_bytes / 1e6:,.1f} MB, in")
-    print_path(console, path)
+    size = f"{held.size_bytes / 1e6:,.1f} MB"
+    console.print(f"{counted(held.replies, 'reply', 'replies')}, {size}, in")
+    print_path(console, held.path)
 
 
 @cache.command()

@@ -13,6 +13,7 @@ import json
 import sqlite3
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from phyblock.config.models import ModelConfig
@@ -26,14 +27,26 @@ SCHEMA = 1
 
 _BUSY_TIMEOUT_S = 2.0
 _HINT = (
-    "delete the file, or name another cache folder with PHYBLOCK_CACHE; answered samples of a run "
-    "stay in its records"
+    "delete the file, or name another cache folder; answered samples of a run stay in its records"
 )
+_ELSEWHERE = "free some space, or name another cache folder with PHYBLOCK_CACHE"
 _CREATE = """
 CREATE TABLE IF NOT EXISTS replies (
     key TEXT PRIMARY KEY, model TEXT NOT NULL, stored_at REAL NOT NULL, reply TEXT NOT NULL
 ) WITHOUT ROWID
 """
+
+
+@dataclass(frozen=True)
+class CacheStats:
+    """Number of replies, by model id too; size of the file; when the first and last came [s]."""
+
+    path: Path
+    replies: int
+    by_model: dict[str, int]
+    size_bytes: int
+    oldest_s: float | None
+    newest_s: float | None
 
 
 def reply_key(config: ModelConfig, request: Request) -> str:
@@ -71,13 +84,16 @@ class ReplyCache:
         self._asked: dict[str, asyncio.Future[None]] = {}
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise self._problem(f"cannot be made: {reason_of(error)}", hint=_ELSEWHERE) from error
+        try:
             self._db = sqlite3.connect(path, timeout=_BUSY_TIMEOUT_S, isolation_level=None)
             try:
                 self._prepare()
             except BaseException:
                 self._db.close()
                 raise
-        except (OSError, sqlite3.Error) as error:
+        except sqlite3.Error as error:
             raise self._unusable(error) from error
 
     def __enter__(self) -> ReplyCache:
@@ -91,9 +107,8 @@ class ReplyCache:
         # As bytes: SQLite calls the whole file unusable where a text is no UTF-8.
         sql = "SELECT CAST(reply AS BLOB) FROM replies WHERE key = ?"
         row = None
-        if not self._is_off:
-            with self._using():
-                row = self._db.execute(sql, (key,)).fetchone()
+        with self._using():
+            row = self._db.execute(sql, (key,)).fetchone() if not self._is_off else None
         if row is None:
             return None
         try:
@@ -130,12 +145,22 @@ class ReplyCache:
         finally:
             self._asked.pop(key).set_result(None)
 
-    def counts(self) -> dict[str, int]:
-        """Return the number of replies by model id."""
-        sql = "SELECT model, count(*) FROM replies GROUP BY model ORDER BY model"
+    def stats(self) -> CacheStats:
+        """Count what the cache holds."""
         with self._using():
-            return dict(self._db.execute(sql).fetchall())
-        return {}
+            rows = self._db.execute(
+                "SELECT model, count(*), min(stored_at), max(stored_at) FROM replies "
+                "GROUP BY model ORDER BY model"
+            ).fetchall()
+        files = (self.path.with_name(self.path.name + end) for end in ("", "-wal"))
+        return CacheStats(
+            self.path,
+            sum(row[1] for row in rows),
+            {row[0]: row[1] for row in rows},
+            sum(file.stat().st_size for file in files if file.exists()),
+            min((row[2] for row in rows), default=None),
+            max((row[3] for row in rows), default=None),
+        )
 
     def clear(self, model_id: str | None = None) -> int:
         """Drop all replies, or those of one model id; returns how many."""
@@ -156,10 +181,9 @@ class ReplyCache:
         tables = self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
         self._db.execute("COMMIT")
         if version != SCHEMA and (version != 0 or tables != 0):
-            where = f"reply cache {self.path}"
             message = "belongs to another version of phyblock, or is no reply cache"
             found, allowed = f"schema {version}", f"schema {SCHEMA}"
-            raise StoreError(Problem(where, message, "", found, allowed, _HINT))
+            raise self._problem(message, found=found, allowed=allowed)
         self._db.execute("PRAGMA journal_mode = WAL")
         self._db.execute("PRAGMA synchronous = NORMAL")
         if version != SCHEMA:
@@ -179,6 +203,13 @@ class ReplyCache:
             self._is_off = True
             self._tell(f"reply cache {self.path}: cannot be used: {error}; going on without it")
 
-    def _unusable(self, error: Exception) -> StoreError:
-        message = f"cannot be used: {reason_of(error)}"
-        return StoreError(Problem(f"reply cache {self.path}", message, hint=_HINT))
+    def _unusable(self, error: sqlite3.Error) -> StoreError:
+        # An operational error is of the disk, the place or another process, not of the content.
+        hint = _ELSEWHERE if isinstance(error, sqlite3.OperationalError) else _HINT
+        return self._problem(f"cannot be used: {error}", hint=hint)
+
+    def _problem(
+        self, message: str, found: str = "", allowed: str = "", hint: str = _HINT
+    ) -> StoreError:
+        where = f"reply cache {self.path}"
+        return StoreError(Problem(where, message, found=found, allowed=allowed, hint=hint))

@@ -135,6 +135,7 @@ class HttpClient:
         self._timeout_s = config.timeout_s
         self._most_bytes = config.most_body_bytes
         self._session: aiohttp.ClientSession | None = None
+        self._proxies: dict[tuple[str, str], str | None] = {}
 
     async def send(
         self, url: str, body: bytes, headers: Mapping[str, str], *, method: str = "POST"
@@ -161,7 +162,7 @@ class HttpClient:
                 yarl.URL(url, encoded=url.isascii()),
                 data=body,
                 headers={**headers, "Accept-Encoding": "gzip, deflate"},
-                proxy=_proxy(url),
+                proxy=self._proxy(url),
                 allow_redirects=False,
             ) as response:
                 content, fault = await self._read(response, url)
@@ -214,14 +215,17 @@ class HttpClient:
             await self._session.close()
             self._session = None
 
-
-def _proxy(url: str) -> str | None:
-    """Return the proxy that the environment names for an address."""
-    parts, proxies = urllib.parse.urlsplit(url), urllib.request.getproxies()
-    proxy = proxies.get(parts.scheme) or proxies.get("all")
-    if not proxy or urllib.request.proxy_bypass(parts.hostname or ""):
-        return None
-    return proxy if "://" in proxy else f"http://{proxy}"
+    def _proxy(self, url: str) -> str | None:
+        """Return the proxy that the environment names for an address, looked up once."""
+        parts = urllib.parse.urlsplit(url)
+        place = parts.scheme, parts.hostname or ""
+        if place not in self._proxies:
+            proxies = urllib.request.getproxies()
+            proxy = proxies.get(place[0]) or proxies.get("all")
+            if urllib.request.proxy_bypass(place[1]):
+                proxy = None
+            self._proxies[place] = f"http://{proxy}" if proxy and "://" not in proxy else proxy
+        return self._proxies[place]
 
 
 class OpenAIClient(Client):

@@ -374,23 +374,26 @@ def counted(reply: Reply, expected: Estimate) -> Reply:
     hundred times what was expected of it.
     """
 
-    least = {
-        "prompt_tokens": 1,
-        "completion_tokens": int(bool(reply.text or reply.reasoning)),
-        "reasoning_tokens": int(bool(reply.reasoning)),
-    }
-    known: dict[str, int | None] = {}
-    for name, count in reply.usage:
-        is_reply = name in ("completion_tokens", "reasoning_tokens")
-        usual = expected.most_completion_tokens if is_reply else expected.prompt_tokens
-        most = _MOST_TIMES_EXPECTED * max(usual, _LEAST_EXPECTED_TOKENS)
-        is_plausible = count is not None and least.get(name, 0) <= count <= most
-        known[name] = count if is_plausible else None
-    if (known["cached_tokens"] or 0) + (known["cache_write_tokens"] or 0) > (
-        known["prompt_tokens"] or 0
-    ):
-        known |= {"cached_tokens": None, "cache_write_tokens": None}
-    return reply.model_copy(update={"usage": Usage.model_validate(known)})
+    def plausible(count: int | None, least: int, expected: int) -> int | None:
+        most = _MOST_TIMES_EXPECTED * max(expected, _LEAST_EXPECTED_TOKENS)
+        is_count = isinstance(count, int) and not isinstance(count, bool)
+        return count if is_count and least <= (count or 0) <= most else None
+
+    usage, asked, longest = reply.usage, expected.prompt_tokens, expected.most_completion_tokens
+    says, thinks = bool(reply.text or reply.reasoning), bool(reply.reasoning)
+    prompt = plausible(usage.prompt_tokens, 1, asked)
+    cached = plausible(usage.cached_tokens, 0, asked)
+    written = plausible(usage.cache_write_tokens, 0, asked)
+    if (cached or 0) + (written or 0) > (prompt or 0):
+        cached = written = None
+    known = Usage(
+        prompt_tokens=prompt,
+        completion_tokens=plausible(usage.completion_tokens, int(says), longest),
+        reasoning_tokens=plausible(usage.reasoning_tokens, int(thinks), longest),
+        cached_tokens=cached,
+        cache_write_tokens=written,
+    )
+    return reply.model_copy(update={"usage": known})
 
 
 _PIECE = re.compile(
@@ -421,6 +424,9 @@ def _pieces(text: str) -> int:
 # Google, Gemini API guides to token counting and media resolution; xAI, guide to image
 # understanding; Qwen, model cards of Qwen2.5-VL and Qwen3-VL.
 
+_Count = Callable[[float, float], float]
+"""Tokens of a picture of so many pixels in width and height."""
+
 
 def picture_tokens(model_id: str, image: Image, detail: ImageDetail | None = None) -> int:
     """Return the tokens of a picture in a detail, or in the provider's default.
@@ -430,80 +436,97 @@ def picture_tokens(model_id: str, image: Image, detail: ImageDetail | None = Non
     """
     name = model_id.rpartition("/")[2].lower()
     rules = (rule for rule in _PICTURE_RULES if re.search(rf"(^|\.){rule[0]}", name))
-    _, count, *numbers = next(rules)
-    tokens: float = count(image.width_px, image.height_px, detail, *numbers)
-    return math.ceil(tokens)
+    _, usual, details = next(rules)
+    return math.ceil(details.get(detail or "auto", usual)(image.width_px, image.height_px))
+
+
+def _fixed(tokens: int) -> _Count:
+    return lambda _width, _height: tokens
 
 
 def _squares(side_px: int, width: float, height: float) -> int:
     return math.ceil(width / side_px) * math.ceil(height / side_px)
 
 
-def _tiles(width: int, height: int, detail: str | None, whole: int, tile: int) -> float:
+def _framed(side_px: int) -> _Count:
+    """Square patches, and two tokens that frame them."""
+    return lambda width, height: _squares(side_px, width, height) + 2
+
+
+def _tiles(whole: int, tile: int) -> _Count:
     """Tiles of 512 x 512 of a picture fit into 2048 x 2048, then its short side to 768."""
-    scale = min(1.0, 2048 / max(width, height), 768 / min(width, height))
-    tiles = 0 if detail == "low" else _squares(512, width * scale, height * scale)
-    return whole + tile * tiles
+
+    def count(width: float, height: float) -> float:
+        scale = min(1.0, 2048 / max(width, height), 768 / min(width, height))
+        return whole + tile * _squares(512, width * scale, height * scale)
+
+    return count
 
 
-def _patches(
-    width: int, height: int, _detail: str | None, factor: float, most: int, longest_px: int = 2048
-) -> float:
-    """Patches of 32 pixels of a picture scaled to a side, at most `most`; `factor` tokens each."""
-    scale = min(1.0, longest_px / max(width, height))
-    sides = (max(1, round(side * scale)) for side in (width, height))
-    return factor * min(most, _squares(32, *sides))
+def _patches(factor: float, most: int, longest_px: int = 2048) -> _Count:
+    """Patches of 32 pixels of a picture scaled to a side, then to `most`; `factor` tokens each."""
+
+    def count(width: float, height: float) -> float:
+        scale = min(1.0, longest_px / max(width, height))
+        width, height = (max(1, round(side * scale)) for side in (width, height))
+        if _squares(32, width, height) > most:
+            scale = math.sqrt(32**2 * most / (width * height))
+            whole = (math.floor(s * scale / 32) / (s * scale / 32) for s in (width, height))
+            scale *= min(part or 1.0 for part in whole)
+            width, height = (max(1, math.floor(side * scale)) for side in (width, height))
+        return min(most, _squares(32, width, height)) * factor
+
+    return count
 
 
-def _shrunk(width: int, height: int, _detail: str | None, longest_px: int, most: int) -> float:
+def _shrunk(longest_px: int, most: int) -> _Count:
     """Square patches of 28 pixels of a picture that is scaled down until it fits both bounds."""
-    scale = min(1.0, longest_px / max(width, height), math.sqrt(most * 28**2 / (width * height)))
-    return min(_squares(28, width * scale, height * scale), most)
+
+    def count(width: float, height: float) -> float:
+        scale = min(1.0, longest_px / max(width, height))
+        scale = min(scale, math.sqrt(most * 28**2 / (width * height)))
+        return min(_squares(28, width * scale, height * scale), most)
+
+    return count
 
 
-def _crops(width: int, height: int, detail: str | None) -> float:
+def _crops(width: float, height: float) -> float:
     """A small picture counts once; a larger one by the squares that cover it."""
-    if detail in ("low", "medium"):
-        return 64 if detail == "low" else 256
     return 258 if max(width, height) <= 384 else 258 * _squares(768, width, height)
 
 
-def _fixed(_width: int, _height: int, detail: str | None) -> float:
-    """Gemini 3: a number by the detail alone."""
-    return {"low": 280, "medium": 560, "ultra_high": 2240}.get(detail or "", 1120)
-
-
-def _grok(width: int, height: int, _detail: str | None) -> float:
+def _grok(width: float, height: float) -> float:
     """Tiles of 448 x 448, at most six, and one of the whole; 256 tokens each."""
     return 256 * (min(6, _squares(448, width, height)) + 1)
 
 
-def _framed(width: int, height: int, _detail: str | None, side_px: int) -> float:
-    """Square patches, and two tokens that frame them."""
-    return _squares(side_px, width, height) + 2
-
-
-_PICTURE_RULES: tuple[tuple[Any, ...], ...] = (
-    (r"gpt-4o-mini", _tiles, 2833, 5667),
-    (r"gpt-4\.1-mini", _patches, 1.62, 6144),
-    (r"gpt-4\.1-nano", _patches, 2.46, 1536),
-    (r"o4-mini", _patches, 1.72, 1536),
-    (r"gpt-5-nano", _patches, 1.5, 1536),
-    (r"gpt-5-mini", _patches, 1.2, 1536),
-    (r"gpt-5(\.1)?($|-)", _tiles, 70, 140),
-    (r"gpt-5\.[23]", _patches, 1.2, 6144),
-    (r"gpt-5\.[45]", _patches, 1.2, 10_000, 6000),
-    (r"gpt-([6-9]|5\.\d)", _patches, 1.2, 30_000, 65_535),
-    (r"o[13]($|-)", _tiles, 75, 150),
-    (r"claude-(opus-4-[7-9]|[a-z]+-([5-9]|\d\d))", _shrunk, 2576, 4784),
-    (r"claude", _shrunk, 1568, 1568),
-    (r"gemini-([12]|exp)", _crops),
-    (r"gemini", _fixed),
-    (r"grok", _grok),
-    (r"qwen2(\.5)?-vl", _framed, 28),
-    (r"qwen3", _framed, 32),
-    (r"", _tiles, 85, 170),
+_SMALL = _patches(1.2, 2500, 512)
+_HIGH = _patches(1.2, 2500)
+_ORIGINAL = _patches(1.2, 10_000, 6000)
+_WHOLE = _patches(1.2, 30_000, 65_535)
+_GEMINI = {"low": _fixed(280), "medium": _fixed(560), "ultra_high": _fixed(2240)}
+_PICTURE_RULES: tuple[tuple[str, _Count, Mapping[str, _Count]], ...] = (
+    (r"gpt-4o-mini", _tiles(2833, 5667), {"low": _fixed(2833)}),
+    (r"gpt-4\.1-mini", _patches(1.62, 6144), {}),
+    (r"gpt-4\.1-nano", _patches(2.46, 1536), {}),
+    (r"o4-mini", _patches(1.72, 1536), {}),
+    (r"gpt-5-nano", _patches(1.5, 1536), {}),
+    (r"gpt-5-mini", _patches(1.2, 1536), {}),
+    (r"gpt-5(\.1)?($|-)", _tiles(70, 140), {"low": _fixed(70)}),
+    (r"gpt-5\.[23]", _patches(1.2, 6144), {}),
+    (r"gpt-5\.4", _HIGH, {"low": _patches(1.2, 6144), "original": _ORIGINAL}),
+    (r"gpt-5\.5", _ORIGINAL, {"low": _SMALL, "high": _HIGH}),
+    (r"gpt-([6-9]|5\.\d)", _WHOLE, {"low": _SMALL, "high": _HIGH}),
+    (r"o[13]($|-)", _tiles(75, 150), {"low": _fixed(75)}),
+    (r"claude-(opus-4-[7-9]|[a-z]+-([5-9]|\d\d))", _shrunk(2576, 4784), {}),
+    (r"claude", _shrunk(1568, 1568), {}),
+    (r"gemini-([12]|exp)", _crops, {"low": _fixed(64), "medium": _fixed(256)}),
+    (r"gemini", _fixed(1120), _GEMINI),
+    (r"grok", _grok, {}),
+    (r"qwen2(\.5)?-vl", _framed(28), {}),
+    (r"qwen3", _framed(32), {}),
+    (r"", _tiles(85, 170), {"low": _fixed(85)}),
 )
-"""A count and its numbers by the beginning of a model's name, or what follows a dot in it; the
-first that matches. Of the details of models that count patches, the finest is counted.
+"""Count of a picture, and in a detail where that differs, by the beginning of a model's name, or
+what follows a dot in it; the first that matches.
 """

@@ -2,9 +2,8 @@
 
 litellm is given the client that it sends with, over our HTTP client: what it sends follows no
 redirect, is read up to the same limit, and is sent once. Its settings, loggers and classes stay as
-they are, except that it is kept from printing where nothing else has imported it. It takes seconds
-to import, so it is imported by the first call and never by a run whose replies are all cached,
-recorded or made by baselines. The only module that imports it.
+they are. It takes seconds to import, so it is imported by the first call and never by a run whose
+replies are all cached, recorded or made by baselines. The only module that imports it.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ import contextlib
 import importlib.util
 import logging
 import os
-import sys
 import time
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -225,7 +223,6 @@ async def _send(exchange: _Exchange, config: ModelConfig, request: httpx.Request
 @cache
 def _litellm() -> Any:
     """Import litellm; the environment is as it was when that is done."""
-    is_ours = "litellm" not in sys.modules
     before = {name: os.environ.pop(name, None) for name in _WHILE_IMPORTED}
     os.environ.update(_WHILE_IMPORTED)
     try:
@@ -234,11 +231,20 @@ def _litellm() -> Any:
         for name in _WHILE_IMPORTED:
             del os.environ[name]
         os.environ.update({name: value for name, value in before.items() if value is not None})
-    if is_ours:
+    if _is_quiet:
         litellm.suppress_debug_info = True
         for name in ("LiteLLM", "LiteLLM Router", "LiteLLM Proxy"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
     return litellm
+
+
+_is_quiet = False
+
+
+def be_quiet() -> None:
+    """Keep litellm from printing: for a program of which phyblock is the whole, as its commands."""
+    global _is_quiet
+    _is_quiet = True
 
 
 def known_providers(config: ModelConfig) -> frozenset[str]:

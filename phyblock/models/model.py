@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import random
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
 from tenacity import AsyncRetrying, RetryCallState, retry_if_exception_type
-from tenacity.wait import wait_random_exponential
 
 from phyblock.config.models import DIRECT_PROVIDERS, ModelConfig
 from phyblock.errors import ModelError, RetryableError, UnavailableError
@@ -95,7 +95,6 @@ class RetryPolicy:
         nothing is tried again.
         """
         first_failure_s: list[float] = []
-        own_wait = wait_random_exponential(self.base_s, self.max_wait_s)
 
         def error_of(state: RetryCallState) -> RetryableError:
             error = state.outcome.exception() if state.outcome is not None else None
@@ -108,7 +107,10 @@ class RetryPolicy:
             return is_over() or self.gives_up(error_of(state), state.attempt_number, lasted_s)
 
         def wait(state: RetryCallState) -> float:
-            return self.followed_s(error_of(state)) + own_wait(state)
+            doubled_s = self.base_s * 2.0 ** min(state.attempt_number - 1, 60)
+            return self.followed_s(error_of(state)) + random.uniform(
+                0.0, min(self.max_wait_s, doubled_s)
+            )
 
         def before_sleep(state: RetryCallState) -> None:
             on_retry(error_of(state), state.upcoming_sleep)

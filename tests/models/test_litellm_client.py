@@ -234,6 +234,6 @@ def test_the_first_call_imports_litellm_quietly_and_reads_no_key_file(tmp_path: 
         done = subprocess.run(
             command, capture_output=True, text=True, check=True, cwd=ROOT, env=environment
         )
-    assert done.stdout == "1000\nTrue None\nTrue False None\n"
+    assert done.stdout == "1000\nTrue None\nFalse False None\n"
     assert done.stderr == ""
     assert [seen.key for seen in running.server.seen] == ["no-key"]
