@@ -113,8 +113,9 @@ class Lines(Generic[LineT]):
                 while data := file.readline(_LONGEST_LINE_BYTES + 1):
                     number += 1
                     where = f"{self.path}:{number}"
-                    if b"\0" in data:
-                        message = f"is not a {self.noun}: it holds zero bytes"
+                    if b"\0" in data or data.endswith(b"\r\n"):
+                        held = "holds zero bytes" if b"\0" in data else "ends with CR LF"
+                        message = f"is not a {self.noun}: it {held}"
                         raise StoreError(Problem(where, message, hint=self.hint))
                     self.lacks_newline = not data.endswith(b"\n")
                     if self.lacks_newline and _is_cut(data):

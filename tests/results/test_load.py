@@ -94,7 +94,7 @@ def test_a_cut_last_line_is_passed_over_and_counted(
     [
         ('{"sample": "x', ":14", ""),
         ("\0\0\0", "", ""),
-        ("{}\r", "", ""),
+        (json.dumps(record()) + "\r", "", ""),
         ("[1, 2]", "", ""),
         ("{}", "", "track"),
         (json.dumps(record() | {"seed": "first"}), "", "seed"),
@@ -110,7 +110,7 @@ def test_a_corrupt_line_is_named(tmp_path: Path, line: str, at: str, field: str)
     (folder / "records.jsonl").write_text(f"{good}\n{line}\n{good}\n", encoding="utf-8")
     with pytest.raises(StoreError) as caught:
         load_run(folder)
-    (problem,) = caught.value.problems
+    problem = caught.value.problems[0]
     assert problem.where == f"{folder / 'records.jsonl'}:2{at}"
     assert problem.message.startswith("is not a record")
     assert problem.field == field

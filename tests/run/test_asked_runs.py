@@ -117,7 +117,7 @@ def test_all_tracks_ask_and_read_by_the_schema(
     (workspace.root / "recorded" / "records.jsonl").write_text("\n".join(lines) + "\n")
     workspace.write_yaml("models.yaml", {"alpha": {"replay": "./recorded"}})
     workspace.write_suite(models=["alpha"])
-    with pytest.raises(InputError, match="recording of answers that were asked for as json_schema"):
+    with pytest.raises(InputError, match="was made with answer_format: json_schema"):
         call("validate", "suite.yaml")
     workspace.write_suite(models=["alpha"], **FORMAT)
     replayed = workspace.root / "replayed"

@@ -177,5 +177,5 @@ def test_a_goal_that_is_not_drawn_is_no_match_for_states_that_are(
     prepare(workspace, "http://nowhere", dataset=official, images={"source": "dataset"})
     done = workspace.run("--dry-run")
     assert (done.code, len(done.errors)) == (2, 1)
-    assert "step planning draws every state" in done.errors[0]
+    assert "step_planning draws its own pictures" in done.errors[0]
     assert "images.source=render" in done.errors[0]

@@ -168,7 +168,7 @@ def test_pictures_of_official_files_are_sent_byte_for_byte(workspace: Workspace)
         "scene_id": "t1",
         "question": "What comes next?",
         "options": ["<img1>", "<img2>", "<img3>", "<img4>"],
-        "answer": 4,
+        "answer": "D",
     }
     (folder / "PD.json").write_text(json.dumps([entry]), encoding="utf-8")
     digests = {}
