@@ -142,7 +142,7 @@ class ShownTask(AssemblyTask):
 
 @dataclass(frozen=True)
 class Presentation:
-    """How scenes are shown: without their goal where `blind`, with that of one of the `others`."""
+    """Conditions of scenes: without their goal where `blind`, with that of one of the `others`."""
 
     order: CandidateOrder = "file"
     blind: bool = False

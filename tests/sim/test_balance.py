@@ -169,6 +169,14 @@ def test_what_surely_stands_stands_in_every_engine(sites: list[Site], blocks: li
             assert site.settle(group).stands
 
 
+@pytest.mark.parametrize(("name", "stands"), [("l1-007-slide", False), ("l2-032-slide", True)])
+def test_a_wedge_on_two_ridges_surely_stands_where_it_covers_them(name: str, stands: bool) -> None:
+    """Its base ends over the ridges, and both engines drop it, or reaches 1 cm beyond them."""
+    left = [one for one in SCENES[name] if one.order != 1]
+    assert is_balanced(left)
+    assert surely_stands(left) is stands
+
+
 def test_what_the_data_set_holds_stands() -> None:
     for blocks in list(SCENES.values())[::80]:
         assert all(is_balanced(group) for group in groups(blocks))

@@ -28,11 +28,12 @@ from phyblock.sim.dynamics import (
 )
 from phyblock.sim.engine import ENGINES, Physics, Pose, World
 from phyblock.sim.outcomes import OUTCOME_SETTINGS, Push, after, after_removal, holds
-from tests.designs import built
+from tests.designs import built, designed_scenes
 from tests.sim.structures import block, counterweighted_beam, tower
 from tests.sim.test_geometry import FLOATING
 
 BUILT_IN = read_builtin(Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400").tasks
+SCENES = {scene.id: scene.blocks for scene in designed_scenes()}
 FIRST = replace(DEFAULT_TRIAL, physics=DEFAULT_TRIAL.physics[:1])
 LINE_BALANCED = {"bowl", "bowl-turned"}
 SEESAW = (
@@ -116,6 +117,13 @@ def test_of_all_official_scenes_only_the_floating_fall(official_checkout: Path) 
     trial = Trial(physics=(Physics(),))
     tasks = read_official(official_checkout).tasks
     assert {t.scene.id for t in tasks if not check(t.scene.blocks, trial).stable} == FLOATING
+
+
+@pytest.mark.parametrize("name", ["l1-dolmen", "l2-rocket", "l4-playground"])
+def test_steps_stand_as_the_long_trial_says(name: str) -> None:
+    blocks = SCENES[name]
+    assert [step.fallen for step in check_steps(blocks, FIRST)] == [()] * len(blocks)
+    assert all(check(blocks[:count], FIRST).stable for count in range(1, 5))
 
 
 def test_what_falls_midway_or_slowly_is_named_at_its_step() -> None:

@@ -200,6 +200,15 @@ def test_who_is_knocked_over_is_named_and_stays_so(engine: PhysicsEngine) -> Non
     assert blocks_reached(beam, done.blocks, 1, 10) < len(beam)
 
 
+def test_the_same_plan_ends_the_same_to_the_last_digit_whatever_came_before(
+    engine: PhysicsEngine,
+) -> None:
+    beam: list[Block | None] = [*counterweighted_beam()[:3]]
+    first = execute(beam, engine=engine)
+    execute(tower(2), engine=engine)
+    assert execute(beam, engine=engine) == first
+
+
 def test_what_stands_elsewhere_changes_no_verdict(engine: PhysicsEngine) -> None:
     far = [at(one, 0.3, 0.3, one.position_m[2]) for one in tower(3)]
     near = counterweighted_beam()[:3]

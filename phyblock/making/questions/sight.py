@@ -1,4 +1,4 @@
-"""What a picture tells of its blocks: how much of each shows, from which side, and where."""
+"""The evidence of a picture on its blocks: how much of each shows, from which side, and where."""
 
 from __future__ import annotations
 
