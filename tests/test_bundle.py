@@ -339,6 +339,7 @@ HOSTILE: dict[str, Callable[[], bytes]] = {
     "thousands": lambda: archive(*((f"{n}", b"") for n in range(70))),
     "changed": lambda: archive(*LESS, (RECORDS, b"other")),
     "no digests": lambda: archive(*LESS[:1], (RECORDS, b"other"), (ABOUT, b"[]")),
+    "other format": lambda: archive(*with_digests(SOUND, {"format": 2}).items()),
     "deep": lambda: archive(*LESS[:1], (RECORDS, b"other"), (ABOUT, b"[" * 9000)),
     "lists too much": lambda: PACKED[:-10] + struct.pack("<L", 2**31) + PACKED[-6:],
     "large archive": lambda: PACKED[:-22] + b"PK\6\7" + bytes(16) + PACKED[-22:],

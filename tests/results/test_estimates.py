@@ -170,6 +170,16 @@ def test_a_mean_of_which_a_part_was_not_answered_has_no_value() -> None:
     assert math.isnan(value(run, "accuracy"))
 
 
+@pytest.mark.parametrize(("missing", "n", "wanted"), [("count", 4, 0.5), ("skip", 3, 2 / 3)])
+def test_missing_answers_count_as_wrong_or_are_left_out(
+    missing: str, n: int, wanted: float
+) -> None:
+    records = [answered("SH", number, "A" if number < 2 else "B") for number in range(3)]
+    records.append(answered("SH", 3, None, outcome="api_error"))
+    row = of(questions(records, missing=missing), "accuracy", "SH")
+    assert (row["n"], row["value"]) == (n, pytest.approx(wanted))
+
+
 def test_circular_needs_every_rotation_of_a_seed() -> None:
     def rotations(number: int, seed: int, wrong: int | None) -> Records:
         return [
@@ -214,6 +224,25 @@ def episodes(*records: dict[str, Any], missing: str = "skip") -> Run:
     facts = manifest(items={"step_planning": 2}, seeds=[0], missing=missing)
     facts["suite"] |= {"tracks": ["step_planning"]}
     return run_of(records, facts)
+
+
+def test_episodes_by_hand() -> None:
+    run = episodes(
+        episode("alpha", "001", "pppop", "completed"),
+        episode("alpha", "002", "ppd", "done"),
+        episode("beta", "001", "o?oi?", "max_failures"),
+    )
+    assert value(run, "precision", criterion="placed") == 1
+    assert value(run, "precision", criterion="attempted") == pytest.approx(6 / 7)
+    assert value(run, "recall", criterion="placed") == 0.75
+    assert (value(run, "completion"), value(run, "ended_done")) == (0.5, 0.5)
+    assert (value(run, "detour"), value(run, "steps")) == (1.25, 4)
+    assert [value(run, f"step_{name}") for name in ("placed", "overflow", "done")] == [
+        *(0.75, 0.125, 0.125)
+    ]
+    assert value(run, "step_unread", model="beta") == 0.4
+    assert value(run, "ended_max_failures", model="beta") == 1
+    assert math.isnan(value(run, "detour", model="beta"))
 
 
 def test_the_strongest_blind_baseline_is_the_best_of_those_that_were_run() -> None:

@@ -85,6 +85,20 @@ def test_outcomes_split_what_was_expected(records: Records) -> None:
         assert table[outcome].iloc[0] == sum(ends)
 
 
+def test_replies_that_are_missing_and_seeds_that_were_refused_stand_under_tables() -> None:
+    records = [
+        record(scene="001", scores=[score(1, 0, 0)], seed_sent=False),
+        record(scene="001", seed=1, scores=[score(0, 0, 4)], outcome="api_error"),
+        record(scene="002", scores=[score(0, 0, 4)], outcome="missing"),
+    ]
+    for missing, how in (("count", "counted as wrong"), ("skip", "left out")):
+        run = run_of(records, manifest(missing=missing))
+        notes = make_tables(run, ["table1"])["table1"].view.notes
+        assert f"Without a reply, {how}: alpha 1 API errors and 1 missing replies." in notes
+        assert "alpha: seed unsupported, seeds are independent repeats." in notes
+        assert "Values pool the samples of 2 seeds." in notes
+
+
 def test_costs_are_of_what_is_known_and_say_how_much_is_not() -> None:
     records = [
         record(scene="000", prompt_tokens=10, completion_tokens=5, cost_usd=0.5, latency_s=1.0),

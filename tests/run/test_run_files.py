@@ -17,7 +17,14 @@ from hypothesis import strategies as st
 
 from phyblock.config.suite import load_suite
 from phyblock.errors import StoreError
-from phyblock.records.files import PromptLines, read_prompts
+from phyblock.records.files import (
+    BatchLines,
+    CallLines,
+    Lines,
+    PromptLines,
+    RecordLines,
+    read_prompts,
+)
 from phyblock.records.record import Call, Reply
 from phyblock.run.plan import make_plan
 from phyblock.run.store import AppendFile, Progress, RunStore
@@ -86,11 +93,18 @@ def test_a_run_whose_records_are_taken_away_asks_no_more_and_says_so(workspace: 
     assert len(workspace.records()) == 100
 
 
-@pytest.mark.parametrize("line", [b"\0" * 40, b"\0" * 40 + b"\n"])
-def test_zero_bytes_are_named(tmp_path: Path, line: bytes) -> None:
-    (tmp_path / "prompts.jsonl").write_bytes(line)
-    with pytest.raises(StoreError, match=r"prompts\.jsonl:1: is not a prompt: it holds"):
-        list(PromptLines(tmp_path))
+@pytest.mark.parametrize("lines", [RecordLines, CallLines, PromptLines, BatchLines])
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [(b"\0" * 40, "zero bytes"), (b"\0" * 40 + b"\n", "zero bytes"), (b"{}\r\n", "CR LF")],
+)
+def test_zero_bytes_and_foreign_line_ends_are_named(
+    tmp_path: Path, lines: Callable[[Path], Lines[Any]], line: bytes, said: str
+) -> None:
+    read = lines(tmp_path)
+    read.path.write_bytes(line)
+    with pytest.raises(StoreError, match=rf"\.jsonl:1: is not a {read.noun}: it .*{said}"):
+        list(read)
 
 
 @pytest.mark.parametrize("call", ["fstat", "write", "fsync"])
