@@ -22,7 +22,7 @@ from phyblock.scoring.pose import Piece, PoseFit, overlap_volume, placed
 from phyblock.sim.geometry import collision_pieces
 from phyblock.stable import plain_sum
 from phyblock.tracks.baselines import text_features
-from phyblock.tracks.pose_planning_results import FITS
+from phyblock.tracks.pose_planning import FITS
 
 DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
 ASKED = read_questions(bundled("benchmarks", "data", "phyblock-vqa"), DATA)

@@ -258,12 +258,19 @@ class Record(Line):
     counts: dict[str, tuple[Amount, ...]] = Field(default_factory=dict)
     """Counts of measures beside `scores`, by name."""
 
-    exported: ClassVar[Mapping[str, str]] = {}
-    """Columns that the track adds to exports, with their types in pandas."""
+    exported: ClassVar[Mapping[str, tuple[str, str]]] = {}
+    """Columns that the track adds to exports, with their types in pandas and their fields."""
 
     def export_row(self) -> Mapping[str, Any]:
-        """The values of `exported`."""
-        return {}
+        """The values of `exported`, None for a field of what is null."""
+
+        def value(path: str) -> Any:
+            found: Any = self
+            for name in path.split("."):
+                found = getattr(found, name, None)
+            return found
+
+        return {column: value(path) for column, (_, path) in self.exported.items()}
 
     @property
     def part(self) -> str | None:

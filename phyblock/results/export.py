@@ -53,7 +53,8 @@ def export_frame(run: Run) -> pd.DataFrame:
     missing. `levels`, `parents` and `plan` are lists.
     """
     types = {**dict.fromkeys(_TEXTS, "string"), "plan": "object"}
-    types |= {name: kind for record in record_types() for name, kind in record.exported.items()}
+    for record in record_types():
+        types |= {column: kind for column, (kind, _) in record.exported.items()}
     for setting in run.design.suite.settings:
         types |= {f"{name}_{setting.lower()}": "Int64" for name in ("tp", "fp", "fn")}
     frame = run.records[list(_TYPES)].astype(_TYPES)

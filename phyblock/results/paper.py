@@ -112,7 +112,7 @@ def _ours(run: Run, table: int) -> pd.DataFrame:
     rows = pd.concat(parts)
     if table == 2:
         # A mean over a part of what the paper averages is not the same number.
-        from phyblock.tracks.vqa_results import ALL_CELLS
+        from phyblock.tracks.questions import ALL_CELLS
 
         asked, whole = (
             rows[CELL].map({cell.name: pooled_in(cell, cells) for cell in cells})

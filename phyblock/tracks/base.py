@@ -8,7 +8,6 @@ instead (`start`). What those about scenes share is in `SceneTrack`.
 from __future__ import annotations
 
 import asyncio
-import importlib
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -28,9 +27,9 @@ from phyblock.records.record import Record, Reply, SentPrompt
 from phyblock.registry import added_measures, known_track, known_tracks
 from phyblock.sim.engine import REFERENCE_ENGINE, engine_version, physics_engine
 from phyblock.stable import hex_digest
-from phyblock.tracks.baselines import Picking
 from phyblock.tracks.items import Item, Others, Presentation, ShownTask, select_tasks
 from phyblock.tracks.measures import SampleCounts, TrackReport
+from phyblock.tracks.picking import Picking
 from phyblock.tracks.pictures import Drawing, Workshop, scene_drawings
 from phyblock.tracks.prompts import Prompt, TemplatePrompt, form_facts
 from phyblock.types import AnswerFormat
@@ -88,10 +87,8 @@ class Track(ABC):
     """How a person answers about a subject; None where nothing can be picked."""
     record: ClassVar[type[Record] | None] = None
     """The model of its records; None for one that adds nothing to them."""
-    results: ClassVar[str] = ""
-    """The module that holds its `REPORT`, for tracks that do not override `report`."""
     counted: ClassVar[tuple[SampleCounts, ...]] = ()
-    """What its measures count of every sample as it is judged."""
+    """The counts that its measures are made of; some are taken as a sample is judged."""
     varies: ClassVar[tuple[str, ...]] = ("repeats",)
     """Factors of a suite's section `vary` that change what it asks."""
     shows_examples: ClassVar[bool] = False
@@ -126,9 +123,8 @@ class Track(ABC):
 
     @classmethod
     def report(cls) -> TrackReport:
-        """Import and return what tables and figures are made by, which takes long."""
-        report: TrackReport = importlib.import_module(cls.results).REPORT
-        return report
+        """Return what tables and figures are made by."""
+        raise NotImplementedError
 
     @classmethod
     def prompt_field(cls) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Answers in place of a model's: guesses from the texts of questions, and the picks of people.
+"""Guesses at questions from their texts alone.
 
 Guesses are told the answers of other questions only: questions are split into folds by the base
 scene they are about, and those of a fold are answered by rules learned from questions whose scenes
@@ -13,12 +13,10 @@ import itertools
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 from phyblock.domain.question import Question, Subtask, is_picture_option
 from phyblock.errors import Problem, SpecError
-from phyblock.sim.pictures import GRID_COLUMNS
 from phyblock.stable import plain_sum
 
 Rule = Callable[[Question], tuple[int, ...]]
@@ -181,126 +179,3 @@ def _overlap(one: Sequence[str], other: Sequence[str]) -> float:
 
 def _bases(question: Question) -> tuple[str, ...]:
     return question.scene.parents or (question.scene.id,)
-
-
-@dataclass(frozen=True)
-class Spot:
-    """The place where a choice is seen: in the last picture of this `label`, the cell of the grid
-    that fills the square at its right end, from 0; or with None the whole picture.
-    """
-
-    label: str
-    cell: int | None = None
-
-    def box(self, width_px: int, height_px: int) -> tuple[float, float, float, float]:
-        """Return left, top, width and height in a picture of this size, as shares of its sides."""
-        if self.cell is None:
-            return (0.0, 0.0, 1.0, 1.0)
-        row, column = divmod(self.cell, GRID_COLUMNS)
-        side = min(width_px, height_px) / width_px
-        width = side / GRID_COLUMNS
-        return (1 - side + column * width, row / GRID_COLUMNS, width, 1 / GRID_COLUMNS)
-
-
-@dataclass(frozen=True)
-class Choice:
-    """One thing to pick: its name as the prompt says it, what it says where that is a text, and
-    where it is seen.
-    """
-
-    name: str
-    text: str = ""
-    spots: tuple[Spot, ...] = ()
-
-
-@dataclass(frozen=True)
-class NumberField:
-    """A number that goes with every pick: its name and unit, from `-most` to `most` with so many
-    `decimals`. Keys change it by `step`, or by `leap`. `start` stands in it at first.
-    """
-
-    name: str
-    unit: str
-    most: float
-    decimals: int
-    step: float
-    leap: float
-    start: float | None = None
-
-    def allows(self, value: float) -> bool:
-        """True for a number in these bounds; none is no finite number."""
-        return abs(value) <= self.most and abs(value - round(value, self.decimals)) <= 1e-9
-
-
-@dataclass(frozen=True)
-class Pick:
-    """A choice, by its place among them from 0, and the numbers that go with it."""
-
-    place: int
-    numbers: tuple[float, ...] = ()
-
-
-@dataclass(frozen=True)
-class Picking:
-    """An answer made of choices that are picked one after another.
-
-    From `least` to `most` of them, each as often as one likes where `repeats`; `noun` is what one
-    pick is called. `fields` are the numbers that go with each. `write` makes the reply, in the form
-    that the prompt asks for. `task` says in one line what to do.
-    """
-
-    choices: tuple[Choice, ...]
-    least: int
-    most: int
-    repeats: bool
-    noun: str
-    write: Callable[[Sequence[Pick]], str]
-    fields: tuple[NumberField, ...] = ()
-    task: str = ""
-
-    def without_cells(self) -> Picking:
-        """Return the same with choices that are not looked for in grids."""
-        whole = [tuple(spot for spot in one.spots if spot.cell is None) for one in self.choices]
-        pairs = zip(self.choices, whole, strict=True)
-        return replace(self, choices=tuple(replace(one, spots=spots) for one, spots in pairs))
-
-    def reply(self, picks: Sequence[Pick]) -> str:
-        """Return the reply that picks make.
-
-        Raises ValueError for too few or many, places that there are not, repeats where none may
-        be, and numbers that are lacking or not allowed.
-        """
-        places = [pick.place for pick in picks]
-        is_answer = (
-            self.least <= len(picks) <= self.most
-            and all(0 <= place < len(self.choices) for place in places)
-            and (self.repeats or len(set(places)) == len(places))
-            and all(len(pick.numbers) == len(self.fields) for pick in picks)
-            and all(
-                field.allows(value)
-                for pick in picks
-                for field, value in zip(self.fields, pick.numbers, strict=True)
-            )
-        )
-        if not is_answer:
-            rules = [f"{self.least} to {self.most} picks of 0 to {len(self.choices) - 1}"]
-            rules += [] if self.repeats else ["none twice"]
-            rules += [
-                f"{one.name} within ±{one.most:g} {one.unit} with at most {one.decimals} decimals"
-                for one in self.fields
-            ]
-            raise ValueError(f"holds picks that make no answer: it needs {', '.join(rules)}")
-        return self.write(picks)
-
-
-def candidate_choices(
-    n_candidates: int, labels: Sequence[str] = ("composite", "candidates")
-) -> tuple[Choice, ...]:
-    """Return the numbered candidates of a scene, wherever a picture with a label shows them.
-
-    In these pictures the square at the right end is the grid of candidates.
-    """
-    return tuple(
-        Choice(str(n + 1), "", tuple(Spot(label, n) for label in labels))
-        for n in range(n_candidates)
-    )

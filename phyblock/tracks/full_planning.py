@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -17,15 +17,23 @@ from phyblock.parsing.plan import ParsedPlan, parse_plan, plan_form, reader_vers
 from phyblock.parsing.structured import AnswerForm
 from phyblock.records.line import Line
 from phyblock.records.record import Record
+from phyblock.records.record import Score as ScoreLine
 from phyblock.resources import bundled
-from phyblock.scoring.counts import Floats, ratio_of
-from phyblock.scoring.plan import AssemblyScorer, Score
+from phyblock.scoring.counts import Counts, Floats, ratio_of
+from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES, AssemblyScorer, Score
+from phyblock.sim.film import FilmStep, Tone
 from phyblock.stable import drawn_bytes
 from phyblock.tracks.base import Judgement, SceneTrack
-from phyblock.tracks.baselines import Picking, candidate_choices
-from phyblock.tracks.goal_blind import BlindGuesses
+from phyblock.tracks.goal_blind import blind_guesses
 from phyblock.tracks.items import examples_of, file_plan
-from phyblock.tracks.measures import SampleCounts
+from phyblock.tracks.measures import (
+    SampleCounts,
+    TrackReport,
+    each_score,
+    level_cells,
+    read_report,
+)
+from phyblock.tracks.picking import Picking, candidate_choices
 from phyblock.tracks.prompts import OfficialPrompt, Prompt
 
 
@@ -209,6 +217,38 @@ POSE_COUNTS = SampleCounts(
 )
 
 
+def _steps(score: ScoreLine) -> tuple[float, ...]:
+    """Count steps; under `membership` they count over again, so no plan has a value of its own."""
+    alone = score.criterion != "membership"
+    f1 = Counts(score.tp, score.fp, score.fn).f1 or 0.0
+    whole = alone and score.fp == score.fn == 0
+    return score.tp, score.fp, score.fn, whole, alone * f1, alone
+
+
+def _wrong_steps(score: ScoreLine) -> list[int] | None:
+    errors = score.errors or {}
+    return [errors.get(name, 0) for name in ERROR_TYPES] if score.criterion == "aov" else None
+
+
+def _blocks(score: ScoreLine) -> tuple[float, ...] | None:
+    """Count plans whose order counts."""
+    if score.criterion != "aov" or score.kept is None:
+        return None
+    blocks, outcomes = score.tp + score.fn, score.blocks or {}
+    both = blocks + score.tp + score.fp
+    distance = 1 - 2 * score.kept / both if both else 0.0
+    return (*(outcomes.get(name, 0) for name in BLOCK_OUTCOMES), blocks, distance, 1)
+
+
+_OUTCOMES = tuple(f"blocks_{name}" for name in BLOCK_OUTCOMES)
+COUNTS = (
+    SampleCounts("steps", ("tp", "fp", "fn", "whole", "f1", "plans"), rows=each_score(_steps)),
+    SampleCounts("blocks", (*_OUTCOMES, "blocks", "distance", "plans"), rows=each_score(_blocks)),
+    SampleCounts("wrong_steps", ERROR_TYPES, rows=each_score(_wrong_steps)),
+    POSE_COUNTS,
+)
+
+
 class FullPlanning(SceneTrack):
     """Asks for a whole plan in one reply."""
 
@@ -217,19 +257,27 @@ class FullPlanning(SceneTrack):
     section = name
     options = PlanningSpec
     template = bundled("prompts", "full_planning.j2")
-    results = "phyblock.tracks.full_planning_results"
     baselines = PLAN_RULES
     by_hand = staticmethod(pick_plan)
     record = PlanRecord
-    counted = (POSE_COUNTS,)
+    counted = COUNTS
     varies = ("prompt", "background", "view", "candidate_order", "layout", "examples", "repeats")
     shows_examples = True
+
+    @classmethod
+    @functools.cache
+    def report(cls) -> TrackReport:
+        """Return what tables and figures are made by."""
+        code = {"pose_gap": {"value": pose_gap}}
+        return read_report(
+            cls.name, COUNTS, code, cells=level_cells, floors=PLAN_FLOORS, film=_film
+        )
 
     def open(self) -> None:
         """Select scenes, and examples, which are shown as scenes are, with their own goals."""
         super().open()
         suite, dataset = self.suite, self.dataset
-        self._guesses = BlindGuesses(suite.candidates.order, dataset.tasks, suite.settings[0])
+        self._guess = blind_guesses(suite.candidates.order, dataset.tasks, suite.settings[0])
         self._scorers: dict[object, AssemblyScorer] = {}
         if self.shop is None:
             return
@@ -265,7 +313,7 @@ class FullPlanning(SceneTrack):
 
     def subject_of(self, item: AssemblyTask) -> PlanSubject:
         """Return what baselines answer about."""
-        return PlanSubject(item.scene, item.candidates, partial(self._guesses.plan, item))
+        return PlanSubject(item.scene, item.candidates, functools.partial(self._guess, item))
 
     def right_answer(self, item: AssemblyTask) -> str:
         """Return the answer of a worked example.
@@ -304,6 +352,29 @@ class FullPlanning(SceneTrack):
         }
         fields = {"parse": parse, "scores": [score_fields(score) for score in scores]}
         return Judgement(parsed.rule is not None, fields)
+
+
+def _film(record: PlanRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
+    """Yield each step by the first score that knows single steps, that of the headline.
+
+    A right step puts a block at its place in the goal; a wrong one puts none.
+    """
+    yield FilmStep(f"{record.model}, {record.scene}", "plain", None, ())
+    score = next((score for score in record.scores if score.placed is not None), None)
+    if score is None or score.placed is None or score.why is None or record.parse is None:
+        yield FilmStep("no step is known", "bad", None, ())
+        return
+    blocks: tuple[Block, ...] = ()
+    steps = zip(record.parse.plan, score.placed, score.why, strict=True)
+    for n, (candidate, vertex, why) in enumerate(steps, 1):
+        heading = FullPlanning.report().heading
+        outcome = "placed" if vertex is not None else heading("wrong", str(why))
+        if task is not None and vertex is not None:
+            blocks += (task.scene.blocks[vertex],)
+        tone: Tone = "good" if vertex is not None else "bad"
+        yield FilmStep(f"{n}. block {candidate}: {outcome}", tone, candidate, blocks)
+    tone = "good" if score.tp == record.n_blocks else "bad"
+    yield FilmStep(f"{score.tp} of {record.n_blocks} blocks placed", tone, None, blocks)
 
 
 TRACK = FullPlanning

@@ -201,26 +201,22 @@ def _plan(
     return Plan(tuple(number for *_, number in sorted(named)))
 
 
-class BlindGuesses:
-    """The goal-blind plans of tasks, learned from all of `pool` in the order that each seed shows.
+def blind_guesses(
+    order: CandidateOrder, pool: Sequence[AssemblyTask], setting: Setting
+) -> Callable[[AssemblyTask], Plan]:
+    """Return what gives the plan for a task of a pool, in the numbers that are shown.
 
     A place in the list tells something only where the order is the file's, so plans are learned
     anew for every order. A goal is not learned from, whichever is shown.
     """
+    of_seed = functools.cache(lambda seed: _learned(tuple(pool), order, seed, setting))
 
-    def __init__(
-        self, order: CandidateOrder, pool: Sequence[AssemblyTask], setting: Setting
-    ) -> None:
-        self._order, self._pool, self._setting = order, tuple(pool), setting
-        self._plans: dict[int, dict[str, Plan]] = {}
+    def plan(task: AssemblyTask) -> Plan:
+        seed = task.seed if isinstance(task, ShownTask) and order == "shuffled" else 0
+        learned: dict[str, Plan] = of_seed(seed)
+        return learned[task.key]
 
-    def plan(self, task: AssemblyTask) -> Plan:
-        """Return the plan for a task of the pool, in the numbers that are shown."""
-        is_shuffled = self._order == "shuffled"
-        seed = task.seed if is_shuffled and isinstance(task, ShownTask) else 0
-        if seed not in self._plans:
-            self._plans[seed] = _learned(self._pool, self._order, seed, self._setting)
-        return self._plans[seed][task.key]
+    return plan
 
 
 @functools.lru_cache(maxsize=32)

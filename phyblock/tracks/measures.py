@@ -68,6 +68,33 @@ def level_cells(suite: Suite, _: Manifest) -> tuple[Cell, ...]:
     return (*levels, Cell(OVERALL, "Overall", criterion=whole))
 
 
+NO_CHOICE: Way = ("", "", "")
+"""The way of a sample that is scored in one way alone."""
+Rows = Callable[[Any], Iterator[tuple[Way, Sequence[float]]]]
+"""The counts of a record with the way that they were scored by."""
+
+
+def each_record(count: Callable[[Any], Sequence[float] | None]) -> Rows:
+    """Return the `rows` of counts that a record has once, unless None."""
+
+    def rows(record: Record) -> Iterator[tuple[Way, Sequence[float]]]:
+        if (numbers := count(record)) is not None:
+            yield NO_CHOICE, numbers
+
+    return rows
+
+
+def each_score(count: Callable[[Score], Sequence[float] | None]) -> Rows:
+    """Return the `rows` of counts that are taken from each score of a record, unless None."""
+
+    def rows(record: Record) -> Iterator[tuple[Way, Sequence[float]]]:
+        for score in record.scores:
+            if (numbers := count(score)) is not None:
+                yield (score.setting, score.matcher or "", score.criterion), numbers
+
+    return rows
+
+
 @dataclass(frozen=True)
 class SampleCounts:
     """Counts of samples, one for each of the `columns`, from which measures are made.
@@ -85,7 +112,7 @@ class SampleCounts:
     name: str
     columns: tuple[str, ...]
     sample: Callable[[Any, Any], Sequence[float] | None] | None = None
-    rows: Callable[[Any], Iterable[tuple[Way, Sequence[float]]]] | None = None
+    rows: Rows | None = None
     cells: tuple[Cell, ...] = ()
     parts: Callable[[Suite], int] | None = None
     alike: tuple[str, ...] = ()
@@ -95,20 +122,7 @@ class SampleCounts:
         if self.rows is not None:
             yield from self.rows(record)
         elif numbers := record.counts.get(self.name):
-            yield ("", "", ""), numbers
-
-
-def each_score(
-    count: Callable[[Score], Sequence[float] | None],
-) -> Callable[[Record], Iterator[tuple[Way, Sequence[float]]]]:
-    """Return the `rows` of counts that are taken from each score of a record, unless None."""
-
-    def rows(record: Record) -> Iterator[tuple[Way, Sequence[float]]]:
-        for score in record.scores:
-            if (numbers := count(score)) is not None:
-                yield (score.setting, score.matcher or "", score.criterion), numbers
-
-    return rows
+            yield NO_CHOICE, numbers
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import threading
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -46,21 +47,26 @@ from phyblock.parsing.text import READER_VERSION
 from phyblock.records.line import Amount, Line, Whole
 from phyblock.records.record import Course, Record
 from phyblock.resources import bundled
+from phyblock.scoring.counts import Floats, ratio_of
 from phyblock.scoring.plan import AssemblyScorer
 from phyblock.scoring.pose import (
+    POSE_ERRORS,
+    POSE_FRAMES,
     Laid,
     Piece,
     PoseError,
+    PoseFrame,
     PoseScorer,
     blocks_reached,
     pose_errors,
 )
-from phyblock.scoring.pose_matching import TURN_TOLERANCE_DEG
+from phyblock.scoring.pose_matching import TOLERANCES_CM, TURN_TOLERANCE_DEG
 from phyblock.sim.balance import MARGIN_M, is_balanced
 from phyblock.sim.camera import VIEWS
 from phyblock.sim.contact import voxel_iou
 from phyblock.sim.dynamics import ExecutionLimits, execute, groups
 from phyblock.sim.engine import Pose, described_engine
+from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.geometry import (
     box_height_cm,
     center_cm,
@@ -71,12 +77,21 @@ from phyblock.sim.geometry import (
 )
 from phyblock.sim.pictures import goal_style
 from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
-from phyblock.tracks.base import CARRYING, Judgement, SceneTrack
-from phyblock.tracks.baselines import NumberField, Pick, Picking, candidate_choices
+from phyblock.stable import plain_sum
+from phyblock.text import counted
+from phyblock.tracks.base import CARRYING, ENGINE, Judgement, SceneTrack
 from phyblock.tracks.full_planning import PlanParse, needed_candidate, score_fields
 from phyblock.tracks.items import ShownTask, file_plan, goal_of
+from phyblock.tracks.measures import (
+    SampleCounts,
+    TrackReport,
+    each_record,
+    level_cells,
+    read_report,
+)
+from phyblock.tracks.picking import NumberField, Pick, Picking, candidate_choices
 from phyblock.tracks.pictures import Drawing, picture_style
-from phyblock.types import REFUSED_ENDS, Matcher, PoseRotation, Setting, StepEnd, View
+from phyblock.types import REFUSED_ENDS, STEP_ENDS, Matcher, PoseRotation, Setting, StepEnd, View
 
 CARRY_VERSION = 3
 """Version of the execution of plans and of how its end is measured; it goes up where some plan may
@@ -594,6 +609,69 @@ def pick_poses(subject: PoseSubject) -> Picking:
     )
 
 
+def _right(record: PoseRecord) -> tuple[float, ...] | None:
+    if (pose := record.pose) is None:
+        return None
+    right = (count for frame in POSE_FRAMES for count in pose.right[frame])
+    score = record.scores[0]
+    return (*right, score.tp + score.fp, score.tp + score.fn)
+
+
+def _fits(record: PoseRecord) -> tuple[float, ...] | None:
+    if (pose := record.pose) is None:
+        return None
+    fits = [step for step in pose.steps if step.vertex is not None]
+    parts = ("position_cm", "turn_deg", "iou")
+    return (*(plain_sum(getattr(fit, part) for fit in fits) for part in parts), len(fits))
+
+
+def _ends(record: PoseRecord) -> tuple[float, ...] | None:
+    if (pose := record.pose) is None:
+        return None
+    ends, blocks = Counter(step.end for step in pose.steps), record.n_blocks
+    whole = (pose.reached, blocks, pose.iou, pose.completed, 1)
+    return (*(ends[name] for name in STEP_ENDS), len(pose.steps), *whole)
+
+
+def _errors(record: PoseRecord) -> tuple[float, ...] | None:
+    if (pose := record.pose) is None:
+        return None
+    errors = Counter(step.error for step in pose.steps)
+    return (*(errors[name] for name in POSE_ERRORS), len(pose.steps))
+
+
+def _plan(record: PoseRecord, setting: Setting = "A") -> tuple[float, ...] | None:
+    """Count the plan without its poses, by the headline matcher."""
+    score = next((one for one in record.scores if one.setting == setting), None)
+    return None if score is None else (score.tp, score.fp, score.fn)
+
+
+_ALIKE = tuple(f"tracks.pose_planning.{key}" for key in (CARRYING, ENGINE))
+RIGHT = SampleCounts(
+    "poses",
+    (*(f"{frame}_{cm:g}" for frame in POSE_FRAMES for cm in TOLERANCES_CM), "steps", "blocks"),
+    rows=each_record(_right),
+)
+ENDS = (*STEP_ENDS, "steps", "reached", "blocks", "iou", "completed", "plans")
+FITS = SampleCounts("fits", ("position_cm", "turn_deg", "iou", "n"), rows=each_record(_fits))
+COUNTS = (
+    RIGHT,
+    FITS,
+    SampleCounts("carried", ENDS, rows=each_record(_ends), alike=_ALIKE),
+    SampleCounts("pose_errors", (*POSE_ERRORS, "steps"), rows=each_record(_errors), alike=_ALIKE),
+    SampleCounts("plan_a", ("tp", "fp", "fn"), rows=each_record(_plan)),
+    SampleCounts("plan_b", ("tp", "fp", "fn"), rows=each_record(partial(_plan, setting="B"))),
+)
+
+
+def _f1(frame: PoseFrame, sums: Floats) -> Floats:
+    """Return the mean over tolerances of 2 TP / (steps + blocks)."""
+    steps, blocks = (sums[..., RIGHT.columns.index(name)] for name in ("steps", "blocks"))
+    right = (sums[..., RIGHT.columns.index(f"{frame}_{cm:g}")] for cm in TOLERANCES_CM)
+    parts = [ratio_of(np.stack([2 * each, steps + blocks], axis=-1)) for each in right]
+    return np.asarray(np.mean(parts, axis=0))
+
+
 class PosePlanning(SceneTrack):
     """Asks for a whole plan with the place of every block, and carries it out."""
 
@@ -602,14 +680,24 @@ class PosePlanning(SceneTrack):
     section = "pose"
     options = PoseSpec
     template = bundled("prompts", "pose_planning.j2")
-    results = "phyblock.tracks.pose_planning_results"
     baselines = POSE_RULES
     by_hand = staticmethod(pick_poses)
     record = PoseRecord
+    counted = COUNTS
     varies = ("prompt", "background", "candidate_order", "repeats")
     simulates = True
     draws = True
     spec: PoseSpec
+
+    @classmethod
+    @functools.cache
+    def report(cls) -> TrackReport:
+        """Return what tables and figures are made by."""
+        frames: dict[str, PoseFrame] = {"f1_c": "absolute", "f1_c_aligned": "aligned"}
+        code = {name: {"value": partial(_f1, frame)} for name, frame in frames.items()}
+        return read_report(
+            cls.name, COUNTS, code, cells=level_cells, floors=POSE_FLOORS, film=_film
+        )
 
     def draw(self, item: AssemblyTask) -> tuple[Drawing, ...]:
         """Return the goal, where it is shown, from every view, and the sheet from the first."""
@@ -674,6 +762,62 @@ class PosePlanning(SceneTrack):
         rules = (self.spec, self.suite.settings, self.suite.scoring.matchers, known)
         found: Judgement = await self.work_out(partial(judge_poses, item, text, *rules))
         return found
+
+
+def _film(record: PoseRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
+    """Yield the plan as given, the world after each step, and the end."""
+    given, pose = record.parse.steps if record.parse else (), record.pose
+    if pose is None or not given:
+        yield FilmStep(f"there is no plan: {_no_plan(record)}", "bad", None, ())
+        return
+    worlds: list[tuple[Block, ...]] = [() for _ in given]
+    blocks: list[Block | None] = []
+    if task is not None:
+        candidates = upright(task.candidates)[0] if pose.rotation == "free" else task.candidates
+        steps = [PoseStep(one.block, one.center_cm, one.euler_deg) for one in given]
+        blocks = [put(step, candidates) for step in steps]
+        worlds = list(worlds_of(blocks, pose.steps))
+    first = tuple(block for block in blocks if block is not None)
+    yield FilmStep(f"{record.model}, {record.scene}: the plan as given", "plain", None, first)
+    for n, (one, step, world) in enumerate(zip(given, pose.steps, worlds, strict=True), 1):
+        tone: Tone = "good" if step.error is None else "bad"
+        caption = f"{n}. block {one.block}: {_ended(step)}"
+        if step.error is not None and step.end == "stands":
+            caption += f", but {_heading(step.error)}"
+        yield FilmStep(caption, tone, one.block, world, _where(one, step))
+    reached = f"{pose.reached} of {counted(record.n_blocks, 'block')} reached"
+    tone = "good" if pose.completed else "bad"
+    yield FilmStep(f"{reached}, IoU {pose.iou:.2f}", tone, None, worlds[-1])
+
+
+def _no_plan(record: PoseRecord) -> str:
+    """Return why there is not one step."""
+    if record.error is not None:
+        return record.error.message
+    if record.parse is not None and record.parse.problem is not None:
+        return f"nothing could be read out of the reply ({record.parse.problem})"
+    return "there is no reply"
+
+
+def _where(given: GivenStep, step: StepOutcome) -> str:
+    """Return where a step puts its block, how far that is off, and what is wrong with it."""
+    told = [f"at ({', '.join(f'{part:g}' for part in given.center_cm)}) cm"]
+    told += [] if step.position_cm is None else [f"off by {step.position_cm:.2f} cm"]
+    told += [] if step.error is None else [_heading(step.error)]
+    return ", ".join(told)
+
+
+def _ended(step: StepOutcome) -> str:
+    if step.end == "falls":
+        return f"falls, {step.moved_cm:.1f} cm from its place"
+    if step.end == "knocks_over":
+        return f"knocks over {', '.join(map(str, step.knocked))}"
+    plain = {"under_floor": "under the floor", "no_block": "no such block"}
+    return plain.get(step.end, step.end)
+
+
+def _heading(error: str) -> str:
+    return PosePlanning.report().heading("pose", error).lower()
 
 
 TRACK = PosePlanning

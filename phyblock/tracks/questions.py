@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import json
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from phyblock.config.suite import Suite
 from phyblock.config.validation import (
     Count,
     Flag,
@@ -30,7 +31,16 @@ from phyblock.data import (
     read_official_questions,
     read_questions,
 )
-from phyblock.domain import LETTERS, SUBTASKS, Question, Scene, Subtask, is_picture_option
+from phyblock.domain import (
+    CATEGORIES,
+    LETTERS,
+    SUBTASK_NAMES,
+    SUBTASKS,
+    Question,
+    Scene,
+    Subtask,
+    is_picture_option,
+)
 from phyblock.domain.question import rotated, rotated_label
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.files import read_picture
@@ -38,8 +48,10 @@ from phyblock.models.request import Image
 from phyblock.parsing.answer import ParsedAnswer, choice_form, parse_answer
 from phyblock.parsing.structured import AnswerForm
 from phyblock.records.line import Line, Whole
+from phyblock.records.manifest import MANIFEST, Manifest
 from phyblock.records.record import Record
 from phyblock.resources import bundled, bundled_sets
+from phyblock.scoring.counts import chance
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import (
     LETTERED_VERSION,
@@ -50,8 +62,18 @@ from phyblock.sim.question_pictures import (
 )
 from phyblock.stable import hex_digest
 from phyblock.tracks.base import Judgement, Track
-from phyblock.tracks.baselines import Choice, Guesses, Picking, Spot
+from phyblock.tracks.baselines import Guesses
 from phyblock.tracks.items import Others, examples_of, spread, stratified
+from phyblock.tracks.measures import (
+    OVERALL,
+    WHOLE,
+    Cell,
+    SampleCounts,
+    TrackReport,
+    each_record,
+    read_report,
+)
+from phyblock.tracks.picking import Choice, Picking
 from phyblock.tracks.pictures import Drawing, picture_style
 from phyblock.tracks.prompts import form_facts
 from phyblock.types import Background, DataFormat
@@ -140,23 +162,15 @@ class ChoiceRecord(Record):
     answer: GivenAnswer | None = None
     """What was answered."""
 
-    exported: ClassVar[Mapping[str, str]] = {
-        "question_id": "string",
-        "question_subtask": "string",
-        "question_category": "string",
-        "question_rotation": "Int64",
-        "answer_right": "string",
-        "answer_given": "string",
-        "answer_correct": "boolean",
+    exported: ClassVar[Mapping[str, tuple[str, str]]] = {
+        "question_id": ("string", "question.id"),
+        "question_subtask": ("string", "question.subtask"),
+        "question_category": ("string", "question.category"),
+        "question_rotation": ("Int64", "question.rotation"),
+        "answer_right": ("string", "answer.right"),
+        "answer_given": ("string", "answer.given"),
+        "answer_correct": ("boolean", "answer.correct"),
     }
-
-    def export_row(self) -> Mapping[str, Any]:
-        """The question, the right answer, and the one that was given."""
-        parts = {name: name.partition("_") for name in self.exported}
-        return {
-            name: getattr(getattr(self, part), field, None)
-            for name, (part, _, field) in parts.items()
-        }
 
     @property
     def part(self) -> str:
@@ -182,6 +196,73 @@ class ChoiceRecord(Record):
     def said(self) -> str | None:
         """The letters given."""
         return None if self.answer is None else self.answer.given
+
+
+CATEGORY_NAMES = {
+    "object_property": "Property",
+    "object_relationship": "Relationship",
+    "scene_understanding": "Scene",
+    "dynamic_reasoning": "Dynamics",
+}
+_LETTER_COUNTS = [(kind, letter) for letter in LETTERS for kind in ("right", "given")]
+
+
+def _cells(asked: Container[str]) -> tuple[Cell, ...]:
+    """Return the subtasks of each category and their mean, as in Table 2, then the mean of all."""
+    cells: list[Cell] = []
+    for category, subtasks in CATEGORIES.items():
+        heading = CATEGORY_NAMES[category]
+        if names := tuple(name for name in subtasks if name in asked):
+            cells += [Cell(name, name, heading) for name in names]
+            cells.append(Cell(category, heading, heading, names))
+    means = tuple(cell.name for cell in cells if cell.of)
+    return (*cells, Cell(OVERALL, WHOLE.heading, of=means))
+
+
+ALL_CELLS = _cells(SUBTASKS)
+"""The cells of a run that asks everything."""
+
+
+def _run_cells(suite: Suite, manifest: Manifest) -> tuple[Cell, ...]:
+    """Return the cells of the subtasks that were asked."""
+    asked = manifest.tracks.get("vqa", {}).get("by_subtask", {})
+    return _cells(asked or suite.section(VqaSpec).subtasks)
+
+
+def _answer(record: ChoiceRecord) -> tuple[int, ...]:
+    given = record.answer
+    return given is not None and given.given == given.right, 1
+
+
+def _letters(record: ChoiceRecord) -> tuple[int, ...] | None:
+    """Count answers with one right letter, which ordering has not."""
+    answer = record.answer
+    if answer is None or len(answer.right) != 1:
+        return None
+    return (*(getattr(answer, kind) == letter for kind, letter in _LETTER_COUNTS), 1)
+
+
+_ALIKE = ("suite.vqa.circular", "tracks.vqa.questions")
+_COLUMNS = tuple(f"{kind}_{letter.lower()}" for kind, letter in _LETTER_COUNTS)
+COUNTS = (
+    SampleCounts(
+        "answer",
+        ("correct", "n"),
+        rows=each_record(_answer),
+        parts=lambda suite: suite.section(VqaSpec).rotations,
+        alike=_ALIKE,
+    ),
+    SampleCounts("rotations", ("correct", "n"), rows=each_record(_answer), alike=_ALIKE),
+    SampleCounts(
+        "letters", (*_COLUMNS, "n"), rows=each_record(_letters), cells=(WHOLE,), alike=_ALIKE
+    ),
+)
+
+
+def _guessing(suite: Suite, cell: str) -> float:
+    """Return the expected accuracy of uniform guesses in a subtask."""
+    subtask = next(name for name in SUBTASKS if name == cell)
+    return chance(subtask) ** suite.section(VqaSpec).rotations
 
 
 @dataclass(frozen=True)
@@ -222,13 +303,18 @@ def pick_answer(subject: ChoiceSubject) -> Picking:
     is_ordering = subject.question.subtask == "OR"
     picked = len(options) if is_ordering else 1
     choices = tuple(
-        Choice(letter, "", (Spot(letter),)) if is_picture_option(option) else Choice(letter, option)
+        Choice(letter, labels=(letter,)) if is_picture_option(option) else Choice(letter, option)
         for letter, option in zip(LETTERS, options, strict=False)
     )
-    noun = "place" if is_ordering else "option"
-    write = lambda picks: choice_text([pick.place for pick in picks])  # noqa: E731
-    task = subject.question.text
-    return Picking(choices, picked, picked, repeats=False, noun=noun, write=write, task=task)
+    return Picking(
+        choices,
+        least=picked,
+        most=picked,
+        repeats=False,
+        noun="place" if is_ordering else "option",
+        write=lambda picks: choice_text([pick.place for pick in picks]),
+        task=subject.question.text,
+    )
 
 
 @dataclass(frozen=True)
@@ -318,13 +404,27 @@ class Vqa(Track):
     section = name
     options = VqaSpec
     template = bundled("prompts", "vqa.j2")
-    results = "phyblock.tracks.vqa_results"
     baselines = CHOICE_RULES
     by_hand = staticmethod(pick_answer)
     record = ChoiceRecord
     varies = ("prompt", "background", "examples", "repeats")
     shows_examples = True
+    counted = COUNTS
     spec: VqaSpec
+
+    @classmethod
+    @functools.cache
+    def report(cls) -> TrackReport:
+        """Return what tables and figures are made by."""
+        return read_report(
+            cls.name,
+            COUNTS,
+            {"accuracy": {"chance": _guessing}},
+            cells=_run_cells,
+            floors=("majority", "text-only", "random"),
+            part_names={str(short): name for short, name in SUBTASK_NAMES.items()},
+            items=question_items,
+        )
 
     def open(self) -> None:
         """Select questions; SpecError where there is none, or wrong pictures cannot be had."""
@@ -488,6 +588,27 @@ def select_questions(
         for place in spread(len(group))[:share]
     }
     return tuple(task for task in tasks if task.key in kept)
+
+
+def question_items(
+    folder: Path, manifest: Manifest, dataset: Dataset
+) -> Callable[[Record], AskedQuestion | None]:
+    """Return the questions of a run; DataError where they are not what it was made on."""
+    recorded = manifest.questions
+    if recorded is None:
+        raise DataError(Problem(str(folder / MANIFEST), "names no questions", "questions"))
+    questions = open_questions(recorded.format, Path(recorded.root), dataset)
+    if questions.sha256 != manifest.tracks.get("vqa", {}).get("questions"):
+        message = "is not the data set that the run was made on, or it was changed since"
+        raise DataError(Problem(str(questions.root), message, "sha256", questions.sha256))
+    by_id = {task.question.id: task for task in questions.tasks}
+
+    def asked(record: Record) -> AskedQuestion | None:
+        if not isinstance(record, ChoiceRecord) or record.question.id not in by_id:
+            return None
+        return AskedQuestion(by_id[record.question.id], record.question.rotation)
+
+    return asked
 
 
 TRACK = Vqa

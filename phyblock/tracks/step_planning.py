@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import accumulate, takewhile
 from typing import Annotated, Any, ClassVar, Literal, get_args
 
@@ -24,14 +24,23 @@ from phyblock.resources import bundled
 from phyblock.scoring.plan import ERROR_TYPES
 from phyblock.scoring.steps import Assembly, MoveOutcome, attempted_counts, placed_counts
 from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, settle
-from phyblock.sim.engine import described_engine
+from phyblock.sim.engine import REFERENCE_ENGINE, described_engine
+from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.pictures import goal_style
 from phyblock.sim.question_pictures import question_key, question_png, state_picture
-from phyblock.tracks.base import Judgement, SceneTrack
-from phyblock.tracks.baselines import Choice, Pick, Picking, candidate_choices
-from phyblock.tracks.full_planning import POSE_COUNTS, PlanParse
-from phyblock.tracks.goal_blind import BlindGuesses
+from phyblock.text import counted
+from phyblock.tracks.base import ENGINE, Judgement, SceneTrack
+from phyblock.tracks.full_planning import POSE_COUNTS, PlanParse, pose_gap
+from phyblock.tracks.goal_blind import blind_guesses
 from phyblock.tracks.items import file_plan
+from phyblock.tracks.measures import (
+    SampleCounts,
+    TrackReport,
+    each_record,
+    each_score,
+    read_report,
+)
+from phyblock.tracks.picking import Choice, Picking, candidate_choices
 from phyblock.tracks.pictures import Drawing, picture_style
 from phyblock.tracks.prompts import TemplatePrompt
 from phyblock.types import Gating, Physics, Setting
@@ -154,11 +163,7 @@ class EpisodeRecord(Record):
     turns: tuple[EpisodeTurn, ...] = ()
     """Every request, with its reply and what came of it."""
 
-    exported: ClassVar[Mapping[str, str]] = {"ending": "string"}
-
-    def export_row(self) -> Mapping[str, Any]:
-        """The ending."""
-        return {"ending": self.ending}
+    exported: ClassVar[Mapping[str, tuple[str, str]]] = {"ending": ("string", "ending")}
 
     def course(self, matcher: str) -> Course:
         """The outcome of every step; no matcher has a part in it."""
@@ -225,34 +230,30 @@ def _random_step(subject: StepSubject, rng: np.random.Generator) -> str:
     return step_text(int(rng.integers(1, len(subject.candidates) + 1)))
 
 
+def _drawn(numbers: Sequence[int], rng: np.random.Generator) -> int | None:
+    return numbers[int(rng.integers(len(numbers)))] if numbers else None
+
+
 def _oracle_step(subject: StepSubject, rng: np.random.Generator) -> str:
     """One of the right moves, so that every valid order can come; Done where there is none."""
-    moves = subject.exact or subject.valid
-    return step_text(moves[int(rng.integers(len(moves)))] if moves else None)
+    return step_text(_drawn(subject.exact or subject.valid, rng))
 
 
 def _unoriented_step(subject: StepSubject, rng: np.random.Generator) -> str:
     """A right move, but with the block turned wrongly wherever there is such a candidate."""
-    index = subject.exact[int(rng.integers(len(subject.exact)))] if subject.exact else None
+    index = _drawn(subject.exact, rng)
     if index is None:
         return _oracle_step(subject, rng)
-    kind, candidates = subject.candidates[index].kind, subject.candidates
-    looks = {block.look for block in subject.scene.blocks}
-    wrong = [
-        n
-        for n in range(1, len(candidates) + 1)
-        if candidates[n].kind == kind and candidates[n].look not in looks
-    ]
-    return step_text(wrong[int(rng.integers(len(wrong)))] if wrong else index)
+    kind, looks = subject.candidates[index].kind, {block.look for block in subject.scene.blocks}
+    listed = enumerate(subject.candidates.candidates, 1)
+    wrong = [n for n, one in listed if one.kind == kind and one.look not in looks]
+    return step_text(_drawn(wrong, rng) or index)
 
 
 def _repeated_step(subject: StepSubject, rng: np.random.Generator) -> str:
     """Any move at random until one fails, then that one for ever."""
-    return (
-        _random_step(subject, rng)
-        if subject.last_failed is None
-        else step_text(subject.last_failed)
-    )
+    failed = subject.last_failed
+    return _random_step(subject, rng) if failed is None else step_text(failed)
 
 
 def _next_candidate(subject: StepSubject, _: np.random.Generator) -> str:
@@ -267,9 +268,9 @@ def _next_guess(subject: StepSubject, _: np.random.Generator) -> str:
 
 def _first_pose(subject: StepSubject, rng: np.random.Generator) -> str:
     """The kind of a right move, in the pose of it that is listed first."""
-    if not subject.exact:
+    index = _drawn(subject.exact, rng)
+    if index is None:
         return _oracle_step(subject, rng)
-    index = subject.exact[int(rng.integers(len(subject.exact)))]
     return step_text(subject.candidates.first_of(subject.candidates[index].kind))
 
 
@@ -293,15 +294,16 @@ STEP_FLOORS = ("goal-blind", "all-candidates", "random", "repeat")
 
 def pick_step(subject: StepSubject) -> Picking:
     """Return the choices of a person: the candidates, and after them the end."""
-    n_candidates = len(subject.candidates)
-
-    def write(picks: Sequence[Pick]) -> str:
-        (pick,) = picks
-        return step_text(pick.place + 1 if pick.place < n_candidates else None)
-
-    choices = (*candidate_choices(n_candidates), Choice("Done", "the goal is complete"))
-    task = "Pick the next block to place, or Done when the goal is complete."
-    return Picking(choices, least=1, most=1, repeats=False, noun="step", write=write, task=task)
+    n = len(subject.candidates)
+    return Picking(
+        (*candidate_choices(n), Choice("Done", "the goal is complete")),
+        least=1,
+        most=1,
+        repeats=False,
+        noun="step",
+        write=lambda picks: step_text(picks[0].place + 1 if picks[0].place < n else None),
+        task="Pick the next block to place, or Done when the goal is complete.",
+    )
 
 
 _FORMAT: Mapping[str, str] = {
@@ -349,6 +351,41 @@ class PastStep:
 _LIKELY = PastStep("Move(1)", "placed", "Next plan: Move(1)", None)
 
 
+STEP_OUTCOMES = ("placed", *ERROR_TYPES, "invalid", "unread", "done")
+"""What becomes of a step; `unread` are replies in which no single operation could be read."""
+_ALIKE = (f"tracks.step_planning.{ENGINE}",)
+
+
+def _episodes(record: EpisodeRecord) -> tuple[int, ...]:
+    """Count an episode: its ending, its steps by outcome, and what it took to complete a goal."""
+    taken = Counter(one if one in STEP_OUTCOMES else "unread" for one in record.outcomes)
+    steps, whole = len(record.outcomes), record.ending == "completed"
+    numbers = (whole, 1, steps, whole * steps, whole * record.n_blocks)
+    ended = (record.ending == name for name in ENDINGS)
+    return (*numbers, *ended, *(taken[name] for name in STEP_OUTCOMES))
+
+
+COUNTS = (
+    SampleCounts(
+        "moves",
+        ("tp", "fp", "fn"),
+        rows=each_score(lambda score: (score.tp, score.fp, score.fn)),
+        alike=_ALIKE,
+    ),
+    SampleCounts(
+        "episodes",
+        (
+            *("completed", "episodes", "steps", "finishing", "fewest"),
+            *(f"ended_{name}" for name in ENDINGS),
+            *(f"step_{name}" for name in STEP_OUTCOMES),
+        ),
+        rows=each_record(_episodes),
+        alike=_ALIKE,
+    ),
+    POSE_COUNTS,
+)
+
+
 class StepPlanning(SceneTrack):
     """Asks for one operation after another; see `StepEpisode`."""
 
@@ -358,16 +395,22 @@ class StepPlanning(SceneTrack):
     section = "steps"
     options = StepsSpec
     template = bundled("prompts", "step_planning.j2")
-    results = "phyblock.tracks.step_planning_results"
     baselines = STEP_RULES
     by_hand = staticmethod(pick_step)
     record = EpisodeRecord
-    counted = (POSE_COUNTS,)
+    counted = COUNTS
     varies = ("prompt", "background", "view", "candidate_order", "layout", "repeats")
     plays = True
     simulates = True
     draws = True
     spec: StepsSpec
+
+    @classmethod
+    @functools.cache
+    def report(cls) -> TrackReport:
+        """Return what tables and figures are made by."""
+        code = {"pose_gap": {"value": pose_gap}}
+        return read_report(cls.name, COUNTS, code, floors=STEP_FLOORS, film=_film)
 
     def open(self) -> None:
         """Select scenes; PromptError where the prompt has no text for turns of a conversation."""
@@ -375,7 +418,8 @@ class StepPlanning(SceneTrack):
         if self.spec.history == "turns" and isinstance(self.prompt, TemplatePrompt):
             self.prompt.require("turn", "for the later messages of history: turns")
         self.accepts = self.spec.setting or self.suite.settings[0]
-        self._guesses = BlindGuesses(self.suite.candidates.order, self.dataset.tasks, self.accepts)
+        order, tasks = self.suite.candidates.order, self.dataset.tasks
+        self.guess = blind_guesses(order, tasks, self.accepts)
         self._fallen: dict[tuple[Block, ...], tuple[int, ...]] = {}
 
     def about(self, item: AssemblyTask) -> dict[str, Any]:
@@ -390,10 +434,6 @@ class StepPlanning(SceneTrack):
         if self.suite.answer_format == "text":
             return None
         return move_form(len(item.candidates), reasons=self.spec.cot)
-
-    def guess(self, item: AssemblyTask) -> Plan:
-        """Return a plan that was learned without the goal."""
-        return self._guesses.plan(item)
 
     def start(
         self, item: AssemblyTask, seed: int, params: Mapping[str, object], *, with_messages: bool
@@ -489,14 +529,16 @@ class StepPlanning(SceneTrack):
         """Return the orders of blocks that fall when all are let go at their goal poses."""
         if blocks not in self._fallen:
             trial = DEFAULT_TRIAL if self.spec.physics == "strict" else ONE_SETTING
-            self._fallen[blocks] = (await self.work_out(partial(settle, blocks, trial))).fallen
+            self._fallen[blocks] = (
+                await self.work_out(functools.partial(settle, blocks, trial))
+            ).fallen
         return self._fallen[blocks]
 
     def draw_state(self, item: AssemblyTask, blocks: Sequence[Block]) -> Drawing:
         """Return the picture of blocks, seen as the goal is."""
         style = goal_style(item.scene, picture_style(self.suite.images))
         recipe = state_picture(item.scene, blocks, style)
-        key, make = question_key(recipe, style), partial(question_png, recipe, style)
+        key, make = question_key(recipe, style), functools.partial(question_png, recipe, style)
         return Drawing(recipe.label, key, make, (style.size_px, style.size_px))
 
 
@@ -549,7 +591,7 @@ class StepEpisode:
             assembly.exact_moves(),
             self._failed[-1].move if self._failed else None,
             len(self._past),
-            partial(track.guess, task),
+            functools.partial(track.guess, task),
         )
         request = track.asked(task, len(self._past), self._params, messages, subject)
         sample, samples = len(self._votes), self._spec.samples
@@ -672,6 +714,35 @@ class StepEpisode:
         ):
             of = {"tp": counts.tp, "fp": counts.fp, "fn": counts.fn, "errors": wrong}
             yield {"criterion": criterion, "matcher": None, "setting": setting, **of}
+
+
+def _film(record: EpisodeRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
+    """Yield the empty ground, every step, wrong ones too, and how the episode ended."""
+    yield FilmStep(f"{record.model}, {record.scene}", "plain", None, ())
+    blocks, heading = tuple[Block, ...](), StepPlanning.report().heading
+    tones: dict[str | None, Tone] = {"placed": "good", "done": "plain"}
+    for turn in record.steps:
+        if task is not None:
+            blocks = tuple(task.scene.blocks[vertex] for vertex in turn.world)
+        move, outcome = turn.parse.move, turn.outcome or "unread"
+        candidate = move if isinstance(move, int) else None
+        operation = f"Move({move})" if candidate is not None else move or "(no operation)"
+        ending = "" if outcome == "done" else f": {heading('step', outcome)}"
+        note = f"{len(turn.world)} of {record.n_blocks} placed"
+        note += f", read by {turn.parse.rule.replace('_', ' ')}" if turn.parse.rule else ""
+        caption, tone = f"{turn.step}. {operation}{ending}", tones.get(turn.outcome, "bad")
+        yield FilmStep(caption, tone, candidate, blocks, note)
+    by = ""
+    if record.ending == "collapsed" and task is not None:
+        blocks = settle(blocks).blocks
+        # Older records say no engine, and no version of it.
+        engine, now = record.engine or REFERENCE_ENGINE, described_engine()
+        if engine not in (now, now.partition(" ")[0]):
+            by = f" (falls in {now}, not {engine})"
+    placed = record.progress[-1] if record.progress else 0
+    how = f"{placed} of {counted(record.n_blocks, 'block')} placed; ended: "
+    tone = "good" if record.ending == "completed" else "bad"
+    yield FilmStep(f"{how}{heading('ended', record.ending)}{by}", tone, None, blocks)
 
 
 TRACK = StepPlanning

@@ -24,7 +24,7 @@ from urllib.parse import urlsplit
 
 from phyblock.errors import Problem, SpecError, reason_of
 from phyblock.files import load_json
-from phyblock.tracks.baselines import Pick
+from phyblock.tracks.picking import Pick
 from phyblock.web.pack import asset
 from phyblock.web.session import NotNowError, PlaySession
 

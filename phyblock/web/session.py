@@ -41,7 +41,7 @@ from phyblock.stable import drawn_bytes, hex_digest
 from phyblock.text import one_line
 from phyblock.tracks import Item
 from phyblock.tracks.base import kind_of
-from phyblock.tracks.baselines import Pick, Picking
+from phyblock.tracks.picking import Pick, Picking
 
 _ItemT = TypeVar("_ItemT", bound=Item)
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,39}")
@@ -211,10 +211,10 @@ def shown(
     choices = []
     for choice in picking.choices:
         # The picture's number, and shares of its sides.
-        seen = [(spot, *last[spot.label]) for spot in choice.spots if spot.label in last]
+        seen = [last[label] for label in choice.labels if label in last]
         spots = [
-            {"picture": n, "box": spot.box(picture.width_px, picture.height_px)}
-            for spot, n, picture in seen
+            {"picture": n, "box": choice.box(picture.width_px, picture.height_px)}
+            for n, picture in seen
         ]
         choices.append({"name": choice.name, "text": choice.text, "spots": spots})
     return {

@@ -10,12 +10,13 @@ from PIL import Image
 
 from phyblock.data import read_builtin
 from phyblock.records.files import read_records
-from phyblock.tracks.step_planning import EpisodeRecord
-from phyblock.tracks.step_planning_results import REPORT
+from phyblock.tracks.step_planning import EpisodeRecord, StepPlanning
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.vqa_set import questions, vqa_suite, write_questions
 from tests.workspace import Workspace
+
+REPORT = StepPlanning.report()
 
 SEESAW = {
     "id": "seesaw",

@@ -28,9 +28,10 @@ from phyblock.parsing.poses import parse_poses
 from phyblock.scoring.counts import micro
 from phyblock.scoring.plan import Goal, match_plan
 from phyblock.sim.pictures import joined_size_px
-from phyblock.tracks.baselines import FOLDS, PROBES, Folds, Guesses, Pick, Picking, Spot
+from phyblock.tracks.baselines import FOLDS, PROBES, Folds, Guesses
 from phyblock.tracks.full_planning import PlanSubject, pick_plan
 from phyblock.tracks.goal_blind import KEYS, chances, goal_blind_plans, related, units
+from phyblock.tracks.picking import Choice, Pick, Picking
 from phyblock.tracks.pose_planning import PoseSubject, pick_poses
 from phyblock.tracks.questions import ChoiceSubject, pick_answer
 from phyblock.tracks.step_planning import StepSubject, pick_step
@@ -326,7 +327,7 @@ def test_candidates_are_clicked_where_the_grid_is_drawn(side: int) -> None:
     """Corners of cells, in pixels, in the composite and in the grid by itself."""
     for width, start in ((joined_size_px(side)[0], joined_size_px(side)[0] - side), (side, 0)):
         for cell in range(16):
-            left, top, wide, high = Spot("composite", cell).box(width, side)
+            left, top, wide, high = Choice("1", "", ("composite",), cell).box(width, side)
             row, column = divmod(cell, 4)
             assert left * width == pytest.approx(start + column * side / 4)
             assert top * side == pytest.approx(row * side / 4)

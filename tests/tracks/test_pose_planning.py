@@ -38,7 +38,6 @@ from phyblock.tracks.pose_planning import (
     worlds_of,
     written,
 )
-from phyblock.tracks.pose_planning_results import REPORT
 from phyblock.types import STEP_ENDS, StepEnd
 from tests.data.broken import write_scenes
 from tests.servers.chassis import Faults, Running, Seen
@@ -146,7 +145,7 @@ def test_a_reply_is_read_scored_and_carried_out(
     record = judged({**fields, **track.about(task)}, task, found)
     assert known_records().validate_json(record.as_json()) == record
     assert isinstance(record, PoseRecord)
-    first, *frames = REPORT.film(record, task)
+    first, *frames = PosePlanning.report().film(record, task)
     assert ("there is no plan: " in first.caption) == (not ends)
     assert ("(no_plan)" in first.caption) == (text == "I cannot say.")
     frames = frames[:-1]
@@ -179,7 +178,7 @@ def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(
             start, end = Pose.goal(one), Pose.goal(other)
             assert start.distance_m(end) < 0.0012
             assert start.angle_deg(end) < 1.1
-    last = list(REPORT.film(record, item))[-1].blocks
+    last = list(PosePlanning.report().film(record, item))[-1].blocks
     assert [block.order for block in last] == [block.order for block in worlds[-1]]
 
 

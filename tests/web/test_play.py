@@ -24,7 +24,7 @@ from phyblock.config.suite import load_suite
 from phyblock.errors import SpecError
 from phyblock.models import HaltedError, Image, Message, Request
 from phyblock.run.runner import RunResult
-from phyblock.tracks.baselines import Choice, Pick, Picking, Spot
+from phyblock.tracks.picking import Choice, Pick, Picking
 from phyblock.web.server import LARGEST_BODY_BYTES, Server
 from phyblock.web.session import (
     Given,
@@ -41,7 +41,7 @@ from tests.workspace import SCENES, Workspace
 WELCOME = {"name": "ada", "consent": "May we?", "done": 0, "of": 2}
 PICTURE = Image(b"pixels", "candidates", 64, 64)
 PICKING = Picking(
-    (Choice("1", "", (Spot("candidates", 0),)), Choice("2", "", (Spot("candidates", 1),))),
+    (Choice("1", "", ("candidates",), 0), Choice("2", "", ("candidates",), 1)),
     least=1,
     most=3,
     repeats=True,

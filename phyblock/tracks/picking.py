@@ -1,0 +1,116 @@
+"""Answers that people put together by hand: choices that are picked, with numbers beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from phyblock.sim.pictures import GRID_COLUMNS
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One thing to pick: its name as the prompt says it, and what it says where that is a text.
+
+    It is seen in the last picture of each label: whole, or in the `cell`, from 0, of the grid that
+    fills the square at the right end.
+    """
+
+    name: str
+    text: str = ""
+    labels: tuple[str, ...] = ()
+    cell: int | None = None
+
+    def box(self, width_px: int, height_px: int) -> tuple[float, float, float, float]:
+        """Return left, top, width and height in a picture of this size, as shares of its sides."""
+        if self.cell is None:
+            return (0.0, 0.0, 1.0, 1.0)
+        row, column = divmod(self.cell, GRID_COLUMNS)
+        side = min(width_px, height_px) / width_px
+        width = side / GRID_COLUMNS
+        return (1 - side + column * width, row / GRID_COLUMNS, width, 1 / GRID_COLUMNS)
+
+
+@dataclass(frozen=True)
+class NumberField:
+    """A number that goes with every pick: its name and unit, from `-most` to `most` with so many
+    `decimals`. Keys change it by `step`, or by `leap`. `start` stands in it at first.
+    """
+
+    name: str
+    unit: str
+    most: float
+    decimals: int
+    step: float
+    leap: float
+    start: float | None = None
+
+    def allows(self, value: float) -> bool:
+        """True for a number in these bounds; none is no finite number."""
+        return abs(value) <= self.most and abs(value - round(value, self.decimals)) <= 1e-9
+
+
+@dataclass(frozen=True)
+class Pick:
+    """A choice, by its place among them from 0, and the numbers that go with it."""
+
+    place: int
+    numbers: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Picking:
+    """An answer made of choices that are picked one after another.
+
+    From `least` to `most` of them, each as often as one likes where `repeats`; `noun` is what one
+    pick is called. `fields` are the numbers that go with each. `write` makes the reply, in the form
+    that the prompt asks for. `task` says in one line what to do.
+    """
+
+    choices: tuple[Choice, ...]
+    least: int
+    most: int
+    repeats: bool
+    noun: str
+    write: Callable[[Sequence[Pick]], str]
+    fields: tuple[NumberField, ...] = ()
+    task: str = ""
+
+    def without_cells(self) -> Picking:
+        """Return the same with choices that are not looked for in grids."""
+        plain = (one if one.cell is None else Choice(one.name, one.text) for one in self.choices)
+        return replace(self, choices=tuple(plain))
+
+    def reply(self, picks: Sequence[Pick]) -> str:
+        """Return the reply that picks make.
+
+        Raises ValueError for too few or many, places that there are not, repeats where none may
+        be, and numbers that are lacking or not allowed.
+        """
+        places, n_fields = [pick.place for pick in picks], len(self.fields)
+        if (
+            not self.least <= len(picks) <= self.most
+            or not all(0 <= place < len(self.choices) for place in places)
+            or (not self.repeats and len(set(places)) < len(places))
+            or any(len(pick.numbers) != n_fields for pick in picks)
+            or not all(
+                field.allows(value)
+                for pick in picks
+                for field, value in zip(self.fields, pick.numbers, strict=True)
+            )
+        ):
+            rules = [f"{self.least} to {self.most} picks of 0 to {len(self.choices) - 1}"]
+            rules += [] if self.repeats else ["none twice"]
+            rules += [
+                f"{one.name} within ±{one.most:g} {one.unit} with at most {one.decimals} decimals"
+                for one in self.fields
+            ]
+            raise ValueError(f"holds picks that make no answer: it needs {', '.join(rules)}")
+        return self.write(picks)
+
+
+def candidate_choices(
+    n_candidates: int, labels: tuple[str, ...] = ("composite", "candidates")
+) -> tuple[Choice, ...]:
+    """Return the numbered candidates of a scene, wherever a picture with a label shows them."""
+    return tuple(Choice(str(n + 1), "", labels, n) for n in range(n_candidates))
