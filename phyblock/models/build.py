@@ -14,7 +14,7 @@ from phyblock.models.costs import Budget, tariff_of
 from phyblock.models.limits import Limits
 from phyblock.models.litellm_client import LitellmClient
 from phyblock.models.model import ChatModel, Observer, RetryPolicy, Tell
-from phyblock.models.replay import BaselineModel, open_replay
+from phyblock.models.replay import open_baseline, open_replay
 from phyblock.models.request import Journal, Model
 from phyblock.models.servers import Server, Servers
 
@@ -39,7 +39,7 @@ def build_model(
     batches, DataError for missing recordings.
     """
     if config.kind == "baseline":
-        return BaselineModel(config)
+        return open_baseline(config)
     if config.kind == "replay":
         return open_replay(config)
     if not config.provider:

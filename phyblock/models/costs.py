@@ -17,7 +17,9 @@ from dataclasses import dataclass
 from datetime import date
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
+
+import yaml
 
 from phyblock.config.models import ModelConfig, Price, Rate, Tariff, host_of
 from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
@@ -419,114 +421,71 @@ def _pieces(text: str) -> int:
     return sum(1 for _ in _PIECE.finditer(text))
 
 
-# Pictures, by the rules that providers publish. Sources, read in November 2026: OpenAI, guide to
-# images and vision, sections on sizing and costs; Anthropic, vision guide, section on costs;
-# Google, Gemini API guides to token counting and media resolution; xAI, guide to image
-# understanding; Qwen, model cards of Qwen2.5-VL and Qwen3-VL.
+@dataclass(frozen=True)
+class PictureRule:
+    """A provider's count of a picture: `plus`, and `each` for every square of `side` pixels on it.
 
-_Count = Callable[[float, float], float]
-"""Tokens of a picture of so many pixels in width and height."""
+    It is scaled down before, until its sides are no longer than `longest` and `shortest` [pixels].
+    No more than `most` squares count; with `fit` it is scaled down until no more are needed, by its
+    `area` alone, or to whole `pixels` and whole squares.
+    """
+
+    plus: float = 0
+    each: float = 1
+    side: float = math.inf
+    longest: float = math.inf
+    shortest: float = math.inf
+    most: float = math.inf
+    fit: Literal["", "area", "pixels"] = ""
+
+    def tokens(self, width: float, height: float) -> int:
+        """Return the tokens of a picture of so many pixels."""
+        scale = min(1.0, self.longest / max(width, height), self.shortest / min(width, height))
+        if self.fit == "area":
+            scale = min(scale, math.sqrt(self.most * self.side**2 / (width * height)))
+        width, height = width * scale, height * scale
+        if self.fit == "pixels":
+            width, height = self._in_pixels(max(1, round(width)), max(1, round(height)))
+        return math.ceil(self.plus + self.each * min(self.most, self._squares(width, height)))
+
+    def _squares(self, width: float, height: float) -> int:
+        return math.ceil(width / self.side) * math.ceil(height / self.side)
+
+    def _in_pixels(self, width: int, height: int) -> tuple[int, int]:
+        """Return the size at which no more than `most` squares cover it, along one side exactly."""
+        if self._squares(width, height) <= self.most:
+            return width, height
+        scale = math.sqrt(self.side**2 * self.most / (width * height))
+        squares = (side * scale / self.side for side in (width, height))
+        scale *= min(math.floor(along) / along or 1.0 for along in squares)
+        return max(1, math.floor(width * scale)), max(1, math.floor(height * scale))
+
+
+@functools.cache
+def _picture_rules() -> list[tuple[re.Pattern[str], dict[str, PictureRule]]]:
+    """Read pictures.yaml: rules by detail, "" the usual one, each with the names that it is for."""
+
+    def rule(told: Any) -> PictureRule:
+        return PictureRule(**told) if isinstance(told, dict) else PictureRule(plus=told)
+
+    text = Path(__file__).with_name("pictures.yaml").read_text(encoding="utf-8")
+    return [
+        (
+            re.compile(rf"(^|\.){entry['model']}"),
+            {
+                name: rule(told)
+                for name, told in {"": entry["usual"], **entry.get("details", {})}.items()
+            },
+        )
+        for entry in yaml.safe_load(text)
+    ]
 
 
 def picture_tokens(model_id: str, image: Image, detail: ImageDetail | None = None) -> int:
     """Return the tokens of a picture in a detail, or in the provider's default.
 
-    `model_id` may name any provider that serves the model. Models that no rule names count as
-    GPT-4o does; a budget learns what a provider really counts.
+    `model_id` may name any provider that serves the model.
     """
     name = model_id.rpartition("/")[2].lower()
-    rules = (rule for rule in _PICTURE_RULES if re.search(rf"(^|\.){rule[0]}", name))
-    _, usual, details = next(rules)
-    return math.ceil(details.get(detail or "auto", usual)(image.width_px, image.height_px))
-
-
-def _fixed(tokens: int) -> _Count:
-    return lambda _width, _height: tokens
-
-
-def _squares(side_px: int, width: float, height: float) -> int:
-    return math.ceil(width / side_px) * math.ceil(height / side_px)
-
-
-def _framed(side_px: int) -> _Count:
-    """Square patches, and two tokens that frame them."""
-    return lambda width, height: _squares(side_px, width, height) + 2
-
-
-def _tiles(whole: int, tile: int) -> _Count:
-    """Tiles of 512 x 512 of a picture fit into 2048 x 2048, then its short side to 768."""
-
-    def count(width: float, height: float) -> float:
-        scale = min(1.0, 2048 / max(width, height), 768 / min(width, height))
-        return whole + tile * _squares(512, width * scale, height * scale)
-
-    return count
-
-
-def _patches(factor: float, most: int, longest_px: int = 2048) -> _Count:
-    """Patches of 32 pixels of a picture scaled to a side, then to `most`; `factor` tokens each."""
-
-    def count(width: float, height: float) -> float:
-        scale = min(1.0, longest_px / max(width, height))
-        width, height = (max(1, round(side * scale)) for side in (width, height))
-        if _squares(32, width, height) > most:
-            scale = math.sqrt(32**2 * most / (width * height))
-            whole = (math.floor(s * scale / 32) / (s * scale / 32) for s in (width, height))
-            scale *= min(part or 1.0 for part in whole)
-            width, height = (max(1, math.floor(side * scale)) for side in (width, height))
-        return min(most, _squares(32, width, height)) * factor
-
-    return count
-
-
-def _shrunk(longest_px: int, most: int) -> _Count:
-    """Square patches of 28 pixels of a picture that is scaled down until it fits both bounds."""
-
-    def count(width: float, height: float) -> float:
-        scale = min(1.0, longest_px / max(width, height))
-        scale = min(scale, math.sqrt(most * 28**2 / (width * height)))
-        return min(_squares(28, width * scale, height * scale), most)
-
-    return count
-
-
-def _crops(width: float, height: float) -> float:
-    """A small picture counts once; a larger one by the squares that cover it."""
-    return 258 if max(width, height) <= 384 else 258 * _squares(768, width, height)
-
-
-def _grok(width: float, height: float) -> float:
-    """Tiles of 448 x 448, at most six, and one of the whole; 256 tokens each."""
-    return 256 * (min(6, _squares(448, width, height)) + 1)
-
-
-_SMALL = _patches(1.2, 2500, 512)
-_HIGH = _patches(1.2, 2500)
-_ORIGINAL = _patches(1.2, 10_000, 6000)
-_WHOLE = _patches(1.2, 30_000, 65_535)
-_GEMINI = {"low": _fixed(280), "medium": _fixed(560), "ultra_high": _fixed(2240)}
-_PICTURE_RULES: tuple[tuple[str, _Count, Mapping[str, _Count]], ...] = (
-    (r"gpt-4o-mini", _tiles(2833, 5667), {"low": _fixed(2833)}),
-    (r"gpt-4\.1-mini", _patches(1.62, 6144), {}),
-    (r"gpt-4\.1-nano", _patches(2.46, 1536), {}),
-    (r"o4-mini", _patches(1.72, 1536), {}),
-    (r"gpt-5-nano", _patches(1.5, 1536), {}),
-    (r"gpt-5-mini", _patches(1.2, 1536), {}),
-    (r"gpt-5(\.1)?($|-)", _tiles(70, 140), {"low": _fixed(70)}),
-    (r"gpt-5\.[23]", _patches(1.2, 6144), {}),
-    (r"gpt-5\.4", _HIGH, {"low": _patches(1.2, 6144), "original": _ORIGINAL}),
-    (r"gpt-5\.5", _ORIGINAL, {"low": _SMALL, "high": _HIGH}),
-    (r"gpt-([6-9]|5\.\d)", _WHOLE, {"low": _SMALL, "high": _HIGH}),
-    (r"o[13]($|-)", _tiles(75, 150), {"low": _fixed(75)}),
-    (r"claude-(opus-4-[7-9]|[a-z]+-([5-9]|\d\d))", _shrunk(2576, 4784), {}),
-    (r"claude", _shrunk(1568, 1568), {}),
-    (r"gemini-([12]|exp)", _crops, {"low": _fixed(64), "medium": _fixed(256)}),
-    (r"gemini", _fixed(1120), _GEMINI),
-    (r"grok", _grok, {}),
-    (r"qwen2(\.5)?-vl", _framed(28), {}),
-    (r"qwen3", _framed(32), {}),
-    (r"", _tiles(85, 170), {"low": _fixed(85)}),
-)
-"""Count of a picture, and in a detail where that differs, by the beginning of a model's name, or
-what follows a dot in it; the first that matches.
-"""
+    rules = next(rules for names, rules in _picture_rules() if names.search(name))
+    return rules.get(detail or "auto", rules[""]).tokens(image.width_px, image.height_px)

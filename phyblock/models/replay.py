@@ -25,6 +25,7 @@ from phyblock.stable import drawn_bytes
 from phyblock.text import well_formed
 from phyblock.types import Finish
 
+_NO_TOKENS = Usage(prompt_tokens=0, completion_tokens=0)
 _MOST_TOKENS = 10**9
 """A hundred times the longest context that there is."""
 
@@ -38,29 +39,35 @@ _FINISH: Mapping[str, Finish] = {
 """Words for the end of a reply, in lower case, by provider's dialect."""
 
 
-class ReplayModel:
-    """Answers with recorded replies."""
+_FREE = {"cost_usd": 0.0, "attempts": 0, "cached": False}
+
+
+class LocalModel:
+    """A model that answers without a network and for free: recorded replies, or a rule.
+
+    It looks at no prompt and no picture, and so none is made for it.
+    """
 
     needs_messages = False
 
-    def __init__(self, config: ModelConfig, find: Callable[[Request], Reply | None]) -> None:
-        self.name = config.name
-        self._find = find
+    def __init__(self, name: str, answer: Callable[[Request], Reply | None]) -> None:
+        self.name = name
+        self._answer = answer
 
     async def ask(self, request: Request) -> Reply | None:
-        """Return the reply recorded for the request, which costs nothing; None where there is none.
+        """Return the answer to the request; None where nothing was recorded.
 
-        Raises the error that was recorded, and DataError for a recording that cannot be read.
+        Raises the error that was recorded; DataError for a recording that cannot be read, or an
+        oracle that lacks a candidate; SpecError for a track that a baseline has no rule for.
         """
-        reply = self._find(request)
-        free = {"cost_usd": 0.0, "attempts": 0, "cached": False}
-        return None if reply is None else reply.model_copy(update=free)
+        reply = self._answer(request)
+        return None if reply is None else reply.model_copy(update=_FREE)
 
     async def aclose(self) -> None:
         """Nothing is held open."""
 
 
-def open_replay(config: ModelConfig) -> ReplayModel:
+def open_replay(config: ModelConfig) -> LocalModel:
     """Open the recording that a configuration names.
 
     A folder with `records.jsonl` is a run of phyblock, any other a folder of raw replies. Raises
@@ -71,11 +78,33 @@ def open_replay(config: ModelConfig) -> ReplayModel:
         where, found = f"model {config.name}", str(folder)
         raise DataError(Problem(where, "recordings not found", "replay", found, "a folder"))
     if (folder / RECORDS).is_file():
-        return ReplayModel(config, partial(_recorded, _read_records(folder, config.name)))
+        return LocalModel(config.name, partial(_recorded, _read_records(folder, config.name)))
     if not any(folder.glob("*.json")):
         allowed = f"a file a scene such as 000.json, or {RECORDS}"
         raise DataError(Problem(str(folder), "holds no recorded replies", allowed=allowed))
-    return ReplayModel(config, partial(_read_file, folder))
+    return LocalModel(config.name, partial(_read_file, folder))
+
+
+def open_baseline(config: ModelConfig) -> LocalModel:
+    """Return the baseline that a configuration names; SpecError where there is none.
+
+    What it draws depends on its name, the seed and the request's key alone, not on the order in
+    which it is asked.
+    """
+    name = config.name
+    if name not in baseline_names():
+        allowed = ", ".join(baseline_names())
+        raise SpecError(Problem(f"model {name}", "is no baseline", "", name, allowed))
+    rules = baseline_rules(name)
+
+    def answer(request: Request) -> Reply:
+        if (rule := rules.get(request.track)) is None:
+            raise SpecError(Problem(f"model {name}", "has no rule for this track"))
+        digest = drawn_bytes(f"{name}|{request.seed}|{request.key}")
+        text = rule(request.subject, np.random.default_rng(int.from_bytes(digest, "big")))
+        return Reply(text=text, usage=_NO_TOKENS, provider_model=name)
+
+    return LocalModel(name, answer)
 
 
 def _read_file(folder: Path, request: Request) -> Reply | None:
@@ -134,27 +163,27 @@ def read_raw_reply(raw: object, where: str) -> Reply:
 
 def read_chat_completion(raw: object) -> Reply | None:
     """Read OpenAI's shape and its copies: `choices[0].message`, or `choices[0].text`."""
-    choice = _first(_get(raw, "choices"))
+    choice = _get(raw, "choices.0")
     message = choice.get("message", choice) if isinstance(choice, Mapping) else None
     if not isinstance(message, Mapping) or not {"content", "text", "refusal"} & message.keys():
         return None
     text, thoughts = _parts(message.get("content", message.get("text")))
-    shown = _text(message.get("reasoning_content") or message.get("reasoning"))
-    refusal, counts = message.get("refusal"), _get(raw, "usage")
-    kept = _get(counts, "prompt_tokens_details")
-    cached = _count(kept, "cached_tokens")
+    beside = _text(message.get("reasoning_content") or message.get("reasoning"))
+    refusal, details = message.get("refusal"), "usage.prompt_tokens_details"
+    cached = _count(raw, f"{details}.cached_tokens")
     if cached is None:
-        cached = _count(counts, "cached_tokens", "prompt_cache_hit_tokens")
+        cached = _count(raw, "usage.cached_tokens", "usage.prompt_cache_hit_tokens")
+    written = f"{details}.cache_write_tokens", f"{details}.cache_creation_tokens"
     usage = Usage(
-        prompt_tokens=_count(counts, "prompt_tokens"),
-        completion_tokens=_count(counts, "completion_tokens"),
-        reasoning_tokens=_count(_get(counts, "completion_tokens_details"), "reasoning_tokens"),
+        prompt_tokens=_count(raw, "usage.prompt_tokens"),
+        completion_tokens=_count(raw, "usage.completion_tokens"),
+        reasoning_tokens=_count(raw, "usage.completion_tokens_details.reasoning_tokens"),
         cached_tokens=cached,
-        cache_write_tokens=_count(kept, "cache_write_tokens", "cache_creation_tokens"),
+        cache_write_tokens=_count(raw, *written),
     )
     return _reply(
         text or _text(refusal),
-        "\n".join(filter(None, (shown, thoughts))),
+        "\n".join(filter(None, (beside, thoughts))),
         "refusal" if refusal and not text else _finish(_get(choice, "finish_reason")),
         usage,
         _get(raw, "model"),
@@ -163,14 +192,14 @@ def read_chat_completion(raw: object) -> Reply | None:
 
 def _anthropic(raw: object) -> Reply | None:
     """Read Anthropic Messages, whose `input_tokens` are those that no cache knows."""
-    content, counts = _get(raw, "content"), _get(raw, "usage")
+    content = _get(raw, "content")
     if not isinstance(content, list) or not all(isinstance(b, Mapping) for b in content):
         return None
-    fresh, out = _count(counts, "input_tokens"), _count(counts, "output_tokens")
+    fresh, out = _count(raw, "usage.input_tokens"), _count(raw, "usage.output_tokens")
     usage = Usage(completion_tokens=out)
     if fresh is not None:
-        cached = _count(counts, "cache_read_input_tokens")
-        written = _count(counts, "cache_creation_input_tokens")
+        cached = _count(raw, "usage.cache_read_input_tokens")
+        written = _count(raw, "usage.cache_creation_input_tokens")
         usage = Usage(
             prompt_tokens=fresh + (cached or 0) + (written or 0),
             completion_tokens=out,
@@ -184,19 +213,19 @@ def _gemini(raw: object) -> Reply | None:
     """Read generateContent; without candidates it is empty if it says why or what it took."""
     if not isinstance(raw, Mapping) or "candidates" not in raw:
         return None
-    candidate = _first(raw["candidates"])
+    candidate = _get(raw, "candidates.0")
     blocked = _get(_get(raw, "promptFeedback", "prompt_feedback"), "blockReason", "block_reason")
     counts = _get(raw, "usageMetadata", "usage_metadata")
     if not isinstance(candidate, Mapping) and not blocked and counts is None:
         return None
-    finish = _finish(_get(candidate, "finishReason", "finish_reason"))
     usage = Usage(
         prompt_tokens=_count(counts, "promptTokenCount", "prompt_token_count"),
         completion_tokens=_count(counts, "candidatesTokenCount", "candidates_token_count"),
         reasoning_tokens=_count(counts, "thoughtsTokenCount", "thoughts_token_count"),
         cached_tokens=_count(counts, "cachedContentTokenCount", "cached_content_token_count"),
     )
-    text, thoughts = _parts(_get(_get(candidate, "content"), "parts"))
+    finish = _finish(_get(candidate, "finishReason", "finish_reason"))
+    text, thoughts = _parts(_get(candidate, "content.parts"))
     model = _get(raw, "modelVersion", "model_version")
     return _reply(text, thoughts, "refusal" if blocked else finish, usage, model)
 
@@ -245,62 +274,28 @@ def _parts(content: object) -> tuple[str, str]:
     return "".join(texts), "\n".join(text for text in thoughts if text)
 
 
-def _get(raw: object, *names: str) -> Any:
-    """Return the first of the names that a mapping holds with a value, else None."""
-    if not isinstance(raw, Mapping):
-        return None
-    return next((raw[name] for name in names if raw.get(name) is not None), None)
+def _get(raw: object, *paths: str) -> Any:
+    """Return the first value, but null, that one of the paths leads to, such as `choices.0.text`;
+    else None. The name 0 stands for the first item of a list.
+    """
+    for path in paths:
+        value = raw
+        for name in path.split("."):
+            if name == "0":
+                value = value[0] if isinstance(value, list) and value else None
+            else:
+                value = value.get(name) if isinstance(value, Mapping) else None
+        if value is not None:
+            return value
+    return None
 
 
-def _count(raw: object, *names: str) -> int | None:
+def _count(raw: object, *paths: str) -> int | None:
     """Return a number of tokens as a server wrote it; None, not known, for what cannot be one."""
-    value = _get(raw, *names)
+    value = _get(raw, *paths)
     is_count = isinstance(value, int) and not isinstance(value, bool)
     return value if is_count and 0 <= value <= _MOST_TOKENS else None
 
 
-def _first(items: object) -> object:
-    return items[0] if isinstance(items, list) and items else None
-
-
 def _text(value: object) -> str:
     return value if isinstance(value, str) else ""
-
-
-class BaselineModel:
-    """A rule instead of a model.
-
-    What it draws depends on its name, the seed and the request's key alone, not on the order in
-    which it is asked. It looks at no prompt and no picture, and so none is made for it.
-    """
-
-    needs_messages = False
-
-    def __init__(self, config: ModelConfig) -> None:
-        if config.name not in baseline_names():
-            allowed = ", ".join(baseline_names())
-            problem = Problem(f"model {config.name}", "is no baseline", "", config.name, allowed)
-            raise SpecError(problem)
-        self.name = config.name
-        self._rules = baseline_rules(config.name)
-
-    async def ask(self, request: Request) -> Reply:
-        """Return the rule's answer; DataError when an oracle lacks a candidate, SpecError for a
-        track that the baseline has no rule for.
-        """
-        rule = self._rules.get(request.track)
-        if rule is None:
-            problem = Problem(f"model {self.name}", "has no rule for this track")
-            raise SpecError(problem)
-        digest = drawn_bytes(f"{self.name}|{request.seed}|{request.key}")
-        rng = np.random.default_rng(int.from_bytes(digest, "big"))
-        return Reply(
-            text=rule(request.subject, rng),
-            usage=Usage(prompt_tokens=0, completion_tokens=0),
-            cost_usd=0.0,
-            provider_model=self.name,
-            attempts=0,
-        )
-
-    async def aclose(self) -> None:
-        """Nothing is held open."""
