@@ -84,6 +84,11 @@ def track_baselines(kind: type[Track]) -> Mapping[str, Callable[..., str]]:
     return {**kind.baselines, **_baselines.get(kind.name, {})}
 
 
+def has_additions() -> bool:
+    """True if tracks, measures or baselines were added to the built-in ones."""
+    return bool(_registered or any(_measures.values()) or _baselines)
+
+
 def baseline_names() -> tuple[str, ...]:
     """Names of all baselines, in the order of the tracks that bring them."""
     tracks = known_tracks().values()

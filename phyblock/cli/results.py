@@ -21,6 +21,7 @@ from phyblock.cli.options import (
     run_argument,
 )
 from phyblock.errors import Problem, SpecError
+from phyblock.results.summary import REPORT_FILE, TABLES, Summary, kept_summary, sources
 from phyblock.text import counted, one_line
 
 _MB = 1e6
@@ -81,15 +82,34 @@ def _check_names(run: Path, names: Sequence[str], known: Iterable[str], noun: st
         raise SpecError(Problem(str(run), f"has no such {noun}", "--only", found, allowed))
 
 
-def show_tables(folder: Path, data: Path | None = None, *, page: bool = True) -> Path:
-    """Write the tables and the page of a run folder.
+def show_tables(
+    folder: Path, data: Path | None = None, *, page: bool = True, anew: bool = True
+) -> Path:
+    """Write the tables and the page of a run folder; without `anew` only where they are not those
+    of the run as it is now.
 
     Prints the summary; returns the page, or the folder of tables where no page is wanted.
     """
+    wanted = REPORT_FILE if page else TABLES
+    if not anew and (kept := kept_summary(folder, wanted)) is not None:
+        _print_summary(kept)
+        return folder / wanted
     from phyblock.results.tables import summary_of, write_tables
 
-    written, console = write_tables(folder), make_console()
-    summary = summary_of(written.run)
+    made_of, written = sources(folder), write_tables(folder)
+    summary, made = summary_of(written.run), [*written.files]
+    _print_summary(summary)
+    if page:
+        from phyblock.web.report import report_files, write_report
+
+        write_report(written, data)
+        made += report_files(folder).values()
+    summary.keep(folder, made_of, made)
+    return folder / wanted
+
+
+def _print_summary(summary: Summary) -> None:
+    console = make_console()
     for table in summary.tables:
         print_table(console, table)
     for model, message, times in summary.failures[:_FAILURES]:
@@ -98,11 +118,6 @@ def show_tables(folder: Path, data: Path | None = None, *, page: bool = True) ->
         console.print(f"and {others:,} other messages", style="yellow")
     for sentence in summary.blind:
         console.print(sentence)
-    if not page:
-        return written.folder
-    from phyblock.web.report import write_report
-
-    return write_report(written, data)
 
 
 @click.command()

@@ -33,6 +33,7 @@ from phyblock.config.models import load_models
 from phyblock.files import OutFolder
 from phyblock.models.costs import price_source
 from phyblock.models.litellm_client import be_quiet
+from phyblock.results.summary import REPORT_FILE, TABLES, kept_summary
 from phyblock.results.text import NO_VALUE, Column, TextTable
 from phyblock.run.estimate import Estimate, estimate, may_bill
 from phyblock.run.plan import (
@@ -95,10 +96,12 @@ def run(
     known = load_models(find_models_file(models_file, loaded.files.path))
     plan = make_plan(loaded, known, only=models, limit=limit)
     folder = out or plan.folder_in(Path("results"))
-    if held_run(folder, plan.manifest) is not None:
+    wanted = TABLES if no_report else REPORT_FILE
+    is_held = held_run(folder, plan.manifest) is not None
+    if is_held and not dry_run and kept_summary(folder, wanted) is None:
         from phyblock.web.report import files_of
 
-        OutFolder(folder).check(() if dry_run else files_of(page=not no_report))
+        OutFolder(folder).check(files_of(page=not no_report))
     asks: dict[str, Any] = {"use_cache": not no_cache, "retry_failed": retry_failed}
     if dry_run:
         print_estimate(console, plan, estimate(plan, folder, **asks))
@@ -113,7 +116,7 @@ def run(
     be_quiet()
     with ProgressView(console) as view:
         result = completed(Session(plan, folder, view, **asks), _SIGNALS, view.tick)
-    made = show_tables(folder, page=not no_report)
+    made = show_tables(folder, page=not no_report, anew=False)
     code = _conclude(console, folder, result, view)
     print_path(console, made)
     return code

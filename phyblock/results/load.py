@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from phyblock.config.suite import Suite
@@ -24,6 +23,8 @@ from phyblock.tracks.measures import Cell, Measure, SampleCounts, Way
 from phyblock.types import WITHOUT_REPLY
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from phyblock.results.compare import Comparison
 
 TOKENS = ("prompt_tokens", "completion_tokens", "reasoning_tokens")
@@ -112,6 +113,8 @@ def frames_of(
 
     The newest record of a sample stands for it. Order and types do not depend on the file.
     """
+    import pandas as pd
+
     columns: dict[str, list[Any]] = {name: [] for name in _TYPES}
     counts: dict[tuple[str, str], _Column] = {}
     taken: dict[str, list[SampleCounts]] = {}
@@ -252,6 +255,8 @@ class Run:
 
         Columns have the short name of a track, or its name, and then `_lo` and `_hi`.
         """
+        import pandas as pd
+
         from phyblock.results.estimates import main_values
 
         table = pd.DataFrame(index=pd.Index(self.design.model_names, name="model"))

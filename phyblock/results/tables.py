@@ -30,6 +30,7 @@ from phyblock.results.estimates import (
 )
 from phyblock.results.load import TOKENS, Run, load_run, track_measures
 from phyblock.results.paper import beside_paper, is_as_published
+from phyblock.results.summary import TABLES, Summary
 from phyblock.results.text import (
     NO_VALUE,
     Column,
@@ -49,8 +50,6 @@ from phyblock.tracks.base import kind_of, kinds
 from phyblock.tracks.measures import CELL, Cell, Layout, LayoutColumn, Measure
 from phyblock.types import OUTCOMES
 
-TABLES = "tables"
-"""The folder of tables in the folder of a run."""
 _FURTHER = ("published", "sensitivity", "coverage", "cost")
 """Tables that are no layouts of tracks."""
 _NONE = Value(math.nan, math.nan, math.nan)
@@ -349,19 +348,6 @@ def make_tables(run: Run, names: Sequence[str] | None = None) -> dict[str, Table
     if "cost" in wanted:
         made["cost"] = cost_table(run)
     return {name: table for name, table in made.items() if table is not None}
-
-
-@dataclass(frozen=True)
-class Summary:
-    """The text that the terminal shows at the end of a run.
-
-    Headline tables, the coverage where it is not complete, one sentence a track on the strongest
-    blind baseline, and failed calls by model and message, the most frequent first.
-    """
-
-    tables: tuple[TextTable, ...] = ()
-    blind: tuple[str, ...] = ()
-    failures: tuple[tuple[str, str, int], ...] = ()
 
 
 def summary_of(run: Run) -> Summary:

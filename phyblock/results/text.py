@@ -56,6 +56,22 @@ class TextTable:
         object.__setattr__(self, "rows", tuple(tuple(map(one_line, row)) for row in self.rows))
         object.__setattr__(self, "notes", tuple(map(one_line, self.notes)))
 
+    def plain(self) -> dict[str, Any]:
+        """Return the table as plain values, as JSON holds it."""
+        columns = [[column.name, column.group, column.is_text] for column in self.columns]
+        return {
+            "caption": self.caption,
+            "columns": columns,
+            "rows": self.rows,
+            "notes": self.notes,
+        }
+
+    @classmethod
+    def of_plain(cls, table: Mapping[str, Any]) -> TextTable:
+        """Return the table of plain values."""
+        columns = tuple(Column(*column) for column in table["columns"])
+        return cls(table["caption"], columns, tuple(map(tuple, table["rows"])), table["notes"])
+
     def without(self, names: Collection[str]) -> TextTable:
         """Return the table but for the columns of these names."""
         kept = [place for place, column in enumerate(self.columns) if column.name not in names]

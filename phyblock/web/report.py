@@ -10,6 +10,7 @@ from phyblock.files import OutFolder, digest_of_file
 from phyblock.records.files import PROMPTS, RECORDS, STOPPED, read_stopped
 from phyblock.records.manifest import MANIFEST
 from phyblock.results.load import Run
+from phyblock.results.summary import REPORT_FILE
 from phyblock.results.tables import TablesWritten, coverage_frame, table_files
 from phyblock.tracks.base import kind_of
 from phyblock.types import WITHOUT_REPLY
@@ -24,7 +25,6 @@ from phyblock.web.board import (
 )
 from phyblock.web.pack import PICTURES, SentPictures, build_of, pack_samples, write_page
 
-REPORT_FILE = "report.html"
 _FOLDER = "report/"
 _FAILURES = 6
 _MOST_NAMED = 6
@@ -124,20 +124,11 @@ def _about(written: TablesWritten) -> dict[str, Any]:
         "Run": manifest.identity[:12],
     }
     about = design.suite.description
-    views = [table.view for table in written.tables.values()]
     return {
         "title": design.suite.name or run.path.name,
         # A suite that was cut short still speaks of all that is in it.
         "about": f"The whole suite: {about}" if manifest.limit and about else about,
         "facts": [(name, text) for name, text in facts.items() if text],
         "cautions": cautions(run),
-        "tables": [
-            {
-                "caption": view.caption,
-                "columns": [[c.name, c.group, c.is_text] for c in view.columns],
-                "rows": view.rows,
-                "notes": view.notes,
-            }
-            for view in views
-        ],
+        "tables": [table.view.plain() for table in written.tables.values()],
     }

@@ -200,3 +200,30 @@ def test_every_record_names_a_prompt_that_is_there(tmp_path: Path, pictures_dir:
         fields = [message.fields() for message in messages]
         canonical = json.dumps(fields, sort_keys=True, separators=(",", ":"))
         assert hashlib.sha256(canonical.encode()).hexdigest() == digest
+
+
+def test_tables_and_page_are_made_again_where_the_run_or_what_was_made_is_another(
+    workspace: Workspace,
+) -> None:
+    workspace.write_suite()
+    ends, estimates = set[str](), workspace.out / "tables" / "estimates.csv"
+
+    def is_made(*, page: bool = False) -> bool:
+        before = estimates.stat().st_mtime_ns if estimates.exists() else 0
+        done = workspace.run(page=page)
+        assert done.code == 0
+        ends.add(done.out.replace("out/report.html", "out/tables"))
+        return estimates.stat().st_mtime_ns != before
+
+    assert is_made()
+    assert not is_made()
+    assert is_made(page=True)
+    assert not is_made(page=True)
+    assert not is_made()
+    (workspace.out / "tables" / "cost.csv").unlink()
+    assert is_made()
+    assert is_made(page=True)
+    records = workspace.out / "records.jsonl"
+    records.write_bytes(records.read_bytes() + records.read_bytes().splitlines(True)[-1])
+    assert is_made(page=True)
+    assert len(ends) == 1

@@ -1,0 +1,68 @@
+"""The end of a run as the terminal shows it, kept in its folder to be shown again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+from phyblock.files import OutFolder, digest_of_file, load_json, read_bytes
+from phyblock.records.files import PROMPTS, RECORDS, STOPPED
+from phyblock.records.manifest import MANIFEST
+from phyblock.registry import has_additions
+from phyblock.results.text import TextTable
+
+TABLES = "tables"
+"""The folder of tables in the folder of a run."""
+REPORT_FILE = "report.html"
+_SUMMARY = ".summary.json"
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The text that the terminal shows at the end of a run.
+
+    Headline tables, the coverage where it is not complete, one sentence a track on the strongest
+    blind baseline, and failed calls by model and message, the most frequent first.
+    """
+
+    tables: tuple[TextTable, ...] = ()
+    blind: tuple[str, ...] = ()
+    failures: tuple[tuple[str, str, int], ...] = ()
+
+    def keep(self, folder: Path, made_of: list[str], files: Iterable[Path]) -> None:
+        """Write the summary with the `sources` of a run and the files that were made of them."""
+        kept = {
+            "made_of": made_of,
+            "files": [path.relative_to(folder).as_posix() for path in files],
+            "tables": [table.plain() for table in self.tables],
+            "blind": self.blind,
+            "failures": self.failures,
+        }
+        OutFolder(folder).write({_SUMMARY: json.dumps(kept)})
+
+
+def sources(folder: Path) -> list[str]:
+    """Return the version of phyblock and digests of the files that tables and page are made of."""
+    names = (MANIFEST, RECORDS, PROMPTS, STOPPED)
+    return [version("phyblock"), *(digest_of_file(folder / name) for name in names)]
+
+
+def kept_summary(folder: Path, needed: str) -> Summary | None:
+    """Return the summary that was kept; None where the run is not as it was, phyblock is another or
+    was extended, or files are not there that were made, or what is `needed` was not made.
+    """
+    try:
+        kept = load_json(read_bytes(folder / _SUMMARY))
+        is_there = all((folder / name).is_file() for name in kept["files"])
+        if has_additions() or not is_there or kept["made_of"] != sources(folder):
+            return None
+        if not any(name.startswith(needed) for name in kept["files"]):
+            return None
+        tables = tuple(TextTable.of_plain(table) for table in kept["tables"])
+        failures = tuple((model, message, times) for model, message, times in kept["failures"])
+        return Summary(tables, tuple(kept["blind"]), failures)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None
