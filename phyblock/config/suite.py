@@ -248,11 +248,6 @@ class VarySpec(Section):
         return tuple(PurePath(text).stem if text.endswith(".j2") else text for text in texts)
 
     @property
-    def n_variants(self) -> int:
-        """The number of variants."""
-        return len(self.variants)
-
-    @property
     def variants(self) -> tuple[Variant, ...]:
         """All combinations of levels, the reference first, repeats of one behind one another."""
         shown = [name for name in self.factors if name != REPEAT]
@@ -410,16 +405,8 @@ class Suite(Section):
         """
         sections = {kind.section: name for name, kind in known_tracks().items() if kind.section}
         idle = {key for key, track in sections.items() if track not in self.tracks}
-        unsaid = {
-            "name",
-            "description",
-            "limit",
-            "limits",
-            "models",
-            "baselines",
-            "seeds",
-        }
-        spec = self.model_dump(mode="json", exclude={*unsaid, *idle})
+        unsaid = {"name", "description", "limit", "limits", "models", "baselines", "seeds", *idle}
+        spec = self.model_dump(mode="json", exclude=unsaid)
         for name in ("levels", "settings", "tracks"):
             spec[name].sort()
         for section in ("dataset", *sections):
@@ -440,26 +427,24 @@ class Suite(Section):
             hint = "give it on the command line: --set dataset.path=FOLDER"
             yield Fault(message, found="", at=("dataset", "path"), hint=hint)
         other = "set dataset.format to official and dataset.path to a checkout, or this to another"
-        needs_official = (
-            (recorded, "models", "recorded replies come with the official data set only"),
-            (official_prompt, "prompt", "the official prompt is read out of an official checkout"),
-            (own_pictures, "images.source", "only the official data set has pictures of its own"),
-        )
-        for is_set, name, message in needs_official:
-            if is_set and not official:
-                yield Fault(message, at=tuple(name.split(".")), hint=other)
-        own_order = "the data set's own pictures show the candidates in the order of the file"
-        recorded_order = "recorded replies name candidates by the numbers of the file"
         clashes = (
-            (as_json and recorded, "answer_format", "recorded replies were asked for in text"),
-            (as_json and official_prompt, "answer_format", "the official prompt asks for text"),
-            (as_json and self.parser == "official", "parser", "this parser reads no JSON"),
-            (shuffled and own_pictures, "candidates.order", own_order),
-            (shuffled and recorded, "candidates.order", recorded_order),
-        )
-        for is_broken, name, message in clashes:
+            (recorded and not official, "models",
+             "recorded replies come with the official data set only", other),
+            (official_prompt and not official, "prompt",
+             "the official prompt is read out of an official checkout", other),
+            (own_pictures and not official, "images.source",
+             "only the official data set has pictures of its own", other),
+            (as_json and recorded, "answer_format", "recorded replies were asked for in text", ""),
+            (as_json and official_prompt, "answer_format", "the official prompt asks for text", ""),
+            (as_json and self.parser == "official", "parser", "this parser reads no JSON", ""),
+            (shuffled and own_pictures, "candidates.order",
+             "the data set's own pictures show the candidates in the order of the file", ""),
+            (shuffled and recorded, "candidates.order",
+             "recorded replies name candidates by the numbers of the file", ""),
+        )  # fmt: skip
+        for is_broken, name, message, hint in clashes:
             if is_broken:
-                yield Fault(message, at=tuple(name.split(".")))
+                yield Fault(message, at=tuple(name.split(".")), hint=hint)
 
     def _vary_faults(self, factor: str) -> Iterator[Fault]:
         """Yield what is wrong with a factor: its tracks must know it, other fields allow it."""

@@ -253,35 +253,30 @@ def _question_task(
     return QuestionTask(question, files)
 
 
-_SPELLINGS: dict[str, tuple[str, ...]] = {
-    "Claude-3.5 Haiku": (),
-    "Claude-3.5 Sonnet": (),
-    "Claude-3.7 Sonnet": ("claude-3-7",),
-    "Claude-3.7 Sonnet-Thinking": ("claude-3-7-thinking",),
-    "GPT-4o-mini": (),
-    "GPT-4o": (),
-    "GPT-o1": ("o1",),
-    "Gemini-1.5-flash-8b": (),
-    "Gemini-1.5-flash": (),
-    "Gemini-2.0-flash-lite": ("gemini-2.0-flash-lite-preview",),
-    "Gemini-2.0-flash": (),
-    "Gemini-2.0-flash-thinking-exp": ("gemini-2.0-flash-thinking",),
-    "Qwen-VL-Max": (),
-    "InternVL2.5-1B": (),
-    "InternVL2.5-8B": (),
-    "InternVL2.5-78B": (),
-    "Qwen2.5-VL-3B-Instruct": ("qwen2.5-vl-3b",),
-    "Qwen2.5-VL-7B-Instruct": ("qwen2.5-vl-7b",),
-    "LLaVa-OneVision-0.5B": tuple(
-        f"llava-onevision-qwen2-0.5b{end}" for end in ("", "-ov", "-ov-hf")
-    ),
-    "LLaVa-OneVision-7B": tuple(f"llava-onevision-qwen2-7b{end}" for end in ("", "-ov", "-ov-hf")),
-    "Random": (),
-    "GPT-4.1": (),
-    "GPT-o3": ("o3",),
-    "Qwen2.5-VL-72B-Instruct": ("qwen2.5-vl-72b",),
+_PUBLISHED = (
+    "Claude-3.5 Haiku", "Claude-3.5 Sonnet", "Claude-3.7 Sonnet", "Claude-3.7 Sonnet-Thinking",
+    "GPT-4o-mini", "GPT-4o", "GPT-o1", "Gemini-1.5-flash-8b", "Gemini-1.5-flash",
+    "Gemini-2.0-flash-lite", "Gemini-2.0-flash", "Gemini-2.0-flash-thinking-exp", "Qwen-VL-Max",
+    "InternVL2.5-1B", "InternVL2.5-8B", "InternVL2.5-78B", "Qwen2.5-VL-3B-Instruct",
+    "Qwen2.5-VL-7B-Instruct", "LLaVa-OneVision-0.5B", "LLaVa-OneVision-7B", "Random", "GPT-4.1",
+    "GPT-o3", "Qwen2.5-VL-72B-Instruct",
+)  # fmt: skip
+"""Rows of the paper's Table 1, then those that Table 2 has beside them."""
+_SPELLINGS = {
+    "claude-3-7": "Claude-3.7 Sonnet",
+    "claude-3-7-thinking": "Claude-3.7 Sonnet-Thinking",
+    "o1": "GPT-o1",
+    "o3": "GPT-o3",
+    "gemini-2.0-flash-lite-preview": "Gemini-2.0-flash-lite",
+    "gemini-2.0-flash-thinking": "Gemini-2.0-flash-thinking-exp",
+    **{f"qwen2.5-vl-{size}": f"Qwen2.5-VL-{size.upper()}-Instruct" for size in ("3b", "7b", "72b")},
+    **{
+        f"llava-onevision-qwen2-{size}{end}": f"LLaVa-OneVision-{size.upper()}"
+        for size in ("0.5b", "7b")
+        for end in ("", "-ov", "-ov-hf")
+    },
 }
-"""Rows of the paper's Table 1, then those that Table 2 has beside them; other spellings of each."""
+"""Other spellings of rows."""
 _TOKEN = re.compile(r"[a-z]+|[0-9]+|[^\W_]+")
 _MONTH, _DAY = "(?:0[1-9]|1[0-2])", "(?:0[1-9]|[12][0-9]|3[01])"
 _DATE = re.compile(rf"(?<![0-9])20[0-9]{{2}}[-_./ ]?{_MONTH}(?:[-_./ ]?{_DAY})?(?![0-9])")
@@ -307,4 +302,7 @@ def _tokens(name: str) -> tuple[str, ...]:
     return tuple(_TOKEN.findall(bare))
 
 
-_ROWS = {_tokens(one): row for row, more in _SPELLINGS.items() for one in (row, *more)}
+_ROWS = {
+    **{_tokens(row): row for row in _PUBLISHED},
+    **{_tokens(name): row for name, row in _SPELLINGS.items()},
+}

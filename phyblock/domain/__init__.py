@@ -1,6 +1,5 @@
 """The field's nouns as frozen dataclasses and pure functions: no files, clock or network."""
 
-from phyblock.domain.aov import AOVGraph, CycleError
 from phyblock.domain.blocks import (
     BLOCK_TYPES,
     COLORS,
@@ -10,13 +9,11 @@ from phyblock.domain.blocks import (
     Color,
     Euler,
     euler_deg_to_matrix,
-    euler_deg_to_quat_xyzw,
-    orientation_class,
     quat_xyzw_to_matrix,
     symmetries,
     turn_deg,
 )
-from phyblock.domain.plan import Plan, PosePlan, PoseStep
+from phyblock.domain.plan import Plan, PoseStep
 from phyblock.domain.question import (
     CATEGORIES,
     LETTERS,
@@ -28,7 +25,7 @@ from phyblock.domain.question import (
     Subtask,
     is_picture_option,
 )
-from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, CandidateSet, Kind, Look, Scene
+from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, CandidateSet, Scene
 
 __all__ = [
     "BLOCK_TYPES",
@@ -40,28 +37,21 @@ __all__ = [
     "SHAPES",
     "SUBTASKS",
     "SUBTASK_NAMES",
-    "AOVGraph",
     "Block",
     "BlockType",
     "Candidate",
     "CandidateSet",
     "Color",
-    "CycleError",
     "Euler",
-    "Kind",
-    "Look",
     "Mark",
     "Plan",
-    "PosePlan",
     "PoseStep",
     "Question",
     "QuestionPicture",
     "Scene",
     "Subtask",
     "euler_deg_to_matrix",
-    "euler_deg_to_quat_xyzw",
     "is_picture_option",
-    "orientation_class",
     "quat_xyzw_to_matrix",
     "symmetries",
     "turn_deg",

@@ -7,6 +7,7 @@ bit masks (bit v set: vertex v is in the set), which keeps the matchers small an
 from __future__ import annotations
 
 import functools
+import graphlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -37,7 +38,13 @@ class AOVGraph:
             for other in needed:
                 if not 0 <= other < n:
                     raise ValueError(f"vertex {vertex} depends on {other}, outside 0..{n - 1}")
-        _check_acyclic(self.depends_on)
+        try:
+            graphlib.TopologicalSorter(dict(enumerate(self.depends_on))).prepare()
+        except graphlib.CycleError as error:
+            # Each vertex is needed by the next, and the first stands at both ends.
+            vertices = error.args[1][:0:-1]
+            start = vertices.index(min(vertices))
+            raise CycleError((*vertices[start:], *vertices[:start])) from None
 
     def __len__(self) -> int:
         return len(self.depends_on)
@@ -86,22 +93,3 @@ class AOVGraph:
             order.append(vertex)
             placed |= 1 << vertex
         return tuple(order)
-
-
-def _check_acyclic(depends_on: tuple[frozenset[int], ...]) -> None:
-    """Raise CycleError naming one cycle, if there is one."""
-    done: set[int] = set()
-    for start in range(len(depends_on)):
-        path: list[int] = []
-        stack: list[tuple[int, bool]] = [(start, False)]
-        while stack:
-            vertex, leaving = stack.pop()
-            if leaving:
-                path.pop()
-                done.add(vertex)
-            elif vertex in path:
-                raise CycleError(tuple(path[path.index(vertex) :]))
-            elif vertex not in done:
-                path.append(vertex)
-                stack.append((vertex, True))
-                stack.extend((other, False) for other in sorted(depends_on[vertex]))

@@ -39,8 +39,3 @@ class PosePlan:
 
     def __len__(self) -> int:
         return len(self.steps)
-
-    @property
-    def plan(self) -> Plan:
-        """The plan without its poses."""
-        return Plan(tuple(step.candidate for step in self.steps))

@@ -13,7 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from phyblock.domain import PosePlan, PoseStep
+from phyblock.domain import PoseStep
+from phyblock.domain.plan import PosePlan
 from phyblock.parsing.plan import chosen_list, item_lists, step_lists
 from phyblock.parsing.structured import AnswerForm, whole_number
 from phyblock.parsing.text import answer_of, is_open, plain_lines

@@ -613,7 +613,7 @@ def _scores(run: Run, what: Comparable) -> Iterator[tuple[str, Floats, Clusters]
         if names:
             wanted = pd.MultiIndex.from_tuples([(*name, *way) for name in names for way in ways])
             worth = np.nan_to_num(what.measure.value(counts[index.get_indexer(wanted)]))
-            scores = worth.reshape(len(names), len(suite.seeds), suite.vary.n_variants)
+            scores = worth.reshape(len(names), len(suite.seeds), len(suite.vary.variants))
             yield side.model, scores, Clusters.of([parents[scene] for scene, _ in names])
 
 

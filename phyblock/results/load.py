@@ -190,7 +190,7 @@ class Design:
 
     def samples(self, track: str) -> int:
         """Samples that a complete run holds of one model in a track."""
-        return self.items.get(track, 0) * len(self.suite.seeds) * self.suite.vary.n_variants
+        return self.items.get(track, 0) * len(self.suite.seeds) * len(self.suite.vary.variants)
 
     @property
     def all_samples(self) -> int:
@@ -308,7 +308,7 @@ class Run:
         words += [text for name, text in _SHOWN_AS.items() if held.get(name)]
         words += ["options on one sheet"] * (held.get("options_as") == "letters")
         words += ["answers asked for as JSON"] * (suite.answer_format == "json_schema")
-        n = suite.vary.n_variants
+        n = len(suite.vary.variants)
         return (*words, *([f"asked in {n:,} ways"] if n > 1 else []))
 
 

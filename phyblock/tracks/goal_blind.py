@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.data import AssemblyTask
-from phyblock.domain import Candidate, CandidateSet, Kind, Plan, Scene
+from phyblock.domain import Candidate, CandidateSet, Plan, Scene
+from phyblock.domain.scene import Kind
 from phyblock.scoring.plan import Goal, most_placed
 from phyblock.tracks.items import Presentation, ShownTask
 from phyblock.types import CandidateOrder, Setting

@@ -28,12 +28,12 @@ from phyblock.domain import (
     Candidate,
     CandidateSet,
     Plan,
-    PosePlan,
     PoseStep,
     Scene,
     euler_deg_to_matrix,
     turn_deg,
 )
+from phyblock.domain.plan import PosePlan
 from phyblock.models.request import Image
 from phyblock.parsing.poses import (
     FARTHEST_PLACE_CM,

@@ -187,7 +187,7 @@ def test_variants_are_all_choices_once_and_the_reference_is_the_first(
     crossed = section["design"] == "crossed"
     ways = prod(shown) if crossed else 1 + sum(n - 1 for n in shown)
     keys = [variant.key for variant in vary.variants]
-    assert len(keys) == len(set(keys)) == vary.n_variants == ways * section[REPEAT]
+    assert len(keys) == len(set(keys)) == len(vary.variants) == ways * section[REPEAT]
     assert keys[0] == ""
     assert all(one.repeat == n % section[REPEAT] + 1 for n, one in enumerate(vary.variants))
     assert {one.shown.key for one in vary.variants} <= set(keys)

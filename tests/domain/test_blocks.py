@@ -22,10 +22,9 @@ from phyblock.domain import (
     SHAPES,
     BlockType,
     Euler,
-    euler_deg_to_quat_xyzw,
-    orientation_class,
     quat_xyzw_to_matrix,
 )
+from phyblock.domain.blocks import euler_deg_to_quat_xyzw, orientation_class
 
 ANGLES = st.floats(-720, 720)
 EULERS = st.tuples(ANGLES, ANGLES, ANGLES)

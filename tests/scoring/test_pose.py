@@ -15,7 +15,6 @@ from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]
 
 from phyblock.domain import (
     BLOCK_TYPES,
-    AOVGraph,
     Block,
     Candidate,
     CandidateSet,
@@ -25,6 +24,7 @@ from phyblock.domain import (
     symmetries,
     turn_deg,
 )
+from phyblock.domain.aov import AOVGraph
 from phyblock.domain.blocks import SHAPES, BlockType
 from phyblock.scoring.plan import Goal, most_placed
 from phyblock.scoring.pose import Laid, Piece, PoseScore, PoseScorer, overlap_volume, placed, volume

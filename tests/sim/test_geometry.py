@@ -22,9 +22,9 @@ from phyblock.domain import (
     Block,
     BlockType,
     Color,
-    euler_deg_to_quat_xyzw,
     quat_xyzw_to_matrix,
 )
+from phyblock.domain.blocks import euler_deg_to_quat_xyzw
 from phyblock.sim.contact import (
     GROUND,
     drop_m,
