@@ -38,10 +38,21 @@ _ROOT = Path(__file__).parents[1]
 _ORDER_BYTES = 1 << 20
 _POLL_S = 0.01
 _NOT_WRITTEN = 120
+_MOST_MEMORY_BYTES = 8 * 2**30
+_WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+_CHANGING = {
+    **dict.fromkeys(("os.remove", "os.rmdir", "os.mkdir", "os.truncate"), 1),
+    **dict.fromkeys(("os.chmod", "os.chown", "shutil.rmtree", "sqlite3.connect"), 1),
+    **dict.fromkeys(("os.rename", "os.symlink", "os.link"), 2),
+}
+"""Events that change files, and how many of their first arguments are paths."""
 
 _PRELOADED = ("PIL.GifImagePlugin", "PIL.JpegPresets", "aiohttp", "matplotlib.backends.backend_agg",
-              "matplotlib.backends.backend_svg", "matplotlib.pyplot", "phyblock.results.tables",
-              "phyblock.web.report", "sqlite3", "yarl")  # fmt: skip
+              "matplotlib.backends.backend_svg", "matplotlib.pyplot", "pandas.core.methods.to_dict",
+              "pandas.io.formats.csvs", "phyblock.api", "phyblock.results.tables",
+              "phyblock.sim.pybullet", "phyblock.web.report", "pyarrow.pandas_compat", "sqlite3",
+              "yarl", *(f"phyblock.tracks.{track}_results" for track in
+                        ("full_planning", "pose_planning", "step_planning", "vqa")))  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -107,15 +118,18 @@ class ForkServer:
         env: Mapping[str, str],
         bytes_left: int | None = None,
         timeout_s: float = 300,
+        deeds: IO[bytes] | None = None,
     ) -> Done:
-        """Run the command to its end."""
+        """Run the command to its end; what it does to files and hosts is written to `deeds`."""
+        watching = () if deeds is None else (deeds,)
         with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
-            pid = self._fork(args, cwd, env, (out, err), bytes_left=bytes_left, leads=False)
+            files = (out, err, *watching)
+            pid = self._fork(args, cwd, env, files, bytes_left=bytes_left, leads=False)
             code = self.wait(pid, timeout_s)
             texts = []
             for file in (out, err):
                 file.seek(0)
-                texts.append(file.read().decode())
+                texts.append(file.read().decode(errors="replace" if watching else "strict"))
         return Done(code, *texts)
 
     def start(self, args: Sequence[str], cwd: Path, env: Mapping[str, str]) -> Forked:
@@ -216,7 +230,9 @@ def end_fork_server() -> None:
 def serve(orders: socket.socket) -> None:
     import phyblock.cli
     import phyblock.making.cli
+    from phyblock.config.suite import suite_model
     from phyblock.models.litellm_client import _litellm
+    from phyblock.records.files import known_records
 
     for package in (phyblock.cli, phyblock.making.cli):
         for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
@@ -224,10 +240,12 @@ def serve(orders: socket.socket) -> None:
     for name in _PRELOADED:
         importlib.import_module(name)
     _litellm()
+    suite_model()
+    known_records()
     gc.collect()
     gc.freeze()
     while True:
-        text, files, _, _ = socket.recv_fds(orders, _ORDER_BYTES, 2)
+        text, files, _, _ = socket.recv_fds(orders, _ORDER_BYTES, 3)
         if not text:
             return
         order = json.loads(text)
@@ -243,7 +261,7 @@ def serve(orders: socket.socket) -> None:
 
 
 def _become(order: Mapping[str, Any], files: Sequence[int]) -> NoReturn:
-    for number, (name, file) in enumerate(zip(("stdout", "stderr"), files, strict=True), 1):
+    for number, (name, file) in enumerate(zip(("stdout", "stderr"), files, strict=False), 1):
         os.dup2(file, number)
         os.close(file)
         old = getattr(sys, name)
@@ -260,6 +278,10 @@ def _become(order: Mapping[str, Any], files: Sequence[int]) -> NoReturn:
     tempfile.tempdir = None
     if order["bytes_left"] is not None:
         small_files_only(order["bytes_left"])()
+    if len(files) > 2:
+        sys.dont_write_bytecode = True
+        resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY_BYTES, _MOST_MEMORY_BYTES))
+        _watch_deeds(files[2])
     sys.argv = ["phyblock", *order["args"]]
     from phyblock.cli.main import main
 
@@ -268,6 +290,32 @@ def _become(order: Mapping[str, Any], files: Sequence[int]) -> NoReturn:
     except SystemExit as ending:
         _exit(ending.code)
     raise AssertionError("main always exits")
+
+
+def _watch_deeds(file: int) -> None:
+    """Write every change to a file and every connection from now on as a line of JSON.
+
+    Each is an audit event of Python's, and the path (its links followed) or the address that it is
+    about. SQLite opens its files by itself; the event that names the database stands for them all.
+    """
+
+    def hook(event: str, arguments: tuple[Any, ...]) -> None:
+        abouts = []
+        if event == "open":
+            path, _, flags = arguments
+            if flags & _WRITING and not isinstance(path, int):
+                abouts = [os.path.realpath(os.fsdecode(path))]
+        elif event == "socket.connect":
+            abouts = [repr(arguments[1])]
+        elif event in _CHANGING:
+            paths = [path for path in arguments[: _CHANGING[event]] if not isinstance(path, int)]
+            # The entry that a path names, even where that is a link.
+            ends = [os.path.split(os.fsdecode(path).rstrip("/")) for path in paths]
+            abouts = [os.path.join(os.path.realpath(above or "."), name) for above, name in ends]
+        for about in abouts:
+            os.write(file, json.dumps([event, about]).encode() + b"\n")
+
+    sys.addaudithook(hook)
 
 
 def _exit(code: object) -> NoReturn:

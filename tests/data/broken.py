@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,26 +31,34 @@ def sound_scene() -> Raw:
     }
 
 
-def with_value(scene: Raw, path: str, value: object) -> Raw:
-    """A copy of `scene` with the value at a dotted path (`blocks.1.depend`) replaced."""
-    changed = copy.deepcopy(scene)
-    *parents, last = path.split(".")
-    at: Any = changed
-    for key in parents:
-        at = at[int(key)] if isinstance(at, list) else at[key]
-    at[int(last) if isinstance(at, list) else last] = value
+Keys = str | Sequence[str | int]
+"""A path in a document; as a text it is dotted: `blocks.1.depend`."""
+
+
+def with_value(document: Any, path: Keys, value: object) -> Any:
+    """A copy of a document with the value at a path replaced."""
+    if not path:
+        return value
+    changed = copy.deepcopy(document)
+    holder, last = _holder(changed, path)
+    holder[last] = value
     return changed
 
 
-def without(scene: Raw, path: str) -> Raw:
-    """A copy of `scene` without the field at a dotted path."""
-    changed = copy.deepcopy(scene)
-    *parents, last = path.split(".")
-    at: Any = changed
-    for key in parents:
-        at = at[int(key)] if isinstance(at, list) else at[key]
-    del at[last]
+def without(document: Any, path: Keys) -> Any:
+    """A copy of a document without what stands at a path."""
+    changed = copy.deepcopy(document)
+    holder, last = _holder(changed, path)
+    del holder[last]
     return changed
+
+
+def _holder(document: Any, path: Keys) -> tuple[Any, Any]:
+    """What holds the value at a path, and its key there."""
+    *above, last = path.split(".") if isinstance(path, str) else path
+    for key in above:
+        document = document[int(key) if isinstance(document, list) else key]
+    return document, int(last) if isinstance(document, list) else last
 
 
 def write_scenes(folder: Path, *scenes: Raw) -> Path:

@@ -1,16 +1,15 @@
-"""One worker and two prepared folders for all fuzzing, and a summary of what was tried."""
+"""Two prepared folders for all fuzzing, and a summary of what was tried."""
 
 from __future__ import annotations
 
+import shutil
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.fuzz.bench import Bench
-from tests.fuzz.sizes import FAULTS, INPUTS, SEED
-from tests.fuzz.worker import Worker
+from tests.fuzz.laws import Bench
+from tests.fuzz.strategies import FAULTS, INPUTS, SEED
 from tests.vqa_set import questions, vqa_suite, write_questions
 from tests.workspace import SCENES, Workspace
 
@@ -22,13 +21,6 @@ _SCENES = SCENES[:2]
 def tallies() -> dict[str, Counter[str]]:
     """Counts of what was tried, by kind and end; printed in the end."""
     return _tallies
-
-
-@pytest.fixture(scope="session")
-def worker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Worker]:
-    """The folder in which all commands of the session run."""
-    with Worker(tmp_path_factory.mktemp("worker")) as made:
-        yield made
 
 
 @pytest.fixture(scope="session")
@@ -49,10 +41,8 @@ def sound(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Works
 
 
 @pytest.fixture(scope="session")
-def ended(sound: Workspace, worker: Worker, tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+def ended(sound: Workspace, tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """The same with a finished run of each track: `out`, `steps` and `asked`."""
-    import shutil
-
     root = tmp_path_factory.mktemp("ended") / "w"
     shutil.copytree(sound.root, root, symlinks=True)
     made = Workspace(root, sound.cache / "pictures")
@@ -62,8 +52,8 @@ def ended(sound: Workspace, worker: Worker, tmp_path_factory: pytest.TempPathFac
         ["suite.yaml", "--out", "steps", "--models", "oracle", *steps],
         ["questions.yaml", "--out", "asked"],
     ):
-        told = worker.phyblock(["run", *args, "--no-report"], made.root, made.env)
-        assert (told.code, told.err) == (0, "")
+        done = made.phyblock("run", *args, "--no-report")
+        assert (done.code, done.err) == (0, "")
     for name in ("report/ch1/thesis.tex", "figures/mine.svg", "tables/mine.csv", "notes.md"):
         path = made.root / "out" / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -73,20 +63,18 @@ def ended(sound: Workspace, worker: Worker, tmp_path_factory: pytest.TempPathFac
 
 @pytest.fixture(scope="session")
 def plain_bench(
-    sound: Workspace, worker: Worker, pictures_dir: Path, tmp_path_factory: pytest.TempPathFactory
+    sound: Workspace, pictures_dir: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Bench:
     """Tries cases beside a sound suite."""
-    root = tmp_path_factory.mktemp("plain")
-    return Bench(worker, sound.root, pictures_dir, root)
+    return Bench(sound.root, pictures_dir, tmp_path_factory.mktemp("plain"))
 
 
 @pytest.fixture(scope="session")
 def runs_bench(
-    ended: Workspace, worker: Worker, pictures_dir: Path, tmp_path_factory: pytest.TempPathFactory
+    ended: Workspace, pictures_dir: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Bench:
     """Tries cases beside finished runs."""
-    root = tmp_path_factory.mktemp("runs")
-    return Bench(worker, ended.root, pictures_dir, root)
+    return Bench(ended.root, pictures_dir, tmp_path_factory.mktemp("runs"))
 
 
 def pytest_report_header() -> str:

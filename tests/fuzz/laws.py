@@ -2,31 +2,46 @@
 
 1. The exit code is 0, 1, 2 or 130, there is never a traceback, and code 2 says what is wrong.
 2. No file outside the run folder and the cache changes, and none of the user's in the run folder.
-3. What was answered is never lost, and never asked twice (`tests/fuzz/ledger.py` has the asking).
+3. What was answered is kept, and is never asked again (the server's own `Ledger` tells exactly);
+   what was refused for good is not asked again either, unless it is told to. What failed may be.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import json
 import os
+import shutil
 import stat
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+import subprocess
+import tempfile
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, NamedTuple
 
-from tests.fuzz.deeds import Deed
-from tests.fuzz.worker import Ended
+from aiohttp import web
 
-__all__ = ["CODES", "Broken", "Fingerprint", "Tree", "broken_laws", "ending_broken", "take_tree"]
+from tests.fork_server import fork_server
+from tests.servers.chassis import Seen
+from tests.servers.faults import WIRE_FAULTS
+from tests.servers.openai_chat import OpenAIChat
+from tests.servers.step_agent import StepAgent
+from tests.workspace import shared_folders
 
 CODES = (0, 1, 2, 130)
 _COMPLAINTS = ("error: ", "Error: ")
 _DEVICES = ("/dev/null", "/dev/tty", "/dev/shm")
 _LOCAL = ("127.0.0.1", "localhost", "::1")
+_LONGEST_S = 30.0
+"""A command on small files that is not done by then hangs [s]."""
+_LONGEST_SHOWN = 1500
+_KEPT_FILES = ("records.jsonl", "calls.jsonl")
 
-Fingerprint = tuple[str, str]
-"""What stands at a path: its kind, and the digest of a file's content or where a link leads."""
-Tree = Mapping[str, Fingerprint]
+Tree = Mapping[str, tuple[str, str]]
+"""What stands at each path below a folder: its kind, and the digest of a file or a link's end."""
 
 
 @dataclass(frozen=True)
@@ -43,17 +58,93 @@ class Broken:
         return f"law {self.law}: {self.kind}"
 
 
-def take_tree(root: Path) -> dict[str, Fingerprint]:
+class Deed(NamedTuple):
+    """A change to a file or a connection, and the path or the address that it is about."""
+
+    event: str
+    about: str
+
+
+@dataclass(frozen=True)
+class Ended:
+    """The end of a command: code None where it hung, negative where a signal ended the process."""
+
+    code: int | None
+    out: str
+    err: str
+    deeds: tuple[Deed, ...]
+
+
+def run_watched(
+    args: Sequence[str], folder: Path, env: Mapping[str, str], longest_s: float = _LONGEST_S
+) -> Ended:
+    """Run a command to its end, or for its longest time."""
+    with tempfile.TemporaryFile() as file:
+        code, out, err = None, "", ""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            done = fork_server().run(args, folder, env, timeout_s=longest_s, deeds=file)
+            code, out, err = done.code, done.out, done.err
+        file.seek(0)
+        return Ended(code, out, err, tuple(Deed(*json.loads(line)) for line in file))
+
+
+class Watch:
+    """Looks at a folder before a command and after it.
+
+    `may_write` are the paths in it that the command is to write in, and `lasting` those of the
+    user's files that stand there all the same.
+    """
+
+    def __init__(self, root: Path, may_write: Sequence[str], lasting: Sequence[str] = ()) -> None:
+        self._root, self._may_write, self._lasting = root, may_write, lasting
+        self._tree, self._lines = take_tree(root), _whole_lines(root)
+
+    def broken(self, ended: Ended) -> list[Broken]:
+        """Every law that a command broke since the last look."""
+        before, after = self._tree, take_tree(self._root)
+        lines, kept = self._lines, _whole_lines(self._root)
+        self._tree, self._lines = after, kept
+        found = list(_ending_broken(ended))
+        for path in sorted(before.keys() | after.keys()):
+            same = before.get(path) == after.get(path)
+            if not same and (path in self._lasting or not _lies_in(path, self._may_write)):
+                change = "changed" if path in after and path in before else "made"
+                change = change if path in after else "deleted"
+                found.append(Broken(2, f"a file was {change}", path))
+        places = [os.path.realpath(self._root / place) for place in self._may_write]
+        found += [broken for deed in ended.deeds for broken in _judge(deed, places)]
+        for name, line in lines - kept:
+            detail = line[:300].decode("utf-8", "replace")
+            found.append(Broken(3, f"a line of {Path(name).name} is lost", detail))
+        return found
+
+
+def take_tree(root: Path) -> dict[str, tuple[str, str]]:
     """Everything below a folder by relative path; links are not followed."""
     return {str(Path(entry.path).relative_to(root)): _look(entry) for entry in _walk(root)}
 
 
-def ending_broken(ended: Ended) -> Iterator[Broken]:
-    """Return the first law that the end of a command breaks, in words."""
-    told = ended.out + ended.err
+def _walk(folder: Path) -> Iterator[os.DirEntry[str]]:
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            yield entry
+            if entry.is_dir(follow_symlinks=False):
+                yield from _walk(Path(entry.path))
+
+
+def _look(entry: os.DirEntry[str]) -> tuple[str, str]:
+    mode = entry.stat(follow_symlinks=False).st_mode
+    if stat.S_ISLNK(mode):
+        return "link", os.readlink(entry.path)
+    if not stat.S_ISREG(mode):
+        return "folder" if stat.S_ISDIR(mode) else "other", ""
+    return "file", hashlib.md5(Path(entry.path).read_bytes()).hexdigest()
+
+
+def _ending_broken(ended: Ended) -> Iterator[Broken]:
     if ended.code is None:
-        yield Broken(1, "it hangs", ended.err[-2000:])
-    elif "Traceback (most recent call last)" in told:
+        yield Broken(1, "it hangs", "")
+    elif "Traceback (most recent call last)" in ended.out + ended.err:
         last = ended.err.strip().splitlines() or ["?"]
         where = [line.strip() for line in last if line.lstrip().startswith('File "')]
         yield Broken(1, f"traceback of {last[-1][:60]} at {where[-1:]}", ended.err[-3000:])
@@ -61,31 +152,6 @@ def ending_broken(ended: Ended) -> Iterator[Broken]:
         yield Broken(1, f"exit code {ended.code}", ended.err[-2000:])
     elif ended.code == 2 and not any(word in ended.err for word in _COMPLAINTS):
         yield Broken(1, "exit code 2 without a message", ended.err[-2000:])
-
-
-def broken_laws(
-    ended: Ended,
-    root: Path,
-    before: Tree,
-    after: Tree,
-    may_write: Sequence[str],
-    lasting: Sequence[str],
-) -> list[Broken]:
-    """Every law that a command broke in the folder `root`.
-
-    `may_write` are the paths in it that the command is to write in, and `lasting` those of the
-    user's files that stand there all the same.
-    """
-    found = list(ending_broken(ended))
-    for path in sorted(before.keys() | after.keys()):
-        same = before.get(path) == after.get(path)
-        if not same and (path in lasting or not _lies_in(path, may_write)):
-            change = "changed" if path in after and path in before else "made"
-            change = change if path in after else "deleted"
-            found.append(Broken(2, f"a file was {change}", path))
-    places = [os.path.realpath(root / place) for place in may_write]
-    found += [broken for deed in ended.deeds for broken in _judge(deed, places)]
-    return found
 
 
 def _judge(deed: Deed, places: Sequence[str]) -> Iterator[Broken]:
@@ -105,19 +171,205 @@ def _lies_in(path: str, places: Sequence[str]) -> bool:
     )
 
 
-def _walk(folder: Path) -> Iterator[os.DirEntry[str]]:
-    with os.scandir(folder) as entries:
-        for entry in entries:
-            yield entry
-            if entry.is_dir(follow_symlinks=False):
-                yield from _walk(Path(entry.path))
+def _whole_lines(folder: Path) -> Counter[tuple[str, bytes]]:
+    """The whole lines of the files that grow, of every run in the folder."""
+    found: Counter[tuple[str, bytes]] = Counter()
+    for path in (path for name in _KEPT_FILES for path in folder.glob(f"*/{name}")):
+        if path.is_file():
+            lines = path.read_bytes().split(b"\n")
+            found.update((str(path.relative_to(folder)), line) for line in lines if _is_whole(line))
+    return found
 
 
-def _look(entry: os.DirEntry[str]) -> Fingerprint:
-    mode = entry.stat(follow_symlinks=False).st_mode
-    if stat.S_ISLNK(mode):
-        return "link", os.readlink(entry.path)
-    if not stat.S_ISREG(mode):
-        return "folder" if stat.S_ISDIR(mode) else "other", ""
-    with open(entry.path, "rb") as file:
-        return "file", hashlib.md5(file.read()).hexdigest()
+def _is_whole(line: bytes) -> bool:
+    try:
+        return isinstance(json.loads(line), dict)
+    except (ValueError, RecursionError):
+        return False
+
+
+@dataclass(frozen=True)
+class Fifo:
+    """A pipe that nobody writes to."""
+
+
+@dataclass(frozen=True)
+class Link:
+    """A symbolic link."""
+
+    to: str
+
+
+@dataclass(frozen=True)
+class Case:
+    """A command line and what stands in the folder where it is given.
+
+    `may_write` are the paths that the command is to write in, beside cache and scratch folder;
+    `lasting` those of the user's files that stand there and must not change.
+    """
+
+    args: tuple[str, ...]
+    files: Mapping[str, bytes | Fifo | Link] = field(default_factory=dict)
+    may_write: tuple[str, ...] = ()
+    lasting: tuple[str, ...] = ()
+
+
+class Bench:
+    """Tries cases in copies of the folder `template`.
+
+    `tally` counts them by exit code, `found` has the laws that were broken, by kind.
+    """
+
+    def __init__(self, template: Path, pictures: Path, root: Path) -> None:
+        self._template, self._folder = template, root / "here"
+        self._places = ("cache", "tmp", *map(str, shared_folders(pictures)))
+        self._environment = {
+            "PATH": os.environ["PATH"],
+            "HOME": str(self._folder),
+            "TMPDIR": str(self._folder / "tmp"),
+            "PHYBLOCK_CACHE": str(self._folder / "cache"),
+            "LITELLM_LOCAL_MODEL_COST_MAP": "True",
+        }
+        self.tally: Counter[str] = Counter()
+        self.found: dict[str, tuple[Case, Broken]] = {}
+
+    def try_out(self, case: Case) -> None:
+        """Note what the case broke; of cases that broke the same, the smallest is kept."""
+        shutil.copytree(self._template, self._folder, symlinks=True)
+        try:
+            (self._folder / "tmp").mkdir()
+            for name, content in case.files.items():
+                _put(self._folder / name, content)
+            watch = Watch(self._folder, (*case.may_write, *self._places), case.lasting)
+            ended = run_watched(case.args, self._folder, self._environment)
+            self.tally["hangs" if ended.code is None else f"code {ended.code}"] += 1
+            for broken in watch.broken(ended):
+                known = self.found.get(broken.name)
+                if known is None or len(repr(case)) < len(repr(known[0])):
+                    self.found[broken.name] = case, broken
+        finally:
+            shutil.rmtree(self._folder)
+
+    def told(self) -> str:
+        """Every way in which a law was broken, with the smallest case that does it."""
+        texts = []
+        for name, (case, broken) in self.found.items():
+            parts = (f"{key}={value!r}"[:_LONGEST_SHOWN] for key, value in vars(case).items())
+            texts.append("\n".join((name, broken.detail, *parts)))
+        return "\n\n".join(texts)
+
+
+def _put(path: Path, content: bytes | Fifo | Link) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.unlink(missing_ok=True)
+    if isinstance(content, Fifo):
+        os.mkfifo(path)
+    elif isinstance(content, Link):
+        path.symlink_to(content.to)
+    else:
+        path.write_bytes(content)
+
+
+_FINAL = {"400": "sample", "policy": "sample"}
+_REPLIES = ("ok", "length", "filtered", "blank")
+
+
+class Entry(NamedTuple):
+    """A request that arrived whole: which model was asked, what, and how the server ended it."""
+
+    model: str
+    sample: str
+    ending: str
+
+    @property
+    def comes_to(self) -> str:
+        """ "reply", "retryable", "unavailable" or "sample" (refused for good)."""
+        if self.ending in WIRE_FAULTS:
+            return WIRE_FAULTS[self.ending].ending
+        return "reply" if self.ending in _REPLIES else _FINAL.get(self.ending, "retryable")
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """A request, and whom it was sent to."""
+        return self.model, self.sample
+
+
+class Ledger:
+    """The entries of a server in the order in which requests arrived."""
+
+    def __init__(self) -> None:
+        self.entries: list[Entry] = []
+
+    @property
+    def faults(self) -> Counter[str]:
+        """Numbers of requests without an ordinary answer, by their end."""
+        return Counter(entry.ending for entry in self.entries if entry.ending != "ok")
+
+    def that_came_to(self, end: str) -> set[tuple[str, str]]:
+        """Requests that ended so."""
+        return {entry.key for entry in self.entries if entry.comes_to == end}
+
+
+def asked_twice(entries: Iterable[Entry], *, retries_refused: bool = False) -> Iterator[Broken]:
+    """Return what was asked again after it was answered, or refused for good."""
+    ended: dict[tuple[str, str], Entry] = {}
+    for entry in entries:
+        if entry.key in ended:
+            yield Broken(3, "asked twice", f"{ended[entry.key]}, then {entry}")
+        if entry.comes_to == "reply" or (entry.comes_to == "sample" and not retries_refused):
+            ended[entry.key] = entry
+
+
+def lost(ledger: Ledger, kept: Collection[tuple[str, str]]) -> Iterator[Broken]:
+    """Return what was answered and is not kept."""
+    for model, sample in sorted(ledger.that_came_to("reply") - set(kept)):
+        endings = [entry.ending for entry in ledger.entries if entry.key == (model, sample)]
+        yield Broken(3, "a reply is lost", f"{sample} of {model}: {endings}")
+
+
+def kept_in(folder: Path) -> set[tuple[str, str]]:
+    """Return the entries of a run's records or calls, by model and signature of the reply.
+
+    A last line that a kill cut short does not count.
+    """
+    found = set()
+    for name in _KEPT_FILES:
+        path = folder / name
+        for line in path.read_bytes().split(b"\n")[:-1] if path.exists() else ():
+            stored: dict[str, Any] = json.loads(line)
+            model = stored["model"]
+            if stored.get("reply") is not None:
+                found.add((model, stored["reply"]["reasoning"]))
+    return found
+
+
+class LedgerChat(OpenAIChat):
+    """Answers plans and questions; the digest of a request is its reply's reasoning.
+
+    Several that serve the same model may share a `ledger`.
+    """
+
+    def __init__(self, *args: Any, ledger: Ledger | None = None, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.ledger = ledger or Ledger()
+
+    async def _end(self, seen: Seen, ending: str, request: web.Request) -> web.StreamResponse:
+        self.ledger.entries.append(Entry(seen.model, seen.sample, ending))
+        return await super()._end(seen, ending, request)
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        body = super().reply(seen, ending)
+        for choice in body["choices"]:
+            letter = "ABCD"[hashlib.sha256(seen.sample.encode()).digest()[0] % 4]
+            message = choice["message"]
+            message["reasoning_content"] = seen.sample
+            if "Question:" in str(seen.parts[-1]):
+                message["content"] = f"Answer: {letter}"
+        return body
+
+
+class LedgerAgent(LedgerChat, StepAgent):
+    """Answers the turns of episodes."""
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        return StepAgent.reply(self, seen, ending)

@@ -3,29 +3,54 @@
 Each strategy gives the bytes of one file: `SUITES`, `MODELS_FILES`, `SCENES`, `QUESTIONS`,
 `CANDIDATES`, `TEMPLATES`, `PICTURES`; `OVERRIDES` gives texts for `--set`. Most begin with
 something sound and break it in one or two places, as people and disks do; some are plain noise.
-A law about them holds for whatever they give: exit code 0 or 2, and never a traceback.
+A law about them holds for whatever they give: exit code 0 or 2, and never a traceback. The amount
+and the seed of fuzzing are set by environment variables, as `make fuzz` does.
 """
 
 from __future__ import annotations
 
-import copy
 import io
 import json
+import os
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
+from hypothesis import HealthCheck, Phase, seed, settings
 from hypothesis import strategies as st
 from PIL import Image
 
 from tests.config.strategies import SUITES as SOUND_SUITES
+from tests.data.broken import with_value, without
 from tests.workspace import tower
 
-__all__ = [
-    *("CANDIDATES", "MODELS_FILES", "NASTY_TOKENS", "OVERRIDES", "PICTURES", "QUESTIONS"),
-    *("SCENES", "SUITES", "TEMPLATES", "broken", "png_header", "sound_question"),
-]
+SEED = int(os.environ.get("PHYBLOCK_FUZZ_SEED", "0"))
+INPUTS = int(os.environ.get("PHYBLOCK_FUZZ_INPUTS", "60"))
+"""Bad inputs that are tried, over all kinds."""
+FAULTS = int(os.environ.get("PHYBLOCK_FUZZ_FAULTS", "40"))
+"""Faults of servers that runs meet, over all tracks and transports."""
+KILLS = int(os.environ.get("PHYBLOCK_FUZZ_KILLS", "36"))
+"""Kills of runs, over all tracks."""
+
+Test = Callable[..., Any]
+
+
+def fuzzed(percent: float) -> Callable[[Test], Test]:
+    """Draw this share of all inputs for a test, the same ones for the same seed.
+
+    Nothing is shrunk: a command that hangs would be tried again and again.
+    """
+    chosen = settings(
+        max_examples=max(1, round(INPUTS * percent / 100)),
+        deadline=None,
+        database=None,
+        derandomize=False,
+        phases=(Phase.generate,),
+        suppress_health_check=list(HealthCheck),
+    )
+    return lambda test: seed(SEED)(chosen(test))
+
 
 JSON_TOKENS = (
     *("null", "true", "-1", "0", "1e308", "-1e308", "1e999", "NaN", "-Infinity", "-0.0", "5e-324"),
@@ -48,55 +73,32 @@ NASTY_TOKENS = (*JSON_TOKENS, *YAML_TOKENS)
 """Texts that stand in YAML where a value belongs; not all of them are YAML."""
 
 _MARK = "@@here@@"
+Place = tuple[str | int, ...]
 
 
-def _places(value: object, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
-    yield path
-    entries: Any = ()
-    if isinstance(value, dict):
-        entries = value.items()
-    elif isinstance(value, list):
-        entries = enumerate(value)
-    for key, inner in entries:
-        yield from _places(inner, (*path, key))
-
-
-def _with(document: Any, path: tuple[str | int, ...], value: object) -> Any:
-    if not path:
-        return value
-    changed = copy.deepcopy(document)
-    here = changed
-    for key in path[:-1]:
-        here = here[key]
-    here[path[-1]] = value
-    return changed
-
-
-def _without(document: Any, path: tuple[str | int, ...]) -> Any:
-    changed = copy.deepcopy(document)
-    here = changed
-    for key in path[:-1]:
-        here = here[key]
-    del here[path[-1]]
-    return changed
+def _places(value: object, path: Place = ()) -> Iterator[tuple[Place, object]]:
+    """Every value in a document, with its path."""
+    yield path, value
+    if isinstance(value, dict | list):
+        for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from _places(inner, (*path, key))
 
 
 @st.composite
 def broken(draw: st.DrawFn, documents: st.SearchStrategy[Any], tokens: tuple[str, ...]) -> bytes:
     """A document as JSON text with one value replaced by a token, left out, renamed or cut."""
     document = draw(documents)
-    paths = list(_places(document))
-    path = draw(st.sampled_from(paths))
+    places = list(_places(document))
+    path, _ = draw(st.sampled_from(places))
     how = draw(st.sampled_from(["token", "token", "token", "gone", "key", "cut", "bytes", "sound"]))
     if how == "gone" and path:
-        document = _without(document, path)
+        document = without(document, path)
     elif how == "key":
-        inside = [p for p in paths if isinstance(_at(document, p), dict)]
-        if inside:
+        if mappings := [path for path, value in places if isinstance(value, dict)]:
             name = draw(st.sampled_from(["no", "id ", "é", "a.b", "\x1b[1m", "<<", "x" * 2000]))
-            document = _with(document, (*draw(st.sampled_from(inside)), name), 1)
+            document = with_value(document, (*draw(st.sampled_from(mappings)), name), 1)
     elif how == "token":
-        document = _with(document, path, _MARK)
+        document = with_value(document, path, _MARK)
     text = json.dumps(document)
     if how == "token":
         text = text.replace(f'"{_MARK}"', draw(st.sampled_from(tokens)))
@@ -107,12 +109,6 @@ def broken(draw: st.DrawFn, documents: st.SearchStrategy[Any], tokens: tuple[str
         at = draw(st.integers(0, len(data)))
         data = data[:at] + draw(st.binary(min_size=1, max_size=4)) + data[at:]
     return data
-
-
-def _at(document: Any, path: tuple[str | int, ...]) -> Any:
-    for key in path:
-        document = document[key]
-    return document
 
 
 NOISE = st.binary(max_size=200) | st.text(max_size=200).map(
@@ -141,18 +137,8 @@ _SOUND_SCENE = tower("t1", [1, 2], ("red", "blue"))
 SCENES = broken(st.just(_SOUND_SCENE), JSON_TOKENS) | NOISE
 """One line of `scenes.jsonl` (noise may hold more lines)."""
 
-CANDIDATES = (
-    broken(
-        st.just(
-            [
-                {**candidate, "position": number}
-                for number, candidate in enumerate(_SOUND_SCENE["candidates"], 1)
-            ]
-        ),
-        JSON_TOKENS,
-    )
-    | NOISE
-)
+_SOUND_CANDIDATES = [{**one, "position": n} for n, one in enumerate(_SOUND_SCENE["candidates"], 1)]
+CANDIDATES = broken(st.just(_SOUND_CANDIDATES), JSON_TOKENS) | NOISE
 """A candidate file of the official layout."""
 
 
@@ -188,13 +174,7 @@ QUESTIONS = broken(st.just(sound_question()), JSON_TOKENS) | NOISE
 _PIECES = (
     *("{{", "}}", "{%", "%}", "{#", "#}", "\n", " ", "x", "1", "'a'", "|", ".", "(", ")", "[", "]"),
     *("{% for i in range(9) %}", "{% endfor %}", "{% if n %}", "{% endif %}", "{{ i }}"),
-    *(
-        "{% macro m(n) %}",
-        "{{ m(n) }}",
-        "{% endmacro %}",
-        "{% set x = x ~ x %}",
-        "{{ x * 9 }}",
-    ),
+    *("{% macro m(n) %}", "{{ m(n) }}", "{% endmacro %}", "{% set x = x ~ x %}", "{{ x * 9 }}"),
     *("{{ 'x'|center(9) }}", "{{ '%9d' % 1 }}", "{{ 9 ** 9 }}", "{{ '{:>9}'.format(1) }}"),
     *("{{ n_candidates }}", "{{ pictures | join(', ') }}"),
     *("{{ self.user() }}", "{% set x = [x, x] %}", "{{ x }}", "{% raw %}", "{% include 'x' %}"),

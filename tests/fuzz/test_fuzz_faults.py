@@ -1,21 +1,52 @@
-"""The laws hold whatever servers do: each track, over both transports, with every fault drawn."""
+"""The laws hold whatever servers do: each track, over both transports, with every fault drawn;
+batches under faults and kills; costs under whatever usage is reported.
+"""
 
 from __future__ import annotations
 
+import asyncio
+import json
 import math
+import random
+import tempfile
 from collections import Counter
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from tests.fork_server import Done
-from tests.fuzz.laws import Broken, broken_laws, take_tree
-from tests.fuzz.ledger import LedgerAgent, LedgerChat, asked_twice, kept_in, lost
-from tests.fuzz.sizes import FAULTS, SEED
-from tests.fuzz.worker import Ended, Worker
-from tests.servers.chassis import Faults, Running
+from phyblock.errors import SampleError
+from phyblock.models import Budget, Reply
+from tests.fuzz.laws import (
+    Broken,
+    Ended,
+    LedgerAgent,
+    LedgerChat,
+    Watch,
+    asked_twice,
+    kept_in,
+    lost,
+    run_watched,
+    take_tree,
+)
+from tests.fuzz.strategies import FAULTS, SEED, fuzzed
+from tests.models.batching import Disk, Killing, command, run_command
+from tests.models.factory import QUICK, make_request
+from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.servers.batches import (
+    AnthropicBatches,
+    BatchFaults,
+    BatchServer,
+    GeminiBatches,
+    OpenAIBatches,
+)
+from tests.servers.chassis import Faults, Running, Seen
 from tests.servers.faults import WIRE_FAULTS
+from tests.servers.openai_chat import OpenAIChat
 from tests.vqa_set import questions, vqa_suite, write_questions
 from tests.workspace import SCENES, SHARED, Workspace
 
@@ -61,75 +92,47 @@ def prepare(workspace: Workspace, url: str, track: str, transport: str, seeds: l
     )
 
 
-class Runner:
-    """Runs the suite of a workspace and holds the first two laws.
-
-    Commands whose transport is litellm, which keeps clients for the life of a process, are run in
-    a process each.
-    """
-
-    def __init__(self, workspace: Workspace, worker: Worker | None) -> None:
-        self.workspace = workspace
-        self._worker = worker
-        self._before = take_tree(workspace.root)
-
-    def run(self, *args: str) -> Done:
-        workspace = self.workspace
-        if self._worker is None:
-            done = workspace.run("--yes", *args)
-            ended = Ended(done.code, done.out, done.err)
-        else:
-            command = [
-                "run",
-                "suite.yaml",
-                "--out",
-                str(workspace.out),
-                "--no-report",
-                "--yes",
-                *args,
-            ]
-            ended = self._worker.phyblock(command, workspace.root, workspace.env, _LONGEST_S)
-        after = take_tree(workspace.root)
-        shared = [str((workspace.cache / name).resolve()) for name in SHARED]
-        places = (workspace.out.name, "cache", *shared)
-        broken = broken_laws(ended, workspace.root, self._before, after, places, ())
-        assert not broken, told(broken)
-        self._before = after
-        return ended.done
+def run(workspace: Workspace, *args: str) -> Ended:
+    """Run the suite of a workspace, which holds the laws of commands."""
+    shared = [str((workspace.cache / name).resolve()) for name in SHARED]
+    watch = Watch(workspace.root, (workspace.out.name, "cache", *shared))
+    words = ["run", "suite.yaml", "--out", str(workspace.out), "--no-report", "--yes", *args]
+    ended = run_watched(words, workspace.root, workspace.env, _LONGEST_S)
+    holds(watch.broken(ended))
+    return ended
 
 
-def told(broken: list[Broken]) -> str:
-    return "\n".join(f"{one.name}: {one.detail}" for one in broken[:20])
+def holds(broken: Iterable[Broken]) -> None:
+    """Fail with the laws that were broken."""
+    told = [f"{one.name}: {one.detail}" for one in broken]
+    assert not told, "\n".join(told[:20])
 
 
-def one_round(runner: Runner, server: LedgerChat, track: str) -> None:
+def one_round(workspace: Workspace, server: LedgerChat, track: str) -> None:
     """A run with faults to its end, the same again, what was refused again, and a second run."""
-    workspace = runner.workspace
     ledger = server.ledger
     first = len(ledger.entries)
     for _ in range(10):
-        done = runner.run()
+        done = run(workspace)
         if "To go on" not in done.out:
             break
     asked = len(ledger.entries)
-    assert runner.run().code == (1 if ledger.refused() else 0), done.out + done.err
+    assert run(workspace).code == (1 if ledger.that_came_to("sample") else 0), done.out + done.err
     assert len(ledger.entries) == asked, "a run that was done asked again"
-    broken = [*asked_twice(ledger.entries), *lost(ledger, kept_in(workspace.out))]
-    assert not broken, told(broken)
+    holds([*asked_twice(ledger.entries), *lost(ledger, kept_in(workspace.out))])
 
     server.faults = Faults()
     refused = {entry.key for entry in ledger.entries[first:] if entry.comes_to == "sample"}
-    done = runner.run("--retry-failed")
+    done = run(workspace, "--retry-failed")
     assert done.code == 0, done.out + done.err
     again = ledger.entries[asked:]
     if track != "step_planning":  # where an episode goes on with turns that were never asked
         assert Counter(entry.key for entry in again) == Counter(refused)
-    broken = [*asked_twice(ledger.entries, retries_refused=True)]
-    assert not broken, told(broken)
+    holds(asked_twice(ledger.entries, retries_refused=True))
 
     asked = len(ledger.entries)
     workspace.out = workspace.out.with_name(f"{workspace.out.name}-again")
-    done = runner.run()
+    done = run(workspace)
     assert done.code == 0, done.out + done.err
     assert len(ledger.entries) == asked, "what stands in the cache was asked again"
 
@@ -137,7 +140,6 @@ def one_round(runner: Runner, server: LedgerChat, track: str) -> None:
 @pytest.mark.parametrize(("track", "transport"), _CELLS)
 def test_faults(
     workspace: Workspace,
-    worker: Worker,
     tallies: dict[str, Counter[str]],
     track: str,
     transport: str,
@@ -152,8 +154,7 @@ def test_faults(
             workspace.out = workspace.root / f"out{n}"
             drawn = list(range(n * seeds, (n + 1) * seeds))
             prepare(workspace, running.url, track, transport, drawn)
-            runner = Runner(workspace, worker if transport == "direct" else None)
-            one_round(runner, server, track)
+            one_round(workspace, server, track)
         met += server.ledger.faults
         n += 1
     tallies.setdefault(f"faults met by {track}, {transport}", Counter()).update(met)
@@ -170,14 +171,12 @@ def test_faults_that_stop_a_model(
         assert isinstance(server, LedgerChat)
         prepare(workspace, running.url, "full_planning", transport, list(range(8)))
         workspace.write_models(running.url, "alpha", transport=transport, max_concurrency=2)
-        runner = Runner(workspace, None)
         for _ in range(12):
-            done = runner.run()
+            done = run(workspace)
             assert done.code in (0, 1), done.out + done.err
         server.faults = Faults()
-        assert runner.run().code == 0
-    broken = [*asked_twice(server.ledger.entries), *lost(server.ledger, kept_in(workspace.out))]
-    assert not broken, told(broken)
+        assert run(workspace).code == 0
+    holds([*asked_twice(server.ledger.entries), *lost(server.ledger, kept_in(workspace.out))])
     tallies.setdefault(f"faults that stop, {transport}", Counter()).update(server.ledger.faults)
 
 
@@ -185,3 +184,128 @@ def test_nothing_of_the_workspace_is_left_out(workspace: Workspace) -> None:
     """The look at a folder sees every file, also hidden ones."""
     Path(workspace.root / ".hidden").write_text("x", encoding="utf-8")
     assert {".hidden", "data/scenes.jsonl"} <= take_tree(workspace.root).keys()
+
+
+ASKED = 4
+COMMANDS = 25
+
+
+class Forgetful(OpenAIBatches):
+    """Keeps no metadata: batches are known by their answers."""
+
+    forgets_names = True
+
+
+WAYS: dict[str, tuple[type[BatchServer], str]] = {
+    "openai": (OpenAIBatches, "direct"),
+    "forgetful": (Forgetful, "direct"),
+    "anthropic": (AnthropicBatches, "anthropic"),
+    "gemini": (GeminiBatches, "gemini"),
+}
+WHOLE = ("ok", "twice", "stranger")
+endings = st.sampled_from([*WHOLE, "500", "429", "400", "length", "missing", "broken", "expired"])
+failures = st.lists(st.sampled_from(["", "500", "reset", "done-reset"]), max_size=3).map(tuple)
+
+
+@st.composite
+def batch_faults(draw: st.DrawFn) -> BatchFaults:
+    """Faults of four batches, one of which may be cancelled or refused, and calls about them."""
+    lines = st.dictionaries(st.integers(0, ASKED - 1), endings, max_size=ASKED)
+    kinds = ["upload", "create", "look", "list", "results"]
+    ends = st.dictionaries(st.integers(0, 1), st.sampled_from(["refused", "cancelled"]), max_size=1)
+    return BatchFaults(
+        draw(st.dictionaries(st.integers(0, 3), lines)),
+        draw(ends),
+        {kind: draw(failures) for kind in kinds},
+        looks=draw(st.integers(1, 3)),
+    )
+
+
+# What a kill cuts off in litellm is closed when it is collected.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize(
+    "way",
+    [name if name == "openai" else pytest.param(name, marks=pytest.mark.slow) for name in WAYS],
+)
+@fuzzed(15)
+@given(batch_faults(), st.lists(st.integers(0, 25), max_size=3))
+def test_batches(way: str, faults: BatchFaults, kills: list[int]) -> None:
+    kind, route = WAYS[way]
+    requests = [make_request(f"{n:03d}") for n in range(ASKED)]
+    policy = replace(QUICK, attempts=3, max_connection_failures=3)
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        pytest.MonkeyPatch.context() as patch,
+        Running(kind(batch=faults)) as running,
+    ):
+        patch.setenv(KEY_VARIABLE, "sk-not-a-real-key-1234")
+        server = running.server
+        assert isinstance(server, BatchServer)
+        config = ROUTES[route].config(running.url, batch=True, price={"input": 1.0, "output": 1.0})
+        disk = Disk(Path(folder))
+        for at in kills:
+            killing = Killing(at)
+            disk.moment, server.moment = killing.here, killing.there
+            asyncio.run(killing.run(command(config, disk, requests, policy=policy)))
+        disk.moment, server.moment = None, lambda *_: None
+        for _ in range(COMMANDS):
+            ended = run_command(config, disk, requests, policy=policy, budget=Budget(1e9))
+            if all(isinstance(one, (Reply, SampleError)) for one in ended):
+                break
+        else:
+            raise AssertionError(f"no end after {COMMANDS} commands: {ended}")
+        answered: Counter[str] = Counter()
+        for made in server.made:
+            told = faults.lines.get(made.ordinal, {})
+            if faults.ends.get(made.ordinal) == "refused":
+                continue
+            for place, seen in enumerate(made.seen):
+                answered[seen.sample] += told.get(place, "ok") in (*WHOLE, "length", "400")
+        assert set(answered.values()) == {1}, answered
+
+
+PRICE = {"input": 10.0, "output": 100.0}
+_ROUNDS = -(-FAULTS // 40)
+
+
+class Moody(OpenAIChat):
+    """Counts up to ninety times the tokens that are expected, and knows what it billed."""
+
+    def __init__(self, draw: random.Random) -> None:
+        super().__init__()
+        self._draw = draw
+        self.billed_usd = 0.0
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        prompt, completion = (int(10 ** self._draw.uniform(1, most)) for most in (4.4, 4.9))
+        self.billed_usd += (prompt * PRICE["input"] + completion * PRICE["output"]) / 1e6
+        usage = {"prompt_tokens": prompt, "completion_tokens": completion}
+        return {**super().reply(seen, ending), "usage": usage}
+
+
+@pytest.mark.parametrize("number", range(_ROUNDS))
+def test_no_more_is_spent_than_the_limit_and_what_was_under_way(
+    workspace: Workspace, tallies: dict[str, Counter[str]], number: int
+) -> None:
+    draw = random.Random(f"{SEED} costs {number}")
+    limit = 10 ** draw.uniform(-1, 2)
+    with Running(Moody(draw)) as running:
+        server = running.server
+        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=999)
+        workspace.write_suite(models=["alpha"], seeds=list(range(8)))
+        done = workspace.run("--set", f"limits.max_cost_usd={limit}")
+        assert done.code in (0, 1), done.err
+    ended: dict[int, float] = {}
+    sent: set[int] = set()
+    spent_at_last = 0.0
+    for line in (workspace.out / "calls.jsonl").read_text(encoding="utf-8").splitlines():
+        call = json.loads(line)
+        if call.get("ended"):
+            ended[call["call"]] = call["billed_usd"]
+        else:
+            sent.add(call["call"])
+            spent_at_last = sum(ended.values())
+            assert len(sent) - len(ended) <= 1 + len(ended), "more at once than were answered"
+    assert spent_at_last <= limit + 1e-9, "a call was sent beyond the limit"
+    assert sum(ended.values()) == pytest.approx(server.billed_usd), "spend is not what was billed"
+    tallies.setdefault("costs", Counter()).update({"calls": len(sent), "stopped": done.code})

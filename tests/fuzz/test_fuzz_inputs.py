@@ -1,28 +1,303 @@
-"""The laws hold for whatever a person gives: files, arguments, folders, earlier runs."""
+"""The laws hold for whatever a person gives: files, arguments, folders, earlier runs.
+
+Each kind of case puts a bad file, argument or folder before a command.
+"""
 
 from __future__ import annotations
 
+import json
 from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
 
 import pytest
+import yaml
 from hypothesis import given
+from hypothesis import strategies as st
 
-from tests.fuzz.bench import Bench, Case
-from tests.fuzz.cases import KINDS, Cases, run_cases
-from tests.fuzz.sizes import fuzzed
+from tests.data.broken import sound_scene
+from tests.fuzz.laws import Bench, Case, Fifo, Link
+from tests.fuzz.strategies import (
+    CANDIDATES,
+    JSON_TOKENS,
+    MODELS_FILES,
+    NASTY_TOKENS,
+    NOISE,
+    OVERRIDES,
+    PICTURES,
+    QUESTIONS,
+    SCENES,
+    SUITES,
+    TEMPLATES,
+    broken,
+    fuzzed,
+)
+from tests.records.damage import YAML_TEXTS
 from tests.workspace import Workspace
 
 pytestmark = pytest.mark.fuzz
-_SHARES_PERCENT = {
-    "suites": 14, "models": 12, "overrides": 8, "arguments": 10, "scenes": 12, "questions": 8,
-    "prompts": 8, "pictures": 6, "replies": 6, "places": 6,
+
+Cases = st.SearchStrategy[Case]
+
+RUN = ("run", "suite.yaml", "--out", "fresh", "--no-report")
+DRY = ("run", "suite.yaml", "--dry-run")
+LASTING = ("thesis/ch1.tex", "suite.yaml", "models.yaml", "data/scenes.jsonl")
+
+_TEXTS = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=12)
+_NO_FILES = st.sampled_from(
+    [
+        Fifo(),
+        *map(Link, ("/dev/zero", "/dev/stdin", "/proc/self/environ", ".", "gone", "/etc/hosts")),
+        b"",
+        b"\xff\xfe\x00",
+        b"a: &a [x,x,x,x,x,x,x,x,x]\nb: &b [*a,*a,*a,*a,*a,*a,*a]\nc: [*b,*b,*b,*b,*b,*b,*b]\n",
+        b"[" * 100_000,
+        b"a: " * 50_000,
+        b"- " * 200_000,
+        b"x" * 3_000_000,
+        b'"' + b"x" * 2_000_000 + b'"',
+        b"name: 0x" + b"f" * 100_000,
+        b"seeds: [" + b"1, " * 200_000 + b"1]",
+    ]
+)
+"""What may stand where a file is expected."""
+
+
+def _file(
+    name: str,
+    contents: st.SearchStrategy[bytes],
+    *commands: tuple[str, ...],
+    may_write: tuple[str, ...] = ("fresh",),
+    lasting: tuple[str, ...] = (),
+) -> Cases:
+    """A command, and a file of this name that is drawn; once in ten it is no such file at all."""
+    mostly = st.integers(0, 9).flatmap(lambda n: contents if n else _NO_FILES)
+    return st.builds(
+        lambda content, args: Case(args, {name: content}, may_write, lasting),
+        mostly,
+        st.sampled_from(commands),
+    )
+
+
+def _sets(texts: Sequence[str]) -> list[str]:
+    return [arg for text in texts for arg in ("--set", text)]
+
+
+def _place_case(place: str, is_there: bool, content: bytes) -> Case:
+    """A run that is told to go somewhere, where something of the user's may be already."""
+    here = place.removeprefix("~/")
+    can_be_there = is_there and place[:1] not in ("", "/", "~") and len(place) < 80
+    can_be_there = can_be_there and not place.startswith("suite.yaml")
+    files = {f"{place}/report/ch1/thesis.tex": content} if can_be_there else {}
+    return Case(
+        ("run", "suite.yaml", "--out", place, "--no-report", "--models", "oracle"),
+        files,
+        (place,) if place.startswith("/") else (here.partition("/")[0] or "nowhere",),
+        (*LASTING, *files),
+    )
+
+
+_PLACES = st.sampled_from(
+    [
+        *(".", "thesis", "fresh", "a/b/c", "~/x", "$HOME/x", "-x", "=1+1", ":b:", "a\nb"),
+        *("[red]x", "x" * 300, "d/" * 3000, "\udcff", "data", "suite.yaml", "suite.yaml/x"),
+        *("/proc/x", "/dev/null", "cache", "..x", "a b", "\u202e", "%s", "{x}"),
+    ]
+)
+_VERBS = (
+    *("run", "score", "report", "figures", "compare", "export", "show", "play"),
+    *("bundle", "verify", "site"),
+    *("models", "validate", "scenes", "questions", "cache", "init", "--help", "-V", "nope", ""),
+)
+_WORDS = (
+    *("suite.yaml", "data", "questions", "thesis", "gone", "stats", "audit", "show", "verify"),
+    *("--dry-run", "--set", "--limit", "--models", "--models-file", "--only", "--format", "--to"),
+    *("-1", "0", "9" * 400, "x=1", "seeds=[0]", "random", "t1", "csv", "html", "\udcff", "a\nb"),
+    *("/dev/null", "/dev/stdin", "--yes", "--", "x" * 5000, "../..", "http://[::1/v1", "%s", "{}"),
+    *("fresh", "check", "list", "--json", "--jobs", "--help"),
+)
+_ARGUMENTS = st.builds(
+    lambda verb, words: (verb, *words),
+    st.sampled_from(_VERBS),
+    st.lists(st.sampled_from(_WORDS) | _TEXTS, max_size=4),
+    # Commands whose honest work takes long: generating data sets, drawing all scenes.
+).filter(lambda args: args[0] != "init" and not {"generate", "render"} & set(args))
+
+
+_SOUND_REPLY = {
+    "id": "x",
+    "model": "m",
+    "choices": [{"finish_reason": "stop", "message": {"role": "assistant", "content": "1, 2"}}],
+    "usage": {"prompt_tokens": 10, "completion_tokens": 3, "total_tokens": 13},
 }  # fmt: skip
+_STEPS = st.sampled_from(
+    [
+        *("Step1: Move block with index 1", "Step 2:", "Move(3)", "index", "1", "-1"),
+        *("9" * 400, "\n", "Answer: A", "=1+1", "<script>", "\ud800", "\u202e", "```json"),
+        *("[1, 2]", "{", "<think>", "\0", "٣", "①", "Step" * 2000, "1, " * 3000),
+        *("Next plan: Done", ":b:", "[red]", "\x1b[31m"),
+    ]
+)
+
+
+def _reply_with(pieces: list[str]) -> bytes:
+    message = {"role": "assistant", "content": " ".join(pieces)}
+    body = {**_SOUND_REPLY, "choices": [{"finish_reason": "stop", "message": message}]}
+    return json.dumps(body).encode()
+
+
+_REPLY_FILES = broken(st.just(_SOUND_REPLY), JSON_TOKENS) | st.builds(
+    _reply_with, st.lists(_STEPS | _TEXTS, max_size=8)
+)
+
+
+def _official(picture: bytes, candidates: bytes | None) -> Case:
+    """A checkout in the official layout with one picture and maybe broken candidates."""
+    scene = {**sound_scene(), "id": "000"}
+    goal = {"level": 2, "blocks": scene["blocks"]}
+    numbered = [{**entry, "position": n} for n, entry in enumerate(scene["candidates"], 1)]
+    folder = "official/data/SCENEs_400_"
+    files = {
+        f"{folder}Goal_Jsons/000.json": json.dumps(goal).encode(),
+        f"{folder}Cand_Jsons/000_16_cand_blocks.json": candidates or json.dumps(numbered).encode(),
+        f"{folder}Goal_and_Cand_Imgs_resized/000.png": picture,
+    }
+    sets = ("dataset.format=official", "dataset.path=official", "images.source=dataset")
+    return Case((*RUN, *_sets(sets)), files, ("fresh",))
+
+
+_PROMPTED = ("--set", "prompt=mine.j2")
+_AUDIT = ("scenes", "audit", "data", "--jobs", "1")
+
+KINDS: dict[str, tuple[float, Cases]] = {
+    "suites": (
+        14,
+        _file("bad.yaml", SUITES, ("validate", "bad.yaml"), ("run", "bad.yaml", "--dry-run")),
+    ),
+    "models": (
+        12,
+        _file("models.yaml", MODELS_FILES, ("validate", "models.yaml"), ("models",), DRY),
+    ),
+    "overrides": (
+        8,
+        st.lists(OVERRIDES, min_size=1, max_size=3).map(lambda texts: Case((*DRY, *_sets(texts)))),
+    ),
+    # A run whose --out was not drawn writes to results.
+    "arguments": (10, _ARGUMENTS.map(lambda args: Case(args, may_write=("fresh", "results")))),
+    "scenes": (
+        12,
+        _file("data/scenes.jsonl", SCENES, ("validate", "data"), _AUDIT, DRY, RUN),
+    ),
+    "questions": (
+        8,
+        _file(
+            "questions/questions.jsonl",
+            QUESTIONS,
+            ("validate", "questions"),
+            ("run", "questions.yaml", "--dry-run"),
+        ),
+    ),
+    "prompts": (8, _file("mine.j2", TEMPLATES, (*RUN, *_PROMPTED), (*DRY, *_PROMPTED))),
+    "pictures": (6, st.builds(_official, PICTURES, st.none() | CANDIDATES)),
+    "replies": (
+        6,
+        st.tuples(_REPLY_FILES, _REPLY_FILES).map(
+            lambda texts: Case(
+                (*RUN, "--models", "old"),
+                {f"replies/t{n}.json": text for n, text in enumerate(texts, 1)},
+                ("fresh",),
+            )
+        ),
+    ),
+    "places": (
+        6,
+        st.builds(
+            _place_case,
+            _PLACES | _TEXTS.filter(lambda text: ".." not in text and text[:1] not in ("/", "~")),
+            st.booleans(),
+            NOISE,
+        ),
+    ),
+}
+"""Cases beside a sound suite, by what is bad about them, with their share of all inputs [%]."""
 _OF_RUNS_PERCENT = 10
+
+_OF_RUN = {
+    "out": (
+        ("report", "out", "--print"),
+        ("score", "out", "--out", "fresh"),
+        ("export", "out", "--to", "csv", "--out", "fresh"),
+        ("compare", "out"),
+        ("report", "out"),
+        ("run", "suite.yaml", "--out", "out", "--no-report", "--models", "random,oracle"),
+    ),
+    "steps": (
+        ("report", "steps", "--print"),
+        ("show", "steps", "step_planning/oracle/t1/s0"),
+        ("run", "suite.yaml", "--out", "steps", "--no-report", "--models", "oracle",
+         "--set", "tracks=[step_planning]", "--set", "steps.physics=off"),
+    ),
+    "asked": (
+        ("report", "asked", "--print"),
+        ("score", "asked", "--out", "fresh"),
+        ("run", "questions.yaml", "--out", "asked", "--no-report"),
+    ),
+}  # fmt: skip
+_GROWING = ("records.jsonl", "calls.jsonl", "prompts.jsonl")
+_IN_OUT = ("report/ch1/thesis.tex", "figures/mine.svg", "tables/mine.csv", "notes.md")
+
+
+def run_cases(root: Path) -> Cases:
+    """Cases about the finished runs in `root`: a line of a file that grows, or the manifest."""
+    found: list[Cases] = []
+    for run, commands in _OF_RUN.items():
+        own = tuple(f"{run}/{name}" for name in _IN_OUT) if run == "out" else ()
+        for name in (*_GROWING, "run.yaml"):
+            path = root / run / name
+            if not path.exists():
+                continue
+            contents = _manifests(path) if name == "run.yaml" else _with_bad_line(path)
+            found.append(
+                _file(
+                    f"{run}/{name}",
+                    contents,
+                    *commands,
+                    may_write=(run, "fresh"),
+                    lasting=(*LASTING, *own),
+                )
+            )
+    return st.one_of(found)
+
+
+def _manifests(path: Path) -> st.SearchStrategy[bytes]:
+    manifest = yaml.safe_load(path.read_text(encoding="utf-8"))
+    whole = path.read_bytes()
+    texts = st.sampled_from([*map(str.encode, YAML_TEXTS.values()), b'"\\ud800"'])
+    # A field that is not known may hold anything; one that is written already is there twice.
+    added = st.builds(
+        lambda field, text: whole + field + b": " + text + b"\n",
+        st.sampled_from([b"mine", b"created", b"limit", b"scenes", b"scenes_by_level"]),
+        texts,
+    )
+    return broken(st.just(manifest), NASTY_TOKENS) | added
+
+
+def _with_bad_line(path: Path) -> st.SearchStrategy[bytes]:
+    lines = path.read_bytes().splitlines(keepends=True)
+    documents = [json.loads(line) for line in lines]
+
+    def joined(place: int, bad: bytes, ending: bytes) -> bytes:
+        return b"".join([*lines[:place], bad + ending, *lines[place + 1 :]])
+
+    bad = broken(st.sampled_from(documents), JSON_TOKENS) | NOISE
+    endings = st.sampled_from([b"\n", b"\n", b"\n", b"", b"\r\n", b"\n\n"])
+    return st.builds(joined, st.integers(0, len(lines) - 1), bad, endings)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_bad_input(plain_bench: Bench, tallies: dict[str, Counter[str]], kind: str) -> None:
-    try_cases(plain_bench, KINDS[kind], _SHARES_PERCENT[kind], tallies.setdefault(kind, Counter()))
+    percent, cases = KINDS[kind]
+    try_cases(plain_bench, cases, percent, tallies.setdefault(kind, Counter()))
 
 
 def test_bad_run_folder(

@@ -17,8 +17,8 @@ from typing import Any
 
 import pytest
 
-from tests.fuzz.ledger import Ledger, LedgerAgent, LedgerChat, kept_in
-from tests.fuzz.sizes import KILLS, SEED
+from tests.fuzz.laws import Ledger, LedgerAgent, LedgerChat, kept_in
+from tests.fuzz.strategies import KILLS, SEED
 from tests.run.test_kill import CALL_USD, PRICE, counted_usd
 from tests.servers.chassis import FAULTS, Faults, Running
 from tests.vqa_set import questions, vqa_suite, write_questions
@@ -111,7 +111,7 @@ def test_kills(
             workspace.write_models("", "alpha", api_base=order, price=PRICE, max_tokens=1000)
             deaths, killed = run_until_killed(workspace, servers, ledger, draw)
             tally.update({"deaths of servers": deaths, "kills": killed})
-            missing = ledger.answered() - on_disk(workspace)
+            missing = ledger.that_came_to("reply") - on_disk(workspace)
             assert len(missing) <= AT_ONCE * (deaths + killed), "more is lost than was under way"
             under_way.update(missing)
             known_usd, _ = counted_usd(workspace)
@@ -121,7 +121,7 @@ def test_kills(
             server.come_back()
         done = workspace.run("--yes")
     assert done.code == 0, done.out + done.err
-    assert not ledger.answered() - kept_in(workspace.out)
+    assert not ledger.that_came_to("reply") - kept_in(workspace.out)
     replies = Counter(entry.key for entry in ledger.entries if entry.comes_to == "reply")
     if count == 1:
         assert tally["kills"] == rounds, "a run ended before it was killed"
