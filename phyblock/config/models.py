@@ -134,17 +134,19 @@ class Price(Section):
     output: Cost
     """Reply tokens [USD per million]."""
     cached: Cost | None = None
-    """Prompt tokens that the provider has in its cache [USD per million]; null: as the others."""
+    """Prompt tokens that the provider has in its cache [USD per million]; null: the price of
+    input."""
     cache_write: Cost | None = None
-    """Prompt tokens that it puts into its cache [USD per million]; null: as the others."""
+    """Prompt tokens that the provider puts into its cache [USD per million]; null: the price of
+    input."""
 
 
 class Rate(Price):
     """Prices of tokens."""
 
     batch: Price | None = None
-    """What they cost in batches; null: half at OpenAI's, Anthropic's and Google's own addresses,
-    and at others as outside of batches."""
+    """Prices in batches; null: half at OpenAI's, Anthropic's and Google's own addresses, and the
+    full price at any other."""
 
 
 class Tier(Rate):
@@ -189,7 +191,7 @@ _Address = Annotated[
 
 
 class SamplingSpec(Section):
-    """Sampling parameters for models that say nothing of their own."""
+    """Sampling parameters for models that set none."""
 
     temperature: Temperature | None = 0.0
     """0 to 2; null: not sent."""
@@ -220,11 +222,11 @@ class ModelConfig(Section):
         BeforeValidator(_one_or_list, json_schema_input_type=_Address | list[_Address] | None),
     ] = Field(default=(), alias="api_base")
     """Address of an OpenAI-compatible server (vLLM, Ollama, LM Studio), such as
-    http://localhost:8000/v1; a list where several serve the same model. The one with the least to
-    do is asked, one that is gone is left out and tried again."""
+    http://localhost:8000/v1; a list where several serve the same model. Each request goes to the
+    one with the fewest under way; one that cannot be reached rests and is tried again."""
     revision: Annotated[str, Field(min_length=1, max_length=100)] | None = None
-    """Which weights answer, where the id does not say it. An address does not tell models apart:
-    one id on two servers is one model, unless revisions differ."""
+    """Name of the weights, where the id does not tell. Two servers with the same id count as the
+    same model, unless their revisions differ."""
     api_key_env: _Variable | None = None
     """Name of the environment variable that holds the key, where it is not the provider's usual
     one. Never the key itself."""
@@ -233,8 +235,8 @@ class ModelConfig(Section):
     protocol. auto: direct where it can."""
     batch: Flag = False
     """Send requests in the provider's batches (OpenAI and servers with its /files and /batches,
-    Anthropic, Gemini): slower, by up to a day, and cheaper. How a model is asked is no part of a
-    run: it may change when the run goes on."""
+    Anthropic, Gemini): slower, by up to a day, and cheaper. A run does not depend on it: it may
+    change before the run is continued."""
     max_concurrency: Count = 64
     """Calls to this model under way at once. Left out: the suite's."""
     rpm: Count | None = None
@@ -253,36 +255,35 @@ class ModelConfig(Section):
     """How much a reasoning model thinks; null: not sent."""
     image_detail: ImageDetail | None = None
     """How closely pictures are looked at: the `detail` of OpenAI and compatible servers (auto, low,
-    high, original), the media resolution of Gemini (low, medium, high, ultra_high); null: as the
-    provider does where nothing is said."""
+    high, original), the media resolution of Gemini (low, medium, high, ultra_high); null: the
+    provider's default."""
     extra_body: Annotated[dict[str, JsonValue], checked(_body_faults)] = Field(default_factory=dict)
     """Further fields of the request body, sent as they are; not model, messages, n, best_of,
     stream, max_tokens, max_completion_tokens."""
     price: Tariff | None = None
     """Price; null: that of litellm's price map, or unknown."""
     max_cost_usd: Cost | None = None
-    """The model is asked no more before it costs more than this in a run [USD]; null: the run's
-    limit alone."""
+    """The model is stopped before it costs more than this in a run [USD]; null: only the run's
+    limit."""
     seed: SendMode = "auto"
     """auto: seeds are sent where litellm knows the provider to take them, and to OpenAI-compatible
-    servers named by api_base. always, never: whatever is known. Without seeds, repeats are
-    independent."""
+    servers named by api_base. always, never: sent, or not, whatever is known. Without seeds,
+    repeats are independent."""
     response_format: SendMode = "auto"
     """With answer_format: json_schema in the suite. auto: the schema is sent where litellm knows
-    the model to take one, and to OpenAI-compatible servers named by api_base. always, never:
-    whatever is known. The prompt says the form all the same."""
+    the model to take one, and to OpenAI-compatible servers named by api_base. always, never: sent,
+    or not, whatever is known. The prompt always states the form."""
     timeout_s: TimeoutS = 300.0
-    """Longest wait for one reply, to the last of its bytes [s]. Left out: the suite's."""
+    """Longest wait for a whole reply [s]. Left out: the suite's."""
     published: Text | None = None
     """Name of its row in the paper's tables."""
     size_b: TimeoutS | None = None
     """Parameters [billions], where known."""
     groups: Unique[_Group] = ()
-    """Groups that it belongs to: group:NAME in a suite or after --models stands for all of a group,
-    in the order of this file."""
+    """Its groups: group:NAME in a suite or after --models stands for all models of a group, in the
+    order of this file."""
     replay: Text | None = None
-    """Folder of recorded replies that stands in for the model (then no id), relative to this
-    file."""
+    """Folder of recorded replies to use instead of an id, relative to this file."""
 
     def faults(self) -> Iterator[Fault]:
         """Yield fields that others, or the provider, leave no room for."""

@@ -100,8 +100,8 @@ class ImagesSpec(Section):
     """The pictures that a model is shown."""
 
     source: PictureSource = "render"
-    """render: drawn from the scene. dataset: the official composites, or their two halves apart; a
-    scene without one is an error."""
+    """render: drawn from the scene. dataset: the official composites, whole or cut into their two
+    halves; a scene without one is an error."""
     layout: PictureLayout = "composite"
     """composite: goal and candidates in one picture. separate: two pictures."""
     order: Annotated[Unique[PictureName], Field(min_length=2, max_length=2)] = (
@@ -115,10 +115,10 @@ class ImagesSpec(Section):
     size_px: Annotated[int, Field(strict=True, ge=128, le=2048)] = 512
     """Edge of a rendered picture [pixels]."""
     view: View = "oblique"
-    """Where rendered scenes and candidates are seen from; questions have views of their own."""
+    """View of rendered scenes and candidates; questions have their own views."""
     background: BackgroundName | None = None
-    """Ground of all rendered pictures, one of the paper's six; the checkerboard is dark. null: each
-    question's own, and the checkerboard for all else."""
+    """Background of all rendered pictures, one of the paper's six. null: for questions the one that
+    each names, else the checkerboard, which is dark."""
 
 
 class CandidatesSpec(Section):
@@ -126,24 +126,25 @@ class CandidatesSpec(Section):
 
     order: CandidateOrder = "file"
     """file: numbered as in the data. shuffled: each seed draws another order for every scene, the
-    same for all models; numbers in pictures, prompts and replies go along."""
+    same for all models; numbers in pictures, prompts and replies follow it."""
 
 
 class ScoringSpec(Section):
     """The rules of scoring."""
 
     matchers: UniqueSome[Matcher] = ("optimal", "paper")
-    """optimal: interchangeable blocks are matched so that most steps count. paper: greedy, the
-    paper's Algorithm 1. The first one makes the headline numbers."""
+    """optimal: interchangeable blocks are matched so that as many steps as possible count. paper:
+    greedy, the paper's Algorithm 1. The first in the list gives the headline numbers."""
     level1: Criterion = "selection"
-    """Criterion of Level 1. selection: one-to-one, order ignored. membership: what the paper's
-    Level-1 columns are. aov: as at the other levels."""
+    """Criterion of Level 1. selection: one-to-one, order ignored. membership: the criterion of the
+    paper's Level-1 columns. aov: as at the other levels."""
     missing: MissingPolicy = "count"
-    """A missing reply: count its blocks as not placed, or skip the scene (as the paper did)."""
+    """Missing replies. count: their blocks count as not placed. skip: the scene is left out, as in
+    the paper."""
     extractor: str | None = None
-    """A model of the models file that is sent the text of replies from which nothing could be read,
-    and copies what they say into the asked form; its calls count against limits.max_cost_usd. Null:
-    such replies stay unread."""
+    """Name of a model that is sent the text of replies that could not be parsed, and copies what
+    they say into the requested form; its calls count against limits.max_cost_usd. null: such
+    replies stay parse failures."""
 
 
 class LimitsSpec(Section):
@@ -152,21 +153,21 @@ class LimitsSpec(Section):
     max_concurrency: Count = 64
     """Calls under way at once, over all models."""
     max_attempts: Count = 8
-    """Requests that must have failed before a sample is given up. More are sent until retry_for_s
-    is over, but for answers that were paid for and cannot be read."""
+    """Number of failed requests after which a sample is given up. Until retry_for_s is over, more
+    are sent, except after answers that were paid for and cannot be read."""
     retry_for_s: Annotated[float, Field(strict=True, ge=0)] = 300.0
-    """Outage that is outlasted [s]: a sample is not given up sooner after its first failure, and a
-    model whose server cannot be reached for longer is stopped."""
+    """Longest outage that a run waits out [s]: a sample is given up no sooner after its first
+    failure, and a model whose server cannot be reached for longer is stopped."""
     max_connection_failures: Count = 20
-    """Failures to reach a server, one after another, after which its models are stopped where it
-    has not answered once in this run; as many answers with HTTP 2xx that hold no reply, where it
-    has not given one."""
+    """Failed connections in a row after which a server that has never answered in this run is given
+    up and its models are stopped; also answers in a row with HTTP 2xx and no reply from one that
+    has never given a reply."""
     timeout_s: TimeoutS = 300.0
     """Longest wait for one reply [s]."""
     batch_poll_s: TimeoutS = 60.0
     """Longest pause between two looks at a batch [s], for models with batch: true."""
     max_cost_usd: Cost | None = None
-    """The run stops before it costs more than this [USD]; null: no bound."""
+    """The run stops before it costs more than this [USD]; null: no limit."""
 
 
 @dataclass(frozen=True)
@@ -204,14 +205,15 @@ Levels = Annotated[Unique[LevelT], checked(_lone_level)]
 
 
 class VarySpec(Section):
-    """Ways of asking that are crossed; the first level of each factor is the reference."""
+    """Conditions of presentation that are varied; the first level of each factor is the
+    reference."""
 
     prompt: Levels[Prompt] = ()
     """Prompts, as in the track's own field; for suites of one track."""
     background: Levels[BackgroundName] = ()
-    """Grounds of rendered pictures, as images.background."""
+    """Backgrounds of rendered pictures, as images.background."""
     view: Levels[View] = ()
-    """Where rendered scenes are seen from, as images.view."""
+    """Views of rendered scenes, as images.view."""
     candidate_order: Levels[CandidateOrder] = ()
     """Orders of the candidates, as candidates.order."""
     layout: Levels[PictureLayout] = ()
@@ -219,11 +221,11 @@ class VarySpec(Section):
     examples: Levels[ExampleCount] = ()
     """Numbers of worked examples, as examples."""
     repeats: Annotated[int, Field(strict=True, ge=1, le=100)] = 1
-    """How often the same is asked, each time anew: the cache answers none but the first, and the
-    provider is sent another seed."""
+    """Number of times that the same request is sent. Only the first may be answered from the cache;
+    each sends another seed."""
     design: Literal["crossed", "one_at_a_time"] = "crossed"
     """crossed: every level with every level of the others. one_at_a_time: each factor alone, the
-    others at their reference; both ask each repeatedly."""
+    others at their reference. Repeats apply to both."""
 
     def faults(self) -> Iterator[Fault]:
         """Yield that two templates would have the same name in tables."""
@@ -296,34 +298,33 @@ class Suite(Section):
     description: str = ""
     """One line on what the suite is for."""
     tracks: UniqueSome[Annotated[str, OneOf(known_tracks)]] = ("full_planning",)
-    """What is asked."""
+    """The tracks to run."""
     dataset: DatasetSpec = DatasetSpec()
     """The scenes of a run."""
     levels: UniqueSome[Level] = (1, 2, 3, 4)
     """Difficulty levels."""
     limit: Count | None = None
-    """Items of each track at most, spread over levels or subtasks; null: all. --limit says another
-    number."""
+    """Most items of each track, spread over levels or subtasks; null: all. --limit overrides it."""
     settings: UniqueSome[Setting] = ("A", "B")
     """A compares type, color and orientation, B type and color. One call is scored under each."""
     seeds: UniqueSome[Seed] = (0,)
     """Each seed repeats every question."""
     models: Literal["recorded"] | UniqueSome[ModelName]
     """Names from models.yaml or built-in baselines, group:NAME for all models of a group; or the
-    word recorded: every folder of recorded replies in the official data."""
+    word recorded, for every folder of recorded replies in the official data."""
     baselines: Unique[Annotated[str, OneOf(baseline_names)]] = ("goal-blind", "random")
-    """Built-in baselines that are scored beside models and recordings of full_planning, where every
-    track has them; they cost nothing. []: none."""
+    """Built-in baselines that are scored beside the models of full_planning, where every track of
+    the suite has them; they cost nothing. []: none."""
     prompt: Prompt = "default"
     """default; official (read out of the official checkout); or the path of a .j2 template,
     relative to the suite file."""
     answer_format: AnswerFormat = "text"
-    """text: lines of text. json_schema: one JSON object, of which the prompt says the schema; it is
-    sent as response_format too where the provider takes one."""
+    """text: lines of text. json_schema: one JSON object, whose schema the prompt states; it is also
+    sent as response_format where the provider takes one."""
     examples: ExampleCount | UniqueSome[Text] = 0
-    """Worked examples that are shown before each question, with a right answer: a number (drawn by
-    the least of seeds, never a scene that shares a base scene or its goal with the one asked
-    about), or names of scenes (where one may not be shown, a drawn one stands in)."""
+    """Worked examples before each question, with a right answer: a number (drawn with the smallest
+    seed, never a scene that shares a base scene or its goal with the one asked about), or names of
+    scenes (one that may not be shown is replaced by a drawn one)."""
     images: ImagesSpec = ImagesSpec()
     """The pictures that a model is shown."""
     candidates: CandidatesSpec = CandidatesSpec()
@@ -334,11 +335,12 @@ class Suite(Section):
     scoring: ScoringSpec = ScoringSpec()
     """The rules of scoring."""
     sampling: SamplingSpec = SamplingSpec()
-    """Sampling parameters for models that say nothing of their own."""
+    """Sampling parameters for models that set none."""
     limits: LimitsSpec = LimitsSpec()
     """Bounds of a run; they change how fast results come, not what they are."""
     vary: VarySpec = VarySpec()
-    """Ways of asking that are crossed, to tell how much each of them moves a model."""
+    """Conditions of presentation that are varied, to measure how much each of them changes a
+    model's score."""
 
     _files: SuiteFiles | None = PrivateAttr(default=None)
 

@@ -121,24 +121,24 @@ Angle = Annotated[float, Field(strict=True, gt=0, le=90, allow_inf_nan=False)]
 
 
 class PoseSpec(PictureControls):
-    """Requests of poses in the pose_planning track, and the execution of plans."""
+    """The pose_planning track: the form of requests, and the tolerances of execution."""
 
     rotation: PoseRotation = "candidate"
     """candidate: blocks keep the orientation in which they are shown, and steps give a number and a
     place. free: each kind is shown once, upright, and steps give a rotation as well."""
     views: Annotated[UniqueSome[View], checked(_oblique_first)] = ("oblique", "top")
-    """Where the goal is seen from, a picture each: oblique, and any of front, side, top after it.
-    Blocks are shown from where the first one is."""
+    """Views of the goal, one picture each: oblique first, then any of front, side and top.
+    Candidates are shown in the first view."""
     overlap_cm: Tolerance = _LIMITS.overlap_cm
-    """A block that shares space with others is moved out of them by so much at most; one that would
-    need more is refused [cm]."""
+    """Farthest that a block that overlaps others is moved out of them; one that would need more is
+    refused [cm]."""
     stand_cm: Tolerance = _LIMITS.stand_cm
-    """A block that moves farther when it is let go has fallen, or was knocked over by another
+    """A block that moves farther than this when it is released has fallen, or was knocked over
     [cm]."""
     stand_deg: Angle = _LIMITS.stand_deg
     """The same for how far it turns [degrees]."""
     reached_cm: Tolerance = 1.0
-    """A block of the goal is reached where one of its kind lies so near in the end [cm]."""
+    """A goal block is reached if a block of its kind ends up at most this far from it [cm]."""
     reached_deg: Angle = 10.0
     """The same for how it is turned [degrees]."""
     prompt: TemplateName = "default"

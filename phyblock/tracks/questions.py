@@ -90,14 +90,14 @@ class VqaSpec(PictureControls):
     """builtin: a folder with questions.jsonl. official: a folder with question files in the
     official JSON form and their pictures."""
     path: Annotated[str, Field(min_length=1)] = BUILTIN_QUESTIONS
-    """The name of a bundled question set (phyblock-vqa), or a folder; relative as dataset.path. Its
+    """Name of a bundled question set (phyblock-vqa), or a folder, relative as in dataset.path. Its
     scenes are those of dataset."""
     subtasks: UniqueSome[SubtaskName] = (*SUBTASKS,)
     """Subtasks to ask about."""
     per_subtask: Count | None = None
-    """Questions of each subtask at most; null: all."""
+    """Most questions of each subtask; null: all."""
     options_as: OptionsAs = "images"
-    """Options that are pictures. images: each sent apart. letters: all on one sheet, lettered."""
+    """Pictures of options. images: each sent by itself. letters: all on one lettered sheet."""
     circular: Flag = False
     """Ask every rotation of the options; a question is right only if all are."""
     prompt: TemplateName = "default"

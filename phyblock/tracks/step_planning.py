@@ -68,8 +68,8 @@ class StepsSpec(PictureControls):
     """The rules of the step_planning track: the simulator, what is shown, when it ends."""
 
     setting: Setting | None = None
-    """By which the simulator lets a step succeed; null: by the first of settings. With B, blocks
-    that are turned wrongly are placed, and count as wrong in A."""
+    """Setting under which the simulator accepts a step; null: the first of settings. With B,
+    wrongly turned blocks are placed, and count as wrong in A."""
     gating: Gating = "aov"
     """aov: a block can be placed when all it rests on is. layer: when all lower layers are
     complete, as in the official code."""
@@ -77,27 +77,27 @@ class StepsSpec(PictureControls):
     """off: placed blocks stay where they are. settle: every new state is simulated; what would fall
     is recorded and held. strict: a structure that collapses ends the episode."""
     feedback: Feedback = "success"
-    """What the model is told of each of its steps."""
+    """Feedback on each step: none, success or failure, or the type of error."""
     history: History = "text"
     """Earlier steps as a text in one message, or as the turns of a conversation."""
     memory: Count | None = None
-    """Earlier steps that are shown; null: all."""
+    """Number of earlier steps that are shown; null: all."""
     cot: Flag = True
     """Ask for reasoning before the step."""
     samples: Count = 1
-    """Replies asked for each step."""
+    """Number of replies for each step."""
     vote: Literal["majority"] = "majority"
-    """How several replies become one step."""
+    """Rule by which several replies become one step: the most frequent one."""
     max_steps: Count | None = None
-    """Steps at most; null: twice the number of blocks."""
+    """Most steps; null: twice the number of blocks."""
     max_failures: Count | None = 5
-    """Failed steps in a row that end an episode; null: no bound."""
+    """Failed steps in a row that end an episode; null: no limit."""
     max_repeats: Count | None = 3
-    """Failures in a row of one and the same step that end an episode; null: no bound."""
+    """Failures in a row of the same step that end an episode; null: no limit."""
     max_episode_tokens: Count | None = None
-    """Tokens of an episode, prompts included; null: no bound."""
+    """Most tokens of an episode, prompts included; null: no limit."""
     max_episode_usd: PositiveUsd | None = None
-    """Dollars of an episode; null: no bound."""
+    """Most dollars of an episode; null: no limit."""
     prompt: TemplateName = "default"
     """default, or the path of a .j2 template."""
 
