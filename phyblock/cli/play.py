@@ -59,7 +59,7 @@ _LARGEST_CONSENT_BYTES = 64 * 1024
     help="Show what the models of this run folder did, after the end.",
 )
 @run_out_option
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="[default: any free one]")
+@click.option("--port", type=click.IntRange(0, 65535), default=0, show_default="any free one")
 @click.option("--exact", is_flag=True, help="Show the models' prompt unfolded, as for a study.")
 @click.option("--no-browser", is_flag=True, help="Print the address and open nothing.")
 def play(

@@ -124,8 +124,8 @@ def _print_summary(summary: Summary) -> None:
 @run_argument
 @click.argument("other", type=UserPath(), required=False)
 @models_option("Only these models; of two runs, A of the first.")
-@click.option("--track", metavar="NAME", default="", help="[default: the first that they have]")
-@click.option("--measure", metavar="NAME", default="", help="[default: the first of the track]")
+@click.option("--track", metavar="NAME", default="", show_default="the first in both")
+@click.option("--measure", metavar="NAME", default="", show_default="the headline measure")
 @click.option("--out", type=UserPath(), metavar="DIR", help="Folder for CSV, Markdown and LaTeX.")
 def compare(
     run: Path, other: Path | None, models: Sequence[str], track: str, measure: str, out: Path | None
@@ -295,9 +295,9 @@ def bundle(run: Path, out: Path | None) -> None:
 @click.argument("file", type=UserPath())
 @data_folders_option
 def verify(file: Path, data: tuple[Path, ...]) -> None:
-    """Score the replies in the bundle FILE again, and render its prompts; say whether its records
-    come out as the same bytes, what was not verified, and whether samples were left out. Exits with
-    2 where they do not come out.
+    """Score the replies in the bundle FILE again, render its prompts, and report whether its
+    records come out as the same bytes, what was not verified, and whether samples are missing.
+    Exits with 2 if the records differ.
 
     Calls no model. A bundle holds no data: sets that come with phyblock are found; name others
     with --data.
@@ -325,8 +325,8 @@ def verify(file: Path, data: tuple[Path, ...]) -> None:
 @data_folders_option
 @click.option("--title", default="PhyBlock leaderboard", help="Its heading.")
 def site(runs: tuple[Path, ...], out: Path, data: tuple[Path, ...], title: str) -> None:
-    """Put RUNS (run folders and bundles) into one static folder: a ranked table, cost against
-    score, a page for every model and scene, replays.
+    """Put RUNS (run folders and bundles) into one static folder: ranks, a page for every model
+    and scene, and every sample step by step.
 
     The folder opens from disk or from any web server. Runs must be of one data version and prompt.
     Bundles are scored again first, and those that do not verify are refused.
