@@ -204,12 +204,11 @@ class PictureControls(Section):
 
     blind: Flag = Field(
         default=False,
-        description="Send no picture of what is asked about: of a question none at all, of a "
-        "scene its candidates alone.",
+        description="Leave out the picture of the goal; for questions, all pictures.",
     )
     wrong_image: Flag = Field(
         default=False,
-        description="Show another scene, which the seed draws; candidates stay the right ones.",
+        description="Show the goal of another scene, drawn with the seed; the candidates stay.",
     )
 
     def faults(self) -> Iterator[Fault]:

@@ -39,7 +39,7 @@ class ManifestModel(Line):
     size_b: float | None = None
     """Its size [billion parameters]."""
     served_at: tuple[str, ...] = ()
-    """Addresses of the servers of one's own at which it was asked when the run began."""
+    """Addresses of your own servers at which it was called when the run began."""
     kind: str = ""
     """`litellm`: asked over the network; `replay`: a recording; `baseline`: a rule; `human`: a
     person."""
@@ -87,26 +87,26 @@ class Manifest(Line):
     """A description of a run, written before anything is asked."""
 
     identity: str
-    """Digest of what decides the results: only the same run goes on in a folder."""
+    """Digest of everything that decides the results: only the same run continues in a folder."""
     created: str = ""
     """The time when it was begun, UTC."""
     format: Annotated[int, Field(ge=1, le=FORMAT)] = FORMAT
     """Version of the run folder."""
     suite: dict[str, Any] = Field(default_factory=dict)
-    """The suite with everything that it left out."""
+    """The suite, with all defaults filled in."""
     models: Annotated[tuple[ManifestModel, ...], checked(_same_names)] = ()
-    """The models as they are called."""
+    """The models and how they are called."""
     others: tuple[ManifestModel, ...] = ()
-    """Models that were asked in this folder before, and that the command did not name this time:
-    their records stay, and no table counts them until they are named again."""
+    """Models that ran in this folder before, but were not named this time: their records stay, and
+    tables leave them out until they are named again."""
     dataset: ManifestDataset | None = None
     """The data set."""
     tracks: dict[str, dict[str, Any]] = Field(default_factory=dict)
     """Digests of what decides the results of each track: prompt, pictures, questions."""
     variants: dict[str, dict[str, dict[str, Any]]] = Field(default_factory=dict)
-    """The same digests by way of asking, as records name it, and track; empty: there is one."""
+    """The same digests by condition, as records name it, and track; empty: there is only one."""
     limit: int | None = None
-    """Items at most of each track."""
+    """Most items of each track."""
     questions: ManifestQuestions | None = None
     """The question set, where one is asked."""
     items: dict[str, int] = Field(default_factory=dict)
@@ -116,8 +116,8 @@ class Manifest(Line):
     scenes_by_level: dict[int, int] = Field(default_factory=dict)
     """Scenes of each level; one scene may be of several."""
     engine: str | None = None
-    """The physics engine that blocks are let go in, with its version; null where nothing of the run
-    depends on one, and in runs from before there was a choice (PyBullet)."""
+    """The physics engine, with its version; null where nothing in the run depends on one, and in
+    runs from before there was a choice (PyBullet)."""
     versions: dict[str, str] = Field(default_factory=dict)
     """Versions of Python, of libraries, and of the readers that read the replies."""
 

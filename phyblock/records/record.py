@@ -51,14 +51,14 @@ class Reply(Line):
     reasoning: str = ""
     """The reasoning that the provider showed beside it."""
     finish: Finish = "stop"
-    """The reason why it ended: by itself, at the token limit, by a content filter, or not said."""
+    """The reason why it ended: by itself, at the token limit, by a content filter, or unknown."""
     usage: Usage = Usage()
     """Its tokens."""
     cost_usd: Usd | None = None
     """Its price [US dollars]; null: not known."""
     billed_usd: Usd | None = None
-    """Amount that `max_cost_usd` counts [US dollars], failed attempts included, a reply without
-    token counts at its dearest; null: no price is known."""
+    """Amount that `max_cost_usd` counts [US dollars], failed attempts included; a reply without
+    token counts counts with its highest cost. null: no price is known."""
     latency_s: Amount = 0.0
     """Time of the successful request alone [s]."""
     provider_model: str = ""
@@ -68,7 +68,7 @@ class Reply(Line):
     cached: bool = False
     """True if it came from the cache."""
     seed_sent: bool = True
-    """True if the provider takes a seed; where not, seeds are independent repeats."""
+    """True if a seed was sent; if not, seeds are independent repeats."""
     batched: bool = False
     """True if it came in a batch, at the price of one."""
 
@@ -103,13 +103,13 @@ class StoredError(Line):
 
     kind: ErrorKind
     """`retryable`: every attempt failed; `sample`: this request cannot succeed; `refused`: by a
-    content policy; `unjudged`: there is a reply, which no engine could carry out."""
+    content policy; `unjudged`: there is a reply, but no engine could carry it out."""
     status: Whole | None = None
     """HTTP status, where there was one."""
     message: str = ""
-    """The words of it."""
+    """Its message."""
     billed_usd: Usd | None = None
-    """As of a reply."""
+    """As in a reply."""
 
 
 class SentImage(Line):
@@ -149,7 +149,7 @@ class Score(Line):
     criterion: str
     """The rule by which steps count."""
     matcher: str | None = None
-    """The rule that matches steps and goal blocks; null where the criterion knows no choice."""
+    """The rule that matches steps and goal blocks; null where the criterion leaves no choice."""
     setting: str
     """`A`: with orientation; `B`: without."""
     tp: Whole
@@ -165,7 +165,7 @@ class Score(Line):
     why: tuple[str | None, ...] | None = None
     """The error type of each wrong step, null for right ones."""
     blocks: dict[str, Whole] | None = None
-    """Goal blocks by what became of them, where the criterion tells them apart."""
+    """Number of goal blocks by outcome, where the criterion tells them apart."""
     kept: Whole | None = None
     """Steps that the nearest valid order keeps."""
 
@@ -191,7 +191,7 @@ class AskedTurn(Line):
 
 
 class ShownScene(Line):
-    """The presentation of a scene, where that was not as the file has it."""
+    """The presentation of a scene, where it differs from the file."""
 
     order: tuple[Whole, ...]
     """The number in the file of each candidate, in the order shown."""
@@ -200,7 +200,7 @@ class ShownScene(Line):
 
 
 class Extraction(Line):
-    """An extraction model's copy of what a reply says that no reader could read."""
+    """An extraction model's copy of the answer in a reply that could not be parsed."""
 
     model: str
     """The model that was asked."""
@@ -239,22 +239,23 @@ class Record(Line):
     """The prompt, null for recordings and baselines, which are sent nothing; of an episode, that of
     the first turn."""
     parse: Any = None
-    """The answer that was read in the reply, as the track says; null: none was."""
+    """The parsed answer, in the form of its track; null: none."""
     scores: tuple[Score, ...]
     """Counts for every setting, matcher and criterion; none for questions."""
     time: str = ""
-    """When it was written, UTC."""
+    """Time when it was written, UTC."""
     run: str = ""
     """Digest of the run that it belongs to; older records have none."""
     extraction: Extraction | None = None
-    """The copy that another model made of the reply; null: it was read, or nobody was asked."""
+    """The copy that another model made of the reply; null: the reply was parsed, or no model was
+    called."""
     shown: ShownScene | None = None
-    """The presentation of the scene; null: as the file has it."""
+    """The presentation of the scene; null: as in the file."""
     asked: AskedAs | None = None
-    """Place where an answer in JSON was asked for: the `prompt` alone, or the request's
-    `response_format` too; null: a text was asked for, or nobody was asked."""
+    """Place where an answer in JSON was requested: only the `prompt`, or also the request's
+    `response_format`; null: text was requested, or no model was called."""
     variant: dict[str, str] = Field(default_factory=dict)
-    """Factors in which the way of asking differs from the run's reference, with their levels."""
+    """Factors in which the condition differs from the run's reference, with their levels."""
     counts: dict[str, tuple[Amount, ...]] = Field(default_factory=dict)
     """Counts of measures beside `scores`, by name."""
 
@@ -311,7 +312,7 @@ class Record(Line):
 
     @property
     def way(self) -> Variant:
-        """The way of asking."""
+        """The condition: the levels of the factors that the suite varies."""
         return Variant(tuple(self.variant.items()))
 
     @property
@@ -352,9 +353,8 @@ class Record(Line):
 
     @property
     def paid_usd(self) -> float | None:
-        """Cost of its replies to the run [US dollars]; None where a price is not known.
-
-        Replies from the cache were paid for elsewhere; an episode can hold both kinds.
+        """Cost of its replies to the run [US dollars]; None if a price is not known. Replies from
+        the cache were paid for elsewhere; an episode can hold both kinds.
         """
         more = () if self.extraction is None else (self.extraction.reply,)
         paid = [reply.cost_usd for reply in (*self.replies, *more) if not reply.cached]
@@ -383,7 +383,7 @@ class Call(Line):
     model: str
     """The model that is asked."""
     sample: str = ""
-    """The sample that it is made for; empty where it is for none, as an extractor's."""
+    """The sample that it is made for; empty for none, as for an extractor's calls."""
     key: str
     """Digest of everything that decides the reply, as in the reply cache."""
     run: str
@@ -393,7 +393,8 @@ class Call(Line):
     ended: bool = False
     """True when its end is known: a reply, or an error."""
     billed_usd: Usd | None = None
-    """Its cost [US dollars], at its dearest where that is not known; null: the price is unknown."""
+    """Its cost [US dollars], or the highest possible where that is not known; null: the price is
+    unknown."""
     reply: Reply | None = None
     """The reply as it arrived, before it was judged; null where none came."""
 
@@ -427,14 +428,14 @@ class BatchLine(Line):
     """An event of a batch of requests; the first line of each is written before it is sent."""
 
     batch: str
-    """Our name for it, which the provider is told, so that it is found there again."""
+    """phyblock's name for it, which is sent to the provider so that it can be found there again."""
     model: str
     """Name of the model."""
     event: BatchEvent
     """`intended`: it is about to be sent; `created`: the provider has it; `lost`: it has not, and
     nothing was asked; `ended`: its answers are in `batches/`."""
     time: str
-    """When, UTC."""
+    """Time of the event, UTC."""
     id: str = ""
     """The provider's name for it."""
     keys: tuple[str, ...] = ()
@@ -446,9 +447,10 @@ class BatchLine(Line):
 
 
 class Stopped(Line):
-    """The reasons why the last session on a run did not ask all; there while there are any."""
+    """The reasons why the last session on a run did not finish; the file exists only while there
+    are any."""
 
     models: dict[str, str] = Field(default_factory=dict)
-    """The reason why a model could not be asked on, by its name."""
+    """The reason why a model was stopped, by its name."""
     run: str = ""
     """The reason why the whole run was stopped; empty: it was not."""

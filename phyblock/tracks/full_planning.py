@@ -45,19 +45,19 @@ class PlanParse(Line):
     """The plan that was read in a reply."""
 
     parser: str
-    """How replies are read."""
+    """Parser of replies."""
     rule: str | None
-    """The rule that matched; null: nothing could be read."""
+    """The rule that matched; null: nothing could be parsed."""
     plan: tuple[int, ...]
     """Candidate numbers in order, as they were shown."""
     file_plan: tuple[int, ...] | None = None
-    """The same in the numbers of the file; null: those are the ones that were shown."""
+    """The same in the numbers of the file; null: they are the numbers that were shown."""
     dropped: tuple[int, ...] = ()
     """Numbers that no candidate has."""
     version: int = 1
     """Version of the parser."""
     problem: str | None = None
-    """Why nothing could be read."""
+    """Reason why nothing could be parsed."""
     truncated: bool = False
     """True where the text breaks off within the plan."""
 

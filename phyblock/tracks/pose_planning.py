@@ -136,11 +136,11 @@ class PoseSpec(PictureControls):
     """A block that moves farther than this when it is released has fallen, or was knocked over
     [cm]."""
     stand_deg: Angle = _LIMITS.stand_deg
-    """The same for how far it turns [degrees]."""
+    """The same for its rotation [degrees]."""
     reached_cm: Tolerance = 1.0
     """A goal block is reached if a block of its kind ends up at most this far from it [cm]."""
     reached_deg: Angle = 10.0
-    """The same for how it is turned [degrees]."""
+    """The same for its rotation [degrees]."""
     prompt: TemplateName = "default"
     """default, or the path of a .j2 template."""
 
@@ -198,32 +198,32 @@ class StepOutcome(Line):
     vertex: Whole | None
     """The goal block, from 0, that it stands for; null: none."""
     position_cm: Amount | None = None
-    """How far its center of mass is from that block's [cm]."""
+    """Distance of its center of mass from that block's [cm]."""
     sideways_cm: Amount | None = None
     """The same over the floor [cm]."""
     up_cm: Amount | None = None
     """The same in height, above zero where it is too high [cm]."""
     turn_deg: Amount | None = None
-    """How far it is turned, up to the block's symmetry [degrees]."""
+    """Angle by which it is turned against that block, up to symmetry [degrees]."""
     iou: Amount | None = None
-    """Volume that both share, of the volume of both together."""
+    """Volume that both share, divided by the volume of both together."""
     end: StepEnd
     """The ending."""
     moved_cm: Amount = 0.0
-    """How far the block came to lie from where it was to be [cm]."""
+    """Distance from where the block was put to where it came to rest [cm]."""
     turned_deg: Amount = 0.0
-    """How far it was turned [degrees]."""
+    """Angle by which it turned on the way [degrees]."""
     gap_cm: Amount = 0.0
-    """How far it was above what it would fall on when it was let go [cm]."""
+    """Height above what is below it when it was released [cm]."""
     overlap_cm: Amount = 0.0
-    """How far it was moved out of others, or how deep it was refused [cm]."""
+    """Distance that it was moved out of others, or depth at which it was refused [cm]."""
     knocked: tuple[Whole, ...] = ()
     """Numbers of the steps, from 1, whose blocks it moved."""
     error: PoseError | None = None
-    """What was wrong, null where nothing was."""
+    """Type of error; null: none."""
     rests: tuple[RestingBlock, ...]
-    """The blocks that lie elsewhere after it than before, its own than where it was put, by more
-    than 1 mm or 1 degree."""
+    """Blocks that moved by more than 1 mm or 1 degree in this step; its own block counts from where
+    it was put."""
 
 
 class PoseOutcome(Line):
@@ -238,15 +238,15 @@ class PoseOutcome(Line):
     turn_deg: Amount
     """The turn about the vertical that aligns it [degrees]."""
     steps: tuple[StepOutcome, ...]
-    """What became of each step."""
+    """Outcome of each step."""
     reached: Whole
-    """Blocks of the goal that stand where they should in the end."""
+    """Goal blocks that stand in their place in the end."""
     iou: Amount
     """Intersection over union of all that stands and the goal, in voxels of 5 mm by 64 points."""
     completed: bool
-    """True if all of the goal was reached, and nothing else lies about."""
+    """True if the whole goal was reached and no other block is left."""
     limits: dict[str, Amount]
-    """The tolerances of the suite's section `pose` by which the plan was carried out."""
+    """The tolerances of the suite's section `pose` with which the plan was carried out."""
     engine: str
     """The physics engine, with its version."""
 
@@ -259,7 +259,7 @@ class PoseRecord(Record):
     parse: PoseParse | None = None
     """The plan that was read."""
     pose: PoseOutcome | None = None
-    """What it is worth."""
+    """Its score."""
 
     def course(self, matcher: str) -> Course | None:
         """Return what was wrong with each step, and how many goal blocks were not reached."""
@@ -386,7 +386,7 @@ def judge_poses(
 
 
 Ended = tuple[tuple[Mapping[str, Any], ...], Mapping[str, Any]]
-"""How each step of a plan that was carried out ended, and the world in the end, as records say."""
+"""Endings of the steps of a plan that was carried out, and the world in the end, as in records."""
 
 
 def _ended_before(

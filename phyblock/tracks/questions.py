@@ -117,7 +117,7 @@ class ChoiceParse(Line):
     letters: str | None = None
     """One letter, or for ordering all in order."""
     problem: str | None = None
-    """Why no answer could be read in the JSON that was asked for."""
+    """Reason why no answer could be read in the requested JSON."""
 
 
 class QuestionShown(Line):
@@ -130,9 +130,9 @@ class QuestionShown(Line):
     category: str = ""
     """The category of the subtask."""
     rotation: Whole = 0
-    """Number of places by which its options were turned."""
+    """Number of places by which its options were rotated."""
     options_as: str = ""
-    """True if options that are pictures were sent as pictures or as letters in one."""
+    """`images`: pictures of options were each sent by themselves; `letters`: on one sheet."""
     blind: bool = False
     """True if no picture was sent."""
     wrong_image: bool = False
@@ -158,9 +158,9 @@ class ChoiceRecord(Record):
     parse: ChoiceParse | None = None
     """The answer that was read."""
     question: QuestionShown
-    """Which question it is and how it was shown."""
+    """The question and how it was shown."""
     answer: GivenAnswer | None = None
-    """What was answered."""
+    """The given answer and the right one."""
 
     exported: ClassVar[Mapping[str, tuple[str, str]]] = {
         "question_id": ("string", "question.id"),

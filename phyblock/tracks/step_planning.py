@@ -114,11 +114,11 @@ class MoveParse(Line):
     move: int | Literal["Done"] | None
     """The candidate's number, `Done`, or null."""
     problem: str | None = None
-    """Why no single operation could be read."""
+    """Reason why no single operation could be parsed."""
 
 
 class EpisodeTurn(AskedTurn):
-    """One request of an episode, with its reply and what came of it."""
+    """One request of an episode, with its reply and its outcome."""
 
     key: str = ""
     """The scene, the step, and the vote where a step has several."""
@@ -129,7 +129,7 @@ class EpisodeTurn(AskedTurn):
     parse: MoveParse
     """The operation that was read."""
     outcome: StepOutcome | None = None
-    """What became of the step; null for votes that it was not taken with."""
+    """Outcome of the step; null for votes that did not decide it."""
     placed: Whole | None = None
     """The goal block, from 0, that was placed."""
     swapped: tuple[tuple[Whole, ...], ...] = ()
@@ -137,7 +137,7 @@ class EpisodeTurn(AskedTurn):
     world: tuple[Whole, ...] = ()
     """The goal blocks that stand after the step."""
     fallen: tuple[Whole, ...] = ()
-    """Orders of the blocks that fell when the assembly was let go."""
+    """Orders of the blocks that fell when the assembly was released."""
 
 
 class EpisodeRecord(Record):
@@ -152,16 +152,16 @@ class EpisodeRecord(Record):
     setting: str = ""
     """The setting under which a move succeeds."""
     engine: str | None = None
-    """The physics engine that blocks were let go in, with its version; null where none were, and
-    in records from before there was a choice (PyBullet)."""
+    """The physics engine, with its version; null where nothing was simulated, and in records from
+    before there was a choice (PyBullet)."""
     ending: Ending = "unanswered"
     """The ending."""
     outcomes: tuple[StepOutcome, ...] = ()
-    """What became of every step."""
+    """Outcome of every step."""
     progress: tuple[Whole, ...] = ()
     """Blocks placed after every step."""
     turns: tuple[EpisodeTurn, ...] = ()
-    """Every request, with its reply and what came of it."""
+    """Every request, with its reply and its outcome."""
 
     exported: ClassVar[Mapping[str, tuple[str, str]]] = {"ending": ("string", "ending")}
 
@@ -267,7 +267,7 @@ def _next_guess(subject: StepSubject, _: np.random.Generator) -> str:
 
 
 def _first_pose(subject: StepSubject, rng: np.random.Generator) -> str:
-    """The kind of a right move, in the pose of it that is listed first."""
+    """The type and color of a right move, in the pose that is listed first."""
     index = _drawn(subject.exact, rng)
     if index is None:
         return _oracle_step(subject, rng)
@@ -352,7 +352,7 @@ _LIKELY = PastStep("Move(1)", "placed", "Next plan: Move(1)", None)
 
 
 STEP_OUTCOMES = ("placed", *ERROR_TYPES, "invalid", "unread", "done")
-"""What becomes of a step; `unread` are replies in which no single operation could be read."""
+"""Outcome of a step; `unread` are replies in which no single operation could be parsed."""
 _ALIKE = (f"tracks.step_planning.{ENGINE}",)
 
 
