@@ -51,8 +51,7 @@ _PRELOADED = ("PIL.GifImagePlugin", "PIL.JpegPresets", "aiohttp", "matplotlib.ba
               "matplotlib.backends.backend_svg", "matplotlib.pyplot", "pandas.core.methods.to_dict",
               "pandas.io.formats.csvs", "phyblock.api", "phyblock.results.tables",
               "phyblock.sim.pybullet", "phyblock.web.report", "pyarrow.pandas_compat", "sqlite3",
-              "yarl", *(f"phyblock.tracks.{track}_results" for track in
-                        ("full_planning", "pose_planning", "step_planning", "vqa")))  # fmt: skip
+              "yarl")  # fmt: skip
 
 
 @dataclass(frozen=True)
