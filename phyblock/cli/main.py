@@ -112,7 +112,7 @@ def main() -> None:
         if "unexpected extra argument" in error.format_message():
             click.echo(f"Hint: {QUOTE_HINT}", err=True)
         elif isinstance(error, click.NoSuchOption):
-            click.echo("Hint: fields of the suite are set with --set KEY=VALUE", err=True)
+            click.echo(f"Hint: {_set_hint(error.option_name)}", err=True)
         sys.exit(2)
     except click.Abort:
         click.echo("Interrupted.", err=True)
@@ -133,6 +133,17 @@ def main() -> None:
         show_problems(StoreError(Problem(where, f"cannot be used: {reason_of(error)}")))
         sys.exit(2)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _set_hint(option: str) -> str:
+    """Return how to set the field of a suite that was taken for an option."""
+    from phyblock.config.suite import suite_model
+
+    name = option.lstrip("-").replace("-", "_")
+    known, form = suite_model().model_fields.get(name), "KEY=VALUE"
+    if known is not None:
+        form = f"'{name}=[...]'" if isinstance(known.default, tuple) else f"{name}=VALUE"
+    return f"fields of the suite are set with --set {form}"
 
 
 def _drop_output() -> None:

@@ -126,11 +126,6 @@ def check(known: Mapping[str, ModelConfig], name: str, yes: bool) -> int:
             console.print(f"{server} does not answer: {error}", style="red")
             code = 1
             continue
-        if not reply.text.strip():
-            nothing = f"{server} answered with nothing (it ended by: {reply.finish})"
-            console.print(nothing, style="red")
-            code = 1
-            continue
         usage = reply.usage
         tokens = f"{usage.prompt_tokens or '?'} + {usage.completion_tokens or '?'} tokens"
         cost = "cost unknown" if reply.cost_usd is None else f"${reply.cost_usd:.6f}"
@@ -155,6 +150,9 @@ async def _ask_tiny(config: ModelConfig) -> Reply:
     alone = config.model_copy(update={"seed": "never", "batch": False})
     model = build_model(alone, cache=None, policy=RetryPolicy(attempts=1, retry_for_s=0.0))
     try:
-        return await model.ask(request) or Reply(text="")
+        reply = await model.ask(request) or Reply(text="")
     finally:
         await model.aclose()
+    if not reply.text.strip():
+        raise ModelError(f"the reply is empty (it ended by: {reply.finish})")
+    return reply

@@ -88,6 +88,7 @@ class ProgressView:
         self._console = console
         self._tallies: dict[str, Tally] = {}
         self._started_s = self._last_line_s = now()
+        self._has_asked = False
         self._progress = Progress(
             TextColumn("{task.description}", markup=False),
             BarColumn(complete_style="cyan", finished_style="green"),
@@ -121,16 +122,16 @@ class ProgressView:
                 self._tallies[name] = tally = Tally(task)
                 for sample in known:
                     tally.add(sample)
-                self._progress.update(task.id, facts=tally.facts)
         elif isinstance(event, SampleDone):
+            self._has_asked = True
             tally = self._tallies[event.record.model]
             tally.add(Summary.of(event.record))
-            self._progress.update(tally.task.id, advance=1, facts=tally.facts)
+            self._progress.advance(tally.task.id)
         elif isinstance(event, ModelEvent) and event.kind == "retry":
             tally = self._tallies[event.model]
             tally.retries += 1
             tally.last_retry = f"{event.message}; waiting {event.wait_s:.0f} s"
-            self._progress.update(tally.task.id, facts=tally.facts)
+            self._has_asked = True
         elif isinstance(event, ModelEvent):
             self._print(f"{event.model}: {event.message}")
         elif isinstance(event, ModelStopped):
@@ -142,9 +143,13 @@ class ProgressView:
             self._print(event.text)
         self.tick()
 
-    def tick(self) -> None:
-        """Print what is due; called several times a second."""
+    def tick(self, *, asks: bool = False) -> None:
+        """Print what is due; called several times a second. `asks`: calls are under way."""
         now_s = self._now()
+        self._has_asked |= asks
+        preparing = "" if self._has_asked else self._preparing(now_s)
+        for tally in self._tallies.values():
+            self._progress.update(tally.task.id, facts=preparing or tally.facts)
         self._log_retries(now_s)
         if not self._console.is_terminal and now_s - self._last_line_s >= _LINE_EVERY_S:
             self._last_line_s = now_s
@@ -176,8 +181,13 @@ class ProgressView:
                 again = counted(more, "call")
                 self._print(f"{model}: {again} sent again; last: {tally.last_retry}")
 
+    def _preparing(self, now_s: float) -> str:
+        return f"Preparing scenes ... ({_duration(now_s - self._started_s)})"
+
     def _line(self, now_s: float) -> str:
         """Return the progress of the run in a line."""
+        if not self._has_asked:
+            return self._preparing(now_s)
         tallies = list(self._tallies.values())
         done = sum(int(tally.task.completed) for tally in tallies)
         total = sum(int(tally.task.total or 0) for tally in tallies)

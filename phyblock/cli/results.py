@@ -337,6 +337,6 @@ def site(runs: tuple[Path, ...], out: Path, data: tuple[Path, ...], title: str) 
     made = write_site(runs, out, data, title)
     if made.lacking:
         console.print(made.lacking)
-    models, samples = counted(made.models, "model"), counted(made.samples, "sample")
-    console.print(f"{models}, {samples}, {made.size_bytes / _MB:.1f} MB:")
+    counts = f"{made.models:,} models and baselines, {counted(made.samples, 'sample')}"
+    console.print(f"{counts}, {made.size_bytes / _MB:.1f} MB:")
     print_path(console, made.path)

@@ -110,23 +110,22 @@ def run(
     if dry_run:
         return 0
     check_ready(plan)
-    if not yes and not _is_agreed(console, plan, folder, **asks):
+    rows = [] if yes else may_bill(plan, folder, **asks)
+    if not may_spend(
+        [row.model.name for row in rows if row.may_cost],
+        lambda: print_estimate(console, plan, rows),
+        has_limit=plan.suite.limits.max_cost_usd is not None,
+    ):
         console.print("Nothing was asked.")
         return 1
     be_quiet()
     with ProgressView(console) as view:
-        result = completed(Session(plan, folder, view, **asks), _SIGNALS, view.tick)
+        session = Session(plan, folder, view, **asks)
+        result = completed(session, _SIGNALS, lambda: view.tick(asks=session.under_way > 0))
     made = show_tables(folder, page=not no_report, anew=False)
     code = _conclude(console, folder, result, view)
     print_path(console, made)
     return code
-
-
-def _is_agreed(console: Console, plan: RunPlan, folder: Path, **asks: bool) -> bool:
-    rows = may_bill(plan, folder, **asks)
-    may_cost = [row.model.name for row in rows if row.may_cost]
-    has_limit = plan.suite.limits.max_cost_usd is not None
-    return may_spend(may_cost, lambda: print_estimate(console, plan, rows), has_limit=has_limit)
 
 
 def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressView) -> int:

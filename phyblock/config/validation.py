@@ -318,8 +318,8 @@ def _fault(detail: ErrorDetails, path: FieldPath, value: Any, model: type[BaseMo
         hint = "take the quotes off"
     elif kind == "string_type" and isinstance(value, int | float):
         hint = f'put it in quotes: "{value}"'
-    elif kind == "tuple_type" and isinstance(value, str) and re.search("[A-Za-z]", value):
-        hint = f"write a list: [{value}]"
+    elif kind == "tuple_type" and (listed := _listed(name, value)):
+        hint = f"write a list: {listed}"
     elif (
         kind == "model_type" and isinstance(value, str) and "path" in _fields(_section(model, path))
     ):
@@ -329,6 +329,17 @@ def _fault(detail: ErrorDetails, path: FieldPath, value: Any, model: type[BaseMo
     if "[key]" in detail["loc"]:
         return Fault(message, allowed, shown(name), key=True)
     return Fault(message, allowed, hint=hint)
+
+
+def _listed(name: str, value: Any) -> str:
+    """Return the list that a value without brackets probably means; "" where it is not clear."""
+    if type(value) is int:
+        return str([*range(value)] if name == "seeds" and 0 < value <= _MOST else [value])
+    if not isinstance(value, str):
+        return ""
+    if ends := re.fullmatch(r"(\d{1,2}) *- *(\d{1,2})", value):
+        return str([*range(int(ends[1]), int(ends[2]) + 1)])
+    return f"[{value}]" if re.search("[A-Za-z,]", value) else ""
 
 
 def _section(model: type[BaseModel], path: FieldPath) -> type[BaseModel]:

@@ -291,10 +291,14 @@ class Session:
                 self._failure = self._failure or error
                 self._stop(Stopping("error", "an error that the run cannot go on with"))
 
+    @property
+    def under_way(self) -> int:
+        """Calls that were sent and have not ended."""
+        return sum(getattr(model, "under_way", 0) for model in self._models.values())
+
     def _stop(self, stop: Stopping) -> None:
         if self.result.stop is None:
-            calls = sum(getattr(model, "under_way", 0) for model in self._models.values())
-            self.result.stop = stop = replace(stop, in_flight=calls)
+            self.result.stop = stop = replace(stop, in_flight=self.under_way)
             for task in self._waiting:
                 task.cancel()
             self.watch(stop)

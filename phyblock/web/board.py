@@ -38,7 +38,7 @@ from phyblock.results.text import number as rounded
 from phyblock.run.rescore import recorded_dataset
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of
-from phyblock.tracks.measures import Measure
+from phyblock.tracks.measures import Better
 from phyblock.types import WITHOUT_REPLY
 
 _LABELS = ("published", "size_b", "served_at")
@@ -291,9 +291,14 @@ def board_of(
             for column in headline_columns(run, track)
         ]
         heading = main_column(run, track).heading
-        main = _id(track, next(iter(values[place, track].values)), heading)
+        setting = next(iter(values[place, track].values))
+        main = _id(track, setting, heading)
         ranked = [entry for entry in entries if main in numbers[entry.name]]
-        models = [numbers[e.name][main] for e in ranked if not e.model.is_baseline]
+        models = [
+            values[e.runs[track], track].values[setting][e.model.name, heading]
+            for e in ranked
+            if not e.model.is_baseline
+        ]
         ranges[track] = rank_ranges_of(track, ranked, runs, values)
         tracks.append(_track(track, run, models))
     lacking = {key: shortfalls(runs[key[0]].run, key[1]) for key in values}
@@ -321,8 +326,8 @@ def board_of(
     }
 
 
-def _track(track: str, run: Run, models: Sequence[Sequence[float | None]]) -> dict[str, Any]:
-    """Return a track of a page; `models` are the values and intervals of those that are ranked."""
+def _track(track: str, run: Run, models: Sequence[Value]) -> dict[str, Any]:
+    """Return a track of a page; `models` are the values of those that are no baselines."""
     kind, measure = kind_of(track), main_measure(run, track)
     report, heading = kind.report(), main_column(run, track).heading
     floor = strongest_floor(run, track)
@@ -340,7 +345,7 @@ def _track(track: str, run: Run, models: Sequence[Sequence[float | None]]) -> di
         "errors": [name.removeprefix("wrong_") for name in names if name.startswith("wrong_")],
         "floor": floor and {"name": floor.name, "value": round(floor.value, 4)},
         "physics": kind.lets_go(run.manifest.suite),
-        "finding": _finding(floor, measure, models),
+        "finding": _finding(floor, measure.better, models),
         "parts": dict(parts),
         "groups": {
             cell.name: {"title": cell.heading, "of": list(cell.of)}
@@ -350,21 +355,17 @@ def _track(track: str, run: Run, models: Sequence[Sequence[float | None]]) -> di
     }
 
 
-def _finding(
-    floor: Floor | None, measure: Measure, values: Sequence[Sequence[float | None]]
-) -> str:
-    """Say how many models, by their value and its interval, are above the strongest blind
-    baseline; "" where there is none of either.
+def _finding(floor: Floor | None, better: Better, models: Sequence[Value]) -> str:
+    """Say how many models are above the strongest blind baseline; "" where there is none of
+    either.
     """
-    if floor is None or not values:
+    if floor is None or not models:
         return ""
-    sign, place = (1, 1) if measure.better == "higher" else (-1, 2)
-    ends = [value[place] for value in values]
-    above = sum(end is not None and sign * (end - floor.value) > 0 for end in ends)
+    above = sum(floor.is_below(value, better) for value in models)
     rule = f"a rule that never sees the goal ({floor.name}, {rounded(floor.value)})"
     if not above:
         return f"No model is shown to beat {rule}."
-    return f"{above} of {counted(len(values), 'model')} beat{'s' * (above == 1)} {rule}."
+    return f"{above} of {counted(len(models), 'model')} beat{'s' * (above == 1)} {rule}."
 
 
 def _id(track: str, setting: str, heading: str) -> str:

@@ -48,7 +48,9 @@ _ABOUT = (
 
 @dataclass
 class SiteWritten:
-    """A site: its page, models, samples and size, and why it draws nothing ("": it does)."""
+    """A site: its page, models with baselines, samples and size, and why it draws nothing ("": it
+    does).
+    """
 
     path: Path
     models: int

@@ -134,28 +134,19 @@ def build_of(*told: object) -> str:
     return hex_digest(json.dumps([_LAYOUT, version("phyblock"), *told]))[:12]
 
 
-class Place(NamedTuple):
-    """The place of the newest record of a sample in `records.jsonl` [bytes], and its sort keys."""
-
-    track: str
-    key: str
-    model: str
-    seed: int
-    start: int
-
-
-def places_of(run: Run) -> list[Place]:
-    """Return every sample once: by track, item, then model in the suite's order, and seed."""
-    names = ("track", "item", "model", "seed", "start")
-    places = map(Place, *(run.records[name].tolist() for name in names))
+def places_of(run: Run) -> list[int]:
+    """Return the place of the newest record of each sample in `records.jsonl` [bytes]: by track,
+    item, then model in the suite's order, and seed.
+    """
     tracks = {name: n for n, name in enumerate(run.design.suite.tracks)}
     models = {name: n for n, name in enumerate(run.design.model_names)}
-
-    def order(place: Place) -> tuple[int, str, int, str, int]:
-        model = models.get(place.model, len(models))
-        return tracks[place.track], place.key, model, place.model, place.seed
-
-    return sorted((place for place in places if place.track in tracks), key=order)
+    columns = (run.records[name].tolist() for name in ("track", "item", "model", "seed", "start"))
+    found = [
+        (tracks[track], item, models.get(model, len(models)), model, seed, start)
+        for track, item, model, seed, start in zip(*columns, strict=True)
+        if track in tracks
+    ]
+    return [start for *_, start in sorted(found)]
 
 
 class _Numbers(dict[Any, int]):
@@ -202,8 +193,8 @@ def pack_samples(
             for _, line in PromptLines(one.run.path):
                 messages = [message.fields() for message in line.messages]
                 prompts[line.sha256] = packs["prompts"].add(messages)
-        starts = (place.start for place in places_of(one.run))
-        for record in RecordLines(one.run.path).at(starts):
+        rules = {model.name for model in one.run.manifest.models if model.is_baseline}
+        for record in RecordLines(one.run.path).at(places_of(one.run)):
             track, item = record.track, record.item
             if (track, item) not in numbered:
                 asked = opener(record) if (opener := one.sources.items.get(track)) else None
@@ -226,7 +217,7 @@ def pack_samples(
                     sum(1 << errors.of(why) for why in set(filter(None, wrong))),
                 )
             )
-            if record.scene in one.sources.tasks and not _is_rule(one.run, record.model):
+            if record.scene in one.sources.tasks and record.model not in rules:
                 found += _failure(record, wrong, len(rows) - 1)
             packs["records"].add(_entry(record, design.matcher, prompts, sent, is_cut))
     is_drawn = False
@@ -258,10 +249,6 @@ def pack_samples(
 
 def _columns(names: str, rows: Sequence[tuple[Any, ...]]) -> dict[str, list[Any]]:
     return {name: [row[n] for row in rows] for n, name in enumerate(names.split())}
-
-
-def _is_rule(run: Run, name: str) -> bool:
-    return any(model.name == name and model.is_baseline for model in run.manifest.models)
 
 
 def _entry(

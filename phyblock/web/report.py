@@ -116,7 +116,8 @@ def _about(written: TablesWritten) -> dict[str, Any]:
     facts = {
         "Data": manifest.dataset.name if manifest.dataset else "",
         "Scenes": f"{design.scenes:,}",
-        "Models": f"{len(design.model_names)}",
+        "Models": f"{sum(not model.is_baseline for model in manifest.models)}",
+        "Baselines": str(sum(model.is_baseline for model in manifest.models) or ""),
         "Seeds": f"{len(design.suite.seeds)}",
         "Samples": f"{answered:,}" if answered == expected else f"{answered:,} of {expected:,}",
         "Made": manifest.created[:10],

@@ -22,6 +22,8 @@ from socketserver import TCPServer
 from typing import Any
 from urllib.parse import urlsplit
 
+from pydantic import BaseModel, ConfigDict
+
 from phyblock.errors import Problem, SpecError, reason_of
 from phyblock.files import load_json
 from phyblock.tracks.picking import Pick
@@ -143,25 +145,28 @@ class Server:
             "pause": self._session.pause,
             "resume": self._session.resume,
             "finish": self.finished.set,
-            "answer": lambda: self._session.answer(*_answer(body)),
+            "answer": lambda: self._answer(_Answer.model_validate(body)),
         }
         if name in actions:
             actions[name]()
         return name in actions
 
+    def _answer(self, answer: _Answer) -> None:
+        self._session.answer(answer.change, answer.given())
 
-def _answer(body: Mapping[str, Any]) -> tuple[int, tuple[Pick, ...]]:
-    change, picks, numbers = body.get("change"), body.get("picks"), body.get("numbers", [])
-    if type(change) is not int or not isinstance(picks, list) or not isinstance(numbers, list):
-        raise ValueError("needs change and picks, with numbers where there are any")
-    if not all(type(pick) is int for pick in picks):
-        raise ValueError("holds picks that are no whole numbers")
-    if not all(isinstance(own, list) and {*map(type, own)} <= {int, float} for own in numbers):
-        raise ValueError("holds numbers that are none")
-    numbers = numbers or [()] * len(picks)
-    if len(numbers) != len(picks):
-        raise ValueError(f"holds numbers of {len(numbers)} picks, and {len(picks)} picks")
-    return change, tuple(map(Pick, picks, map(tuple, numbers)))
+
+class _Answer(BaseModel):
+    """An answer as the page sends it: picks, and the numbers of each where they have some."""
+
+    model_config = ConfigDict(strict=True)
+    change: int
+    picks: list[int]
+    numbers: list[list[int | float]] = []
+
+    def given(self) -> tuple[Pick, ...]:
+        """Return the picks; ValueError for numbers of other picks."""
+        numbers = self.numbers or [[] for _ in self.picks]
+        return tuple(Pick(pick, tuple(own)) for pick, own in zip(self.picks, numbers, strict=True))
 
 
 class _Listener(ThreadingHTTPServer):

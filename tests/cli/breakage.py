@@ -5,9 +5,9 @@ from __future__ import annotations
 import io
 import json
 import os
-import shutil
 import sqlite3
 from collections.abc import Callable
+from contextlib import closing
 
 import yaml
 from PIL import Image as PillowImage
@@ -21,14 +21,41 @@ FRESH = ["run", "suite.yaml", "--out", "fresh"]
 FAKE_KEY = "sk-" + "x1" * 12
 
 
-def suite_text(text: str) -> Prepare:
-    """The suite is this text."""
+def after(change: Callable[[Workspace], object], *args: str) -> Prepare:
+    """Something is changed, and then this command is given."""
 
     def prepare(workspace: Workspace) -> list[str]:
-        (workspace.root / "suite.yaml").write_text(text, encoding="utf-8")
-        return RUN
+        change(workspace)
+        return list(args)
 
     return prepare
+
+
+def file(name: str, content: str | bytes, *args: str) -> Prepare:
+    """A file holds this, whatever it was."""
+
+    def change(workspace: Workspace) -> None:
+        path = workspace.root / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+
+    return after(change, *args)
+
+
+def lines(name: str, change: Callable[[list[str]], list[str]], *args: str) -> Prepare:
+    """The lines of a file are changed."""
+
+    def changed(workspace: Workspace) -> None:
+        path = workspace.root / name
+        texts = change(path.read_text(encoding="utf-8").splitlines())
+        path.write_text("".join(text + "\n" for text in texts), encoding="utf-8")
+
+    return after(changed, *args)
+
+
+def suite_text(text: str) -> Prepare:
+    """The suite is this text."""
+    return file("suite.yaml", text, *RUN)
 
 
 def suite_line(line: str) -> Prepare:
@@ -50,14 +77,7 @@ def command(*args: str) -> Prepare:
 
 def scenes_text(change: Callable[[list[str]], list[str]]) -> Prepare:
     """The lines of `scenes.jsonl` are changed."""
-
-    def prepare(workspace: Workspace) -> list[str]:
-        path = workspace.root / "data" / "scenes.jsonl"
-        lines = change(path.read_text(encoding="utf-8").splitlines())
-        path.write_text("".join(line + "\n" for line in lines), encoding="utf-8")
-        return RUN
-
-    return prepare
+    return lines("data/scenes.jsonl", change, *RUN)
 
 
 def second_scene(at: str, value: object) -> Prepare:
@@ -80,12 +100,7 @@ def template(text: str | None) -> Prepare:
 
 def template_alone(verb: str) -> Prepare:
     """A template stands where a suite belongs."""
-
-    def prepare(workspace: Workspace) -> list[str]:
-        (workspace.root / "mine.j2").write_text(user_block("Build it."), encoding="utf-8")
-        return [verb, "mine.j2"]
-
-    return prepare
+    return file("mine.j2", user_block("Build it."), verb, "mine.j2")
 
 
 def user_block(text: str) -> str:
@@ -95,12 +110,7 @@ def user_block(text: str) -> str:
 
 def models_text(text: str) -> Prepare:
     """`models.yaml` is this text."""
-
-    def prepare(workspace: Workspace) -> list[str]:
-        (workspace.root / "models.yaml").write_text(text, encoding="utf-8")
-        return FRESH
-
-    return prepare
+    return file("models.yaml", text, *FRESH)
 
 
 def png(size: tuple[int, int] = (64, 32)) -> bytes:
@@ -123,12 +133,7 @@ def pipe(name: str, *args: str) -> Prepare:
 
 def noise(name: str, *args: str) -> Prepare:
     """Ten megabytes that are no text stand in a file."""
-
-    def prepare(workspace: Workspace) -> list[str]:
-        (workspace.root / name).write_bytes(bytes(range(256)) * 40_000)
-        return list(args)
-
-    return prepare
+    return file(name, bytes(range(256)) * 40_000, *args)
 
 
 def checkout(picture: bytes | None) -> Prepare:
@@ -165,27 +170,11 @@ def recording(content: str | None) -> Prepare:
     return prepare
 
 
-def earlier_run(name: str, text: str) -> Prepare:
-    """A file of the finished run is this text, and the same command is given again."""
-
-    def prepare(workspace: Workspace) -> list[str]:
-        (workspace.out / name).write_text(text, encoding="utf-8")
-        return RUN
-
-    return prepare
-
-
 def broken_record(change: Callable[[str], str], *args: str) -> Prepare:
     """The second of the finished run's records is changed."""
-
-    def prepare(workspace: Workspace) -> list[str]:
-        path = workspace.out / "records.jsonl"
-        lines = path.read_text(encoding="utf-8").splitlines()
-        lines[1] = change(lines[1])
-        path.write_text("".join(line + "\n" for line in lines), encoding="utf-8")
-        return list(args) or RUN
-
-    return prepare
+    return lines(
+        "out/records.jsonl", lambda them: [them[0], change(them[1]), *them[2:]], *(args or RUN)
+    )
 
 
 def without_field(field: str) -> Callable[[str], str]:
@@ -202,75 +191,34 @@ def without_field(field: str) -> Callable[[str], str]:
 def manifest_without(field: str, *args: str) -> Prepare:
     """The finished run's manifest lacks a field."""
 
-    def prepare(workspace: Workspace) -> list[str]:
-        path = workspace.out / "run.yaml"
-        manifest: Raw = yaml.safe_load(path.read_text(encoding="utf-8"))
+    def change(workspace: Workspace) -> None:
+        manifest: Raw = yaml.safe_load((workspace.out / "run.yaml").read_text(encoding="utf-8"))
         del manifest[field]
-        path.write_text(yaml.safe_dump(manifest), encoding="utf-8")
-        return list(args)
+        workspace.write_yaml("out/run.yaml", manifest)
 
-    return prepare
-
-
-def cache_file(content: bytes | None, *args: str) -> Prepare:
-    """The reply cache is these bytes, or a database of another schema."""
-
-    def prepare(workspace: Workspace) -> list[str]:
-        path = workspace.cache / "replies.sqlite"
-        path.unlink()
-        if content is not None:
-            path.write_bytes(content)
-        else:
-            database = sqlite3.connect(path)
-            database.execute("CREATE TABLE theirs (x)")
-            database.commit()
-            database.close()
-        return list(args) or [*FRESH, "--models", "alpha"]
-
-    return prepare
+    return after(change, *args)
 
 
 def file_in_the_way(*args: str) -> Prepare:
     """A file `taken` stands where the command line names a folder."""
-
-    def prepare(workspace: Workspace) -> list[str]:
-        (workspace.root / "taken").write_text("mine", encoding="utf-8")
-        return list(args)
-
-    return prepare
+    return file("taken", "mine", *args)
 
 
-def pictures_taken(workspace: Workspace) -> list[str]:
-    """A file stands where pictures are to be kept."""
-    (workspace.root / "c2").mkdir()
-    (workspace.root / "c2" / "pictures").write_text("mine", encoding="utf-8")
-    return [*FRESH, "--models", "alpha"]
+def foreign_cache(workspace: Workspace) -> None:
+    """The reply cache is a database of another schema."""
+    path = workspace.cache / "replies.sqlite"
+    path.unlink()
+    with closing(sqlite3.connect(path)) as database:
+        database.execute("CREATE TABLE theirs (x)")
+        database.commit()
 
 
-def changed_data(workspace: Workspace) -> list[str]:
-    """The data set is not what the run was made on: as many blocks, of another color."""
-    path = workspace.root / "data" / "scenes.jsonl"
-    text = path.read_text(encoding="utf-8").replace('"red"', '"#"')
-    path.write_text(text.replace('"blue"', '"red"').replace('"#"', '"blue"'), encoding="utf-8")
-    return ["score", "out"]
-
-
-def scores_over_run(workspace: Workspace) -> list[str]:
-    """The new scores are to go where another run is."""
-    shutil.copytree(workspace.out, workspace.root / "precious")
-    return ["score", "out", "--out", "precious"]
-
-
-def no_manifest(workspace: Workspace) -> list[str]:
-    """Records whose manifest was deleted."""
-    (workspace.out / "run.yaml").unlink()
-    return RUN
-
-
-def lost_data(workspace: Workspace) -> list[str]:
-    """The data set of the run is gone."""
-    (workspace.root / "data").rename(workspace.root / "moved")
-    return ["score", "out"]
+def changed_colors(texts: list[str]) -> list[str]:
+    """Lines of scenes with as many blocks, of another color."""
+    return [
+        text.replace('"red"', '"#"').replace('"blue"', '"red"').replace('"#"', '"blue"')
+        for text in texts
+    ]
 
 
 def many_files(workspace: Workspace) -> list[str]:

@@ -79,7 +79,8 @@ def is_option(verb: str, *words: str) -> bool:
 
 
 def test_a_field_of_suites_that_is_taken_for_an_option_is_shown_how_to_set() -> None:
-    command = [sys.executable, "-m", "phyblock", "run", "quick", "--seeds", "0,1"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert "fields of the suite are set with --set" in done.stderr
+    for option, form in (("--seeds", "'seeds=[...]'"), ("--answer-format", "answer_format=VALUE")):
+        command = [sys.executable, "-m", "phyblock", "run", "quick", option, "0,1"]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 2
+        assert f"fields of the suite are set with --set {form}\n" in done.stderr

@@ -1,9 +1,15 @@
-"""`phyblock models`: what is shown of each model, and the one call that `check` makes."""
+"""`phyblock models` and `validate`: what is shown and found, and the one call of `check`."""
 
 from __future__ import annotations
 
-import pytest
+import json
+from typing import Any
 
+import pytest
+import yaml
+
+from phyblock.config.models import ModelConfig
+from phyblock.models import known_providers, litellm_client
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
@@ -55,3 +61,62 @@ def test_an_empty_name_does_not_mean_all_models(workspace: Workspace, names: str
     assert done.code == 2
     assert "holds an empty name" in done.err
     assert not workspace.out.exists()
+
+
+def test_missing_recordings_and_unknown_providers_are_found(workspace: Workspace) -> None:
+    models = {
+        "far": {"replay": "./nowhere"},
+        "odd": {"id": "opnai/gpt-4o", "groups": ["mine"]},
+        "own": {"id": "hosted_vllm/x", "api_base": "http://localhost:1/v1"},
+        "straight": {"id": "My/x", "api_base": "http://localhost:1/v1", "transport": "direct"},
+    }
+    workspace.write_yaml("models.yaml", models)
+    workspace.write_suite(models=["group:mine", "own", "straight"], seeds=[0])
+    done = workspace.phyblock("validate", "models.yaml", "suite.yaml")
+    assert done.code == 2
+    assert "models.yaml:2:11: far.replay: recordings not found" in done.err
+    # Of the suite its own models alone are looked at.
+    assert done.err.count("far.replay") == 1
+    assert done.err.count("models.yaml:4:7: odd.id: is of no provider that is known") == 2
+    assert "did you mean openai?" in done.err
+    assert "own.id" not in done.err
+    assert "straight.id" not in done.err
+
+
+@pytest.mark.parametrize(
+    "model", ["hosted_vllm/x", "openai/new", "gemini/gemini-2.5-pro", "anthropic/claude-unheard-of"]
+)
+def test_a_model_at_hand_needs_no_litellm(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(litellm_client, "_litellm", lambda: pytest.fail("it was imported"))
+    assert model.partition("/")[0] in known_providers(ModelConfig(name="m", id=model))
+
+
+@pytest.mark.parametrize("keys", [{}, {"levels": [2], "candidates": []}], ids=["plain", "derived"])
+@pytest.mark.parametrize("form", ["yaml", "json"])
+def test_scenes_that_are_no_data_set_yet_are_told_from_models(
+    workspace: Workspace, keys: dict[str, Any], form: str
+) -> None:
+    blocks = [{"type": "cube", "color": "red", "position": [0, 0, 0.025], "euler": [0, 0, 0]}]
+    scene = {"id": "mine", "blocks": blocks, **keys}
+    if form == "yaml":
+        text = yaml.safe_dump(scene).replace("blocks:", "blocks:  # from below")
+        (workspace.root / "mine.yaml").write_text(text, encoding="utf-8")
+    else:
+        (workspace.root / "mine.json").write_text(json.dumps(scene), encoding="utf-8")
+    done = workspace.phyblock("validate", f"mine.{form}")
+    assert (done.code, len(done.errors)) == (2, 1)
+    assert f"mine.{form}: holds scenes" in done.err
+    assert f"phyblock scenes complete mine.{form}" in done.err
+    workspace.write_yaml("odd.yaml", {"blocks": {"position": "x"}})
+    assert "holds scenes" not in workspace.phyblock("validate", "odd.yaml").err
+
+
+def test_validate_uses_the_models_file_that_a_run_would(workspace: Workspace) -> None:
+    workspace.write_suite(models=["delta"], seeds=[0])
+    assert "delta" in workspace.phyblock("validate", "suite.yaml").err
+    (workspace.root / "other").mkdir()
+    workspace.write_yaml("other/mine.yaml", {"delta": "openai/gpt-4o"})
+    named = workspace.phyblock("validate", "suite.yaml", "--models-file", "other/mine.yaml")
+    assert named.code == 0, named.err
+    workspace.write_yaml("models.yaml", {"delta": "openai/gpt-4o"})
+    assert workspace.phyblock("validate", "suite.yaml").code == 0

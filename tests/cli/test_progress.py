@@ -91,6 +91,12 @@ def test_no_model_has_more_than_a_line_in_ten_seconds_and_every_retry_is_counted
     assert counted == sum(is_retry for *_, is_retry in steps)
 
 
+def test_before_anything_is_asked_scenes_are_being_prepared() -> None:
+    lines = logged((12.0, None), (23.0, done()))
+    assert lines[0] == "Preparing scenes ... (12 s)"
+    assert lines[1].startswith("1 of 10 samples after 23 s")
+
+
 def test_no_time_is_told_before_every_model_has_given_answers() -> None:
     """Two models of 100 samples: alpha answers every second, beta every ten from 100 s on."""
     events = [(float(second), done("alpha")) for second in range(1, 101)]

@@ -165,7 +165,7 @@ def site(runs: Workspace) -> Path:
     named = ("--title", f"A site {NAME}", "--out", "site")
     done = runs.phyblock("site", "hostile", "later.zip", *data, *named)
     assert done.code == 0, done.err
-    assert "4 models, 58 samples" in done.out
+    assert "4 models and baselines, 58 samples" in done.out
     return runs.root / "site" / "index.html"
 
 

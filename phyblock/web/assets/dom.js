@@ -62,7 +62,7 @@ const Words = (() => {
   const reasons = {
     shape_not_in_gt: (block) => `the goal has no ${block}`,
     overflow: (block) => `every ${block} of the goal is already placed`,
-    incorrect_orientation: (block, turned) => `the goal has no ${block} turned this way${turned && `, but candidate ${turned}`}`,
+    incorrect_orientation: (block, turned) => `the goal has no ${block} turned this way${turned && `; turned as it needs: ${turned}`}`,
     dependency_not_met: (block, turned, below) => `too early: ${below || "what it rests on"} must come first`,
   };
   /**

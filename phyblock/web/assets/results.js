@@ -42,7 +42,7 @@ const Results = (() => {
       isSaid ? null : sentences(track).map((sentence, i) => el("p", { class: i ? null : "finding" }, sentence)),
       Charts.bars(track),
       el("details", { class: "more" }, el("summary", {}, "All numbers: intervals, settings, tokens and cost"), Table.numbers(track)),
-      el("ul", { class: "notes" }, [...track.notes, "Thin bars are 95 % intervals: jackknife over base scenes. Ranks are ranges: paired tests of every pair of models, corrected for their number (Holm). Baselines have no rank, nor have models that are not complete.",
+      el("ul", { class: "notes" }, [...track.notes, "Thin bars are 95 % intervals: jackknife over base scenes. Ranks are ranges: paired tests of every pair of models, corrected for their number (Holm). Baselines have no rank, nor have models that were not asked about every sample.",
         track.physics && "What fell is taken from the records; physics is not run again."].filter(Boolean).map((note) => el("li", {}, note))),
       Charts.slope(track), Charts.losses(track));
   }
