@@ -110,6 +110,11 @@ def _axes(height_in: float, columns: int = 1) -> tuple[Figure, list[Axes]]:
     return figure, list(figure.subplots(1, columns, sharex=True, sharey=True, squeeze=False)[0])
 
 
+def _is_wide(figure: Figure) -> bool:
+    """True if a figure is wider than a column of a two-column paper."""
+    return bool(figure.get_figwidth() > COLUMN_IN + 0.1)
+
+
 def _finished(
     figure: Figure, run: Run, title: str, how: str, *, grid: str = "x", reverse: bool = False
 ) -> Figure:
@@ -146,8 +151,8 @@ def forest(run: Run, *, track: str) -> Figure | None:
     """A row a pair of models under the better one's name, the difference with its 95 % interval.
 
     All pairs of up to six models; of more, the best one and each of the others; of two, a row a
-    part of the track. Of the same samples, as `phyblock compare` has them; None for fewer than two
-    models that answered.
+    part of the track. Wide figures say the numbers beside. Of the same samples, as `phyblock
+    compare` has them; None for fewer than two models that answered.
     """
     models = list(main_values(run, track, ranked=True))
     if len(models) < 2:
@@ -160,10 +165,13 @@ def forest(run: Run, *, track: str) -> Figure | None:
         table = pd.concat([table.iloc[-1:], table.iloc[:-1]])
         labels = [level_name(part.replace("_", " ")) for part in table["part"]]
         title = f"{table.iloc[0]['a']} minus {table.iloc[0]['b']}"
-    else:
+    elif len(models) > _MOST_MODELS:
         # Pairs come in the order of the models that were given.
-        table = table[table["a"].isin(models[: 1 if len(models) > _MOST_MODELS else None])]
-        labels = [f"{row['a']} - {row['b']}" for row in table.to_dict("records")]
+        table = table[table["a"] == models[0]]
+        labels = list(table["b"])
+        title = f"{kind_of(track).title}: {found.name} of {models[0]} minus that of each other"
+    else:
+        labels = [f"{a} − {b}" for a, b in zip(table["a"], table["b"], strict=True)]  # noqa: RUF001
         title = f"{kind_of(track).title}: paired differences of {found.name}"
     figure, (ax,) = _axes(0.7 + _ROW_IN * len(table))
     places = np.arange(len(table))
@@ -175,7 +183,7 @@ def forest(run: Run, *, track: str) -> Figure | None:
         look: dict[str, Any] = {"color": _ACCENT, "markerfacecolor": face, "label": label}
         ax.plot(table["difference"][chosen], places[chosen], "o", **look)
     edge = ax.get_yaxis_transform()
-    for place, row in enumerate(table.to_dict("records")):
+    for place, row in enumerate(table.to_dict("records") if _is_wide(figure) else ()):
         ends = between(row["lo"], row["hi"], signed=True)
         text = f"{number(row['difference'], signed=True)} {ends}"
         ax.text(1.02, place, text, transform=edge, va="center", fontsize=6.5, color=_MUTED)
@@ -243,7 +251,7 @@ def shares(run: Run, *, track: str, table: str) -> Figure | None:
     for place, name in enumerate(map(str, frame)):
         values, color = frame[name].to_numpy(np.float64), _COLORS[place % len(_COLORS)]
         ax.barh(models, values, left=left, color=color, height=0.66, label=headings[name])
-        for row in np.flatnonzero(values >= 6):
+        for row in np.flatnonzero(values >= 6 * WIDTH_IN / figure.get_figwidth()):
             at = (float(left[row] + values[row] / 2), float(row))
             middle: dict[str, Any] = {"ha": "center", "va": "center", "color": "white"}
             ax.text(*at, f"{values[row]:.0f}", fontsize=6.5, **middle)
@@ -259,6 +267,9 @@ _CALLOUTS = 4
 
 def cost(run: Run, *, track: str) -> Figure | None:
     """The main value against dollars for 100 replies; None where no cost is known."""
+    from matplotlib.patheffects import withStroke
+    from matplotlib.ticker import NullFormatter
+
     ranked, measure = main_values(run, track, ranked=True), main_measure(run, track)
     table = coverage_frame(run)
     prices = table[table["track"] == track].set_index("model")["cost_per_100_usd"].to_dict()
@@ -271,11 +282,16 @@ def cost(run: Run, *, track: str) -> Figure | None:
         ax.vlines(prices[model], value.lo, value.hi, color=_PALE, linewidth=2.2)
         ax.plot(prices[model], value.value, "o", color=_ACCENT)
     cheapest = sorted(models, key=lambda model: prices[model])
-    named = models if len(models) <= _NAMED else [*models[: _CALLOUTS - 1], cheapest[0]]
+    best = _CALLOUTS - 1 if _is_wide(figure) else 1
+    named = models if len(models) <= _NAMED else [*models[:best], cheapest[0]]
     for model in dict.fromkeys(named):
         at = (prices[model], ranked[model].value)
-        ax.annotate(model, at, xytext=(5, 3), textcoords="offset points", fontsize=6.5)
+        name = ax.annotate(model, at, xytext=(5, 3), textcoords="offset points", fontsize=6.5)
+        name.set_path_effects([withStroke(linewidth=2, foreground="white")])
     ax.set_xscale("log")
+    # As plain numbers: the style prints no mathematics, and so no powers of ten.
+    ax.xaxis.set_major_formatter("{x:g}")
+    ax.xaxis.set_minor_formatter(NullFormatter())
     ax.set(xlabel="Cost of 100 replies (USD, log scale)", ylabel=measure.heading_in_unit)
     ax.set_xlim(prices[cheapest[0]] / 1.7, prices[cheapest[-1]] * 4)
     lacking = len(ranked) - len(models)
@@ -305,7 +321,8 @@ def sensitivity(run: Run, *, track: str) -> Figure | None:
             )
             ax.hlines(places, lo, hi, color=color, linewidth=1.3)
             ax.plot(value, places, _MARKERS[n], color=color, label=label, clip_on=False)
-        ax.set(title=factor_name(factor).replace(" ", "\n"), xlabel="SD")
+        ax.set_title(factor_name(factor).replace(" ", "\n"), fontsize=min(8.5, 40 / len(factors)))
+        ax.set_xlabel("SD")
     _named_rows(axes[0], models)
     axes[0].set_xlim(left=0)
     what = f"Standard deviation of {main_measure(run, track).heading_in_unit}"
@@ -374,6 +391,6 @@ def _captions(run: Run, name: str, figure: Figure) -> dict[str, str]:
     sentences = [title, subtitle[:1].upper() + subtitle[1:]]
     sentences += [", ".join(dict.fromkeys(words))]
     text = " ".join(f"{sentence}." for sentence in sentences if sentence)
-    star = "*" if figure.get_figwidth() > COLUMN_IN + 0.1 else ""
+    star = "*" if _is_wide(figure) else ""
     float_text = latex("figure.tex.j2", name=name, caption=text, star=star)
     return {f"{name}.txt": text + "\n", f"{name}.tex": float_text}

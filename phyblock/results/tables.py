@@ -187,6 +187,8 @@ _SUMS = [
     *("recorded", *OUTCOMES, "extracted", "replies"),
     *("tokens_unknown", "cost_unknown", "cached", "attempts"),
 ]
+_MADE = "coverage and cost"
+"""Where `Run.made` keeps the frame of both."""
 
 
 def coverage_frame(run: Run) -> pd.DataFrame:
@@ -199,8 +201,11 @@ def coverage_frame(run: Run) -> pd.DataFrame:
     `cost_unknown` without one; `cached` ones were paid for by another run and cost nothing here;
     `cost_per_100_usd` what 100 cost at the price of those with a known one, cached ones included;
     median and 90th percentile of the latency [s] of those for which a request was sent; `attempts`
-    the sum of requests sent for them. NaN where nothing is known.
+    the sum of requests sent for them. NaN where nothing is known. The same frame whenever it is
+    asked for, not to be changed.
     """
+    if _MADE in run.made:
+        return run.made[_MADE]
     records, design = run.records, run.design
     replied, cached = records["finish"].notna(), records["cached"].fillna(False).astype(bool)
     attempts = records["attempts"].fillna(0).astype("int64")
@@ -233,7 +238,8 @@ def coverage_frame(run: Run) -> pd.DataFrame:
     table = table.join(costs, on=_ROW)
     table.loc[(table["replies"] > 0) & (table["replies"] == table["cached"]), "cost_usd"] = 0.0
     table["not_run"] = table["expected"] - table["recorded"]
-    return table[[*_COVERAGE, *_COST[2:]]]
+    run.made[_MADE] = table[[*_COVERAGE, *_COST[2:]]]
+    return run.made[_MADE]
 
 
 def coverage_table(run: Run) -> Table:

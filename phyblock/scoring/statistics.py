@@ -34,13 +34,6 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import (  # type: ignore[import-untyped]
-    chdtri,
-    ncfdtr,
-    ncfdtrinc,
-    stdtr,
-    stdtrit,
-)
 
 from phyblock.scoring.counts import Floats, Metric
 
@@ -123,6 +116,8 @@ def jackknife(
     go opposite ways. `p` is never less than `least_p`. There is no standard error where leaving
     out a cluster leaves nothing to measure.
     """
+    from scipy.special import stdtr, stdtrit  # type: ignore[import-untyped]
+
     given = np.asarray(counts, dtype=np.float64)
     total = given.sum(axis=0)
     value = _measured(metric, total)
@@ -155,6 +150,8 @@ def in_range(estimate: Estimate, most: ArrayLike = 1.0) -> Estimate:
     where that is infinite. The interval stays in the range and has a width even where nothing
     varies, unless the range has no end, which leaves no scale for one.
     """
+    from scipy.special import stdtrit
+
     end = np.broadcast_to(np.asarray(most, dtype=np.float64), estimate.value.shape)
     chosen = ~np.isnan(end)
     value = np.where(chosen, estimate.value, np.nan)
@@ -203,6 +200,8 @@ def detectable(
     the `most` that values can differ by, and where no sample differs: a standard error of 0 says
     nothing about what could be found.
     """
+    from scipy.special import stdtrit
+
     behind = np.asarray(n_clusters, dtype=np.float64)
     df = np.where(behind > 1, behind - 1.0, np.nan)
     error = np.asarray(se, dtype=np.float64)
@@ -291,6 +290,8 @@ def shift(scores: Floats, clusters: Clusters) -> Component:
     test*, Psychological Methods 9, 2004), with the jackknife's error and one degree of freedom less
     than base scenes; it begins at 0 where the test finds nothing.
     """
+    from scipy.special import ncfdtr, ncfdtrinc
+
     items, levels, _ = scores.shape
     if items < 2 or levels < 2 or clusters.size < 2:
         return NO_COMPONENT
@@ -393,6 +394,8 @@ def _of_variance(variance: float, se: float, noise: float = 0.0, *, most: float)
     is at times far too small, even 0: there are at `most` as many degrees of freedom as independent
     base scenes have.
     """
+    from scipy.special import chdtri
+
     square = variance + noise
     ends = (square, square)
     if square > 0:

@@ -99,6 +99,7 @@ def test_files_are_the_same_each_time_in_three_formats_with_captions(
     }
     assert {file: file.read_bytes() for file in write_paper_figures(run, (), Look())} == first
     assert {file.stem for file in first} <= set(figures_of(run))
+    assert not any(b"mathdefault" in data for file, data in first.items() if file.suffix == ".svg")
     files = write_paper_figures(run, ["errors"], Look(COLUMN_IN, "serif", titled=False))
     assert {file.name for file in files} == {
         f"errors.{ending}" for ending in ("pdf", "svg", "png", "txt", "tex")
