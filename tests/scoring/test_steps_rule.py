@@ -43,26 +43,26 @@ def assert_no_valid_order_fails(
         assert assembly.vertices == tuple(range(len(task.scene)))
 
 
-@pytest.mark.parametrize("setting", ["A", pytest.param("B", marks=pytest.mark.slow)])
-def test_no_valid_order_of_the_official_scenes_fails(
-    official_checkout: Path, setting: Setting
+@pytest.mark.parametrize(
+    ("source", "setting", "gating", "orders"),
+    [
+        ("official", "A", "aov", ORDERS),
+        pytest.param("official", "B", "aov", ORDERS, marks=pytest.mark.slow),
+        ("built-in", "A", "aov", ORDERS),
+        pytest.param("built-in", "B", "aov", ORDERS, marks=pytest.mark.slow),
+        ("built-in", "A", "layer", 2),
+    ],
+)
+def test_no_valid_order_fails(
+    source: str, setting: Setting, gating: Gating, orders: int, request: pytest.FixtureRequest
 ) -> None:
+    if source == "official":
+        tasks = read_official(request.getfixturevalue("official_checkout")).tasks
+    else:
+        tasks = read_builtin(BUILT_IN).tasks
     rng = np.random.default_rng(0)
-    for task in read_official(official_checkout).tasks:
-        assert_no_valid_order_fails(task, ORDERS, rng, setting, "aov")
-
-
-@pytest.mark.parametrize("setting", ["A", pytest.param("B", marks=pytest.mark.slow)])
-def test_no_valid_order_of_the_built_in_scenes_fails(setting: Setting) -> None:
-    rng = np.random.default_rng(1)
-    for task in read_builtin(BUILT_IN).tasks:
-        assert_no_valid_order_fails(task, ORDERS, rng, setting, "aov")
-
-
-def test_no_order_by_layers_fails_under_layer_gating() -> None:
-    rng = np.random.default_rng(2)
-    for task in read_builtin(BUILT_IN).tasks:
-        assert_no_valid_order_fails(task, 2, rng, "A", "layer")
+    for task in tasks:
+        assert_no_valid_order_fails(task, orders, rng, setting, gating)
 
 
 def right(case: Case, setting: Setting) -> list[int]:
@@ -181,16 +181,9 @@ def test_equal_blocks_change_places_where_the_next_move_needs_it(
     assert assembly.right_moves() == (1, 2, 3)
     move = assembly.move(third)
     assert move.outcome == "placed"
+    assert move.swapped == (((0, 1),) if third == 3 else ())
     assert assembly.vertices == standing
     assert assembly.move(5 - third).outcome == "dependency_not_met"
-
-
-def test_a_swap_is_told() -> None:
-    assembly = Assembly(*two_pillars(), "A")
-    first = assembly.move(1).vertex
-    assert first == 0
-    move = assembly.move(3)
-    assert (move.vertex, move.swapped) == (3, ((0, 1),))
 
 
 def test_layers_wait_for_the_whole_layer_below() -> None:

@@ -1,7 +1,11 @@
+"""Uncertainty: intervals, tests, ranks and variance components, and how often they are right."""
+
 from __future__ import annotations
 
 import csv
 from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,20 +14,80 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy import stats
+from scipy.special import gammaincinv  # type: ignore[import-untyped]
 
 from phyblock.data import read_official
 from phyblock.scoring.counts import Floats, f1_of, ratio_of
 from phyblock.scoring.statistics import (
     POWER,
     Clusters,
+    Component,
     detectable,
     holm,
     in_range,
+    interaction,
     jackknife,
     rank_ranges,
+    shift,
+    spread_of_items,
+    within,
 )
 from tests.scoring.cases import precision_of, recall_of
-from tests.scoring.worlds import World
+
+
+@dataclass(frozen=True)
+class World:
+    """`bases` base scenes, each a scene of its own, and `pairs` scenes made of two of them.
+
+    A block is placed rightly with log odds `ease` (less `harder` in a pair), plus what the base
+    scene adds (sd `base_sd`, the mean of the two in a pair), plus what the scene alone adds
+    (sd `scene_sd`). Every plan is as long as its goal.
+    """
+
+    bases: int = 150
+    pairs: int = 250
+    base_sd: float = 1.2
+    scene_sd: float = 0.3
+    ease: float = -0.4
+    harder: float = 0.5
+
+    def draw(self, rng: np.random.Generator, models: int = 1) -> tuple[Floats, Clusters, Floats]:
+        """Counts (scenes, models, [tp, fp, fn]), clusters, and the expected tp and blocks.
+
+        All models share half the variance of each effect.
+        """
+        first, second = self._parents(rng)
+        single = first == second
+        sizes = rng.integers(3, 11, self.bases)
+        blocks = np.where(single, sizes[first], sizes[first] + sizes[second])
+        base = self._effects(rng, self.base_sd, self.bases, models)
+        scene = self._effects(rng, self.scene_sd, len(first), models)
+        odds = self.ease + (base[first] + base[second]) / 2 + scene
+        odds -= np.where(single, 0.0, self.harder)[:, None]
+        chance = 1 / (1 + np.exp(-odds))
+        right = rng.binomial(blocks[:, None], chance).astype(np.float64)
+        left = blocks[:, None] - right
+        counts = np.stack([right, left, left], axis=-1)
+        parents = [[str(a), str(b)] for a, b in zip(first, second, strict=True)]
+        expected = np.array([(blocks[:, None] * chance).sum(axis=0)[0], blocks.sum()])
+        return counts, Clusters.of(parents), expected
+
+    def true_f1(self, rng: np.random.Generator, worlds: int = 300) -> float:
+        """F1 of endlessly many scenes, from `worlds` drawings."""
+        right, blocks = sum(self.draw(rng)[2] for _ in range(worlds))
+        return float(right / blocks)
+
+    def _parents(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+        alone = np.arange(self.bases)
+        couples = np.array([(a, b) for a in alone for b in alone[:a]], dtype=np.intp).reshape(-1, 2)
+        chosen = couples[rng.choice(len(couples), self.pairs, replace=False)]
+        return np.concatenate([alone, chosen[:, 0]]), np.concatenate([alone, chosen[:, 1]])
+
+    @staticmethod
+    def _effects(rng: np.random.Generator, sd: float, size: int, models: int) -> Floats:
+        shared, own = rng.normal(0, sd, (size, 1)), rng.normal(0, sd, (size, models))
+        return np.asarray((shared + own) / np.sqrt(2))
+
 
 NAMES = st.lists(st.sampled_from("abcdefg"), min_size=1, max_size=3)
 MEMBERS = st.lists(NAMES, min_size=2, max_size=12)
@@ -316,3 +380,112 @@ def test_intervals_hold_the_truth_and_tests_err_as_often_as_they_say(world: Worl
         erred += bool(jackknife(counts, clusters, difference_of).p < 0.05)
     assert 0.93 <= covered / n <= 0.97
     assert 0.03 <= erred / n <= 0.07
+
+
+ITEMS, LEVELS, BLOCKS, REPEATS = 40, 2, 8, 2
+TRUTH = {"shift": 0.04, "interaction": 0.08, "within": 0.1, "spread": 0.3}
+RUNS = 150
+
+
+def drawn(seed: int, items: int = 12) -> np.ndarray:
+    return np.random.default_rng(seed).normal(size=(items, 3, 4))
+
+
+def close(one: Component, other: Component, scale: float = 1.0) -> bool:
+    a, b = ([part.sd, part.lo, part.hi] for part in (one, other))
+    return np.allclose(np.array(a) * scale, b, rtol=1e-6, atol=1e-7)
+
+
+@pytest.mark.parametrize("component", [shift, interaction])
+@given(seed=st.integers(0, 10**6))
+def test_what_belongs_to_items_and_blocks_is_no_work_of_levels(
+    component: Callable[..., Component], seed: int
+) -> None:
+    scores, rng = drawn(seed), np.random.default_rng(seed + 1)
+    other = scores + rng.normal(size=(12, 1, 1)) + rng.normal(size=(1, 1, 4))
+    assert close(component(scores, alone(12)), component(other, alone(12)))
+    assert close(component(scores, alone(12)), component(100 * scores, alone(12)), 100)
+
+
+@given(seed=st.integers(0, 10**6))
+def test_an_effect_alike_on_all_items_is_shift_alone(seed: int) -> None:
+    scores = drawn(seed)
+    moved = scores + np.array([0.0, 5.0, -1.0])[None, :, None]
+    assert close(interaction(scores, alone(12)), interaction(moved, alone(12)))
+    assert shift(moved, alone(12)).sd > shift(scores, alone(12)).sd
+
+
+def test_two_levels_are_half_their_squared_difference_less_its_error() -> None:
+    scores = drawn(3)[:, :2]
+    gap = (scores[:, 1] - scores[:, 0]).mean(axis=1)
+    error = gap.var(ddof=1) / len(gap)
+    assert shift(scores, alone(12)).sd ** 2 == pytest.approx(
+        max(0.0, (gap.mean() ** 2 - error) / 2), abs=1e-12
+    )
+
+
+def test_components_of_a_crossed_design_are_those_of_the_analysis_of_variance() -> None:
+    """By the sums of squares of a textbook: items x levels x blocks, one score a cell."""
+    y = drawn(5)
+    n, levels, blocks = y.shape
+    mean = {axes: y.mean(axis=axes, keepdims=True) for axes in [(2,), (1,), (0,), (1, 2), (0, 2)]}
+    mean |= {(0, 1): y.mean(axis=(0, 1), keepdims=True), (0, 1, 2): y.mean(keepdims=True)}
+    two = mean[2,] - mean[1, 2] - mean[0, 2] + mean[0, 1, 2]
+    three = y - mean[2,] - mean[1,] - mean[0,] + mean[1, 2] + mean[0, 2] + mean[0, 1]
+    three = three - mean[0, 1, 2]
+    df = (n - 1) * (levels - 1)
+    square = blocks * (two**2).sum() / df
+    rest = (three**2).sum() / (df * (blocks - 1))
+    expected = max(0.0, (square - rest) / blocks)
+    assert interaction(y, alone(n)).sd ** 2 == pytest.approx(expected)
+
+
+def test_known_components_lie_in_their_intervals() -> None:
+    rng = np.random.default_rng(2)
+    hits = dict.fromkeys(TRUTH, 0)
+    squares = dict.fromkeys(TRUTH, 0.0)
+    for _ in range(RUNS):
+        y = rng.normal(0, TRUTH["spread"], (ITEMS, 1, 1, 1))
+        y = y + np.array([-1, 1])[None, :, None, None] * TRUTH["shift"] / np.sqrt(2)
+        y = y + rng.normal(0, TRUTH["interaction"], (ITEMS, LEVELS, 1, 1))
+        y = y + rng.normal(0, TRUTH["within"], (ITEMS, LEVELS, BLOCKS, REPEATS))
+        clusters = alone(ITEMS)
+        cells = y.mean(axis=3)
+        found = {
+            "shift": shift(cells, clusters),
+            "interaction": interaction(cells, clusters),
+            "within": within(y.reshape(ITEMS, -1, REPEATS), clusters),
+        }
+        for name, part in found.items():
+            hits[name] += part.lo <= TRUTH[name] <= part.hi
+            squares[name] += part.sd**2 / RUNS
+    for name in found:
+        # Three standard errors of a share of 0.95 in so many runs, and of their mean.
+        assert hits[name] / RUNS > 0.89, name
+        assert np.sqrt(squares[name]) == pytest.approx(TRUTH[name], rel=0.15), name
+
+
+def test_scenes_that_agree_by_chance_are_no_certainty() -> None:
+    """The error is 0 where every scene says the same, but there are four scenes of each alone."""
+    alike = np.tile(np.array([0.0, 1.0, 0.0, 1.0]), (4, 3, 1))
+    spread = np.array([0.0, 1.0, 0.0, 1.0])[:, None] * np.ones((4, 3))
+    across = np.array([[[0.0, 0.0], [1.0, 1.0]], [[1.0, 1.0], [0.0, 0.0]]] * 2)
+    parts = (
+        within(alike, alone(4)),
+        spread_of_items(spread, alone(4)),
+        interaction(across, alone(4)),
+    )
+    for part, df in zip(parts, (4 * 3 * 3, 3, 3), strict=True):
+        assert part.lo < part.sd < part.hi
+        ends = part.sd * np.sqrt(df / (2 * gammaincinv(df / 2, [0.975, 0.025])))
+        assert np.allclose([part.lo, part.hi], ends)
+
+
+def test_nothing_to_tell_has_no_value() -> None:
+    scores = drawn(1)
+    assert np.isnan(interaction(scores[:, :, :1], alone(12)).sd)
+    assert np.isnan(within(scores[:, :, :1], alone(12)).sd)
+    assert np.isnan(shift(scores, Clusters.of([("one",)] * 12)).sd)
+    assert np.isnan(spread_of_items(scores[:2], alone(2)).sd)
+    alike = np.ones((12, 3, 4))
+    assert [shift(alike, alone(12)).hi, interaction(alike, alone(12)).sd] == [0.0, 0.0]

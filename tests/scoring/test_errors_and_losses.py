@@ -1,9 +1,9 @@
-"""Losses: what became of every goal block, and how near a plan is to a valid order."""
+"""Wrong steps and lost goal blocks: one type for each, and the right one."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import permutations
 
@@ -15,19 +15,119 @@ from hypothesis import strategies as st
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring.plan import (
     BLOCK_OUTCOMES,
+    ERROR_TYPES,
     BlockOutcome,
+    ErrorType,
     Goal,
     block_outcomes,
+    count_errors,
     level1_counts,
     match_plan,
+    step_errors,
     steps_kept,
 )
-from phyblock.types import SETTINGS, Setting
+from phyblock.types import LEVEL1_CRITERIA, MATCHERS, SETTINGS, Matcher, Setting
 from tests.domain.graphs import acyclic
 from tests.scoring.cases import Case, cases, equal, renumbered
 
-each_setting = pytest.mark.parametrize("setting", SETTINGS)
 FLAT, TURNED = (0.0, 0.0, 0.0), (0.0, 0.0, 90.0)
+
+
+def errors_of(case: Case, setting: Setting, matcher: Matcher) -> tuple[ErrorType | None, ...]:
+    goal = Goal(case.scene, case.candidates, setting)
+    match = match_plan(goal, case.plan, matcher)
+    return step_errors(goal, case.plan, match)
+
+
+def true_of(case: Case, setting: Setting, index: int, placed: set[int]) -> ErrorType:
+    """The four definitions, each written out whole, of which exactly one must hold."""
+    candidate = case.candidates[index]
+    of_kind = [b for b in case.scene.blocks if b.kind == candidate.kind]
+    free = [b for b in of_kind if b.order not in placed]
+    free_equal = [b for b in free if equal(b, candidate, setting)]
+    holds: dict[ErrorType, bool] = {
+        "shape_not_in_gt": not of_kind,
+        "overflow": bool(of_kind) and not free,
+        "incorrect_orientation": bool(free) and not free_equal,
+        "dependency_not_met": bool(free_equal)
+        and not any(placed.issuperset(b.depend) for b in free_equal),
+    }
+    (name,) = (name for name, true in holds.items() if true)
+    return name
+
+
+@pytest.mark.parametrize("matcher", MATCHERS)
+@pytest.mark.parametrize("setting", SETTINGS)
+@given(case=cases(max_blocks=8, max_steps=12))
+def test_each_wrong_step_has_exactly_the_one_type_that_holds(
+    setting: Setting, matcher: Matcher, case: Case
+) -> None:
+    match = match_plan(Goal(case.scene, case.candidates, setting), case.plan, matcher)
+    errors = errors_of(case, setting, matcher)
+    placed: set[int] = set()
+    for index, vertex, error in zip(case.plan.steps, match.vertices, errors, strict=True):
+        if vertex is None:
+            assert error == true_of(case, setting, index, placed)
+        else:
+            assert error is None
+            placed.add(case.scene.blocks[vertex].order)
+    counted = count_errors(errors)
+    assert tuple(counted) == ERROR_TYPES
+    assert sum(counted.values()) == match.counts.fp
+
+
+@st.composite
+def carriers(draw: st.DrawFn) -> Case:
+    """Equal cubes that carry blocks of few kinds: what the plan names depends on which it takes."""
+    position = (0.0, 0.0, 0.0)
+    n_cubes = draw(st.integers(2, 3))
+    blocks = [Block(n + 1, "cube", "red", position, FLAT, (), 1) for n in range(n_cubes)]
+    tops = [("arch", "red", FLAT), ("arch", "red", TURNED), ("arch", "blue", FLAT)]
+    for cube in range(n_cubes):
+        for top in draw(st.lists(st.sampled_from(tops), min_size=1, max_size=2)):
+            blocks.append(Block(len(blocks) + 1, *top[:2], position, top[2], (cube + 1,), 2))
+    candidates = CandidateSet((Candidate("cube", "red", FLAT), *(Candidate(*top) for top in tops)))
+    tail = draw(st.lists(st.integers(1, len(candidates)), min_size=3, max_size=7))
+    return Case(Scene("s", (3,), tuple(blocks), ("s",)), candidates, Plan((1, *tail)))
+
+
+@pytest.mark.parametrize("setting", SETTINGS)
+@given(case=st.one_of(cases(max_blocks=7, max_steps=10), carriers()), data=st.data())
+def test_file_order_of_blocks_changes_no_type_under_optimal(
+    setting: Setting, case: Case, data: st.DataObject
+) -> None:
+    blocks = tuple(data.draw(st.permutations(case.scene.blocks)))
+    shuffled = replace(case, scene=replace(case.scene, blocks=blocks))
+    assert count_errors(errors_of(shuffled, setting, "optimal")) == count_errors(
+        errors_of(case, setting, "optimal")
+    )
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_of_choices_alike_the_one_with_the_lightest_types_is_taken(first: int) -> None:
+    # Either cube can be the one that is named, and then either arch stands; only if the turned
+    # one does is the flat one, at its second naming, in no other pose than the one that is left.
+    position = (0.0, 0.0, 0.0)
+    cubes = [Block(n, "cube", "red", position, FLAT, (), 1) for n in (1, 2)]
+    blocks = (
+        cubes[first],
+        cubes[1 - first],
+        Block(3, "arch", "red", position, FLAT, (1,), 2),
+        Block(4, "arch", "red", position, TURNED, (2,), 2),
+    )
+    candidates = CandidateSet(
+        (
+            Candidate("cube", "red", FLAT),
+            Candidate("arch", "red", FLAT),
+            Candidate("arch", "red", TURNED),
+        )
+    )
+    case = Case(Scene("s", (3,), blocks, ("s",)), candidates, Plan((1, 2, 3, 2)))
+    early = "dependency_not_met"
+    assert errors_of(case, "A", "optimal") == (None, early, None, early)
+
+
+each_setting = pytest.mark.parametrize("setting", SETTINGS)
 
 
 def outcomes(case: Case, setting: Setting) -> dict[BlockOutcome, int]:
@@ -214,8 +314,13 @@ def test_steps_kept_are_those_common_with_the_nearest_of_all_valid_orders(
 
 def test_a_step_that_is_no_candidate_is_refused() -> None:
     scene = Scene("s", (3,), (Block(1, "arch", "red", FLAT, FLAT, (), 1),), ("s",))
-    goal = Goal(scene, CandidateSet((Candidate("arch", "red", FLAT),)), "A")
-    with pytest.raises(KeyError):
-        block_outcomes(goal, Plan((2,)), [0])
-    with pytest.raises(KeyError):
-        steps_kept(goal, Plan((2,)))
+    goal, plan = Goal(scene, CandidateSet((Candidate("arch", "red", FLAT),)), "A"), Plan((1, 2))
+    asked: list[Callable[[], object]] = [
+        lambda: block_outcomes(goal, plan, [0]),
+        lambda: steps_kept(goal, plan),
+        *(lambda matcher=matcher: match_plan(goal, plan, matcher) for matcher in MATCHERS),
+        *(lambda name=name: level1_counts(goal, plan, name) for name in LEVEL1_CRITERIA),
+    ]
+    for ask in asked:
+        with pytest.raises(KeyError):
+            ask()

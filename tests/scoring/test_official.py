@@ -1,0 +1,161 @@
+"""Official and bundled data: known counts, valid orders, averages as they are published."""
+
+from __future__ import annotations
+
+import csv
+import math
+import random
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from phyblock.data import AssemblyTask, read_builtin, read_official
+from phyblock.domain import CATEGORIES, Plan
+from phyblock.parsing.plan import parse_plan
+from phyblock.results.paper import published_table
+from phyblock.scoring.counts import chance
+from phyblock.scoring.plan import AssemblyScorer, Goal, match_plan
+from phyblock.types import MATCHERS, PLAN_PARSERS, SETTINGS, PlanParser
+from tests.official_replies import reply_texts
+
+Row = tuple[str, str, str, str]
+
+
+@pytest.fixture(scope="module")
+def tasks(official_checkout: Path) -> dict[str, AssemblyTask]:
+    return {task.scene.id: task for task in read_official(official_checkout).tasks}
+
+
+def scored(
+    checkout: Path, tasks: dict[str, AssemblyTask]
+) -> Iterator[tuple[Row, tuple[int, int, int, int]]]:
+    scorers = {
+        name: AssemblyScorer(task.scene, task.candidates, SETTINGS) for name, task in tasks.items()
+    }
+    for (model, scene), text in reply_texts(checkout).items():
+        plan = parse_plan(text, len(tasks[scene].candidates), "official").plan
+        for score in scorers[scene].score(plan, ["paper"], "membership"):
+            level = 1 if score.criterion == "membership" else tasks[scene].scene.level
+            counts = score.counts
+            row = (model, scene, score.setting, score.criterion)
+            yield row, (level, counts.tp, counts.fp, counts.fn)
+
+
+def test_known_counts_match_row_for_row(
+    official_dir: Path, official_checkout: Path, tasks: dict[str, AssemblyTask]
+) -> None:
+    path = official_dir / "expected" / "assembly_counts.csv"
+    with path.open(encoding="utf-8", newline="") as file:
+        expected = {
+            (row["model"], row["scene"], row["setting"], row["criterion"]): tuple(
+                int(row[column]) for column in ("level", "tp", "fp", "fn")
+            )
+            for row in csv.DictReader(file)
+        }
+    models = {model for model, *_ in expected}
+    found = dict(scored(official_checkout, tasks))
+    assert {row: counts for row, counts in found.items() if row[0] in models} == expected
+    assert len(expected) >= 6250
+
+
+@pytest.mark.parametrize("share", [0.2, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("parser", PLAN_PARSERS)
+def test_optimal_is_never_below_paper_on_recorded_replies(
+    official_checkout: Path, tasks: dict[str, AssemblyTask], parser: PlanParser, share: float
+) -> None:
+    goals = {
+        (name, setting): Goal(task.scene, task.candidates, setting)
+        for name, task in tasks.items()
+        for setting in SETTINGS
+    }
+    replies = reply_texts(official_checkout)
+    plans: set[tuple[str, Plan]] = {
+        (scene, parse_plan(text, len(tasks[scene].candidates), parser).plan)
+        for (_, scene), text in replies.items()
+        if random.Random(text).random() < share
+    }
+    assert len(plans) > 1000 * share
+    for scene, plan in plans:
+        tp = {}
+        for setting in SETTINGS:
+            goal = goals[scene, setting]
+            for matcher in MATCHERS:
+                tp[setting, matcher] = match_plan(goal, plan, matcher).counts.tp
+            assert tp[setting, "optimal"] >= tp[setting, "paper"], (scene, plan)
+        assert tp["B", "optimal"] >= tp["A", "optimal"], (scene, plan)
+
+
+ORDERS = 200
+BUNDLED = sorted((Path(__file__).parents[2] / "benchmarks" / "data").glob("*/scenes.jsonl"))
+EVERY = pytest.mark.parametrize("every", [5, pytest.param(1, marks=pytest.mark.slow)])
+"""Each fifth scene, of all levels; all scenes when there is time."""
+
+
+def assert_every_order_scores_1(task: AssemblyTask, rng: np.random.Generator) -> None:
+    number = [task.candidates.index_of(block.look) for block in task.scene.blocks]
+    steps = [index for index in number if index is not None]
+    assert len(steps) == len(number), task.scene.id
+    goals = [Goal(task.scene, task.candidates, setting) for setting in SETTINGS]
+    for order in {task.scene.graph.random_order(rng) for _ in range(ORDERS)}:
+        assert task.scene.graph.is_valid(order)
+        plan = Plan(tuple(steps[vertex] for vertex in order))
+        for goal in goals:
+            assert match_plan(goal, plan, "optimal").counts.f1 == 1, (task.scene.id, order)
+
+
+@EVERY
+def test_valid_orders_of_the_official_scenes_score_1(official_checkout: Path, every: int) -> None:
+    rng = np.random.default_rng(0)
+    for task in read_official(official_checkout).tasks[::every]:
+        assert_every_order_scores_1(task, rng)
+
+
+@EVERY
+@pytest.mark.parametrize("path", BUNDLED, ids=lambda path: path.parent.name)
+def test_valid_orders_of_the_bundled_scenes_score_1(path: Path, every: int) -> None:
+    rng = np.random.default_rng(0)
+    for task in read_builtin(path.parent).tasks[::every]:
+        assert_every_order_scores_1(task, rng)
+
+
+ROUNDING = 0.05 + 1e-9
+OTHERWISE_AVERAGED = {
+    "Claude-3.7 Sonnet": 53.65,
+    "Gemini-1.5-flash": 53.75,
+    "Qwen-VL-Max": 51.45,
+    "Qwen2.5-VL-72B-Instruct": 46.825,
+    "Random": 23.90,
+}
+"""Rows whose printed overall number is not the mean of the printed categories, and that mean."""
+
+
+def published() -> dict[str, dict[tuple[str, str], float]]:
+    table = published_table(2)
+    return {
+        str(model): {(row.category, row.subtask): row.value for row in rows.itertuples()}
+        for model, rows in table.groupby("model")
+    }
+
+
+def test_every_published_category_average_is_the_mean_of_its_four_subtasks() -> None:
+    for model, cells in published().items():
+        for category, subtasks in CATEGORIES.items():
+            mean = sum(cells[category, subtask] for subtask in subtasks) / len(subtasks)
+            assert abs(mean - cells[category, "average"]) <= ROUNDING, (model, category)
+
+
+def test_the_published_overall_is_the_mean_of_the_categories_but_in_five_rows() -> None:
+    others = {}
+    for model, cells in published().items():
+        mean = sum(cells[category, "average"] for category in CATEGORIES) / len(CATEGORIES)
+        if abs(mean - cells["overall", "average"]) > ROUNDING:
+            others[model] = mean
+    assert others == pytest.approx(OTHERWISE_AVERAGED)
+
+
+def test_chance_of_an_order_is_one_in_all_permutations() -> None:
+    assert chance("SH") == 0.25
+    assert chance("OR") == pytest.approx(1 / math.factorial(4))
+    assert chance("VP", 2) == 0.5

@@ -1,0 +1,229 @@
+"""Plans: matchers, Level-1 criteria and ratios, against plain re-implementations."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
+from phyblock.scoring.counts import Counts, micro
+from phyblock.scoring.plan import (
+    AssemblyScorer,
+    Goal,
+    Match,
+    level1_counts,
+    match_plan,
+    most_placed,
+)
+from phyblock.types import LEVEL1_CRITERIA, MATCHERS, SETTINGS, Level1Criterion, Matcher, Setting
+from tests.scoring.cases import Case, cases, choices, equal, greatest_tp, greedy_tp
+
+each_setting = pytest.mark.parametrize("setting", SETTINGS)
+each_matcher = pytest.mark.parametrize("matcher", MATCHERS)
+
+
+def matched(case: Case, setting: Setting, matcher: Matcher) -> Match:
+    return match_plan(Goal(case.scene, case.candidates, setting), case.plan, matcher)
+
+
+def counted(case: Case, setting: Setting, matcher: Matcher = "optimal") -> Counts:
+    return matched(case, setting, matcher).counts
+
+
+@each_setting
+@given(case=cases(max_blocks=8, max_steps=12))
+def test_optimal_is_the_best_of_all_sequences_of_choices_and_paper_is_algorithm_1(
+    setting: Setting, case: Case
+) -> None:
+    """The counts follow: B is never below A, nor optimal below paper, whatever the file order."""
+    steps, blocks = len(case.plan), len(case.scene)
+    greatest, greedy = greatest_tp(case, setting), greedy_tp(case, setting)
+    assert counted(case, setting) == Counts(greatest, steps - greatest, blocks - greatest)
+    assert counted(case, setting, "paper") == Counts(greedy, steps - greedy, blocks - greedy)
+    assert most_placed(Goal(case.scene, case.candidates, setting), case.plan) == greatest
+
+
+@each_matcher
+@each_setting
+@given(case=cases(max_blocks=8, max_steps=12))
+def test_every_step_places_a_ready_equal_block_or_could_not(
+    setting: Setting, matcher: Matcher, case: Case
+) -> None:
+    match = matched(case, setting, matcher)
+    placed: frozenset[int] = frozenset()
+    for index, vertex, mask in zip(case.plan.steps, match.vertices, match.placed, strict=True):
+        orders = {case.scene.blocks[v].order for v in range(len(case.scene)) if mask & 1 << v}
+        assert orders == placed
+        possible = choices(case, index, placed, setting)
+        if vertex is None:
+            assert not possible
+        else:
+            assert case.scene.blocks[vertex] in possible
+            placed |= {case.scene.blocks[vertex].order}
+    assert match.n_blocks == len(case.scene)
+
+
+@each_setting
+@given(case=cases(max_blocks=8), seed=st.integers(0, 2**32 - 1))
+def test_every_valid_order_scores_1(setting: Setting, case: Case, seed: int) -> None:
+    scene = case.scene
+    looks = {block.look: block for block in scene.blocks}
+    candidates = CandidateSet(tuple(looks.values()))  # type: ignore[arg-type]
+    order = scene.graph.random_order(np.random.default_rng(seed))
+    steps = [candidates.index_of(scene.blocks[vertex].look) for vertex in order]
+    assert None not in steps
+    plan = Plan(tuple(step for step in steps if step is not None))
+    counts = match_plan(Goal(scene, candidates, setting), plan, "optimal").counts
+    assert (counts.fp, counts.fn, counts.f1) == (0, 0, 1)
+
+
+def test_the_greedy_choice_can_punish_a_valid_order() -> None:
+    # Two equal arches stand on the ground; the second in the file carries the cuboid.
+    case = _two_arches(carrier=2)
+    assert case.scene.graph.is_valid((1, 2, 0))
+    assert counted(case, "A", "paper") == Counts(2, 1, 1)
+    assert counted(case, "A", "optimal") == Counts(3, 0, 0)
+    assert counted(_two_arches(carrier=1), "A", "paper") == Counts(3, 0, 0)
+
+
+def _two_arches(carrier: int) -> Case:
+    ground, flat = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    blocks = (
+        Block(1, "arch", "red", ground, flat, (), 1),
+        Block(2, "arch", "red", ground, flat, (), 1),
+        Block(3, "cuboid3", "blue", ground, flat, (carrier,), 2),
+    )
+    candidates = CandidateSet((Candidate("arch", "red", flat), Candidate("cuboid3", "blue", flat)))
+    return Case(Scene("s", (3,), blocks, ("s",)), candidates, Plan((1, 2, 1)))
+
+
+def test_the_greedy_choice_can_score_less_in_b_than_in_a() -> None:
+    ground, flat, turned = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 90.0)
+    blocks = (
+        Block(1, "arch", "red", ground, turned, (), 1),
+        Block(2, "arch", "red", ground, flat, (), 1),
+        Block(3, "cuboid3", "blue", ground, flat, (2,), 2),
+    )
+    candidates = _two_arches(carrier=2).candidates
+    case = Case(Scene("s", (3,), blocks, ("s",)), candidates, Plan((1, 2)))
+    assert [counted(case, setting, "paper").tp for setting in SETTINGS] == [2, 1]
+    assert [counted(case, setting, "optimal").tp for setting in SETTINGS] == [2, 2]
+
+
+def test_the_greedy_choice_can_lose_blocks_by_one_more_right_step() -> None:
+    ground, flat, turned = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 90.0)
+    blocks = (
+        Block(1, "arch", "red", ground, flat, (2,), 2),
+        Block(2, "cube", "red", ground, flat, (), 1),
+        Block(3, "arch", "red", ground, flat, (), 1),
+        Block(4, "cuboid3", "blue", ground, flat, (3,), 2),
+        Block(5, "cuboid3", "blue", ground, turned, (3,), 2),
+    )
+    candidates = CandidateSet(
+        (
+            Candidate("cube", "red", flat),
+            Candidate("arch", "red", flat),
+            Candidate("cuboid3", "blue", flat),
+            Candidate("cuboid3", "blue", turned),
+        )
+    )
+    scene = Scene("s", (3,), blocks, ("s",))
+    short = Case(scene, candidates, Plan((2, 3, 4)))
+    long = Case(scene, candidates, Plan((1, 2, 3, 4)))
+    assert [counted(case, "A", "paper").tp for case in (short, long)] == [3, 2]
+    assert [counted(case, "A", "optimal").tp for case in (short, long)] == [3, 4]
+
+
+COUNTS = st.builds(Counts, *[st.integers(0, 1000)] * 3)
+
+
+def level1(case: Case, setting: Setting, criterion: Level1Criterion) -> Counts:
+    return level1_counts(Goal(case.scene, case.candidates, setting), case.plan, criterion)
+
+
+@each_setting
+@given(case=cases())
+def test_selection_is_a_one_to_one_matching_without_order(setting: Setting, case: Case) -> None:
+    left = list(case.scene.blocks)
+    for index in case.plan.steps:
+        hit = next((b for b in left if equal(b, case.candidates[index], setting)), None)
+        if hit is not None:
+            left.remove(hit)
+    tp = len(case.scene) - len(left)
+    assert level1(case, setting, "selection") == Counts(tp, len(case.plan) - tp, len(left))
+
+
+@each_setting
+@given(case=cases())
+def test_membership_counts_every_step_whose_block_occurs(setting: Setting, case: Case) -> None:
+    tp = sum(
+        any(equal(block, case.candidates[index], setting) for block in case.scene.blocks)
+        for index in case.plan.steps
+    )
+    counts = level1(case, setting, "membership")
+    assert counts == Counts(tp, len(case.plan) - tp, len(case.scene) - tp)
+
+
+@given(counts=st.lists(COUNTS, max_size=8), data=st.data())
+def test_micro_averages_sum_first_whatever_the_order(
+    counts: list[Counts], data: st.DataObject
+) -> None:
+    total = micro(counts)
+    assert total == Counts(*(sum(getattr(c, name) for c in counts) for name in ("tp", "fp", "fn")))
+    assert micro(data.draw(st.permutations(counts))) == total
+    half = data.draw(st.integers(0, len(counts)))
+    assert micro([micro(counts[:half]), micro(counts[half:])]) == total
+
+
+@given(counts=COUNTS)
+@example(counts=Counts())
+def test_precision_recall_and_f1_are_the_textbook_ratios(counts: Counts) -> None:
+    tp, fp, fn = counts.tp, counts.fp, counts.fn
+    precision = Fraction(tp, tp + fp) if tp + fp else None
+    recall = Fraction(tp, tp + fn) if tp + fn else None
+    assert counts.precision == (None if precision is None else float(precision))
+    assert counts.recall == (None if recall is None else float(recall))
+    if precision and recall:
+        harmonic = 2 * precision * recall / (precision + recall)
+        assert counts.f1 == pytest.approx(float(harmonic))
+    else:
+        assert counts.f1 == (None if tp + fp + fn == 0 else 0)
+
+
+@given(case=cases(), level1=st.sampled_from([None, *LEVEL1_CRITERIA]))
+def test_the_scorer_says_what_its_parts_say(case: Case, level1: Level1Criterion | None) -> None:
+    scores = AssemblyScorer(case.scene, case.candidates, SETTINGS).score(
+        case.plan, MATCHERS, level1
+    )
+    expected = []
+    for setting in SETTINGS:
+        goal = Goal(case.scene, case.candidates, setting)
+        for matcher in MATCHERS:
+            match = match_plan(goal, case.plan, matcher)
+            expected.append(("aov", setting, matcher, match.counts, match.vertices))
+        if level1 is not None and 1 in case.scene.levels:
+            counts = level1_counts(goal, case.plan, level1)
+            expected.append((level1, setting, None, counts, None))
+    assert [(s.criterion, s.setting, s.matcher, s.counts, s.vertices) for s in scores] == expected
+    for score in scores:
+        if score.criterion == "aov":
+            assert score.errors is not None
+            assert sum(score.errors.values()) == score.counts.fp
+            assert score.step_errors is not None
+            assert len(score.step_errors) == len(case.plan)
+        else:
+            assert (score.errors, score.step_errors) == (None, None)
+
+
+@given(case=cases(), data=st.data())
+def test_what_was_scored_before_changes_nothing(case: Case, data: st.DataObject) -> None:
+    steps = st.lists(st.integers(1, len(case.candidates)), max_size=8)
+    plans = [Plan(tuple(found)) for found in data.draw(st.lists(steps, max_size=4))]
+    scorer = AssemblyScorer(case.scene, case.candidates, SETTINGS)
+    first = [scorer.score(plan, MATCHERS, "selection") for plan in plans]
+    again = [scorer.score(plan, MATCHERS, "selection") for plan in reversed(plans)]
+    assert first == again[::-1]
