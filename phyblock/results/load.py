@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -115,14 +116,11 @@ def frames_of(
     """
     import pandas as pd
 
-    columns: dict[str, list[Any]] = {name: [] for name in _TYPES}
+    values: list[tuple[Any, ...]] = []
     counts: dict[tuple[str, str], _Column] = {}
     taken: dict[str, list[SampleCounts]] = {}
-    shared: dict[Any, Any] = {}
     for owner, (record, start) in enumerate(records):
-        for name, value in _values(record, start).items():
-            is_shared = isinstance(value, (str, tuple)) and name != "sample"
-            columns[name].append(shared.setdefault(value, value) if is_shared else value)
+        values.append(_values(record, start))
         track = record.track
         if track not in taken:
             known = dict.fromkeys(measure.counted for measure in track_measures(track))
@@ -133,8 +131,9 @@ def frames_of(
         for name, numbers in record.counts.items():
             if numbers:
                 counts.setdefault((track, name), _Column()).add(owner, ("", "", ""), numbers)
-    frame = pd.DataFrame({name: pd.Series(columns.pop(name), dtype=kind)
-                          for name, kind in _TYPES.items()})  # fmt: skip
+    columns = zip(_TYPES.items(), zip(*values, strict=True) if values else [()] * len(_TYPES),
+                  strict=True)  # fmt: skip
+    frame = pd.DataFrame({name: pd.Series(column, dtype=kind) for (name, kind), column in columns})
     rows = np.full(len(frame), -1, dtype=np.intp)
     place = {name: n for n, name in enumerate(design.model_names)}
     frame = frame.drop_duplicates("sample", keep="last")
@@ -145,19 +144,30 @@ def frames_of(
     return frame, {key: column.placed(rows) for key, column in counts.items()}
 
 
-def _values(record: Record, start: int) -> dict[str, Any]:
-    reply, error, parse = record.reply, record.error, record.parse
+def _attributes(names: Iterable[str]) -> Callable[[object], tuple[Any, ...]]:
+    """Return what reads attributes of a thing; each is None of no thing."""
+    read, none = attrgetter(*names), (None,) * len(tuple(names))
+    return lambda thing: none if thing is None else read(thing)
+
+
+_of_record, _of_reply, _of_error = map(_attributes, (_OF_RECORD, _OF_REPLY, _OF_ERROR))
+_of_usage = _attributes(TOKENS)
+
+
+def _values(record: Record, start: int) -> tuple[Any, ...]:
+    """Return a row of `Run.records`, in the order of `_TYPES`."""
+    reply, parse = record.reply, record.parse
     rule = parse.get("rule") if isinstance(parse, dict) else getattr(parse, "rule", None)
-    return {
-        **{name: getattr(record, name) for name in _OF_RECORD},
-        "variant": record.way.key,
-        **{name: getattr(reply, name, None) for name in _OF_REPLY},
-        **{name: getattr(reply and reply.usage, name, None) for name in TOKENS},
-        "paid_usd": reply and record.paid_usd,
-        **{f"error_{name}": getattr(error, name, None) for name in _OF_ERROR},
-        "rule": None if rule is None else str(rule),
-        "start": start,
-    }
+    return (
+        *_of_record(record),
+        record.way.key,
+        *_of_reply(reply),
+        *_of_usage(reply and reply.usage),
+        reply and record.paid_usd,
+        *_of_error(record.error),
+        None if rule is None else str(rule),
+        start,
+    )
 
 
 @dataclass(frozen=True)
