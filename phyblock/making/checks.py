@@ -7,41 +7,16 @@ import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
-from phyblock.domain.aov import AOVGraph, CycleError
 from phyblock.domain.blocks import KIT_PALETTE, orientation_class
-from phyblock.domain.scene import MAX_CANDIDATES, Block, CandidateSet, Kind, Scene
+from phyblock.domain.scene import MAX_CANDIDATES, CandidateSet, Kind, Scene
 from phyblock.errors import Problem
 from phyblock.making.scenes.sketch import POSES, find_twins
-from phyblock.sim.contact import (
-    FIT_TOLERANCE_M,
-    GROUND,
-    find_gaps,
-    find_overlaps,
-    support_graph,
-)
+from phyblock.sim.contact import FIT_TOLERANCE_M, GROUND, find_gaps, find_overlaps, support_graph
 from phyblock.sim.dynamics import DEFAULT_TRIAL, Stability, Trial, check, check_steps
 from phyblock.sim.pictures import LEAST_SHOWN, PictureStyle, hidden_blocks, visible_shares
 from phyblock.text import csv_cell
-
-CheckName = Literal[
-    "size",
-    "palette",
-    "layer",
-    "order",
-    "hidden",
-    "overlap",
-    "floating",
-    "undeclared dependency",
-    "dependency without contact",
-    "unstable step",
-    "unstable",
-    "candidates",
-    "distractor",
-    "duplicate",
-    "parents",
-]
 
 
 @dataclass(frozen=True)
@@ -54,7 +29,7 @@ class Finding:
     """
 
     scene: str
-    check: CheckName
+    check: str
     message: str
     blocks: tuple[int, ...] = ()
     field: str = ""
@@ -72,34 +47,27 @@ class Finding:
         return str(self.problem)
 
 
-FINISHED_QUIET_S = 0.5
-"""Time at rest after which a trial of a finished structure ends [s]; `cards/` tell of it."""
-STEP_TRIAL = replace(DEFAULT_TRIAL, physics=DEFAULT_TRIAL.physics[:1])
-"""Every step is tried at the first of the two time steps, for two seconds or until at rest."""
-
-
 @dataclass(frozen=True)
 class Tolerances:
-    """Limits: overlaps and gaps up to `fit_m` [m], movement within the limits of the trials.
+    """Limits: overlaps and gaps up to `fit_m` [m], movement within the limits of a trial.
 
-    `trial` is that of the finished structure, which is watched to its end, or until it is at rest
-    for `quiet_s` [s]; `step_trial` that of every step, `last_step` whether of the last step, too.
+    The finished structure is watched to the end of the `trial`, or until it is at rest for
+    `quiet_s` [s]. Each step is tried at the first of its time steps, the last one if `last_step`.
     """
 
     fit_m: float = FIT_TOLERANCE_M
     trial: Trial = DEFAULT_TRIAL
-    step_trial: Trial = STEP_TRIAL
     quiet_s: float | None = None
     last_step: bool = True
 
 
 OURS = Tolerances()
 """For scenes made here."""
-OURS_IN_HASTE = Tolerances(quiet_s=FINISHED_QUIET_S)
-"""For scenes that are being made: the same, but a trial ends once all is at rest."""
+OURS_IN_HASTE = Tolerances(quiet_s=0.5)
+"""For scenes that are being made: the same, but a trial ends once all is at rest (see `cards/`)."""
 # The last step of a foreign scene is left to the trial of the finished structure: what falls there
 # shall be told once. 2 mm cannot be seen in a picture.
-FOREIGN = Tolerances(fit_m=0.002, last_step=False, quiet_s=FINISHED_QUIET_S)
+FOREIGN = Tolerances(fit_m=0.002, last_step=False, quiet_s=0.5)
 """For scenes made elsewhere, whose positions are written by hand in rounded millimeters."""
 
 
@@ -121,10 +89,7 @@ LEVEL_LIMITS: dict[int, Limits] = {
 
 @dataclass(frozen=True)
 class SceneFacts:
-    """A scene whose orders are unique, with what its checks go by; dependencies may be unsound.
-
-    Without `candidates` checks of them find nothing.
-    """
+    """A scene with what its checks go by; without `candidates` checks of them find nothing."""
 
     scene: Scene
     candidates: CandidateSet | None = None
@@ -140,37 +105,26 @@ class SceneFacts:
         graph = support_graph(self.scene.blocks)
         return {order: (below - {GROUND}) or below for order, below in graph.items()}
 
-    @cached_property
-    def declared(self) -> Mapping[int, frozenset[int]]:
-        """The same as the file declares it."""
-        return declared_supports(self.scene)
-
-    @cached_property
-    def graph(self) -> AOVGraph | None:
-        """The graph of the declared dependencies; None when they are unsound."""
-        vertex_of = {order: vertex for vertex, order in enumerate(self.declared)}
-        rests_on = [orders - {GROUND} for orders in self.declared.values()]
-        if any(order not in vertex_of for orders in rests_on for order in orders):
-            return None
-        try:
-            return AOVGraph(tuple(frozenset(vertex_of[o] for o in orders) for orders in rests_on))
-        except CycleError:
-            return None
-
-    def finding(self, check: CheckName, message: str, *blocks: int, **about: object) -> Finding:
+    def finding(self, check: str, message: str, *blocks: int, **about: object) -> Finding:
         """Return a finding about the scene; `about` are further fields of it."""
         return Finding(self.scene.id, check, message, blocks, **about)  # type: ignore[arg-type]
+
+    def measured(
+        self, check: str, message: str, *blocks: int, value_m: float, limit_m: float
+    ) -> Finding:
+        """Return a finding about a length that exceeds a limit [m]."""
+        about = {"value_mm": value_m * 1000, "tolerance_mm": limit_m * 1000}
+        return self.finding(check, message, *blocks, **about)
 
 
 def declared_supports(scene: Scene) -> Mapping[int, frozenset[int]]:
     """Return the orders that each block rests on as the file says; the ground only alone."""
-    return {block.order: frozenset(block.depend) or frozenset({GROUND}) for block in scene.blocks}
+    return {block.order: frozenset(block.depend or {GROUND}) for block in scene.blocks}
 
 
 def _size(facts: SceneFacts) -> Iterator[Finding]:
     """More or fewer blocks, or more layers, than a level of the scene allows."""
-    count = len(facts.scene)
-    layers = 0 if facts.graph is None else max(facts.graph.layers, default=0)
+    count, layers = len(facts.scene), max(facts.scene.graph.layers, default=0)
     for level in facts.scene.levels:
         least, most, most_layers = LEVEL_LIMITS[level]
         if not least <= count <= most:
@@ -183,28 +137,29 @@ def _size(facts: SceneFacts) -> Iterator[Finding]:
 
 def _palette(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks whose pair of type and color is not in the palette."""
-    for at, block in _blocks(facts):
+    for i, block in enumerate(facts.scene.blocks):
         if block.kind not in facts.palette:
-            found = " ".join(block.kind)
-            yield facts.finding("palette", "not in the palette", block.order, field=at, found=found)
+            about = {"field": f"blocks[{i}]", "found": " ".join(block.kind)}
+            yield facts.finding("palette", "not in the palette", block.order, **about)
 
 
 def _layer(facts: SceneFacts) -> Iterator[Finding]:
-    """Layers that are not the longest path of the declared dependencies, where these are sound."""
-    layers = () if facts.graph is None else facts.graph.layers
-    for (at, block), layer in zip(_blocks(facts), layers, strict=False):
+    """Layers that are not the longest path of the declared dependencies."""
+    for i, (block, layer) in enumerate(
+        zip(facts.scene.blocks, facts.scene.graph.layers, strict=True)
+    ):
         if block.layer != layer:
             message = (
                 f"block {block.order} is on layer {block.layer}, but on {layer} by the longest "
                 "path of dependencies"
             )
-            yield facts.finding("layer", message, block.order, field=f"{at}.layer")
+            yield facts.finding("layer", message, block.order, field=f"blocks[{i}].layer")
 
 
 def _order(facts: SceneFacts) -> Iterator[Finding]:
-    """Blocks that stand in the file before one that they depend on, if that is sound."""
+    """Blocks that stand in the file before one that they depend on."""
     placed: set[int] = set()
-    for block in facts.scene.blocks if facts.graph else ():
+    for block in facts.scene.blocks:
         if early := sorted(set(block.depend) - placed):
             supports = ", ".join(map(_name, early))
             message = f"the stored order puts block {block.order} before its support, {supports}"
@@ -225,60 +180,59 @@ def _hidden(facts: SceneFacts) -> Iterator[Finding]:
 
 def _overlap(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks that share space, with one another or with the ground."""
-    for one in find_overlaps(facts.scene.blocks, facts.tolerances.fit_m):
-        depth_mm = one.depth_m * 1000
-        message = f"block {one.second} overlaps {_name(one.first)} by {depth_mm:.2f} mm"
-        measured = {"value_mm": depth_mm, "tolerance_mm": facts.tolerances.fit_m * 1000}
-        yield facts.finding("overlap", message, one.first, one.second, **measured)
+    limit_m = facts.tolerances.fit_m
+    for one in find_overlaps(facts.scene.blocks, limit_m):
+        message = f"block {one.second} overlaps {_name(one.first)} by {one.depth_m * 1000:.2f} mm"
+        about = (one.first, one.second)
+        yield facts.measured("overlap", message, *about, value_m=one.depth_m, limit_m=limit_m)
 
 
 def _floating(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks that hang above what is below them."""
-    for gap in find_gaps(facts.scene.blocks, facts.tolerances.fit_m):
-        height_mm = gap.height_m * 1000
-        message = f"block {gap.order} floats {height_mm:.2f} mm above its support"
-        measured = {"value_mm": height_mm, "tolerance_mm": facts.tolerances.fit_m * 1000}
-        yield facts.finding("floating", message, gap.order, **measured)
+    limit_m = facts.tolerances.fit_m
+    for gap in find_gaps(facts.scene.blocks, limit_m):
+        message = f"block {gap.order} floats {gap.height_m * 1000:.2f} mm above its support"
+        about = {"value_m": gap.height_m, "limit_m": limit_m}
+        yield facts.measured("floating", message, gap.order, **about)
 
 
-def _dependencies(facts: SceneFacts, name: CheckName, message: str) -> Iterator[Finding]:
+def _dependencies(facts: SceneFacts, check: str) -> Iterator[Finding]:
     """Contacts that carry and are not declared, or what is declared without contact."""
-    for at, block in _blocks(facts):
-        contacts, declared = facts.contacts[block.order], facts.declared[block.order]
-        is_undeclared = name == "undeclared dependency"
+    declared_of, is_undeclared = declared_supports(facts.scene), check == "undeclared dependency"
+    for i, order in enumerate(declared_of):
+        contacts, declared = facts.contacts[order], declared_of[order]
         for other in sorted(contacts - declared if is_undeclared else declared - contacts):
-            yield facts.finding(
-                *(name, message.format(block.order, _name(other)), block.order, other),
-                field=f"{at}.depend",
-                found=str(sorted(declared)),
-                allowed=str(sorted(contacts)),
-            )
+            message = f"block {order} does not rest on {_name(other)}, which is declared"
+            if is_undeclared:
+                message = f"block {order} rests on {_name(other)}, which is not declared"
+            about = {"found": str(sorted(declared)), "allowed": str(sorted(contacts))}
+            yield facts.finding(check, message, order, other, field=f"blocks[{i}].depend", **about)
 
 
 def _unstable_step(facts: SceneFacts) -> Iterator[Finding]:
     """Steps of the stored order after which something falls."""
-    blocks = facts.scene.blocks if facts.tolerances.last_step else facts.scene.blocks[:-1]
-    trial = facts.tolerances.step_trial
+    limits = facts.tolerances
+    blocks = facts.scene.blocks if limits.last_step else facts.scene.blocks[:-1]
+    trial = replace(limits.trial, physics=limits.trial.physics[:1])
     for count, step in enumerate(check_steps(blocks, trial), 1):
         if not step.stable:
             when = f"at step {count}, once block {blocks[count - 1].order} is placed"
-            yield _fall(facts, "unstable step", when, step, trial)
+            yield _fall(facts, "unstable step", when, step)
 
 
 def _unstable(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks that fall from the finished structure."""
-    trial = facts.tolerances.trial
-    whole = check(facts.scene.blocks, trial, facts.tolerances.quiet_s)
+    whole = check(facts.scene.blocks, facts.tolerances.trial, facts.tolerances.quiet_s)
     if not whole.stable:
         differing = "" if whole.agreed else ", not the same ones at every time step"
-        yield _fall(facts, "unstable", f"when all is built{differing}", whole, trial)
+        yield _fall(facts, "unstable", f"when all is built{differing}", whole)
 
 
-def _fall(facts: SceneFacts, name: CheckName, when: str, shown: Stability, trial: Trial) -> Finding:
+def _fall(facts: SceneFacts, check: str, when: str, shown: Stability) -> Finding:
     named = ", ".join(map(str, shown.fallen))
     falling = f"blocks {named} fall" if len(shown.fallen) > 1 else f"block {named} falls"
-    measured = {"value_mm": shown.moved_m * 1000, "tolerance_mm": trial.limit_m * 1000}
-    return facts.finding(name, f"{falling} {when}", *shown.fallen, **measured)
+    about = {"value_m": shown.moved_m, "limit_m": facts.tolerances.trial.limit_m}
+    return facts.measured(check, f"{falling} {when}", *shown.fallen, **about)
 
 
 def _candidates(facts: SceneFacts) -> Iterator[Finding]:
@@ -303,17 +257,11 @@ def _distractor(facts: SceneFacts) -> Iterator[Finding]:
             yield facts.finding("distractor", message, field=f"candidates[{i}]", found=str(one))
 
 
-def _blocks(facts: SceneFacts) -> Iterator[tuple[str, Block]]:
-    """Each block with its field in the file."""
-    for i, block in enumerate(facts.scene.blocks):
-        yield f"blocks[{i}]", block
-
-
 def _name(order: int) -> str:
     return "the ground" if order == GROUND else f"block {order}"
 
 
-CHECKS: dict[CheckName, Callable[[SceneFacts], Iterable[Finding]]] = {
+CHECKS: dict[str, Callable[[SceneFacts], Iterable[Finding]]] = {
     "size": _size,
     "palette": _palette,
     "layer": _layer,
@@ -321,34 +269,25 @@ CHECKS: dict[CheckName, Callable[[SceneFacts], Iterable[Finding]]] = {
     "hidden": _hidden,
     "overlap": _overlap,
     "floating": _floating,
-    "undeclared dependency": partial(
-        _dependencies,
-        name="undeclared dependency",
-        message="block {} rests on {}, which is not declared",
-    ),
-    "dependency without contact": partial(
-        _dependencies,
-        name="dependency without contact",
-        message="block {} does not rest on {}, which is declared",
-    ),
+    "undeclared dependency": partial(_dependencies, check="undeclared dependency"),
+    "dependency without contact": partial(_dependencies, check="dependency without contact"),
     "unstable step": _unstable_step,
     "unstable": _unstable,
     "candidates": _candidates,
     "distractor": _distractor,
 }
 """The checks of a scene by itself, cheap ones first, and causes before their effects."""
-_NAMES = tuple(CHECKS)
-FORM: tuple[CheckName, ...] = _NAMES[:4]
+FORM = tuple(CHECKS)[:4]
 """Checks without geometry."""
-PHYSICS: tuple[CheckName, ...] = _NAMES[5:11]
+PHYSICS = tuple(CHECKS)[5:11]
 """Overlaps, floating blocks, wrong dependencies, and what does not stand."""
-VERIFIED: tuple[CheckName, ...] = tuple(name for name in CHECKS if name != "palette")
+VERIFIED = tuple(name for name in CHECKS if name != "palette")
 """Checks of a scene that was made here, with its candidates."""
-AUDITED: tuple[CheckName, ...] = (*PHYSICS, "layer", "order", "candidates")
+AUDITED = (*PHYSICS, "layer", "order", "candidates")
 """Checks of a scene made elsewhere."""
 
 
-def findings_of(facts: SceneFacts, names: Iterable[CheckName]) -> Iterator[Finding]:
+def findings_of(facts: SceneFacts, names: Iterable[str]) -> Iterator[Finding]:
     """Yield the findings of these checks, each computed when it is asked for.
 
     Raises SimulationError as the simulator does.
@@ -397,14 +336,11 @@ def check_set(scenes: Sequence[Scene]) -> tuple[Finding, ...]:
     return tuple(found)
 
 
-_COLUMNS = ("scene", "level", "check", "blocks", "value_mm", "tolerance_mm", "message")
-
-
 def findings_csv(findings: Iterable[Finding], levels: Mapping[str, int]) -> str:
     """Return findings as CSV text with a header, sorted by scene; `levels` are by scene."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(_COLUMNS)
+    writer.writerow(("scene", "level", "check", "blocks", "value_mm", "tolerance_mm", "message"))
     for one in sorted(findings, key=lambda finding: finding.scene):
         blocks = " ".join(map(str, one.blocks))
         sizes = ("" if mm is None else f"{mm:.3f}" for mm in (one.value_mm, one.tolerance_mm))

@@ -6,6 +6,7 @@ import contextlib
 import importlib
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from typing import Any, TypeVar
@@ -15,27 +16,27 @@ from phyblock.workers import WorkerDiedError, WorkerPool
 
 T = TypeVar("T")
 R = TypeVar("R")
-_AHEAD, _RAY_AHEAD = 4, 64
-"""Tasks under way, for each process and on a cluster, so that none waits and memory stays flat."""
 _RAY_RETRIES = 5
 
 
+@dataclass(frozen=True)
 class Workers:
-    """Runs pure functions on many inputs, at most `ahead` of them at a time."""
+    """Runs pure functions: `submit(function, task)` starts a job, `result(job)` waits for it.
 
-    def __init__(
-        self, submit: Callable[..., Any], result: Callable[[Any], Any], ahead: int
-    ) -> None:
-        """`submit(function, task)` starts a job, `result(job)` waits for its answer."""
-        self._submit, self._result, self._ahead = submit, result, ahead
+    At most `ahead` jobs are under way, so that no worker waits and memory stays flat.
+    """
+
+    submit: Callable[..., Any]
+    result: Callable[[Any], Any]
+    ahead: int
 
     def map(self, function: Callable[[T], R], tasks: Iterable[T]) -> Iterator[R]:
         """Yield the answers in the order of the tasks."""
         waiting = iter(tasks)
-        running = deque(self._submit(function, task) for task in islice(waiting, self._ahead))
+        running = deque(self.submit(function, task) for task in islice(waiting, self.ahead))
         while running:
-            yield self._result(running.popleft())
-            running.extend(self._submit(function, task) for task in islice(waiting, 1))
+            yield self.result(running.popleft())
+            running.extend(self.submit(function, task) for task in islice(waiting, 1))
 
 
 @contextlib.contextmanager
@@ -50,15 +51,15 @@ def open_workers(jobs: int = 1, ray_address: str | None = None) -> Iterator[Work
         try:
             # A task whose worker dies runs again, which changes nothing: it is pure.
             remote = partial(ray.remote, max_retries=_RAY_RETRIES)
-            yield Workers(lambda f, task: remote()(f).remote(task), ray.get, _RAY_AHEAD)
+            yield Workers(lambda f, task: remote()(f).remote(task), ray.get, ahead=64)
         finally:
             ray.shutdown()
     elif jobs == 1:
-        yield Workers(partial, lambda job: job(), 1)
+        yield Workers(partial, lambda job: job(), ahead=1)
     else:
         with WorkerPool(jobs) as pool:
             try:
-                yield Workers(pool.submit, lambda job: job.result(), jobs * _AHEAD)
+                yield Workers(pool.submit, lambda job: job.result(), ahead=4 * jobs)
             except WorkerDiedError as error:
                 raise PhyblockError("a worker process was killed; nothing was written") from error
             except KeyboardInterrupt:

@@ -190,7 +190,7 @@ def _counts(found: Sequence[Finding], checks: Sequence[str]) -> list[tuple[str, 
     """Each check with the number of scenes that it found something in, and of findings."""
     scenes = Counter(check for _, check in {(one.scene, one.check) for one in found})
     findings = Counter(one.check for one in found)
-    return [(check, scenes[check], findings[check]) for check in checks]  # type: ignore[index]
+    return [(check, scenes[check], findings[check]) for check in checks]
 
 
 _WORST = 15

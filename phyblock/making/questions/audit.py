@@ -21,15 +21,12 @@ from numpy.typing import NDArray
 from phyblock.domain.question import LETTERS, SUBTASKS, Question, QuestionPicture, Subtask
 from phyblock.making.questions.base import stem_of
 from phyblock.making.questions.selection import BALANCE
-from phyblock.sim.pictures import COLOR_RGB, Shot
 from phyblock.sim.question_pictures import changed_pixels, seen
 from phyblock.tracks.baselines import FOLDS, Folds, Guesses
 
 Floats = NDArray[np.float64]
 GUESSABLE = 0.35
 """Accuracy that no probe of a sound set exceeds beyond its interval."""
-_DARKEST_FACE = 60
-_EDGE_STEP = 40
 _FEWEST = 12
 _RIDGE = 4.0
 
@@ -156,11 +153,11 @@ def picture_probe(questions: Sequence[Question], folds: Folds) -> Probe | None:
             known = [q for q in members if folds.is_known(fold, q)]
             if not held_out or len(known) < _FEWEST:
                 continue
+            # The means over the four options are zero, and so is that of what each is worth.
             rows = np.vstack([features[q.id] for q in known])
             worth = np.concatenate([_worth(q) for q in known])
-            centered = rows - rows.mean(axis=0)
-            gram = centered.T @ centered + _RIDGE * np.eye(rows.shape[1])
-            weights = np.linalg.solve(gram, centered.T @ (worth - worth.mean()))
+            gram = rows.T @ rows + _RIDGE * np.eye(rows.shape[1])
+            weights = np.linalg.solve(gram, rows.T @ worth)
             for question in held_out:
                 order = np.argsort(-(features[question.id] @ weights), kind="stable")
                 right += tuple(order[: len(question.answer)]) == question.answer
@@ -169,61 +166,44 @@ def picture_probe(questions: Sequence[Question], folds: Folds) -> Probe | None:
 
 
 def _worth(question: Question) -> Floats:
-    """1 for the right option and 0 for others; in an order, the first is worth most."""
+    """1 for the right option and 0 for others, less the mean; in an order, the first most."""
     worth = np.zeros(len(question.options))
     worth[list(question.answer)] = np.arange(len(question.answer), 0, -1)
-    return worth
+    return np.asarray(worth - worth.mean())
 
 
 def _picture_features(question: Question) -> Floats:
-    """Features of each option's picture beside the other options', shape (options, 2 * features):
-    deviations from their mean in standard deviations, and the absolute values of these.
+    """Features of each option's picture beside the other options', shape (options, features).
+
+    What shows of blocks, its mean color, how much each picture differs from the others, and what
+    it changes in the scene: deviations from the mean of the options in standard deviations, and
+    the absolute values of these less their mean.
     """
     pictures = {picture.label: picture for picture in question.pictures}
     shots = [seen(pictures[letter]) for letter in LETTERS if letter in pictures]
     if not shots:
         return np.empty((0, 0))
-    columns = [_measures(shot) for shot in shots]
-    colors = [_color_shares(shot) for shot in shots]
-    for i, (shot, column) in enumerate(zip(shots, columns, strict=True)):
-        column.append(sum(float(changed_pixels(shot, other).sum()) for other in shots))
-        column.append(sum(float(np.abs(colors[i] - other).sum()) for other in colors))
-    if "scene" in pictures:
-        scene = seen(replace(pictures["scene"], marks=()))
-        shown = _color_shares(scene)
-        for shot, column, color in zip(shots, columns, colors, strict=True):
-            changed = changed_pixels(scene, shot)
-            column += [float(changed.sum()), *_center(changed), float(np.abs(shown - color).sum())]
-    values = np.array(columns)
+    start = [seen(replace(pictures["scene"], marks=()))] if "scene" in pictures else []
+    values = np.array(
+        [
+            [
+                *_extent(shot.block >= 0),
+                *shot.rgb[shot.block >= 0].mean(axis=0),
+                sum(changed_pixels(shot, other).sum() for other in shots),
+                *(number for scene in start for number in _extent(changed_pixels(scene, shot))),
+            ]
+            for shot in shots
+        ],
+        dtype=np.float64,
+    )
     spread = values.std(axis=0)
     steps = (values - values.mean(axis=0)) / np.where(spread > 0, spread, 1.0)
-    return np.hstack([steps, np.abs(steps)])
+    return np.hstack([steps, np.abs(steps) - np.abs(steps).mean(axis=0)])
 
 
-def _measures(shot: Shot) -> list[float]:
-    """Colored area, its center, its extent, brightness and edges of a picture [pixels]."""
-    mask = shot.block >= 0
-    lines = [np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0)]
-    extents = [float(np.ptp(line)) if len(line) else 0.0 for line in lines]
-    gray = np.where(mask, shot.rgb.mean(axis=2), 255.0)
-    edges = sum(int((np.abs(np.diff(gray, axis=axis)) > _EDGE_STEP).sum()) for axis in (0, 1))
-    brightness = float(shot.rgb[mask].mean()) if mask.any() else 0.0
-    return [float(mask.sum()), *_center(mask), *extents, brightness, float(edges)]
-
-
-def _center(mask: NDArray[np.bool_]) -> tuple[float, float]:
-    """Mean row and column of a mask, the picture's middle where it is empty."""
+def _extent(mask: NDArray[np.bool_]) -> list[float]:
+    """Area, mean row and column, and extents of a mask [pixels]; zeros where it is empty."""
     rows, columns = np.nonzero(mask)
     if not len(rows):
-        return mask.shape[0] / 2, mask.shape[1] / 2
-    return float(rows.mean()), float(columns.mean())
-
-
-def _color_shares(shot: Shot) -> Floats:
-    """Shares of the pixels of faces by the block color nearest in hue, shape (colors,)."""
-    pixels = shot.rgb[shot.block >= 0].astype(np.float64)
-    faces = pixels[pixels.max(axis=1) > _DARKEST_FACE]
-    hues = np.array(list(COLOR_RGB.values()), dtype=np.float64)
-    hues /= np.linalg.norm(hues, axis=1, keepdims=True)
-    counts = np.bincount((faces @ hues.T).argmax(axis=1), minlength=len(hues)).astype(np.float64)
-    return np.asarray(counts / max(counts.sum(), 1.0))
+        return [0.0] * 5
+    return [len(rows), *(float(f(line)) for f in (np.mean, np.ptp) for line in (rows, columns))]

@@ -32,7 +32,7 @@ from phyblock.domain.aov import CycleError
 from phyblock.domain.blocks import KIT_PALETTE, Color
 from phyblock.domain.scene import Block, CandidateSet, Scene
 from phyblock.errors import DataError, Problem, SpecError
-from phyblock.making.checks import LEVEL_LIMITS, OURS_IN_HASTE, CheckName, SceneFacts, findings_of
+from phyblock.making.checks import LEVEL_LIMITS, OURS_IN_HASTE, SceneFacts, findings_of
 from phyblock.making.scenes.sketch import Palette, scene_of
 from phyblock.records.line import Line, decode, validated
 
@@ -83,13 +83,6 @@ class Completed:
     notes: tuple[str, ...]
 
 
-_REFUSED: tuple[tuple[CheckName, ...], ...] = (
-    ("overlap", "floating", "order", "candidates"),
-    ("unstable step", "unstable"),
-)
-"""What overlaps or floats falls as well; that is reported once."""
-
-
 def complete(read: ReadScene) -> Completed:
     """Derive a scene, and check that it can be built and stands.
 
@@ -100,18 +93,20 @@ def complete(read: ReadScene) -> Completed:
     scene = derived(read.name, given, read.where)
     offered = None if given.candidates is None else candidate_set(given.candidates)
     facts = SceneFacts(scene, offered, OURS_IN_HASTE)
-    for names in _REFUSED:
-        if findings := tuple(findings_of(facts, names)):
-            hint = "order blocks so that each can be placed, and stands, after those before it"
-            raise DataError(
-                replace(
-                    one.problem,
-                    where=read.where,
-                    message=f"scene {read.name}: {one.message}",
-                    hint=hint if one.check in ("order", "unstable step") else "",
-                )
-                for one in findings
+    # What overlaps or floats falls as well; that is reported once.
+    found = [*findings_of(facts, ("overlap", "floating", "order", "candidates"))]
+    found = found or [*findings_of(facts, ("unstable step", "unstable"))]
+    hint = "order blocks so that each can be placed, and stands, after those before it"
+    if found:
+        raise DataError(
+            replace(
+                one.problem,
+                where=read.where,
+                message=f"scene {read.name}: {one.message}",
+                hint=hint if one.check in ("order", "unstable step") else "",
             )
+            for one in found
+        )
     noted = findings_of(facts, ("size", "hidden"))
     notes = (", ".join(filter(None, (one.message, one.found, one.allowed))) for one in noted)
     return Completed(scene, offered, tuple(notes))
@@ -160,7 +155,8 @@ def read_given(path: Path) -> tuple[ReadScene, ...]:
     """
     scenes: dict[str, ReadScene] = {}
     problems: list[Problem] = []
-    for file in _files(path):
+    files = sorted(path.iterdir()) if path.is_dir() else [path]
+    for file in (one for one in files if one.is_file() and one.suffix in _SUFFIXES):
         try:
             for one in _read(file):
                 if earlier := scenes.get(one.name):
@@ -169,21 +165,12 @@ def read_given(path: Path) -> tuple[ReadScene, ...]:
                 scenes[one.name] = one
         except (DataError, SpecError) as error:
             problems += error.problems
+    if not scenes and not problems:
+        message = "holds no scenes" if path.exists() else "there is no such file or folder"
+        problems.append(Problem(str(path), message, allowed=_ALLOWED))
     if problems:
         raise DataError(problems)
-    if not scenes:
-        raise DataError(Problem(str(path), "holds no scenes", allowed=_ALLOWED))
     return tuple(scenes[name] for name in sorted(scenes))
-
-
-def _files(path: Path) -> list[Path]:
-    if path.is_dir():
-        files = sorted(file for file in path.iterdir() if file.suffix in _SUFFIXES)
-        return [file for file in files if file.is_file()]
-    if not path.is_file() or path.suffix not in _SUFFIXES:
-        message = "is no file of scenes" if path.exists() else "there is no such file or folder"
-        raise DataError(Problem(str(path), message, allowed=_ALLOWED))
-    return [path]
 
 
 def _read(file: Path) -> Iterator[ReadScene]:
