@@ -6,11 +6,13 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from jinja2 import Environment, StrictUndefined
+
 from phyblock.data import VERSION_FILE
 from phyblock.data.questions import StoredQuestion
 from phyblock.data.scenes import StoredScene
 from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
-from phyblock.domain.scene import CandidateSet, Scene
+from phyblock.domain.scene import CandidateSet, Kind, Scene
 from phyblock.errors import Problem
 from phyblock.files import atomic_write, check_free, make_folder, read_text, writing
 from phyblock.making.checks import LEVEL_LIMITS
@@ -28,7 +30,6 @@ often as goals need them, and shows at least 3 % of every block's outline.
 """
 QUESTION_SET_VERSION = 5
 """Raised whenever questions of a name ask something else, so that no results are mixed."""
-_QUANTITIES = ("blocks", "types", "colors", "layers")
 _Tasks = Sequence[tuple[Scene, CandidateSet]]
 
 
@@ -86,43 +87,28 @@ def check_sums(folder: Path) -> tuple[int, tuple[Problem, ...]]:
     return len(lines), tuple(wrong)
 
 
-def _card(template: str, /, **fields: object) -> str:
-    """A card with its fields filled."""
+def _card(template: str, /, **facts: object) -> str:
+    """A card of `cards/`, a Jinja template, with its facts filled in."""
     text = (Path(__file__).parent / "cards" / f"{template}.md").read_text(encoding="utf-8")
-    return text.format(**fields) if fields else text
+    environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    return environment.from_string(text).render(simulator=other_engine(), **facts) + "\n"
 
 
 def scene_card(name: str, tasks: _Tasks, command: str, palette: Palette) -> str:
     """Return the Markdown card of scenes that `command` generated."""
-    by_level: dict[int, list[Scene]] = {}
-    for scene, _ in tasks:
-        for level in scene.levels:
-            by_level.setdefault(level, []).append(scene)
-    levels = dict(sorted(by_level.items()))
-    base, sizes = sum(_is_base(scene) for scene, _ in tasks), {len(offered) for _, offered in tasks}
-    owner = {"kit": "the official kit's", "full": "all"}[palette]
-    limits = (
-        f"    level {level}: {one.least_blocks} to {one.most_blocks} blocks, "
-        f"up to {one.most_layers} layers"
-        for level, one in LEVEL_LIMITS.items()
-        if level in levels
-    )
+    scenes, sizes = [scene for scene, _ in tasks], {len(offered) for _, offered in tasks}
+    by_level = {n: [one for one in scenes if n in one.levels] for n in LEVEL_LIMITS}
     text = _card(
         "scenes",
         name=name,
-        count=len(tasks),
-        levels=", ".join(f"{len(some)} of level {level}" for level, some in levels.items()),
-        shared=sum(len(scene.levels) > 1 for scene, _ in tasks),
-        base=base,
-        varied=len(tasks) - base,
         command=command,
-        simulators=f", by {engine}" if (engine := other_engine()) else "",
-        palette=f"{owner} {len(PALETTES[palette])} pairs of type and color",
         version=SCENE_SET_VERSION,
-        limits="\n".join(limits),
-        heads=" | ".join(f"{quantity}, mean | most" for quantity in _QUANTITIES),
-        rules="|".join("---|---" for _ in _QUANTITIES),
-        rows="\n".join(_scene_row(level, some) for level, some in levels.items()),
+        count=len(scenes),
+        shared=sum(len(scene.levels) > 1 for scene in scenes),
+        base=_bases(scenes),
+        levels=[(n, LEVEL_LIMITS[n], _row(some)) for n, some in by_level.items() if some],
+        palette=palette,
+        pairs=len(PALETTES[palette]),
         candidates=" to ".join(map(str, sorted({min(sizes), max(sizes)}))),
     )
     return text + _card("scenes_file")
@@ -134,49 +120,50 @@ def completed_card(name: str, count: int, command: str) -> str:
     return text + _card("scenes_file")
 
 
-def _is_base(scene: Scene) -> bool:
-    return scene.parents == (scene.id,)
+def _bases(scenes: Sequence[Scene]) -> int:
+    return sum(scene.parents == (scene.id,) for scene in scenes)
 
 
-def _scene_row(level: int, scenes: Sequence[Scene]) -> str:
+def _row(scenes: Sequence[Scene]) -> list[str]:
+    """Numbers of scenes and base scenes; mean and most of blocks, types, colors and layers."""
     counts = [
-        (
-            len(scene),
-            len({block.type for block in scene.blocks}),
-            len({block.color for block in scene.blocks}),
-            max(scene.graph.layers),
-        )
-        for scene in scenes
+        (len(one), *(len({kind[i] for kind in _kinds(one)}) for i in (0, 1)), max(one.graph.layers))
+        for one in scenes
     ]
-    cells = [str(level), str(len(scenes)), str(sum(map(_is_base, scenes)))]
+    cells = [str(len(scenes)), str(_bases(scenes))]
     for column in zip(*counts, strict=True):
         cells += [f"{sum(column) / len(column):.1f}", str(max(column))]
-    return f"| {' | '.join(cells)} |"
+    return cells
+
+
+def _kinds(scene: Scene) -> set[Kind]:
+    return {block.kind for block in scene.blocks}
 
 
 def question_card(name: str, scenes_name: str, questions: Sequence[Question], command: str) -> str:
     """Return the Markdown card of questions about the scenes of a set, made by `command`."""
-    by_subtask = [[q for q in questions if q.subtask == subtask] for subtask in SUBTASKS]
+    by_subtask = {s: [q for q in questions if q.subtask == s] for s in SUBTASKS}
     return _card(
         "questions",
         name=name,
         scenes_name=scenes_name,
+        command=command,
         count=len(questions),
         scenes=len({question.scene.id for question in questions}),
-        subtasks=sum(map(bool, by_subtask)),
-        made_by=command,
-        simulators=f", with {engine}," if (engine := other_engine()) else "",
-        rows="\n".join(map(_question_row, filter(None, by_subtask))),
+        rows=[(s, SUBTASK_NAMES[s], *_shares(some)) for s, some in by_subtask.items() if some],
     )
 
 
-def _question_row(questions: Sequence[Question]) -> str:
-    subtask, count = questions[0].subtask, len(questions)
+def _shares(questions: Sequence[Question]) -> list[object]:
+    """Numbers of questions, scenes and wordings; shares of the letters, and of the answer that is
+    right most often, where options are texts.
+    """
+    count = len(questions)
     letters = Counter(question.answer[0] for question in questions)
     texts = Counter(question.options[question.answer[0]] for question in questions)
-    scenes = {question.scene.id for question in questions}
-    wordings = {question.wording for question in questions}
-    shares = [f"{letters[i] / count:.0%}" for i in range(len(LETTERS))]
     most = "" if "<img1>" in texts or "place A" in texts else f"{max(texts.values()) / count:.0%}"
-    cells = [subtask, SUBTASK_NAMES[subtask], count, len(scenes), len(wordings), *shares, most]
-    return f"| {' | '.join(map(str, cells))} |"
+    return [
+        *(count, len({one.scene.id for one in questions}), len({one.wording for one in questions})),
+        *(f"{letters[i] / count:.0%}" for i in range(len(LETTERS))),
+        most,
+    ]
