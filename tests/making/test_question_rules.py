@@ -15,9 +15,8 @@ from phyblock.domain import LETTERS, Block, BlockType, Color, QuestionPicture, S
 from phyblock.domain.blocks import SHAPES, Euler
 from phyblock.domain.question import Mark
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, turned_form
-from phyblock.making.questions.affordance import is_on_face, stays_at
 from phyblock.making.questions.base import Draft, UnfairError, four_alike, ranks_among
-from phyblock.making.questions.counterfactual import resting_on
+from phyblock.making.questions.dynamics import is_on_face, resting_on, stays_at
 from phyblock.making.questions.names import (
     SHAPE_WORDS,
     Feature,
@@ -26,8 +25,13 @@ from phyblock.making.questions.names import (
     resolve_one,
 )
 from phyblock.making.questions.properties import layers_of, sure_blocks
-from phyblock.making.questions.relations import LENGTHS
-from phyblock.making.questions.rotation import AXIS_TURNS, axis_turns, put_beside, tipped_over
+from phyblock.making.questions.relations import (
+    AXIS_TURNS,
+    LENGTHS,
+    axis_turns,
+    put_beside,
+    tipped_over,
+)
 from phyblock.making.questions.selection import BALANCE, even_letters, keeping_odds
 from phyblock.making.questions.structures import is_sure, lowered, with_annex
 from phyblock.making.questions.views import ViewpointMaker

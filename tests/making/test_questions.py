@@ -18,7 +18,7 @@ from phyblock.errors import DataError, StoreError
 from phyblock.making.files import question_card, write_questions
 from phyblock.making.questions.audit import SubtaskAudit, audit_questions, duplicates_of
 from phyblock.making.questions.base import stem_of
-from phyblock.making.questions.counterfactual import OUTCOME_TEXTS
+from phyblock.making.questions.dynamics import OUTCOME_TEXTS
 from phyblock.making.questions.production import PER_SUBTASK, make_questions, problem_of
 from phyblock.making.questions.sight import LEAST_PIXELS
 from phyblock.making.workers import open_workers

@@ -19,13 +19,15 @@ from phyblock.domain.question import (
 )
 from phyblock.domain.scene import Block, Scene
 from phyblock.errors import DataError, PhyblockError, Problem
-from phyblock.making.questions.affordance import AffordanceMaker
 from phyblock.making.questions.base import Draft, Maker, StaticMaker, pick, shuffled
-from phyblock.making.questions.counterfactual import CounterfactualMaker
-from phyblock.making.questions.predictive import PredictiveMaker
+from phyblock.making.questions.dynamics import AffordanceMaker, CounterfactualMaker, PredictiveMaker
 from phyblock.making.questions.properties import PropertyMaker, SizeMaker, TallyMaker
-from phyblock.making.questions.relations import DependencyMaker, DistanceMaker, PositionMaker
-from phyblock.making.questions.rotation import RotationMaker
+from phyblock.making.questions.relations import (
+    DependencyMaker,
+    DistanceMaker,
+    PositionMaker,
+    RotationMaker,
+)
 from phyblock.making.questions.selection import even_letters, select
 from phyblock.making.questions.views import OrderingMaker, ViewpointMaker
 from phyblock.making.workers import Workers
