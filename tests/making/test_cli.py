@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import csv
+import importlib.util
 import io
 import json
+import os
+import signal
+import subprocess
+import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,8 +19,10 @@ from click.testing import CliRunner, Result
 from PIL import Image
 
 from phyblock.cli.main import phyblock
-from phyblock.errors import DataError, StoreError
+from phyblock.errors import DataError, InputError, StoreError
 from phyblock.files import LIST
+from phyblock.making.scenes.production import Share, produce
+from phyblock.making.workers import open_workers
 from phyblock.resources import bundled
 from phyblock.sim.engine import other_engine
 from tests.workspace import SCENES, tower
@@ -205,3 +212,72 @@ def test_an_audit_says_what_it_finds(asked: Path, tmp_path: Path) -> None:
     done = vqa("audit", tmp_path, "--data", asked)
     assert "co-009: asks what an earlier question asks" in done.stdout
     assert "9 questions, " in done.stdout
+
+
+# Workers
+
+SHARES = (Share("1", 3, 1), Share("2", 4, 2), Share("3", 2, 1))
+HAS_RAY = importlib.util.find_spec("ray") is not None
+
+
+def killed_once(mark: str) -> int:
+    """Kill the process that works on it, but for the second time."""
+    try:
+        Path(mark).touch(exist_ok=False)
+    except FileExistsError:
+        return os.getpid()
+    os.kill(os.getpid(), signal.SIGKILL)
+    raise AssertionError
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not HAS_RAY, reason="Ray is not installed: pip install 'phyblock[ray]'")
+@pytest.mark.filterwarnings("ignore")
+def test_a_killed_worker_loses_and_doubles_nothing(tmp_path: Path) -> None:
+    with open_workers() as workers:
+        expected = list(produce(3, "kit", SHARES, workers))
+    with open_workers(2, "local") as workers:
+        marks = [str(tmp_path / str(number)) for number in range(3)]
+        assert len(list(workers.map(killed_once, marks))) == 3
+        assert list(produce(3, "kit", SHARES, workers)) == expected
+
+
+def test_no_ray_and_no_cluster_are_told() -> None:
+    with pytest.raises(InputError, match="--ray"), open_workers(2, "127.0.0.1:1"):
+        pass
+
+
+# A task says its process and stays; the first line tells that both are at work. Workers know the
+# functions of modules, not those of the program itself.
+TASKS = """
+import time, os
+
+def stay(n):
+    os.write(1, f"{os.getpid()}\\n".encode())
+    time.sleep(60)
+"""
+WORK = """
+import sys
+from phyblock.making.workers import open_workers
+from tasks import stay
+
+try:
+    with open_workers(2) as workers:
+        list(workers.map(stay, range(2)))
+except KeyboardInterrupt:
+    sys.exit(130)
+"""
+
+
+def test_workers_end_at_ctrl_c(tmp_path: Path) -> None:
+    for name, text in (("work.py", WORK), ("tasks.py", TASKS)):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    words = [sys.executable, str(tmp_path / "work.py")]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "start_new_session": True}
+    with subprocess.Popen(words, **pipes) as process:
+        assert int(process.stdout.readline()) != int(process.stdout.readline())
+        os.killpg(process.pid, signal.SIGINT)
+        # The workers hold the pipe open: it ends when they have.
+        _, errors = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert b"Traceback" not in errors
