@@ -1,4 +1,4 @@
-"""Public names of `phyblock`, for programs and notebooks: nothing is spent unasked."""
+"""Public names of `phyblock`, for programs and notebooks; nothing is spent without consent."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ class Picture:
     png: bytes
 
     def save(self, path: str | Path) -> Path:
-        """Write the PNG in place of what is there; StoreError where that cannot be."""
+        """Write the PNG, replacing a file that is there; StoreError if that fails."""
         write_named(Path(path), self.png)
         return Path(path)
 
@@ -119,8 +119,8 @@ def render(
 ) -> Picture:
     """Draw a scene as models see it: goal and numbered candidates, or one of the two.
 
-    `size_px` is the side of each square [pixels]. Raises SpecError for a view, background or size
-    that there is not and for arguments of another kind, DataError for a scene without blocks.
+    `size_px` is the side of each square [pixels]. Raises SpecError for an unknown view, background
+    or size, and for arguments of another type, DataError for a scene without blocks.
     """
     try:
         style = PictureStyle.from_view(view, size_px, background)
@@ -198,7 +198,7 @@ class Suite:
 @_checked
 def load_suite(suite: Place, *overrides: str) -> Suite:
     """Read a suite: a YAML file, or the name of a bundled one; `overrides` are `KEY=VALUE` texts,
-    as of `--set`.
+    as for `--set`.
 
     Raises SpecError with all that is wrong, each with its file, line and field.
     """
@@ -240,8 +240,7 @@ def score(
 ) -> PlanScore:
     """Read a reply to full planning and score its plan against a scene, by the AOV graph.
 
-    Raises SpecError for a setting, matcher or parser that there is not, and for arguments of
-    another kind.
+    Raises SpecError for an unknown setting, matcher or parser, and for arguments of another type.
     """
     parsed = parse_plan(reply, len(scene.candidates), parser)
     scorer = AssemblyScorer(scene.scene, scene.candidates, (setting,))
@@ -273,7 +272,7 @@ def run_suite(
     retry_failed: bool = False,
     yes: bool = False,
 ) -> Run:
-    """Run a suite, or go on with its run where it stopped, and load the run.
+    """Run a suite, or continue its run where it stopped, and load the run.
 
     The arguments are the options of `phyblock run`: `models` replaces the suite's, `limit` keeps so
     many scenes, `out` is the run's folder (`results/SUITE-DIGEST`). A model that bills is asked
@@ -329,7 +328,7 @@ def remarks_on(result: RunResult, folder: Path | str) -> list[str]:
 
 
 _NAP_S = 0.1
-"""How long a signal may wait to be noticed that the system gives to another thread."""
+"""Longest delay until a signal that the system gives to another thread is noticed [s]."""
 
 
 def completed(

@@ -1,9 +1,9 @@
 """A run as one file that others can score again: its manifest, its records and their digests.
 
-A bundle is a ZIP archive of three members, the same bytes for the same run. It holds no prompts, no
-pictures, of paths of this machine the last part, no address of a server, and of a failed request
-its kind and status alone. Whoever sends one may mean harm: members are known by name and bounded in
-size, and nothing is read or written where an archive or a manifest says.
+A bundle is a ZIP archive of three members, the same bytes for the same run. It holds no prompts,
+pictures or addresses of servers, only the last part of local paths, and only the kind and status of
+failed requests. A bundle may be hostile: members are known by name and bounded in size, and no path
+in an archive or a manifest is ever read or written.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ from phyblock.tracks.base import simulating
 BUNDLE_FILE = "bundle.zip"
 """Its name in the run's folder, unless another place is named."""
 ABOUT = "bundle.json"
-"""The phyblock that made the bundle, and digests of the other members."""
+"""Member with the version of phyblock that made the bundle, and digests of the others."""
 _MB = 1024 * 1024
 MEMBERS = {MANIFEST: 2 * _MB, RECORDS: 512 * _MB, ABOUT: _MB}
 """Members in their order, with their largest sizes [bytes]."""
@@ -58,14 +58,14 @@ _BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, Runtim
 _SHOWN = ("prompt", "pictures", "examples")
 """Parts of a track's identity that say what models were shown."""
 _EARLIEST, _CLOCKS = datetime(2025, 1, 1, tzinfo=UTC), timedelta(days=1)
-"""Times of records lie after the one, and in the future by no more than clocks differ."""
+"""Bounds of times in records: the earliest one, and how far clocks may differ."""
 _HINT = "ask for the bundle again, or make it again with phyblock bundle"
 _NEVER_VERIFIED = (
     "The bytes of pictures: what they are drawn from is compared.",
     "That the models gave these replies, when, how fast and at what cost: no bundle can show it.",
 )
 _SENT = frozenset({"params", "sampling"})
-"""Keys of what is sent to a model as it stands, where `/no_think` is a word."""
+"""Keys of values that are sent to a model unchanged, where `/no_think` is a word and no path."""
 _PATH = re.compile(
     r"^([\w.-]+/(?=/|~/|[A-Za-z]:[\\/]))?(?:~/|/.*/|[A-Za-z]:[\\/])(?:.*[\\/])?([^\\/\n]+)[\\/]*$"
 )
@@ -225,7 +225,7 @@ class _Prompts:
                     self.unverified.append(f"{title}: the prompts after the first of an episode.")
 
     def made(self, record: Record) -> bool:
-        """True if the prompt of a record is what its item is asked by, as far as can be told."""
+        """True if the prompt of a record is its item's, as far as can be checked."""
         turns, at = record.asked_turns, (record.way.shown.key, record.track)
         prompt = turns[0].prompt if turns else record.prompt
         if prompt is None or at not in self._tracks:
@@ -243,12 +243,12 @@ class _Prompts:
 
 
 def _name_of(prompt: object) -> object:
-    """The name of a prompt, of what a manifest says of it."""
+    """Return the name of a prompt in a manifest."""
     return prompt.get("name") if isinstance(prompt, Mapping) else prompt
 
 
 def _sent(prompt: SentPrompt) -> tuple[object, ...]:
-    """All that is known of a prompt without its pictures' bytes."""
+    """Return the fields of a prompt that do not depend on the bytes of its pictures."""
     labels = tuple(image.label for image in prompt.images)
     return prompt.template, prompt.version, prompt.messages, prompt.examples, labels
 
@@ -306,7 +306,7 @@ def _without_paths(value: Any) -> Any:
 
 
 def portable(record: Record) -> Record:
-    """Return a record without what a server of this machine said, with plain names of models."""
+    """Return a record without messages of servers and without local paths of models."""
     fields = record.fields()
     if fields.get("error") is not None:
         fields["error"]["message"] = ""
@@ -319,7 +319,7 @@ def portable(record: Record) -> Record:
 def unpack(path: Path, folder: Path) -> str:
     """Write the members of the bundle at `path` into `folder`; return the phyblock that made it.
 
-    Raises StoreError for what is no bundle, or was changed after it was made.
+    Raises StoreError if it is no bundle, or was changed after it was made.
     """
     try:
         with open_regular(path) as file:

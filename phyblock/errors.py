@@ -64,7 +64,7 @@ def reason_of(error: BaseException) -> str:
 
 
 def _plain(text: str) -> str:
-    """A text for a terminal: no escape codes, no halves of characters, no end of garbage."""
+    """Return a text for a terminal: no escape codes, no lone surrogates, bounded in length."""
     if len(text) > _LONGEST_PART:
         text = f"{text[:_LONGEST_PART]}... ({len(text):,} characters)"
     if text.isprintable():
@@ -107,8 +107,8 @@ class StoreError(InputError):
 
 
 Sent = Literal["no", "lost", "maybe", "answered"]
-"""How far a call came that failed: nothing was sent; the connection was lost; it was sent and not
-answered in time, or it is not known; the server answered.
+"""Progress of a call that failed: nothing was sent; the connection was lost; it was sent and not
+answered in time, or that is unknown; the server answered.
 """
 
 

@@ -194,7 +194,7 @@ def _damaged(where: str, why: str) -> Problem:
 
 @contextlib.contextmanager
 def writing(path: Path, hint: str = "") -> Iterator[None]:
-    """Turn what the disk refuses while `path` is written into a StoreError that names it.
+    """Turn OSErrors while `path` is written into a StoreError that names it.
 
     `path` is the file, or the folder where many files are written; `hint` says what to do.
     """
@@ -246,7 +246,7 @@ def atomic_write(path: Path, data: bytes | str | Iterable[bytes], *, sync: bool 
 
 
 def sync_folder(path: Path) -> None:
-    """Wait until the names in a folder are on disk; raises OSError where the disk refuses."""
+    """Wait until the names in a folder are on disk; raises OSError if that fails."""
     number = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(number)
@@ -279,7 +279,7 @@ def append_whole(number: int, data: bytes, *, sync: bool = False) -> None:
 
 
 def write_named(path: Path, data: bytes | str | Iterable[bytes]) -> None:
-    """Write the very file that a person named, in place of what is there, and folders above it.
+    """Write the file that a person named, replacing one that is there, and the folders above it.
 
     A link is followed, as they made it. Raises StoreError where the disk refuses, and for what is
     there and no regular file: to replace a device would take it from the whole machine.

@@ -18,7 +18,7 @@ def hex_digest(content: bytes | str) -> str:
 
 
 def drawn_bytes(*words: object) -> bytes:
-    """Return bytes that words decide, evenly spread: to sort by, or to draw a number from."""
+    """Return evenly spread bytes that depend on the words alone, to sort by or to draw from."""
     return hashlib.sha256("|".join(map(str, words)).encode()).digest()
 
 

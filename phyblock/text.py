@@ -1,4 +1,4 @@
-"""Text that others wrote (names, replies, paths), made harmless where we show or store it."""
+"""Text that others wrote (names, replies, paths), made harmless before it is shown or stored."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def well_formed(text: str) -> str:
 def one_line(text: str) -> str:
     """Return the text on one line: a space for each newline and control character.
 
-    Half a character, as it stands for a byte of a file name that is not UTF-8, becomes U+FFFD.
+    A lone surrogate, which stands for a byte of a file name that is not UTF-8, becomes U+FFFD.
     Marks that turn the direction of writing go, too: they would change what stands beside them.
     """
     if text.isprintable():

@@ -1,4 +1,4 @@
-"""`phyblock models`: what can be asked, at what price, and whether it answers."""
+"""`phyblock models`: the models with prices and keys, and a check that one answers."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def _row(name: str, config: ModelConfig) -> tuple[str, ...]:
 
 
 def _usd(dollars: Iterable[float]) -> str:
-    """The price of short prompts, and that of the longest where it is another."""
+    """Return the price of short prompts, and that of the longest if it differs."""
     shown = [f"{usd:.3f}".rstrip("0").rstrip(".") for usd in dollars]
     return _TIERS.join(dict.fromkeys((*shown[:1], *shown[-1:])))
 
@@ -100,7 +100,7 @@ def _usd(dollars: Iterable[float]) -> str:
 @yes_option
 @click.pass_obj
 def check(known: Mapping[str, ModelConfig], name: str, yes: bool) -> int:
-    """Make one tiny call to the model NAME, to each of its servers, and say what came back."""
+    """Make one tiny call to each server of the model NAME, and print the answer."""
     names = [*baseline_names(), *known]
     if name not in names:
         hint = did_you_mean(name, names) or "list them: phyblock models"

@@ -49,7 +49,7 @@ class Verbs(click.Group):
 
 
 class UserPath(click.Path):
-    """A path with `~` for the home folder, and never empty, as of a variable that is not set."""
+    """A path with `~` for the home folder; an empty one, as from an unset variable, is refused."""
 
     def __init__(self, *, path_type: type[Any] = Path, **options: Any) -> None:
         super().__init__(path_type=path_type, **options)

@@ -75,10 +75,10 @@ def play(
     exact: bool,
     no_browser: bool,
 ) -> int:
-    """Answer SUITE yourself, in a browser: what a model is sent, with a click for a word.
+    """Answer SUITE yourself, in a browser: the pictures that models get, and clicks for answers.
 
-    Answers are records of the model human:NAME in a run folder. The same command again goes on
-    where it stopped.
+    Answers are records of the model human:NAME in a run folder. Give the same command again to
+    continue where it stopped.
     """
     from phyblock.api import load_run, load_suite
 

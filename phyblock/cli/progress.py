@@ -1,4 +1,4 @@
-"""A run while it goes on: a bar a model in a terminal, a line now and then elsewhere."""
+"""Progress of a run: a bar for each model in a terminal, a line now and then elsewhere."""
 
 from __future__ import annotations
 
@@ -168,7 +168,7 @@ class ProgressView:
         return sum(tally.cached for tally in self._tallies.values())
 
     def _print(self, line: str, style: str = "") -> None:
-        """Print a line; one that nobody can read any more must not end calls that cost money."""
+        """Print a line; a closed output must not end calls that cost money."""
         with contextlib.suppress(OSError):
             self._console.print(Text(one_line(line), style=style))
 

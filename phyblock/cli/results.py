@@ -46,8 +46,8 @@ def report(
 ) -> None:
     """Write tables and report.html of the folder RUN again; with --print, print its tables.
 
-    Takes numbers from run.yaml and records.jsonl alone: no model, no network. Draws scenes from the
-    data set, where it is at hand.
+    Uses only run.yaml and records.jsonl: no model, no network. Draws scenes from the data set,
+    where it is at hand.
     """
     console = make_console()
     if not prints:
@@ -132,9 +132,9 @@ def compare(
 ) -> None:
     """Compare the models of the folder RUN with one another, or those of RUN with OTHER's.
 
-    Pairs samples of the same scene or question and seed, and tests them by a t test that knows
-    which scenes share base scenes. Shows p values with Holm's correction, and the difference that
-    each test could have found.
+    Pairs samples of the same scene or question and seed, and tests them by a t test that accounts
+    for scenes that share base scenes. Shows p values with Holm's correction, and the difference
+    that each test could have found.
     """
     from phyblock.results.compare import (
         compare_models,
@@ -186,8 +186,8 @@ def figures(
     no_title: bool,
     out: Path | None,
 ) -> None:
-    """Draw figures of the folder RUN for a paper: PDF and SVG whose text is text, PNG for slides,
-    and captions as plain text and as LaTeX floats.
+    """Draw figures of the folder RUN for a paper: PDF and SVG with real text, PNG for slides, and
+    captions as plain text and LaTeX floats.
 
     Draws all figures, unless you name some with --only. Leaves out figures that the run has no
     numbers for.
@@ -280,8 +280,7 @@ def bundle(run: Path, out: Path | None) -> None:
     """Write the folder RUN as one file: manifest, records, digests.
 
     Leaves out keys, pictures, prompts, addresses of servers, and all but the last part of paths of
-    this machine. Keeps what models wrote, and what they were sent beside the prompt. `phyblock
-    verify` scores it again.
+    this machine. Keeps replies and sampling parameters. `phyblock verify` scores it again.
     """
     from phyblock.bundle import bundle_run
 

@@ -1,4 +1,4 @@
-"""`phyblock run` and `phyblock score`: asking models, and judging stored replies again."""
+"""`phyblock run` and `phyblock score`: call models, and score stored replies again."""
 
 from __future__ import annotations
 
@@ -86,8 +86,8 @@ def run(
 ) -> int:
     """Run SUITE: a YAML file, or the name of a bundled suite.
 
-    Keeps every record as it comes. Give the same command again to continue where it stopped;
-    nothing is asked twice.
+    Keeps every record as it comes. Give the same command again to continue where it stopped; no
+    call is repeated.
     """
     from phyblock.api import completed, load_suite
 
@@ -129,7 +129,7 @@ def run(
 
 
 def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressView) -> int:
-    """Print how a run ended, what it cost and how to go on; return the exit code."""
+    """Print how a run ended, its cost and how to continue; return the exit code."""
     from phyblock.api import remarks_on
 
     for remark in remarks_on(result, shown_path(folder)):
@@ -154,7 +154,7 @@ def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressV
 
 
 def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> None:
-    """Print what each model would take, the sum, and where prices are from."""
+    """Print the calls, tokens and cost of each model, their sums, and the sources of prices."""
     items = [counted(len(track.items), kind_of(track.name).item) for track in plan.tracks]
     facts = [f"{', '.join(items)} of {plan.dataset.name}", counted(len(plan.suite.seeds), "seed")]
     if len(plan.variants) > 1:

@@ -82,7 +82,7 @@ def validate(files: tuple[Path, ...], sets: tuple[str, ...], models_file: str | 
     """Check FILES: suites (or names of bundled ones) and models files, data set folders, official
     checkouts.
 
-    Shows all problems of all files, and exits with 2 when there are any.
+    Shows all problems of all files; exits with 2 if there are any.
     """
     console = make_console()
     problems: list[Problem] = []
@@ -148,7 +148,7 @@ def cache() -> None:
 
 @cache.command()
 def stats() -> None:
-    """Show how many replies the cache holds of each model, and how large its file is."""
+    """Show the number of cached replies of each model, and the size of the file."""
     from phyblock.models import ReplyCache
 
     console = make_console()

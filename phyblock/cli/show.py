@@ -37,11 +37,10 @@ _STYLES = {"plain": "", "good": "green", "bad": "red"}
 )
 @data_option
 def show(run: Path, sample: str, gif: Path | None, size: int, data: Path | None) -> None:
-    """Show SAMPLE of the folder RUN: prompt, reply, what was read in it, and the verdict of each
-    step, wrong ones too.
+    """Show SAMPLE of the folder RUN: prompt, reply, what was parsed, and the verdict of each step.
 
-    SAMPLE is as in records.jsonl (TRACK/MODEL/ITEM/sSEED); a part of it will do where only one
-    sample has it.
+    SAMPLE is as in records.jsonl (TRACK/MODEL/ITEM/sSEED); a part that only one sample has is
+    enough.
     """
     from phyblock.files import write_named
     from phyblock.tracks import kind_of
