@@ -94,7 +94,7 @@ class StoredPicture(Line, extra="forbid"):
     swap: dict[str, StoredKind] = Field(default_factory=dict)
     """Kinds of blocks that differ from the scene, by order."""
     add: Annotated[tuple[StoredBlock, ...], Field(min_length=1, max_length=MAX_BLOCKS)] = ()
-    """Whole blocks that the scene does not have."""
+    """Blocks that the scene does not have, as whole entries."""
     marks: Annotated[tuple[StoredMark, ...], Field(min_length=1, max_length=MAX_BLOCKS)] = ()
     """Places."""
     framed: Literal[True] | _Framed = ()
@@ -214,7 +214,7 @@ class StoredQuestion(Line, extra="forbid"):
     colors: dict[str, Color] = Field(default_factory=dict)
     """Colors of blocks that are recolored, by order; left out where none is."""
     background: BackgroundName | None = None
-    """Ground of all its pictures; left out where a run's own is drawn, as in older sets."""
+    """Background of all its pictures; missing where the run's own is drawn, as in older sets."""
     pictures: Annotated[tuple[StoredPicture, ...], Field(min_length=1, max_length=_MOST_PICTURES)]
     """Its pictures."""
     evidence: dict[str, Any] = Field(default_factory=dict)

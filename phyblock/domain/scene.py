@@ -9,9 +9,9 @@ from phyblock.domain.aov import AOVGraph
 from phyblock.domain.blocks import BlockType, Color, Euler, orientation_class
 
 Kind = tuple[BlockType, Color]
-"""What setting B compares: type and color."""
+"""Key of setting B: type and color."""
 Look = tuple[BlockType, Color, tuple[float, ...]]
-"""What setting A compares: type, color, and orientation up to the block's own symmetry."""
+"""Key of setting A: type, color, and orientation up to the block's own symmetry."""
 
 
 class Oriented:

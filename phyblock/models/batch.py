@@ -34,7 +34,7 @@ T = TypeVar("T")
 
 _FIRST_PAUSE_S = 5.0
 _QUIET_S = 30.0
-"""A draft that nothing came into for so long is sent, though more was expected."""
+"""Time after which a draft that gets no more requests is sent, though more were expected [s]."""
 _CLOCKS_APART_S = 3600.0
 _TIME = "%Y-%m-%dT%H:%M:%SZ"
 

@@ -40,10 +40,10 @@ _LARGEST_RESULTS_BYTES = 1024**3
 class BatchStatus:
     """The state of a batch, as its provider says.
 
-    A `refused` batch asked nothing of anyone, of a `cancelled` one some was not asked. `words` are
-    its own, with counts and errors; `results` are the addresses of the answers. `token` is the name
-    that we gave it, None where the provider does not tell. `total` counts requests, 0 where it does
-    not say; `created_s` is a Unix time.
+    No request of a `refused` batch was answered; a `cancelled` one may lack some answers. `words`
+    are the provider's, with counts and errors; `results` are the addresses of the answers. `token`
+    is the name that we gave it, None where the provider does not tell. `total` counts requests, 0
+    where it does not say; `created_s` is a Unix time.
     """
 
     id: str

@@ -242,13 +242,14 @@ _is_quiet = False
 
 
 def be_quiet() -> None:
-    """Keep litellm from printing: for a program of which phyblock is the whole, as its commands."""
+    """Keep litellm from printing, in programs that consist of phyblock alone, such as its
+    commands."""
     global _is_quiet
     _is_quiet = True
 
 
 def known_providers(config: ModelConfig) -> frozenset[str]:
-    """Return providers of which a model's is one, if it is known; else all that are known.
+    """Return known providers, among them that of the model if it is known.
 
     litellm is imported only where its map has neither the model nor another of its provider.
     """

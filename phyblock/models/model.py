@@ -28,14 +28,14 @@ from phyblock.models.servers import Server, Servers
 from phyblock.records.record import Call, Reply
 
 _SCHEMA_PROVIDERS = ("predibase", "fireworks_ai", "lm_studio", "nebius", "databricks")
-"""Providers of which litellm knows that all their models take a schema."""
+"""Providers whose models, as litellm knows, all accept a schema."""
 
 EventKind = Literal["retry", "batch"]
 
 
 @dataclass(frozen=True)
 class ModelEvent:
-    """Something a user may want to see while a model works.
+    """An event of a model that a user may want to see.
 
     `retry`: a request failed, with `status` if the server gave one, and is sent again after
     `wait_s`; `batch`: one was sent, is waited for or has ended. `message` is safe to show.

@@ -1,4 +1,4 @@
-"""Recorded replies and baselines in the place of a model, and raw replies of providers.
+"""Recorded replies and baselines that answer instead of a model, and raw replies of providers.
 
 Known are the shapes of the official outputs: chat completions, Anthropic messages, Gemini responses
 (as the REST API and as its Python client write them), and a text under `predict`, `text` or

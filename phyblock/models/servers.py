@@ -46,7 +46,8 @@ class Server:
 
 
 class Servers:
-    """Chooses among the servers of a model; asyncio, one loop. `tell` hears what befalls them."""
+    """Chooses among the servers of a model; asyncio, one loop. `tell` is called with what happens
+    to them."""
 
     def __init__(
         self, servers: Sequence[Server], policy: RetryPolicy, tell: Callable[[str], None]
@@ -129,7 +130,7 @@ class Servers:
         return True
 
     def pause(self, server: Server, error: RetryableError, wait_s: float) -> None:
-        """Ask a server that says that it has too much to do no more for a while."""
+        """Stop using a server that reports overload, for a while."""
         if error.status in _TOO_MUCH:
             until_s = self._policy.clock.now() + wait_s
             server.rests_until_s = max(server.rests_until_s, until_s)

@@ -600,7 +600,8 @@ def sensitivity_frame(run: Run) -> pd.DataFrame:
 
 def _scores(run: Run, what: Comparable) -> Iterator[tuple[str, Floats, Clusters]]:
     """Yield each model with its scores by the main measure, (items, seeds, variants), and the base
-    scenes of these items: those that it has in every way of asking. Models may have different ones.
+    scenes of these items: those that it answered under every condition. Models may have different
+    ones.
     """
     suite, parents = run.design.suite, base_scenes(run)
     sides = [Side(name, name, run) for name in run.design.model_names]

@@ -303,7 +303,7 @@ def cost(run: Run, *, track: str) -> Figure | None:
 def sensitivity(run: Run, *, track: str) -> Figure | None:
     """A panel a factor, a row a model, dots for shift and single items; None where nothing varies.
 
-    What differs between items is left out: it is an order larger, and no way of asking.
+    The spread between items is left out: it is an order of magnitude larger, and no factor.
     """
     table = sensitivity_frame(run)
     table = table[(table["track"] == track) & (table["factor"] != ITEMS)]

@@ -1,4 +1,4 @@
-"""Tables: frames with the way in which people read them, as text, CSV, Markdown and LaTeX."""
+"""Tables: frames as people read them, as text, CSV, Markdown and LaTeX."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 NO_VALUE = "–"  # noqa: RUF001
-"""What stands in a cell that has no value; it is not a zero."""
+"""Content of a cell without a value, which is not a zero."""
 Row = Mapping[Hashable, Any]
 
 
@@ -136,7 +136,7 @@ def intervals(group: str = "", lo: str = "lo", hi: str = "hi", *, signed: bool =
 
 
 def track_name(tracks: Sequence[str]) -> list[Column]:
-    """Return the column that says of which track a row is; none where there is one track alone."""
+    """Return the column that names the track of a row; none if there is only one track."""
     show = Column("Track", "", True, lambda row: str(row["track"]).replace("_", " "))
     return [show] if len(tracks) > 1 else []
 

@@ -332,7 +332,7 @@ class RunStore:
 
 
 def _selection(manifest: Manifest) -> tuple[list[str], object]:
-    """The models and seeds of a run, of which a command may name others than the last."""
+    """The models and seeds of a run; each command may name others than the last."""
     return [model.name for model in manifest.models], manifest.suite.get("seeds")
 
 
@@ -369,7 +369,7 @@ def held_run(folder: Path, manifest: Manifest) -> Manifest | None:
 LOCK = ".lock"
 _OWN = (MANIFEST, RECORDS, CALLS, PROMPTS, BATCHES, "batches", LOCK, LIST)
 _BEGUN = re.compile(rf"{re.escape(LOCK)}|{re.escape(LIST)}|\.[0-9a-f]{{32}}\.part")
-"""What a run that was killed before it had a manifest leaves behind."""
+"""Names of files that a run leaves behind if it is killed before it has a manifest."""
 
 
 @contextlib.contextmanager
