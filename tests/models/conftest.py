@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.models.routes import KEY, KEY_VARIABLE
+from tests.models.factory import KEY, KEY_VARIABLE
 
 
 @pytest.fixture(autouse=True)

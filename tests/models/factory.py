@@ -1,9 +1,10 @@
-"""Requests, configurations and models for tests of the network seam."""
+"""Requests, configurations, models and the ways to local servers, for tests of the network seam."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Coroutine, Sequence
+from collections.abc import Callable, Coroutine, Sequence
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from phyblock.config.models import ModelConfig
@@ -22,8 +23,40 @@ from phyblock.models import (
     build_model,
 )
 from phyblock.tracks.full_planning import PlanSubject
+from tests.servers.anthropic_messages import AnthropicMessages
+from tests.servers.chassis import LocalServer
+from tests.servers.gemini_generate import GeminiGenerate
+from tests.servers.openai_chat import OpenAIChat
 
 T = TypeVar("T")
+
+KEY_VARIABLE = "PHYBLOCK_TEST_KEY"
+KEY = "sk-not-a-real-key-1234"
+
+
+@dataclass(frozen=True)
+class Route:
+    """A protocol, the model id that leads to it, the path of its API, and a transport."""
+
+    server: type[LocalServer]
+    model_id: str
+    path: str
+    transport: str
+
+    def config(self, url: str, **fields: Any) -> ModelConfig:
+        """A model at the server with this address, its key in `KEY_VARIABLE`."""
+        known: dict[str, Any] = {"id": self.model_id, "transport": self.transport, **fields}
+        base = url + self.path
+        return ModelConfig(name="m", api_base=base, api_key_env=KEY_VARIABLE, **known)
+
+
+ROUTES = {
+    "direct": Route(OpenAIChat, "openai/m", "/v1", "direct"),
+    "openai": Route(OpenAIChat, "openai/m", "/v1", "litellm"),
+    "vllm": Route(OpenAIChat, "hosted_vllm/m", "/v1", "litellm"),
+    "anthropic": Route(AnthropicMessages, "anthropic/claude-3-7-sonnet-20250219", "", "litellm"),
+    "gemini": Route(GeminiGenerate, "gemini/gemini-2.5-flash", "", "litellm"),
+}
 
 
 def with_fields(config: ModelConfig, **fields: Any) -> ModelConfig:
@@ -133,7 +166,6 @@ def reply_of(model: Model, request: Request) -> Reply:
     return answer
 
 
-def run(main: Callable[[], Coroutine[Any, Any, T]] | Awaitable[T]) -> T:
+def run(main: Callable[[], Coroutine[Any, Any, T]]) -> T:
     """Run a coroutine function in a loop of its own."""
-    assert callable(main)
     return asyncio.run(main())

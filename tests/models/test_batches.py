@@ -29,8 +29,7 @@ from phyblock.models.batch import (
 from phyblock.models.batch_providers import PROVIDERS, UNREADABLE, _joined
 from phyblock.records.record import BatchLine
 from tests.models.batching import Disk, Killing, command, run_command
-from tests.models.factory import QUICK, ask, make_model, make_request, with_fields
-from tests.models.routes import KEY, ROUTES
+from tests.models.factory import KEY, QUICK, ROUTES, ask, make_model, make_request, with_fields
 from tests.servers.batches import (
     AnthropicBatches,
     BatchFaults,

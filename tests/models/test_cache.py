@@ -18,8 +18,7 @@ from hypothesis import strategies as st
 from phyblock.config.models import ModelConfig
 from phyblock.errors import StoreError
 from phyblock.models import Image, Message, Reply, ReplyCache, Request, Usage, reply_key
-from tests.models.factory import ask, make_model, make_request, with_fields
-from tests.models.routes import ROUTES
+from tests.models.factory import ROUTES, ask, make_model, make_request, with_fields
 from tests.servers.chassis import Faults, Running
 
 CONFIG = ModelConfig(name="m", id="openai/m", api_base="http://localhost:1/v1")

@@ -29,8 +29,16 @@ from phyblock.models import (
 )
 from phyblock.models.costs import cost_usd, counted, map_entry, most_usd, picture_tokens, price_at
 from phyblock.tracks.full_planning import PlanSubject
-from tests.models.factory import CANDIDATES, SCENE, ask, make_model, make_request, run, with_fields
-from tests.models.routes import ROUTES
+from tests.models.factory import (
+    CANDIDATES,
+    ROUTES,
+    SCENE,
+    ask,
+    make_model,
+    make_request,
+    run,
+    with_fields,
+)
 from tests.servers.chassis import Faults, Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 

@@ -15,7 +15,7 @@ from phyblock.config.models import ModelConfig
 from phyblock.errors import UnavailableError
 from phyblock.models import api_key_status
 from phyblock.models.keys import KeyStatus, api_key, hidden, secrets_of
-from tests.models.routes import KEY_VARIABLE
+from tests.models.factory import KEY_VARIABLE
 
 
 @pytest.fixture(autouse=True)

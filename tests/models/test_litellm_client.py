@@ -19,8 +19,7 @@ from phyblock.config.models import ModelConfig
 from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.models import Message, Reply, RetryPolicy
 from phyblock.models.client import Answer, HttpClient
-from tests.models.factory import ask, make_model, make_request
-from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.models.factory import KEY_VARIABLE, ROUTES, ask, make_model, make_request
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 

@@ -19,8 +19,7 @@ from phyblock.errors import (
 )
 from phyblock.models import Budget, Reply, ReplyCache, RetryPolicy, reply_key
 from phyblock.models.limits import Clock
-from tests.models.factory import make_model, make_request, run
-from tests.models.routes import ROUTES
+from tests.models.factory import ROUTES, make_model, make_request, run
 from tests.servers.chassis import Faults, Running
 
 

@@ -21,8 +21,7 @@ from phyblock.models import Budget, Model, Reply, Request, RetryPolicy
 from phyblock.models.limits import Limits
 from phyblock.models.model import ChatModel
 from phyblock.models.servers import FAILURES_TO_REST, Server, Servers
-from tests.models.factory import ask, make_model, make_request, run, with_fields
-from tests.models.routes import ROUTES
+from tests.models.factory import ROUTES, ask, make_model, make_request, run, with_fields
 from tests.models.test_limits import FakeTime
 from tests.servers.chassis import Faults, Running, kill, start
 from tests.servers.openai_chat import OpenAIChat

@@ -15,8 +15,7 @@ from phyblock.models import ends_on
 from phyblock.models.costs import map_entry
 from phyblock.models.keys import KEYLESS
 from phyblock.run.plan import to_config
-from tests.models.factory import make_model, make_request, reply_of
-from tests.models.routes import ROUTES
+from tests.models.factory import ROUTES, make_model, make_request, reply_of
 from tests.servers.chassis import Running
 
 AS_OF = date(2026, 11, 22)

@@ -22,7 +22,7 @@ from phyblock.resources import bundled
 from phyblock.run.estimate import Estimate, estimate
 from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.runner import Session
-from tests.models.routes import ROUTES
+from tests.models.factory import ROUTES
 from tests.servers.billing import (
     COMPLETION,
     PROVIDERS,

@@ -123,15 +123,19 @@ class LocalServer(ABC):
         self._gate: AbstractAsyncContextManager[None] = (
             nullcontext() if width is None else asyncio.Semaphore(width)
         )
-        self.faults = faults or Faults()
         self.keep = keep
         self.elsewhere = elsewhere
         self.holds = holds
+        self.at_once = 0
+        self.most_at_once = 0
+        self.forget(faults)
+
+    def forget(self, faults: Faults | None = None) -> None:
+        """Begin as new, with other faults."""
+        self.faults = faults or Faults()
         self.seen: list[Seen] = []
         self.ended: Counter[str] = Counter()
         self.by_sample: Counter[str] = Counter()
-        self.at_once = 0
-        self.most_at_once = 0
 
     @abstractmethod
     def read(self, body: dict[str, Any], request: web.Request) -> Seen:

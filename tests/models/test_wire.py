@@ -1,0 +1,524 @@
+"""Calls over a real wire, through both transports and all protocols: what arrives at the server,
+and what comes of each way in which it can end a call.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import socket
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from phyblock.config.models import ModelConfig
+from phyblock.config.suite import Suite
+from phyblock.errors import (
+    DataError,
+    ModelError,
+    RefusedError,
+    RetryableError,
+    SampleError,
+    UnavailableError,
+    UnreachableError,
+)
+from phyblock.models import Image, Message, Model, ModelEvent, Reply, Request, RetryPolicy
+from phyblock.models.client import shown
+from phyblock.models.request import json_body, wire_messages
+from phyblock.parsing.answer import choice_form
+from phyblock.parsing.move import move_form
+from phyblock.parsing.plan import plan_form
+from phyblock.run.plan import to_config
+from phyblock.types import ImageDetail
+from tests.models.factory import (
+    JPEG,
+    KEY,
+    PNG,
+    QUICK,
+    ROUTES,
+    Route,
+    ask,
+    make_model,
+    make_request,
+    picture,
+)
+from tests.servers.chassis import Faults, LocalServer, Running, Seen
+from tests.servers.faults import WIRE_FAULTS
+from tests.servers.openai_chat import OpenAIChat
+
+OPENAI = ("direct", "openai", "vllm")
+ONCE = RetryPolicy(1, 0.0)
+
+
+class Wire:
+    """One server for each route, which forgets what was before whenever a test asks."""
+
+    def __init__(self, running: dict[str, Running]) -> None:
+        self._running = running
+
+    def ask(
+        self,
+        route: str,
+        *requests: Request,
+        faults: Faults | None = None,
+        policy: RetryPolicy = QUICK,
+        **fields: Any,
+    ) -> tuple[list[Any], LocalServer, list[ModelEvent]]:
+        """Ask a new model one request after another: its answers, the server, the events."""
+        server, url = self.at(route, faults)
+        events: list[ModelEvent] = []
+        config = ROUTES[route].config(url, **{"max_concurrency": 1, **fields})
+        return ask(make_model(config, events=events, policy=policy), *requests), server, events
+
+    def arrived(self, route: str, request: Request, **fields: Any) -> Seen:
+        """Return a request as it arrived at the server."""
+        (answer,), server, _ = self.ask(route, request, **fields)
+        assert isinstance(answer, Reply), answer
+        return server.seen[0]
+
+    def at(self, route: str, faults: Faults | None = None) -> tuple[LocalServer, str]:
+        """Return the server of a route, as new, and its address."""
+        running = self._running[route]
+        running.server.forget(faults)
+        return running.server, running.url
+
+
+@pytest.fixture(scope="module")
+def wire() -> Iterator[Wire]:
+    with contextlib.ExitStack() as stack:
+        yield Wire({n: stack.enter_context(Running(r.server())) for n, r in ROUTES.items()})
+
+
+@pytest.fixture(autouse=True)
+def _no_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NO_PROXY", "*")
+
+
+# What arrives.
+
+
+@pytest.mark.parametrize("route", ROUTES)
+def test_a_request_arrives_in_order_byte_for_byte_and_nothing_else(wire: Wire, route: str) -> None:
+    pictures = (picture(1, PNG, 150_000), picture(2, JPEG, 90_000))
+    request = make_request("017", 42, pictures=pictures)
+    goal, candidates = (p for p in request.messages[1].parts if isinstance(p, Image))
+    seen = wire.arrived(route, request)
+    assert seen.system == "You assemble blocks."
+    assert seen.parts == (
+        "The goal:",
+        ("image/png", goal.sha256),
+        "The candidates, numbered:",
+        ("image/jpeg", candidates.sha256),
+        "Scene 017: which blocks, in which order?",
+    )
+    longest = "max_output_tokens" if route == "gemini" else "max_tokens"
+    assert seen.params == {"temperature": 0.5, "top_p": 0.9, longest: 128}
+    assert seen.seed == (None if route == "anthropic" else 42)
+
+
+@pytest.mark.parametrize(
+    "extra",
+    [
+        {},
+        {"extra_body": {"top_k": 20, "chat_template_kwargs": {"enable_thinking": False}}},
+        {"stop": ["END"], "presence_penalty": 0.5},
+        {"temperature": None, "top_p": None},
+    ],
+)
+def test_both_transports_put_the_same_json_on_the_wire(
+    wire: Wire, extra: dict[str, object]
+) -> None:
+    request = make_request("017", 42, **extra)
+    direct, through_litellm = (wire.arrived(route, request).raw for route in ("direct", "openai"))
+    assert direct == through_litellm
+    assert direct["seed"] == 42
+    assert ("temperature" in direct) == (extra.get("temperature", 0) is not None)
+
+
+@pytest.mark.parametrize("route", ["direct", "openai"])
+def test_thoughts_left_in_the_text_become_reasoning(route: str) -> None:
+    class Thinker(OpenAIChat):
+        def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+            content = "<think>\nred first\n</think>\n\nStep1: Move block with index 3"
+            message = {"role": "assistant", "content": content}
+            choices = [{"message": message, "finish_reason": "stop"}]
+            return {**super().reply(seen, ending), "choices": choices}
+
+    with Running(Thinker()) as running:
+        (reply,) = ask(make_model(ROUTES[route].config(running.url)), make_request())
+    assert isinstance(reply, Reply)
+    assert reply.text.strip() == "Step1: Move block with index 3"
+    assert reply.reasoning.strip() == "red first"
+
+
+def looked_at(seen: Seen) -> list[object]:
+    """Return the detail that a request asks for, picture by picture or as a whole."""
+    if "contents" in seen.raw:
+        whole = seen.params.get("mediaResolution")
+        parts = [part for content in seen.raw["contents"] for part in content["parts"]]
+        return [part.get("media_resolution", whole) for part in parts if "text" not in part]
+    content = seen.raw["messages"][-1]["content"]
+    return [p["image_url"].get("detail") for p in content if p["type"] == "image_url"]
+
+
+@pytest.mark.parametrize(
+    ("route", "model_id", "detail", "arrives"),
+    [
+        ("direct", "openai/m", "low", "low"),
+        ("openai", "openai/m", "original", "original"),
+        ("vllm", "hosted_vllm/m", "high", "high"),
+        ("gemini", "gemini/gemini-3.8-flash", "medium", {"level": "MEDIA_RESOLUTION_MEDIUM"}),
+        ("gemini", "gemini/gemini-2.5-flash", "low", "MEDIA_RESOLUTION_LOW"),
+        ("direct", "openai/m", None, None),
+        ("gemini", "gemini/gemini-3.8-flash", None, None),
+    ],
+)
+def test_how_closely_to_look_arrives_in_the_words_of_the_provider(
+    wire: Wire, route: str, model_id: str, detail: ImageDetail | None, arrives: object
+) -> None:
+    # litellm refuses the sampling parameters that models of today do not take.
+    request = replace(make_request(), params={})
+    seen = wire.arrived(route, request, id=model_id, image_detail=detail)
+    assert looked_at(seen) == [arrives, arrives]
+
+
+texts = st.text(max_size=30)
+images = st.builds(
+    lambda magic, tail: Image(magic + tail, "goal", 8, 8),
+    st.sampled_from([PNG, JPEG, b"GIF89a", b"RIFF0000WEBP"]),
+    st.binary(max_size=40),
+)
+messages = st.builds(
+    Message,
+    st.sampled_from(["system", "user", "assistant"]),
+    st.lists(texts | images, min_size=1, max_size=5).map(tuple),
+)
+
+
+@settings(max_examples=200)
+@given(
+    st.lists(messages, max_size=4).map(tuple),
+    st.dictionaries(texts, texts, max_size=3),
+    st.sampled_from([None, "low", "high"]),
+)
+def test_a_body_made_around_the_encoder_says_what_the_encoder_would(
+    content: tuple[Message, ...], fields: dict[str, str], detail: ImageDetail | None
+) -> None:
+    expected = {**fields, "messages": wire_messages(content, detail)}
+    assert json.loads(json_body(fields, content, detail)) == expected
+
+
+def test_only_pictures_are_sent_as_pictures() -> None:
+    request = make_request(pictures=(b"<html>", picture(1)))
+    with pytest.raises(DataError, match=r"'goal'.*is no picture"):
+        wire_messages(request.messages, None)
+
+
+def asking(form: Any) -> Request:
+    return replace(make_request("017", 42), response_format=form.response_format)
+
+
+def test_the_schema_arrives_as_it_is_declared(wire: Wire) -> None:
+    form = plan_form(16)
+    seen = wire.arrived("direct", asking(form), response_format="always")
+    schema = {"name": "plan", "schema": form.schema, "strict": True}
+    assert seen.raw["response_format"] == {"type": "json_schema", "json_schema": schema}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", [plan_form(16), move_form(16), choice_form("abcd", True)])
+def test_litellm_hands_every_schema_on(wire: Wire, form: Any) -> None:
+    def arrived(route: str) -> Seen:
+        return wire.arrived(route, asking(form), response_format="always")
+
+    direct = arrived("direct").raw
+    assert [arrived(route).raw for route in ("openai", "vllm")] == [direct, direct]
+    gemini = arrived("gemini").params
+    assert gemini["response_mime_type"] == "application/json"
+    assert form.key in json.dumps(gemini["response_json_schema"])
+    claude = arrived("anthropic").params
+    assert claude["tools"][0]["input_schema"]["properties"] == form.schema["properties"]
+
+
+LOCAL = "http://localhost:8000/v1"
+
+
+@pytest.mark.parametrize(
+    ("fields", "sends"),
+    [
+        ({"id": "openai/gpt-4o-2024-08-06"}, True),
+        ({"id": "openai/gpt-4o-2024-08-06", "response_format": "never"}, False),
+        ({"id": "hosted_vllm/Qwen/Qwen3-VL-8B-Instruct", "api_base": LOCAL}, True),
+        ({"id": "openai/mine", "api_base": LOCAL}, True),
+        ({"id": "openai/mine"}, False),
+        ({"id": "dashscope/qwen-vl-max"}, False),
+        ({"id": "dashscope/qwen-vl-max", "response_format": "always"}, True),
+    ],
+)
+def test_who_is_sent_a_schema(fields: dict[str, str], sends: bool) -> None:
+    spec = ModelConfig.model_validate(fields)
+    suite = Suite(name="s", models=("m",))
+    in_json = Suite(name="s", models=("m",), answer_format="json_schema")
+    assert to_config("m", spec, in_json).sends_format is sends
+    assert not to_config("m", spec, suite).sends_format
+
+
+@pytest.mark.parametrize(
+    ("model_id", "api_base", "transport", "is_direct"),
+    [
+        ("openai/m", LOCAL, "auto", True),
+        ("hosted_vllm/m", LOCAL, "auto", True),
+        ("openai/m", None, "auto", False),
+        ("openai/o1", LOCAL, "auto", False),
+        ("anthropic/c", LOCAL, "auto", False),
+        ("anthropic/c", LOCAL, "direct", True),
+        ("openai/m", LOCAL, "litellm", False),
+    ],
+)
+def test_the_transport_is_chosen_by_rule(
+    model_id: str, api_base: str | None, transport: Any, is_direct: bool
+) -> None:
+    config = ModelConfig(name="m", id=model_id, api_base=api_base, transport=transport)  # type: ignore[call-arg]
+    assert config.is_direct == is_direct
+
+
+# What comes of it.
+
+ENDS: dict[str, tuple[type, int, tuple[str, ...]]] = {
+    **dict.fromkeys(
+        ("429", "500", "reset", "cut", "html", "empty"),
+        (RetryableError, QUICK.attempts, tuple(ROUTES)),
+    ),
+    **dict.fromkeys(("401", "403", "404"), (UnavailableError, 1, tuple(ROUTES))),
+    "400": (SampleError, 3, tuple(ROUTES)),
+    "policy": (RefusedError, 3, (*OPENAI, "anthropic")),
+    "quota": (UnavailableError, 1, OPENAI),
+    **dict.fromkeys(("ok", "length", "filtered"), (Reply, 3, tuple(ROUTES))),
+}
+"""By mode: the outcome, requests of three questions (of one that is retried), and the routes."""
+CELLS = [(route, mode) for mode, (_, _, routes) in ENDS.items() for route in routes]
+
+
+def seeded(*seeds: int) -> list[Request]:
+    return [make_request("001", seed) for seed in seeds]
+
+
+@pytest.mark.parametrize(("route", "mode"), CELLS)
+def test_a_call_ends_as_the_server_ends_it(wire: Wire, route: str, mode: str) -> None:
+    kind, requests, _ = ENDS[mode]
+    asked = seeded(1) if kind is RetryableError else seeded(1, 2, 3)
+    answers, server, events = wire.ask(route, *asked, faults=Faults(mode=mode), seed="never")
+    assert {type(answer) for answer in answers} == {kind}, answers
+    assert server.requests == requests
+    retried = requests - 1 if kind is RetryableError else 0
+    assert [event.kind for event in events] == ["retry"] * retried
+    if mode.startswith("4") and kind is UnavailableError:
+        assert {answer.status for answer in answers} == {int(mode)}
+    if kind is Reply:
+        finish = {"ok": "stop", "filtered": "refusal"}.get(mode, mode)
+        text = server.seen[0].reply_text if mode == "ok" else ""
+        read = [(answer.finish, answer.text, answer.usage.prompt_tokens) for answer in answers]
+        assert read == [(finish, text, 1000)] * 3
+        assert mode != "ok" or {answer.reasoning for answer in answers} == {"Let me see."}
+        assert {(answer.attempts, answer.seed_sent) for answer in answers} == {(1, False)}
+        assert {seen.seed for seen in server.seen} == {None}
+
+
+@pytest.mark.parametrize("route", ROUTES)
+@pytest.mark.parametrize("wish", ["7", "Wed, 21 Oct 2099 07:28:00 GMT"])
+def test_retry_after_is_read_as_seconds_and_as_a_date(wire: Wire, route: str, wish: str) -> None:
+    faults = Faults(mode="429", retry_after=wish)
+    (answer,), _, _ = wire.ask(route, *seeded(1), faults=faults, policy=ONCE)
+    assert isinstance(answer, RetryableError)
+    assert (answer.retry_after_s or 0) >= 7
+
+
+@pytest.mark.parametrize("route", [*OPENAI, "gemini"])
+def test_a_refused_seed_is_an_error_that_says_what_to_set(wire: Wire, route: str) -> None:
+    (answer,), _, _ = wire.ask(route, *seeded(1), faults=Faults(mode="seed"))
+    assert isinstance(answer, SampleError)
+    assert "set seed: never" in str(answer)
+    (answer,), _, _ = wire.ask(route, *seeded(1), faults=Faults(mode="seed"), seed="never")
+    assert (answer.seed_sent, answer.attempts) == (False, 1)
+
+
+def test_where_no_seed_exists_none_is_sent_unless_it_must_be(wire: Wire) -> None:
+    answers, server, _ = wire.ask("anthropic", *seeded(1, 2))
+    assert [answer.seed_sent for answer in answers] == [False, False]
+    (answer,), server, _ = wire.ask("anthropic", *seeded(1), seed="always")
+    assert isinstance(answer, UnavailableError)
+    assert server.requests == 0
+
+
+@pytest.mark.parametrize("route", ROUTES)
+def test_a_server_that_never_answers_is_a_timeout(wire: Wire, route: str) -> None:
+    policy, faults = replace(QUICK, attempts=3), Faults(mode="slow")
+    (answer,), server, _ = wire.ask(route, *seeded(1), faults=faults, policy=policy, timeout_s=0.1)
+    assert isinstance(answer, RetryableError)
+    assert answer.status is None
+    assert server.requests == policy.attempts
+
+
+def test_keys_leave_an_error_before_it_is_cut() -> None:
+    for length in range(440, 520):
+        text = shown(f"{'x' * length}{KEY} and more", (KEY,))
+        assert len(text) <= 500
+        assert KEY[:4] not in text
+
+
+# Every named fault of a server.
+
+ENDINGS = {
+    "reply": Reply,
+    "retryable": RetryableError,
+    "unavailable": UnavailableError,
+    "sample": SampleError,
+}
+REDIRECTED = {
+    **ROUTES,
+    "xai": Route(OpenAIChat, "xai/m", "/v1", "litellm"),
+    "openrouter": Route(OpenAIChat, "openrouter/m", "/v1", "litellm"),
+}
+AS_LITELLM_READS = {
+    **dict.fromkeys((name, "usage-true") for name in ("openai", "vllm", "anthropic", "gemini")),
+    **dict.fromkeys(("anthropic", mode) for mode in ("usage-huge", "usage-fraction")),
+}
+"""Counts that are none and that litellm takes for some: what it makes of them is what is known."""
+SERVERS_WORDS = {
+    name for name in WIRE_FAULTS if name.startswith(("200-code", "200-message", "200-error-s"))
+}
+Answers = dict[str, Reply | ModelError]
+
+
+def answers_to(route: Route, server: LocalServer, url: str, faults: list[str]) -> Answers:
+    """Return what comes of each fault, met one after another; each costs one request.
+
+    One model meets them all, as long as it is not stopped: no fault spoils what comes after it.
+    """
+
+    async def one(model: Model, mode: str) -> Reply | ModelError:
+        server.faults = Faults(mode=mode)
+        try:
+            reply = await model.ask(make_request())
+        except ModelError as error:
+            return error
+        assert reply is not None
+        return reply
+
+    def new(timeout_s: float) -> Model:
+        fields = {"seed": "never", "timeout_s": timeout_s, "most_body_bytes": 2**20}
+        return make_model(route.config(url, **fields), policy=ONCE)
+
+    async def all_of_them() -> Answers:
+        found: Answers = {}
+        model, hasty = new(20.0), new(0.7)
+        for mode in faults:
+            found[mode] = await one(hasty if mode == "drip" else model, mode)
+            if isinstance(found[mode], UnavailableError):
+                await model.aclose()
+                model = new(20.0)
+        await model.aclose()
+        await hasty.aclose()
+        return found
+
+    return asyncio.run(all_of_them())
+
+
+@pytest.mark.parametrize("name", ROUTES)
+def test_every_fault_ends_as_it_must_after_one_request(wire: Wire, name: str) -> None:
+    server, url = wire.at(name)
+    answers = answers_to(ROUTES[name], server, url, list(WIRE_FAULTS))
+    for mode, answer in answers.items():
+        assert isinstance(answer, ENDINGS[WIRE_FAULTS[mode].ending]), (mode, answer)
+        assert server.ended[mode] == 1, mode
+        told = str(answer) + repr(answer)
+        assert KEY not in told, mode
+        assert KEY[:8] not in told, mode
+        if mode in SERVERS_WORDS and name != "anthropic":
+            assert "Upstream is down" in told or "No auth credentials" in told, (mode, told)
+        if mode.startswith("usage-") and (name, mode) not in AS_LITELLM_READS:
+            assert isinstance(answer, Reply)
+            usage = answer.usage
+            counts = (usage.prompt_tokens, usage.completion_tokens, usage.reasoning_tokens)
+            assert counts == (None, None, None), mode
+    whole, surrogate, echo = (answers[m] for m in ("gzip", "surrogate", "echo-key-in-reply"))
+    assert isinstance(whole, Reply)
+    assert (whole.usage.prompt_tokens, whole.usage.completion_tokens) == (1000, 40)
+    assert isinstance(surrogate, Reply)
+    assert surrogate.text == "Step1: \ufffd index 1"
+    assert isinstance(echo, Reply)
+    assert "[key]" in echo.text
+    assert "[key]" in echo.provider_model
+
+
+@pytest.mark.parametrize("name", REDIRECTED)
+def test_a_redirect_takes_nothing_anywhere(name: str) -> None:
+    route = REDIRECTED[name]
+    away = OpenAIChat()
+    with Running(away) as elsewhere:
+        there = elsewhere.url.replace("127.0.0.1", "localhost")
+        server = route.server(elsewhere=there)
+        with Running(server) as running:
+            modes = [mode for mode in WIRE_FAULTS if mode.startswith("redirect")]
+            answers = answers_to(route, server, running.url, modes)
+    assert away.requests == 0
+    for mode, answer in answers.items():
+        assert isinstance(answer, UnavailableError), mode
+        assert server.ended[mode] == 1, mode
+        assert "is api_base the address" in str(answer)
+        assert "h1dden" not in str(answer)
+        if mode.endswith("away"):
+            assert f"redirects to localhost:{elsewhere.port}," in str(answer)
+
+
+def test_both_transports_say_the_same_of_what_a_server_said(wire: Wire) -> None:
+    modes = ["200-quota", "200-code-object", "200-error-string", "400-string", "401-string"]
+    modes += ["429-bare", "503", "redirect-nowhere", "gzip-bomb", "reset-midway"]
+    told = []
+    for name in ("direct", "openai", "vllm", "gemini"):
+        # Addresses stand in some of the words.
+        answers = answers_to(ROUTES[name], *wire.at(name), modes)
+        told.append({mode: str(answer) for mode, answer in answers.items()})
+    assert told[1:] == [told[0]] * 3
+
+
+def unreachable(name: str, url: str, **fields: Any) -> str:
+    """Return what is said of a server that no connection can be made to."""
+    config = ROUTES[name].config(url, seed="never", **fields)
+    (answer,) = ask(make_model(config, policy=ONCE), make_request())
+    assert isinstance(answer, UnreachableError), answer
+    assert answer.status is None
+    return str(answer)
+
+
+@pytest.mark.parametrize("name", ["direct", "openai", "vllm", "anthropic"])
+def test_a_name_that_is_not_known_is_not_called_a_lost_connection(name: str) -> None:
+    said = unreachable(name, "http://no-such-host.invalid")
+    assert "DNS" in said
+    assert "no-such-host.invalid" in said
+
+
+@pytest.mark.parametrize("name", ["direct", "vllm"])
+def test_a_closed_port_and_a_server_without_tls_are_named(wire: Wire, name: str) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        closed = f"http://127.0.0.1:{taken.getsockname()[1]}"
+        for url in (closed, wire.at("direct")[1].replace("http://", "https://")):
+            assert f"no connection to {url.partition('//')[2]}" in unreachable(name, url)
+
+
+def test_a_connection_that_is_not_made_in_time_was_not_sent() -> None:
+    with socket.socket() as full, contextlib.ExitStack() as stack:
+        full.bind(("127.0.0.1", 0))
+        full.listen(0)
+        for _ in range(4):
+            other = stack.enter_context(socket.socket())
+            other.setblocking(False)
+            other.connect_ex(full.getsockname())
+        url = f"http://127.0.0.1:{full.getsockname()[1]}"
+        assert "no connection to 127.0.0.1" in unreachable("direct", url, timeout_s=0.6)
