@@ -153,13 +153,13 @@ def stats() -> None:
 
     console = make_console()
     with ReplyCache(reply_cache_file()) as opened:
-        held = opened.stats()
-    rows = [(model, f"{replies:,}") for model, replies in held.by_model.items()]
+        counts, size = opened.counts(), f"{opened.size_bytes / 1e6:,.1f} MB"
+    rows = [(model, f"{replies:,}") for model, replies in counts.items()]
     if rows:
         print_rows(console, ("model", "replies"), rows, numbers=1)
-    size = f"{held.size_bytes / 1e6:,.1f} MB"
-    console.print(f"{counted(held.replies, 'reply', 'replies')}, {size}, in")
-    print_path(console, held.path)
+    replies = counted(sum(counts.values()), "reply", "replies")
+    console.print(f"{replies}, {size}, in")
+    print_path(console, opened.path)
 
 
 @cache.command()

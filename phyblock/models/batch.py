@@ -265,12 +265,7 @@ class BatchModel:
         await self.files.put(line)
         batch.take(line)
         if event == "lost":
-            self._forget(batch)
-
-    def _forget(self, batch: Batch) -> None:
-        for key in batch.most_usd:
-            if self._newest.get(key) is batch:
-                del self._newest[key]
+            self._newest = {key: one for key, one in self._newest.items() if one is not batch}
 
     # A batch from its draft to its answers.
 

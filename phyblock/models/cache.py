@@ -13,7 +13,6 @@ import json
 import sqlite3
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from phyblock.config.models import ModelConfig
@@ -29,24 +28,12 @@ _BUSY_TIMEOUT_S = 2.0
 _HINT = (
     "delete the file, or name another cache folder; answered samples of a run stay in its records"
 )
-_ELSEWHERE = "free some space, or name another cache folder with PHYBLOCK_CACHE"
+_NO_ROOM = "free some space, or name another cache folder with PHYBLOCK_CACHE"
 _CREATE = """
 CREATE TABLE IF NOT EXISTS replies (
     key TEXT PRIMARY KEY, model TEXT NOT NULL, stored_at REAL NOT NULL, reply TEXT NOT NULL
 ) WITHOUT ROWID
 """
-
-
-@dataclass(frozen=True)
-class CacheStats:
-    """Number of replies, by model id too; size of the file; when the first and last came [s]."""
-
-    path: Path
-    replies: int
-    by_model: dict[str, int]
-    size_bytes: int
-    oldest_s: float | None
-    newest_s: float | None
 
 
 def reply_key(config: ModelConfig, request: Request) -> str:
@@ -85,7 +72,7 @@ class ReplyCache:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise self._problem(f"cannot be made: {reason_of(error)}", hint=_ELSEWHERE) from error
+            raise self._problem(f"cannot be made: {reason_of(error)}", hint=_NO_ROOM) from error
         try:
             self._db = sqlite3.connect(path, timeout=_BUSY_TIMEOUT_S, isolation_level=None)
             try:
@@ -145,22 +132,18 @@ class ReplyCache:
         finally:
             self._asked.pop(key).set_result(None)
 
-    def stats(self) -> CacheStats:
-        """Count what the cache holds."""
+    def counts(self) -> dict[str, int]:
+        """Return the number of replies by model id."""
         with self._using():
-            rows = self._db.execute(
-                "SELECT model, count(*), min(stored_at), max(stored_at) FROM replies "
-                "GROUP BY model ORDER BY model"
-            ).fetchall()
+            sql = "SELECT model, count(*) FROM replies GROUP BY model ORDER BY model"
+            return dict(self._db.execute(sql).fetchall())
+        return {}
+
+    @property
+    def size_bytes(self) -> int:
+        """The size of its file, with what was written last and lies beside it."""
         files = (self.path.with_name(self.path.name + end) for end in ("", "-wal"))
-        return CacheStats(
-            self.path,
-            sum(row[1] for row in rows),
-            {row[0]: row[1] for row in rows},
-            sum(file.stat().st_size for file in files if file.exists()),
-            min((row[2] for row in rows), default=None),
-            max((row[3] for row in rows), default=None),
-        )
+        return sum(file.stat().st_size for file in files if file.exists())
 
     def clear(self, model_id: str | None = None) -> int:
         """Drop all replies, or those of one model id; returns how many."""
@@ -205,7 +188,7 @@ class ReplyCache:
 
     def _unusable(self, error: sqlite3.Error) -> StoreError:
         # An operational error is of the disk, the place or another process, not of the content.
-        hint = _ELSEWHERE if isinstance(error, sqlite3.OperationalError) else _HINT
+        hint = _NO_ROOM if isinstance(error, sqlite3.OperationalError) else _HINT
         return self._problem(f"cannot be used: {error}", hint=hint)
 
     def _problem(

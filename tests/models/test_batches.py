@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import itertools
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -68,15 +68,21 @@ def requests_of(count: int) -> list[Request]:
     return [make_request(f"{n:03d}") for n in range(count)]
 
 
+@contextlib.contextmanager
+def serving(
+    route: str, faults: BatchFaults | None = None, kind: type[BatchServer] | None = None
+) -> Iterator[tuple[BatchServer, ModelConfig]]:
+    """A server of batches, and a model there."""
+    server = (kind or SERVERS[route])(batch=faults)
+    with Running(server) as running:
+        yield server, config_at(route, running.url)
+
+
 def served(
     route: str, disk: Disk, requests: Sequence[Request], faults: BatchFaults, **options: Any
 ) -> tuple[BatchServer, list[Reply | Exception]]:
-    with Running(SERVERS[route](batch=faults)) as running:
-        config = config_at(route, running.url, **options.pop("config", {}))
-        ended = run_command(config, disk, requests, **options)
-    server = running.server
-    assert isinstance(server, BatchServer)
-    return server, ended
+    with serving(route, faults) as (server, config):
+        return server, run_command(config, disk, requests, **options)
 
 
 def texts(ended: Sequence[Reply | Exception]) -> list[str]:
@@ -91,10 +97,9 @@ def once(server: BatchServer, count: int) -> bool:
 def test_a_batch_asks_and_answers_as_single_calls_do(route: str, disk: Disk) -> None:
     requests = requests_of(3)
     server, ended = served(route, disk, requests, BatchFaults(lines={0: {1: "length"}}))
-    with Running(SERVERS[route]()) as running:
-        config = with_fields(config_at(route, running.url), batch=False)
-        single = ask(make_model(config), *requests)
-        in_order = {one.sample: one.raw for one in running.server.seen}
+    with serving(route) as (other_server, config):
+        single = ask(make_model(with_fields(config, batch=False)), *requests)
+        in_order = {one.sample: one.raw for one in other_server.seen}
     assert {one.sample: one.raw for one in server.seen} == in_order
     for place, (one, other) in enumerate(zip(ended, single, strict=True)):
         assert isinstance(one, Reply)
@@ -147,10 +152,8 @@ def test_what_expired_is_asked_again_and_what_was_answered_is_not(route: str, di
 
 def test_a_cancelled_batch_keeps_its_answers_and_stops_the_model(route: str, disk: Disk) -> None:
     faults = BatchFaults(ends={0: "cancelled"}, lines={0: {1: "cancelled", 2: "cancelled"}})
-    with Running(SERVERS[route](batch=faults)) as running:
-        config, requests = config_at(route, running.url), requests_of(4)
-        server = running.server
-        assert isinstance(server, BatchServer)
+    requests = requests_of(4)
+    with serving(route, faults) as (server, config):
         ended = run_command(config, disk, requests)
         assert [isinstance(one, Reply) for one in ended] == [True, False, False, True]
         assert isinstance(ended[1], UnavailableError)
@@ -161,15 +164,14 @@ def test_a_cancelled_batch_keeps_its_answers_and_stops_the_model(route: str, dis
 
 
 def test_a_refused_batch_stops_the_model_and_asks_nothing(disk: Disk) -> None:
-    faults = BatchFaults(ends={0: "refused"})
-    with Running(OpenAIBatches(batch=faults)) as running:
-        config, requests = config_at("direct", running.url), requests_of(2)
+    requests = requests_of(2)
+    with serving("direct", BatchFaults(ends={0: "refused"})) as (server, config):
         ended = run_command(config, disk, requests, budget=Budget(1e9))
         assert isinstance(ended[0], UnavailableError)
         assert "Enqueued token limit" in str(ended[0])
         assert disk.events[-1] == "lost"
         assert len(texts(run_command(config, disk, requests))) == 2
-        assert once(running.server, 2)  # type: ignore[arg-type]
+    assert once(server, 2)
 
 
 CALLS = {
@@ -206,10 +208,8 @@ def test_what_cannot_be_learned_now_stops_the_model_and_is_learned_by_the_next_c
     route: str, disk: Disk, calls: dict[str, tuple[str, ...]]
 ) -> None:
     policy = replace(QUICK, attempts=3, max_connection_failures=3)
-    with Running(SERVERS[route](batch=BatchFaults(calls=calls))) as running:
-        config, requests, server = config_at(route, running.url), requests_of(2), running.server
-        assert isinstance(server, BatchServer)
-        budget = Budget(1e9)
+    requests, budget = requests_of(2), Budget(1e9)
+    with serving(route, BatchFaults(calls=calls)) as (server, config):
         ended = run_command(config, disk, requests, policy=policy, budget=budget)
         assert {type(one) for one in ended} <= {UnavailableError, UnsureError}
         assert server.made == [] or budget.spent_usd > 0
@@ -271,10 +271,8 @@ def test_what_is_in_the_cache_is_not_asked_and_answers_go_there(route: str, tmp_
     disk = Disk(tmp_path, cache)
     server, (first,) = served(route, disk, requests[:1], BatchFaults())
     assert isinstance(first, Reply)
-    with Running(SERVERS[route]()) as running:
-        config = with_fields(config_at(route, running.url), batch=False)
-        with ReplyCache(cache) as kept:
-            found, single = ask(make_model(config, cache=kept), *requests)
+    with serving(route) as (_, config), ReplyCache(cache) as kept:
+        found, single = ask(make_model(with_fields(config, batch=False), cache=kept), *requests)
     assert isinstance(found, Reply)
     assert isinstance(single, Reply)
     assert (found.cached, found.batched, found.cost_usd) == (True, True, first.cost_usd)
@@ -296,10 +294,7 @@ def test_a_kill_at_any_moment_loses_nothing_and_asks_nothing_twice(
     for at in itertools.count():
         disk = Disk(tmp_path / str(at))
         killing = Killing(at)
-        with Running(SERVERS[route]()) as running:
-            server = running.server
-            assert isinstance(server, BatchServer)
-            config = config_at(route, running.url)
+        with serving(route) as (server, config):
             disk.moment, server.moment = killing.here, killing.there
             is_over = asyncio.run(killing.run(command(config, disk, requests)))
             disk.moment, server.moment = None, lambda *_: None
@@ -315,16 +310,15 @@ def test_a_kill_at_any_moment_loses_nothing_and_asks_nothing_twice(
 
 
 def test_rejected_requests_are_asked_again_only_when_that_is_wanted(disk: Disk) -> None:
-    faults = BatchFaults(lines={0: {0: "400"}})
-    with Running(OpenAIBatches(batch=faults)) as running:
-        config, requests = config_at("direct", running.url), requests_of(1)
+    requests = requests_of(1)
+    with serving("direct", BatchFaults(lines={0: {0: "400"}})) as (server, config):
         assert isinstance(run_command(config, disk, requests)[0], SampleError)
         budget = Budget(1e9)
         assert isinstance(run_command(config, disk, requests, budget=budget)[0], SampleError)
         assert budget.spent_usd == 0
         assert len(texts(run_command(config, disk, requests, anew=True, budget=budget))) == 1
         assert len(texts(run_command(config, disk, requests, anew=True))) == 1
-        assert len(running.server.made) == 2  # type: ignore[attr-defined]
+    assert len(server.made) == 2
 
 
 TOKEN = "pb0"
@@ -425,10 +419,9 @@ def test_results_that_are_not_there_yet_are_not_taken_for_none(disk: Disk) -> No
             is_early = made.looks <= self.batch_faults.looks
             return {**super().told(made), **({"output_file_id": None} if is_early else {})}
 
-    with Running(Late()) as running:
-        ended = run_command(config_at("direct", running.url), disk, requests_of(2))
-        assert len(texts(ended)) == 2
-        assert len(running.server.made) == 1  # type: ignore[attr-defined]
+    with serving("direct", kind=Late) as (server, config):
+        assert len(texts(run_command(config, disk, requests_of(2)))) == 2
+    assert len(server.made) == 1
 
 
 def test_headers_that_requests_need_go_with_their_batch(disk: Disk) -> None:
@@ -441,11 +434,10 @@ def test_headers_that_requests_need_go_with_their_batch(disk: Disk) -> None:
             betas.append(request.headers.get("anthropic-beta", ""))
             return super().key_of(request)
 
-    with Running(Noting()) as running:
-        fields = {"id": "anthropic/claude-sonnet-4-5", "response_format": "always"}
-        config = config_at("anthropic", running.url, **fields)
+    fields = {"id": "anthropic/claude-sonnet-4-5", "response_format": "always"}
+    with serving("anthropic", kind=Noting) as (_, config):
         request = replace(make_request(), response_format=form)
-        (reply,) = run_command(config, disk, [request])
+        (reply,) = run_command(with_fields(config, **fields), disk, [request])
     assert isinstance(reply, Reply)
     assert betas[0].startswith("structured-outputs")
     assert set(betas[2:]) == {""}

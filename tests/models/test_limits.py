@@ -1,16 +1,29 @@
-"""Laws of the limits, under a clock of our own."""
+"""Limits, retries and cancellations: when a request is sent, how often, and when no more."""
 
 from __future__ import annotations
 
 import asyncio
 import heapq
 import itertools
+from pathlib import Path
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from phyblock.errors import (
+    ModelError,
+    RefusedError,
+    RetryableError,
+    SampleError,
+    StoreError,
+    UnavailableError,
+)
+from phyblock.models import Budget, Reply, ReplyCache, RetryPolicy, reply_key
+from phyblock.models.client import HttpClient
 from phyblock.models.limits import WINDOW_S, Clock, Limits
-from tests.models.factory import run
+from tests.models.factory import ROUTES, make_model, make_request, run
+from tests.servers.chassis import Faults, Running
 
 
 class FakeTime:
@@ -174,3 +187,195 @@ def test_limits_survive_those_that_give_up(plans: list[tuple[int, bool]], width:
             await asyncio.wait_for(overall.acquire(), 1)
 
     run(main)
+
+
+class Script:
+    """Raises the given errors one by one, each after `takes_s`, then answers; sleeps are jumps."""
+
+    def __init__(self, *errors: Exception, takes_s: float = 0.0) -> None:
+        self.errors = list(errors)
+        self.takes_s = takes_s
+        self.now_s = 0.0
+        self.failed_at: list[float] = []
+        self.calls = 0
+        self.waits: list[float] = []
+        self.told: list[float] = []
+
+    async def send(self) -> str:
+        self.calls += 1
+        self.now_s += self.takes_s
+        if self.errors:
+            self.failed_at.append(self.now_s)
+            raise self.errors.pop(0)
+        return "answer"
+
+    async def sleep(self, seconds: float) -> None:
+        self.waits.append(seconds)
+        self.now_s += seconds
+
+    def run(self, **policy: float) -> str:
+        clock = Clock(lambda: self.now_s, self.sleep)
+        rules = RetryPolicy(clock=clock, **policy)  # type: ignore[arg-type]
+
+        async def main() -> str:
+            async for attempt in rules.retrying(lambda _, wait_s: self.told.append(wait_s)):
+                with attempt:
+                    return await self.send()
+            raise AssertionError
+
+        return asyncio.run(main())
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        SampleError("bad"),
+        RefusedError("no"),
+        UnavailableError("gone"),
+        StoreError([]),
+        ModelError("x"),
+        ZeroDivisionError(),
+        asyncio.CancelledError(),
+    ],
+)
+def test_nothing_but_a_retryable_error_is_sent_again(error: Exception) -> None:
+    script = Script(error)
+    with pytest.raises(type(error)):
+        script.run()
+    assert script.calls == 1
+    assert script.waits == []
+
+
+statuses = st.sampled_from([None, 408, 429, 500, 502, 503])
+
+
+@given(
+    st.lists(statuses, min_size=1, max_size=8),
+    st.integers(1, 12),
+    st.floats(0, 600, allow_nan=False),
+    st.floats(0, 400, allow_nan=False),
+)
+def test_a_request_is_given_up_when_both_number_and_time_are_over(
+    found: list[int | None], attempts: int, retry_for_s: float, takes_s: float
+) -> None:
+    errors = (RetryableError("x", status=status) for status in found * 400)
+    script = Script(*errors, takes_s=takes_s)
+    with pytest.raises(RetryableError):
+        script.run(attempts=attempts, retry_for_s=retry_for_s, base_s=2.0)
+    lasted = [now_s - script.failed_at[0] for now_s in script.failed_at]
+    is_over = [n >= attempts and s >= retry_for_s for n, s in enumerate(lasted, 1)]
+    assert is_over[-1]
+    assert not any(is_over[:-1])
+
+
+@pytest.mark.parametrize("status", [200, 201, 204])
+def test_answers_that_were_paid_for_and_cannot_be_read_are_bounded_by_number_alone(
+    status: int,
+) -> None:
+    script = Script(*(RetryableError("malformed", status=status) for _ in range(20)))
+    with pytest.raises(RetryableError, match="malformed"):
+        script.run(attempts=3)
+    assert script.calls == 3
+
+
+@given(st.lists(st.none() | st.floats(0, 500, allow_nan=False), min_size=1, max_size=7))
+def test_waits_keep_to_retry_after_and_to_their_bounds(wishes: list[float | None]) -> None:
+    script = Script(*(RetryableError("429", status=429, retry_after_s=wish) for wish in wishes))
+    assert script.run() == "answer"
+    assert len(script.waits) == len(wishes)
+    for number, (wish, wait) in enumerate(zip(wishes, script.waits, strict=True)):
+        floor = min(wish or 0.0, 120.0)
+        assert floor <= wait <= floor + min(60.0, 0.5 * 2**number)
+
+
+@pytest.mark.parametrize("route", ["direct", "openai"])
+@pytest.mark.parametrize("cancels", [1, 2])
+def test_a_request_under_way_is_answered_and_a_second_cancellation_gives_it_up(
+    tmp_path: Path, route: str, cancels: int
+) -> None:
+    server = ROUTES[route].server(Faults(latency_s=0.2))
+    budget = Budget(100.0)
+
+    async def main(url: str) -> tuple[object, bool]:
+        config = ROUTES[route].config(url, price={"input": 1, "output": 1})
+        with ReplyCache(tmp_path / "c.sqlite") as cache:
+            model = make_model(config, cache=cache, budget=budget)
+            asked = asyncio.create_task(model.ask(make_request()))
+            while not server.requests:
+                await asyncio.sleep(0.001)
+            for _ in range(cancels):
+                asked.cancel()
+                await asyncio.sleep(0.01)
+            (answer,) = await asyncio.gather(asked, return_exceptions=True)
+            await model.aclose()
+            return answer, (reply_key(config, make_request()) in cache)
+
+    with Running(server) as running:
+        answer, is_kept = run(lambda: main(running.url))
+    assert server.requests == 1
+    if cancels == 1:
+        assert isinstance(answer, Reply), answer
+        assert is_kept
+        assert budget.spent_usd == answer.billed_usd == answer.cost_usd
+    else:
+        assert isinstance(answer, asyncio.CancelledError)
+        assert budget.spent_usd > 0, "it may be billed"
+    assert budget.holds == 0
+
+
+@pytest.mark.parametrize("where", ["slot", "minute", "budget", "retry", "rest"])
+def test_whatever_is_waited_for_a_cancellation_ends_the_wait_and_nothing_is_sent(
+    where: str,
+) -> None:
+    mode = {"retry": "429", "rest": "429"}.get(where, "slow")
+    server = ROUTES["direct"].server(Faults(mode=mode, retry_after="100"))
+    fields = {"slot": {"max_concurrency": 1}, "minute": {"rpm": 1}}.get(where, {})
+
+    async def main(url: str) -> list[object]:
+        price = {"input": 0, "output": 1e6}
+        config = ROUTES["direct"].config(url, price=price, seed="never", **fields)
+        budget = Budget(200.0) if where == "budget" else None
+        model = make_model(config, budget=budget, policy=RetryPolicy())
+        asked = [asyncio.create_task(model.ask(make_request("000")))]
+        while not (server.requests if where != "retry" else server.ended["429"]):
+            await asyncio.sleep(0.001)
+        await asyncio.sleep(0.05)
+        if where != "retry":
+            asked.append(asyncio.create_task(model.ask(make_request("001"))))
+            await asyncio.sleep(0.05)
+        asked[-1].cancel()
+        (answer,) = await asyncio.gather(asked[-1], return_exceptions=True)
+        for _ in range(2):
+            asked[0].cancel()
+            await asyncio.sleep(0.01)
+        await asyncio.gather(*asked, return_exceptions=True)
+        await model.aclose()
+        return [answer]
+
+    with Running(server) as running:
+        (answer,) = run(lambda: main(running.url))
+    assert isinstance(answer, asyncio.CancelledError), answer
+    assert server.requests == 1
+
+
+def test_a_bug_of_ours_is_neither_sent_again_nor_charged(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = 0
+
+    async def broken(*_: object, **__: object) -> None:
+        nonlocal calls
+        calls += 1
+        raise KeyError("choices")
+
+    monkeypatch.setattr(HttpClient, "send", broken)
+    for route in ROUTES.values():
+        calls, budget = 0, Budget(100.0)
+        config = route.config("http://127.0.0.1:9", price={"input": 1, "output": 1}, seed="never")
+
+        async def main() -> None:
+            model = make_model(config, budget=budget)  # noqa: B023
+            with pytest.raises(KeyError):
+                await model.ask(make_request())
+            await model.aclose()
+
+        run(main)
+        assert (calls, budget.spent_usd) == (1, 0.0)

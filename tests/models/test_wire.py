@@ -357,8 +357,8 @@ def test_where_no_seed_exists_none_is_sent_unless_it_must_be(wire: Wire) -> None
 
 @pytest.mark.parametrize("route", ROUTES)
 def test_a_server_that_never_answers_is_a_timeout(wire: Wire, route: str) -> None:
-    policy, faults = replace(QUICK, attempts=3), Faults(mode="slow")
-    (answer,), server, _ = wire.ask(route, *seeded(1), faults=faults, policy=policy, timeout_s=0.1)
+    policy, faults = replace(QUICK, attempts=2), Faults(mode="slow")
+    (answer,), server, _ = wire.ask(route, *seeded(1), faults=faults, policy=policy, timeout_s=0.3)
     assert isinstance(answer, RetryableError)
     assert answer.status is None
     assert server.requests == policy.attempts

@@ -35,11 +35,10 @@ _DRIP_S = 0.02
 
 @dataclass(frozen=True)
 class Fault:
-    """A behaviour; what must come of it; whether the answer would go on for ever."""
+    """A behaviour, and what must come of it."""
 
     behave: Behaviour
     ending: Ending
-    is_endless: bool = False
 
 
 def reset_connection(request: web.Request) -> web.Response:
@@ -338,15 +337,12 @@ WIRE_FAULTS: Mapping[str, Fault] = {
         partial(_raw, data=b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\nxyz\r\n"),
         "retryable",
     ),
-    "endless": Fault(
-        partial(_stream, chunk=b" " * 65_536, pause_s=0), "retryable", is_endless=True
-    ),
+    "endless": Fault(partial(_stream, chunk=b" " * 65_536, pause_s=0), "retryable"),
     "endless-gzip": Fault(
         partial(_stream, chunk=gzip.compress(b" " * 2**20), pause_s=0, encoding="gzip"),
         "retryable",
-        is_endless=True,
     ),
-    "drip": Fault(partial(_stream, chunk=b" ", pause_s=_DRIP_S), "retryable", is_endless=True),
+    "drip": Fault(partial(_stream, chunk=b" ", pause_s=_DRIP_S), "retryable"),
     "gzip": Fault(partial(_packed, encoding="gzip"), "reply"),
     "deflate": Fault(partial(_packed, encoding="deflate"), "reply"),
     "gzip-cut": Fault(partial(_packed, encoding="gzip", share=0.5), "retryable"),
