@@ -43,6 +43,9 @@ if TYPE_CHECKING:
 _GRACE_S = 10.0
 """What litellm's own work may take beyond the time for the exchange, which our client keeps."""
 
+_MOST_ERROR_BYTES = 10_000
+"""The part of an error's body that litellm sees, which looks for keys in it again and again."""
+
 _WHILE_IMPORTED = {
     "LITELLM_LOCAL_MODEL_COST_MAP": "True",  # else the import fetches the price map
     "LITELLM_MODE": "PRODUCTION",  # else the import reads keys from any .env file above
@@ -170,9 +173,8 @@ def _sender(config: ModelConfig) -> Any:
             exchange.answer = answer
             unpacked = ("content-encoding", "content-length", "transfer-encoding")
             headers = [(k, v) for k, v in answer.headers.items() if k.lower() not in unpacked]
-            return httpx.Response(
-                answer.status, headers=headers, content=answer.body, request=request
-            )
+            body = answer.body if answer.is_success else answer.body[:_MOST_ERROR_BYTES]
+            return httpx.Response(answer.status, headers=headers, content=body, request=request)
 
     client = httpx.AsyncClient(transport=Wire(), trust_env=False, follow_redirects=False)
     fields: dict[str, Any] = {"http_client": client, "max_retries": 0, "timeout": config.timeout_s}
