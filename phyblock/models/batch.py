@@ -65,7 +65,7 @@ class BatchFiles:
 
 @dataclass(eq=False)
 class Batch:
-    """A batch, from its draft, with `lines` to send, to its answers by request.
+    """A batch, from its draft, with `lines` of `size_bytes` to send, to its answers by request.
 
     `most_usd` are its requests by their keys in the reply cache, with the most that each can cost
     [US dollars], None where no price is known; `held` are their reservations in the budget, and
@@ -82,6 +82,7 @@ class Batch:
     held: dict[str, int] = field(default_factory=dict)
     unheld: set[str] = field(default_factory=set)
     lines: list[bytes] = field(default_factory=list)
+    size_bytes: int = 0
     grown_s: float = 0.0
     work: asyncio.Future[None] | None = None
     answers: dict[str, Answer | str] | None = None
@@ -230,16 +231,16 @@ class BatchModel:
                 self.budget.settle(held, 0.0)
             raise self._refusal
         draft = self._draft
-        if draft is not None and (
-            len(draft.lines) >= self._provider.most_requests
-            or sum(map(len, draft.lines)) + len(http.body) > self._provider.most_bytes
+        if (
+            draft is None
+            or len(draft.lines) >= self._provider.most_requests
+            or draft.size_bytes + len(http.body) > self._provider.most_bytes
         ):
-            draft = None
-        if draft is None:
             draft = self._draft = Batch()
             self._batches.append(draft)
         name = custom_id(draft, len(draft.lines))
         draft.lines.append(self._provider.line(name, http.body, http.headers))
+        draft.size_bytes += len(draft.lines[-1])
         draft.grown_s = time.monotonic()
         draft.most_usd[key] = usd
         if held is not None:

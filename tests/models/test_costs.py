@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.config.models import ModelConfig, Price, Tariff, Tier
-from phyblock.errors import BudgetReachedError, RetryableError, SpecError, UnavailableError
+from phyblock.errors import BudgetReachedError, RetryableError, SpecError
 from phyblock.models import (
     Budget,
     Estimate,
@@ -240,19 +240,6 @@ def test_a_call_costs_no_more_than_was_held_once_a_reply_like_it_has_come(
                 assert budget.spent_usd <= limit + over_usd + 1e-9
 
         await asyncio.gather(*map(call, told))
-
-    run(main)
-
-
-def test_a_limit_of_one_model_stops_that_model_alone() -> None:
-    async def main() -> None:
-        budget = Budget(10.0, {"a": 0.5})
-        capped, other = budget.of("a", max_cost_usd=1.0), budget.of("b")
-        capped.settle(await capped.reserve(lambda: 0.25), 0.25)
-        with pytest.raises(UnavailableError, match=r"its max_cost_usd 1 is reached: 0\.7500 spent"):
-            await capped.reserve(lambda: 0.3)
-        other.settle(await other.reserve(lambda: 5.0), 5.0)
-        assert budget.spent_usd == 5.75
 
     run(main)
 
