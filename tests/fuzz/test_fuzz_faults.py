@@ -35,8 +35,7 @@ from tests.fuzz.laws import (
 )
 from tests.fuzz.strategies import FAULTS, SEED, fuzzed
 from tests.models.batching import Disk, Killing, command, run_command
-from tests.models.factory import QUICK, make_request
-from tests.models.routes import KEY_VARIABLE, ROUTES
+from tests.models.factory import KEY_VARIABLE, QUICK, ROUTES, make_request
 from tests.servers.batches import (
     AnthropicBatches,
     BatchFaults,
