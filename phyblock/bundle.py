@@ -173,7 +173,7 @@ def opened_bundle(path: Path, data: Sequence[Path] = ()) -> Iterator[Verified]:
 
 
 def _differs(where: object, field: str, made_by: str) -> StoreError:
-    message = "does not verify: made again, it comes out otherwise"
+    message = "does not verify: scored again, it comes out differently"
     return StoreError(
         Problem(str(where), message, field, hint=f"{_HINT}; it was made by phyblock {made_by}")
     )

@@ -290,7 +290,7 @@ def to_config(name: str, known: ModelConfig, suite: Suite) -> ModelConfig:
     sends = suite.answer_format == "json_schema" and config.response_format != "never"
     sends = sends and (config.response_format == "always" or takes_format(config))
     if sends and "response_format" in config.extra_body:
-        message = "says its own response_format, where the suite asks for one"
+        message = "sets its own response_format, but the suite asks for one"
         hint = "take it out of extra_body, or set response_format: never to send it all the same"
         field = "extra_body.response_format"
         raise SpecError(Problem(f"model {config.name}", message, field, hint=hint))

@@ -255,8 +255,8 @@ async def _judged_again(
     if same == len(asked) and not (goes_on and record.error is None):
         return judged(given, item, judgement)
     if strict:
-        message = "goes otherwise than it did, in another version"
-        hint = "the version of phyblock that made the run plays it as it went"
+        message = "does not go as it did: another version of phyblock made it"
+        hint = "use the version of phyblock that made the run"
         raise StoreError(Problem(where, message, "turns", record.sample, hint=hint))
     message = f"this version asks something else from turn {same + 2} on"
     error = StoredError(kind="retryable", message=message)

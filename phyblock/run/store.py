@@ -360,8 +360,8 @@ def held_run(folder: Path, manifest: Manifest) -> Manifest | None:
     if differ := [name for name in here if found.versions.get(name) != here[name]]:
         made = ", ".join(f"{name} {found.versions.get(name)}" for name in differ)
         now = ", ".join(f"{name} {here[name]}" for name in differ)
-        message = "was judged by another version of phyblock"
-        hint = f"phyblock score {folder} first: it judges the replies again and asks nobody"
+        message = "was scored by another version of phyblock"
+        hint = f"phyblock score {folder} first: it scores the replies again and calls no model"
         raise StoreError(Problem(str(folder), message, found=made, allowed=now, hint=hint))
     return found
 
