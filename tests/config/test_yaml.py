@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.config.yaml import dotted, dump_yaml, looks_secret, parse_yaml, read_yaml
+from phyblock.config.yaml import dotted, dump_yaml, looks_secret, parse_yaml, read_yaml, shown
 from phyblock.errors import SpecError
 
 SCALARS = {
@@ -144,3 +144,14 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
 )
 def test_a_search_for_keys_takes_linear_time(text: str) -> None:
     assert not looks_secret(text)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [10**6000, {object(): 1}, {(1, 2): 3}, b"x", "\ud800", {"a": {1, 2}}, "x" * 10**6],
+    ids=lambda value: type(value).__name__,
+)
+def test_any_value_can_be_shown(value: object) -> None:
+    text = shown(value)
+    assert len(text) <= 80
+    text.encode()

@@ -76,6 +76,7 @@ def test_what_only_official_files_have_is_read(tmp_path: Path) -> None:
     assert (scene.blocks[1].layer, scene.graph.layers) == (5, (1, 2))
 
 
+# name: path in the file, value there, field of the problem, words of the message
 BROKEN_GOALS: dict[str, tuple[str, object, str, str]] = {
     "level 5": ("level", 5, "level", "out of range"),
     "combined is a number": ("combined", 80, "combined", "wrong type"),
@@ -85,16 +86,6 @@ BROKEN_GOALS: dict[str, tuple[str, object, str, str]] = {
 }
 
 
-@pytest.mark.parametrize("name", BROKEN_GOALS)
-def test_a_broken_goal_is_named_with_file_and_field(tmp_path: Path, name: str) -> None:
-    path, value, field, message = BROKEN_GOALS[name]
-    goal = goal_path(write_checkout(tmp_path, SCENE))
-    change(goal, path, value)
-    (problem,) = problems_of(tmp_path)
-    assert (problem.where, problem.field) == (str(goal), field)
-    assert message in problem.message
-
-
 BROKEN_CANDIDATES: dict[str, tuple[str, object, str, str]] = {
     "wrong number": ("1.position", 3, "[1].position", "is wrong"),
     "duplicate look": ("1.euler", [0, 0, -90], "[2]", "looks the same as candidate 2"),
@@ -102,13 +93,14 @@ BROKEN_CANDIDATES: dict[str, tuple[str, object, str, str]] = {
 }
 
 
-@pytest.mark.parametrize("name", BROKEN_CANDIDATES)
-def test_a_broken_candidate_set_is_named_with_file_and_field(tmp_path: Path, name: str) -> None:
-    path, value, field, message = BROKEN_CANDIDATES[name]
-    candidates = candidates_path(write_checkout(tmp_path, SCENE))
-    change(candidates, path, value)
+@pytest.mark.parametrize("name", [*BROKEN_GOALS, *BROKEN_CANDIDATES])
+def test_what_is_broken_is_named_with_file_and_field(tmp_path: Path, name: str) -> None:
+    write_checkout(tmp_path, SCENE)
+    file = goal_path(tmp_path) if name in BROKEN_GOALS else candidates_path(tmp_path)
+    path, value, field, message = (BROKEN_GOALS | BROKEN_CANDIDATES)[name]
+    change(file, path, value)
     (problem,) = problems_of(tmp_path)
-    assert (problem.where, problem.field) == (str(candidates), field)
+    assert (problem.where, problem.field) == (str(file), field)
     assert message in problem.message
 
 
@@ -177,10 +169,6 @@ def test_the_official_scenes(official_checkout: Path) -> None:
             assert base.issuperset(task.scene.parents)
 
 
-def test_the_official_prompt_asks_for_the_form_that_is_parsed(official_checkout: Path) -> None:
-    assert "Move block with index" in official_prompt(official_checkout)
-
-
 COLOR: Raw = {
     "scene_id": "t1",
     "question": "What is the color of the block on top?",
@@ -241,18 +229,11 @@ def test_texts_pictures_and_orders_are_read(tmp_path: Path, scenes: Dataset) -> 
     assert found["or-001"].question.pictures == ()
 
 
-@pytest.mark.parametrize(
-    ("answers", "letters"),
-    [
-        (["a", "(B)", "C.", "yellow"], "ABCD"),
-    ],
-)
-def test_letters_texts_and_indices_are_answers(
-    tmp_path: Path, scenes: Dataset, answers: list[object], letters: str
-) -> None:
+def test_letters_and_texts_are_answers(tmp_path: Path, scenes: Dataset) -> None:
+    answers = ("a", "(B)", "C.", "yellow")
     write(tmp_path, "CO.json", [{**COLOR, "answer": answer} for answer in answers])
     found = read_official_questions(tmp_path, scenes).tasks
-    assert "".join(task.question.answer_letters for task in found) == letters
+    assert "".join(task.question.answer_letters for task in found) == "ABCD"
 
 
 FAULTS = [

@@ -29,7 +29,7 @@ from tests.servers.chassis import Seen
 from tests.servers.faults import WIRE_FAULTS
 from tests.servers.openai_chat import OpenAIChat
 from tests.servers.step_agent import StepAgent
-from tests.workspace import shared_folders
+from tests.workspace import Workspace, shared_folders
 
 CODES = (0, 1, 2, 130)
 _COMPLAINTS = ("error: ", "Error: ")
@@ -221,15 +221,8 @@ class Bench:
     """
 
     def __init__(self, template: Path, pictures: Path, root: Path) -> None:
-        self._template, self._folder = template, root / "here"
+        self._template, self._pictures, self._folder = template, pictures, root / "here"
         self._places = ("cache", "tmp", *map(str, shared_folders(pictures)))
-        self._environment = {
-            "PATH": os.environ["PATH"],
-            "HOME": str(self._folder),
-            "TMPDIR": str(self._folder / "tmp"),
-            "PHYBLOCK_CACHE": str(self._folder / "cache"),
-            "LITELLM_LOCAL_MODEL_COST_MAP": "True",
-        }
         self.tally: Counter[str] = Counter()
         self.found: dict[str, tuple[Case, Broken]] = {}
 
@@ -241,7 +234,10 @@ class Bench:
             for name, content in case.files.items():
                 _put(self._folder / name, content)
             watch = Watch(self._folder, (*case.may_write, *self._places), case.lasting)
-            ended = run_watched(case.args, self._folder, self._environment)
+            env = Workspace(self._folder, self._pictures).env
+            ended = run_watched(
+                case.args, self._folder, {**env, "TMPDIR": str(self._folder / "tmp")}
+            )
             self.tally["hangs" if ended.code is None else f"code {ended.code}"] += 1
             for broken in watch.broken(ended):
                 known = self.found.get(broken.name)

@@ -1,9 +1,10 @@
-"""Law: every reader takes time that is linear in the text, whatever the text is made of."""
+"""Laws of every reader: any text is read or a named problem, in time that is linear in it."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from hypothesis import example, given, settings
@@ -15,7 +16,7 @@ from phyblock.parsing.plan import parse_plan
 from phyblock.parsing.poses import parse_poses
 
 TEXTS = ("a red cube", "a blue cube", "an arch", "a cylinder")
-READERS: dict[str, Callable[[str], object]] = {
+READERS: dict[str, Callable[[str], Any]] = {
     "plan": lambda text: parse_plan(text, 16),
     "official": lambda text: parse_plan(text, 16, "official"),
     "move": parse_move,
@@ -65,3 +66,15 @@ def test_a_text_of_one_piece_is_read_in_linear_time(name: str) -> None:
 @example("Step1: Move block with index 16  \n")
 def test_a_text_of_many_pieces_is_read_in_linear_time(name: str, piece: str) -> None:
     check(READERS[name], piece)
+
+
+@pytest.mark.parametrize("name", READERS)
+@given(st.text())
+def test_any_text_is_read_or_a_named_problem(name: str, text: str) -> None:
+    parsed = READERS[name](text)
+    assert (parsed.rule is None) == (parsed.problem is not None)
+    if name == "move":
+        assert (parsed.rule is None) == (parsed.move is None and not parsed.is_done)
+    elif name in ("choice", "order"):
+        assert (parsed.rule is None) == (parsed.letters is None)
+        assert set(parsed.letters or "") <= set("ABCD")

@@ -64,9 +64,3 @@ def test_what_stands_before_the_asked_form_changes_nothing(
         move_form(16).write(f"Move({number})", text) if is_json else f"Next plan: Move({number})"
     )
     assert parse_move(f"{text}\n{asked}").move == number
-
-
-@given(st.text())
-def test_no_text_is_too_much(text: str) -> None:
-    parsed = parse_move(text)
-    assert (parsed.problem is None) == (parsed.is_done or parsed.move is not None)

@@ -1,16 +1,24 @@
-"""Plans: a table of replies with what they say, and laws of decoration, order and numbering."""
+"""Plans: a table of replies with what they say, laws of decoration, order and numbering, and counts
+of readings of the official recordings.
+"""
 
 from __future__ import annotations
 
+import csv
 import json
+from collections import Counter
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.parsing.plan import parse_plan
+from tests.official_replies import reply_texts
 
 N = 16
+COUNTS = Path(__file__).with_name("recordings.csv")
+"""Readings of the official recordings, by model."""
 
 
 def asked(*numbers: int) -> str:
@@ -231,8 +239,20 @@ def test_numbering_candidates_otherwise_numbers_the_plan_otherwise(
         assert parse_plan(write(*moved), N).plan.steps == tuple(moved)
 
 
-@given(st.text())
-def test_no_text_is_too_much(text: str) -> None:
-    for parser in ("steps", "official"):
-        parsed = parse_plan(text, N, parser)
-        assert (parsed.rule is None) == (parsed.problem is not None)
+def test_every_recorded_reply_is_read_as_counted(official_checkout: Path) -> None:
+    found: dict[str, Counter[str]] = {}
+    for (model, _), text in reply_texts(official_checkout).items():
+        parsed = parse_plan(text, 16)
+        official = parse_plan(text, 16, "official").plan
+        counts = found.setdefault(model, Counter())
+        counts["replies"] += 1
+        counts[parsed.rule or "unread"] += 1
+        counts["truncated"] += parsed.truncated
+        counts["blocks"] += len(parsed.plan.steps)
+        counts["dropped"] += len(parsed.dropped)
+        counts["as_official"] += parsed.plan == official
+    with COUNTS.open(encoding="utf-8", newline="") as file:
+        known = {row.pop("model"): row for row in csv.DictReader(file)}
+    for model, counts in found.items():
+        assert {name: str(counts[name]) for name in known[model]} == known[model], model
+    assert found

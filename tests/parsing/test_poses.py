@@ -126,9 +126,3 @@ def test_every_plan_of_the_asked_forms_is_read_as_it_is_written(
         items.append({"block": step.candidate, **dict(values)})
     text = pose_form(16, free=True).write(items) if is_json else "\n".join(lines)
     assert parse_poses(text, 16, free=True).plan.steps == tuple(plan)
-
-
-@given(st.text(), st.booleans())
-def test_no_text_is_too_much(text: str, free: bool) -> None:
-    parsed = parse_poses(text, 16, free=free)
-    assert (parsed.rule is None) == (parsed.problem is not None)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
-Raw = dict[str, Any]
+from tests.data import broken
+from tests.data.broken import Raw
 
 BEFORE = Path(__file__).with_name("format-1.jsonl")
 """A record of each track as the first version wrote it."""
@@ -24,13 +24,7 @@ def plan_record() -> Raw:
 
 def with_value(at: str, value: object) -> bytes:
     """The record with another value at a dotted place, as a line."""
-    record = plan_record()
-    *above, last = at.split(".")
-    node: Any = record
-    for name in above:
-        node = node[int(name) if isinstance(node, list) else name]
-    node[int(last) if isinstance(node, list) else last] = value
-    return json.dumps(record).encode()
+    return json.dumps(broken.with_value(plan_record(), at, value)).encode()
 
 
 def with_text(value: str, text: str) -> bytes:

@@ -1,15 +1,25 @@
-"""`run.yaml` is read within bounds, and said to be wrong in words."""
+"""`run.yaml` is read within bounds; only a run's own records are counted, and go on in it."""
 
 from __future__ import annotations
 
+import json
+import shutil
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from phyblock.config.yaml import shown
 from phyblock.errors import StoreError
-from phyblock.records.manifest import MANIFEST, read_manifest
-from tests.records.damage import YAML_TEXTS
+from phyblock.records.files import Validation, known_records
+from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
+from phyblock.records.record import Call
+from phyblock.results.load import load_run
+from phyblock.run.rescore import rescore
+from tests.records.damage import YAML_TEXTS, Raw, plan_record
+from tests.workspace import Workspace
+
+IDENTITY = "5eed" * 16
 
 
 @pytest.mark.parametrize("name", YAML_TEXTS)
@@ -26,12 +36,116 @@ def test_half_a_character_is_refused(tmp_path: Path) -> None:
         read_manifest(tmp_path)
 
 
+def facts(**changes: Any) -> Manifest:
+    """The manifest of the run that `plan_record` is of."""
+    return Manifest.model_validate({"identity": IDENTITY, **changes})
+
+
+def differs(validation: Validation, record: Raw) -> str | None:
+    """The field that shows that a record is of another run."""
+    problem = validation.problem("records.jsonl:7", known_records().validate_python(record))
+    if problem is None:
+        return None
+    assert problem.where == "records.jsonl:7"
+    assert problem.hint
+    return problem.field
+
+
+def renamed(**changes: Any) -> Raw:
+    record = {**plan_record(), **changes}
+    parts = (record["track"], record["model"], record["key"], f"s{record['seed']}")
+    return {**record, "sample": "/".join(parts)}
+
+
+def test_a_run_takes_its_own_records_and_those_scored_elsewhere() -> None:
+    plain, signed = plan_record(), {**plan_record(), "run": IDENTITY[:16]}
+    samples = {plain["sample"]}
+    for identity in (IDENTITY, f"{IDENTITY} scored by official, paper"):
+        for record in (plain, signed):
+            assert differs(Validation(facts(identity=identity), samples), record) is None
+
+
 @pytest.mark.parametrize(
-    "value",
-    [10**6000, {object(): 1}, {(1, 2): 3}, b"x", "\ud800", {"a": {1, 2}}, "x" * 10**6],
-    ids=lambda value: type(value).__name__,
+    ("record", "field"),
+    [
+        ({**plan_record(), "run": "0" * 16}, "run"),
+        (renamed(model="oracle"), "sample"),
+        (renamed(seed=2), "sample"),
+        (renamed(key="another"), "sample"),
+        (renamed(track="pose_planning") | {"track": "full_planning"}, "sample"),
+        ({**plan_record(), "seed": 1}, "sample"),
+        ({**plan_record(), "model": "oracle"}, "sample"),
+    ],
 )
-def test_any_value_can_be_shown(value: object) -> None:
-    text = shown(value)
-    assert len(text) <= 80
-    text.encode()
+def test_a_foreign_record_is_known_by_what_differs(record: Raw, field: str) -> None:
+    assert differs(Validation(facts(), {plan_record()["sample"]}), record) == field
+
+
+def test_a_call_of_another_run_is_foreign() -> None:
+    manifest = facts()
+    call = Call(call=0, model="m", sample="s", key="k", run=manifest.run)
+    assert Validation(manifest, {"t"}).problem("calls.jsonl:1", call) is None
+    other = call.model_copy(update={"run": "0" * 16})
+    problem = Validation(manifest, {"s"}).problem("calls.jsonl:1", other)
+    assert problem is not None
+    assert problem.field == "run"
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+    """Two runs that differ in the background of their pictures alone: `out` and `other`."""
+    made = Workspace(tmp_path_factory.mktemp("runs"), pictures_dir)
+    made.write_scenes()
+    for name, background in (("other", "white"), ("out", "checkerboard")):
+        made.out = made.root / name
+        made.write_suite(models=["random"], images={"size_px": 128, "background": background})
+        done = made.run()
+        assert done.code == 0, done.err
+    return made
+
+
+READERS: dict[str, Callable[[Path], object]] = {
+    "load": load_run,
+    "score": lambda folder: rescore(folder, "official", None, folder / "again"),
+}
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_records_that_were_copied_in_are_not_counted(
+    runs: Workspace, tmp_path: Path, reader: str
+) -> None:
+    folder = shutil.copytree(runs.out, tmp_path / "run")
+    READERS[reader](folder)
+    path = folder / "records.jsonl"
+    with path.open("ab") as file:
+        file.write((runs.root / "other" / "records.jsonl").read_bytes())
+    before = path.read_bytes()
+    with pytest.raises(StoreError) as caught:
+        READERS[reader](folder)
+    (problem,) = caught.value.problems
+    assert (problem.where, problem.field) == (f"{path}:6", "run")
+    assert path.read_bytes() == before
+
+
+def test_a_run_does_not_go_on_with_records_that_were_copied_in(
+    runs: Workspace, tmp_path: Path
+) -> None:
+    whole = runs.out
+    runs.out = Path(shutil.copytree(whole, tmp_path / "run"))
+    try:
+        assert runs.run().code == 0
+        path = runs.out / "records.jsonl"
+        shutil.copy(runs.root / "other" / "records.jsonl", path)
+        before = path.read_bytes()
+        done = runs.run()
+        assert done.code == 2
+        assert "records.jsonl:1: run: is of another run" in done.err
+        assert path.read_bytes() == before
+        lines = [json.loads(line) for line in (whole / "records.jsonl").read_bytes().splitlines()]
+        lines[2] |= {"key": "t9", "scene": "t9", "sample": "full_planning/random/t9/s0"}
+        path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+        done = runs.run()
+        assert done.code == 2
+        assert "records.jsonl:3: sample: is of another run" in done.err
+    finally:
+        runs.out = whole
