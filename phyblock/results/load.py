@@ -124,7 +124,7 @@ def frames_of(
         track = record.track
         if track not in taken:
             known = dict.fromkeys(measure.counted for measure in track_measures(track))
-            taken[track] = [counted for counted in known if counted.rows is not None]
+            taken[track] = [counted for counted in known if counted.sample is None]
         for counted in taken[track]:
             for way, numbers in counted.of(record):
                 counts.setdefault((track, counted.name), _Column()).add(owner, way, numbers)

@@ -8,6 +8,7 @@ instead (`start`). What those about scenes share is in `SceneTrack`.
 from __future__ import annotations
 
 import asyncio
+import functools
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -28,7 +29,7 @@ from phyblock.registry import added_measures, known_track, known_tracks
 from phyblock.sim.engine import REFERENCE_ENGINE, engine_version, physics_engine
 from phyblock.stable import hex_digest
 from phyblock.tracks.items import Item, Others, Presentation, ShownTask, select_tasks
-from phyblock.tracks.measures import SampleCounts, TrackReport
+from phyblock.tracks.measures import SampleCounts, TrackReport, read_report
 from phyblock.tracks.picking import Picking
 from phyblock.tracks.pictures import Drawing, Workshop, scene_drawings
 from phyblock.tracks.prompts import Prompt, TemplatePrompt, form_facts
@@ -89,10 +90,10 @@ class Track(ABC):
     """The model of its records; None for one that adds nothing to them."""
     counted: ClassVar[tuple[SampleCounts, ...]] = ()
     """The counts that its measures are made of; some are taken as a sample is judged."""
+    results: ClassVar[Mapping[str, Any]] = {}
+    """What `read_report` takes beside its YAML file."""
     varies: ClassVar[tuple[str, ...]] = ("repeats",)
     """Factors of a suite's section `vary` that change what it asks."""
-    shows_examples: ClassVar[bool] = False
-    """True if it can show worked examples."""
     plays: ClassVar[bool] = False
     """True if a sample is an episode of several turns."""
     simulates: ClassVar[bool] = False
@@ -122,9 +123,10 @@ class Track(ABC):
         """Select its items, and worked examples where there are any."""
 
     @classmethod
+    @functools.cache
     def report(cls) -> TrackReport:
-        """Return what tables and figures are made by."""
-        raise NotImplementedError
+        """Return what tables and figures are made by: the YAML file of its name, and `results`."""
+        return read_report(cls.name, cls.counted, **cls.results)
 
     @classmethod
     def prompt_field(cls) -> tuple[str, ...]:
@@ -387,7 +389,7 @@ def open_tracks(
         if kind.template_for(suite.answer_format) is None:
             message, hint = f"{name} cannot be asked for as JSON", "use answer_format: text"
             raise SpecError(Problem(suite.where(field), message, field, "json_schema", hint=hint))
-        if suite.examples and not kind.shows_examples:
+        if suite.examples and "examples" not in kind.varies:
             where, message = suite.where("examples"), f"{name} shows no worked examples"
             raise SpecError(Problem(where, message, "examples", hint="leave them out"))
     return tuple(kind_of(name)(suite, dataset, limit, shop) for name in suite.tracks)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -19,20 +19,14 @@ from phyblock.records.line import Line
 from phyblock.records.record import Record
 from phyblock.records.record import Score as ScoreLine
 from phyblock.resources import bundled
-from phyblock.scoring.counts import Counts, Floats, ratio_of
+from phyblock.scoring.counts import Counts
 from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES, AssemblyScorer, Score
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.stable import drawn_bytes
 from phyblock.tracks.base import Judgement, SceneTrack
 from phyblock.tracks.goal_blind import blind_guesses
 from phyblock.tracks.items import examples_of, file_plan
-from phyblock.tracks.measures import (
-    SampleCounts,
-    TrackReport,
-    each_score,
-    level_cells,
-    read_report,
-)
+from phyblock.tracks.measures import SampleCounts, level_cells
 from phyblock.tracks.picking import Picking, candidate_choices
 from phyblock.tracks.prompts import OfficialPrompt, Prompt
 
@@ -162,8 +156,6 @@ PLAN_RULES: Mapping[str, Callable[..., str]] = {
     "oracle": _in_valid_order(lambda *_: None),
     "oracle-no-orientation": _in_valid_order(_turned),
 }
-PLAN_FLOORS = ("goal-blind", "all-candidates", "random")
-"""The baselines that never see the goal."""
 
 
 def pick_plan(subject: PlanSubject) -> Picking:
@@ -207,11 +199,6 @@ def pose_counts(item: Any, record: Any) -> tuple[int, int, int, int]:
     return sum(first), len(first), sum(later), len(later)
 
 
-def pose_gap(sums: Floats) -> Floats:
-    """Return the difference of the two shares of `POSE_COUNTS`."""
-    return np.asarray(ratio_of(sums[..., :2]) - ratio_of(sums[..., 2:]))
-
-
 POSE_COUNTS = SampleCounts(
     "poses", ("first_right", "first_n", "later_right", "later_n"), sample=pose_counts
 )
@@ -242,11 +229,34 @@ def _blocks(score: ScoreLine) -> tuple[float, ...] | None:
 
 _OUTCOMES = tuple(f"blocks_{name}" for name in BLOCK_OUTCOMES)
 COUNTS = (
-    SampleCounts("steps", ("tp", "fp", "fn", "whole", "f1", "plans"), rows=each_score(_steps)),
-    SampleCounts("blocks", (*_OUTCOMES, "blocks", "distance", "plans"), rows=each_score(_blocks)),
-    SampleCounts("wrong_steps", ERROR_TYPES, rows=each_score(_wrong_steps)),
+    SampleCounts("steps", ("tp", "fp", "fn", "whole", "f1", "plans"), score=_steps),
+    SampleCounts("blocks", (*_OUTCOMES, "blocks", "distance", "plans"), score=_blocks),
+    SampleCounts("wrong_steps", ERROR_TYPES, score=_wrong_steps),
     POSE_COUNTS,
 )
+
+
+def _film(record: PlanRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
+    """Yield each step by the first score that knows single steps, that of the headline.
+
+    A right step puts a block at its place in the goal; a wrong one puts none.
+    """
+    yield FilmStep(f"{record.model}, {record.scene}", "plain", None, ())
+    score = next((score for score in record.scores if score.placed is not None), None)
+    if score is None or score.placed is None or score.why is None or record.parse is None:
+        yield FilmStep("no step is known", "bad", None, ())
+        return
+    blocks: tuple[Block, ...] = ()
+    steps = zip(record.parse.plan, score.placed, score.why, strict=True)
+    for n, (candidate, vertex, why) in enumerate(steps, 1):
+        heading = FullPlanning.report().heading
+        outcome = "placed" if vertex is not None else heading("wrong", str(why))
+        if task is not None and vertex is not None:
+            blocks += (task.scene.blocks[vertex],)
+        tone: Tone = "good" if vertex is not None else "bad"
+        yield FilmStep(f"{n}. block {candidate}: {outcome}", tone, candidate, blocks)
+    tone = "good" if score.tp == record.n_blocks else "bad"
+    yield FilmStep(f"{score.tp} of {record.n_blocks} blocks placed", tone, None, blocks)
 
 
 class FullPlanning(SceneTrack):
@@ -261,17 +271,8 @@ class FullPlanning(SceneTrack):
     by_hand = staticmethod(pick_plan)
     record = PlanRecord
     counted = COUNTS
+    results: ClassVar = {"cells": level_cells, "film": _film}
     varies = ("prompt", "background", "view", "candidate_order", "layout", "examples", "repeats")
-    shows_examples = True
-
-    @classmethod
-    @functools.cache
-    def report(cls) -> TrackReport:
-        """Return what tables and figures are made by."""
-        code = {"pose_gap": {"value": pose_gap}}
-        return read_report(
-            cls.name, COUNTS, code, cells=level_cells, floors=PLAN_FLOORS, film=_film
-        )
 
     def open(self) -> None:
         """Select scenes, and examples, which are shown as scenes are, with their own goals."""
@@ -352,29 +353,6 @@ class FullPlanning(SceneTrack):
         }
         fields = {"parse": parse, "scores": [score_fields(score) for score in scores]}
         return Judgement(parsed.rule is not None, fields)
-
-
-def _film(record: PlanRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
-    """Yield each step by the first score that knows single steps, that of the headline.
-
-    A right step puts a block at its place in the goal; a wrong one puts none.
-    """
-    yield FilmStep(f"{record.model}, {record.scene}", "plain", None, ())
-    score = next((score for score in record.scores if score.placed is not None), None)
-    if score is None or score.placed is None or score.why is None or record.parse is None:
-        yield FilmStep("no step is known", "bad", None, ())
-        return
-    blocks: tuple[Block, ...] = ()
-    steps = zip(record.parse.plan, score.placed, score.why, strict=True)
-    for n, (candidate, vertex, why) in enumerate(steps, 1):
-        heading = FullPlanning.report().heading
-        outcome = "placed" if vertex is not None else heading("wrong", str(why))
-        if task is not None and vertex is not None:
-            blocks += (task.scene.blocks[vertex],)
-        tone: Tone = "good" if vertex is not None else "bad"
-        yield FilmStep(f"{n}. block {candidate}: {outcome}", tone, candidate, blocks)
-    tone = "good" if score.tp == record.n_blocks else "bad"
-    yield FilmStep(f"{score.tp} of {record.n_blocks} blocks placed", tone, None, blocks)
 
 
 TRACK = FullPlanning

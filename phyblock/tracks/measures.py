@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from phyblock.config.suite import Suite
     from phyblock.data import AssemblyTask, Dataset
     from phyblock.records.manifest import Manifest
-    from phyblock.records.record import Record, Score
+    from phyblock.records.record import Record
     from phyblock.scoring.counts import Metric
     from phyblock.sim.film import FilmStep
 
@@ -68,41 +68,14 @@ def level_cells(suite: Suite, _: Manifest) -> tuple[Cell, ...]:
     return (*levels, Cell(OVERALL, "Overall", criterion=whole))
 
 
-NO_CHOICE: Way = ("", "", "")
-"""The way of a sample that is scored in one way alone."""
-Rows = Callable[[Any], Iterator[tuple[Way, Sequence[float]]]]
-"""The counts of a record with the way that they were scored by."""
-
-
-def each_record(count: Callable[[Any], Sequence[float] | None]) -> Rows:
-    """Return the `rows` of counts that a record has once, unless None."""
-
-    def rows(record: Record) -> Iterator[tuple[Way, Sequence[float]]]:
-        if (numbers := count(record)) is not None:
-            yield NO_CHOICE, numbers
-
-    return rows
-
-
-def each_score(count: Callable[[Score], Sequence[float] | None]) -> Rows:
-    """Return the `rows` of counts that are taken from each score of a record, unless None."""
-
-    def rows(record: Record) -> Iterator[tuple[Way, Sequence[float]]]:
-        for score in record.scores:
-            if (numbers := count(score)) is not None:
-                yield (score.setting, score.matcher or "", score.criterion), numbers
-
-    return rows
-
-
 @dataclass(frozen=True)
 class SampleCounts:
     """Counts of samples, one for each of the `columns`, from which measures are made.
 
     `sample` counts when a reply is judged: it is given the item that was asked about and the
-    record, in which its numbers are kept; None: the sample is not counted. Instead of it, `rows`
-    takes them from a record as it is read, once for each way of scoring it. `cells` are its own
-    where they are not the track's.
+    record, in which its numbers are kept. Instead of it, `record` counts a record as it is read, or
+    `score` each of its scores. None: it is not counted. `cells` are its own where they are not the
+    track's.
 
     With `parts`, the samples of one group, as the rotations of a question, count as one, right only
     if all of so many are. `alike` names fields of `run.yaml` that decide the counts: runs that
@@ -112,17 +85,21 @@ class SampleCounts:
     name: str
     columns: tuple[str, ...]
     sample: Callable[[Any, Any], Sequence[float] | None] | None = None
-    rows: Rows | None = None
+    record: Callable[[Any], Sequence[float] | None] | None = None
+    score: Callable[[Any], Sequence[float] | None] | None = None
     cells: tuple[Cell, ...] = ()
     parts: Callable[[Suite], int] | None = None
     alike: tuple[str, ...] = ()
 
-    def of(self, record: Record) -> Iterable[tuple[Way, Sequence[float]]]:
-        """Yield the numbers of a record with the way in which it was scored."""
-        if self.rows is not None:
-            yield from self.rows(record)
-        elif numbers := record.counts.get(self.name):
-            yield NO_CHOICE, numbers
+    def of(self, record: Record) -> Iterator[tuple[Way, Sequence[float]]]:
+        """Yield what is counted as a record is read, with the way in which that was scored."""
+        if self.record is not None and (numbers := self.record(record)):
+            yield ("", "", ""), numbers
+        if (count := self.score) is None:
+            return
+        for score in record.scores:
+            if (numbers := count(score)) is not None:
+                yield (score.setting, score.matcher or "", score.criterion), numbers
 
 
 @dataclass(frozen=True)
@@ -181,12 +158,6 @@ class Measure:
 def in_unit(heading: str, unit: str) -> str:
     """Return a heading with the unit of the values below it in brackets, where they have one."""
     return f"{heading} ({unit})" if unit else heading
-
-
-def _divided(by: Metric, columns: Sequence[str], *named: Sequence[str]) -> Metric:
-    """Return the metric that divides the sum of some columns by that of others."""
-    places = [[columns.index(name) for name in names] for names in named]
-    return lambda sums: by(np.stack([sums[..., one].sum(axis=-1) for one in places], axis=-1))
 
 
 @dataclass(frozen=True)
@@ -262,7 +233,7 @@ class TrackReport:
     headline: tuple[LayoutColumn, ...] = ()
     tables: Mapping[str, Layout] = field(default_factory=dict)
     notes: Sequence[str] = ()
-    floors: tuple[str, ...] = ()
+    floors: Sequence[str] = ()
     short: str = ""
     part_names: Mapping[str, str] = field(default_factory=dict)
     items: Callable[[Path, Manifest, Dataset], Callable[[Record], Any | None]] | None = None
@@ -283,11 +254,12 @@ def read_report(
     """Return the report of a track: its YAML file, joined with what is code.
 
     Measures stand in groups that share fields. Each is the sum of the columns in `part` (by default
-    the column of its name) over that of `whole`; a mean where its unit is not "%" or it says so.
-    `code` has the fields of measures, by name, that are functions.
+    the column of its name) over that of `whole`, a mean where its unit is not "%" or it says so; or
+    the `mean_of` others of its counts, or the `difference_of` two. `code` has the fields of
+    measures, by name, that are functions.
     """
     told = yaml.safe_load(Path(__file__).with_name(f"{track}.yaml").read_text(encoding="utf-8"))
-    by_name, measures = {counted.name: counted for counted in counts}, []
+    by_name, measures = {counted.name: counted for counted in counts}, dict[str, Measure]()
     for group in told.pop("measures"):
         for name, own in group.pop("of").items():
             about = {**group, **own, **(code or {}).get(name, {})}
@@ -297,13 +269,31 @@ def read_report(
             about.setdefault("over", *whole[:1])
             if about.get("unit", "%") != "%":
                 is_mean, about = True, {"most": math.inf, **about}
-            if "value" not in about:
+            if others := about.pop("mean_of", None):
+                value = _combined(measures, others, lambda parts: np.mean(parts, axis=0))
+            elif others := about.pop("difference_of", None):
+                value = _combined(measures, others, lambda parts: parts[0] - parts[1])
+                about["is_difference"] = True
+            else:
                 by = mean_of if is_mean else ratio_of
-                about["value"] = _divided(by, counted.columns, part, whole)
-            measures.append(Measure(name, counted=counted, **about))
+                value = _divided(by, counted.columns, part, whole)
+            measures[name] = Measure(name, counted=counted, value=value, **about)
     told["headline"] = tuple(LayoutColumn(**column) for column in told["headline"])
     told["tables"] = {
         name: Layout(**{**one, "columns": [LayoutColumn(**column) for column in one["columns"]]})
         for name, one in told["tables"].items()
     }
-    return TrackReport(tuple(measures), **told, **more)
+    return TrackReport(tuple(measures.values()), **told, **more)
+
+
+def _divided(by: Metric, columns: Sequence[str], *named: Sequence[str]) -> Metric:
+    """Return the metric that divides the sum of some columns by that of others."""
+    places = [[columns.index(name) for name in names] for names in named]
+    return lambda sums: by(np.stack([sums[..., one].sum(axis=-1) for one in places], axis=-1))
+
+
+def _combined(
+    measures: Mapping[str, Measure], names: Sequence[str], join: Callable[[list[Any]], Any]
+) -> Metric:
+    """Return the metric that joins the values of measures, which need not be there yet."""
+    return lambda sums: np.asarray(join([measures[name].value(sums) for name in names]))

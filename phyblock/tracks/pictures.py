@@ -176,44 +176,42 @@ def picture_style(images: ImagesSpec) -> PictureStyle:
 def scene_drawings(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, ...]:
     """Return the goal and the candidates of a scene: one composite, or two pictures apart.
 
-    A goal that is not shown has no part in the size of what is. DataError where the data set is to
-    bring the picture and has none.
+    They are drawn, or cut out of the data set's own composites. A goal that is not shown has no
+    part in the size of what is. DataError where the data set is to bring a picture and has none.
     """
-    if images.source == "dataset":
-        return _dataset_drawings(task, images)
     shown, style = goal_of(task), picture_style(images)
-    style = style if shown is None else goal_style(shown.scene, style)
-    side = (style.size_px, style.size_px)
-    key = candidates_key(task.candidates, style)
-    grid = Drawing("candidates", key, partial(candidates_png, task.candidates, style), side)
+    is_drawn = images.source == "render"
+    if is_drawn:
+        style = style if shown is None else goal_style(shown.scene, style)
+        side = (style.size_px, style.size_px)
+        key = candidates_key(task.candidates, style)
+        grid = Drawing("candidates", key, partial(candidates_png, task.candidates, style), side)
+    else:
+        grid = _cut_out(task, "candidates")
     if shown is None:
         return (grid,)
-    key = goal_key(shown.scene, style)
-    goal = Drawing("goal", key, partial(goal_png, shown.scene, style), side)
+    if is_drawn:
+        key = goal_key(shown.scene, style)
+        goal = Drawing("goal", key, partial(goal_png, shown.scene, style), side)
+    else:
+        goal = _cut_out(shown, "goal")
     if images.layout == "separate":
         return (goal, grid) if images.order[0] == "goal" else (grid, goal)
-    key = hex_digest(f"composite {goal.key} {grid.key}")
     join = partial(_joined, goal.make, grid.make)
-    return (Drawing("composite", key, join, joined_size_px(style.size_px)),)
-
-
-def _dataset_drawings(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, ...]:
-    """Return the data set's own composite, or what is cut out of it."""
-    shown, own = goal_of(task), _composite(task)
-    grid = partial(_half, own, is_goal=False)
-    key = hex_digest(read_picture(own))
-    candidates = Drawing("candidates", key, grid, is_file=True)
-    if shown is None:
-        return (candidates,)
-    other = _composite(shown)
-    goal, of_goal = partial(_half, other, is_goal=True), hex_digest(read_picture(other))
-    if images.layout == "separate":
-        apart = (Drawing("goal", of_goal, goal, is_file=True), candidates)
-        return apart if images.order[0] == "goal" else apart[::-1]
+    if is_drawn:
+        key = hex_digest(f"composite {goal.key} {grid.key}")
+        return (Drawing("composite", key, join, joined_size_px(style.size_px)),)
     if isinstance(task, ShownTask):
-        joined = partial(_joined, goal, grid)
-        return (Drawing("composite", f"{key} {of_goal}", joined, is_file=True),)
-    return (Drawing("composite", key, partial(read_picture, own), is_file=True),)
+        return (Drawing("composite", f"{grid.key} {goal.key}", join, is_file=True),)
+    whole = partial(read_picture, _composite(task))
+    return (Drawing("composite", grid.key, whole, is_file=True),)
+
+
+def _cut_out(task: AssemblyTask, label: str) -> Drawing:
+    """Return a half of the data set's own composite of a scene, its key that of the whole."""
+    path = _composite(task)
+    half = partial(_half, path, is_goal=label == "goal")
+    return Drawing(label, hex_digest(read_picture(path)), half, is_file=True)
 
 
 def _composite(task: AssemblyTask) -> Path:

@@ -9,18 +9,12 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
-from phyblock.config.validation import (
-    Fault,
-    PictureControls,
-    TemplateName,
-    UniqueSome,
-    checked,
-)
+from phyblock.config.validation import Fault, PictureControls, TemplateName, UniqueSome, checked
 from phyblock.data import AssemblyTask
 from phyblock.domain import (
     Block,
@@ -47,7 +41,6 @@ from phyblock.parsing.text import READER_VERSION
 from phyblock.records.line import Amount, Line, Whole
 from phyblock.records.record import Course, Record
 from phyblock.resources import bundled
-from phyblock.scoring.counts import Floats, ratio_of
 from phyblock.scoring.plan import AssemblyScorer
 from phyblock.scoring.pose import (
     POSE_ERRORS,
@@ -55,7 +48,6 @@ from phyblock.scoring.pose import (
     Laid,
     Piece,
     PoseError,
-    PoseFrame,
     PoseScorer,
     blocks_reached,
     pose_errors,
@@ -67,14 +59,7 @@ from phyblock.sim.contact import voxel_iou
 from phyblock.sim.dynamics import ExecutionLimits, execute, groups
 from phyblock.sim.engine import Pose, described_engine
 from phyblock.sim.film import FilmStep, Tone
-from phyblock.sim.geometry import (
-    box_height_cm,
-    center_cm,
-    collision_pieces,
-    origin_m,
-    put,
-    upright,
-)
+from phyblock.sim.geometry import box_height_cm, center_cm, collision_pieces, origin_m, put, upright
 from phyblock.sim.pictures import goal_style
 from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
 from phyblock.stable import plain_sum
@@ -82,13 +67,7 @@ from phyblock.text import counted
 from phyblock.tracks.base import CARRYING, ENGINE, Judgement, SceneTrack
 from phyblock.tracks.full_planning import PlanParse, needed_candidate, score_fields
 from phyblock.tracks.items import ShownTask, file_plan, goal_of
-from phyblock.tracks.measures import (
-    SampleCounts,
-    TrackReport,
-    each_record,
-    level_cells,
-    read_report,
-)
+from phyblock.tracks.measures import SampleCounts, level_cells
 from phyblock.tracks.picking import NumberField, Pick, Picking, candidate_choices
 from phyblock.tracks.pictures import Drawing, picture_style
 from phyblock.types import REFUSED_ENDS, STEP_ENDS, Matcher, PoseRotation, Setting, StepEnd, View
@@ -397,8 +376,9 @@ def _ended_before(
         return None
     pose = record.pose
     known = [PoseStep(s.block, s.center_cm, s.euler_deg) for s in record.parse.steps]
-    is_same = (known, dict(pose.limits)) == (list(given), spec.tolerances)
-    if not is_same or len(pose.steps) != len(given):
+    if known != list(given) or len(pose.steps) != len(known):
+        return None
+    if dict(pose.limits) != spec.tolerances:
         return None
     steps = tuple({n: v for n, v in step.fields().items() if n in _END} for step in pose.steps)
     return steps, {name: getattr(pose, name) for name in _WHOLE}
@@ -581,8 +561,6 @@ POSE_RULES: Mapping[str, Callable[..., str]] = {
     "oracle-2d": _flat,
     "stack": _stack,
 }
-POSE_FLOORS = ("random",)
-"""The baselines that never see the goal."""
 
 
 def pick_poses(subject: PoseSubject) -> Picking:
@@ -647,29 +625,73 @@ def _plan(record: PoseRecord, setting: Setting = "A") -> tuple[float, ...] | Non
 
 
 _ALIKE = tuple(f"tracks.pose_planning.{key}" for key in (CARRYING, ENGINE))
-RIGHT = SampleCounts(
-    "poses",
-    (*(f"{frame}_{cm:g}" for frame in POSE_FRAMES for cm in TOLERANCES_CM), "steps", "blocks"),
-    rows=each_record(_right),
-)
 ENDS = (*STEP_ENDS, "steps", "reached", "blocks", "iou", "completed", "plans")
-FITS = SampleCounts("fits", ("position_cm", "turn_deg", "iou", "n"), rows=each_record(_fits))
+FITS = SampleCounts("fits", ("position_cm", "turn_deg", "iou", "n"), record=_fits)
+_RIGHT = tuple(f"{frame}_{cm:g}" for frame in POSE_FRAMES for cm in TOLERANCES_CM)
 COUNTS = (
-    RIGHT,
+    SampleCounts("poses", (*_RIGHT, "steps", "blocks"), record=_right),
     FITS,
-    SampleCounts("carried", ENDS, rows=each_record(_ends), alike=_ALIKE),
-    SampleCounts("pose_errors", (*POSE_ERRORS, "steps"), rows=each_record(_errors), alike=_ALIKE),
-    SampleCounts("plan_a", ("tp", "fp", "fn"), rows=each_record(_plan)),
-    SampleCounts("plan_b", ("tp", "fp", "fn"), rows=each_record(partial(_plan, setting="B"))),
+    SampleCounts("carried", ENDS, record=_ends, alike=_ALIKE),
+    SampleCounts("pose_errors", (*POSE_ERRORS, "steps"), record=_errors, alike=_ALIKE),
+    SampleCounts("plan_a", ("tp", "fp", "fn"), record=_plan),
+    SampleCounts("plan_b", ("tp", "fp", "fn"), record=partial(_plan, setting="B")),
 )
 
 
-def _f1(frame: PoseFrame, sums: Floats) -> Floats:
-    """Return the mean over tolerances of 2 TP / (steps + blocks)."""
-    steps, blocks = (sums[..., RIGHT.columns.index(name)] for name in ("steps", "blocks"))
-    right = (sums[..., RIGHT.columns.index(f"{frame}_{cm:g}")] for cm in TOLERANCES_CM)
-    parts = [ratio_of(np.stack([2 * each, steps + blocks], axis=-1)) for each in right]
-    return np.asarray(np.mean(parts, axis=0))
+def _film(record: PoseRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
+    """Yield the plan as given, the world after each step, and the end."""
+    given, pose = record.parse.steps if record.parse else (), record.pose
+    if pose is None or not given:
+        yield FilmStep(f"there is no plan: {_no_plan(record)}", "bad", None, ())
+        return
+    worlds: list[tuple[Block, ...]] = [() for _ in given]
+    blocks: list[Block | None] = []
+    if task is not None:
+        candidates = upright(task.candidates)[0] if pose.rotation == "free" else task.candidates
+        steps = [PoseStep(one.block, one.center_cm, one.euler_deg) for one in given]
+        blocks = [put(step, candidates) for step in steps]
+        worlds = list(worlds_of(blocks, pose.steps))
+    first = tuple(block for block in blocks if block is not None)
+    yield FilmStep(f"{record.model}, {record.scene}: the plan as given", "plain", None, first)
+    for n, (one, step, world) in enumerate(zip(given, pose.steps, worlds, strict=True), 1):
+        tone: Tone = "good" if step.error is None else "bad"
+        caption = f"{n}. block {one.block}: {_ended(step)}"
+        if step.error is not None and step.end == "stands":
+            caption += f", but {_heading(step.error)}"
+        yield FilmStep(caption, tone, one.block, world, _where(one, step))
+    reached = f"{pose.reached} of {counted(record.n_blocks, 'block')} reached"
+    tone = "good" if pose.completed else "bad"
+    yield FilmStep(f"{reached}, IoU {pose.iou:.2f}", tone, None, worlds[-1])
+
+
+def _no_plan(record: PoseRecord) -> str:
+    """Return why there is not one step."""
+    if record.error is not None:
+        return record.error.message
+    if record.parse is not None and record.parse.problem is not None:
+        return f"nothing could be read out of the reply ({record.parse.problem})"
+    return "there is no reply"
+
+
+def _where(given: GivenStep, step: StepOutcome) -> str:
+    """Return where a step puts its block, how far that is off, and what is wrong with it."""
+    told = [f"at ({', '.join(f'{part:g}' for part in given.center_cm)}) cm"]
+    told += [] if step.position_cm is None else [f"off by {step.position_cm:.2f} cm"]
+    told += [] if step.error is None else [_heading(step.error)]
+    return ", ".join(told)
+
+
+def _ended(step: StepOutcome) -> str:
+    if step.end == "falls":
+        return f"falls, {step.moved_cm:.1f} cm from its place"
+    if step.end == "knocks_over":
+        return f"knocks over {', '.join(map(str, step.knocked))}"
+    plain = {"under_floor": "under the floor", "no_block": "no such block"}
+    return plain.get(step.end, step.end)
+
+
+def _heading(error: str) -> str:
+    return PosePlanning.report().heading("pose", error).lower()
 
 
 class PosePlanning(SceneTrack):
@@ -684,20 +706,11 @@ class PosePlanning(SceneTrack):
     by_hand = staticmethod(pick_poses)
     record = PoseRecord
     counted = COUNTS
+    results: ClassVar = {"cells": level_cells, "film": _film}
     varies = ("prompt", "background", "candidate_order", "repeats")
     simulates = True
     draws = True
     spec: PoseSpec
-
-    @classmethod
-    @functools.cache
-    def report(cls) -> TrackReport:
-        """Return what tables and figures are made by."""
-        frames: dict[str, PoseFrame] = {"f1_c": "absolute", "f1_c_aligned": "aligned"}
-        code = {name: {"value": partial(_f1, frame)} for name, frame in frames.items()}
-        return read_report(
-            cls.name, COUNTS, code, cells=level_cells, floors=POSE_FLOORS, film=_film
-        )
 
     def draw(self, item: AssemblyTask) -> tuple[Drawing, ...]:
         """Return the goal, where it is shown, from every view, and the sheet from the first."""
@@ -762,62 +775,6 @@ class PosePlanning(SceneTrack):
         rules = (self.spec, self.suite.settings, self.suite.scoring.matchers, known)
         found: Judgement = await self.work_out(partial(judge_poses, item, text, *rules))
         return found
-
-
-def _film(record: PoseRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
-    """Yield the plan as given, the world after each step, and the end."""
-    given, pose = record.parse.steps if record.parse else (), record.pose
-    if pose is None or not given:
-        yield FilmStep(f"there is no plan: {_no_plan(record)}", "bad", None, ())
-        return
-    worlds: list[tuple[Block, ...]] = [() for _ in given]
-    blocks: list[Block | None] = []
-    if task is not None:
-        candidates = upright(task.candidates)[0] if pose.rotation == "free" else task.candidates
-        steps = [PoseStep(one.block, one.center_cm, one.euler_deg) for one in given]
-        blocks = [put(step, candidates) for step in steps]
-        worlds = list(worlds_of(blocks, pose.steps))
-    first = tuple(block for block in blocks if block is not None)
-    yield FilmStep(f"{record.model}, {record.scene}: the plan as given", "plain", None, first)
-    for n, (one, step, world) in enumerate(zip(given, pose.steps, worlds, strict=True), 1):
-        tone: Tone = "good" if step.error is None else "bad"
-        caption = f"{n}. block {one.block}: {_ended(step)}"
-        if step.error is not None and step.end == "stands":
-            caption += f", but {_heading(step.error)}"
-        yield FilmStep(caption, tone, one.block, world, _where(one, step))
-    reached = f"{pose.reached} of {counted(record.n_blocks, 'block')} reached"
-    tone = "good" if pose.completed else "bad"
-    yield FilmStep(f"{reached}, IoU {pose.iou:.2f}", tone, None, worlds[-1])
-
-
-def _no_plan(record: PoseRecord) -> str:
-    """Return why there is not one step."""
-    if record.error is not None:
-        return record.error.message
-    if record.parse is not None and record.parse.problem is not None:
-        return f"nothing could be read out of the reply ({record.parse.problem})"
-    return "there is no reply"
-
-
-def _where(given: GivenStep, step: StepOutcome) -> str:
-    """Return where a step puts its block, how far that is off, and what is wrong with it."""
-    told = [f"at ({', '.join(f'{part:g}' for part in given.center_cm)}) cm"]
-    told += [] if step.position_cm is None else [f"off by {step.position_cm:.2f} cm"]
-    told += [] if step.error is None else [_heading(step.error)]
-    return ", ".join(told)
-
-
-def _ended(step: StepOutcome) -> str:
-    if step.end == "falls":
-        return f"falls, {step.moved_cm:.1f} cm from its place"
-    if step.end == "knocks_over":
-        return f"knocks over {', '.join(map(str, step.knocked))}"
-    plain = {"under_floor": "under the floor", "no_block": "no such block"}
-    return plain.get(step.end, step.end)
-
-
-def _heading(error: str) -> str:
-    return PosePlanning.report().heading("pose", error).lower()
 
 
 TRACK = PosePlanning

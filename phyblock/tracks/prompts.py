@@ -27,8 +27,6 @@ from phyblock.resources import bundled
 from phyblock.stable import hex_digest
 from phyblock.text import did_you_mean
 
-FORM_FACTS = ("answer_schema", "answer_example")
-"""The names by which templates say the JSON that is asked for."""
 _LARGEST_BYTES = 256 * 1024
 _COMMON_BLOCKS = ("system", "user", "caption")
 _ALL_BLOCKS = (*_COMMON_BLOCKS, "answer", "turn", "check")
@@ -38,9 +36,9 @@ _ALL_BLOCKS = (*_COMMON_BLOCKS, "answer", "turn", "check")
 def form_facts(form: AnswerForm[Any] | None) -> dict[str, object]:
     """Return what templates may use of the form of the answer; None is text."""
     if form is None:
-        return {"answer_format": "text", **dict.fromkeys(FORM_FACTS)}
-    facts = (json.dumps(form.schema), form.example)
-    return {"answer_format": "json_schema", **dict(zip(FORM_FACTS, facts, strict=True))}
+        return {"answer_format": "text", "answer_schema": None, "answer_example": None}
+    schema = json.dumps(form.schema)
+    return {"answer_format": "json_schema", "answer_schema": schema, "answer_example": form.example}
 
 
 @dataclass(frozen=True)

@@ -64,15 +64,7 @@ from phyblock.stable import hex_digest
 from phyblock.tracks.base import Judgement, Track
 from phyblock.tracks.baselines import Guesses
 from phyblock.tracks.items import Others, examples_of, spread, stratified
-from phyblock.tracks.measures import (
-    OVERALL,
-    WHOLE,
-    Cell,
-    SampleCounts,
-    TrackReport,
-    each_record,
-    read_report,
-)
+from phyblock.tracks.measures import OVERALL, WHOLE, Cell, SampleCounts
 from phyblock.tracks.picking import Choice, Picking
 from phyblock.tracks.pictures import Drawing, picture_style
 from phyblock.tracks.prompts import form_facts
@@ -248,14 +240,12 @@ COUNTS = (
     SampleCounts(
         "answer",
         ("correct", "n"),
-        rows=each_record(_answer),
+        record=_answer,
         parts=lambda suite: suite.section(VqaSpec).rotations,
         alike=_ALIKE,
     ),
-    SampleCounts("rotations", ("correct", "n"), rows=each_record(_answer), alike=_ALIKE),
-    SampleCounts(
-        "letters", (*_COLUMNS, "n"), rows=each_record(_letters), cells=(WHOLE,), alike=_ALIKE
-    ),
+    SampleCounts("rotations", ("correct", "n"), record=_answer, alike=_ALIKE),
+    SampleCounts("letters", (*_COLUMNS, "n"), record=_letters, cells=(WHOLE,), alike=_ALIKE),
 )
 
 
@@ -395,6 +385,27 @@ def _sheet(makes: Sequence[Callable[[], bytes]], letters: str, side_px: int) -> 
     return lettered_sheet_png([make() for make in makes], letters, side_px)
 
 
+def question_items(
+    folder: Path, manifest: Manifest, dataset: Dataset
+) -> Callable[[Record], AskedQuestion | None]:
+    """Return the questions of a run; DataError where they are not what it was made on."""
+    recorded = manifest.questions
+    if recorded is None:
+        raise DataError(Problem(str(folder / MANIFEST), "names no questions", "questions"))
+    questions = open_questions(recorded.format, Path(recorded.root), dataset)
+    if questions.sha256 != manifest.tracks.get("vqa", {}).get("questions"):
+        message = "is not the data set that the run was made on, or it was changed since"
+        raise DataError(Problem(str(questions.root), message, "sha256", questions.sha256))
+    by_id = {task.question.id: task for task in questions.tasks}
+
+    def asked(record: Record) -> AskedQuestion | None:
+        if not isinstance(record, ChoiceRecord) or record.question.id not in by_id:
+            return None
+        return AskedQuestion(by_id[record.question.id], record.question.rotation)
+
+    return asked
+
+
 class Vqa(Track):
     """Asks multiple-choice questions."""
 
@@ -408,23 +419,14 @@ class Vqa(Track):
     by_hand = staticmethod(pick_answer)
     record = ChoiceRecord
     varies = ("prompt", "background", "examples", "repeats")
-    shows_examples = True
     counted = COUNTS
+    results: ClassVar = {
+        "code": {"accuracy": {"chance": _guessing}},
+        "cells": _run_cells,
+        "part_names": {str(short): name for short, name in SUBTASK_NAMES.items()},
+        "items": question_items,
+    }
     spec: VqaSpec
-
-    @classmethod
-    @functools.cache
-    def report(cls) -> TrackReport:
-        """Return what tables and figures are made by."""
-        return read_report(
-            cls.name,
-            COUNTS,
-            {"accuracy": {"chance": _guessing}},
-            cells=_run_cells,
-            floors=("majority", "text-only", "random"),
-            part_names={str(short): name for short, name in SUBTASK_NAMES.items()},
-            items=question_items,
-        )
 
     def open(self) -> None:
         """Select questions; SpecError where there is none, or wrong pictures cannot be had."""
@@ -588,27 +590,6 @@ def select_questions(
         for place in spread(len(group))[:share]
     }
     return tuple(task for task in tasks if task.key in kept)
-
-
-def question_items(
-    folder: Path, manifest: Manifest, dataset: Dataset
-) -> Callable[[Record], AskedQuestion | None]:
-    """Return the questions of a run; DataError where they are not what it was made on."""
-    recorded = manifest.questions
-    if recorded is None:
-        raise DataError(Problem(str(folder / MANIFEST), "names no questions", "questions"))
-    questions = open_questions(recorded.format, Path(recorded.root), dataset)
-    if questions.sha256 != manifest.tracks.get("vqa", {}).get("questions"):
-        message = "is not the data set that the run was made on, or it was changed since"
-        raise DataError(Problem(str(questions.root), message, "sha256", questions.sha256))
-    by_id = {task.question.id: task for task in questions.tasks}
-
-    def asked(record: Record) -> AskedQuestion | None:
-        if not isinstance(record, ChoiceRecord) or record.question.id not in by_id:
-            return None
-        return AskedQuestion(by_id[record.question.id], record.question.rotation)
-
-    return asked
 
 
 TRACK = Vqa

@@ -30,16 +30,10 @@ from phyblock.sim.pictures import goal_style
 from phyblock.sim.question_pictures import question_key, question_png, state_picture
 from phyblock.text import counted
 from phyblock.tracks.base import ENGINE, Judgement, SceneTrack
-from phyblock.tracks.full_planning import POSE_COUNTS, PlanParse, pose_gap
+from phyblock.tracks.full_planning import POSE_COUNTS, PlanParse
 from phyblock.tracks.goal_blind import blind_guesses
 from phyblock.tracks.items import file_plan
-from phyblock.tracks.measures import (
-    SampleCounts,
-    TrackReport,
-    each_record,
-    each_score,
-    read_report,
-)
+from phyblock.tracks.measures import SampleCounts
 from phyblock.tracks.picking import Choice, Picking, candidate_choices
 from phyblock.tracks.pictures import Drawing, picture_style
 from phyblock.tracks.prompts import TemplatePrompt
@@ -230,24 +224,32 @@ def _random_step(subject: StepSubject, rng: np.random.Generator) -> str:
     return step_text(int(rng.integers(1, len(subject.candidates) + 1)))
 
 
-def _drawn(numbers: Sequence[int], rng: np.random.Generator) -> int | None:
-    return numbers[int(rng.integers(len(numbers)))] if numbers else None
+def _right_move(choose: Callable[[StepSubject, int, np.random.Generator], int | None]) -> Any:
+    """Return the rule that draws one of the right moves, so that every valid order can come, and
+    names what is chosen in its place, if anything is; Done where no move is right.
+    """
+
+    def rule(subject: StepSubject, rng: np.random.Generator) -> str:
+        moves = subject.exact or subject.valid
+        if not moves:
+            return step_text(None)
+        index = moves[int(rng.integers(len(moves)))]
+        return step_text((choose(subject, index, rng) if subject.exact else None) or index)
+
+    return rule
 
 
-def _oracle_step(subject: StepSubject, rng: np.random.Generator) -> str:
-    """One of the right moves, so that every valid order can come; Done where there is none."""
-    return step_text(_drawn(subject.exact or subject.valid, rng))
-
-
-def _unoriented_step(subject: StepSubject, rng: np.random.Generator) -> str:
-    """A right move, but with the block turned wrongly wherever there is such a candidate."""
-    index = _drawn(subject.exact, rng)
-    if index is None:
-        return _oracle_step(subject, rng)
+def _turned(subject: StepSubject, index: int, rng: np.random.Generator) -> int | None:
+    """Return a candidate of the same kind that is turned as no block of the goal is, or None."""
     kind, looks = subject.candidates[index].kind, {block.look for block in subject.scene.blocks}
     listed = enumerate(subject.candidates.candidates, 1)
     wrong = [n for n, one in listed if one.kind == kind and one.look not in looks]
-    return step_text(_drawn(wrong, rng) or index)
+    return wrong[int(rng.integers(len(wrong)))] if wrong else None
+
+
+def _first_pose(subject: StepSubject, index: int, _: np.random.Generator) -> int | None:
+    """Return the candidate of the same kind that is listed first."""
+    return subject.candidates.first_of(subject.candidates[index].kind)
 
 
 def _repeated_step(subject: StepSubject, rng: np.random.Generator) -> str:
@@ -256,22 +258,14 @@ def _repeated_step(subject: StepSubject, rng: np.random.Generator) -> str:
     return _random_step(subject, rng) if failed is None else step_text(failed)
 
 
-def _next_candidate(subject: StepSubject, _: np.random.Generator) -> str:
-    """Every candidate once, in their order."""
-    return step_text(subject.step + 1 if subject.step < len(subject.candidates) else None)
+def _in_turn(plan_of: Callable[[StepSubject], Sequence[int]]) -> Callable[..., str]:
+    """Return the rule that takes the steps of a plan one after another, then says Done."""
 
+    def rule(subject: StepSubject, _: np.random.Generator) -> str:
+        plan = plan_of(subject)
+        return step_text(plan[subject.step] if subject.step < len(plan) else None)
 
-def _next_guess(subject: StepSubject, _: np.random.Generator) -> str:
-    plan = subject.guess().steps
-    return step_text(plan[subject.step] if subject.step < len(plan) else None)
-
-
-def _first_pose(subject: StepSubject, rng: np.random.Generator) -> str:
-    """The type and color of a right move, in the pose that is listed first."""
-    index = _drawn(subject.exact, rng)
-    if index is None:
-        return _oracle_step(subject, rng)
-    return step_text(subject.candidates.first_of(subject.candidates[index].kind))
+    return rule
 
 
 def step_text(index: int | None) -> str:
@@ -281,15 +275,13 @@ def step_text(index: int | None) -> str:
 
 STEP_RULES: Mapping[str, Callable[..., str]] = {
     "random": _random_step,
-    "oracle": _oracle_step,
-    "oracle-no-orientation": _unoriented_step,
+    "oracle": _right_move(lambda *_: None),
+    "oracle-no-orientation": _right_move(_turned),
     "repeat": _repeated_step,
-    "all-candidates": _next_candidate,
-    "goal-blind": _next_guess,
-    "first-pose": _first_pose,
+    "all-candidates": _in_turn(lambda subject: range(1, len(subject.candidates) + 1)),
+    "goal-blind": _in_turn(lambda subject: subject.guess().steps),
+    "first-pose": _right_move(_first_pose),
 }
-STEP_FLOORS = ("goal-blind", "all-candidates", "random", "repeat")
-"""The baselines that never see the goal."""
 
 
 def pick_step(subject: StepSubject) -> Picking:
@@ -369,7 +361,7 @@ COUNTS = (
     SampleCounts(
         "moves",
         ("tp", "fp", "fn"),
-        rows=each_score(lambda score: (score.tp, score.fp, score.fn)),
+        score=lambda score: (score.tp, score.fp, score.fn),
         alike=_ALIKE,
     ),
     SampleCounts(
@@ -379,11 +371,40 @@ COUNTS = (
             *(f"ended_{name}" for name in ENDINGS),
             *(f"step_{name}" for name in STEP_OUTCOMES),
         ),
-        rows=each_record(_episodes),
+        record=_episodes,
         alike=_ALIKE,
     ),
     POSE_COUNTS,
 )
+
+
+def _film(record: EpisodeRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
+    """Yield the empty ground, every step, wrong ones too, and how the episode ended."""
+    yield FilmStep(f"{record.model}, {record.scene}", "plain", None, ())
+    blocks, heading = tuple[Block, ...](), StepPlanning.report().heading
+    tones: dict[str | None, Tone] = {"placed": "good", "done": "plain"}
+    for turn in record.steps:
+        if task is not None:
+            blocks = tuple(task.scene.blocks[vertex] for vertex in turn.world)
+        move, outcome = turn.parse.move, turn.outcome or "unread"
+        candidate = move if isinstance(move, int) else None
+        operation = f"Move({move})" if candidate is not None else move or "(no operation)"
+        ending = "" if outcome == "done" else f": {heading('step', outcome)}"
+        note = f"{len(turn.world)} of {record.n_blocks} placed"
+        note += f", read by {turn.parse.rule.replace('_', ' ')}" if turn.parse.rule else ""
+        caption, tone = f"{turn.step}. {operation}{ending}", tones.get(turn.outcome, "bad")
+        yield FilmStep(caption, tone, candidate, blocks, note)
+    by = ""
+    if record.ending == "collapsed" and task is not None:
+        blocks = settle(blocks).blocks
+        # Older records say no engine, and no version of it.
+        engine, now = record.engine or REFERENCE_ENGINE, described_engine()
+        if engine not in (now, now.partition(" ")[0]):
+            by = f" (falls in {now}, not {engine})"
+    placed = record.progress[-1] if record.progress else 0
+    how = f"{placed} of {counted(record.n_blocks, 'block')} placed; ended: "
+    tone = "good" if record.ending == "completed" else "bad"
+    yield FilmStep(f"{how}{heading('ended', record.ending)}{by}", tone, None, blocks)
 
 
 class StepPlanning(SceneTrack):
@@ -399,18 +420,12 @@ class StepPlanning(SceneTrack):
     by_hand = staticmethod(pick_step)
     record = EpisodeRecord
     counted = COUNTS
+    results: ClassVar = {"film": _film}
     varies = ("prompt", "background", "view", "candidate_order", "layout", "repeats")
     plays = True
     simulates = True
     draws = True
     spec: StepsSpec
-
-    @classmethod
-    @functools.cache
-    def report(cls) -> TrackReport:
-        """Return what tables and figures are made by."""
-        code = {"pose_gap": {"value": pose_gap}}
-        return read_report(cls.name, COUNTS, code, floors=STEP_FLOORS, film=_film)
 
     def open(self) -> None:
         """Select scenes; PromptError where the prompt has no text for turns of a conversation."""
@@ -714,35 +729,6 @@ class StepEpisode:
         ):
             of = {"tp": counts.tp, "fp": counts.fp, "fn": counts.fn, "errors": wrong}
             yield {"criterion": criterion, "matcher": None, "setting": setting, **of}
-
-
-def _film(record: EpisodeRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
-    """Yield the empty ground, every step, wrong ones too, and how the episode ended."""
-    yield FilmStep(f"{record.model}, {record.scene}", "plain", None, ())
-    blocks, heading = tuple[Block, ...](), StepPlanning.report().heading
-    tones: dict[str | None, Tone] = {"placed": "good", "done": "plain"}
-    for turn in record.steps:
-        if task is not None:
-            blocks = tuple(task.scene.blocks[vertex] for vertex in turn.world)
-        move, outcome = turn.parse.move, turn.outcome or "unread"
-        candidate = move if isinstance(move, int) else None
-        operation = f"Move({move})" if candidate is not None else move or "(no operation)"
-        ending = "" if outcome == "done" else f": {heading('step', outcome)}"
-        note = f"{len(turn.world)} of {record.n_blocks} placed"
-        note += f", read by {turn.parse.rule.replace('_', ' ')}" if turn.parse.rule else ""
-        caption, tone = f"{turn.step}. {operation}{ending}", tones.get(turn.outcome, "bad")
-        yield FilmStep(caption, tone, candidate, blocks, note)
-    by = ""
-    if record.ending == "collapsed" and task is not None:
-        blocks = settle(blocks).blocks
-        # Older records say no engine, and no version of it.
-        engine, now = record.engine or REFERENCE_ENGINE, described_engine()
-        if engine not in (now, now.partition(" ")[0]):
-            by = f" (falls in {now}, not {engine})"
-    placed = record.progress[-1] if record.progress else 0
-    how = f"{placed} of {counted(record.n_blocks, 'block')} placed; ended: "
-    tone = "good" if record.ending == "completed" else "bad"
-    yield FilmStep(f"{how}{heading('ended', record.ending)}{by}", tone, None, blocks)
 
 
 TRACK = StepPlanning

@@ -12,13 +12,13 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import phyblock.env
-from phyblock.data import AssemblyTask
-from phyblock.domain import BLOCK_TYPES, COLORS, Block, Candidate, CandidateSet, PoseStep, Scene
+from phyblock.domain import BLOCK_TYPES, COLORS, PoseStep
 from phyblock.env import DONE, PhyBlockEnv, read_tasks
 from phyblock.scoring.pose import blocks_reached
 from phyblock.sim.dynamics import execute
 from phyblock.sim.geometry import put
 from phyblock.types import SETTINGS, Setting
+from tests.tracks.opened import seesaw
 
 ROOT = Path(__file__).parents[2]
 SOME = read_tasks("phyblock-400")[::20]
@@ -124,17 +124,6 @@ def test_a_finished_assembly_looks_like_the_goal() -> None:
     picture = env.render()
     assert picture is not None
     assert np.array_equal(picture, observation["goal"])
-
-
-def seesaw() -> AssemblyTask:
-    """The bar tips unless the second cube is there before it; nothing says so but physics."""
-    blocks = (
-        Block(1, "cube", "red", (0, 0, 0.025), (0, 0, 0), (), 1),
-        Block(2, "cube", "blue", (0.11, 0, 0.025), (0, 0, 0), (), 1),
-        Block(3, "cuboid3", "yellow", (0.055, 0, 0.0625), (0, 0, 0), (1,), 2),
-    )
-    numbered = tuple(Candidate(b.type, b.color, b.euler_deg) for b in blocks)
-    return AssemblyTask(Scene("seesaw", (2,), blocks, ("seesaw",)), CandidateSet(numbered))
 
 
 @pytest.mark.parametrize(

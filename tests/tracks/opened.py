@@ -11,6 +11,7 @@ import yaml
 
 from phyblock.config.suite import Suite, load_suite
 from phyblock.data import AssemblyTask, Dataset, read_builtin
+from phyblock.domain import Block, Candidate, CandidateSet, Scene
 from phyblock.resources import bundled
 from phyblock.tracks import open_tracks
 from phyblock.tracks.pictures import Workshop
@@ -41,3 +42,14 @@ def track_of(
     dataset = Dataset("test", Path("."), tuple(tasks))
     (track,) = open_tracks(suite, dataset, limit, shop)
     return track
+
+
+def seesaw() -> AssemblyTask:
+    """A bar that tips unless the second cube is there before it; nothing says so but physics."""
+    blocks = (
+        Block(1, "cube", "red", (0, 0, 0.025), (0, 0, 0), (), 1),
+        Block(2, "cube", "blue", (0.11, 0, 0.025), (0, 0, 0), (), 1),
+        Block(3, "cuboid3", "yellow", (0.055, 0, 0.0625), (0, 0, 0), (1,), 2),
+    )
+    numbered = tuple(Candidate(b.type, b.color, b.euler_deg) for b in blocks)
+    return AssemblyTask(Scene("seesaw", (2,), blocks, ("seesaw",)), CandidateSet(numbered))

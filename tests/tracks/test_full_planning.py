@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,20 +11,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.data import AssemblyTask, read_builtin
+import phyblock
+from phyblock.data import AssemblyTask
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.tracks.full_planning import pose_choices, pose_counts
 from phyblock.tracks.goal_blind import goal_blind_plans
 from phyblock.tracks.items import Presentation
-from tests.data.broken import write_scenes
 from tests.tracks.opened import track_of
-from tests.workspace import SCENES
-
-
-@pytest.fixture(scope="module")
-def tasks(tmp_path_factory: pytest.TempPathFactory) -> tuple[AssemblyTask, ...]:
-    """The first is a red cube under a blue one; candidate 1 is the red cube, 3 the blue one."""
-    return read_builtin(write_scenes(tmp_path_factory.mktemp("data"), *SCENES)).tasks
 
 
 @pytest.fixture(scope="module")
@@ -92,6 +87,20 @@ def test_learned_plans_are_those_of_the_order_shown(tasks: tuple[AssemblyTask, .
         for task in track.items:
             (request,) = track.outlines(track.shown(task, seed))
             assert request.subject.guess() == plans[task.key] != Plan()
+
+
+@pytest.mark.parametrize(
+    ("name", "text"), [("full_planning", steps(1, 3, 2, 4)), ("vqa", "I see\na cube.\n\nAnswer: B")]
+)
+def test_a_reply_is_judged_in_ten_modules(name: str, text: str) -> None:
+    track, entered = track_of(name, limit=1), set[str]()
+    sys.setprofile(lambda frame, *_: entered.add(frame.f_code.co_filename))
+    try:
+        assert track.judge(track.items[0], text).is_read
+    finally:
+        sys.setprofile(None)
+    modules = {file for file in entered if file.startswith(str(Path(phyblock.__file__).parent))}
+    assert 2 < len(modules) <= 10, sorted(modules)
 
 
 UP, OVER, ASIDE = (0.0, 0.0, 0.0), (90.0, 0.0, 0.0), (0.0, 0.0, 90.0)

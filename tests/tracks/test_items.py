@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.data import AssemblyTask, read_builtin
+from phyblock.data import AssemblyTask
 from phyblock.domain.symmetry import Symmetry, canonical_form
 from phyblock.errors import DataError, SpecError
 from phyblock.making.scenes.sketch import transformed
@@ -32,9 +32,7 @@ from phyblock.tracks.items import (
     stratified,
 )
 from phyblock.tracks.pictures import Workshop
-from tests.data.broken import write_scenes
 from tests.tracks.opened import BUILT_IN, track_of
-from tests.workspace import SCENES
 
 
 def goals_of(pool: Sequence[AssemblyTask]) -> Others[AssemblyTask]:
@@ -46,18 +44,6 @@ SHUFFLED = Presentation("shuffled")
 seeds = st.integers(0, 2**31 - 1)
 plans = st.lists(st.integers(-1, 18), max_size=8)
 names = st.lists(st.sampled_from([task.key for task in BUILT_IN.tasks]), max_size=3, unique=True)
-
-
-@pytest.fixture(scope="module")
-def tasks(tmp_path_factory: pytest.TempPathFactory) -> tuple[AssemblyTask, ...]:
-    return read_builtin(write_scenes(tmp_path_factory.mktemp("data"), *SCENES)).tasks
-
-
-@pytest.fixture(scope="module")
-def shop(pictures_dir: Any) -> Any:
-    made = Workshop(1, pictures_dir)
-    yield made
-    made.close()
 
 
 @given(SIZES, st.integers(1, 900))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,32 +13,18 @@ import pytest
 from PIL import Image as PillowImage
 
 from phyblock.config.suite import ImagesSpec
-from phyblock.data import AssemblyTask, read_builtin, read_official
+from phyblock.data import AssemblyTask, read_official
 from phyblock.errors import DataError, StoreError
 from phyblock.models.request import Image
 from phyblock.sim.pictures import candidates_png, goal_png
 from phyblock.tracks.items import Others, Presentation, ShownTask
 from phyblock.tracks.pictures import Workshop, picture_style, scene_drawings
-from tests.data.broken import write_scenes
 from tests.fuzz.strategies import png_header
-from tests.workspace import SCENES
 
 COMPOSITE = ImagesSpec(size_px=128)
 GOAL_FIRST = ImagesSpec(size_px=128, layout="separate")
 GOAL_LAST = ImagesSpec(size_px=128, layout="separate", order=("candidates", "goal"))
 OWN = ImagesSpec(source="dataset")
-
-
-@pytest.fixture(scope="module")
-def tasks(tmp_path_factory: pytest.TempPathFactory) -> tuple[AssemblyTask, ...]:
-    return read_builtin(write_scenes(tmp_path_factory.mktemp("data"), *SCENES)).tasks
-
-
-@pytest.fixture
-def shop(pictures_dir: Path) -> Iterator[Workshop]:
-    made = Workshop(1, pictures_dir)
-    yield made
-    made.close()
 
 
 def draw(
@@ -81,24 +67,6 @@ def test_a_picture_is_drawn_once_however_often_and_by_whomever_it_is_asked_for(
         path.write_bytes(path.read_bytes()[:-20])
     assert draw(tmp_path, COMPOSITE, tasks) == (first[:2], 2)
     assert not list(tmp_path.rglob("*.part"))
-
-
-def test_layout_and_order_are_those_of_the_suite(
-    tasks: tuple[AssemblyTask, ...], tmp_path: Path
-) -> None:
-    tasks = tasks[:2]
-    ((goal, grid), (other_goal, other_grid)), drawn = draw(tmp_path, GOAL_FIRST, tasks)
-    assert drawn == 3, "both tasks have the same candidates"
-    assert (goal.label, grid.label) == ("goal", "candidates")
-    assert grid == other_grid
-    assert goal.data != other_goal.data
-    assert draw(tmp_path, GOAL_LAST, tasks) == ([(grid, goal), (grid, other_goal)], 0)
-    (((both,)), _), _ = draw(tmp_path, COMPOSITE, tasks)
-    whole, side = opened(both), goal.width_px
-    assert whole.size == (both.width_px, both.height_px)
-    assert whole.crop((0, 0, side, side)).tobytes() == opened(goal).tobytes()
-    right = whole.crop((both.width_px - side, 0, both.width_px, side))
-    assert right.tobytes() == opened(grid).tobytes()
 
 
 def test_an_outline_draws_nothing_and_has_the_real_sizes(

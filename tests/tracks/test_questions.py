@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -44,13 +44,6 @@ def question_set(tmp_path_factory: pytest.TempPathFactory) -> QuestionSet:
     root = tmp_path_factory.mktemp("vqa")
     scenes = read_builtin(Workspace(root, root / "pictures").write_scenes())
     return read_questions(write_questions(root / "questions"), scenes)
-
-
-@pytest.fixture(scope="module")
-def shop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
-    made = Workshop(1, tmp_path_factory.mktemp("pictures"))
-    yield made
-    made.close()
 
 
 def opened(found: QuestionSet, shop: Workshop | None, size_px: int = 128, **vqa: Any) -> Vqa:

@@ -24,16 +24,10 @@ from phyblock.records.record import Reply, Usage
 from phyblock.run.estimate import has_all_pictures
 from phyblock.scoring.steps import MOVE_OUTCOMES
 from phyblock.tracks.pictures import Workshop
-from phyblock.tracks.step_planning import (
-    ENDINGS,
-    STEP_RULES,
-    Feedback,
-    PastStep,
-    StepPlanning,
-)
+from phyblock.tracks.step_planning import ENDINGS, STEP_RULES, Feedback, PastStep, StepPlanning
 from phyblock.types import SETTINGS, Setting
 from tests.parsing.test_move import REPLIES
-from tests.tracks.opened import BUILT_IN, track_of
+from tests.tracks.opened import BUILT_IN, seesaw, track_of
 
 OPEN = {"max_failures": None, "max_repeats": None}
 GOAL, CANDIDATES = Image(b"g", "goal", 1, 1), Image(b"c", "candidates", 1, 1)
@@ -61,17 +55,6 @@ def tower(*colors: str) -> AssemblyTask:
     cubes = [Candidate("cube", c, (0, 0, 0)) for c in ("red", "yellow", "blue", "green", "orange")]  # type: ignore[arg-type]
     arch = Candidate("arch", "red", (0, 0, 0))
     return AssemblyTask(Scene("tower", (3,), blocks, ("tower",)), CandidateSet((*cubes, arch)))
-
-
-def seesaw() -> AssemblyTask:
-    """A bar that tips unless the second cube is there before it."""
-    blocks = (
-        Block(1, "cube", "red", (0, 0, 0.025), (0, 0, 0), (), 1),
-        Block(2, "cube", "blue", (0.11, 0, 0.025), (0, 0, 0), (), 1),
-        Block(3, "cuboid3", "yellow", (0.055, 0, 0.0625), (0, 0, 0), (1,), 2),
-    )
-    numbered = tuple(Candidate(b.type, b.color, b.euler_deg) for b in blocks)
-    return AssemblyTask(Scene("seesaw", (2,), blocks, ("seesaw",)), CandidateSet(numbered))
 
 
 def scripted(*texts: str) -> Agent:
@@ -317,13 +300,6 @@ def test_runs_of_failures_end_an_episode(
 def test_outlines_are_as_many_as_an_episode_can_have() -> None:
     task, rules = tower("red", "blue"), ({"samples": 2}, {}, {"max_steps": 1})
     assert [len(list(made(**one).outlines(task))) for one in rules] == [8, 4, 1]
-
-
-@pytest.fixture(scope="module")
-def shop(pictures_dir: Path) -> Any:
-    shop = Workshop(1, pictures_dir)
-    yield shop
-    shop.close()
 
 
 def current(n: int) -> Image:

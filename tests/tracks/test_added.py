@@ -1,30 +1,38 @@
-"""A measure is added in one place; a name or counts that clash are refused."""
+"""Measures and tracks that are added in one place; names and counts that clash are refused."""
 
 from __future__ import annotations
 
 import csv
 import json
+import math
+import re
 import sys
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from phyblock import registry
 from phyblock.cli.main import phyblock
-from phyblock.errors import StoreError
-from phyblock.results.estimates import track_estimates
-from phyblock.results.load import load_run, track_measures
+from phyblock.data import AssemblyTask
+from phyblock.errors import SpecError, StoreError
+from phyblock.records.record import Record
+from phyblock.results.compare import comparable, compare_models
+from phyblock.results.estimates import main_column, track_estimates
+from phyblock.results.export import export_run
+from phyblock.results.load import Run, load_run, track_measures
 from phyblock.results.tables import write_tables
 from phyblock.run.rescore import rescore
-from phyblock.scoring.counts import ratio_of
-from phyblock.tracks import kind_of
+from phyblock.scoring.counts import mean_of, ratio_of
+from phyblock.tracks import Judgement, SceneTrack, kind_of
 from phyblock.tracks.full_planning import FullPlanning
-from phyblock.tracks.measures import Measure, SampleCounts
-from phyblock.web.report import write_report
+from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts, TrackReport
+from phyblock.web.board import SiteRun, Sources, all_values, board_of, entries_of, values_of
 from tests.vqa_set import write_questions
 from tests.web.factory import manifest, record, write_run
 from tests.workspace import Workspace
@@ -74,36 +82,6 @@ def here(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> Workspace:
     return workspace
 
 
-def check_everywhere(folder: Path) -> None:
-    """The measure is in the tables, with intervals, in comparisons and on the page."""
-    with (folder / "tables" / "estimates.csv").open(newline="") as file:
-        rows = [row for row in csv.DictReader(file) if row["measure"] == "needless"]
-    whole = {row["model"]: row for row in rows if row["cell"] == "overall"}
-    assert float(whole["oracle"]["value"]) == float(whole["oracle"]["lo"]) == 0
-    row = whole["all-candidates"]
-    assert 0.5 < float(row["lo"]) <= float(row["value"]) <= float(row["hi"]) < 1
-    assert {row["cell"] for row in rows} == {"1", "2", "3", "4", "overall"}
-    table = (folder / "tables" / "full_planning_measures.md").read_text("utf-8")
-    assert "Needless steps %" in table
-    assert f"{NEEDLESS.meaning}; over steps; lower is better." in table
-    assert "Needless steps" in (folder / "report.html").read_text("utf-8")
-    command("compare", folder, "--measure", "needless", "--out", folder / "compared")
-    with (folder / "compared" / "comparison.csv").open(newline="") as file:
-        compared = {row["part"]: row for row in csv.DictReader(file)}["overall"]
-    assert float(compared["value_b"]) == pytest.approx(100 * float(row["value"]), abs=1e-3)
-    assert float(compared["lo"]) < float(compared["difference"]) < float(compared["hi"])
-    assert (compared["better"], compared["worse"]) == ("5", "0")
-
-
-@pytest.mark.usefixtures("added")
-def test_a_measure_is_in_tables_intervals_comparisons_and_the_report(
-    here: Workspace,
-) -> None:
-    assert not command("run", "suite.yaml", "--out", here.out)
-    assert all(set(record["counts"]) >= {"poses", "needless_steps"} for record in here.records())
-    check_everywhere(here.out)
-
-
 def test_scoring_again_fills_in_what_older_records_lack(
     here: Workspace, request: pytest.FixtureRequest
 ) -> None:
@@ -121,10 +99,23 @@ def test_scoring_again_fills_in_what_older_records_lack(
         known = {row["measure"] for row in csv.DictReader(file)}
     assert known.isdisjoint({"needless", "distance", "blocks_order"})
     assert {"success", "macro_f1"} <= known
-    command("score", here.out, "--out", here.root / "scored")
-    write_report(write_tables(here.root / "scored"))
-    check_everywhere(here.root / "scored")
-    for line, again in zip(stored, here.records(here.root / "scored"), strict=True):
+    scored = here.root / "scored"
+    command("score", here.out, "--out", scored)
+    write_tables(scored)
+    with (scored / "tables" / "estimates.csv").open(newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["measure"] == "needless"]
+    assert {row["cell"] for row in rows} == {"1", "2", "3", "4", "overall"}
+    whole = {row["model"]: row for row in rows if row["cell"] == "overall"}
+    assert float(whole["oracle"]["value"]) == float(whole["oracle"]["lo"]) == 0
+    row = whole["all-candidates"]
+    assert 0.5 < float(row["lo"]) <= float(row["value"]) <= float(row["hi"]) < 1
+    command("compare", scored, "--measure", "needless", "--out", scored / "compared")
+    with (scored / "compared" / "comparison.csv").open(newline="") as file:
+        compared = {row["part"]: row for row in csv.DictReader(file)}["overall"]
+    assert float(compared["value_b"]) == pytest.approx(100 * float(row["value"]), abs=1e-3)
+    assert float(compared["lo"]) < float(compared["difference"]) < float(compared["hi"])
+    assert (compared["better"], compared["worse"]) == ("5", "0")
+    for line, again in zip(stored, here.records(scored), strict=True):
         assert json.dumps({**line, "counts": again["counts"]}, sort_keys=True) == json.dumps(
             again, sort_keys=True
         )
@@ -236,3 +227,118 @@ def test_counts_of_another_measure_name_the_file(tmp_path: Path) -> None:
     assert json.loads((folder / "records.jsonl").read_text())["counts"] == {"sampled": [1]}
     with pytest.raises(StoreError, match=r"records.jsonl: counts.sampled: was counted in another"):
         track_estimates(load_run(folder), "full_planning")
+
+
+def count_blocks(item: AssemblyTask, record: Record) -> tuple[float, float, float]:
+    off = abs((record.parse["number"] or 0) - len(item.scene))
+    return off, off == 0, 1
+
+
+COUNTS = SampleCounts("blocks", ("off", "exact", "n"), sample=count_blocks)
+ERROR = Measure(
+    "error", "Error", COUNTS, lambda sums: mean_of(sums[..., [0, 2]]),
+    "blocks too many or too few", unit="blocks", better="lower", most=math.inf,
+)  # fmt: skip
+EXACT = Measure("exact", "Exact", COUNTS, lambda s: ratio_of(s[..., 1:]), "right counts")
+
+
+class Counting(SceneTrack):
+    """Asks how many blocks a goal has."""
+
+    name = "counting"
+    title = "Counting"
+    template = Path(__file__).with_name("counting.j2")
+    baselines: ClassVar = {
+        "oracle": lambda task, _: str(len(task.scene)),
+        "random": lambda _, rng: str(np.random.Generator.integers(rng, 5, 9)),
+    }
+    counted = (COUNTS,)
+
+    @classmethod
+    def report(cls) -> TrackReport:
+        return TrackReport((ERROR, EXACT), short="count_error")
+
+    def judge(self, item: AssemblyTask, text: str | None) -> Judgement:
+        del item
+        found = re.findall(r"\d+", text or "")
+        number = int(found[-1]) if found else None
+        parse = {"rule": "number" if found else None, "number": number}
+        return Judgement(bool(found), {"parse": parse})
+
+
+def led_by(leading: Measure, *measures: Measure) -> type[Counting]:
+    """The track with these measures, the leading one behind what stands first."""
+    columns = tuple(LayoutColumn({m.name: m.heading}, main=m is leading) for m in measures)
+    report = replace(Counting.report(), measures=measures, headline=columns)
+    return type("Led", (Counting,), {"report": classmethod(lambda _: report)})
+
+
+@pytest.fixture
+def run(here: Workspace) -> Iterator[Run]:
+    registry.register_track(Counting)
+    here.write_suite(tracks=["counting"], models=["oracle", "random"])
+    assert not command("run", "suite.yaml", "--out", "out", "--no-report")
+    yield load_run(here.out)
+    registry.unregister_track(Counting.name)
+
+
+def test_samples_of_an_added_track_are_exported(run: Run) -> None:
+    (path,) = export_run(run, "csv")
+    rows = pd.read_csv(path)
+    assert len(rows) == 10
+    assert rows["count_blocks_exact"][rows["model"] == "oracle"].eq(1).all()
+
+
+def show(kind: type[Counting]) -> None:
+    registry.unregister_track(Counting.name)
+    registry.register_track(kind)
+
+
+def test_the_leading_measure_leads_everywhere(run: Run) -> None:
+    for kind, leading in ((Counting, ERROR), (led_by(EXACT, ERROR, EXACT), EXACT)):
+        show(kind)
+        assert comparable(run, "counting").measure == leading
+        assert compare_models(run).name == leading.heading
+        one = (SiteRun("run", run, Sources()),)
+        (track,) = board_of(one, entries_of(one), all_values(one))["tracks"]
+        assert track["main"] == main_column(run, "counting").heading
+        worth = values_of(run, "counting").samples["oracle"].values()
+        assert set(worth) == {leading.best}
+
+
+@pytest.mark.parametrize(
+    ("better", "most", "best"),
+    [
+        *(("higher", 8, 8), ("higher", math.inf, math.nan), ("higher", None, math.nan)),
+        *(("lower", 8, 0), ("lower", math.inf, 0), ("lower", None, math.nan)),
+    ],
+)
+def test_a_sample_is_solved_where_it_has_the_best_value_that_there_is(
+    run: Run, better: Any, most: float | None, best: float
+) -> None:
+    """The oracle has it everywhere, guesses nowhere: they are off by one block or more."""
+    far = {"higher": lambda sums: 8 - ERROR.value(sums), "lower": ERROR.value}
+    measure = replace(ERROR, value=far[better], better=better, most=most)
+    show(led_by(measure, measure))
+    assert measure.best == pytest.approx(best, nan_ok=True)
+    has_best = not math.isnan(best)
+    flipped = compare_models(run).flipped
+    assert set(flipped["right"]) == ({"oracle"} if has_best else set())
+    sites = [SiteRun("run", run, Sources())]
+    board = board_of(sites, entries_of(sites), all_values(sites))
+    assert json.loads(json.dumps(board, allow_nan=False))["tracks"][0]["best"] == (
+        best if has_best else None
+    )
+    solved = {row["name"]: row["facts"]["counting"]["solved"] for row in board["rows"]}
+    asked = run.design.samples("counting")
+    assert solved == (
+        {"oracle": asked, "random": 0} if has_best else {"oracle": None, "random": None}
+    )
+
+
+@pytest.mark.usefixtures("run")
+def test_what_a_track_has_not_is_refused() -> None:
+    with pytest.raises(SpecError, match="cannot be asked for as JSON"):
+        command("run", "suite.yaml", "--set", "answer_format=json_schema", "--out", "json")
+    with pytest.raises(SpecError, match="is a person, who cannot answer in counting"):
+        command("play", "suite.yaml", "--name", "ada")
