@@ -17,13 +17,7 @@ from phyblock.domain.question import Mark
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, turned_form
 from phyblock.making.questions.base import Draft, UnfairError, four_alike, ranks_among
 from phyblock.making.questions.dynamics import is_on_face, resting_on, stays_at
-from phyblock.making.questions.names import (
-    SHAPE_WORDS,
-    Feature,
-    names,
-    resolve,
-    resolve_one,
-)
+from phyblock.making.questions.production import BALANCE, even_letters, keeping_odds
 from phyblock.making.questions.properties import layers_of, sure_blocks
 from phyblock.making.questions.relations import (
     AXIS_TURNS,
@@ -32,7 +26,13 @@ from phyblock.making.questions.relations import (
     put_beside,
     tipped_over,
 )
-from phyblock.making.questions.selection import BALANCE, even_letters, keeping_odds
+from phyblock.making.questions.sight import (
+    SHAPE_WORDS,
+    Feature,
+    names,
+    resolve,
+    resolve_one,
+)
 from phyblock.making.questions.structures import is_sure, lowered, with_annex
 from phyblock.making.questions.views import ViewpointMaker
 from phyblock.making.scenes.sketch import POSES, transformed

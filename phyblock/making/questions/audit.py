@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from phyblock.domain.question import LETTERS, SUBTASKS, Question, QuestionPicture, Subtask
 from phyblock.making.questions.base import stem_of
-from phyblock.making.questions.selection import BALANCE
+from phyblock.making.questions.production import BALANCE
 from phyblock.sim.question_pictures import changed_pixels, seen
 from phyblock.tracks.baselines import FOLDS, Folds, Guesses
 

@@ -1,25 +1,29 @@
-"""Questions of all subtasks from a seed: drafts, a choice of them, letters; answers found again."""
+"""Questions of all subtasks from a seed: drafts, a choice of them, letters; answers found again.
+
+Answers are drawn, what a reader sees beside them is evened out. Drafts of each kind are taken in
+turns from all scenes, so that none counts for more than another. Of these, chance leaves out some
+until the texts of those kept tell nothing of what is right (`keeping_odds`). Of those the greedy
+choice takes, out of a hundred or so at a time, the one that evens out best what was taken so far.
+Where options are texts it goes by what the text itself says alone, kind, wording and set of
+options: to choose by the scene as well would choose answers, for large scenes have larger numbers,
+and to even out answers would make what is right often in some questions rare in the others.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import math
+from collections import Counter, defaultdict
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
 from typing import Any
 
 import numpy as np
 
-from phyblock.domain.question import (
-    LETTERS,
-    SUBTASKS,
-    Mark,
-    Question,
-    QuestionPicture,
-    Subtask,
-)
+from phyblock.domain.question import LETTERS, SUBTASKS, Mark, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.errors import DataError, PhyblockError, Problem
-from phyblock.making.questions.base import Draft, Maker, StaticMaker, pick, shuffled
+from phyblock.making.questions.base import Draft, Floats, Maker, StaticMaker, pick, shuffled
 from phyblock.making.questions.dynamics import AffordanceMaker, CounterfactualMaker, PredictiveMaker
 from phyblock.making.questions.properties import PropertyMaker, SizeMaker, TallyMaker
 from phyblock.making.questions.relations import (
@@ -28,9 +32,9 @@ from phyblock.making.questions.relations import (
     PositionMaker,
     RotationMaker,
 )
-from phyblock.making.questions.selection import even_letters, select
 from phyblock.making.questions.views import OrderingMaker, ViewpointMaker
 from phyblock.making.workers import Workers
+from phyblock.tracks.baselines import text_features
 from phyblock.types import BACKGROUNDS, Background
 
 MAKERS: dict[Subtask, Maker] = {
@@ -187,3 +191,169 @@ def problem_of(question: Question) -> str | None:
         letters = "".join(LETTERS[index] for index in derived)
         return f"the answer is {letters}, not {question.answer_letters}"
     return None
+
+
+# The choice among drafts
+
+_LOOKED_AT = 100
+_SPREAD = 20
+"""So many times the drafts that are wanted of a kind are looked at, where the pool has them,"""
+_SPARE = 2
+"""and so many times the drafts that are wanted are kept at the least."""
+BALANCE = (0.22, 0.28)
+"""Shares of right answers that every letter is to stay within."""
+
+
+def select(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[Draft]:
+    """Return at most `count` drafts, no two the same question about the same scene."""
+    left = _spread(pool, count, rng)
+    rank = rng.random(len(left)) / np.maximum(keeping_odds(left), 1e-9)
+    most = max(1.0, *np.sort(rank)[: _SPARE * count][-1:])
+    left = [one for one, place in zip(left, rank, strict=True) if place <= most]
+    members: dict[Hashable, set[Hashable]] = defaultdict(set)
+    for one in left:
+        for group, member, _ in _even(one):
+            members[group].add(member)
+    counts: Counter[tuple[Hashable, Hashable]] = Counter()
+
+    def cost(one: Draft) -> float:
+        """Return the unevenness that a further draft adds to those taken; the lower the better."""
+        cost = 0.0
+        for group, member, weight in _even(one):
+            others = [counts[group, other] for other in members[group]]
+            cost += weight * (counts[group, member] - sum(others) / len(others))
+        return cost
+
+    taken: dict[Hashable, Draft] = {}
+    while left and len(taken) < count:
+        size = min(_LOOKED_AT, len(left))
+        drawn = rng.choice(len(left), size=size, replace=False).tolist()
+        chosen = left.pop(min(drawn, key=lambda i: cost(left[i])))
+        if _identity(chosen) not in taken:
+            taken[_identity(chosen)] = chosen
+            counts.update((group, member) for group, member, _ in _even(chosen))
+    return list(taken.values())
+
+
+def _spread(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[Draft]:
+    """Return drafts of each kind, one of each scene in turns, several times those wanted."""
+    turns: dict[str, list[tuple[int, int]]] = defaultdict(list)
+    of_scene: Counter[tuple[str, str]] = Counter()
+    for i in rng.permutation(len(pool)).tolist():
+        about = (pool[i].kind, pool[i].scene.id)
+        of_scene[about] += 1
+        turns[pool[i].kind].append((of_scene[about], i))
+    most = -(-_SPREAD * count // max(len(turns), 1))
+    ranked = (sorted(group, key=lambda entry: entry[0])[:most] for group in turns.values())
+    return [pool[i] for group in ranked for _, i in group]
+
+
+def _even(draft: Draft) -> Iterator[tuple[Hashable, Hashable, float]]:
+    """Yield groups, the draft's member of each, and weights: members should be as frequent."""
+    yield "kind", draft.kind, 6.0
+    yield ("wording", draft.kind), draft.wording, 2.0
+    if texts := _texts(draft):
+        yield ("options", draft.kind), frozenset(texts), 0.2
+    else:
+        yield "scene", draft.scene.id, 3.0
+        yield "level", draft.scene.level, 0.3
+
+
+def _texts(draft: Draft) -> tuple[str, ...]:
+    """Return the options as texts; of pictures and places, whose texts tell nothing, none."""
+    return tuple(option for option in draft.options if isinstance(option, str))
+
+
+def _identity(draft: Draft) -> Hashable:
+    """Return scene, colors, what is asked about and pictures, but not the words around them."""
+    colors = tuple(block.color for block in draft.scene.blocks)
+    slots = tuple(sorted(draft.evidence["slots"].items()))
+    options = frozenset(option for option in draft.options if not isinstance(option, str))
+    return (draft.scene.id, colors, draft.kind, slots, draft.pictures, options)
+
+
+def even_letters(count: int, rng: np.random.Generator) -> list[int]:
+    """Return indices of the letters that are right, each share within `BALANCE`.
+
+    Of few questions the share that is nearest to it. Exactly equal shares would give the letters
+    of some questions away by those of the others.
+    """
+    # Rounded, as 0.28 of 150 is a little more than 42 in floating point.
+    low, high = (round(share * count, 6) for share in BALANCE)
+    while True:
+        drawn = rng.integers(len(LETTERS), size=count)
+        shares = np.bincount(drawn, minlength=len(LETTERS))
+        if math.floor(low) <= shares.min() and shares.max() <= math.ceil(high):
+            return [int(letter) for letter in drawn]
+
+
+_STEPS, _RATE, _PENALTY = 60, 0.3, 2.0
+_FITTED = 2000
+"""So many drafts are learned from at most, spread over the pool."""
+
+
+def keeping_odds(drafts: Sequence[Draft]) -> Floats:
+    """Return the probability with which each draft is kept; 1 where there is nothing to guess by.
+
+    A reader without pictures learns from half of the base scenes, and guesses at the other half: a
+    logistic regression of greatest penalized likelihood, by steps of AdaGrad (Duchi et al. 2011).
+    """
+    # SciPy takes a while to import, which commands that choose nothing do without.
+    from scipy import sparse  # type: ignore[import-untyped]
+
+    odds = np.ones(len(drafts))
+    telling = [i for i, one in enumerate(drafts) if _texts(one) or one.looks]
+    base_of = {i: (drafts[i].scene.parents or (drafts[i].scene.id,))[0] for i in telling}
+    half_of = {base: n % 2 for n, base in enumerate(sorted(set(base_of.values())))}
+    halves = [[i for i in telling if half_of[base_of[i]] == half] for half in (0, 1)]
+
+    def table(chosen: Sequence[int], names: dict[str, int], grows: bool) -> sparse.csr_matrix:
+        """Return the features of all options, four rows a draft; new names are added or dropped."""
+        values, columns, starts = list[float](), list[int](), [0]
+        for features in (row for i in chosen for row in _features(drafts[i])):
+            known = {name: x for name, x in features.items() if grows or name in names}
+            values += known.values()
+            columns += (names.setdefault(name, len(names)) for name in known)
+            starts.append(len(values))
+        return sparse.csr_matrix((values, columns, starts), (len(starts) - 1, len(names)))
+
+    for mine, known in (halves, halves[::-1]) if all(halves) else ():
+        names: dict[str, int] = {}
+        learned = table(known[:: -(-len(known) // _FITTED)], names, True)
+        weights, squares = np.zeros(len(names)), np.full(len(names), 1e-9)
+        is_right = np.zeros((learned.shape[0] // len(LETTERS), len(LETTERS)))
+        is_right[:, 0] = 1.0
+        for _ in range(_STEPS):
+            missed = (is_right - _chances(learned @ weights)).ravel()
+            slope = learned.T @ missed - _PENALTY * weights
+            squares += slope**2
+            weights += _RATE * slope / np.sqrt(squares)
+        chances = _chances(table(mine, names, False) @ weights)
+        odds[mine] = chances.min(axis=1) / chances[:, 0]
+    return odds
+
+
+def _chances(scores: Floats) -> Floats:
+    """Return the probability of each of four options, shape (drafts, 4)."""
+    by_draft = scores.reshape(-1, len(LETTERS))
+    raised = np.exp(by_draft - by_draft.max(axis=1, keepdims=True))
+    chances: Floats = raised / raised.sum(axis=1, keepdims=True)
+    return chances
+
+
+def _features(one: Draft) -> Iterator[Mapping[str, float]]:
+    """Yield what a reader sees of each option, as it is and for its kind, beside the others."""
+    if one.looks:
+        # How far each measure is from the mean of the options, in standard deviations.
+        values = np.array(one.looks)
+        spread = values.std(axis=0)
+        for steps in (values - values.mean(axis=0)) / np.where(spread > 0, spread, 1.0):
+            yield {f"{one.kind}: {i}": step for i, step in enumerate(steps)} | {
+                f"{one.kind}: off {i}": abs(step) for i, step in enumerate(steps)
+            }
+        return
+    options = _texts(one)
+    together = " / ".join(sorted(options))
+    for option, features in zip(options, text_features(one.text, options), strict=True):
+        own = {f"{one.kind}: {name}": value for name, value in features.items()}
+        yield {"": 1.0, **features, **own, f"{one.kind}: {option} of {together}": 1.0}

@@ -19,7 +19,7 @@ from phyblock.domain.question import QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions import base, sight
 from phyblock.making.questions.base import Asked, Slots, StaticMaker, UnfairError, View, pick
-from phyblock.making.questions.names import (
+from phyblock.making.questions.sight import (
     SHAPE_WORDS,
     Feature,
     drawn_name,

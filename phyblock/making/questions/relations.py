@@ -20,7 +20,7 @@ from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import angles_deg
 from phyblock.making.questions import base, sight
 from phyblock.making.questions.base import Asked, Floats, StaticMaker, T, UnfairError, View, pick
-from phyblock.making.questions.names import plain_names, resolve_one, shape_word
+from phyblock.making.questions.sight import plain_names, resolve_one, shape_word
 from phyblock.sim.balance import surely_stands
 from phyblock.sim.camera import view_axes
 from phyblock.sim.contact import GROUND, bounds_m, boxes_near, support_graph, whole_bounds_m
