@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import os
 import subprocess
@@ -21,6 +23,13 @@ SHARED = ("pictures", "goal-blind")
 COMMAND = (sys.executable, "-m", "phyblock")
 _CUBE_M = 0.05
 _COLORS = ("red", "yellow", "blue", "green", "orange")
+
+
+def call(*words: object) -> int:
+    """Give a command in this process; return its exit code."""
+    from phyblock.cli.main import phyblock
+
+    return phyblock.main([str(word) for word in words], standalone_mode=False) or 0
 
 
 def candidates() -> list[Raw]:
@@ -184,6 +193,10 @@ class Workspace:
     def tables(self, folder: Path | None = None) -> dict[str, bytes]:
         """The table files of a run by name."""
         return {p.name: p.read_bytes() for p in sorted((folder or self.out).glob("tables/*"))}
+
+    def rows(self, table: str) -> list[Raw]:
+        """The rows of a table, as its CSV file has them."""
+        return list(csv.DictReader(io.StringIO(self.tables()[f"{table}.csv"].decode())))
 
     def files(self) -> dict[str, bytes]:
         """Every file below the folder but pictures, by relative path."""

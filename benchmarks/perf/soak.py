@@ -6,8 +6,8 @@ A run is made of recorded replies for the bundled scenes: the real command asks 
 its records are repeated under so many seeds that there are `--samples`. Then each in a process of
 its own: the floor, which reads the same lines as JSON and does nothing with them; resuming, which
 opens the run, reads its records and finds nothing left to ask; `phyblock report --print`; and
-`phyblock report`, `site` and `bundle`. Prints wall and CPU seconds, their ratio to the floor's wall
-seconds, and the peak of resident memory.
+`phyblock report`, `figures`, `site` and `bundle`. Prints wall and CPU seconds, their ratio to the
+floor's wall seconds, and the peak of resident memory.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ def main() -> None:
         if not given.no_report:
             site = ("site", str(run), "--out", str(folder / "site"))
             bundle = ("bundle", str(run), "--out", str(folder / "bundle.zip"))
-            commands += [("report", str(run)), site, bundle]
+            commands += [("report", str(run)), ("figures", str(run)), site, bundle]
         for words in commands:
             named = "report --print" if "--print" in words else words[0]
             show(f"phyblock {named}", run_measured((*PHYBLOCK, *words), os.environ), floor)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -17,7 +18,8 @@ from phyblock.results.text import TextTable
 TABLES = "tables"
 """The folder of tables in the folder of a run."""
 REPORT_FILE = "report.html"
-_SUMMARY = ".summary.json"
+SUMMARY = ".summary.json"
+"""The file in the folder of a run that keeps its end."""
 
 
 @dataclass(frozen=True)
@@ -41,13 +43,17 @@ class Summary:
             "blind": self.blind,
             "failures": self.failures,
         }
-        OutFolder(folder).write({_SUMMARY: json.dumps(kept)})
+        OutFolder(folder).write({SUMMARY: json.dumps(kept)})
 
 
 def sources(folder: Path) -> list[str]:
-    """Return the version of phyblock and digests of the files that tables and page are made of."""
+    """Return the version of phyblock and digests of the files that tables and page are made of;
+    nothing where one cannot be read.
+    """
     names = (MANIFEST, RECORDS, PROMPTS, STOPPED)
-    return [version("phyblock"), *(digest_of_file(folder / name) for name in names)]
+    with suppress(OSError, ValueError):
+        return [version("phyblock"), *(digest_of_file(folder / name) for name in names)]
+    return []
 
 
 def kept_summary(folder: Path, needed: str) -> Summary | None:
@@ -55,9 +61,10 @@ def kept_summary(folder: Path, needed: str) -> Summary | None:
     was extended, or files are not there that were made, or what is `needed` was not made.
     """
     try:
-        kept = load_json(read_bytes(folder / _SUMMARY))
+        kept = load_json(read_bytes(folder / SUMMARY))
         is_there = all((folder / name).is_file() for name in kept["files"])
-        if has_additions() or not is_there or kept["made_of"] != sources(folder):
+        made_of = sources(folder)
+        if has_additions() or not is_there or not made_of or kept["made_of"] != made_of:
             return None
         if not any(name.startswith(needed) for name in kept["files"]):
             return None

@@ -71,6 +71,10 @@ def make_manifest(
             if variant == variant.shown
         }
     identity = hex_digest(json.dumps(inputs, sort_keys=True, separators=(",", ":")))
+    libraries = {}
+    for name in _LIBRARIES:
+        with contextlib.suppress(PackageNotFoundError):
+            libraries[name] = version(name)
     engine = {"engine": described_engine()} if simulating(suite.model_dump()) else {}
     fields = {
         "identity": identity,
@@ -95,7 +99,7 @@ def make_manifest(
         **engine,
         **_questions(suite),
         **asked_counts(suite, dataset, variants[Variant()]),
-        "versions": {"python": platform.python_version(), **_versions(), **code_versions()},
+        "versions": {"python": platform.python_version(), **libraries, **code_versions()},
     }
     return Manifest.model_validate(fields)
 
@@ -122,14 +126,6 @@ def asked_counts(suite: Suite, dataset: Dataset, tracks: Iterable[Track]) -> dic
 def code_versions() -> dict[str, str]:
     """Return the versions of what judges replies."""
     return {"phyblock": version("phyblock"), "readers": str(READER_VERSION)}
-
-
-def _versions() -> dict[str, str]:
-    found = {}
-    for name in _LIBRARIES:
-        with contextlib.suppress(PackageNotFoundError):
-            found[name] = version(name)
-    return found
 
 
 def _model(model: ModelConfig) -> dict[str, object]:

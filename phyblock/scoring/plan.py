@@ -412,12 +412,17 @@ class Score:
     kept: int | None = None
 
 
+_PLANS_KEPT = 16
+
+
 class AssemblyScorer:
     """Scores plans for one scene; build once, use for every model and seed."""
 
     def __init__(self, scene: Scene, candidates: CandidateSet, settings: Sequence[Setting]) -> None:
         self._scene = scene
         self._goals = {setting: Goal(scene, candidates, setting) for setting in settings}
+        # Several models, and a model at several seeds, often give the same plan.
+        self._kept = functools.lru_cache(_PLANS_KEPT)(self._scores)
 
     def score(
         self, plan: Plan, matchers: Sequence[Matcher], level1: Level1Criterion | None
@@ -426,6 +431,11 @@ class AssemblyScorer:
 
         Raises KeyError for a step that is no candidate.
         """
+        return self._kept(plan, tuple(matchers), level1)
+
+    def _scores(
+        self, plan: Plan, matchers: tuple[Matcher, ...], level1: Level1Criterion | None
+    ) -> tuple[Score, ...]:
         scores: list[Score] = []
         for setting, goal in self._goals.items():
             matches = [match_plan(goal, plan, matcher) for matcher in matchers]

@@ -10,7 +10,7 @@ from phyblock.files import OutFolder, digest_of_file
 from phyblock.records.files import PROMPTS, RECORDS, STOPPED, read_stopped
 from phyblock.records.manifest import MANIFEST
 from phyblock.results.load import Run
-from phyblock.results.summary import REPORT_FILE
+from phyblock.results.summary import REPORT_FILE, SUMMARY
 from phyblock.results.tables import TablesWritten, coverage_frame, table_files
 from phyblock.tracks.base import kind_of
 from phyblock.types import WITHOUT_REPLY
@@ -91,8 +91,8 @@ def write_report(written: TablesWritten, data: Path | None = None) -> Path:
 
 
 def files_of(*, page: bool) -> tuple[str, ...]:
-    """Return what a run folder may get: tables, and with `page` the page as well."""
-    return table_files() + (page_files() if page else ())
+    """Return what a run folder may get: tables, its end, and with `page` the page as well."""
+    return (*table_files(), SUMMARY, *(page_files() if page else ()))
 
 
 def page_files() -> tuple[str, ...]:

@@ -11,7 +11,6 @@ from typing import Any
 
 import pytest
 
-from phyblock.cli.main import phyblock
 from phyblock.errors import StoreError
 from phyblock.parsing.move import parse_move
 from phyblock.parsing.plan import parse_plan
@@ -21,7 +20,7 @@ from phyblock.run import manifest, rescore, store
 from tests.run.test_step_runs import by_sample
 from tests.servers.chassis import Faults, Running, Seen
 from tests.servers.step_agent import StepAgent
-from tests.workspace import Raw, Workspace
+from tests.workspace import Raw, Workspace, call
 
 EARLIER = 5
 
@@ -39,10 +38,6 @@ class Stopping(StepAgent):
         if len(self.answered) >= self.answers:
             self.faults = Faults(mode="401")
         return super().reply(seen, ending)
-
-
-def call(*args: object) -> int:
-    return phyblock.main([str(arg) for arg in args], standalone_mode=False) or 0
 
 
 def run(out: str, *args: object) -> int:
@@ -69,17 +64,14 @@ def unread(text: str) -> str:
 
 
 @pytest.fixture
-def begun(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stopping]:
+def begun(inside: Workspace, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stopping]:
     """A run of two tracks that earlier readers began, stopped in the middle of episodes; the
     server, which answers again.
     """
-    monkeypatch.chdir(workspace.root)
-    monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
-    monkeypatch.setattr(sys, "argv", ["phyblock"])
     server = Stopping(22)
     with Running(server) as running:
-        workspace.write_models(running.url, "alpha", max_tokens=100)
-        workspace.write_suite(
+        inside.write_models(running.url, "alpha", max_tokens=100)
+        inside.write_suite(
             tracks=["full_planning", "step_planning"],
             models=["random", "alpha"],
             images={"size_px": 128, "layout": "separate"},

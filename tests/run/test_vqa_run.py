@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
 import json
 import re
 from collections import Counter
@@ -91,13 +89,8 @@ def shown(seen: Seen) -> list[tuple[str, str]]:
     return [(str(caption), picture[1]) for caption, picture in pairs]
 
 
-def table(workspace: Workspace, name: str) -> list[Raw]:
-    text = workspace.tables()[f"{name}.csv"].decode()
-    return list(csv.DictReader(io.StringIO(text)))
-
-
 def accuracies(workspace: Workspace, measure: str) -> dict[str, Raw]:
-    rows = table(workspace, "estimates")
+    rows = workspace.rows("estimates")
     return {row["cell"]: row for row in rows if row["measure"] == measure}
 
 

@@ -1,0 +1,367 @@
+"""Costs of a run: expected by a dry run as providers bill, and never above max_cost_usd."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import json
+import re
+from contextlib import ExitStack
+from importlib.metadata import version
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.console import Console
+
+from phyblock.cli.run import print_estimate
+from phyblock.config.models import ModelConfig, Tariff, load_models
+from phyblock.config.suite import load_suite
+from phyblock.models import Estimate as CallEstimate
+from phyblock.models.costs import text_tokens
+from phyblock.resources import bundled
+from phyblock.run.estimate import Estimate, estimate
+from phyblock.run.plan import RunPlan, make_plan
+from phyblock.run.runner import Session
+from tests.models.factory import ROUTES
+from tests.servers.billing import (
+    COMPLETION,
+    PROVIDERS,
+    Billing,
+    BillingOpenAI,
+    o200k_tokens,
+    tile_tokens,
+)
+from tests.servers.chassis import Faults, Running, Seen
+from tests.servers.openai_chat import OpenAIChat
+from tests.servers.step_agent import said
+from tests.vqa_set import questions, write_questions
+from tests.workspace import Workspace
+
+PRICE = {"input": 10.0, "output": 100.0}
+CALL_USD = 1000 * PRICE["input"] / 1e6 + 40 * PRICE["output"] / 1e6
+"""The server counts 1,000 tokens in and 40 out for every call."""
+MOST_USD = 0.505
+"""Room for 35 calls, and for no 36th, be it as estimated at first or as the run learns to."""
+TWICE = {"max_attempts": 2, "retry_for_s": 0.0}
+"""Limits of a run that gives up soon, however little time it took."""
+
+
+class Silent(OpenAIChat):
+    """Does not say how many tokens it counted."""
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        return {**super().reply(seen, ending), "usage": None}
+
+
+def spent(workspace: Workspace) -> float:
+    return sum(record["reply"]["cost_usd"] for record in workspace.records())
+
+
+def test_the_limit_is_not_passed_and_a_higher_one_goes_on(workspace: Workspace) -> None:
+    with Running(OpenAIChat()) as running:
+        server = running.server
+        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=100)
+        workspace.write_suite(models=["alpha"], seeds=list(range(12)))
+        first = workspace.run("--set", f"limits.max_cost_usd={MOST_USD}")
+        assert (first.code, first.err) == (1, "")
+        assert f"max_cost_usd {MOST_USD} is reached" in first.out
+        assert "give the same command again" in first.out
+        assert spent(workspace) == pytest.approx(CALL_USD * server.requests)
+        # It stops no earlier than it must: another two calls at their dearest would pass it.
+        assert MOST_USD - 2 * (CALL_USD + 100 * PRICE["output"] / 1e6) < spent(workspace)
+        assert spent(workspace) <= MOST_USD
+
+        asked = server.requests
+        same = workspace.run("--set", f"limits.max_cost_usd={MOST_USD}")
+        assert same.code == 1
+        assert server.requests == asked
+
+        more = workspace.run("--set", "limits.max_cost_usd=5")
+        assert (more.code, more.err) == (0, "")
+        assert "All 60 samples are done" in more.out
+        assert server.requests == 60
+
+
+class Counting(OpenAIChat):
+    """Counts as many tokens as it likes."""
+
+    def __init__(self, prompt: int, completion: int) -> None:
+        super().__init__()
+        self.usage = {"prompt_tokens": prompt, "completion_tokens": completion}
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        return {**super().reply(seen, ending), "usage": self.usage}
+
+
+@pytest.mark.parametrize(("prompt", "completion"), [(40_000, 40), (1000, 2500)])
+def test_a_server_that_counts_more_than_is_expected_does_not_pass_the_limit_at_once(
+    workspace: Workspace, prompt: int, completion: int
+) -> None:
+    usd = (prompt * PRICE["input"] + completion * PRICE["output"]) / 1e6
+    with Running(Counting(prompt, completion)) as running:
+        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=100)
+        workspace.write_suite(models=["alpha"], seeds=list(range(12)))
+        done = workspace.run("--set", f"limits.max_cost_usd={5 * usd}")
+    assert done.code == 1
+    assert f"the next call can cost {usd:.1f}"[:-2] in done.out
+    assert 1 < running.server.requests <= 5
+    assert spent(workspace) <= 5 * usd
+
+
+def test_a_model_is_asked_no_more_when_its_own_limit_is_reached(workspace: Workspace) -> None:
+    with Running(OpenAIChat()) as running:
+        workspace.write_yaml("models.yaml", {
+            name: {"id": f"openai/{name}", "api_base": f"{running.url}/v1", "price": PRICE,
+                   "max_tokens": 100, "max_cost_usd": limit}
+            for name, limit in (("alpha", 3.2 * CALL_USD), ("beta", None))
+        })  # fmt: skip
+        workspace.write_suite(models=["alpha", "beta"])
+        done = workspace.run("--yes")
+        assert (done.code, "alpha was stopped: its max_cost_usd" in done.out) == (1, True)
+        asked = running.server.requests
+        assert 6 <= asked <= 8
+        workspace.run("--yes")
+        assert running.server.requests == asked
+    assert sum(record["model"] == "beta" for record in workspace.records()) == 5
+
+
+def test_nothing_is_asked_where_not_even_one_call_fits(workspace: Workspace) -> None:
+    with Running(OpenAIChat()) as running:
+        workspace.write_models(running.url, "alpha", price=PRICE)
+        workspace.write_suite(models=["alpha", "random"])
+        done = workspace.run("--set", "limits.max_cost_usd=0")
+        assert done.code == 1
+        assert "max_cost_usd 0 is reached" in done.out
+        assert running.server.requests == 0
+
+
+def test_a_dry_run_says_what_it_would_cost_and_asks_nothing(workspace: Workspace) -> None:
+    with Running(OpenAIChat()) as running:
+        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=9000)
+        workspace.write_suite(models=["alpha", "random"], seeds=[0, 1])
+        before = workspace.files()
+        done = workspace.run("--dry-run")
+        assert done.code == 0
+        assert "10 calls, about $" in done.out
+        usual, most = re.findall(r"\$([\d.]+)", done.out)[:2]
+        assert 10 * 4000 * PRICE["output"] / 1e6 < float(usual) < 5
+        assert 10 * 9000 * PRICE["output"] / 1e6 < float(most) < 10
+        assert running.server.requests == 0
+        assert workspace.files() == before
+
+        assert workspace.run("--yes").code == 0
+        after = workspace.run("--dry-run")
+        assert "0 calls, about $0.00" in after.out
+
+
+@pytest.mark.parametrize(
+    "server",
+    [Silent(), OpenAIChat(Faults(mode="html")), OpenAIChat(Faults(mode="reset"))],
+    ids=["no usage", "no reply", "no answer"],
+)
+def test_what_an_earlier_run_may_have_paid_counts_in_the_next(
+    workspace: Workspace, server: OpenAIChat
+) -> None:
+    dearest_reply_usd = 1000 * PRICE["output"] / 1e6
+    with Running(server) as running:
+        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=1000)
+        workspace.write_suite(models=["alpha"], seeds=list(range(4)), limits=TWICE)
+        codes = [workspace.run("--set", "limits.max_cost_usd=1").code for _ in range(3)]
+    assert codes == [1, 1, 1]
+    assert 2 <= server.requests <= 1 / dearest_reply_usd
+    lines = (workspace.out / "calls.jsonl").read_text().splitlines()
+    billed_usd = sum(json.loads(line).get("billed_usd") or 0.0 for line in lines)
+    assert server.requests * dearest_reply_usd < billed_usd <= 1
+
+
+def test_an_attempt_that_was_billed_counts_though_the_next_does_not_fit(
+    workspace: Workspace,
+) -> None:
+    with Running(OpenAIChat(Faults(mode="html"))) as running:
+        server = running.server
+        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=1000)
+        workspace.write_suite(models=["alpha"], limits={"max_concurrency": 1})
+        for _ in range(2):
+            assert workspace.run("--set", "limits.max_cost_usd=0.15").code == 1
+    assert server.requests == 1
+
+
+def test_a_run_without_a_limit_counts_once_there_is_one(workspace: Workspace) -> None:
+    with Running(OpenAIChat(Faults(server_error=0.5))) as running:
+        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=100)
+        workspace.write_suite(
+            models=["alpha"], seeds=[0, 1, 2, 3], limits={**TWICE, "max_attempts": 1}
+        )
+        assert workspace.run("--yes").code == 1
+        asked, answered = running.server.requests, running.server.ended["ok"]
+        assert 0 < answered < asked == 20
+        same = workspace.run("--set", f"limits.max_cost_usd={answered * CALL_USD}")
+        assert same.code == 1
+        assert running.server.requests == asked
+
+
+TARIFF = {"input": 3.0, "output": 15.0}
+WITHIN = 0.05
+CALLS = 4
+
+
+@pytest.fixture(autouse=True)
+def _environment(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A key, and a cache without pictures: what is not drawn yet is counted, too."""
+    monkeypatch.setenv("PHYBLOCK_TEST_KEY", "sk-not-a-real-key-1234")
+    monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.root / "nothing"))
+
+
+def planned(workspace: Workspace) -> RunPlan:
+    loaded = load_suite(workspace.root / "suite.yaml", data_dir=bundled("benchmarks", "data"))
+    return make_plan(loaded, load_models(workspace.root / "models.yaml"))
+
+
+def begin(workspace: Workspace, stack: ExitStack) -> dict[str, Billing]:
+    """Write a suite and its models, each behind a server that bills as its provider does."""
+    servers: dict[str, Billing] = {}
+    entries = {}
+    for model_id, make in PROVIDERS.items():
+        provider, _, name = model_id.partition("/")
+        running = stack.enter_context(Running(servers.setdefault(name, make())))
+        entries[name] = {
+            "id": model_id,
+            "api_base": running.url + ROUTES.get(provider, ROUTES["openai"]).path,
+            "api_key_env": "PHYBLOCK_TEST_KEY",
+            "temperature": None,
+            "price": TARIFF,
+        }
+    workspace.write_yaml("models.yaml", entries)
+    workspace.write_scenes()
+    write_questions(workspace.root / "questions", questions())
+    workspace.write_suite(
+        tracks=["full_planning", "vqa"],
+        vqa={"path": "./questions"},
+        images={"size_px": 512},
+        models=list(servers),
+        limit=CALLS // 2,
+    )
+    return servers
+
+
+def printed(plan: RunPlan, rows: list[Estimate]) -> str:
+    console = Console(file=io.StringIO(), width=150)
+    print_estimate(console, plan, rows)
+    assert isinstance(console.file, io.StringIO)
+    return console.file.getvalue()
+
+
+def asked(workspace: Workspace, plan: RunPlan) -> None:
+    """Ask everything of a plan; no tables are made."""
+
+    async def ask() -> None:
+        result = await Session(plan, workspace.out, lambda _: None, use_cache=False).run()
+        assert (result.left, result.failed) == (0, 0), result
+
+    asyncio.run(ask())
+
+
+def dollars(prompt_tokens: int, replies: int) -> float:
+    return (prompt_tokens * TARIFF["input"] + replies * COMPLETION * TARIFF["output"]) / 1e6
+
+
+def test_a_dry_run_is_near_the_bill_of_every_provider(workspace: Workspace) -> None:
+    with ExitStack() as stack:
+        servers = begin(workspace, stack)
+        plan = planned(workspace)
+        rows = estimate(plan, workspace.out, use_cache=False)
+        asked(workspace, plan)
+        left = estimate(plan, workspace.out, use_cache=False)
+    prompts, replies = sum(row.prompt_usd for row in rows), sum(row.replies[1] for row in rows)
+    assert f"(prompts ${prompts:.2f}, replies ${replies:.2f})" in printed(plan, rows)
+    records = workspace.records()
+    for row in rows:
+        billed = servers[row.model.name].billed
+        assert (row.calls, len(billed)) == (CALLS, CALLS)
+        assert row.prompt_tokens == pytest.approx(sum(billed), rel=WITHIN), row.model.name
+        assert row.prompt_usd == pytest.approx(dollars(sum(billed), 0), rel=WITHIN), row.model.name
+        paid = sum(r["reply"]["cost_usd"] for r in records if r["model"] == row.model.name)
+        assert paid == pytest.approx(dollars(sum(billed), CALLS))
+        assert row.most_usd is not None
+        assert paid < row.most_usd
+    assert [(row.calls, row.done) for row in left] == [(0, CALLS)] * len(left)
+
+
+@given(
+    st.lists(
+        st.tuples(st.sampled_from("ab"), st.integers(1, 500), st.integers(1, 500)), min_size=1
+    ),
+    st.lists(st.tuples(st.sampled_from("abc"), st.integers(0, 2000)), max_size=80),
+)
+def test_replies_of_one_kind_say_nothing_of_another_and_none_is_longer_than_it_can_be(
+    calls: list[tuple[str, int, int]], replies: list[tuple[str, int]]
+) -> None:
+    row = Estimate(ModelConfig(name="m", id="openai/m"), 100, Tariff(input=0.0, output=10.0))
+    for kind, usual, more in calls:
+        row.add_call(CallEstimate(100, usual, usual + more), kind)
+    for kind, tokens in replies:
+        row.add_reply(tokens, kind)
+    assert row.cost_usd is not None
+    assert row.most_usd is not None
+    assert row.cost_usd <= row.most_usd * (1 + 1e-9)
+    expected = 0.0
+    for kind, usual, more in calls:
+        known = [tokens for other, tokens in replies if other == kind]
+        expected += usual if len(known) < 20 else min(sum(known) / len(known), usual + more)
+    assert row.replies[0] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("track", ["full_planning", "step_planning"])
+def test_texts_count_as_the_public_vocabulary_does(workspace: Workspace, track: str) -> None:
+    workspace.write_models("http://localhost:1", "m")
+    suite = {"name": "s", "tracks": [track], "models": ["m"], "limit": 4}
+    workspace.write_yaml("suite.yaml", suite)
+    (opened,) = planned(workspace).tracks
+    texts = [
+        part
+        for item in opened.items
+        for request in opened.outlines(item)
+        for message in request.messages
+        for part in message.parts
+        if isinstance(part, str)
+    ]
+    counted = sum(text_tokens("openai/m", text) for text in texts)
+    assert counted == pytest.approx(sum(map(o200k_tokens, texts)), rel=0.02)
+
+
+class BillingAgent(BillingOpenAI):
+    """Plays episodes, and bills each turn."""
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        body = super().reply(seen, ending)
+        body["choices"][0]["message"]["content"] = said(seen)
+        return body
+
+
+def test_episodes_are_billed_no_more_than_a_dry_run_expects(workspace: Workspace) -> None:
+    server = BillingAgent(o200k_tokens, tile_tokens, 3)
+    with Running(server) as running:
+        entry = {"id": "openai/gpt-4o-2024-08-06", "api_base": f"{running.url}/v1", "price": TARIFF}
+        entry["api_key_env"] = "PHYBLOCK_TEST_KEY"
+        workspace.write_yaml("models.yaml", {"m": entry})
+        workspace.write_scenes()
+        workspace.write_suite(tracks=["step_planning"], models=["m"], limit=2)
+        plan = planned(workspace)
+        (row,) = estimate(plan, workspace.out, use_cache=False)
+        asked(workspace, plan)
+    assert len(server.billed) <= row.calls
+    assert sum(server.billed) <= row.prompt_tokens * (1 + WITHIN)
+    a_call, expected = sum(server.billed) / len(server.billed), row.prompt_tokens / row.calls
+    assert a_call == pytest.approx(expected, rel=WITHIN)
+
+
+def test_a_dry_run_says_where_prices_are_from(workspace: Workspace) -> None:
+    workspace.write_scenes()
+    priced = {"id": "openai/gpt-4o", "price": {"input": 1.0, "output": 2.0}}
+    workspace.write_yaml("models.yaml", {"a": priced, "b": {"id": "openai/gpt-4o"}})
+    workspace.write_suite(models=["a", "b"])
+    plan = planned(workspace)
+    told = " ".join(printed(plan, estimate(plan, workspace.out, use_cache=False)).split())
+    assert f"Prices: the models file (a); litellm {version('litellm')} map (b)." in told
