@@ -8,6 +8,7 @@ record and read by the same readers, so that `phyblock score` needs to ask nobod
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
 from typing import Any, TypeVar
 
 from phyblock.config.models import ModelConfig
@@ -41,6 +42,26 @@ from phyblock.types import Outcome
 RULE = "extractor"
 """The rule of a record whose reply was read out of what the model copied."""
 _N = TypeVar("_N", int, float)
+
+
+def begun(
+    sample: str, track: str, model: str, item: Item, seed: int, answer: Reply | ModelError | None
+) -> dict[str, Any]:
+    """Return the fields of a record before it is judged; None is a reply that a recording lacks."""
+    return {
+        "sample": sample,
+        "track": track,
+        "model": model,
+        "key": item.key,
+        **about_item(item),
+        "seed": seed,
+        "reply": answer.storable() if isinstance(answer, Reply) else None,
+        "error": _error(answer) if isinstance(answer, ModelError) else None,
+        "prompt": None,
+        "parse": None,
+        "scores": (),
+        "time": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
 
 
 def about_item(item: Item) -> dict[str, Any]:
@@ -125,8 +146,7 @@ def _outcome(reply: Reply | None, error: StoredError | None, readable: bool) -> 
     return "ok" if readable else "parse_failure"
 
 
-def stored_error(error: ModelError) -> StoredError:
-    """Return the error of a request as it is kept."""
+def _error(error: ModelError) -> StoredError:
     kind: ErrorKind = "unavailable"
     if isinstance(error, RetryableError):
         kind = "retryable"

@@ -13,7 +13,6 @@ from collections import deque
 from collections.abc import Coroutine, Mapping
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -52,15 +51,7 @@ from phyblock.run.events import (
     Summary,
     Watcher,
 )
-from phyblock.run.judge import (
-    Extractor,
-    about_item,
-    about_prompt,
-    judge_reply,
-    judged,
-    pooled,
-    stored_error,
-)
+from phyblock.run.judge import Extractor, about_prompt, begun, judge_reply, judged, pooled
 from phyblock.run.plan import RunPlan, Sample, provider_problem
 from phyblock.run.store import RunStore
 
@@ -395,26 +386,10 @@ class Session:
         request: Request | None,
         config: ModelConfig,
     ) -> dict[str, Any]:
-        """Return the fields of a record before it is judged; None is a reply that a recording
-        lacks, or of an episode that has none yet.
-        """
+        """Return the fields of a record before it is judged."""
         track, item = sample.track, sample.item
-        fields: dict[str, Any] = {
-            "sample": sample.id,
-            "track": track.name,
-            "model": sample.model,
-            "key": item.key,
-            **about_item(item),
-            "seed": sample.seed,
-            "reply": answer.storable() if isinstance(answer, Reply) else None,
-            "error": stored_error(answer) if isinstance(answer, ModelError) else None,
-            "prompt": None,
-            "parse": None,
-            "scores": (),
-            "time": datetime.now(UTC).isoformat(timespec="seconds"),
-            "run": self.plan.manifest.run,
-            **track.about(item),
-        }
+        fields = begun(sample.id, track.name, sample.model, item, sample.seed, answer)
+        fields |= {"run": self.plan.manifest.run, **track.about(item)}
         if sample.variant.levels:
             fields["variant"] = dict(sample.variant.levels)
         if request is not None and request.messages:
