@@ -97,7 +97,9 @@ def test_files_are_the_same_each_time_in_three_formats_with_captions(
     assert {file.stem for file in first} == {
         *("levels-full-planning", "errors", "losses", "cost-full-planning", "forest-full-planning"),
     }
-    assert {file: file.read_bytes() for file in write_paper_figures(run, (), Look())} == first
+    again = write_paper_figures(run, ["levels-full-planning", "errors"], Look())
+    assert len(again) == 10
+    assert all(file.read_bytes() == first[file] for file in again)
     assert {file.stem for file in first} <= set(figures_of(run))
     assert not any(b"mathdefault" in data for file, data in first.items() if file.suffix == ".svg")
     files = write_paper_figures(run, ["errors"], Look(COLUMN_IN, "serif", titled=False))

@@ -169,10 +169,11 @@ def test_writing_again_changes_nothing(
 
 
 def test_the_summary_ranks_models_and_says_who_is_above_the_blind_baseline() -> None:
-    facts = manifest(models=["alpha", "beta", "random"], seeds=[0], levels=[3, 4])
-    facts["models"][2]["kind"] = "baseline"
+    tp = {"alpha": 1, "beta": 4, "random": 0, "goal-blind": 2}
+    facts = manifest(models=list(tp), seeds=[0], levels=[3, 4])
+    for model in facts["models"][2:]:
+        model["kind"] = "baseline"
     facts["items"] = {"full_planning": 2}
-    tp = {"alpha": 1, "beta": 4, "random": 0}
     records = [
         record(name, scene, scores=[score(n, 4 - n, 4 - n)])
         for name, n in tp.items()
@@ -182,11 +183,12 @@ def test_the_summary_ranks_models_and_says_who_is_above_the_blind_baseline() -> 
     (table,) = summary.tables
     assert [row[:3] for row in table.rows] == [
         ("1", "beta", "100.0"),
+        ("", "goal-blind", "50.0"),
         ("2", "alpha", "25.0"),
         ("", "random", "0.0"),
     ]
     (sentence,) = summary.blind
-    assert sentence.endswith("of 2 models are above random (0.0).")
+    assert sentence.endswith("of 2 models are above goal-blind (50.0).")
 
 
 LATEX = next(filter(shutil.which, ("pdflatex", "lualatex")), None)
