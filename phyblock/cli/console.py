@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -109,6 +110,12 @@ def shown_path(path: Path) -> str:
 def print_path(console: Console, path: Path | str) -> None:
     """Print a path, or a command, on a line that is never broken, so that it can be copied."""
     console.print(shown_path(path) if isinstance(path, Path) else path, soft_wrap=True)
+
+
+def print_again(console: Console, how: str = "give") -> None:
+    """Print that the same command goes on, and the command."""
+    console.print(f"To go on, {how} the same command again:")
+    print_path(console, f"  {shlex.join(['phyblock', *sys.argv[1:]])}")
 
 
 def may_spend(

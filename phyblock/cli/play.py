@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import shlex
-import sys
 import webbrowser
 from pathlib import Path
 from threading import Thread
 
 import click
 
-from phyblock.cli.console import make_console, print_path
+from phyblock.cli.console import make_console, print_again, print_path
 from phyblock.cli.options import (
     INTERRUPTED,
     NAME_OR_PATH,
@@ -104,8 +102,7 @@ def play(
         result = asyncio.run(session.run(plan, person, folder, begun))
         if result.left:
             console.print(f"{result.settled:,} of {result.samples:,} tasks are answered.")
-            console.print("To go on, give the same command again:")
-            print_path(console, f"  {shlex.join(['phyblock', *sys.argv[1:]])}")
+            print_again(console)
             return INTERRUPTED
         made = show_tables(folder, page=True)
         server.show_files(report_files(folder))

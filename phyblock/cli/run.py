@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import shlex
 import signal
-import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -13,7 +11,14 @@ from typing import Any, cast
 import click
 from rich.console import Console
 
-from phyblock.cli.console import make_console, may_spend, print_path, print_table, shown_path
+from phyblock.cli.console import (
+    make_console,
+    may_spend,
+    print_again,
+    print_path,
+    print_table,
+    shown_path,
+)
 from phyblock.cli.options import (
     INTERRUPTED,
     NAME_OR_PATH,
@@ -145,9 +150,7 @@ def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressV
     console.print(f"{done}. Cost so far: {view.cost_text}{unanswered}.{cached}")
     cause = result.stop.cause if result.stop else None
     if result.left:
-        how = "raise limits.max_cost_usd and give" if cause == "cost" else "give"
-        console.print(f"To go on, {how} the same command again:")
-        print_path(console, f"  {shlex.join(['phyblock', *sys.argv[1:]])}")
+        print_again(console, "raise limits.max_cost_usd and give" if cause == "cost" else "give")
     if cause == "interrupted" and result.left:
         return INTERRUPTED
     return 1 if result.left or result.failed or result.unjudged else 0

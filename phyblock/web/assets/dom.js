@@ -31,6 +31,8 @@ function choice(id, label, options, now, act) {
       options.map(([value, text]) => el("option", { value, selected: value === now }, text))));
 }
 
+const mean = (values) => values.reduce((sum, one) => sum + one, 0) / values.length;
+
 /** A part that is scrolled sideways, by keyboard too. */
 const scrolled = (label, ...children) =>
   el("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": label }, children);

@@ -87,8 +87,6 @@
 
   // ---- the end
 
-  const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
-
   /** Means of the person and of others over the same items, the best first, and every item. */
   function ofTrack(track) {
     const all = new Map([["You", track.rows.map(({ value }) => value).filter((value) => value !== null)]]);

@@ -118,14 +118,15 @@ const Results = (() => {
   function method({ runs, rows }) {
     const samples = rows.flatMap((row) => Object.values(row.facts)).reduce((sum, fact) => sum + fact.done, 0);
     const dates = [...new Set(runs.map((run) => run.date).filter(Boolean).sort())];
-    const verified = runs.filter((run) => run.verified).length, suite = runs[0].suite || "full";
+    const verified = runs.filter((run) => run.verified).length, suite = runs[0].suite || "full", isOfficial = runs[0].data === "official";
+    const where = isOfficial ? " --set dataset.path=FOLDER   # a checkout of the official repository" : "";
     const said = [Words.count(rows.filter(Data.isModel).length, "model"), Words.count(samples, "sample"),
-      runs[0].data && `data ${runs[0].data}, version ${runs[0].version}`, [...new Set([dates[0], dates.at(-1)])].filter(Boolean).join(" to ")];
+      isOfficial ? "official data" : runs[0].data && `data ${runs[0].data}, version ${runs[0].version}`, [...new Set([dates[0], dates.at(-1)])].filter(Boolean).join(" to ")];
     return [el("section", { class: "method" }, el("h2", {}, "Method"),
       el("p", {}, `${said.filter(Boolean).join("; ")}. ${verified} of ${Words.count(runs.length, "run")} independently re-scored.`),
       el("h3", {}, "Take part"),
       el("p", {}, "Run the suite, then send the bundle; it is scored again before it is listed:"),
-      el("pre", { tabindex: 0 }, `phyblock run ${suite} --models my-model\nphyblock bundle results/${suite}-… --out my-model.zip`),
+      el("pre", { tabindex: 0 }, `phyblock run ${suite} --models my-model${where}\nphyblock bundle results/${suite}-… --out my-model.zip`),
       el("h3", {}, "Cite"),
       el("p", {}, "Ma, Wen, Lin, Xu, Liang, Lin et al.: PhyBlock: A Progressive Benchmark for Physical Understanding and Planning via 3D Block Assembly. NeurIPS 2025, Datasets and Benchmarks Track."))];
   }

@@ -11,6 +11,8 @@ const Stage = (() => {
   const DEGREES_PER_PX = 0.5;
   const DEGREES_PER_KEY = 10;
 
+  // Registered, so that they are read as they are in the theme of the page.
+  for (const name of ["--accent", "--tried", "--grid"]) CSS.registerProperty({ name, syntax: "<color>", inherits: true, initialValue: "#3a4cc4" });
   const rgb = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).match(/\d+/g).map(Number);
   const isStill = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
 

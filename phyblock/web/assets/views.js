@@ -4,7 +4,6 @@
 const Views = (() => {
   const { number, DASH } = Words;
   const link = (view, words, ...children) => el("a", { href: App.address(view, words) }, ...children);
-  const mean = (list) => list.reduce((sum, one) => sum + one, 0) / list.length;
   const isBuilt = (sample) => sample.part === null && sample.score !== null && Data.index.starts.scenes.length > 0;
 
   // ---- a model

@@ -1,0 +1,206 @@
+"""Root modules: texts that steer nothing, sums that are alike, worker processes."""
+
+from __future__ import annotations
+
+import builtins
+import functools
+import math
+import operator
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future
+from operator import truediv
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from phyblock.data import read_builtin, read_questions
+from phyblock.domain import euler_deg_to_matrix
+from phyblock.errors import DataError, ModelError, Problem
+from phyblock.resources import bundled
+from phyblock.scoring.pose import Piece, PoseFit, overlap_volume, placed
+from phyblock.sim.geometry import collision_pieces
+from phyblock.stable import plain_sum
+from phyblock.text import counted, csv_cell, one_line
+from phyblock.tracks.baselines import text_features
+from phyblock.tracks.pose_planning import FITS
+from phyblock.workers import WorkerDiedError, WorkerPool
+
+STARTS = tuple("=+-@\t\r\n")
+risky = st.text(alphabet="'=+-@\t\r\n1.a") | st.text()
+
+
+def taken_back(cell: str) -> str:
+    """Read a line as docs/results.md says a reader does."""
+    return cell[1:] if cell.startswith("'") and cell.lstrip("'").startswith(STARTS) else cell
+
+
+@given(risky)
+def test_no_cell_begins_a_formula_and_what_it_held_can_be_had_back(text: str) -> None:
+    cell = csv_cell(text)
+    assert isinstance(cell, str)
+    if cell.startswith(STARTS):
+        float(cell)
+    assert taken_back(cell) == text
+
+
+@given(st.integers() | st.floats() | st.none())
+def test_numbers_stay_numbers(value: float | None) -> None:
+    assert csv_cell(value) is value
+    text = str(value)
+    assert csv_cell(text) == text or text == "-inf"
+
+
+@given(st.text(alphabet=st.characters()))
+def test_one_line_is_one_line_that_can_be_written(text: str) -> None:
+    shown = one_line(text)
+    assert len(shown) == len(text)
+    assert shown.isprintable()
+    shown.encode()
+
+
+@pytest.mark.parametrize(
+    ("number", "said"),
+    [(0, "0 replies"), (1, "1 reply"), (2, "2 replies"), (1500, "1,500 replies")],
+)
+def test_one_thing_is_no_plural(number: int, said: str) -> None:
+    assert counted(number, "reply", "replies") == said
+    assert counted(number, "scene") == said.replace("replies", "scenes").replace("reply", "scene")
+
+
+@given(st.text())
+def test_what_a_server_says_steers_no_terminal(message: str) -> None:
+    assert str(ModelError(message)).isprintable()
+
+
+def rounding(values: Iterable[Any], /, start: Any = 0) -> Any:
+    """`sum` as it is before Python 3.12."""
+    return functools.reduce(operator.add, values, start)
+
+
+def compensating(values: Iterable[Any], /, start: Any = 0) -> Any:
+    """`sum` as it is from Python 3.12 on: nothing is lost of floats."""
+    listed = list(values)
+    if any(type(value) is float for value in listed):
+        return math.fsum([start, *listed])
+    return rounding(listed, start)
+
+
+@given(st.lists(st.floats(-1e6, 1e6) | st.integers(-9, 9)))
+def test_values_are_added_one_after_another(values: list[float]) -> None:
+    total: float = 0
+    for value in values:
+        total += value
+    assert (plain_sum(values), type(plain_sum(values))) == (total, type(total))
+
+
+def texts() -> list[Any]:
+    """Features of options' texts, by which drafts are kept and the text-only probe answers."""
+    scenes = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
+    tasks = read_questions(bundled("benchmarks", "data", "phyblock-vqa"), scenes).tasks[::5]
+    return [text_features(task.question.text, task.question.options) for task in tasks]
+
+
+def solids() -> list[Any]:
+    """The overlap of two arches, which are three pieces each or more."""
+    arch = [Piece(p.vertices_m, p.face_normals) for p in collision_pieces("arch")]
+    turns = (euler_deg_to_matrix((7.0 * n, 11.0 * n, 13.0 * n)) for n in range(5))
+    return [overlap_volume(arch, placed(arch, turn, np.full(3, 0.003))) for turn in turns]
+
+
+def fits() -> list[Any]:
+    """Counts of how steps lie to goal blocks, as records hold them."""
+    off = [PoseFit(n, 0.1 * n, 0.0, 0.0, 0.7 * n, 1 / (n + 1)) for n in range(30)]
+    records: list[Any] = [SimpleNamespace(pose=SimpleNamespace(steps=off[:n])) for n in range(30)]
+    return [list(FITS.of(record)) for record in records]
+
+
+@pytest.mark.parametrize("compute", [texts, solids, fits])
+def test_results_are_those_of_either_sum(
+    compute: Callable[[], list[Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    computed = []
+    for either in (rounding, compensating):
+        with monkeypatch.context() as patched:
+            patched.setattr(builtins, "sum", either)
+            computed.append(compute())
+    assert computed[0] == computed[1]
+
+
+def fail(where: str) -> None:
+    raise DataError(Problem(where, "is broken"))
+
+
+def die(_: object) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_jobs_give_what_functions_give_or_raise() -> None:
+    with WorkerPool(2) as pool:
+        assert list(pool.map(truediv, range(20), [4] * 20)) == [n / 4 for n in range(20)]
+        with pytest.raises(ZeroDivisionError) as caught:
+            pool.submit(truediv, 1, 0).result()
+        assert "in _serve" in str(caught.value.__cause__)
+        with pytest.raises(DataError, match="here: is broken") as broken:
+            pool.submit(fail, "here").result()
+        assert broken.value.problems == (Problem("here", "is broken"),)
+
+
+def test_a_process_that_is_killed_fails_its_own_job_alone() -> None:
+    with WorkerPool(2) as pool:
+        jobs: list[Future[object]] = [
+            pool.submit(die if n == 3 else abs, -n)  # type: ignore[arg-type]
+            for n in range(8)
+        ]
+        done = [job.exception() or job.result() for job in jobs]
+    assert isinstance(done.pop(3), WorkerDiedError)
+    assert done == [0, 1, 2, 4, 5, 6, 7]
+
+
+def test_processes_that_are_killed_answer_nothing() -> None:
+    pool = WorkerPool(2)
+    job = pool.submit(time.sleep, 600)
+    assert pool.submit(abs, -1).result() == 1
+    pool.kill()
+    with pytest.raises(WorkerDiedError):
+        job.result()
+    pool.shutdown()
+
+
+UNGUARDED = """
+import os, sys, threading, time
+main = sys.modules["__main__"]
+seen = set()
+def look():
+    while True:
+        seen.add(sys.modules["__main__"])
+threading.Thread(target=look, daemon=True).start()
+from phyblock.workers import WorkerPool
+pool = WorkerPool(1)
+pid = pool.submit(os.getpid).result()
+assert seen == {main}
+print("begun", pid, flush=True)
+pool.submit(time.sleep, 600).result()
+"""
+
+
+def test_a_program_without_a_guard_runs_once_and_takes_its_workers_with_it(tmp_path: Path) -> None:
+    (tmp_path / "program.py").write_text(UNGUARDED)
+    words = [sys.executable, str(tmp_path / "program.py")]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as program:
+        assert program.stdout is not None
+        begun, pid = program.stdout.readline().split()
+        assert begun == "begun"
+        assert os.getpgid(int(pid)) != os.getpgid(program.pid)
+        program.kill()
+        # The worker holds the pipe open: it ends when the worker has.
+        assert program.stdout.read() == ""
