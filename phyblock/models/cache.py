@@ -106,9 +106,6 @@ class ReplyCache:
                 self._tell(f"reply cache {self.path}: a broken reply is asked for again ({error})")
             return None
 
-    def __contains__(self, key: object) -> bool:
-        return isinstance(key, str) and self.get(key) is not None
-
     def put(self, key: str, model_id: str, reply: Reply) -> bool:
         """Keep a reply, unless it is empty, truncated or refused; True if it was kept."""
         if self._is_off or reply.finish in ("length", "refusal") or not reply.text.strip():
