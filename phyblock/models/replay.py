@@ -170,15 +170,13 @@ def read_chat_completion(raw: object) -> Reply | None:
     text, thoughts = _parts(message.get("content", message.get("text")))
     beside = _text(message.get("reasoning_content") or message.get("reasoning"))
     refusal, details = message.get("refusal"), "usage.prompt_tokens_details"
-    cached = _count(raw, f"{details}.cached_tokens")
-    if cached is None:
-        cached = _count(raw, "usage.cached_tokens", "usage.prompt_cache_hit_tokens")
+    cached = f"{details}.cached_tokens", "usage.cached_tokens", "usage.prompt_cache_hit_tokens"
     written = f"{details}.cache_write_tokens", f"{details}.cache_creation_tokens"
     usage = Usage(
         prompt_tokens=_count(raw, "usage.prompt_tokens"),
         completion_tokens=_count(raw, "usage.completion_tokens"),
         reasoning_tokens=_count(raw, "usage.completion_tokens_details.reasoning_tokens"),
-        cached_tokens=cached,
+        cached_tokens=_count(raw, *cached),
         cache_write_tokens=_count(raw, *written),
     )
     return _reply(
@@ -291,10 +289,10 @@ def _get(raw: object, *paths: str) -> Any:
 
 
 def _count(raw: object, *paths: str) -> int | None:
-    """Return a number of tokens as a server wrote it; None, not known, for what cannot be one."""
-    value = _get(raw, *paths)
-    is_count = isinstance(value, int) and not isinstance(value, bool)
-    return value if is_count and 0 <= value <= _MOST_TOKENS else None
+    """Return the first number of tokens that can be one; None, not known, where there is none."""
+    found = (_get(raw, path) for path in paths)
+    counts = (count for count in found if isinstance(count, int) and not isinstance(count, bool))
+    return next((count for count in counts if 0 <= count <= _MOST_TOKENS), None)
 
 
 def _text(value: object) -> str:
