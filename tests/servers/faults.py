@@ -60,21 +60,17 @@ async def _redirect(
     return web.Response(status=status, headers={"Location": location})
 
 
-async def _sends(
-    _: LocalServer,
-    __: Seen,
-    ___: web.Request,
-    *,
-    status: int,
-    body: Any = None,
-    headers: Mapping[str, str] | None = None,
-) -> web.Response:
-    """Answer with this status and body: bytes as they are, anything else as JSON."""
-    if body is None:
-        return web.Response(status=status, headers=headers)
-    data = body if isinstance(body, bytes) else json.dumps(body).encode()
-    content_type = "application/json"
-    return web.Response(body=data, status=status, headers=headers, content_type=content_type)
+def _sent(
+    ending: Ending, body: Any = None, status: int = 200, headers: Mapping[str, str] | None = None
+) -> Fault:
+    """An answer with this status and body: bytes as they are, anything else as JSON."""
+    data = body if body is None or isinstance(body, bytes) else json.dumps(body).encode()
+
+    async def behave(_: LocalServer, __: Seen, ___: web.Request) -> web.Response:
+        kind = None if data is None else "application/json"
+        return web.Response(body=data, status=status, headers=headers, content_type=kind)
+
+    return Fault(behave, ending)
 
 
 async def _changed(
@@ -231,53 +227,58 @@ def _error(message: Any, code: Any) -> dict[str, Any]:
 _DEEP = b'{"choices": ' + b"[" * 100_000 + b"]" * 100_000 + b"}"
 _QUOTA = "You exceeded your current quota"
 
-_ERRORS_IN_200: Mapping[str, tuple[Any, Ending]] = {
-    "200-quota": (_error(_QUOTA, "insufficient_quota"), "unavailable"),
-    "200-code-401": (_error("No auth credentials found", "401"), "unavailable"),
-    "200-code-401-number": (_error("No auth credentials found", 401), "unavailable"),
-    "200-code-429": (_error("Upstream is down", 429), "retryable"),
-    "200-code-500": (_error("Upstream is down", 500), "retryable"),
-    "200-code-object": (_error("Upstream is down", {"status": 401}), "retryable"),
-    "200-code-huge": (_error("Upstream is down", 10**30), "retryable"),
-    "200-message-object": (_error({"text": "Upstream is down"}, None), "retryable"),
-    "200-error-string": ({"error": "Upstream is down"}, "retryable"),
-    "200-error-list": ({"error": ["Upstream is down"]}, "retryable"),
-    "200-error-empty": ({"error": {}}, "retryable"),
-    "200-error-and-null-choices": (
-        {**_error("Upstream is down", 502), "choices": None},
-        "retryable",
+_ERRORS_IN_200: Mapping[str, Fault] = {
+    "200-quota": _sent("unavailable", _error(_QUOTA, "insufficient_quota")),
+    "200-code-401": _sent("unavailable", _error("No auth credentials found", "401")),
+    "200-code-401-number": _sent("unavailable", _error("No auth credentials found", 401)),
+    "200-code-429": _sent("retryable", _error("Upstream is down", 429)),
+    "200-code-500": _sent("retryable", _error("Upstream is down", 500)),
+    "200-code-object": _sent("retryable", _error("Upstream is down", {"status": 401})),
+    "200-code-huge": _sent("retryable", _error("Upstream is down", 10**30)),
+    "200-message-object": _sent("retryable", _error({"text": "Upstream is down"}, None)),
+    "200-error-string": _sent("retryable", {"error": "Upstream is down"}),
+    "200-error-list": _sent("retryable", {"error": ["Upstream is down"]}),
+    "200-error-empty": _sent("retryable", {"error": {}}),
+    "200-error-and-null-choices": _sent(
+        "retryable", {**_error("Upstream is down", 502), "choices": None}
     ),
-    "200-string": ("Upstream is down", "retryable"),
-    "200-null": (b"null", "retryable"),
-    "200-number": (b"7", "retryable"),
-    "200-list": ([], "retryable"),
-    "200-empty-object": ({}, "retryable"),
-    "200-empty": (b"", "retryable"),
-    "200-no-utf-8": (b'{"choices": "\xff\xfe"}', "retryable"),
-    "200-nan": (b'{"choices": NaN}', "retryable"),
-    "200-deep": (_DEEP, "retryable"),
-    "200-huge-number": (b'{"choices": ' + b"9" * 100_000 + b"}", "retryable"),
+    "200-string": _sent("retryable", "Upstream is down"),
+    "200-null": _sent("retryable", b"null"),
+    "200-number": _sent("retryable", b"7"),
+    "200-list": _sent("retryable", []),
+    "200-empty-object": _sent("retryable", {}),
+    "200-empty": _sent("retryable", b""),
+    "200-no-utf-8": _sent("retryable", b'{"choices": "\xff\xfe"}'),
+    "200-nan": _sent("retryable", b'{"choices": NaN}'),
+    "200-deep": _sent("retryable", _DEEP),
+    "200-huge-number": _sent("retryable", b'{"choices": ' + b"9" * 100_000 + b"}"),
 }
 """Bodies that come with status 200 and are no reply."""
 
-_STATUSES: Mapping[str, tuple[int, Any, Mapping[str, str], Ending]] = {
-    "201-empty": (201, b"", {}, "retryable"),
-    "202-accepted": (202, {"status": "queued"}, {}, "retryable"),
-    "204": (204, None, {}, "retryable"),
-    "400-string": (400, {"error": "Invalid value for messages"}, {}, "sample"),
-    "401-string": (401, {"error": "Unauthorized"}, {}, "unavailable"),
-    "402": (402, _error("Insufficient credits", 402), {}, "unavailable"),
-    "408": (408, b"", {}, "retryable"),
-    "429-bare": (429, {"error": "Too many requests"}, {}, "retryable"),
-    "429-soon": (429, {"error": "Too many requests"}, {"Retry-After": "0"}, "retryable"),
-    "429-broken-wish": (429, {"error": "Too many"}, {"Retry-After": "soon"}, "retryable"),
-    "429-endless-wish": (429, {"error": "Too many"}, {"Retry-After": "1e400"}, "retryable"),
-    "429-no-wish": (429, {"error": "Too many"}, {"Retry-After": "nan"}, "retryable"),
-    "500-string": (500, {"error": "Internal error"}, {}, "retryable"),
-    "500-deep": (500, _DEEP, {}, "retryable"),
-    "502-page": (502, b"<html>Bad gateway</html>", {}, "retryable"),
-    "503": (503, _error("Overloaded", None), {}, "retryable"),
-    "529": (529, _error("Overloaded", None), {}, "retryable"),
+_STATUSES: Mapping[str, Fault] = {
+    "201-empty": _sent("retryable", b"", 201),
+    "202-accepted": _sent("retryable", {"status": "queued"}, 202),
+    "204": _sent("retryable", None, 204),
+    "400-string": _sent("sample", {"error": "Invalid value for messages"}, 400),
+    "401-string": _sent("unavailable", {"error": "Unauthorized"}, 401),
+    "402": _sent("unavailable", _error("Insufficient credits", 402), 402),
+    "408": _sent("retryable", b"", 408),
+    "429-bare": _sent("retryable", {"error": "Too many requests"}, 429),
+    "429-soon": _sent(
+        "retryable", {"error": "Too many requests"}, 429, headers={"Retry-After": "0"}
+    ),
+    "429-broken-wish": _sent(
+        "retryable", {"error": "Too many"}, 429, headers={"Retry-After": "soon"}
+    ),
+    "429-endless-wish": _sent(
+        "retryable", {"error": "Too many"}, 429, headers={"Retry-After": "1e400"}
+    ),
+    "429-no-wish": _sent("retryable", {"error": "Too many"}, 429, headers={"Retry-After": "nan"}),
+    "500-string": _sent("retryable", {"error": "Internal error"}, 500),
+    "500-deep": _sent("retryable", _DEEP, 500),
+    "502-page": _sent("retryable", b"<html>Bad gateway</html>", 502),
+    "503": _sent("retryable", _error("Overloaded", None), 503),
+    "529": _sent("retryable", _error("Overloaded", None), 529),
 }
 """Answers by their status alone."""
 
@@ -307,18 +308,10 @@ WIRE_FAULTS: Mapping[str, Fault] = {
         for status in (301, 302, 303, 307, 308)
         for away in (False, True)
     },
-    "redirect-nowhere": Fault(partial(_sends, status=302), "unavailable"),
-    "redirect-garbled": Fault(
-        partial(_sends, status=302, headers={"Location": "http://[::1/v1"}), "unavailable"
-    ),
-    **{
-        name: Fault(partial(_sends, status=200, body=body), ending)
-        for name, (body, ending) in _ERRORS_IN_200.items()
-    },
-    **{
-        name: Fault(partial(_sends, status=status, body=body, headers=headers), ending)
-        for name, (status, body, headers, ending) in _STATUSES.items()
-    },
+    "redirect-nowhere": _sent("unavailable", status=302),
+    "redirect-garbled": _sent("unavailable", status=302, headers={"Location": "http://[::1/v1"}),
+    **_ERRORS_IN_200,
+    **_STATUSES,
     **{
         name: Fault(partial(_changed, change=change), ending)
         for name, (change, ending) in _CHANGES.items()
