@@ -19,14 +19,6 @@ from phyblock.domain.question import QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions import base, sight
 from phyblock.making.questions.base import Asked, Slots, StaticMaker, UnfairError, View, pick
-from phyblock.making.questions.sight import (
-    SHAPE_WORDS,
-    Feature,
-    drawn_name,
-    plain_names,
-    resolve_one,
-    shape_word,
-)
 from phyblock.sim.contact import GROUND, bounds_m, support_graph
 
 _LYING_M = 0.03
@@ -39,8 +31,8 @@ class PropertyMaker(StaticMaker):
     def __init__(self, subtask: Literal["SH", "CO"]) -> None:
         self.subtask: Subtask = subtask
         self._is_shape = subtask == "SH"
-        other: Feature = "color" if self._is_shape else "type"
-        self._features: tuple[Feature, ...] = (other, "side", "layer", "support")
+        other: sight.Feature = "color" if self._is_shape else "type"
+        self._features: tuple[sight.Feature, ...] = (other, "side", "layer", "support")
 
     def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
         """Ask about each block that can be named, in colors drawn anew."""
@@ -48,12 +40,12 @@ class PropertyMaker(StaticMaker):
             shown = sight.recolored(scene, rng)
             picture = sight.goal_picture(shown, view)
             block = next(b for b in shown.blocks if b.order == order)
-            if name := drawn_name(rng, block, picture, self._features):
+            if name := sight.drawn_name(rng, block, picture, self._features):
                 yield Asked(self.subtask.lower(), shown, picture, {"block": name})
 
     def right(self, asked: Asked) -> str:
         """Return the shape or color of the block that the text names."""
-        block = resolve_one(asked.slots["block"], asked.picture)
+        block = sight.resolve_one(asked.slots["block"], asked.picture)
         sight.require_seen(asked.picture, sight.STUDIED if self._is_shape else sight.NAMED, [block])
         if not self._is_shape:
             return block.color
@@ -62,11 +54,11 @@ class PropertyMaker(StaticMaker):
         is_standing = block.type == "semi_cylinder" and sight.height_m(block) > _LYING_M
         if is_standing and any(block.order in other.depend for other in asked.picture.blocks):
             raise UnfairError("a half cylinder that stands and carries looks like a cylinder")
-        return shape_word(block.type)
+        return sight.shape_word(block.type)
 
     def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
         """Return the right shape or color and three others."""
-        words: Sequence[str] = list(SHAPE_WORDS) if asked.stem == "sh" else COLORS
+        words: Sequence[str] = list(sight.SHAPE_WORDS) if asked.stem == "sh" else COLORS
         return [right, *base.shuffled(rng, [word for word in words if word != right])[:3]]
 
 
@@ -116,7 +108,7 @@ class SizeMaker(StaticMaker):
         """Compare the blocks that the text or the options name."""
         is_choice, pair = "comparison" in asked.slots, ("block", "other")
         named = asked.options if is_choice else [asked.slots[name] for name in pair]
-        blocks = [resolve_one(name, asked.picture) for name in named]
+        blocks = [sight.resolve_one(name, asked.picture) for name in named]
         sight.require_seen(asked.picture, sight.STUDIED, blocks)
         if not is_choice:
             ratio = sight.height_m(blocks[0]) / sight.height_m(blocks[1])
@@ -143,7 +135,8 @@ class SizeMaker(StaticMaker):
 # Counts
 
 _TYPES_OF = {
-    f"{word}es" if word == "arch" else f"{word}s": types for word, types in SHAPE_WORDS.items()
+    f"{word}es" if word == "arch" else f"{word}s": types
+    for word, types in sight.SHAPE_WORDS.items()
 }
 """The types that each plural names."""
 _WEDGED_M = 0.005
@@ -231,7 +224,7 @@ def _fitting(picture: QuestionPicture, slots: Slots) -> int:
 
 
 def _layer_of_block(picture: QuestionPicture, slots: Slots) -> int:
-    block, layers = resolve_one(slots["block"], picture), layers_of(picture.blocks)
+    block, layers = sight.resolve_one(slots["block"], picture), layers_of(picture.blocks)
     sight.require_seen(picture, sight.NAMED, [block])
     under = [one for one in picture.blocks if layers[one.order] < layers[block.order]]
     sight.require_seen(picture, sight.COUNTED, under)
@@ -289,7 +282,7 @@ TALLIES: Mapping[str, Tally] = {
     "lc-block": Tally(
         _layer_of_block,
         range(1, 9),
-        lambda p: [{"block": name} for name in plain_names(p).values()],
+        lambda p: [{"block": name} for name in sight.plain_names(p).values()],
         is_recolored=True,
     ),
     "lc-in": Tally(
@@ -304,7 +297,8 @@ TALLIES: Mapping[str, Tally] = {
     ),
     "tc-all": Tally(lambda p, _: len(_types(_shaped(p))), range(1, len(BLOCK_TYPES) + 1)),
     "tc-shapes": Tally(
-        lambda p, _: len({shape_word(b.type) for b in _shaped(p)}), range(1, len(SHAPE_WORDS) + 1)
+        lambda p, _: len({sight.shape_word(b.type) for b in _shaped(p)}),
+        range(1, len(sight.SHAPE_WORDS) + 1),
     ),
     "tc-once": Tally(lambda p, _: sum(n == 1 for n in _types(_shaped(p)).values()), range(0, 7)),
     "tc-ground": Tally(lambda p, _: len(_types(_on_ground(_shaped(p)))), range(1, 8)),

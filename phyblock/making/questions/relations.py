@@ -20,7 +20,6 @@ from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import angles_deg
 from phyblock.making.questions import base, sight
 from phyblock.making.questions.base import Asked, Floats, StaticMaker, T, UnfairError, View, pick
-from phyblock.making.questions.sight import plain_names, resolve_one, shape_word
 from phyblock.sim.balance import surely_stands
 from phyblock.sim.camera import view_axes
 from phyblock.sim.contact import GROUND, bounds_m, boxes_near, support_graph, whole_bounds_m
@@ -36,7 +35,7 @@ def _named(
     for _ in range(_RECOLORED):
         shown = sight.recolored(scene, rng)
         picture = sight.goal_picture(shown, view)
-        names = plain_names(picture)
+        names = sight.plain_names(picture)
         if len(names) >= least:
             yield shown, picture, names
 
@@ -48,7 +47,7 @@ def _pairs(items: Sequence[T], rng: np.random.Generator) -> list[tuple[T, T]]:
 
 def _resolved(picture: QuestionPicture, names: Sequence[str]) -> list[Block]:
     """Return the blocks of these names, each of which shows enough of itself."""
-    blocks = [resolve_one(name, picture) for name in names]
+    blocks = [sight.resolve_one(name, picture) for name in names]
     sight.require_seen(picture, sight.NAMED, blocks)
     return blocks
 
@@ -490,7 +489,7 @@ class RotationMaker(StaticMaker):
 
     def right(self, asked: Asked) -> str:
         """Compare the orientations in the picture, up to the symmetry of the type."""
-        pair = [resolve_one(asked.slots[name], asked.picture) for name in ("block", "other")]
+        pair = [sight.resolve_one(asked.slots[name], asked.picture) for name in ("block", "other")]
         sight.require_seen(asked.picture, sight.STUDIED, pair)
         true = {phrase for phrase in phrases(asked.stem, *pair) if phrase in asked.options}
         if len(true) != 1:
@@ -505,7 +504,7 @@ def _asked(
     every = replace(scene, blocks=(*scene.blocks, loose))
     shown = sight.with_own_colors(every, [loose.order, other.order], rng)
     color = {block.order: block.color for block in shown.blocks}
-    names = {one: f"{color[one.order]} {shape_word(one.type)}" for one in (loose, other)}
+    names = {one: f"{color[one.order]} {sight.shape_word(one.type)}" for one in (loose, other)}
     slots = {"block": names[loose], "other": names[other]}
     colored, picture = replace(scene, blocks=shown.blocks[:-1]), sight.goal_picture(shown, view)
     return Asked(stem, colored, picture, slots, _OFFERED[stem], _KINDS[stem])

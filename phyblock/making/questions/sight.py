@@ -180,9 +180,11 @@ def shows_profile(block: Block, view: View) -> bool:
 # The pictures of a question
 
 
-def are_told_apart(pictures: Sequence[QuestionPicture], least: int = LEAST_PIXELS) -> bool:
+def are_told_apart(pictures: Sequence[QuestionPicture]) -> bool:
     """True if nothing is cut off, and any two of the pictures differ in enough pixels."""
-    return all(map(is_inside, pictures)) and least_difference([*map(seen, pictures)]) >= least
+    return (
+        all(map(is_inside, pictures)) and least_difference([*map(seen, pictures)]) >= LEAST_PIXELS
+    )
 
 
 def same_blocks(one: Sequence[Block], other: Sequence[Block]) -> bool:
