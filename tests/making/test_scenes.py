@@ -23,7 +23,7 @@ from phyblock.making.scenes.production import (
     produce,
     shares,
 )
-from phyblock.making.scenes.sketch import PALETTES, POSES, Draft, Sketch, transformed
+from phyblock.making.scenes.sketch import PALETTES, POSES, Draft, transformed
 from phyblock.making.workers import open_workers
 from phyblock.sim.contact import bounds_m, find_gaps, find_overlaps, support_graph
 from phyblock.sim.pictures import drawn_m, hidden_blocks
@@ -44,7 +44,7 @@ steps = st.lists(
 @given(steps)
 @settings(max_examples=40, deadline=None)
 def test_whatever_is_put_down_neither_overlaps_nor_floats(drawn) -> None:
-    sketch = Sketch()
+    sketch = Draft(np.random.default_rng(0))
     for block_type, y, x, pose in drawn:
         sketch.put(block_type, y, x, pose)
     assert find_overlaps(sketch.blocks, 1e-5) == ()

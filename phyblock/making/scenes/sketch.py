@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import product
 from typing import Literal, TypeVar
 
@@ -63,38 +63,6 @@ UNIT_M = 0.025
 _ABOVE_M = 1.0
 
 
-@dataclass
-class Sketch:
-    """A structure in the making."""
-
-    blocks: list[Block] = field(default_factory=list)
-
-    def put(
-        self,
-        block_type: BlockType,
-        y: float = 0.0,
-        x: float = 0.0,
-        pose: str = "",
-        color: Color | None = None,
-    ) -> None:
-        """Let a block down with the center of its outline at (x, y) [grid units].
-
-        `pose` is a name from `POSES`, by default the first; `color` by default the kit's.
-        """
-        poses = POSES[block_type]
-        euler = poses[pose] if pose else next(iter(poses.values()))
-        corners = corners_m(block_type, (0.0, 0.0, 0.0), euler)
-        middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
-        place = np.array([x, y]) * UNIT_M - middle[:2]
-        above = (float(place[0]), float(place[1]), _ABOVE_M)
-        order = len(self.blocks) + 1
-        color = color or SHAPES[block_type].kit_colors[0]
-        block = Block(order, block_type, color, above, euler, (), 1)
-        fall_m = drop_height_m(block, self.blocks)
-        landed = tuple(round(c, 6) + 0.0 for c in (above[0], above[1], _ABOVE_M - fall_m))
-        self.blocks.append(replace(block, position_m=(landed[0], landed[1], landed[2])))
-
-
 def make_scene(name: str, levels: tuple[int, ...], blocks: list[Block]) -> Scene:
     """Return the scene that blocks make, the middle of its ground plan moved to the origin.
 
@@ -136,15 +104,15 @@ PALETTES: dict[Palette, tuple[tuple[BlockType, Color], ...]] = {
 T = TypeVar("T")
 
 
-class Draft(Sketch):
-    """A sketch with the random source and the colors that the rules of the grammar draw on.
+class Draft:
+    """A structure in the making, with the random source and the colors that its rules draw on.
 
     A cube comes in one of two tones of the structure, 0 or 1, so that a storey has one color; any
     other type has one color a structure, the kit's own with the palette `kit`.
     """
 
     def __init__(self, rng: np.random.Generator, palette: Palette = "kit") -> None:
-        super().__init__()
+        self.blocks: list[Block] = []
         self.rng = rng
         order = rng.permutation(len(COLORS))
         self._tones: tuple[Color, ...] = tuple(COLORS[i] for i in order[:2])
@@ -166,6 +134,31 @@ class Draft(Sketch):
     def maybe(self, chance: float = 0.5) -> bool:
         """True in a share `chance` of cases."""
         return float(self.rng.random()) < chance
+
+    def put(
+        self,
+        block_type: BlockType,
+        y: float = 0.0,
+        x: float = 0.0,
+        pose: str = "",
+        color: Color | None = None,
+    ) -> None:
+        """Let a block down with the center of its outline at (x, y) [grid units].
+
+        `pose` is a name from `POSES`, by default the first; `color` by default the kit's.
+        """
+        poses = POSES[block_type]
+        euler = poses[pose] if pose else next(iter(poses.values()))
+        corners = corners_m(block_type, (0.0, 0.0, 0.0), euler)
+        middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+        place = np.array([x, y]) * UNIT_M - middle[:2]
+        above = (float(place[0]), float(place[1]), _ABOVE_M)
+        order = len(self.blocks) + 1
+        color = color or SHAPES[block_type].kit_colors[0]
+        block = Block(order, block_type, color, above, euler, (), 1)
+        fall_m = drop_height_m(block, self.blocks)
+        landed = tuple(round(c, 6) + 0.0 for c in (above[0], above[1], _ABOVE_M - fall_m))
+        self.blocks.append(replace(block, position_m=(landed[0], landed[1], landed[2])))
 
     def build(self, text: str, tone: int = 0) -> None:
         """Let blocks down one after another, as `2 cube 1; arch:cradle 0,-1; cube +1; top`.
