@@ -17,6 +17,7 @@ from tests.domain.graphs import acyclic
 TYPES = ("arch", "cuboid3")
 COLORS = ("red", "blue")
 YAWS_DEG = (0.0, 90.0, 180.0)
+FLAT, TURNED = (0.0, 0.0, 0.0), (0.0, 0.0, 90.0)
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,21 @@ def cases(draw: st.DrawFn, max_blocks: int = 6, max_steps: int = 8) -> Case:
     steps = draw(st.lists(st.integers(1, len(chosen)), max_size=max_steps))
     scene = Scene("s", draw(st.sampled_from([(1, 2), (3,)])), blocks, ("s",))
     return Case(scene, CandidateSet(tuple(chosen)), Plan(tuple(steps)))
+
+
+@st.composite
+def carriers(draw: st.DrawFn) -> Case:
+    """Equal cubes that carry blocks of few kinds: what the plan names depends on which it takes."""
+    position = (0.0, 0.0, 0.0)
+    n_cubes = draw(st.integers(2, 3))
+    blocks = [Block(n + 1, "cube", "red", position, FLAT, (), 1) for n in range(n_cubes)]
+    tops = [("arch", "red", FLAT), ("arch", "red", TURNED), ("arch", "blue", FLAT)]
+    for cube in range(n_cubes):
+        for top in draw(st.lists(st.sampled_from(tops), min_size=1, max_size=2)):
+            blocks.append(Block(len(blocks) + 1, *top[:2], position, top[2], (cube + 1,), 2))
+    candidates = CandidateSet((Candidate("cube", "red", FLAT), *(Candidate(*top) for top in tops)))
+    tail = draw(st.lists(st.integers(1, len(candidates)), min_size=3, max_size=7))
+    return Case(Scene("s", (3,), tuple(blocks), ("s",)), candidates, Plan((1, *tail)))
 
 
 def equal(block: Block, candidate: Candidate, setting: Setting) -> bool:

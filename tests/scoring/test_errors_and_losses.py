@@ -28,9 +28,7 @@ from phyblock.scoring.plan import (
 )
 from phyblock.types import LEVEL1_CRITERIA, MATCHERS, SETTINGS, Matcher, Setting
 from tests.domain.graphs import acyclic
-from tests.scoring.cases import Case, cases, equal, renumbered
-
-FLAT, TURNED = (0.0, 0.0, 0.0), (0.0, 0.0, 90.0)
+from tests.scoring.cases import FLAT, TURNED, Case, carriers, cases, equal, renumbered
 
 
 def errors_of(case: Case, setting: Setting, matcher: Matcher) -> tuple[ErrorType | None, ...]:
@@ -74,21 +72,6 @@ def test_each_wrong_step_has_exactly_the_one_type_that_holds(
     counted = count_errors(errors)
     assert tuple(counted) == ERROR_TYPES
     assert sum(counted.values()) == match.counts.fp
-
-
-@st.composite
-def carriers(draw: st.DrawFn) -> Case:
-    """Equal cubes that carry blocks of few kinds: what the plan names depends on which it takes."""
-    position = (0.0, 0.0, 0.0)
-    n_cubes = draw(st.integers(2, 3))
-    blocks = [Block(n + 1, "cube", "red", position, FLAT, (), 1) for n in range(n_cubes)]
-    tops = [("arch", "red", FLAT), ("arch", "red", TURNED), ("arch", "blue", FLAT)]
-    for cube in range(n_cubes):
-        for top in draw(st.lists(st.sampled_from(tops), min_size=1, max_size=2)):
-            blocks.append(Block(len(blocks) + 1, *top[:2], position, top[2], (cube + 1,), 2))
-    candidates = CandidateSet((Candidate("cube", "red", FLAT), *(Candidate(*top) for top in tops)))
-    tail = draw(st.lists(st.integers(1, len(candidates)), min_size=3, max_size=7))
-    return Case(Scene("s", (3,), tuple(blocks), ("s",)), candidates, Plan((1, *tail)))
 
 
 @pytest.mark.parametrize("setting", SETTINGS)

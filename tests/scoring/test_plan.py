@@ -20,7 +20,7 @@ from phyblock.scoring.plan import (
     most_placed,
 )
 from phyblock.types import LEVEL1_CRITERIA, MATCHERS, SETTINGS, Level1Criterion, Matcher, Setting
-from tests.scoring.cases import Case, cases, choices, equal, greatest_tp, greedy_tp
+from tests.scoring.cases import Case, carriers, cases, choices, equal, greatest_tp, greedy_tp
 
 each_setting = pytest.mark.parametrize("setting", SETTINGS)
 each_matcher = pytest.mark.parametrize("matcher", MATCHERS)
@@ -35,7 +35,7 @@ def counted(case: Case, setting: Setting, matcher: Matcher = "optimal") -> Count
 
 
 @each_setting
-@given(case=cases(max_blocks=8, max_steps=12))
+@given(case=cases(max_blocks=8, max_steps=12) | carriers())
 def test_optimal_is_the_best_of_all_sequences_of_choices_and_paper_is_algorithm_1(
     setting: Setting, case: Case
 ) -> None:
