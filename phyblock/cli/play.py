@@ -92,7 +92,7 @@ def play(
 
     def begun() -> None:
         print_path(console, f"Open {server.address}")
-        console.print("Ctrl-C ends the session; the same command goes on.", style="dim")
+        console.print("Ctrl-C ends the session; the same command continues it.", style="dim")
         if not no_browser:
             # A browser for terminals would not come back before it is closed.
             Thread(target=webbrowser.open, args=(server.one_time_address,), daemon=True).start()

@@ -578,7 +578,7 @@ def sensitivity_frame(run: Run) -> pd.DataFrame:
     `shift` is the standard deviation of the means of the `levels` of a factor, `single` that of the
     scores of single items over levels beyond the shift; of repeats, that of one question asked
     again; in the row `items`, that between items. `*_lo` and `*_hi` bound 95 % intervals over the
-    `n_clusters` base scenes of the `n_items` items that the model has in every way of asking.
+    `n_clusters` base scenes of the `n_items` items that the model answered under every condition.
     See `phyblock.scoring.statistics`. Empty where the run varies nothing.
     """
     rows: list[dict[str, Any]] = []
@@ -678,7 +678,7 @@ def sensitivity_table(run: Run) -> Table | None:
         "score over levels, beyond the shift and noise; asked again: of one question repeated. One "
         "factor alone without repeats cannot be told from noise in single items."
     )
-    return Table.of(table, f"What the way of asking changes{run.design.of_suite}", columns, notes)
+    return Table.of(table, f"Effect of the presentation{run.design.of_suite}", columns, notes)
 
 
 def sizes_text(table: pd.DataFrame) -> str:

@@ -327,7 +327,7 @@ def sensitivity(run: Run, *, track: str) -> Figure | None:
     axes[0].set_xlim(left=0)
     what = f"Standard deviation of {main_measure(run, track).heading_in_unit}"
     how = f"{what}; lines: 95 % intervals, {sizes_text(table)}"
-    return _finished(figure, run, f"{kind_of(track).title}: what the way of asking changes", how)
+    return _finished(figure, run, f"{kind_of(track).title}: effect of the presentation", how)
 
 
 def figures_of(run: Run) -> dict[str, Callable[[Run], Figure | None]]:

@@ -335,8 +335,8 @@ def table_names(run: Run) -> tuple[str, ...]:
 def make_tables(run: Run, names: Sequence[str] | None = None) -> dict[str, Table]:
     """Make the tables of these names that the run has values for; of None, those that it writes.
 
-    A run writes the tables of its tracks, what the way of asking changes, coverage that is not
-    complete, cost, and the paper's numbers where it counts as the paper does.
+    A run writes the tables of its tracks, the effect of varied presentation, coverage if it is not
+    complete, cost, and the paper's numbers if it counts as the paper does.
     """
     wanted, made = set(table_names(run) if names is None else names), dict[str, Table | None]()
     for track in run.design.suite.tracks if run.design.models else ():

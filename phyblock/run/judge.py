@@ -1,8 +1,8 @@
-"""Records of samples: what came of a request, judged by its track, for the first time or again.
+"""Records of samples: the outcome of a request, judged by its track.
 
-Where no reader can read a reply, another model may be asked to copy what it says into the asked
-form. That model is sent the text of the reply and nothing else; what it copies is kept in the
-record and read by the same readers, so that `phyblock score` needs to ask nobody.
+If a reply cannot be parsed, another model may copy its answer into the requested form. That model
+is sent only the text of the reply; its copy is kept in the record and parsed as a reply is, so that
+`phyblock score` calls no model.
 """
 
 from __future__ import annotations

@@ -131,7 +131,7 @@ def make_plan(
     dataset = open_dataset(suite.dataset.format, suite.files.dataset)
     models = tuple(people) or _planned_models(suite, known, only)
     if suite.models != RECORDED:
-        # Members in the place of their group: the run is the same by them.
+        # A group stands for its members: the run is the same as one that names them.
         suite = suite.model_copy(update={"models": with_members(suite.models, known)})
     limit = suite.limit if limit is None else limit
     asks = any(model.kind != "replay" for model in models)

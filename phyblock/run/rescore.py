@@ -1,4 +1,4 @@
-"""Judging stored replies again with today's code: nobody is asked anything."""
+"""Scores of stored replies by today's code; no model is called."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ def _asked_about(manifest: Manifest, dataset: Dataset) -> Dataset:
 def reopen_tracks(
     folder: Path, manifest: Manifest, suite: Suite, dataset: Dataset, *, with_prompts: bool = False
 ) -> tuple[Track, ...]:
-    """Return the tracks of the run in `folder`, known to ask what was asked; nobody is.
+    """Return the tracks of the run in `folder`, which ask exactly what was asked then.
 
     `dataset` is the run's. With prompts, those of the bundled templates. Raises DataError for other
     data of a track than those that the run was made on.

@@ -1,4 +1,4 @@
-"""Comparisons of models and runs, and tables of what the way of asking changes."""
+"""Comparisons of models and runs, and the effect of the presentation."""
 
 from __future__ import annotations
 
