@@ -58,11 +58,8 @@ class AOVGraph:
     def layers(self) -> tuple[int, ...]:
         """Layer of each vertex: 1 on the ground, else 1 + the highest layer it depends on."""
         layers = [0] * len(self)
-        placed = 0
-        while choices := self.ready(placed):
-            vertex = choices[0]
+        for vertex in graphlib.TopologicalSorter(dict(enumerate(self.depends_on))).static_order():
             layers[vertex] = 1 + max((layers[o] for o in self.depends_on[vertex]), default=0)
-            placed |= 1 << vertex
         return tuple(layers)
 
     def is_ready(self, vertex: int, placed: int) -> bool:

@@ -115,11 +115,6 @@ class Question:
     evidence: Mapping[str, Any] = field(default_factory=dict)
 
     @property
-    def key(self) -> str:
-        """The name of the question in samples and caches."""
-        return self.id
-
-    @property
     def category(self) -> Category:
         """The category of its subtask."""
         return category_of(self.subtask)

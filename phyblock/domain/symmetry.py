@@ -111,14 +111,15 @@ def _form(blocks: Sequence[Block], symmetry: Symmetry) -> tuple[tuple[object, ..
     steps = np.floor(places / _STEP_M + _PHASE).astype(int)
     return tuple(
         sorted(
-            (block.type, block.color, _image_class(block, symmetry), *place)
+            (
+                block.type,
+                block.color,
+                pose_class(block.type, image_deg(block.euler_deg, symmetry)),
+                *place,
+            )
             for block, place in zip(blocks, steps.tolist(), strict=True)
         )
     )
-
-
-def _image_class(block: Block, symmetry: Symmetry) -> tuple[float, ...]:
-    return pose_class(block.type, image_deg(block.euler_deg, symmetry))
 
 
 def _neat(angle_rad: float) -> float:

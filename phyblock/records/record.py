@@ -367,11 +367,6 @@ class Record(Line):
         more = 0.0 if self.extraction is None else self.extraction.reply.limit_usd
         if self.reply is not None:
             return self.reply.limit_usd + more
-        return self.failed_usd
-
-    @property
-    def failed_usd(self) -> float:
-        """Amount that the run's cost limit counted for a request that failed [US dollars]."""
         return 0.0 if self.error is None else self.error.billed_usd or 0.0
 
 
