@@ -240,9 +240,9 @@ class ModelConfig(Section):
     max_concurrency: Count = 64
     """Calls to this model under way at once. Left out: the suite's."""
     rpm: Count | None = None
-    """Requests a minute at most."""
+    """Most requests a minute."""
     tpm: Count | None = None
-    """Tokens a minute at most."""
+    """Most tokens a minute."""
     temperature: Temperature | None = None
     """0 to 2. Left out: the suite's; null: not sent."""
     top_p: TopP | None = None
@@ -252,9 +252,9 @@ class ModelConfig(Section):
     reasoning_effort: Literal["none", "minimal", "low", "medium", "high", "xhigh", "max"] | None = (
         None
     )
-    """How much a reasoning model thinks; null: not sent."""
+    """Effort of a reasoning model; null: not sent."""
     image_detail: ImageDetail | None = None
-    """How closely pictures are looked at: the `detail` of OpenAI and compatible servers (auto, low,
+    """Detail in which pictures are seen: the `detail` of OpenAI and compatible servers (auto, low,
     high, original), the media resolution of Gemini (low, medium, high, ultra_high); null: the
     provider's default."""
     extra_body: Annotated[dict[str, JsonValue], checked(_body_faults)] = Field(default_factory=dict)

@@ -74,7 +74,7 @@ _MESSAGES: dict[str, tuple[str, str]] = {
     "string_too_long": ("is too long", "at most {max_length}"),
     "string_pattern_mismatch": ("has the wrong form", "{pattern}"),
 }
-"""What is wrong and what is allowed, by pydantic's types of errors."""
+"""Message and allowed values, by pydantic's types of errors."""
 _FORMS: dict[str, str] = {}
 """Regular expressions of texts in words."""
 

@@ -23,7 +23,7 @@ _KEY_VARIABLES: Mapping[str, tuple[str, ...]] = {
     "qwencloud": ("QWENCLOUD_API_KEY", "DASHSCOPE_API_KEY"),
     "together_ai": ("TOGETHERAI_API_KEY", "TOGETHER_API_KEY", "TOGETHER_AI_API_KEY"),
 }
-"""Where the name is not `<PROVIDER>_API_KEY`, in the order in which they are looked for."""
+"""Variables of providers whose key is not in `<PROVIDER>_API_KEY`, in the order of lookup."""
 
 _ADDRESS_VARIABLES: Mapping[str, tuple[str, ...]] = {
     "anthropic": ("ANTHROPIC_API_BASE", "ANTHROPIC_BASE_URL"),
@@ -32,7 +32,7 @@ _ADDRESS_VARIABLES: Mapping[str, tuple[str, ...]] = {
     "ollama_chat": ("OLLAMA_API_BASE",),
     "openai": ("OPENAI_BASE_URL", "OPENAI_API_BASE"),
 }
-"""Where litellm looks for a server's address, if not in `<PROVIDER>_API_BASE`, in its order."""
+"""Variables of a server's address, if not `<PROVIDER>_API_BASE`, in litellm's order."""
 
 _OWN_CREDENTIALS = (
     "azure", "bedrock", "github_copilot", "oci", "sagemaker", "vertex_ai", "watsonx",
@@ -44,7 +44,7 @@ KEYLESS = ("hosted_vllm", "lm_studio", "llamafile", "ollama", "ollama_chat")
 
 _PLACEHOLDER = "no-key"
 _PLACEHOLDERS = (_PLACEHOLDER, "empty", "none", "null", "dummy", "test")
-"""What people write where a server needs no key, in lower case: no secrets."""
+"""Placeholders for a key that a server does not need, in lower case; they are no secrets."""
 
 _CALLED_SECRET = re.compile(
     r"(?:^|_|API)(?:KEY|TOKEN|SECRET|PASSW(?:OR)?D|CREDENTIALS?|JWT)(?:_|$)", re.IGNORECASE

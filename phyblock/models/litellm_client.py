@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     import httpx
 
 _GRACE_S = 10.0
-"""What litellm's own work may take beyond the time for the exchange, which our client keeps."""
+"""Time that litellm's own work may take beyond that of the exchange [s]."""
 
 _MOST_ERROR_BYTES = 10_000
 """The part of an error's body that litellm sees, which looks for keys in it again and again."""

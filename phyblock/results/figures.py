@@ -144,7 +144,7 @@ def _named_rows(ax: Axes, names: Sequence[str]) -> None:
 
 
 _MOST_MODELS = 6
-"""Of more models than these, all are held against the best one alone."""
+"""Most models of which all pairs are shown; with more, each is compared with the best one."""
 
 
 def forest(run: Run, *, track: str) -> Figure | None:

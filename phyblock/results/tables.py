@@ -188,7 +188,7 @@ _SUMS = [
     *("tokens_unknown", "cost_unknown", "cached", "attempts"),
 ]
 _MADE = "coverage and cost"
-"""Where `Run.made` keeps the frame of both."""
+"""Key of the frame of both in `Run.made`."""
 
 
 def coverage_frame(run: Run) -> pd.DataFrame:

@@ -24,7 +24,7 @@ from phyblock.tracks.base import simulating
 
 _ENGINES = (engine.distribution for engine in ENGINES.values())
 _LIBRARIES = ("litellm", *_ENGINES, "numpy", "pillow", "jinja2")
-"""Of the physics engines, one or both may be there."""
+"""Libraries whose versions a run names; one or both physics engines may be installed."""
 _LABELS = ("published", "served_at", "size_b", "pictures")
 _NOT_IDENTITY = {
     *("dataset.root", "suite.name", "suite.description", "suite.limit", "suite.limits"),

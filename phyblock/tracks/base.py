@@ -85,13 +85,13 @@ class Track(ABC):
     baselines: ClassVar[Mapping[str, Callable[..., str]]] = {}
     """Rules that answer, given the subject of a request and a random generator, by name."""
     by_hand: ClassVar[Callable[..., Picking] | None] = None
-    """How a person answers about a subject; None where nothing can be picked."""
+    """Choices of a person who answers about a subject; None where nothing can be picked."""
     record: ClassVar[type[Record] | None] = None
     """The model of its records; None for one that adds nothing to them."""
     counted: ClassVar[tuple[SampleCounts, ...]] = ()
     """The counts that its measures are made of; some are taken as a sample is judged."""
     results: ClassVar[Mapping[str, Any]] = {}
-    """What `read_report` takes beside its YAML file."""
+    """Further arguments of `read_report`, beside its YAML file."""
     varies: ClassVar[tuple[str, ...]] = ("repeats",)
     """Factors of a suite's section `vary` that change what it asks."""
     plays: ClassVar[bool] = False
@@ -106,7 +106,7 @@ class Track(ABC):
     def __init__(
         self, suite: Suite, dataset: Dataset, limit: int | None = None, shop: Workshop | None = None
     ) -> None:
-        """Open the track on at most `limit` items; without a shop for pictures nobody is asked.
+        """Open the track on at most `limit` items; without a shop it makes no requests.
 
         Raises SpecError, DataError or PromptError with what is wrong.
         """

@@ -107,7 +107,7 @@ class TemplatePrompt:
 
     @property
     def unsent_line(self) -> int | None:
-        """The first line with text that stands outside of blocks, and so is sent to nobody."""
+        """The first line with text outside of all blocks, which is never sent."""
         for node in self._tree.body:
             for part in node.nodes if isinstance(node, nodes.Output) else ():
                 if isinstance(part, nodes.TemplateData) and part.data.strip():
@@ -195,7 +195,7 @@ class TemplatePrompt:
 
 
 Prompt = OfficialPrompt | TemplatePrompt
-"""What turns pictures and facts about a sample into chat messages."""
+"""Prompt: turns pictures and facts about a sample into chat messages."""
 
 
 def _nothing(_context: object) -> Iterator[str]:

@@ -43,7 +43,7 @@ PositiveUsd = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
 Feedback = Literal["none", "success", "error_type"]
 History = Literal["text", "turns"]
 StepOutcome = MoveOutcome | Literal["done"] | MoveProblem
-"""What became of a step; a problem is a reply in which no single operation could be read."""
+"""Outcome of a step; a problem is a reply in which no single operation could be parsed."""
 Ending = Literal[
     "completed",
     "done",
