@@ -96,7 +96,7 @@ def test_it_is_refused_until_it_is_scored_and_then_ends_as_if_today_had_begun_it
     before, earlier = newest(workspace, "out"), read_manifest(workspace.out)
     files = workspace.files()
     for args in ((), ("--dry-run",)):
-        with pytest.raises(StoreError, match="judged by another version") as refused:
+        with pytest.raises(StoreError, match="by another version") as refused:
             run("out", *args)
         (problem,) = refused.value.problems
         assert f"readers {EARLIER}" in problem.found
@@ -144,7 +144,7 @@ def test_killed_before_either_file_is_replaced_it_is_scored_again(
         with pytest.raises(KeyboardInterrupt):
             rescore.rescore(workspace.out)
     assert ((workspace.out / "records.jsonl").read_bytes() == before) == (writes == 1)
-    with pytest.raises(StoreError, match="judged by another version"):
+    with pytest.raises(StoreError, match="by another version"):
         run("out")
     assert call("score", "out") == 0
     assert newest(workspace, "out") == newest(workspace, "whole")
