@@ -212,9 +212,9 @@ def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) ->
         console.print(text, style="dim")
     if left:
         text = (
-            "Tokens are estimates: texts by their words, pictures by their providers' rules, "
-            "replies as earlier ones of the model, or of usual length where there are none; at "
-            "most: each reply as long as it can be."
+            "Tokens are estimates: texts by their words, pictures by the provider's rule, replies "
+            "as long as the model's earlier ones, or of usual length if there are none. At most: "
+            "every reply is as long as its limit allows."
         )
         console.print(text, style="dim")
 
