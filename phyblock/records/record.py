@@ -143,9 +143,6 @@ class SentPrompt(Line):
 class Score(Line):
     """Steps counted by one criterion under one setting."""
 
-    FURTHER: ClassVar[tuple[str, ...]] = ("kept",)
-    """Fields that are counts beside tp, fp and fn; older lines lack them."""
-
     criterion: str
     """The rule by which steps count."""
     matcher: str | None = None

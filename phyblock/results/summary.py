@@ -47,12 +47,15 @@ class Summary:
 
 
 def sources(folder: Path) -> list[str]:
-    """Return the version of phyblock and digests of the files that tables and page are made of;
-    nothing where one cannot be read.
+    """Return what tables and page are made of: version and last change of phyblock, digests of the
+    files of the run; nothing where one cannot be read.
     """
     names = (MANIFEST, RECORDS, PROMPTS, STOPPED)
     with suppress(OSError, ValueError):
-        return [version("phyblock"), *(digest_of_file(folder / name) for name in names)]
+        code = (path for path in Path(__file__).parents[1].rglob("*") if path.suffix != ".pyc")
+        changed_ns = max(path.stat().st_mtime_ns for path in code if path.is_file())
+        digests = (digest_of_file(folder / name) for name in names)
+        return [version("phyblock"), str(changed_ns), *digests]
     return []
 
 

@@ -69,6 +69,15 @@ def test_an_official_suite_without_data_says_how_to_set_it(name: str, tmp_path: 
     assert "--set dataset.path=FOLDER" in problem.hint
 
 
+def test_the_paper_suite_scores_as_the_paper_did(tmp_path: Path) -> None:
+    path = ROOT / "benchmarks" / "paper-table1.yaml"
+    suite = load_suite(path, [f"dataset.path={tmp_path}"], data_dir=tmp_path)
+    assert (suite.dataset.format, suite.models) == ("official", "recorded")
+    assert suite.parser == "official"
+    assert suite.scoring.matchers == ("paper", "optimal")
+    assert (suite.scoring.level1, suite.scoring.missing) == ("membership", "skip")
+
+
 def test_every_model_of_the_paper_is_listed() -> None:
     known = {spec.published for spec in load_models(ROOT / "models.yaml").values()} - {None}
     assert known == {name.strip() for name in PUBLISHED.split(",")}

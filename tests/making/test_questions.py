@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -13,8 +14,8 @@ from phyblock.data.questions import StoredQuestion
 from phyblock.domain import LETTERS, SUBTASKS, Question, Subtask
 from phyblock.domain.blocks import COLORS
 from phyblock.domain.question import rotated
-from phyblock.errors import DataError
-from phyblock.making.files import question_card
+from phyblock.errors import DataError, StoreError
+from phyblock.making.files import question_card, write_questions
 from phyblock.making.questions.audit import SubtaskAudit, audit_questions, duplicates_of
 from phyblock.making.questions.base import stem_of
 from phyblock.making.questions.dynamics import OUTCOME_TEXTS
@@ -143,6 +144,16 @@ def test_pictures_that_were_changed_are_found_out(pictured: list[Question]) -> N
     ]
     spoiled = replace(matching, pictures=tuple(copied))
     assert problem_of(spoiled) == "4 of 4 options are right"
+
+
+def test_lines_read_back_as_the_questions(static: list[Question], tmp_path: Path) -> None:
+    folder = tmp_path / "q"
+    write_questions(folder, static, SCENES, question_card("q", "phyblock-400", static, "command"))
+    assert [task.question for task in read_questions(folder, DATA).tasks] == static
+    sums = (folder / "SHA256SUMS").read_text(encoding="utf-8").splitlines()
+    assert [line.split("  ")[1] for line in sums] == ["CARD.md", "questions.jsonl", "VERSION"]
+    with pytest.raises(StoreError, match="give another --out"):
+        write_questions(folder, static, SCENES, "card")
 
 
 def test_the_processes_change_nothing_and_the_seed_does() -> None:
