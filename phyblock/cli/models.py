@@ -123,7 +123,7 @@ def check(known: Mapping[str, ModelConfig], name: str, yes: bool) -> int:
         try:
             reply = asyncio.run(_ask_tiny(config.at(address)))
         except ModelError as error:
-            console.print(f"{server} does not answer: {error}", style="red")
+            console.print(f"{server} failed the check: {error}", style="red")
             code = 1
             continue
         usage = reply.usage

@@ -133,6 +133,8 @@ class ProgressView:
             tally.last_retry = f"{event.message}; waiting {event.wait_s:.0f} s"
             self._has_asked = True
         elif isinstance(event, ModelEvent):
+            # As a batch that was sent, which has no calls under way.
+            self._has_asked = True
             self._print(f"{event.model}: {event.message}")
         elif isinstance(event, ModelStopped):
             task = self._tallies[event.model].task

@@ -46,7 +46,7 @@ def report(
 ) -> None:
     """Write tables and report.html of the folder RUN again; with --print, print its tables.
 
-    Uses only run.yaml and records.jsonl: no model, no network. Draws scenes from the data set,
+    Uses only the files of the run: no model, no network. Draws scenes from the data set,
     where it is at hand.
     """
     console = make_console()
@@ -83,12 +83,17 @@ def _check_names(run: Path, names: Sequence[str], known: Iterable[str], noun: st
 
 
 def show_tables(
-    folder: Path, data: Path | None = None, *, page: bool = True, anew: bool = True
+    folder: Path,
+    data: Path | None = None,
+    *,
+    page: bool = True,
+    anew: bool = True,
+    keep: bool = False,
 ) -> Path:
-    """Write the tables and the page of a run folder; without `anew` only where they are not those
-    of the run as it is now.
+    """Write the tables and the page of a run folder; without `anew`, only if they are out of date.
 
-    Prints the summary; returns the page, or the folder of tables where no page is wanted.
+    Prints the summary, and keeps it in the folder with `keep`, for a run that is complete. Returns
+    the page, or the folder of tables where no page is wanted.
     """
     wanted = REPORT_FILE if page else TABLES
     if not anew and (kept := kept_summary(folder, wanted)) is not None:
@@ -104,7 +109,8 @@ def show_tables(
 
         write_report(written, data)
         made += report_files(folder).values()
-    summary.keep(folder, made_of, made)
+    if keep:
+        summary.keep(folder, made_of, made)
     return folder / wanted
 
 

@@ -102,8 +102,15 @@ def run(
     plan = make_plan(loaded, known, only=models, limit=limit)
     folder = out or plan.folder_in(Path("results"))
     wanted = TABLES if no_report else REPORT_FILE
-    is_held = held_run(folder, plan.manifest) is not None
-    if is_held and not dry_run and kept_summary(folder, wanted) is None:
+    held = held_run(folder, plan.manifest)
+    # Nothing is left to ask, and what was made stays.
+    is_as_it_was = (
+        held is not None
+        and not retry_failed
+        and held.model_copy(update={"created": plan.manifest.created}) == plan.manifest
+        and kept_summary(folder, wanted) is not None
+    )
+    if held is not None and not is_as_it_was and not dry_run:
         from phyblock.web.report import files_of
 
         OutFolder(folder).check(files_of(page=not no_report))
@@ -127,7 +134,7 @@ def run(
     with ProgressView(console) as view:
         session = Session(plan, folder, view, **asks)
         result = completed(session, _SIGNALS, lambda: view.tick(asks=session.under_way > 0))
-    made = show_tables(folder, page=not no_report, anew=False)
+    made = show_tables(folder, page=not no_report, anew=False, keep=not result.left)
     code = _conclude(console, folder, result, view)
     print_path(console, made)
     return code

@@ -384,7 +384,7 @@ class ModelConfig(Section):
     def identity(self) -> dict[str, object]:
         """Return what changes replies, JSON-able: not the limits, the price, the transport, nor at
         which address a custom server is. That it is no provider's does count, or the replies of a
-        stand-in would pass for the provider's. What a model has not is not said.
+        stand-in would pass for the provider's. Fields that a model does not set are left out.
         """
         identity: dict[str, object] = {
             "kind": self.kind,

@@ -273,7 +273,7 @@ def _parts(content: object) -> tuple[str, str]:
 
 
 def _get(raw: object, *paths: str) -> Any:
-    """Return the first value, but null, that one of the paths leads to, such as `choices.0.text`;
+    """Return the first value other than null that a path leads to, such as `choices.0.text`;
     else None. The name 0 stands for the first item of a list.
     """
     for path in paths:

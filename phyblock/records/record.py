@@ -265,7 +265,7 @@ class Record(Line):
         def value(path: str) -> Any:
             found: Any = self
             for name in path.split("."):
-                found = getattr(found, name, None)
+                found = None if found is None else getattr(found, name)
             return found
 
         return {column: value(path) for column, (_, path) in self.exported.items()}

@@ -60,14 +60,16 @@ def sources(folder: Path) -> list[str]:
 
 
 def kept_summary(folder: Path, needed: str) -> Summary | None:
-    """Return the summary that was kept; None where the run is not as it was, phyblock is another or
-    was extended, or files are not there that were made, or what is `needed` was not made.
+    """Return the kept summary; None if the run or phyblock has changed, phyblock was extended, a
+    file that was made is missing, or `needed` was not made.
     """
     try:
+        if has_additions():
+            return None
         kept = load_json(read_bytes(folder / SUMMARY))
         is_there = all((folder / name).is_file() for name in kept["files"])
         made_of = sources(folder)
-        if has_additions() or not is_there or not made_of or kept["made_of"] != made_of:
+        if not is_there or not made_of or kept["made_of"] != made_of:
             return None
         if not any(name.startswith(needed) for name in kept["files"]):
             return None

@@ -159,7 +159,7 @@ def _error(error: ModelError) -> StoredError:
 def pooled(replies: Sequence[Reply]) -> Reply:
     """Return the sum of an episode's replies, with the text of the last one.
 
-    It is cut off or refused where every one of them is.
+    It counts as cut off or refused only if all of them are.
     """
     counts = {
         name: _sum(getattr(reply.usage, name) for reply in replies) for name in Usage.model_fields

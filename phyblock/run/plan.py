@@ -123,8 +123,8 @@ def make_plan(
 ) -> RunPlan:
     """Resolve a suite against the known models.
 
-    `only` names models to run in place of the suite's, `people` are asked in their place; `limit`,
-    else that of the suite, keeps that many items of each track: scenes spread over levels,
+    `only` names models to run in place of the suite's, `people` are asked instead of models.
+    `limit`, else that of the suite, keeps that many items of each track: scenes spread over levels,
     questions over subtasks. Raises SpecError, DataError, StoreError or PromptError with all that is
     wrong.
     """

@@ -325,10 +325,11 @@ def execute(
 class Executor:
     """Execution of a plan with poses, step by step; a context manager.
 
-    A block that shares space by no more than a tolerance is moved out the shortest way, one that
-    hangs no higher is lowered; where it shares more, it stays out. It is let go with blocks near it
-    alone; others join as soon as something that fell comes near. Where a step moves nothing past
-    the limits of `DEFAULT_TRIAL`, all is set back, so that no step is judged by earlier drift.
+    A block that overlaps others by no more than a tolerance is moved out the shortest way, and one
+    that hangs in the air by no more is lowered; one that overlaps more stays out. It is let go with
+    blocks near it alone; others join as soon as something that fell comes near. Where a step moves
+    nothing past the limits of `DEFAULT_TRIAL`, all is set back, so that no step is judged by
+    earlier drift.
     """
 
     def __init__(

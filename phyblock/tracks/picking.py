@@ -46,7 +46,7 @@ class NumberField:
     start: float | None = None
 
     def allows(self, value: float) -> bool:
-        """True for a number in these bounds; none is no finite number."""
+        """True for a number within the bounds and with no more decimals; NaN is refused."""
         return abs(value) <= self.most and abs(value - round(value, self.decimals)) <= 1e-9
 
 

@@ -224,9 +224,12 @@ def _random_step(subject: StepSubject, rng: np.random.Generator) -> str:
     return step_text(int(rng.integers(1, len(subject.candidates) + 1)))
 
 
-def _right_move(choose: Callable[[StepSubject, int, np.random.Generator], int | None]) -> Any:
-    """Return the rule that draws one of the right moves, so that every valid order can come, and
-    names what is chosen in its place, if anything is; Done where no move is right.
+_Choose = Callable[[StepSubject, int, np.random.Generator], int | None]
+
+
+def _right_move(choose: _Choose) -> Callable[[StepSubject, np.random.Generator], str]:
+    """Return a rule that draws a right move and names the candidate chosen instead, if there is
+    one; Done if no move is right.
     """
 
     def rule(subject: StepSubject, rng: np.random.Generator) -> str:
@@ -234,7 +237,8 @@ def _right_move(choose: Callable[[StepSubject, int, np.random.Generator], int | 
         if not moves:
             return step_text(None)
         index = moves[int(rng.integers(len(moves)))]
-        return step_text((choose(subject, index, rng) if subject.exact else None) or index)
+        instead = choose(subject, index, rng) if subject.exact else None
+        return step_text(index if instead is None else instead)
 
     return rule
 

@@ -96,7 +96,7 @@ def test_a_check_asks_every_server(workspace: Workspace) -> None:
         checked = workspace.phyblock("models", "--models-file", models_file, "check", "m")
     assert checked.code == 1
     assert f"m at 127.0.0.1:{server.port} answers: " in checked.out
-    assert "m at 127.0.0.1:9 does not answer: " in checked.out
+    assert "m at 127.0.0.1:9 failed the check: " in checked.out
 
 
 def test_one_model_at_two_addresses_is_named_before_anything_is_asked(workspace: Workspace) -> None:

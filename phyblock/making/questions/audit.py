@@ -184,15 +184,16 @@ def _picture_features(question: Question) -> Floats:
     if not shots:
         return np.empty((0, 0))
     start = [seen(replace(pictures["scene"], marks=()))] if "scene" in pictures else []
+    masks = [shot.block >= 0 for shot in shots]
     values = np.array(
         [
             [
-                *_extent(shot.block >= 0),
-                *shot.rgb[shot.block >= 0].mean(axis=0),
+                *_extent(mask),
+                *(shot.rgb[mask].mean(axis=0) if mask.any() else np.zeros(3)),
                 sum(changed_pixels(shot, other).sum() for other in shots),
                 *(number for scene in start for number in _extent(changed_pixels(scene, shot))),
             ]
-            for shot in shots
+            for shot, mask in zip(shots, masks, strict=True)
         ],
         dtype=np.float64,
     )

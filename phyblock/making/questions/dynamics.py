@@ -233,7 +233,7 @@ def _looks_of_lot(plain: QuestionPicture, taken: int, lot: Lot) -> tuple[float, 
 
 
 def resting_on(blocks: Sequence[Block], order: int, *, only: bool = False) -> Lot:
-    """Return orders of the blocks that rest on one, directly or not; not its own.
+    """Return the orders of the blocks that rest on a block, directly or not, without its own.
 
     With `only` they rest on nothing but it and others that do. The naive rule says that these, or
     those, fall when it is taken away, and nothing else.
