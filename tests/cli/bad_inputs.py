@@ -177,6 +177,8 @@ MODELS: tuple[Bad, ...] = (
     Bad("jinja-pipe", pipe("mine.j2", *FRESH, "--set", "prompt=mine.j2"), ("no such file",)),
     Bad("hex", models_text("a:\n  id: openai/x\n  extra_body: {k: 0x" + "f" * 90_000 + "}\n"),
         ("models.yaml:3:19: a.extra_body.k: is too large a number", "90,002 digits")),
+    Bad("infinite", models_text("a:\n  id: openai/x\n  extra_body: {k: [1e999]}\n"),
+        ("models.yaml:3:19: a.extra_body.k: cannot be sent as JSON", "numbers that are finite")),
     Bad("no-user", template("Build it."), ("mine.j2", "has no user block")),
     Bad("no-template", template(None), ("suite.yaml", "prompt", "no such file")),
     Bad("secret", models_text(f"mine:\n  id: openai/x\n  api_key: {FAKE_KEY}\n"),
