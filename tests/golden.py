@@ -38,7 +38,7 @@ HEADLINES = ("table1.csv", "table2.csv", "table3.csv", "table_c.csv")
 RUNS: dict[str, tuple[str, ...]] = {
     "quick": ("quick",),
     "steps": ("steps", "--models", "random", "--limit", "60"),
-    "pose": ("pose", "--limit", "8"),
+    "pose": ("pose", "--limit", "16"),
     "vqa": ("vqa", "--models", "random,majority"),
     "paper-table1": ("paper-table1", "--set", "dataset.path={official}"),
 }
