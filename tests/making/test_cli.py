@@ -269,15 +269,19 @@ except KeyboardInterrupt:
 """
 
 
-def test_workers_end_at_ctrl_c(tmp_path: Path) -> None:
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
+def test_workers_end_with_the_process_that_started_them(
+    sent: signal.Signals, tmp_path: Path
+) -> None:
     for name, text in (("work.py", WORK), ("tasks.py", TASKS)):
         (tmp_path / name).write_text(text, encoding="utf-8")
     words = [sys.executable, str(tmp_path / "work.py")]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "start_new_session": True}
     with subprocess.Popen(words, **pipes) as process:
         assert int(process.stdout.readline()) != int(process.stdout.readline())
-        os.killpg(process.pid, signal.SIGINT)
+        # Ctrl-C reaches the whole group, a kill one process alone.
+        (os.killpg if sent == signal.SIGINT else os.kill)(process.pid, sent)
         # The workers hold the pipe open: it ends when they have.
         _, errors = process.communicate(timeout=30)
-    assert process.returncode == 130
+    assert process.returncode == (130 if sent == signal.SIGINT else -signal.SIGKILL)
     assert b"Traceback" not in errors

@@ -282,6 +282,18 @@ def run(here: Workspace) -> Iterator[Run]:
     registry.unregister_track(Counting.name)
 
 
+def test_a_run_of_an_added_track_that_was_cut_goes_on(run: Run) -> None:
+    records = run.path / "records.jsonl"
+
+    def samples() -> list[str]:
+        return sorted(json.loads(line)["sample"] for line in records.read_text().splitlines())
+
+    whole, text = samples(), records.read_text()
+    records.write_text(text[: len(text) // 2])
+    assert not command("run", "suite.yaml", "--out", "out", "--no-report")
+    assert samples() == whole
+
+
 def test_samples_of_an_added_track_are_exported(run: Run) -> None:
     (path,) = export_run(run, "csv")
     rows = pd.read_csv(path)

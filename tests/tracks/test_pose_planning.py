@@ -229,7 +229,7 @@ def test_a_step_has_one_error_the_first_in_time(
     assert wanted is None or wanted in POSE_ERRORS
 
 
-def test_a_run_is_scored_again_without_an_engine(
+def test_a_run_that_was_cut_goes_on_and_is_scored_again_without_an_engine(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(workspace.root)
@@ -245,13 +245,18 @@ def test_a_run_is_scored_again_without_an_engine(
         kept = ("parse", "scores", "pose")
         return {one["sample"]: {name: one[name] for name in kept} for one in records}
 
+    whole = by_sample(workspace.records())
+    text = (workspace.out / "records.jsonl").read_text()
+    (workspace.out / "records.jsonl").write_text(text[: len(text) // 2])
+    assert not phyblock.main(run, standalone_mode=False)
+    assert by_sample(workspace.records()) == whole
     # What fell when it was asked is what fell: nothing is carried out again.
     monkeypatch.setattr(pose_track, "execute", None)
     monkeypatch.setattr(pose_track, "CARRY_VERSION", pose_track.CARRY_VERSION + 1)
     again = rescore(workspace.out, None, None, workspace.root / "again")
     with pytest.raises(StoreError, match=r"pose_planning\.carrying"):
         phyblock.main(run, standalone_mode=False)
-    assert by_sample(workspace.records(again)) == by_sample(workspace.records())
+    assert by_sample(workspace.records(again)) == whole
     table = pd.read_csv(workspace.out / "tables" / "table_c.csv").set_index("model")
     shown = ["f1_a", "f1_b", "f1_c", "stands", "completed"]
     assert table.loc["oracle", shown].tolist() == [100] * 5
