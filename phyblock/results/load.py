@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from pathlib import Path
@@ -144,9 +144,9 @@ def frames_of(
     return frame, {key: column.placed(rows) for key, column in counts.items()}
 
 
-def _attributes(names: Iterable[str]) -> Callable[[object], tuple[Any, ...]]:
+def _attributes(names: Collection[str]) -> Callable[[object], tuple[Any, ...]]:
     """Return what reads attributes of a thing; each is None of no thing."""
-    read, none = attrgetter(*names), (None,) * len(tuple(names))
+    read, none = attrgetter(*names), (None,) * len(names)
     return lambda thing: none if thing is None else read(thing)
 
 

@@ -31,13 +31,13 @@ _AT_ONCE = 1 << 16
 """Pixels that are worked on together: what they take of memory is used again and again."""
 _FLAT = 1e-9  # Unit normals that differ by less in each component are those of one plane.
 _LEAST_DEPTH_M = 1e-3
-"""What is nearer to a camera is not drawn, as one cannot project what is behind it."""
+"""Faces nearer to a camera are not drawn, as one cannot project what is behind it."""
 _LIGHT_SCREEN = 0.75
 """Side of the light's picture, as a share of the camera's: props fill the former wholly."""
 _MARGIN_PX = 2
 _AWAY = -1e-6
 _TOUCHING_M = 5e-5
-"""What lies this little behind a face is at it: blocks at rest overlap by less [m]."""
+"""A point this little behind a face is at it: blocks at rest overlap by less [m]."""
 _TAPS = ((0, 0), (1, 0), (0, 1), (1, 1))
 
 

@@ -1,4 +1,4 @@
-"""What a picture tells of its blocks: how much of each shows, where, and words that fit one alone.
+"""Facts that a picture tells of its blocks: how much of each shows, where, and words that fit one.
 
 An expression is `[side] [color] noun [in layer N] [resting on the [color] noun]`. What a reader
 understands by it is computed from the text again by `resolve`, so that a question can be checked
