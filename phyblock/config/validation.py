@@ -333,8 +333,10 @@ def _fault(detail: ErrorDetails, path: FieldPath, value: Any, model: type[BaseMo
 
 def _listed(name: str, value: Any) -> str:
     """Return the list that a value without brackets probably means; "" where it is not clear."""
+    if type(value) is int and name == "seeds":
+        return str([*range(value)]) if 0 < value <= 10 else ""
     if type(value) is int:
-        return str([*range(value)] if name == "seeds" and 0 < value <= _MOST else [value])
+        return str([value])
     if not isinstance(value, str):
         return ""
     if ends := re.fullmatch(r"(\d{1,2}) *- *(\d{1,2})", value):
