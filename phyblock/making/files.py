@@ -24,9 +24,10 @@ SUMS_FILE = "SHA256SUMS"
 SCENE_FILES = ("README.md", "scenes.jsonl", VERSION_FILE)
 QUESTION_FILES = ("CARD.md", "questions.jsonl", VERSION_FILE)
 """Card, lines and version of a set."""
-SCENE_SET_VERSION = 2
+SCENE_SET_VERSION = 3
 """Counts what makes other scenes or candidate sets out of the same seed: 2 offers distractors as
-often as goals need them, and shows at least 3 % of every block's outline.
+often as goals need them, and shows at least 3 % of every block's outline; 3 holds nothing that
+the built-in set has.
 """
 QUESTION_SET_VERSION = 5
 """Raised whenever questions of a name ask something else, so that no results are mixed."""
@@ -94,7 +95,7 @@ def _card(template: str, /, **facts: object) -> str:
     return environment.from_string(text).render(simulator=other_engine(), **facts) + "\n"
 
 
-def scene_card(name: str, tasks: _Tasks, command: str, palette: Palette) -> str:
+def scene_card(name: str, tasks: _Tasks, command: str, palette: Palette, rejected: int) -> str:
     """Return the Markdown card of scenes that `command` generated."""
     scenes, sizes = [scene for scene, _ in tasks], {len(offered) for _, offered in tasks}
     by_level = {n: [one for one in scenes if n in one.levels] for n in LEVEL_LIMITS}
@@ -103,6 +104,7 @@ def scene_card(name: str, tasks: _Tasks, command: str, palette: Palette) -> str:
         name=name,
         command=command,
         version=SCENE_SET_VERSION,
+        rejected=rejected,
         count=len(scenes),
         shared=sum(len(scene.levels) > 1 for scene in scenes),
         base=_bases(scenes),

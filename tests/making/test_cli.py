@@ -7,6 +7,7 @@ import importlib.util
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -21,7 +22,7 @@ from PIL import Image
 from phyblock.cli.main import phyblock
 from phyblock.errors import DataError, InputError, StoreError
 from phyblock.files import LIST
-from phyblock.making.scenes.production import Share, produce
+from phyblock.making.scenes.production import Production, Share
 from phyblock.making.workers import open_workers
 from phyblock.resources import bundled
 from phyblock.sim.engine import other_engine
@@ -67,6 +68,27 @@ def test_what_is_made_is_verified_and_a_changed_scene_is_named(
     assert "scenes.jsonl: differs from its checksum" in done.output
     assert f"failed: {spoiled['id']}" in done.output
     assert "floats 10.00 mm above its support" in done.output
+
+
+def test_a_set_holds_nothing_of_those_that_it_excludes(folder: Path, tmp_path: Path) -> None:
+    words = ("generate", "--count", 3, "--levels", 2, "--seed", 9, *ALONE)
+    said = scenes(*words, "--exclude", folder, "--out", tmp_path / "other").stdout
+    rejected = int(said.splitlines()[-1].split()[0])
+    assert rejected >= 3
+    assert f"({rejected} drafts were rejected)" in (tmp_path / "other" / "README.md").read_text()
+    for name in (folder, "phyblock-400"):
+        compared = scenes("compare", tmp_path / "other", name).stdout
+        assert compared == "of 3 scenes: 0 equal, 0 equal but for colors\n"
+    assert "of 3 scenes: 3 equal, 0 equal" in scenes("compare", folder, folder).stdout
+    painted = tmp_path / "painted"
+    painted.mkdir()
+    lines = (folder / "scenes.jsonl").read_text(encoding="utf-8")
+    swapped = {"red": "blue", "blue": "green", "green": "yellow", "yellow": "red"}
+    lines = re.sub("|".join(swapped), lambda found: swapped[found[0]], lines)
+    (painted / "scenes.jsonl").write_text(lines, encoding="utf-8")
+    assert (
+        "of 3 scenes: 0 equal, 3 equal but for colors" in scenes("compare", folder, painted).stdout
+    )
 
 
 @pytest.mark.parametrize(
@@ -235,11 +257,11 @@ def killed_once(mark: str) -> int:
 @pytest.mark.filterwarnings("ignore")
 def test_a_killed_worker_loses_and_doubles_nothing(tmp_path: Path) -> None:
     with open_workers() as workers:
-        expected = list(produce(3, "kit", SHARES, workers))
+        expected = list(Production(3, "kit", workers).scenes(SHARES))
     with open_workers(2, "local") as workers:
         marks = [str(tmp_path / str(number)) for number in range(3)]
         assert len(list(workers.map(killed_once, marks))) == 3
-        assert list(produce(3, "kit", SHARES, workers)) == expected
+        assert list(Production(3, "kit", workers).scenes(SHARES)) == expected
 
 
 def test_no_ray_and_no_cluster_are_told() -> None:

@@ -17,13 +17,15 @@ from phyblock.making.checks import FORM, PHYSICS, SceneFacts, check_set, finding
 from phyblock.making.scenes.designs import BUILDINGS, COMPOSITIONS, CREATURES, beside
 from phyblock.making.scenes.production import (
     GROUP_LEVELS,
+    Production,
     Request,
     Share,
+    builtin_forms,
     draw,
-    produce,
     shares,
+    split_tasks,
 )
-from phyblock.making.scenes.sketch import PALETTES, POSES, Draft, transformed
+from phyblock.making.scenes.sketch import PALETTES, POSES, Draft, colorless, transformed
 from phyblock.making.workers import open_workers
 from phyblock.sim.contact import bounds_m, find_gaps, find_overlaps, support_graph
 from phyblock.sim.pictures import drawn_m, hidden_blocks
@@ -143,7 +145,7 @@ SMALL = (Share("1", 3, 1), Share("2", 4, 2), Share("3", 2, 1))
 
 def made(jobs: int = 1) -> list[Scene]:
     with open_workers(jobs) as workers:
-        return list(produce(3, "kit", SMALL, workers))
+        return list(Production(3, "kit", workers).scenes(SMALL))
 
 
 @pytest.fixture(scope="module")
@@ -173,6 +175,33 @@ def test_no_two_scenes_are_the_same_and_variations_name_base_scenes(scenes: list
 @pytest.mark.slow
 def test_two_processes_give_the_same_scenes(scenes: list[Scene]) -> None:
     assert made(jobs=2) == scenes
+
+
+def test_splits_share_no_scene_with_one_another_or_with_the_built_in_set() -> None:
+    split = {
+        name: list(islice(split_tasks(name, 4, levels=levels), count))
+        for name, levels, count in (("train", (1, 2, 3, 4), 12), ("dev", (1, 2), 3))
+    }
+    forms = {
+        name: {colorless(task.scene.blocks) for task in tasks} for name, tasks in split.items()
+    }
+    assert not forms["train"] & forms["dev"]
+    assert not builtin_forms() & (forms["train"] | forms["dev"])
+    assert {level for one in split["train"] for level in one.scene.levels} == {1, 2, 3, 4}
+    assert all(not task.candidates.missing(task.scene) for task in split["train"])
+    shard = list(islice(split_tasks("train", 4, first=1, step=3), 4))
+    assert shard == split["train"][1::3]
+    other = next(split_tasks("train", 4, excluded=forms["train"]))
+    assert colorless(other.scene.blocks) not in forms["train"]
+
+
+@pytest.mark.parametrize("count", [20, pytest.param(200, marks=pytest.mark.slow)])
+def test_no_generated_scene_has_a_form_of_the_built_in_set(count: int) -> None:
+    with open_workers() as workers:
+        production = Production(1, "kit", workers, builtin_forms())
+        made = list(production.scenes(shares(count)))
+    assert production.rejected
+    assert not builtin_forms() & {colorless(scene.blocks) for scene in made}
 
 
 # Turned and mirrored

@@ -23,6 +23,7 @@ from phyblock.data import (
     read_data_set,
 )
 from phyblock.domain.scene import Scene
+from phyblock.domain.symmetry import fingerprint
 from phyblock.errors import DataError, Problem
 from phyblock.files import OutFolder, check_free, make_folder, write_named
 from phyblock.making.checks import (
@@ -54,8 +55,8 @@ from phyblock.making.files import (
 )
 from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.completing import Completed, ReadScene, complete, palette_of, read_given
-from phyblock.making.scenes.production import produce, shares
-from phyblock.making.scenes.sketch import PALETTES, Palette
+from phyblock.making.scenes.production import Production, builtin_forms, shares
+from phyblock.making.scenes.sketch import PALETTES, Palette, colorless
 from phyblock.making.workers import open_workers
 from phyblock.sim.camera import VIEWS
 from phyblock.sim.film import assembly_gif
@@ -85,11 +86,19 @@ def scenes() -> None:
     show_default=True,
     help=f"The kit's {len(PALETTES['kit'])} pairs of type and color, or all that there are.",
 )
+@click.option(
+    "--exclude",
+    multiple=True,
+    type=NAME_OR_PATH,
+    metavar="SET",
+    help="Make no scene of this set either, in whatever colors.",
+)
 @making_options
 def generate(
     count: int,
     levels: tuple[str, ...],
     palette: str,
+    exclude: tuple[str, ...],
     seed: int,
     jobs: int,
     ray_address: str | None,
@@ -97,23 +106,60 @@ def generate(
 ) -> None:
     """Make N scenes with candidate sets, each checked by physics, and their data card.
 
-    The same N, seed, levels and palette give the same files with the same
+    None is equal to a scene of the built-in set, or of a SET to exclude, but for colors, turning,
+    mirroring and shifting. The same N, seed, levels and palette give the same files with the same
     physics engine, on any Python, any number of processes or a cluster.
     """
     check_out(out, SCENE_FILES)
     kind = cast(Palette, palette)
+    others = (task.scene for name in exclude for task in read_data_set(name).tasks)
+    excluded = builtin_forms().union(colorless(scene.blocks) for scene in others)
     with open_workers(jobs, ray_address) as workers:
-        produced = produce(seed, kind, shares(count, list(map(int, levels))), workers)
+        production = Production(seed, kind, workers, excluded)
+        produced = production.scenes(shares(count, list(map(int, levels))))
         tasks = [
             (scene, make_candidates(scene, palette=PALETTES[kind]))
             for scene in tracked(produced, count, "Making")
         ]
     chosen = ",".join(sorted(levels))
     command = f"phyblock scenes generate --count {count} --seed {seed} --levels {chosen}"
-    command += f" --palette {palette} --out {out.name}"
-    write_scenes(out, tasks, scene_card(out.name, tasks, command, kind))
+    command += f" --palette {palette}"
+    command += "".join(f" --exclude {shlex.quote(name)}" for name in exclude)
+    command += f" --out {out.name}"
+    write_scenes(out, tasks, scene_card(out.name, tasks, command, kind, production.rejected))
     click.echo(f"{counted(count, 'scene')}, all checks passed: {shown_path(out)}")
+    known = "the built-in set or an excluded one" if exclude else "the built-in set"
+    click.echo(f"{counted(production.rejected, 'draft')} rejected: a scene of {known}")
     print_engine()
+
+
+@scenes.command("compare")
+@click.argument("first", metavar="A", type=NAME_OR_PATH)
+@click.argument("second", metavar="B", type=NAME_OR_PATH)
+def compare(first: str, second: str) -> None:
+    """List the scenes of the data set A that B holds too, whatever their colors.
+
+    Scenes are equal when turning, mirroring and shifting makes one the other, and nearly equal
+    when colors alone differ then.
+    """
+    equal: dict[bytes, str] = {}
+    nearly: dict[bytes, str] = {}
+    for task in read_data_set(second).tasks:
+        equal.setdefault(fingerprint(task.scene.blocks), task.key)
+        nearly.setdefault(colorless(task.scene.blocks), task.key)
+    tasks = read_data_set(first).tasks
+    rows = []
+    for task in tasks:
+        if twin := equal.get(fingerprint(task.scene.blocks)):
+            rows.append((task.key, twin, "equal"))
+        elif twin := nearly.get(colorless(task.scene.blocks)):
+            rows.append((task.key, twin, "equal but for colors"))
+    if rows:
+        print_rows(make_console(), ("scene of A", "scene of B", ""), rows, numbers=0)
+    same = sum(how == "equal" for *_, how in rows)
+    click.echo(
+        f"of {counted(len(tasks), 'scene')}: {same} equal, {len(rows) - same} equal but for colors"
+    )
 
 
 @scenes.command("complete")

@@ -6,24 +6,37 @@ requests of the scenes it is made from. So any process can draw any scene, in an
 
 from __future__ import annotations
 
+import functools
+import itertools
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
+from phyblock.data import AssemblyTask, read_builtin
 from phyblock.domain.aov import CycleError
 from phyblock.domain.blocks import COLORS
 from phyblock.domain.scene import Block, Kind, Scene
 from phyblock.domain.symmetry import SYMMETRIES, fingerprint
 from phyblock.errors import DataError, Problem
 from phyblock.making.checks import LEVEL_LIMITS, is_acceptable
+from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.designs import BUILDINGS, COMPOSITIONS, CREATURES, beside
-from phyblock.making.scenes.sketch import PALETTES, Draft, Palette, Theme, make_scene, transformed
+from phyblock.making.scenes.sketch import (
+    PALETTES,
+    Draft,
+    Palette,
+    Theme,
+    colorless,
+    make_scene,
+    transformed,
+)
 from phyblock.making.workers import Workers
+from phyblock.resources import bundled
 from phyblock.sim.contact import find_gaps
 from phyblock.stable import drawn_bytes
 
@@ -187,31 +200,62 @@ def shares(count: int, levels: Sequence[int] = (1, 2, 3, 4)) -> tuple[Share, ...
     return tuple(Share(group, given[group, 0], given[group, 1]) for group in groups)
 
 
-def produce(
-    seed: int, palette: Palette, wanted: Sequence[Share], workers: Workers
-) -> Iterator[Scene]:
-    """Yield accepted scenes: first all base scenes, group by group, then the variations.
+@functools.cache
+def builtin_forms() -> frozenset[bytes]:
+    """Colorless forms of the built-in set, which no generated scene may have."""
+    tasks = read_builtin(bundled("benchmarks", "data", "phyblock-400")).tasks
+    return frozenset(colorless(task.scene.blocks) for task in tasks)
+
+
+class Drawn(NamedTuple):
+    """A scene that was drawn, with what it is recognized by, with and without its colors."""
+
+    request: Request
+    scene: Scene
+    form: bytes
+    colorless: bytes
+
+
+def _drawn(request: Request) -> Drawn | None:
+    scene = draw(request)
+    if scene is None:
+        return None
+    return Drawn(request, scene, fingerprint(scene.blocks), colorless(scene.blocks))
+
+
+class Production:
+    """Scenes of a seed; it remembers 16 bytes a candidate, and a request a base scene.
 
     The same arguments give the same scenes with any workers: a candidate depends on its number
-    alone, and of two that are alike the lower number is kept. Raises DataError when the rules
-    give no more different scenes.
+    alone, and of two that are alike the lower number is kept. What has a form of `excluded` in
+    any colors is `rejected`, and counted.
     """
-    maker = _Maker(seed, palette, workers, max(3, len(str(sum(s.base + s.varied for s in wanted)))))
-    for share in wanted:
-        yield from maker.bases(share.group, share.base)
-    for share in wanted:
-        yield from maker.variations(share.group, share.varied)
 
-
-class _Maker:
-    """Remembers what was taken: 16 bytes a candidate, and a request a base scene."""
-
-    def __init__(self, seed: int, palette: Palette, workers: Workers, width: int) -> None:
-        self._seed, self._palette, self._workers, self._width = seed, palette, workers, width
+    def __init__(
+        self,
+        seed: int,
+        palette: Palette,
+        workers: Workers,
+        excluded: Set[bytes] = frozenset(),
+    ) -> None:
+        self._seed, self._palette, self._workers = seed, palette, workers
+        self._excluded, self.rejected = excluded, 0
         self._seen: set[bytes] = set()
         self._bases: dict[Group, list[tuple[str, Request]]] = {g: [] for g in GROUP_LEVELS}
         self._next: Counter[Group] = Counter()
         self._named: Counter[int] = Counter()
+        self._width = 3
+
+    def scenes(self, wanted: Sequence[Share]) -> Iterator[Scene]:
+        """Yield accepted scenes: first all base scenes, group by group, then the variations.
+
+        Raises DataError when the rules give no more different scenes.
+        """
+        self._width = max(3, len(str(sum(share.base + share.varied for share in wanted))))
+        for share in wanted:
+            yield from self.bases(share.group, share.base)
+        for share in wanted:
+            yield from self.variations(share.group, share.varied)
 
     def bases(self, group: Group, wanted: int) -> Iterator[Scene]:
         """Scenes that the grammar draws."""
@@ -267,10 +311,12 @@ class _Maker:
 
     def _sound(self, requests: list[Request]) -> Iterator[tuple[Request, Scene]]:
         fresh: list[tuple[Request, Scene]] = []
-        for made, scene in zip(requests, self._workers.map(draw, requests), strict=True):
-            if scene is not None and (form := fingerprint(scene.blocks)) not in self._seen:
-                self._seen.add(form)
-                fresh.append((made, scene))
+        for one in filter(None, self._workers.map(_drawn, requests)):
+            if one.colorless in self._excluded:
+                self.rejected += 1
+            elif one.form not in self._seen:
+                self._seen.add(one.form)
+                fresh.append((one.request, one.scene))
         is_sound = partial(is_acceptable, palette=PALETTES[self._palette])
         sound = self._workers.map(is_sound, [scene for _, scene in fresh])
         return (one for one, is_kept in zip(fresh, sound, strict=True) if is_kept)
@@ -279,3 +325,69 @@ class _Maker:
         level = scene.levels[0]
         self._named[level] += 1
         return f"l{level}-{self._named[level]:0{self._width}d}-{scene.id}"
+
+
+Split = Literal["train", "dev"]
+"""Scenes without end that share no form with one another's or with the built-in test set."""
+_DEV_BELOW = 26
+"""Forms whose first byte is below this are of `dev`: a tenth of all."""
+_LONGEST_SEARCH = 2000
+
+
+def split_tasks(
+    split: Split,
+    seed: int = 0,
+    *,
+    levels: Sequence[int] = (1, 2, 3, 4),
+    palette: Palette = "kit",
+    excluded: Set[bytes] = frozenset(),
+    first: int = 0,
+    step: int = 1,
+) -> Iterator[AssemblyTask]:
+    """Yield scenes with their candidates, without end, in the proportions of the built-in set.
+
+    Each depends on its number alone; `first` and `step` take every so many-th. Scenes are named
+    after what they are, so that one which comes again has the same name. Raises DataError where
+    the rules give no scene that is not `excluded`.
+    """
+    barred = builtin_forms() | excluded
+    for number in itertools.count(first, step):
+        scene = _streamed(split, f"{split}/{seed}/{number}", tuple(levels), palette, barred)
+        yield AssemblyTask(scene, make_candidates(scene, palette=PALETTES[palette]))
+
+
+def _streamed(
+    split: Split, salt: str, levels: tuple[int, ...], palette: Palette, barred: Set[bytes]
+) -> Scene:
+    rng = np.random.default_rng(int.from_bytes(drawn_bytes(salt)[:16], "big"))
+    parts = [(share, part) for share in shares(10_000, levels) for part in (0, 1)]
+    weights = np.array([(share.base, share.varied)[part] for share, part in parts])
+
+    def base(group: Group) -> Request:
+        return Request(int(rng.integers(2**62)), palette, group, int(rng.integers(2**31)))
+
+    for _ in range(_LONGEST_SEARCH):
+        share, is_varied = parts[int(rng.choice(len(parts), p=weights / weights.sum()))]
+        made = base(share.group)
+        parents: list[Drawn] = []
+        if is_varied:
+            count, groups = _SOURCES[share.group][int(rng.integers(len(_SOURCES[share.group])))]
+            sources = [base(groups[int(rng.integers(len(groups)))]) for _ in range(count)]
+            parents = [one for one in map(_drawn, sources) if one is not None]
+            if len(parents) < count:
+                continue
+            made = replace(made, parents=tuple(sources))
+        one = _drawn(made)
+        for each in (*parents, *([one] if one else ())):
+            if each.colorless in barred or (each.colorless[0] < _DEV_BELOW) != (split == "dev"):
+                break
+        else:
+            if one is not None and is_acceptable(one.scene, PALETTES[palette]):
+                names = tuple(dict.fromkeys(f"{p.scene.id}-{p.form.hex()[:12]}" for p in parents))
+                name = f"{one.scene.id}-{one.form.hex()[:12]}"
+                return replace(one.scene, id=name, parents=names or (name,))
+    message, hint = (
+        f"none new in {_LONGEST_SEARCH} tries",
+        "ask for other levels, or for palette full",
+    )
+    raise DataError(Problem(f"split {split}", message, hint=hint))

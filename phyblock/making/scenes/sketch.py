@@ -47,6 +47,11 @@ def find_twins(scenes: Iterable[Scene]) -> dict[str, str]:
     return {name: twin for name, twin in earlier.items() if twin != name}
 
 
+def colorless(blocks: Iterable[Block]) -> bytes:
+    """Return the fingerprint that structures share which are equal but for their colors."""
+    return fingerprint([replace(block, color=COLORS[0]) for block in blocks])
+
+
 @functools.cache
 def _turned(block_type: BlockType, euler_deg: Euler, symmetry: Symmetry) -> Euler:
     """Angles of the image of a pose, as `POSES` names them where it does."""
