@@ -1,46 +1,45 @@
-"""phyblock: declarative runner for PhyBlock, 3D block assembly for vision-language models.
+"""phyblock: PhyBlock, 3D block assembly for vision-language models, as tasks, scenes and runs.
 
-`load_suite(name)` reads a suite and its scenes, `render(scene)` draws one, `score(reply, scene)`
-says what a reply is worth, `run_suite(suite)` runs a suite. `load_run(path)` opens a run folder:
-`.records` is a DataFrame, a row a sample, `.estimates` every value with its interval, `.tables`
-maps names to DataFrames, `.summary()` and `.compare(other)` say what came out.
+`tasks(track)` gives what a track asks, and the score of a reply. `generate(n)` makes scenes,
+`verify(scene)` checks one, `render(scene)` draws one. `load_suite(name)` reads a suite and its
+scenes, `run_suite(suite)` runs it. `load_run(path)` opens a run folder: `.records` is a DataFrame,
+a row a sample, `.estimates` every value with its interval, `.tables` maps names to DataFrames,
+`.summary()` and `.compare(other)` say what came out.
 """
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from phyblock.api import (
-        Picture,
-        PlanScore,
-        Run,
-        SceneTask,
-        Suite,
-        load_run,
-        load_suite,
-        render,
-        run_suite,
-        score,
-    )
+    from phyblock.api import Picture, Run, SceneTask, Suite, load_run, load_suite, render, run_suite
     from phyblock.errors import PhyblockError
+    from phyblock.task import Episode, Score, Task, Tasks, Turn, generate, tasks, verify
 
     __version__: str
 
 __all__ = [
+    "Episode",
     "PhyblockError",
     "Picture",
-    "PlanScore",
     "Run",
     "SceneTask",
+    "Score",
     "Suite",
+    "Task",
+    "Tasks",
+    "Turn",
     "__version__",
+    "generate",
     "load_run",
     "load_suite",
     "render",
     "run_suite",
-    "score",
+    "tasks",
+    "verify",
 ]
+_OF_TASK = ("Episode", "Score", "Task", "Tasks", "Turn", "generate", "tasks", "verify")
 
 
 def __getattr__(name: str) -> object:
@@ -49,15 +48,10 @@ def __getattr__(name: str) -> object:
         from importlib.metadata import version
 
         return version("phyblock")
-    if name == "PhyblockError":
-        from phyblock.errors import PhyblockError
-
-        return PhyblockError
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from phyblock import api
-
-    return getattr(api, name)
+    of = "errors" if name == "PhyblockError" else "task" if name in _OF_TASK else "api"
+    return getattr(import_module(f"phyblock.{of}"), name)
 
 
 def __dir__() -> list[str]:

@@ -34,22 +34,19 @@ from phyblock.config.validation import problems_of
 from phyblock.data import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.files import write_named
-from phyblock.parsing.plan import parse_plan
 from phyblock.resources import bundled
 from phyblock.results.load import Run, load_run
 from phyblock.run.estimate import may_bill
 from phyblock.run.events import RunEvent, Stopping
 from phyblock.run.plan import find_models_file, find_suite, make_plan, open_dataset, prompt_dirs
 from phyblock.run.runner import RunResult, Session, check_ready
-from phyblock.scoring.plan import AssemblyScorer, ErrorType
 from phyblock.sim.pictures import PictureStyle, candidates_png, composite_png, goal_png, goal_style
 from phyblock.text import counted, did_you_mean
 from phyblock.tracks.items import select_tasks
-from phyblock.types import Background, Matcher, PlanParser, Setting, View
+from phyblock.types import Background, View
 
 __all__ = [
     "Picture",
-    "PlanScore",
     "Run",
     "SceneTask",
     "Scenes",
@@ -58,7 +55,6 @@ __all__ = [
     "load_suite",
     "render",
     "run_suite",
-    "score",
 ]
 
 _P = ParamSpec("_P")
@@ -67,7 +63,7 @@ _Text = Annotated[str, Field(min_length=1)]
 Place = _Text | Path
 
 
-def _checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
+def checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
     """Raise SpecError for all arguments that are not of the types that the function declares."""
     check: Callable[..., _T] = validate_call(config=ConfigDict(strict=True))(function)
     names = list(inspect.signature(function).parameters)
@@ -108,7 +104,7 @@ class Picture:
         return f"<picture: PNG, {len(self.png):,} bytes>"
 
 
-@_checked
+@checked
 def render(
     scene: InstanceOf[AssemblyTask],
     *,
@@ -195,7 +191,7 @@ class Suite:
         return f"<suite {self.name}: {asked}; models {', '.join(self.models)}>"
 
 
-@_checked
+@checked
 def load_suite(suite: Place, *overrides: str) -> Suite:
     """Read a suite: a YAML file, or the name of a bundled one; `overrides` are `KEY=VALUE` texts,
     as for `--set`.
@@ -207,60 +203,7 @@ def load_suite(suite: Place, *overrides: str) -> Suite:
     return Suite(read_suite(path, overrides, data_dir=data, prompt_dirs=prompts))
 
 
-@dataclass(frozen=True)
-class PlanScore:
-    """A reply, read and scored.
-
-    `plan` holds the candidates in order as they were read by `rule`, which is None where nothing
-    could be read; `problem` says why then. `errors` has the reason of each wrong step, None for a
-    right one. `tp`, `fp` and `fn` count right steps, wrong steps and blocks that are missing;
-    `precision`, `recall` and `f1` are in [0, 1], None where nothing was counted.
-    """
-
-    plan: tuple[int, ...]
-    rule: str | None
-    problem: str | None
-    tp: int
-    fp: int
-    fn: int
-    precision: float | None
-    recall: float | None
-    f1: float | None
-    errors: tuple[ErrorType | None, ...]
-
-
-@_checked
-def score(
-    reply: str,
-    scene: InstanceOf[AssemblyTask],
-    *,
-    setting: Setting = "A",
-    matcher: Matcher = "optimal",
-    parser: PlanParser = "steps",
-) -> PlanScore:
-    """Read a reply to full planning and score its plan against a scene, by the AOV graph.
-
-    Raises SpecError for an unknown setting, matcher or parser, and for arguments of another type.
-    """
-    parsed = parse_plan(reply, len(scene.candidates), parser)
-    scorer = AssemblyScorer(scene.scene, scene.candidates, (setting,))
-    (scored,) = scorer.score(parsed.plan, (matcher,), None)
-    counts = scored.counts
-    return PlanScore(
-        parsed.plan.steps,
-        parsed.rule,
-        parsed.problem,
-        counts.tp,
-        counts.fp,
-        counts.fn,
-        counts.precision,
-        counts.recall,
-        counts.f1,
-        scored.step_errors or (),
-    )
-
-
-@_checked
+@checked
 def run_suite(
     suite: Suite | str | Path,
     *,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import re
 import subprocess
 import sys
@@ -18,8 +17,9 @@ from phyblock.errors import SpecError
 from phyblock.sim.engine import ENGINES
 from tests.workspace import Workspace
 
-NAMES = ["PhyblockError", "Picture", "PlanScore", "Run", "SceneTask", "Suite", "__version__"]
-NAMES += ["load_run", "load_suite", "render", "run_suite", "score"]
+NAMES = ["Episode", "PhyblockError", "Picture", "Run", "SceneTask", "Score", "Suite", "Task"]
+NAMES += ["Tasks", "Turn", "__version__", "generate", "load_run", "load_suite", "render"]
+NAMES += ["run_suite", "tasks", "verify"]
 GUIDE = Path(__file__).parents[1] / "docs" / "python.md"
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -29,7 +29,7 @@ def test_public_names_are_these_and_completion_finds_them() -> None:
     assert all(getattr(phyblock, name).__doc__ for name in phyblock.__all__)
     assert set(phyblock.__all__) <= set(dir(phyblock))
     assert phyblock.__version__ == version("phyblock")
-    for name in ("load_suite", "render", "run_suite", "score", "load_run"):
+    for name in ("load_suite", "render", "run_suite", "load_run", "tasks", "generate", "verify"):
         assert "return" in typing.get_type_hints(getattr(phyblock, name)), name
     with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
         _ = phyblock.nothing
@@ -57,6 +57,7 @@ def test_the_guide_runs_and_every_object_shows_itself(
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"```python\n(.*?)```", GUIDE.read_text("utf-8"), re.DOTALL)
     assert len(blocks) == 5
+    assert blocks[0].count("\n") < 25, "one screen"
     names: dict[str, typing.Any] = {}
     for block in blocks:
         exec(compile(block, str(GUIDE), "exec"), names)
@@ -69,14 +70,6 @@ def test_the_guide_runs_and_every_object_shows_itself(
     assert "quick" in repr(names["suite"])
     assert "random" in run._repr_html_()
     assert set(run.estimates["model"]) == {"random", "goal-blind"}
-    # What a reply is worth here is what it is worth in the run.
-    scenes = names["suite"].scenes
-    for text in (run.path / "records.jsonl").read_text("utf-8").splitlines()[:40]:
-        record = json.loads(text)
-        alone = phyblock.score(record["reply"]["text"], scenes[record["scene"]])
-        kept = [s for s in record["scores"] if (s["criterion"], s["setting"]) == ("aov", "A")]
-        (optimal,) = [one for one in kept if one["matcher"] == "optimal"]
-        assert (alone.tp, alone.fp, alone.fn) == tuple(optimal[name] for name in ("tp", "fp", "fn"))
 
 
 def test_what_is_wrong_is_named() -> None:
@@ -90,8 +83,13 @@ def test_what_is_wrong_is_named() -> None:
         "render: show": lambda: phyblock.render(scene, show="all"),  # type: ignore[arg-type]
         "background is 'sea'": lambda: phyblock.render(scene, background="sea"),  # type: ignore[arg-type]
         "size_px is 5": lambda: phyblock.render(scene, size_px=5),
-        "score: setting": lambda: phyblock.score("", scene, setting="C"),  # type: ignore[arg-type]
-        "score: reply": lambda: phyblock.score(None, scene),  # type: ignore[arg-type]
+        "tasks: track": lambda: phyblock.tasks("full"),
+        "tasks: split: has no questions": lambda: phyblock.tasks("vqa", split="train"),
+        "tasks: split: takes no data": lambda: phyblock.tasks("vqa", split="dev", data="x"),
+        "tasks: limit": lambda: phyblock.tasks("vqa", limit=0),
+        "levels[0]": lambda: phyblock.tasks("full_planning", levels=[7]),
+        "generate: count": lambda: phyblock.generate(0),
+        "verify: scene": lambda: phyblock.verify("x"),  # type: ignore[arg-type]
         "run_suite: limit": lambda: phyblock.run_suite(suite, limit=0),
         "run_suite: models: has the wrong type": lambda: phyblock.run_suite(suite, models="random"),
         "run_suite: models[0]": lambda: phyblock.run_suite(suite, models=[1]),  # type: ignore[list-item]
@@ -99,7 +97,6 @@ def test_what_is_wrong_is_named() -> None:
         "run_suite: out: is too short": lambda: phyblock.run_suite(suite, out=""),
         'found: "x"': lambda: phyblock.run_suite(suite, limit="x"),  # type: ignore[arg-type]
         "found: true": lambda: phyblock.run_suite(suite, limit=True),
-        "score: scene": lambda: phyblock.score("", "l1-001-animal"),  # type: ignore[arg-type]
         "render: scene": lambda: phyblock.render(suite),  # type: ignore[arg-type]
         "render: size_px": lambda: phyblock.render(scene, size_px=128.5),  # type: ignore[arg-type]
         "render: view": lambda: phyblock.render(scene, view=["front"]),  # type: ignore[arg-type]
@@ -108,9 +105,6 @@ def test_what_is_wrong_is_named() -> None:
     for said, call in wrong.items():
         with pytest.raises(SpecError, match=re.escape(said)):
             call()
-    unread = phyblock.score("I cannot.", scene)
-    assert (unread.rule, unread.f1, unread.tp) == (None, 0, 0)
-    assert unread.problem
 
 
 def test_nothing_is_spent_unasked_and_a_loop_may_run(

@@ -35,7 +35,7 @@ from phyblock.records.record import (
 from phyblock.resources import bundled
 from phyblock.stable import plain_sum
 from phyblock.tracks import Item, Judgement, Track
-from phyblock.tracks.base import count_sample
+from phyblock.tracks.base import Episode, count_sample
 from phyblock.tracks.prompts import TemplatePrompt
 from phyblock.types import Outcome
 
@@ -99,6 +99,17 @@ def judged(fields: Mapping[str, Any], item: Item, judgement: Judgement) -> Recor
     if counts := count_sample(item, record):
         record = record.model_copy(update={"counts": {**record.counts, **counts}})
     return record
+
+
+def judge_episode(
+    episode: Episode, item: Item, fields: Mapping[str, Any], replies: Sequence[Reply]
+) -> Record:
+    """Return the record of an episode as far as it has come with these replies."""
+    judgement = episode.judgement()
+    if replies:
+        first = judgement.fields["turns"][0]["prompt"]
+        fields = {**fields, "reply": pooled(replies).storable(), "prompt": first}
+    return judged(fields, item, judgement)
 
 
 async def judge_reply(

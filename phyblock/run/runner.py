@@ -51,7 +51,7 @@ from phyblock.run.events import (
     Summary,
     Watcher,
 )
-from phyblock.run.judge import Extractor, about_prompt, begun, judge_reply, judged, pooled
+from phyblock.run.judge import Extractor, about_prompt, begun, judge_episode, judge_reply
 from phyblock.run.plan import RunPlan, Sample, provider_problem
 from phyblock.run.store import RunStore
 
@@ -364,11 +364,7 @@ class Session:
                 break
             replies.append(answer.storable())
             episode.take(request, replies[-1], fields["prompt"])
-        judgement = episode.judgement()
-        if replies:
-            first = judgement.fields["turns"][0]["prompt"]
-            fields |= {"reply": pooled(replies).storable(), "prompt": first}
-        return judged(fields, item, judgement)
+        return judge_episode(episode, item, fields, replies)
 
     async def _answer(self, model: Model, request: Request) -> Reply | ModelError | None:
         """Return the reply, or the error that is this sample's alone."""

@@ -219,7 +219,8 @@ class TrackReport:
     columns that models are ranked by, where it is empty the first measure in every cell. `notes`
     say how its values are counted: Jinja templates that are given the `suite`, the `spec` (the
     track's section of it) and the `manifest`; those that come out empty are left out. `floors`
-    names baselines that never see the goal, `short` the column of `Run.summary`.
+    names baselines that never see the goal, `short` the column of `Run.summary`, `success` the
+    measure that is 1 where a sample is wholly right.
 
     `part_names` say what `Record.part` stands for. `items` opens, for the page of a run in a
     folder, what was asked about where that is more than scenes, and gives of a record what has a
@@ -235,6 +236,7 @@ class TrackReport:
     notes: Sequence[str] = ()
     floors: Sequence[str] = ()
     short: str = ""
+    success: str = ""
     part_names: Mapping[str, str] = field(default_factory=dict)
     items: Callable[[Path, Manifest, Dataset], Callable[[Record], Any | None]] | None = None
     film: Callable[[Any, AssemblyTask | None], Iterator[FilmStep]] | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -79,6 +80,7 @@ class Workshop:
         self._alone = asyncio.Lock()
         self._making: dict[str, asyncio.Task[bytes]] = {}
         self._recent: dict[tuple[str, str], Image] = {}
+        self._recent_lock = threading.Lock()
 
     async def work_out(self, work: Callable[[], _Result]) -> _Result:
         """Return what `work`, a `partial` of a function of a module, gives in a worker process.
@@ -145,25 +147,56 @@ class Workshop:
 
     def _remembered(self, drawing: Drawing, data: bytes) -> Image:
         image = Image(data, drawing.label, *picture_size(data, f"picture {drawing.label}"))
-        self._recent[drawing.key, drawing.label] = image
-        if len(self._recent) > _KEPT:
-            del self._recent[next(iter(self._recent))]
+        with self._recent_lock:
+            self._recent[drawing.key, drawing.label] = image
+            if len(self._recent) > _KEPT:
+                del self._recent[next(iter(self._recent))]
         return image
 
     async def _draw(self, drawing: Drawing) -> bytes:
-        path = self._path(drawing.key)
         try:
             data = await self.work_out(drawing.make)
-            self.rendered += 1
-            with writing(path, "name another cache folder with PHYBLOCK_CACHE"):
-                path.parent.mkdir(parents=True, exist_ok=True)
-                atomic_write(path, data)
+            self._keep(drawing, data)
         finally:
             del self._making[drawing.key]
         return data
 
+    def _keep(self, drawing: Drawing, data: bytes) -> None:
+        self.rendered += 1
+        path = self._path(drawing.key)
+        with writing(path, "name another cache folder with PHYBLOCK_CACHE"):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            atomic_write(path, data)
+
     def _path(self, key: str) -> Path:
         return self._folder / key[:2] / f"{key}.png"
+
+
+class LocalShop(Workshop):
+    """Draws and works in the process and thread that asks; what it returns never waits.
+
+    So a coroutine of a track can be run to its end without an event loop, in any thread.
+    """
+
+    def __init__(self, folder: Path | None = None) -> None:
+        super().__init__(1, folder)
+        self._engine_lock = threading.Lock()
+
+    async def work_out(self, work: Callable[[], _Result]) -> _Result:
+        """Return what `work` gives; one at a time, as a physics engine wants it."""
+        with self._engine_lock:
+            return work()
+
+    async def images(self, drawings: Sequence[Drawing]) -> tuple[Image, ...]:
+        """Return pictures from memory, from the cache, or drawn now; raises as a `Workshop`."""
+        return tuple(map(self._drawn, drawings))
+
+    def _drawn(self, drawing: Drawing) -> Image:
+        if (kept := self._kept(drawing)) is not None:
+            return kept
+        data = drawing.make()
+        self._keep(drawing, data)
+        return self._remembered(drawing, data)
 
 
 def picture_style(images: ImagesSpec) -> PictureStyle:

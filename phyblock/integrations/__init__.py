@@ -1,0 +1,1 @@
+"""Adapters to other frameworks, one module each; none is imported by the rest."""

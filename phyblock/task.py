@@ -1,0 +1,436 @@
+"""Tasks: what a track asks of a model, and what a reply is worth, as Python objects.
+
+A task asks and judges through the functions that runs use, so its scores are those of a run to the
+last bit. Pictures are drawn in the calling process and kept in the cache on disk. Tasks may be used
+from several threads; each process opens its own.
+"""
+
+from __future__ import annotations
+
+import io
+import itertools
+import json
+import math
+from collections import Counter
+from collections.abc import Callable, Coroutine, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar
+
+import numpy as np
+from PIL import Image
+from pydantic import Field, InstanceOf, SkipValidation
+
+from phyblock.api import Scenes, SceneTask, checked, load_suite
+from phyblock.config.suite import Suite
+from phyblock.data import SCENES_FILE, AssemblyTask, Dataset, find_data_set
+from phyblock.errors import Problem, SpecError
+from phyblock.making.checks import Finding, verify_scene
+from phyblock.making.scenes.candidates import make_candidates
+from phyblock.making.scenes.production import Production, builtin_forms, shares, split_tasks
+from phyblock.making.scenes.sketch import PALETTES, Palette
+from phyblock.making.workers import open_workers
+from phyblock.models.request import Image as SentPicture
+from phyblock.models.request import Request, wire_messages
+from phyblock.records.record import Record, Reply
+from phyblock.registry import added_measures, known_track, known_tracks
+from phyblock.run.judge import begun, judge_episode, judge_reply
+from phyblock.run.plan import open_dataset
+from phyblock.text import did_you_mean, well_formed
+from phyblock.tracks import Item, Track, open_tracks
+from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts
+from phyblock.tracks.pictures import LocalShop
+
+Split = Literal["test", "train", "dev"]
+_SUITES = {"step_planning": "steps", "vqa": "vqa", "pose_planning": "pose"}
+"""Bundled suites that say how a track asks; others ask as `full` does."""
+_LEVELS = (1, 2, 3, 4)
+_T = TypeVar("_T")
+
+
+def _result(work: Coroutine[Any, Any, _T]) -> _T:
+    """Return the result of a coroutine that never waits, as those of tracks with a local shop."""
+    try:
+        work.send(None)
+    except StopIteration as end:
+        result: _T = end.value
+        return result
+    work.close()
+    raise RuntimeError("the coroutine waits for an event loop")
+
+
+@dataclass(frozen=True)
+class Score:
+    """The worth of a reply: its record as a run would keep it, read by one setting and matcher."""
+
+    record: Record
+    setting: str
+    matcher: str
+
+    @property
+    def measure(self) -> str:
+        """The name of the track's headline measure."""
+        return [*_headline(self.record.track).headings][-1]
+
+    @property
+    def value(self) -> float:
+        """The headline measure, in [0, 1]: F1 of a plan, in setting C of one with poses, of all
+        attempts of an episode; 1 or 0 for an answer. 0 where it is not defined.
+        """
+        return self._value(self.measure) or 0.0
+
+    @property
+    def f1(self) -> float | None:
+        """The headline F1; None where that is no F1."""
+        return self.value if self.measure.startswith("f1") else None
+
+    @property
+    def success(self) -> bool:
+        """True if all is right."""
+        name = known_track(self.record.track).report().success or self.measure
+        return self._value(name) == 1.0
+
+    @property
+    def outcome(self) -> str:
+        """The outcome of the reply, as in records."""
+        return self.record.outcome
+
+    @property
+    def problem(self) -> str | None:
+        """The reason why nothing could be read or carried out."""
+        if self.record.error is not None:
+            return self.record.error.message
+        missing = "there is no reply" if self.outcome == "missing" else None
+        return missing or getattr(self.record.parse, "problem", None)
+
+    @property
+    def counts(self) -> dict[str, float]:
+        """The counts that `value` is made of, by name."""
+        counted = self._measures[self.measure].counted
+        return dict(zip(counted.columns, self._numbers(counted) or (), strict=False))
+
+    @property
+    def errors(self) -> dict[str, int]:
+        """The wrong steps by type of error."""
+        course = self.record.course(self.matcher)
+        return dict(Counter(why for _, why in course.steps if why is not None)) if course else {}
+
+    @property
+    def measures(self) -> dict[str, float]:
+        """All measures of the track that have a value, by name."""
+        values = {name: self._value(name) for name in self._measures}
+        return {name: value for name, value in values.items() if value is not None}
+
+    def as_json(self) -> dict[str, Any]:
+        """Return its numbers and words, for the logs of other tools."""
+        names = ("value", "measure", "success", "outcome", "problem", "counts", "errors")
+        return {name: getattr(self, name) for name in names}
+
+    @property
+    def _measures(self) -> dict[str, Measure]:
+        report = known_track(self.record.track).report()
+        return {one.name: one for one in (*report.measures, *added_measures(self.record.track))}
+
+    def _value(self, name: str) -> float | None:
+        measure = self._measures[name]
+        if (numbers := self._numbers(measure.counted)) is None:
+            return None
+        value = float(measure.value(np.asarray(numbers, dtype=np.float64)))
+        return None if math.isnan(value) else value
+
+    def _numbers(self, counted: SampleCounts) -> Sequence[float] | None:
+        if counted.sample is not None:
+            return self.record.counts.get(counted.name) or None
+        criterion = _headline(self.record.track).criterion or "aov"
+        ways = [("", "", ""), *((self.setting, by, criterion) for by in (self.matcher, ""))]
+        return next((numbers for way, numbers in counted.of(self.record) if way in ways), None)
+
+
+def _headline(track: str) -> LayoutColumn:
+    """Return the column that models are ranked by."""
+    headline = known_track(track).report().headline
+    return next((column for column in headline if column.main), headline[-1])
+
+
+@dataclass(frozen=True, repr=False)
+class Task:
+    """One item of a track, as a seed shows it."""
+
+    track: Track
+    item: Item
+    seed: int = 0
+
+    @property
+    def key(self) -> str:
+        """Its name in the track: the scene, or the question."""
+        return self.item.key
+
+    @property
+    def id(self) -> str:
+        """Its name among the tasks of all tracks."""
+        return f"{self.track.name}/{self.key}"
+
+    @property
+    def level(self) -> int:
+        """The lowest level that its scene counts in."""
+        return self.item.scene.level
+
+    @property
+    def base_scene(self) -> str:
+        """The first scene that its scene was made from, by which errors cluster."""
+        return (self.item.scene.parents or (self.item.scene.id,))[0]
+
+    @property
+    def plays(self) -> bool:
+        """True if it is an episode of several turns."""
+        return self.track.plays
+
+    def request(self) -> Request:
+        """Return the request as a run makes it; of an episode its first."""
+        if self.plays:
+            request: Request = _result(self._start(shows=True).request())
+            return request
+        return _result(self.track.request(self.item, self.seed, {}, with_messages=True))
+
+    def messages(self) -> list[dict[str, Any]]:
+        """Return the messages in OpenAI's form, with pictures as data URLs."""
+        return wire_messages(self.request().messages, None)
+
+    @property
+    def pictures(self) -> dict[str, Image.Image]:
+        """The pictures by their labels, in the order sent."""
+        return pictures_of(self.request())
+
+    @property
+    def answer_schema(self) -> Mapping[str, Any] | None:
+        """The JSON schema of an answer; None where it is asked for as text."""
+        form = self.track.form(self.item)
+        return None if form is None else form.schema
+
+    def score(self, reply: str | Sequence[str] | None) -> Score:
+        """Return the score of a reply, of an episode's replies in order, or of none."""
+        if self.plays:
+            episode = Episode(self, shows=False)
+            for one in [reply] if isinstance(reply, str) else reply or ():
+                if episode.step(one).done:
+                    break
+            return episode.score()
+        assert reply is None or isinstance(reply, str), "one reply"
+        record = _result(judge_reply(self.track, self.item, self._begun(reply)))
+        return self._scored(record)
+
+    def episode(self) -> Episode:
+        """Return a new episode; SpecError where the track asks once."""
+        return Episode(self)
+
+    def _begun(self, reply: str | None) -> dict[str, Any]:
+        answer = None if reply is None else Reply(text=well_formed(reply))
+        sample = f"{self.track.name}/reply/{self.key}/s{self.seed}"
+        fields = begun(sample, self.track.name, "reply", self.item, self.seed, answer)
+        return {**fields, **self.track.about(self.item)}
+
+    def _scored(self, record: Record) -> Score:
+        suite = self.track.suite
+        return Score(record, suite.settings[0], suite.scoring.matchers[0])
+
+    def _start(self, *, shows: bool) -> Any:
+        return self.track.start(self.item, self.seed, {}, with_messages=shows)
+
+    def __repr__(self) -> str:
+        return f"<task {self.id}: level {self.level}>"
+
+
+def pictures_of(request: Request) -> dict[str, Image.Image]:
+    """Return the pictures of a request by their labels, in the order sent."""
+    parts = (part for message in request.messages for part in message.parts)
+    return {
+        part.label: Image.open(io.BytesIO(part.data))
+        for part in parts
+        if isinstance(part, SentPicture)
+    }
+
+
+class Turn(NamedTuple):
+    """A step of an episode: the next messages, what it added to the score, and how it went."""
+
+    messages: list[dict[str, Any]]
+    reward: float
+    done: bool
+    outcome: str
+
+
+class Episode:
+    """A task of several turns, played by replies. One thread plays it.
+
+    Rewards are differences of `Score.value`, so that they sum to that of the whole episode.
+    """
+
+    def __init__(self, task: Task, *, shows: bool = True) -> None:
+        """Begin; without `shows`, no pictures are drawn and messages are empty.
+
+        Raises SpecError for a task that is asked once.
+        """
+        if not task.plays:
+            raise SpecError(Problem(task.id, "is asked once and has no episode"))
+        self.task, self._shows = task, shows
+        self.reset()
+
+    def reset(self) -> list[dict[str, Any]]:
+        """Begin anew; return the first messages."""
+        self._episode = self.task._start(shows=self._shows)
+        self._replies: list[Reply] = []
+        self._value = 0.0
+        self._request: Request | None = _result(self._episode.request())
+        return self.messages
+
+    @property
+    def messages(self) -> list[dict[str, Any]]:
+        """The messages of the turn that waits for a reply; none at the end."""
+        return [] if self._request is None else wire_messages(self._request.messages, None)
+
+    @property
+    def done(self) -> bool:
+        """True if it has ended."""
+        return self._request is None
+
+    def step(self, reply: str) -> Turn:
+        """Take a step with a reply; SpecError where the episode has ended."""
+        if self._request is None:
+            raise SpecError(Problem(self.task.id, "has ended", hint="call reset() before step()"))
+        self._replies.append(Reply(text=well_formed(reply)).storable())
+        self._episode.take(self._request, self._replies[-1])
+        self._request = _result(self._episode.request())
+        score, before = self.score(), self._value
+        self._value = score.value
+        outcomes = getattr(score.record, "outcomes", None) or (score.outcome,)
+        return Turn(self.messages, self._value - before, self.done, str(outcomes[-1]))
+
+    def score(self) -> Score:
+        """Return the score as far as it has come."""
+        fields = self.task._begun(None)
+        record = judge_episode(self._episode, self.task.item, fields, self._replies)
+        return self.task._scored(record)
+
+
+@dataclass(frozen=True, repr=False)
+class Tasks:
+    """The tasks of a track in one split: a finite set, by place or key, or a stream without end.
+
+    A stream begins anew with each iteration; each of its tasks has a track of its own, so that
+    nothing is kept of those that are done.
+    """
+
+    suite: Suite
+    name: str
+    source: Callable[[], Iterator[AssemblyTask]] | None
+    found: Mapping[str, Task]
+
+    @property
+    def is_endless(self) -> bool:
+        """True if it is a stream."""
+        return self.source is not None
+
+    def __iter__(self) -> Iterator[Task]:
+        if self.source is None:
+            yield from self.found.values()
+            return
+        shop = LocalShop()
+        for scene in self.source():
+            yield from _opened(self.suite, Dataset(self.name, Path(self.name), (scene,)), shop)
+
+    def __len__(self) -> int:
+        if self.is_endless:
+            raise TypeError(f"{self!r} has no length: give a limit")
+        return len(self.found)
+
+    def __getitem__(self, key: int | str) -> Task:
+        """Return a task by its place or its key; SpecError for a key that is not there."""
+        if isinstance(key, int):
+            return list(self.found.values())[key]
+        if key not in self.found:
+            hint = did_you_mean(key, list(self.found))
+            raise SpecError(Problem(repr(self), "has no such task", "", key, hint=hint))
+        return self.found[key]
+
+    def __repr__(self) -> str:
+        size = "endless" if self.is_endless else len(self.found)
+        return f"<tasks of {self.suite.tracks[0]}, {self.name}: {size}>"
+
+
+def _opened(
+    suite: Suite, dataset: Dataset, shop: LocalShop, limit: int | None = None
+) -> Iterator[Task]:
+    (track,) = open_tracks(suite, dataset, limit, shop)
+    seed = suite.seeds[0]
+    return (Task(track, track.shown(item, seed), seed) for item in track.items)
+
+
+@checked
+def tasks(
+    track: str,
+    *overrides: str,
+    split: Split = "test",
+    levels: Sequence[Annotated[int, Field(ge=1)]] | None = None,
+    seed: Annotated[int, Field(ge=0)] = 0,
+    data: SkipValidation[str | Path | Dataset | Iterable[AssemblyTask] | None] = None,
+    limit: Annotated[int, Field(ge=1)] | None = None,
+) -> Tasks:
+    """Return the tasks of a track: `full_planning`, `step_planning`, `pose_planning` or `vqa`.
+
+    The split `test` is the built-in set, or `data`: a data set's name or folder, or scenes. `train`
+    and `dev` are made from the seed and share no structure with the test set or with one another;
+    they have no end, unless a `limit` makes them a finite set at once. `overrides` are `KEY=VALUE`
+    texts for the track's bundled suite, as for `--set`. `limit` keeps so many, spread over levels
+    or subtasks. Raises SpecError, DataError or PromptError with what is wrong.
+    """
+    if track not in known_tracks():
+        allowed, hint = ", ".join(known_tracks()), did_you_mean(track, known_tracks())
+        raise SpecError(Problem("tasks", "is no track", "track", track, allowed, hint))
+    if split != "test" and (data is not None or track == "vqa"):
+        message = "takes no data" if data is not None else "has no questions"
+        hint = "make questions with phyblock questions generate, and give vqa.path=FOLDER"
+        raise SpecError(Problem("tasks", message, "split", split, hint="" if data else hint))
+    said = [f"tracks=[{track}]", f"seeds=[{seed}]"]
+    said += [] if levels is None else [f"levels={list(levels)}"]
+    if isinstance(data, str | Path):
+        folder = find_data_set(str(data)).absolute()
+        form = "builtin" if (folder / SCENES_FILE).is_file() else "official"
+        said += [f"dataset.format={form}", f"dataset.path={json.dumps(str(folder))}"]
+    suite = load_suite(_SUITES.get(track, "full"), *said, *overrides).loaded
+    limit = suite.limit if limit is None else limit
+    dataset = data if isinstance(data, Dataset) else None
+    if split != "test":
+        stream = partial(split_tasks, split, seed, levels=suite.levels)
+        if limit is None:
+            return Tasks(suite, split, stream, {})
+        dataset = Dataset(split, Path(split), tuple(itertools.islice(stream(), limit)))
+    elif data is not None and not isinstance(data, str | Path | Dataset):
+        dataset = Dataset("data", Path("data"), tuple(data))
+    dataset = dataset or open_dataset(suite.dataset.format, suite.files.dataset)
+    found = _opened(suite, dataset, LocalShop(), limit)
+    return Tasks(suite, dataset.name, None, {task.key: task for task in found})
+
+
+@checked
+def generate(
+    count: Annotated[int, Field(ge=1)],
+    *,
+    levels: Sequence[Annotated[int, Field(ge=1, le=4)]] = _LEVELS,
+    seed: Annotated[int, Field(ge=0)] = 0,
+    palette: Palette = "kit",
+) -> Scenes:
+    """Make scenes with their candidates, those of `phyblock scenes generate`; each stands, and none
+    has the structure of a built-in one. DataError where the rules give no more.
+    """
+    kinds = PALETTES[palette]
+    with open_workers() as workers:
+        made = Production(seed, palette, workers, builtin_forms()).scenes(shares(count, levels))
+        found = [SceneTask(scene, make_candidates(scene, palette=kinds)) for scene in made]
+    return Scenes({one.key: one for one in found})
+
+
+@checked
+def verify(scene: InstanceOf[AssemblyTask]) -> tuple[Finding, ...]:
+    """Return all that is wrong with a scene and its candidates, by geometry and physics."""
+    return verify_scene((scene.scene, scene.candidates))
