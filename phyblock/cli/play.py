@@ -20,15 +20,13 @@ from phyblock.cli.options import (
     sets_option,
 )
 from phyblock.cli.results import show_tables
-from phyblock.errors import Problem, SpecError, reason_of
-from phyblock.files import OutFolder, read_text
+from phyblock.files import OutFolder
 from phyblock.run.plan import bundled_suites
 from phyblock.run.store import held_run
+from phyblock.web.ending import Ending
 from phyblock.web.report import files_of, report_files
-from phyblock.web.server import Server, default_consent
-from phyblock.web.session import Person, PlaySession, outcomes, plan_session
-
-_LARGEST_CONSENT_BYTES = 64 * 1024
+from phyblock.web.server import Server
+from phyblock.web.session import Person, PlaySession, plan_session
 
 
 @click.command(epilog=f"Bundled suites: {', '.join(bundled_suites())}.")
@@ -39,22 +37,14 @@ _LARGEST_CONSENT_BYTES = 64 * 1024
     metavar="NAME",
     help="Who answers, as human:NAME in all tables: letters, digits, - and _; better no real name.",
 )
-@click.option(
-    "--number",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="Number of the person in a study, from 1: balances the order of scenes over people. "
-    "[default: an order by the name]",
-)
 @sets_option
 @limit_option
-@click.option("--consent", type=UserPath(), metavar="FILE", help="Text that is agreed to first.")
 @click.option(
     "--beside",
     type=UserPath(),
     multiple=True,
     metavar="RUN",
-    help="Show what the models of this run folder did, after the end.",
+    help="Show after the end how the models of this run folder did.",
 )
 @run_out_option
 @click.option("--port", type=click.IntRange(0, 65535), default=0, show_default="any free one")
@@ -63,10 +53,8 @@ _LARGEST_CONSENT_BYTES = 64 * 1024
 def play(
     suite: str,
     name: str,
-    number: int | None,
     sets: tuple[str, ...],
     limit: int | None,
-    consent: Path | None,
     beside: tuple[Path, ...],
     out: Path | None,
     port: int,
@@ -80,8 +68,7 @@ def play(
     """
     from phyblock.api import load_run, load_suite
 
-    text = default_consent() if consent is None else _consent(consent)
-    person = Person(name, number, text, exact)
+    person = Person(name, exact)
     plan = plan_session(load_suite(Path(suite), *sets).loaded, person, limit)
     folder = out or plan.folder_in(Path("results"))
     if held_run(folder, plan.manifest) is not None:
@@ -101,25 +88,14 @@ def play(
     with Server(session, port) as server:
         result = asyncio.run(session.run(plan, person, folder, begun))
         if result.left:
-            console.print(f"{result.settled:,} of {result.samples:,} tasks are answered.")
+            console.print(f"{session.done:,} of {plan.samples_per_model:,} tasks are answered.")
             print_again(console)
             return INTERRUPTED
         made = show_tables(folder, page=True)
         server.show_files(report_files(folder))
-        session.finish(outcomes(folder, person.model, beside))
+        session.finish(Ending(folder, person.model, beside, plan.dataset.tasks))
         print_path(console, made)
         console.print("All is answered; the page shows how it went. Ctrl-C ends.", style="dim")
         with contextlib.suppress(KeyboardInterrupt):
             server.finished.wait()
     return 0
-
-
-def _consent(path: Path) -> str:
-    try:
-        text = read_text(path, _LARGEST_CONSENT_BYTES).strip()
-    except (OSError, ValueError) as error:
-        message = f"cannot be read: {reason_of(error)}"
-        raise SpecError(Problem(str(path), message, "--consent")) from error
-    if not text:
-        raise SpecError(Problem(str(path), "is empty", "--consent"))
-    return text

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from operator import attrgetter
@@ -65,8 +65,7 @@ class RunPlan:
     """Everything a run needs.
 
     `manifest` is what `run.yaml` holds; `tracks` are those of the reference, `variants` all
-    conditions with the tracks of each; `arranged` gives the order in which the items of a track are
-    asked about; `extractor` is asked about replies that cannot be read.
+    conditions with the tracks of each; `extractor` is asked about replies that cannot be read.
     """
 
     suite: Suite
@@ -74,7 +73,6 @@ class RunPlan:
     dataset: Dataset
     variants: Mapping[Variant, tuple[Track, ...]]
     manifest: Manifest
-    arranged: Callable[[Sequence[Item]], Sequence[Item]] = interleaved
     extractor: ModelConfig | None = None
 
     @property
@@ -98,12 +96,12 @@ class RunPlan:
 
     def samples(self, model: str) -> Iterator[Sample]:
         """Yield all samples of a model: seed by seed, in each the conditions, in each of these the
-        tracks in the suite's order, of each its items as they are arranged.
+        tracks in the suite's order, of each its items interleaved over levels and scenes.
         """
         for seed in self.suite.seeds:
             for variant, tracks in self.variants.items():
                 for track in tracks:
-                    for item in self.arranged(track.items):
+                    for item in interleaved(track.items):
                         yield Sample(track, model, item, seed, variant)
 
     def close(self) -> None:
@@ -129,7 +127,7 @@ def make_plan(
     wrong.
     """
     dataset = open_dataset(suite.dataset.format, suite.files.dataset)
-    models = tuple(people) or _planned_models(suite, known, only)
+    models = _planned_models(suite, known, only, people)
     if suite.models != RECORDED:
         # A group stands for its members: the run is the same as one that names them.
         suite = suite.model_copy(update={"models": with_members(suite.models, known)})
@@ -223,16 +221,21 @@ def open_dataset(format_name: str, path: Path) -> Dataset:
 
 
 def _planned_models(
-    suite: Suite, known: Mapping[str, ModelConfig], only: Sequence[str]
+    suite: Suite,
+    known: Mapping[str, ModelConfig],
+    only: Sequence[str],
+    people: Sequence[ModelConfig],
 ) -> tuple[ModelConfig, ...]:
-    """Return the suite's models in its order, or those that `only` names, in its order, and where
-    any is asked or recorded, the suite's `baselines` that all its tracks know: what rules reach
+    """Return the suite's models in its order, or those that `only` names, in its order, or people,
+    and where any is no rule, the suite's `baselines` that all its tracks know: what rules reach
     that never see the goal is what a score has to be held against.
 
     `only` may name any known model or group, in the suite or not; of recordings, any that is there.
     Raises SpecError for a name that is not known, DataError where no recordings are found.
     """
-    if suite.models == RECORDED:
+    if people:
+        found = {one.name: one for one in people}
+    elif suite.models == RECORDED:
         folders = recorded_models(suite.files.dataset)
         message, allowed = "is not among the recordings", ", ".join(folders)
         if unknown := [name for name in only if name not in folders]:
@@ -243,7 +246,7 @@ def _planned_models(
         found = resolve_models(only, known, lambda _: "--models")
     else:
         found = resolve_models(suite.models, known, lambda at: suite.where("models", at))
-    asks = any(model.kind in ("litellm", "replay") for model in found.values())
+    asks = any(model.kind != "baseline" for model in found.values())
     if asks and "full_planning" in suite.tracks:
         able = [kind_of(name).baselines for name in suite.tracks]
         more = [

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import io
 import os
 import re
-import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from PIL import Image, ImageDraw, ImageFont
 from pydantic import BaseModel
 
 from phyblock.bundle import opened_bundle
@@ -21,9 +18,10 @@ from phyblock.files import LIST, OutFolder, digest_of_file, writing
 from phyblock.records.files import RECORDS
 from phyblock.records.manifest import MANIFEST
 from phyblock.results.load import Run, load_run
-from phyblock.sim.pictures import PictureStyle, goal_png, to_png
+from phyblock.sim.pictures import Lookout, PictureStyle
 from phyblock.tracks.base import CARRYING, kind_of
 from phyblock.web.board import SiteRun, all_values, board_of, entries_of, open_sources
+from phyblock.web.card import card_png
 from phyblock.web.pack import build_of, pack_samples, write_page
 
 INDEX = "index.html"
@@ -215,19 +213,11 @@ def _facts(run: Run, shared: Sequence[str]) -> Iterator[tuple[str, Any]]:
 
 
 def _card(title: str, finding: str, runs: Sequence[SiteRun], index: Mapping[str, Any]) -> bytes:
-    """Return the picture of a site for links to it: its title and finding, and a goal, as PNG of
-    1200 x 630 pixels.
-    """
-    card = Image.new("RGB", (1200, 630), "#ffffff")
+    """Return the picture of a site for links to it: its title and finding, and a goal."""
+    goal = None
     for row in index["telling"][:1]:
         scene = index["scenes"][index["items"]["scene"][index["rows"]["item"][row]]]
         task = next(one.sources.tasks[scene] for one in runs if scene in one.sources.tasks)
-        goal = goal_png(task.scene, PictureStyle(size_px=560))
-        card.paste(Image.open(io.BytesIO(goal)).convert("RGB"), (605, 35))
-    draw, top = ImageDraw.Draw(card), 110
-    for text, size, color, width in ((title, 58, "#16181d", 18), (finding, 36, "#3a4cc4", 30)):
-        for line in textwrap.wrap(text, width):
-            draw.text((50, top), line, color, ImageFont.load_default(size))
-            top += round(1.25 * size)
-        top += 36
-    return to_png(card)
+        style = PictureStyle(size_px=560)
+        goal = Lookout(task.scene, style).image(task.scene.blocks)
+    return card_png(title, finding, goal)

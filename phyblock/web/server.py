@@ -64,11 +64,6 @@ def assets() -> dict[str, tuple[str, bytes]]:
     }
 
 
-def default_consent() -> str:
-    """Return the text that a person agrees to where a study brings none of its own."""
-    return asset("consent.txt").decode()
-
-
 class Server:
     """A server of one session until it is closed; a context manager.
 
@@ -132,6 +127,8 @@ class Server:
         if asked := _PICTURE.fullmatch(name):
             picture = self._session.picture(int(asked[1]), int(asked[2]))
             return None if picture is None else ("image/png", picture.data, _POLICY)
+        if drawn := self._session.drawn(name):
+            return "image/png", drawn, _POLICY
         if name in self._files:
             kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
             # These bring a policy of their own.
@@ -141,7 +138,7 @@ class Server:
     def post(self, name: str, body: Mapping[str, Any]) -> bool:
         """Do what a page asks for; False for what there is not. Raises as the session does."""
         actions: dict[str, Callable[[], None]] = {
-            "agree": self._session.agree,
+            "begin": self._session.begin,
             "pause": self._session.pause,
             "resume": self._session.resume,
             "finish": self.finished.set,
@@ -202,7 +199,7 @@ class _Handler(BaseHTTPRequestHandler):
                 self._send(200, *found)
 
     def do_POST(self) -> None:
-        """Take an answer, a pause, an agreement, an end."""
+        """Take an answer, a pause, a beginning, an end."""
         if (asked := self._admitted(changes=True)) is None:
             return
         length = self.headers.get("Content-Length", "")

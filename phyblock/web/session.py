@@ -3,11 +3,6 @@ scores of a model.
 
 The run asks in its loop and waits; the server's threads read the question on show, and take an
 answer. No question is shown before the answer to the last one is on disk, as the run sees to.
-
-The order of items is a row of a Williams design, over whose rows every item stands in every place
-equally often and follows every other equally often, so that neither practice nor what came just
-before favors an item (E. J. Williams 1949, Australian Journal of Scientific Research A 2, 149-168).
-An even number of items has as many rows, an odd one twice as many.
 """
 
 from __future__ import annotations
@@ -17,69 +12,38 @@ import re
 import signal
 import threading
 import time
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 from pydantic import JsonValue
 
 from phyblock.config.models import HUMAN, ModelConfig
 from phyblock.config.suite import Suite
+from phyblock.data import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.models import HaltedError, Image, Reply, Request, Usage
-from phyblock.records.files import read_records
-from phyblock.records.record import Record
-from phyblock.results.compare import check_alike, comparable
-from phyblock.results.load import Design, load_run
 from phyblock.run.events import RunEvent, RunStarted, SampleDone
+from phyblock.run.judge import begun, judge_reply
 from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.runner import RunResult, Session
-from phyblock.stable import drawn_bytes, hex_digest
-from phyblock.text import one_line
-from phyblock.tracks import Item
-from phyblock.tracks.base import kind_of
+from phyblock.tracks.base import SceneTrack, kind_of
 from phyblock.tracks.picking import Pick, Picking
+from phyblock.web.ending import Ending, went
 
-_ItemT = TypeVar("_ItemT", bound=Item)
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,39}")
-Phase = Literal["consent", "waiting", "question", "paused", "done", "closed"]
-
-
-def williams_rows(n: int) -> int:
-    """Return how many rows the design of `n` items has."""
-    return max(1, n if n % 2 == 0 else 2 * n)
-
-
-def williams_row(n: int, row: int) -> tuple[int, ...]:
-    """Return the items 0 to `n` - 1 in the order of a row from 0; rows begin again at the end."""
-    row %= williams_rows(n)
-    # Neighbors differ by 1, -2, 3, ...: by every difference but 0, each once.
-    first = [(place + 1) // 2 if place % 2 else -place // 2 for place in range(n)]
-    turned = [(item + row) % n for item in first]
-    return tuple(turned if row < n else reversed(turned))
-
-
-def arranged(items: Sequence[_ItemT], row: int) -> tuple[_ItemT, ...]:
-    """Return the items in the order of a row; which of them is which in the design is drawn once
-    for all people, by digests of their keys.
-    """
-    mixed = sorted(items, key=lambda item: drawn_bytes("place", item.key))
-    return tuple(mixed[place] for place in williams_row(len(mixed), row))
+Phase = Literal["start", "warmed", "waiting", "question", "paused", "done", "closed"]
 
 
 @dataclass(frozen=True)
 class Person:
-    """A person who answers: a short name, the number in the study if there is one, and the text
-    that is agreed to first. One who `is_exact` reads the prompt of models, as studies may want.
-    Raises SpecError for a name with other characters than stated.
+    """A person who answers, by a short name; one who `is_exact` reads the prompt of models, as
+    studies may want. Raises SpecError for a name with other characters than stated.
     """
 
     name: str
-    number: int | None
-    consent: str
     is_exact: bool = False
 
     def __post_init__(self) -> None:
@@ -92,30 +56,14 @@ class Person:
         """The name in records and tables."""
         return f"{HUMAN}{self.name}"
 
-    @property
-    def row(self) -> int:
-        """The row of the design: that of the number, or one drawn by the name."""
-        if self.number is not None:
-            return self.number - 1
-        return int.from_bytes(drawn_bytes("row", self.name)[:6], "big")
-
-    @property
-    def consent_sha256(self) -> str:
-        """Digest of the text that is agreed to."""
-        return hex_digest(self.consent)
-
     def planned(self) -> ModelConfig:
-        """Return the person in a plan; number and text make runs that are not the same."""
-        params: dict[str, JsonValue] = {"consent": self.consent_sha256}
-        if self.number is not None:
-            params["number"] = self.number
-        if self.is_exact:
-            params["exact"] = True
+        """Return the person in a plan; another prompt makes another run."""
+        params: dict[str, JsonValue] = {"exact": True} if self.is_exact else {}
         return ModelConfig(name=self.model, extra_body=params, max_concurrency=1)
 
 
 def plan_session(suite: Suite, person: Person, limit: int | None) -> RunPlan:
-    """Plan the run of one person: a suite asked once, with its first seed, in a row's order.
+    """Plan the run of one person: a suite asked once, with its first seed.
 
     Raises SpecError for a suite that asks in several ways or what nobody can answer by hand, and
     what `make_plan` raises.
@@ -125,8 +73,7 @@ def plan_session(suite: Suite, person: Person, limit: int | None) -> RunPlan:
         found = ", ".join(suite.vary.factors)
         raise SpecError(Problem(suite.where("vary"), message, "vary", found, hint=hint))
     once = suite.model_copy(update={"seeds": suite.seeds[:1]})
-    plan = make_plan(once, {}, limit=limit, people=[person.planned()])
-    return replace(plan, arranged=partial(arranged, row=person.row))
+    return make_plan(once, {}, limit=limit, people=[person.planned()])
 
 
 @dataclass(frozen=True)
@@ -149,20 +96,38 @@ def picking_of(request: Request, suite: Suite) -> Picking:
 
 
 class PersonModel:
-    """A model that answers a request with the reply that picks make; `answer` waits for them."""
+    """A model that answers a request with the reply that a person's picks make at a page.
+
+    Before the first, the person may try the page on a scene of level 1 that the run leaves out;
+    nothing of it is kept.
+    """
 
     needs_messages = True
 
-    def __init__(
-        self, name: str, suite: Suite, answer: Callable[[Request, Picking], Awaitable[Given]]
-    ) -> None:
+    def __init__(self, name: str, plan: RunPlan, session: PlaySession) -> None:
         self.name = name
-        self._suite, self._answer = suite, answer
+        self._plan, self._session = plan, session
+        self._spare = _spare_scene(plan)
 
     async def ask(self, request: Request) -> Reply:
-        """Return the reply, in the form that the prompt asks for; raises what `answer` raises."""
-        picking = picking_of(request, self._suite)
-        given = await self._answer(request, picking)
+        """Return the reply, in the form that the prompt asks for; HaltedError after the end."""
+        if self._spare is not None and not self._session.done:
+            item, self._spare = self._spare, None
+            await self._warm_up(item)
+        return await self._answered(request)
+
+    async def _warm_up(self, item: AssemblyTask) -> None:
+        track, seed = self._plan.tracks[0], self._plan.suite.seeds[0]
+        shown = track.shown(item, seed)
+        request = await track.request(shown, seed, {}, with_messages=True)
+        reply = await self._answered(replace(request, track=track.name), is_warm_up=True)
+        fields = begun("warm-up", track.name, self.name, shown, seed, reply)
+        record = await judge_reply(track, shown, fields)
+        self._session.warmed(went(record, self._plan.suite.scoring.matchers[0]))
+
+    async def _answered(self, request: Request, *, is_warm_up: bool = False) -> Reply:
+        picking = picking_of(request, self._plan.suite)
+        given = await self._session.ask(request, picking, is_warm_up=is_warm_up)
         return Reply(
             text=picking.reply(given.picks),
             usage=Usage(prompt_tokens=0, completion_tokens=0),
@@ -175,9 +140,23 @@ class PersonModel:
         """Do nothing: nothing is held open."""
 
 
+def _spare_scene(plan: RunPlan) -> AssemblyTask | None:
+    """Return a scene of level 1 that no item of the plan shows; None where plans are not asked for
+    in one reply, or no such scene is left.
+    """
+    track = plan.tracks[0]
+    if track.plays or not isinstance(track, SceneTrack):
+        return None
+    used = {task.scene.id for task in plan.dataset.tasks}
+    spare = (task for task in track.dataset.tasks if task.scene.id not in used)
+    return next((task for task in spare if 1 in task.scene.levels), None)
+
+
 @dataclass(frozen=True)
 class Place:
-    """The place of a question: the item's number from 1, of how many, and the turn there."""
+    """The place of a question: the item's number from 1, of how many, and the turn there; the
+    number of a warm-up is 0.
+    """
 
     number: int
     of: int
@@ -253,38 +232,38 @@ class PlaySession:
     """One question at a time; every change has a number, by which a page asks for the next."""
 
     def __init__(self, of: int, clock: Callable[[], float] = time.monotonic) -> None:
-        self._of, self._done, self._turns = of, 0, 0
+        self._of, self.done, self._turns = of, 0, 0
         self._clock = clock
         self._changed = threading.Condition()
         self._number = 0
         self._phase: Phase = "waiting"
         self._asked: _Asked | None = None
-        self._about: Mapping[str, Any] = {}
+        self._name = ""
+        self._warm_up: Mapping[str, Any] = {}
         self._is_exact = False
-        self._results: Mapping[str, Any] | None = None
+        self._ending: Ending | None = None
 
     async def run(
-        self, plan: RunPlan, person: Person, folder: Path, begun: Callable[[], None]
+        self, plan: RunPlan, person: Person, folder: Path, opened: Callable[[], None]
     ) -> RunResult:
         """Ask what is left; a signal closes the session, and what was answered is written.
 
-        `begun` is called when the run is open and the page can be shown. Raises what the run meets.
+        `opened` is called when the page can be shown. Raises what the run meets.
         """
 
         self._is_exact = person.is_exact
 
         def watch(event: RunEvent) -> None:
             if isinstance(event, RunStarted):
-                self._done = len(event.earlier[person.model])
-                if self._done < self._of:
-                    about = {"name": person.name, "consent": person.consent}
-                    self.welcome({**about, "done": self._done, "of": self._of})
-                begun()
-            elif isinstance(event, SampleDone):
-                self._done += event.record.is_final
+                self.done = len(event.earlier[person.model])
+                if self.done < self._of:
+                    self.welcome(person.name)
+                opened()
+            elif isinstance(event, SampleDone) and event.record.model == person.model:
+                self.done += event.record.is_final
                 self._turns = 0
 
-        model, loop = PersonModel(person.model, plan.suite, self.ask), asyncio.get_running_loop()
+        model, loop = PersonModel(person.model, plan, self), asyncio.get_running_loop()
         signals = (signal.SIGINT, signal.SIGTERM)
         session = Session(plan, folder, watch, use_cache=False, present={model.name: model})
 
@@ -303,7 +282,7 @@ class PlaySession:
             for one in signals:
                 loop.remove_signal_handler(one)
 
-    async def ask(self, request: Request, picking: Picking) -> Given:
+    async def ask(self, request: Request, picking: Picking, *, is_warm_up: bool = False) -> Given:
         """Return what the person picks; HaltedError where the session is closed first."""
         answer: Future[Given] = Future()
         # From now on it can be settled, whoever has stopped waiting.
@@ -311,8 +290,8 @@ class PlaySession:
         with self._changed:
             if self._phase == "closed":
                 raise HaltedError("the session was closed")
-            self._turns += 1
-            place = Place(self._done + 1, self._of, self._turns)
+            self._turns += not is_warm_up
+            place = Place(0 if is_warm_up else self.done + 1, self._of, max(1, self._turns))
             self._asked = _Asked(request, picking, place, answer)
             if self._phase == "waiting":
                 self._go_to("question")
@@ -323,10 +302,12 @@ class PlaySession:
         with self._changed:
             self._changed.wait_for(lambda: self._number != after, wait_s)
             told: dict[str, Any] = {"change": self._number, "phase": self._phase}
-            if self._phase == "consent":
-                told["about"] = dict(self._about)
-            elif self._phase == "done":
-                told["results"] = self._results
+            if self._phase == "start":
+                told["about"] = {"name": self._name, "done": self.done, "of": self._of}
+            elif self._phase == "warmed":
+                told["went"] = self._warm_up
+            elif self._phase == "done" and self._ending is not None:
+                told["results"] = self._ending.shown
             elif self._asked is not None and self._phase == "question":
                 asked, now_s = self._asked, self._clock()
                 # The clock starts when the question is first given out.
@@ -345,16 +326,27 @@ class PlaySession:
             pictures = pictures_of(self._asked.request)
             return pictures[number] if 0 <= number < len(pictures) else None
 
-    def welcome(self, about: Mapping[str, Any]) -> None:
-        """Ask for consent first; `about` is what the page says of the session."""
-        with self._changed:
-            self._about = about
-            self._go_to("consent")
+    def drawn(self, name: str) -> bytes | None:
+        """Return a picture of the end by its name; None for any other, and before the end."""
+        return None if self._ending is None else self._ending.picture(name)
 
-    def agree(self) -> None:
-        """Show questions from now on: the text was agreed to."""
+    def welcome(self, name: str) -> None:
+        """Say what comes, to a person of this name."""
         with self._changed:
-            self._expect("consent")
+            self._name = name
+            self._go_to("start")
+
+    def warmed(self, went: Mapping[str, Any]) -> None:
+        """Show how the warm-up went."""
+        with self._changed:
+            self._warm_up = went
+            self._go_to("warmed")
+
+    def begin(self) -> None:
+        """Show questions from now on."""
+        with self._changed:
+            if self._phase not in ("start", "warmed"):
+                raise NotNowError
             self._go_to("waiting" if self._asked is None else "question")
 
     def answer(self, change: int, picks: Sequence[Pick]) -> None:
@@ -384,10 +376,10 @@ class PlaySession:
             self._expect("paused")
             self._go_to("question")
 
-    def finish(self, results: Mapping[str, Any]) -> None:
+    def finish(self, ending: Ending) -> None:
         """Show how it went: the session is over."""
         with self._changed:
-            self._results = results
+            self._ending = ending
             self._go_to("done")
 
     def close(self) -> None:
@@ -411,60 +403,3 @@ class PlaySession:
         self._phase = phase
         self._number += 1
         self._changed.notify_all()
-
-
-def outcomes(folder: Path, person: str, beside: Sequence[Path]) -> dict[str, Any]:
-    """Return what a page shows after the end: a part for each track, in it a row for each item in
-    the order in which it was shown, beside what models of this and other runs did.
-
-    `beside` are folders of other runs; of one that cannot be compared a note says why.
-    """
-    run = load_run(folder)
-    others = [load_run(path) for path in beside]
-    records, notes, tracks = list(read_records(folder)), [], []
-    for track in run.design.suite.tracks:
-        kind, what = kind_of(track), comparable(run, track)
-        measure, part = what.measure, what.parts[-1]
-        rest: list[tuple[str, dict[str, float]]] = []
-        for other in [run, *others]:
-            if track not in other.design.suite.tracks:
-                continue
-            try:
-                check_alike(other, run, [part.cell], track, measure)
-            except SpecError as error:
-                notes.append(f"Left out, as it cannot be compared: {one_line(str(error))}")
-                continue
-            for model, values in what.values(other, part, run.design):
-                means = values.groupby(level="item").mean()
-                rest.append((model, {str(item): float(mean) for item, mean in means.items()}))
-        own = next((found for name, found in rest if name == person), {})
-        rows = [
-            {
-                "key": record.item,
-                "sample": record.sample,
-                "value": own.get(record.item),
-                "took_s": None if record.reply is None else record.reply.latency_s,
-                "others": [
-                    {"name": name, "value": found[record.item]}
-                    for name, found in rest
-                    if record.item in found and found is not own
-                ],
-                **_went(record, run.design),
-            }
-            for record in records
-            if record.track == track
-        ]
-        about = {"title": kind.title, "item": kind.item, "measure": measure.heading}
-        tracks.append({**about, "unit": measure.unit, "better": measure.better, "rows": rows})
-    return {"tracks": tracks, "notes": list(dict.fromkeys(notes))}
-
-
-def _went(record: Record, design: Design) -> dict[str, Any]:
-    """Return what was answered, step by step with why a step is wrong, or with what is right."""
-    if record.is_correct is not None:
-        return {"given": record.said, "right": record.target, "correct": record.is_correct}
-    course = record.course(design.matcher)
-    if course is None:
-        return {}
-    steps = [{"name": name, "why": why} for name, why in course.steps]
-    return {"steps": steps, "missing": course.missing}

@@ -1,4 +1,4 @@
-"""A sitting at the desk: the order of tasks, the session, the server that refuses others."""
+"""A session of a person: what it shows and keeps, the server that refuses others."""
 
 from __future__ import annotations
 
@@ -9,10 +9,7 @@ import socket
 import struct
 import threading
 import time
-from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -31,14 +28,10 @@ from phyblock.web.session import (
     NotNowError,
     Person,
     PlaySession,
-    arranged,
     plan_session,
-    williams_row,
-    williams_rows,
 )
 from tests.workspace import SCENES, Workspace
 
-WELCOME = {"name": "ada", "consent": "May we?", "done": 0, "of": 2}
 PICTURE = Image(b"pixels", "candidates", 64, 64)
 PICKING = Picking(
     (Choice("1", "", ("candidates",), 0), Choice("2", "", ("candidates",), 1)),
@@ -50,36 +43,6 @@ PICKING = Picking(
 )
 
 
-@given(st.integers(1, 24))
-def test_over_the_rows_every_item_has_every_place_and_every_predecessor_equally_often(
-    n: int,
-) -> None:
-    rows = [williams_row(n, row) for row in range(williams_rows(n))]
-    places = Counter((item, place) for row in rows for place, item in enumerate(row))
-    follows = Counter(pair for row in rows for pair in pairwise(row))
-    assert len(places) == n * n
-    assert len(set(places.values())) == 1
-    assert len(follows) == n * (n - 1)
-    assert len(set(follows.values())) <= 1
-
-
-@dataclass(frozen=True)
-class Thing:
-    key: str
-
-
-@given(st.sets(st.text(max_size=4), max_size=20), st.integers(0, 2**40), st.randoms())
-def test_a_row_holds_every_item_once_in_whatever_order_they_come(
-    keys: set[str], row: int, random: object
-) -> None:
-    things = [Thing(key) for key in sorted(keys)]
-    mixed = list(things)
-    random.shuffle(mixed)  # type: ignore[attr-defined]
-    shown = arranged(things, row)  # type: ignore[type-var]
-    assert sorted(thing.key for thing in shown) == sorted(keys)
-    assert shown == arranged(mixed, row)  # type: ignore[type-var]
-
-
 class Clock:
     def __init__(self) -> None:
         self.now = 0.0
@@ -89,9 +52,9 @@ class Clock:
 
 
 async def asked(clock: Clock) -> tuple[PlaySession, asyncio.Task[Given]]:
-    """A session that asks for consent, and its first question."""
+    """A session before its beginning, and its first question."""
     session = PlaySession(2, clock)
-    session.welcome(WELCOME)
+    session.welcome("ada")
     message = Message("user", ("Look:", PICTURE, "What comes first?"))
     request = Request("secret-scene", 0, (message,), {}, "v", {"answer": "secret-answer"})
     task = asyncio.create_task(session.ask(request, PICKING))
@@ -99,14 +62,14 @@ async def asked(clock: Clock) -> tuple[PlaySession, asyncio.Task[Given]]:
     return session, task
 
 
-def test_nothing_is_shown_before_consent_and_no_name_or_answer_ever() -> None:
+def test_nothing_is_shown_before_the_beginning_and_no_name_or_answer_ever() -> None:
     async def play() -> None:
         session, task = await asked(Clock())
         told = session.state(-1)
-        assert told["phase"] == "consent"
+        assert told["phase"] == "start"
         assert "question" not in told
         assert session.picture(told["change"], 0) is None
-        session.agree()
+        session.begin()
         told = session.state(-1)
         parts = told["question"]["messages"][0]["parts"]
         assert [part.get("text") for part in parts] == ["Look:", None, "What comes first?"]
@@ -125,7 +88,7 @@ def test_the_clock_runs_from_the_first_look_and_stands_still_in_pauses() -> None
         clock = Clock()
         session, task = await asked(clock)
         for now, act in (
-            (100.0, session.agree),
+            (100.0, session.begin),
             (200.0, lambda: session.state(-1)),
             (203.0, session.pause),
             (400.0, session.resume),
@@ -144,7 +107,7 @@ def test_the_clock_runs_from_the_first_look_and_stands_still_in_pauses() -> None
 def test_an_answer_counts_once_and_only_for_what_lies_there() -> None:
     async def play() -> None:
         session, task = await asked(Clock())
-        session.agree()
+        session.begin()
         change = session.state(-1)["change"]
         with pytest.raises(NotNowError):
             session.answer(change - 1, [Pick(0)])
@@ -162,7 +125,7 @@ def test_an_answer_counts_once_and_only_for_what_lies_there() -> None:
 
 def played(suite: Path, picks: Sequence[int]) -> tuple[RunResult, list[str]]:
     """Sit down, pick these one after another, and close the sitting; what was shown."""
-    person = Person("ada", None, "May we?")
+    person = Person("ada")
     plan = plan_session(load_suite(suite, data_dir=suite.parent), person, None)
     session = PlaySession(plan.samples_per_model)
     shown: list[str] = []
@@ -173,10 +136,12 @@ def played(suite: Path, picks: Sequence[int]) -> tuple[RunResult, list[str]]:
         while not run.done():
             await asyncio.sleep(0.01)
             told = session.state(-1)
-            if told["phase"] == "consent":
-                session.agree()
+            if told["phase"] in ("start", "warmed"):
+                if "went" in told:
+                    shown.append(json.dumps(told["went"]))
+                session.begin()
             elif told["phase"] == "question" and left:
-                shown.append(json.dumps(told["question"]["messages"]))
+                shown.append(json.dumps(told["question"]))
                 session.answer(told["change"], [Pick(left.pop(0))])
             elif told["phase"] == "question":
                 session.close()
@@ -205,10 +170,28 @@ def test_an_episode_goes_on_where_the_sitting_was_closed(
     assert [turn["reply"]["text"] for turn in record["turns"]] == moves
 
 
+def test_a_warm_up_on_another_scene_of_level_1_is_shown_how_it_went_and_not_kept(
+    tmp_path: Path, pictures_dir: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    workspace = Workspace(tmp_path, pictures_dir)
+    monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
+    workspace.write_scenes(*SCENES[:2])
+    suite = workspace.write_suite(limit=1, baselines=["goal-blind", "random"])
+    _, (warm_up, went, question) = played(suite, [0, 2])
+    assert ['"number": 0' in warm_up, '"number": 1' in question] == [True, True]
+    assert [step["name"] for step in json.loads(went)["steps"]] == ["1"]
+    lines = (tmp_path / "out" / "records.jsonl").read_text().splitlines()
+    records = {one["model"]: one for one in map(json.loads, lines)}
+    # Rules that never see the goal stand beside the person.
+    assert records.keys() == {"human:ada", "goal-blind", "random"}
+    assert len(lines) == len(records)
+    assert records["human:ada"]["parse"]["plan"] == [3]
+
+
 @pytest.fixture(scope="module")
 def session() -> PlaySession:
     session = PlaySession(1)
-    session.welcome(WELCOME)
+    session.welcome("ada")
     return session
 
 
@@ -420,7 +403,7 @@ def test_who_leaves_while_waiting_leaves_no_word_on_the_terminal(
     if resets:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     connection.close()
-    session.welcome(session.state(-1)["about"])
+    session.welcome("ada")
     until_idle()
     assert capfd.readouterr() == ("", "")
 

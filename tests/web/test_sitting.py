@@ -27,8 +27,7 @@ if TYPE_CHECKING:
 SUBTASKS = ("SH", "OR", "AD", "VP")
 PHONE = {"width": 390, "height": 780}
 HOSTILE = "<img src=x onerror=alert(1)></script><script>alert(2)</script>"
-CONSENT = f"May we keep your answers?\n\n{HOSTILE}"
-ADA = ("play", "suite.yaml", "--name", "ada", "--number", "2", "--consent", "consent.txt")
+ADA = ("play", "suite.yaml", "--name", "ada")
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +49,6 @@ def workspace(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> W
         vqa={"path": "./questions", "subtasks": list(SUBTASKS)},
         seeds=[3, 4],
     )
-    (made.root / "consent.txt").write_text(CONSENT, encoding="utf-8")
     started = made.root / "browser"
     started.write_text('#!/bin/sh\necho "$1" > opened.new && mv opened.new opened\n')
     started.chmod(0o755)
@@ -117,7 +115,8 @@ def answered(folder: Path) -> list[Raw]:
     path = folder / "records.jsonl"
     if not path.exists():
         return []
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return [one for one in map(json.loads, lines) if one["model"] == "human:ada"]
 
 
 def said(record: Raw) -> str:
@@ -161,8 +160,7 @@ def test_a_sitting_by_mouse_keys_and_phone_over_a_kill(
 
 
 def begin_with_mouse_and_keys(page: Page, run: Path) -> None:
-    page.get_by_text("May we keep your answers?").wait_for()
-    page.get_by_role("button", name="I agree").click()
+    page.get_by_role("button", name="Begin").click()
 
     task(page, 1)
     for name in ("Candidate 3", "Candidate 7", "Candidate 12"):
@@ -187,7 +185,7 @@ def begin_with_mouse_and_keys(page: Page, run: Path) -> None:
 
 def end_on_a_phone(page: Page, run: Path) -> None:
     page.get_by_text("Welcome back. 8 tasks of 10 are left").wait_for()
-    page.get_by_role("button", name="I agree").tap()
+    page.get_by_role("button", name="Begin").tap()
     task(page, 3)
     fits_the_phone(page)
     # Goal and candidates one below the other, without the line that is between them.
@@ -231,7 +229,15 @@ def end_on_a_phone(page: Page, run: Path) -> None:
     }
     text = page.inner_text("#main")
     assert "It first broke at step 1" in text
-    assert "oracle 100.0" in text
+    assert "You 0.0" in page.locator(".finding").first.inner_text()
+    page.get_by_text("All means").first.tap()
+    assert "oracle\t100.0" in page.locator("table").first.inner_text()
+    built = page.get_by_alt_text("what you built").first
+    built.scroll_into_view_if_needed()
+    assert built.evaluate("image => image.decode().then(() => image.naturalWidth)") == 640
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Save a picture").tap()
+    assert Path(download.value.path()).read_bytes().startswith(b"\x89PNG")
     fits_the_phone(page)
     with page.expect_popup() as popup:
         page.get_by_role("link", name="Replay").first.click()

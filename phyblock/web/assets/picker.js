@@ -43,7 +43,7 @@ const Picker = (() => {
       hasFields ? el("p", { class: "muted" }, `Each ${noun} that you pick asks for ${new Intl.ListFormat("en").format(fields.map((one) => one.name))}; ↑ ↓ change a number, PageUp and PageDown by more.`) : null,
       el("div", { class: "choices" }, buttons), chips, typing, el("div", { class: "acts" }, isOne ? null : [undo, clear], done));
     main.replaceChildren(
-      el("h1", {}, el("span", { class: "unseen" }, `Question ${question.number} of ${question.of}: `), question.task),
+      el("h1", {}, el("span", { class: "unseen" }, question.number ? `Question ${question.number} of ${question.of}: ` : "Warm-up: "), question.task),
       el("div", { class: hasFields ? "task with-fields" : "task" }, el("div", { class: "shown" }, messages.map(figures)),
         el("div", { class: "side" }, answer, el("details", { open: isExact }, el("summary", {}, "The model's exact prompt"), messages.map(texts)))));
     lay();
@@ -59,7 +59,7 @@ const Picker = (() => {
 
     /** The pictures of a message; a text before one is its caption. */
     function figures({ parts }) {
-      return parts.map((part, n) => (part.text === undefined ? figure(part, parts[n - 1]?.text ?? "") : null));
+      return parts.map((part, n) => (part.text === undefined ? figure(part, parts[n - 1]?.text ?? (pictures.length > 1 ? part.label : "")) : null));
     }
 
     function figure(part, caption) {
@@ -74,11 +74,20 @@ const Picker = (() => {
         const alt = n ? "" : part.label === "composite" ? "The goal on the left, the candidates on the right" : `Picture: ${part.label}`;
         const image = el("img", { src: part.picture, alt, draggable: "false", style: { width: `${100 / share}%`, left: `${(-100 * from) / share}%` } });
         return el("div", { class: isLine ? "window line" : "window", style: { flexGrow: share, aspectRatio: `${part.width * share} / ${part.height}` } },
-          image, here.filter(({ box }) => box[0] >= from && box[0] < to).map(({ box, place }) => spot(place, box, from, share)));
+          here.length ? image : el("button", { type: "button", class: "enlarge", "aria-label": `Enlarge: ${part.label}`, onclick: () => enlarge(part) }, image), here.filter(({ box }) => box[0] >= from && box[0] < to).map(({ box, place }) => spot(place, box, from, share)));
       });
       const made = el("figure", {}, caption ? el("figcaption", { class: "muted" }, caption) : null, el("div", { class: "windows" }, windows));
       made.style.setProperty("--wide", part.width / part.height);
       return made;
+    }
+
+    /** A picture as large as the screen, until it is clicked or Escape is pressed. */
+    function enlarge(part) {
+      const image = el("img", { src: part.picture, alt: `Picture: ${part.label}`, width: part.width, height: part.height });
+      const large = el("dialog", { "aria-label": part.label, onclick: () => large.close(), onclose: () => large.remove() },
+        image, el("button", { type: "button", class: "quiet", autofocus: true }, "Close"));
+      main.append(large);
+      large.showModal();
     }
 
     function spot(place, [x, y, width, height], from, share) {
@@ -215,7 +224,7 @@ const Picker = (() => {
         if (key === "Enter" && typed) return () => name(typed, true);
         return /^[0-9a-z]$/i.test(key) ? () => name(typed + key, false) : null;
       };
-      const found = event.altKey || event.metaKey ? null : act();
+      const found = event.altKey || event.metaKey || main.querySelector("dialog") ? null : act();
       if (!found) return;
       event.preventDefault();
       found();

@@ -28,7 +28,7 @@
   const button = (text, act) => el("button", { type: "button", onclick: act }, text);
 
   const views = {
-    consent({ about }) {
+    start({ about }) {
       progress.textContent = "";
       const left = about.of - about.done;
       card(
@@ -36,23 +36,25 @@
         el("p", { class: "lead" }, about.done
           ? `Welcome back. ${Words.count(left, "task")} of ${about.of} ${left === 1 ? "is" : "are"} left.`
           : `${Words.count(about.of, "task")} for ${about.name}.`),
-        el("div", { class: "consent", tabindex: "0", role: "region", "aria-label": "What you agree to" },
-          about.consent.split(/\n{2,}/).map((text) => el("p", {}, text))),
-        el("h2", {}, "How it works"),
         el("ul", {}, [
-          "You see the pictures that models are sent. Their exact prompt is one click away; it asks for a written form, which is written for you from your clicks.",
+          "You see the pictures that models are sent. Their exact prompt is one click away; the written form that it asks for is made from your clicks.",
           "Click a numbered block or an option to pick it. Where places are asked for as well, type the numbers. All can be undone until you submit; then it is kept, and the next task comes.",
           "Without a mouse: type the number or letter (Enter where a longer number might follow), Backspace takes back, Ctrl+Enter submits.",
-          "The time you take is written down. Pause stops it and hides the task.",
+          "Your answers and the time that each takes are written to a file on this computer; nothing goes over the network. Pause stops the clock and hides the task. Scores are shown at the end.",
         ].map((text) => el("li", {}, text))),
-        button("I agree, begin", () => post("agree")),
+        button("Begin", () => post("begin")),
       );
+    },
+    warmed({ went }) {
+      progress.textContent = "Warm-up";
+      card(el("h1", {}, "That was the warm-up"), given(went),
+        el("p", {}, "It does not count. From now on answers are kept, and how they went is shown at the end."), button("Begin", () => post("begin")));
     },
     waiting() {
       card(el("p", { class: "lead", role: "status" }, "One moment …"));
     },
     question({ question, change, elapsed_s: elapsed, exact }) {
-      progress.textContent = `Task ${question.number} of ${question.of}`;
+      progress.textContent = question.number ? `Task ${question.number} of ${question.of}` : "Warm-up: it does not count";
       shown.since = performance.now() - 1000 * elapsed;
       shown.keys = Picker.show(main, question, (answer) => submit(change, answer), exact);
       if (shown.notice) main.prepend(el("p", { class: "notice", role: "alert" }, shown.notice));
@@ -75,36 +77,35 @@
       progress.textContent = "Done";
       main.replaceChildren(el("div", { class: "results" }, el("h1", {}, "How it went"),
         results.notes.map((note) => el("p", { class: "notice" }, note)),
-        results.tracks.filter((track) => track.rows.length).map(ofTrack),
-        el("p", {}, el("a", { href: "report.html", target: "_blank" }, "The whole report, with replays"), " (opens beside this page)"),
-        button("Finish", (event) => {
-          event.target.disabled = true;
-          event.target.textContent = "You can close this page";
-          post("finish");
-        })));
+        results.tracks.map(ofTrack),
+        el("div", { class: "tools" },
+          el("a", { href: "card.png", download: "phyblock.png" }, "Save a picture of the result"),
+          el("a", { href: "report.html", target: "_blank" }, "The whole report, with replays (in a new tab)"),
+          button("Finish", (event) => {
+            event.target.disabled = true;
+            event.target.textContent = "You can close this page";
+            post("finish");
+          }))));
     },
   };
 
   // ---- the end
 
-  /** Means of the person and of others over the same items, the best first, and every item. */
+  /** The person between a rule and the best model, all means, and every item. */
   function ofTrack(track) {
-    const all = new Map([["You", track.rows.map(({ value }) => value).filter((value) => value !== null)]]);
-    for (const { others } of track.rows) for (const { name, value } of others) all.set(name, [...(all.get(name) || []), value]);
-    const lines = [...all].filter(([, values]) => values.length).map(([name, values]) => [name, mean(values), values.length])
-      .sort((a, b) => (track.better === "higher" ? b[1] - a[1] : a[1] - b[1]));
     return el("section", {}, el("h2", {}, track.title),
-      el("p", { class: "finding" }, lines.slice(0, 4).map(([name, value]) => `${name} ${number(value)}`).join(" · ")),
+      el("p", { class: "finding" }, track.line.map(([name, value]) => `${name} ${number(value)}`).join(" · ")),
       el("p", { class: "muted" }, `${track.measure}, mean over ${Words.count(track.rows.length, track.item)}${track.unit && ` [${track.unit}]`}`),
-      scrolled(`${track.title}: means`, el("table", {}, el("tbody", {}, lines.map(([name, value, n]) => el("tr", { class: name === "You" ? "own" : null },
-        el("th", { scope: "row", class: "text" }, name), el("td", {}, number(value)), el("td", { class: "muted" }, `n = ${n}`)))))),
+      track.means.length < 2 ? null : el("details", {}, el("summary", {}, "All means"), scrolled(`${track.title}: means`, el("table", {}, el("tbody", {}, track.means.map(([name, value, n]) =>
+        el("tr", { class: name === "You" ? "own" : null }, el("th", { scope: "row", class: "text" }, name), el("td", {}, number(value)), el("td", { class: "muted" }, `n = ${n}`))))))),
       el("ol", { class: "cards" }, track.rows.map((row) => item(row, track))));
   }
 
   function item(row, track) {
-    const others = row.others.map(({ name, value }) => `${name} ${number(value)}`).join(", ");
-    return el("li", { class: "card" }, el("h3", {}, `${row.key}: ${number(row.value)} ${track.unit}`), given(row),
-      el("p", { class: "muted" }, row.took_s === null ? null : `You took ${Math.round(row.took_s)} s. `, others && `Others: ${others}. `,
+    return el("li", { class: "card" }, el("h3", {}, `${row.key}: ${number(row.value)} ${track.unit}`),
+      row.picture && el("figure", {}, el("figcaption", { class: "pair" }, el("span", {}, "Goal"), el("span", {}, "You")),
+        el("img", { src: row.picture, loading: "lazy", width: 640, height: 320, alt: "The goal on the left, what you built on the right" })), given(row),
+      el("p", { class: "muted" }, row.took_s === null ? null : `You took ${Math.round(row.took_s)} s. `,
         el("a", { href: `report.html#samples?s=${encodeURIComponent(row.sample)}`, target: "_blank", "aria-label": `Replay ${row.key}` }, "Replay")));
   }
 

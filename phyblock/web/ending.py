@@ -1,0 +1,157 @@
+"""The end of a human baseline: a person's results beside rules and models, with pictures."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from statistics import fmean
+from typing import Any
+
+from PIL import Image
+
+from phyblock.data import AssemblyTask
+from phyblock.errors import SpecError
+from phyblock.records.files import read_records
+from phyblock.records.record import Record
+from phyblock.results.compare import check_alike, comparable
+from phyblock.results.estimates import strongest_floor
+from phyblock.results.load import Run, load_run
+from phyblock.results.text import number
+from phyblock.sim.film import FilmStep
+from phyblock.sim.pictures import Lookout, PictureStyle, to_png
+from phyblock.text import counted, one_line
+from phyblock.tracks.base import kind_of
+from phyblock.tracks.items import as_recorded
+from phyblock.web.card import card_png
+
+CARD = "card.png"
+_BUILT = re.compile(r"built/(\d{1,9})\.png")
+_SIZE_PX = 320
+
+
+class Ending:
+    """What a page shows after the end: a part for each track, in it the means of the person, the
+    rules and the models of this run and those `beside` it, and a row for each item.
+
+    Of a run that cannot be compared a note says why. Pictures are drawn as they are asked for.
+    """
+
+    def __init__(
+        self, folder: Path, person: str, beside: Sequence[Path], tasks: Sequence[AssemblyTask]
+    ) -> None:
+        self._run, self._person = load_run(folder), person
+        self._others = [load_run(path) for path in beside]
+        self._tasks = {task.scene.id: task for task in tasks}
+        records = [one for one in read_records(folder) if one.model == person]
+        self._films = {
+            n: steps for n, one in enumerate(records) if (steps := self._film(one)) is not None
+        }
+        self._notes: list[str] = []
+        tracks = [self._track(name, records) for name in self._run.design.suite.tracks]
+        self.shown: Mapping[str, Any] = {
+            "tracks": [track for track in tracks if track["rows"]],
+            "notes": list(dict.fromkeys(self._notes)),
+        }
+
+    def picture(self, name: str) -> bytes | None:
+        """Return the card, or the goal beside what was built for an item; None for other names."""
+        if (found := _BUILT.fullmatch(name)) and int(found[1]) in self._films:
+            return to_png(self._pair(int(found[1])))
+        if name != CARD or not self.shown["tracks"]:
+            return None
+        first = self.shown["tracks"][0]
+        said = " · ".join(f"{one} {number(value)}" for one, value in first["line"])
+        about = (
+            f"{first['title']}: {first['measure']}, {counted(len(first['rows']), first['item'])}"
+        )
+        pair = self._pair(next(iter(self._films))) if self._films else None
+        return card_png("Can you build this?", f"{said}\n{about}", pair)
+
+    def _film(self, record: Record) -> tuple[AssemblyTask, FilmStep] | None:
+        """Return the scene of a record with the last step of its build, where it has one."""
+        film, task = kind_of(record.track).report().film, self._tasks.get(record.scene)
+        if film is None or task is None:
+            return None
+        *_, last = film(record, as_recorded(task, record))
+        return task, last
+
+    def _pair(self, number: int) -> Image.Image:
+        """Return the goal on the left and what was built on the right."""
+        task, last = self._films[number]
+        lookout = Lookout(task.scene, PictureStyle(_SIZE_PX))
+        pair = Image.new("RGB", (2 * _SIZE_PX, _SIZE_PX))
+        for place, blocks in enumerate((task.scene.blocks, last.blocks)):
+            pair.paste(lookout.image(blocks), (place * _SIZE_PX, 0))
+        return pair
+
+    def _track(self, track: str, records: Sequence[Record]) -> dict[str, Any]:
+        """Return a track: its measure, the line that sums it up, all means, and a row an item."""
+        kind, measure = kind_of(track), comparable(self._run, track).measure
+        own, others = self._values(track)
+        rows = [
+            {
+                "key": record.item,
+                "sample": record.sample,
+                "value": own.get(record.item),
+                "took_s": None if record.reply is None else record.reply.latency_s,
+                "picture": f"built/{n}.png" if n in self._films else None,
+                **went(record, self._run.design.matcher),
+            }
+            for n, record in enumerate(records)
+            if record.track == track
+        ]
+        means = [("You", fmean(own.values()), len(own))] if own else []
+        for name, found in others.items():
+            if common := [found[row["key"]] for row in rows if row["key"] in found]:
+                means.append((name, fmean(common), len(common)))
+        means.sort(key=lambda one: one[1], reverse=measure.better == "higher")
+        return {
+            "title": kind.title,
+            "item": kind.item,
+            "measure": measure.heading,
+            "unit": measure.unit,
+            "line": self._line(track, means),
+            "means": means,
+            "rows": rows,
+        }
+
+    def _values(self, track: str) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
+        """Return the person's value of each item, and those of all others by name."""
+        what = comparable(self._run, track)
+        part, found = what.parts[-1], dict[str, dict[str, float]]()
+        for other in (one for one in self._runs if track in one.design.suite.tracks):
+            try:
+                check_alike(other, self._run, [part.cell], track, what.measure)
+            except SpecError as error:
+                self._notes.append(f"Left out, as it cannot be compared: {one_line(str(error))}")
+                continue
+            for model, values in what.values(other, part, self._run.design):
+                means = values.groupby(level="item").mean()
+                found.setdefault(model, {str(item): float(mean) for item, mean in means.items()})
+        return found.pop(self._person, {}), found
+
+    @property
+    def _runs(self) -> list[Run]:
+        return [self._run, *self._others]
+
+    def _line(self, track: str, means: Sequence[tuple[str, float, int]]) -> list[tuple[str, float]]:
+        """Return the person, the strongest rule that never sees the goal, and the best model."""
+        floor = strongest_floor(self._run, track)
+        rules = set().union(*(one.design.baselines for one in self._runs))
+        models = [one for one in means if one[0] != "You" and one[0] not in rules]
+        chosen = [one for one in means if one[0] in ("You", floor and floor.name)]
+        chosen.sort(key=lambda one: one[0] != "You")
+        line = [(name, value) for name, value, _ in chosen]
+        return line + [(f"best model {name}", value) for name, value, _ in models[:1]]
+
+
+def went(record: Record, matcher: str) -> dict[str, Any]:
+    """Return what was answered, step by step with why a step is wrong, or with what is right."""
+    if record.is_correct is not None:
+        return {"given": record.said, "right": record.target, "correct": record.is_correct}
+    course = record.course(matcher)
+    if course is None:
+        return {}
+    steps = [{"name": name, "why": why} for name, why in course.steps]
+    return {"steps": steps, "missing": course.missing}
