@@ -141,10 +141,6 @@ class ScoringSpec(Section):
     missing: MissingPolicy = "count"
     """Missing replies. count: their blocks count as not placed. skip: the scene is left out, as in
     the paper."""
-    extractor: str | None = None
-    """Name of a model that is sent the text of replies that could not be parsed, and copies what
-    they say into the requested form; its calls count against limits.max_cost_usd. null: such
-    replies stay parse failures."""
 
 
 class LimitsSpec(Section):

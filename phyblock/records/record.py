@@ -196,15 +196,6 @@ class ShownScene(Line):
     """The scene whose goal was shown; null: none was."""
 
 
-class Extraction(Line):
-    """An extraction model's copy of the answer in a reply that could not be parsed."""
-
-    model: str
-    """The model that was asked."""
-    reply: Reply
-    """Its reply."""
-
-
 class Record(Line):
     """A sample's stored outcome."""
 
@@ -243,9 +234,6 @@ class Record(Line):
     """Time when it was written, UTC."""
     run: str = ""
     """Digest of the run that it belongs to; older records have none."""
-    extraction: Extraction | None = None
-    """The copy that another model made of the reply; null: the reply was parsed, or no model was
-    called."""
     shown: ShownScene | None = None
     """The presentation of the scene; null: as in the file."""
     asked: AskedAs | None = None
@@ -353,17 +341,15 @@ class Record(Line):
         """Cost of its replies to the run [US dollars]; None if a price is not known. Replies from
         the cache were paid for elsewhere; an episode can hold both kinds.
         """
-        more = () if self.extraction is None else (self.extraction.reply,)
-        paid = [reply.cost_usd for reply in (*self.replies, *more) if not reply.cached]
+        paid = [reply.cost_usd for reply in self.replies if not reply.cached]
         known = [cost for cost in paid if cost is not None]
         return plain_sum(known) if len(known) == len(paid) else None
 
     @property
     def limit_usd(self) -> float:
         """Amount that the run's cost limit counted for this line [US dollars]."""
-        more = 0.0 if self.extraction is None else self.extraction.reply.limit_usd
         if self.reply is not None:
-            return self.reply.limit_usd + more
+            return self.reply.limit_usd
         return 0.0 if self.error is None else self.error.billed_usd or 0.0
 
 
@@ -375,7 +361,7 @@ class Call(Line):
     model: str
     """The model that is asked."""
     sample: str = ""
-    """The sample that it is made for; empty for none, as for an extractor's calls."""
+    """The sample that it is made for."""
     key: str
     """Digest of everything that decides the reply, as in the reply cache."""
     run: str

@@ -177,15 +177,14 @@ def _sample_notes(run: Run, track: str) -> Iterator[str]:
 
 
 _ROW = ["model", "track"]
-_COVERAGE = [*_ROW, "expected", "recorded", "not_run", *OUTCOMES, "extracted"]
+_COVERAGE = [*_ROW, "expected", "recorded", "not_run", *OUTCOMES]
 _COST = [
     *(*_ROW, "replies", *TOKENS, "tokens_unknown", "cost_usd", "cost_unknown", "cost_per_100_usd"),
     *("latency_median_s", "latency_p90_s", "cached", "attempts"),
 ]
 
 _SUMS = [
-    *("recorded", *OUTCOMES, "extracted", "replies"),
-    *("tokens_unknown", "cost_unknown", "cached", "attempts"),
+    *("recorded", *OUTCOMES, "replies", "tokens_unknown", "cost_unknown", "cached", "attempts")
 ]
 _MADE = "coverage and cost"
 """Key of the frame of both in `Run.made`."""
@@ -194,11 +193,10 @@ _MADE = "coverage and cost"
 def coverage_frame(run: Run) -> pd.DataFrame:
     """Return one row a model and track: what was asked of it, and what that took.
 
-    `expected` samples are `recorded` + `not_run`; the outcomes split `recorded`, and `extracted`
-    are those that an extraction model read. Of the `replies` (samples that hold one; of step
-    planning, a whole episode together): mean tokens of those that tell, with `tokens_unknown` that
-    do not; `cost_usd` what the run paid, the sum of the known prices, NaN where none is, with
-    `cost_unknown` without one; `cached` ones were paid for by another run and cost nothing here;
+    `expected` samples are `recorded` + `not_run`; the outcomes split `recorded`. Of the `replies`
+    (samples that hold one; of step planning, a whole episode together): mean tokens of those that
+    tell, with `tokens_unknown` that do not; `cost_usd` what the run paid, the sum of the known
+    prices, NaN where none is, with `cost_unknown` without one; `cached` ones were paid for by another run and cost nothing here;
     `cost_per_100_usd` what 100 cost at the price of those with a known one, cached ones included;
     median and 90th percentile of the latency [s] of those for which a request was sent; `attempts`
     the sum of requests sent for them. NaN where nothing is known. The same frame whenever it is
@@ -214,7 +212,6 @@ def coverage_frame(run: Run) -> pd.DataFrame:
     facts = facts.assign(
         recorded=1,
         **{name: records["outcome"] == name for name in OUTCOMES},
-        extracted=records["rule"] == "extractor",
         replies=replied,
         tokens_unknown=replied & records["completion_tokens"].isna(),
         cost_unknown=paid & records["paid_usd"].isna(),
@@ -248,11 +245,7 @@ def coverage_table(run: Run) -> Table:
     fields = [texts("model", "Model"), *track_name(run.design.suite.tracks)]
     for name in ("expected", "not_run", *OUTCOMES):
         fields.append(wholes(name, _HEADINGS.get(name, name.replace("_", " ").capitalize())))
-    read = table[table["extracted"] > 0]
-    listed = ", ".join(f"{r.model} {r.extracted} of {r.recorded}" for r in read.itertuples())
-    notes = [f"Read by extractor: {listed}."] if listed else []
-    if run.is_cut:
-        notes.append("The last line of records.jsonl was cut off and is ignored.")
+    notes = ["The last line of records.jsonl was cut off and is ignored."] if run.is_cut else []
     return Table.of(table[_COVERAGE], f"Coverage{run.design.of_suite}", fields, notes)
 
 

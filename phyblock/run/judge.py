@@ -1,9 +1,4 @@
-"""Records of samples: the outcome of a request, judged by its track.
-
-If a reply cannot be parsed, another model may copy its answer into the requested form. That model
-is sent only the text of the reply; its copy is kept in the record and parsed as a reply is, so that
-`phyblock score` calls no model.
-"""
+"""Records of samples: the outcome of a request, judged by its track."""
 
 from __future__ import annotations
 
@@ -11,20 +6,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any, TypeVar
 
-from phyblock.config.models import ModelConfig
 from phyblock.errors import (
-    BudgetReachedError,
     ModelError,
     RefusedError,
     RetryableError,
     SampleError,
     SimulationError,
 )
-from phyblock.models import HaltedError, Image, Message, Model, Request
+from phyblock.models import Image, Request
 from phyblock.records.files import known_records
 from phyblock.records.record import (
     ErrorKind,
-    Extraction,
     Record,
     Reply,
     SentImage,
@@ -32,15 +24,11 @@ from phyblock.records.record import (
     StoredError,
     Usage,
 )
-from phyblock.resources import bundled
 from phyblock.stable import plain_sum
 from phyblock.tracks import Item, Judgement, Track
 from phyblock.tracks.base import Episode, count_sample
-from phyblock.tracks.prompts import TemplatePrompt
 from phyblock.types import Outcome
 
-RULE = "extractor"
-"""The rule of a record whose reply was read out of what the model copied."""
 _N = TypeVar("_N", int, float)
 
 
@@ -118,31 +106,21 @@ async def judge_reply(
     fields: Mapping[str, Any],
     earlier: Record | None = None,
 ) -> Record:
-    """Return the record of a sample that is asked once, judged by its reply or, where that cannot
-    be read, by what another model copied of it; for the first time or again after an `earlier` one.
+    """Return the record of a sample that is asked once, judged by its reply, for the first time or
+    again after an `earlier` one.
 
     Where no engine could carry the reply out, the record says so and can be judged again.
     """
-
-    async def by(text: str | None) -> Record:
-        try:
-            return judged(fields, item, await track.judge_apart(item, text, earlier))
-        except SimulationError as error:
-            if text is None:
-                raise
-            lacking = StoredError(kind="unjudged", message=str(error))
-            nothing = await track.judge_apart(item, None, None)
-            return judged({**fields, "error": lacking}, item, nothing)
-
-    reply, extraction = fields["reply"], fields.get("extraction")
-    record = await by(None if reply is None else reply.text)
-    if record.outcome != "parse_failure" or extraction is None:
-        return record
-    copied = extraction.reply.text
-    again = await by("" if copied.strip().strip(".").upper() == "NONE" else copied)
-    if again.outcome != "ok":
-        return record
-    return again.model_copy(update={"parse": again.parse.model_copy(update={"rule": RULE})})
+    reply = fields["reply"]
+    text = None if reply is None else reply.text
+    try:
+        return judged(fields, item, await track.judge_apart(item, text, earlier))
+    except SimulationError as error:
+        if text is None:
+            raise
+        lacking = StoredError(kind="unjudged", message=str(error))
+        nothing = await track.judge_apart(item, None, None)
+        return judged({**fields, "error": lacking}, item, nothing)
 
 
 def _outcome(reply: Reply | None, error: StoredError | None, readable: bool) -> Outcome:
@@ -196,37 +174,3 @@ def _sum(values: Iterable[_N | None]) -> _N | None:
     found = list(values)
     known = [value for value in found if value is not None]
     return plain_sum(known) if known and len(known) == len(found) else None
-
-
-def extraction_prompt() -> TemplatePrompt:
-    """Return the prompt that extraction models are asked with."""
-    return TemplatePrompt(bundled("prompts", "extract.j2"), "extract")
-
-
-class Extractor:
-    """Asks a model what replies say that could not be read."""
-
-    def __init__(self, model: Model, config: ModelConfig) -> None:
-        self._model = model
-        self._config = config
-        self._prompt = extraction_prompt()
-
-    async def read(self, track: Track, item: Item, record: Record) -> Record:
-        """Return a record judged by what the model copied, if nothing was read in its reply.
-
-        Where the model cannot be asked, the record stays as it is: its reply is paid for.
-        """
-        text = "" if record.reply is None else record.reply.text
-        if record.outcome != "parse_failure" or not text.strip():
-            return record
-        content = self._prompt.text("user", {"track": track.name, "reply": text})
-        messages, params = (Message("user", (content,)),), self._config.params
-        name, version = f"{track.name}/{item.key}", self._prompt.version
-        try:
-            reply = await self._model.ask(Request(name, 0, messages, params, version, None))
-        except (ModelError, BudgetReachedError, HaltedError):
-            return record
-        if reply is None:
-            return record
-        extraction = Extraction(model=self._model.name, reply=reply.storable())
-        return await judge_reply(track, item, {**record.as_given(), "extraction": extraction})

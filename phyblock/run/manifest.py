@@ -16,7 +16,6 @@ from phyblock.config.suite import Suite, Variant
 from phyblock.data import UNNUMBERED, Dataset, read_version
 from phyblock.parsing.text import READER_VERSION
 from phyblock.records.manifest import FORMAT, Manifest
-from phyblock.run.judge import extraction_prompt
 from phyblock.sim.engine import ENGINES, described_engine
 from phyblock.stable import hex_digest
 from phyblock.tracks import Track, kind_of
@@ -40,7 +39,6 @@ def make_manifest(
     dataset: Dataset,
     variants: Mapping[Variant, Sequence[Track]],
     limit: int | None,
-    extractor: ModelConfig | None = None,
 ) -> Manifest:
     """Return the manifest of a run.
 
@@ -62,8 +60,6 @@ def make_manifest(
         "tracks": {track.name: track.identity() for track in variants[Variant()]},
         "limit": limit,
     }
-    if extractor is not None:
-        inputs["extractor"] = {**extractor.identity(), "prompt": extraction_prompt().version}
     if suite.vary.factors:
         inputs["variants"] = {
             variant.key: {track.name: track.identity() for track in of_variant}

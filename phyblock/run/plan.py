@@ -65,7 +65,7 @@ class RunPlan:
     """Everything a run needs.
 
     `manifest` is what `run.yaml` holds; `tracks` are those of the reference, `variants` all
-    conditions with the tracks of each; `extractor` is asked about replies that cannot be read.
+    conditions with the tracks of each.
     """
 
     suite: Suite
@@ -73,7 +73,6 @@ class RunPlan:
     dataset: Dataset
     variants: Mapping[Variant, tuple[Track, ...]]
     manifest: Manifest
-    extractor: ModelConfig | None = None
 
     @property
     def tracks(self) -> tuple[Track, ...]:
@@ -151,9 +150,8 @@ def make_plan(
         # PromptError where a prompt cannot be rendered for the first item, before anything is.
         next(iter(track.outlines(track.items[0])), None) if track.items else None
     selected = replace(dataset, tasks=select_tasks(dataset.tasks, suite.levels, limit))
-    extractor = _planned_extractor(suite, known)
-    manifest = make_manifest(suite, models, selected, variants, limit, extractor)
-    return RunPlan(suite, models, selected, variants, manifest, extractor=extractor)
+    manifest = make_manifest(suite, models, selected, variants, limit)
+    return RunPlan(suite, models, selected, variants, manifest)
 
 
 def _check_models(models: Sequence[ModelConfig], tracks: Sequence[Track], suite: Suite) -> None:
@@ -263,23 +261,6 @@ def _planned_models(
     )
 
 
-def _planned_extractor(suite: Suite, known: Mapping[str, ModelConfig]) -> ModelConfig | None:
-    """Return the model that a suite has unread replies copied by, or None.
-
-    Raises SpecError for a name that no model of the models file has.
-    """
-    name = suite.scoring.extractor
-    if name is None:
-        return None
-    if name not in known or known[name].kind != "litellm":
-        names = [other for other, config in known.items() if config.kind == "litellm"]
-        where, message = suite.where("scoring", "extractor"), "is no model that can be asked"
-        field, hint = "scoring.extractor", did_you_mean(name, names)
-        raise SpecError(Problem(where, message, field, name, ", ".join(names), hint))
-    config = to_config(name, known[name], suite.model_copy(update={"answer_format": "text"}))
-    return config.model_copy(update={"batch": False})
-
-
 def to_config(name: str, known: ModelConfig, suite: Suite) -> ModelConfig:
     """Return a model as a suite asks it; SpecError for one that says a response format of its own
     where the suite asks for JSON.
@@ -371,7 +352,7 @@ def prompt_dirs(suite: Path) -> list[Path]:
 
 
 def asking_remarks(suite: Suite, plan: RunPlan) -> list[str]:
-    """Return which custom prompts are sent, and who copies replies that cannot be read."""
+    """Return a sentence on each custom prompt that is sent."""
     if all(model.kind != "litellm" for model in plan.models):
         return []
     remarks: dict[str, None] = {}
@@ -384,6 +365,4 @@ def asking_remarks(suite: Suite, plan: RunPlan) -> list[str]:
             line = prompt.unsent_line
             lost = f"; the text outside of its blocks (line {line}) is NOT sent" if line else ""
             remarks[f"prompt of {track}: {files}{lost}"] = None
-    if plan.extractor is not None:
-        remarks[f"replies that cannot be read are sent to {plan.extractor.name}, as text"] = None
     return list(remarks)

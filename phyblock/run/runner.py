@@ -51,7 +51,7 @@ from phyblock.run.events import (
     Summary,
     Watcher,
 )
-from phyblock.run.judge import Extractor, about_prompt, begun, judge_episode, judge_reply
+from phyblock.run.judge import about_prompt, begun, judge_episode, judge_reply
 from phyblock.run.plan import RunPlan, Sample, provider_problem
 from phyblock.run.store import RunStore
 
@@ -88,7 +88,7 @@ class RunResult:
 def check_ready(plan: RunPlan) -> None:
     """Raise SpecError naming every model whose key or address is not set."""
     problems: list[Problem] = []
-    for config in (*plan.models, *filter(None, [plan.extractor])):
+    for config in plan.models:
         where, status = f"model {config.name}", api_key_status(config)
         if status.fault:
             problems.append(Problem(where, status.fault, "", config.id))
@@ -119,7 +119,6 @@ class Session:
     retry_failed: bool = False
     present: Mapping[str, Model] = field(default_factory=dict)
     _models: dict[str, Model] = field(init=False, default_factory=dict)
-    _extractor: Extractor | None = field(init=False, default=None)
     _waiting: set[asyncio.Task[Any]] = field(init=False, default_factory=set)
     _is_over: bool = field(init=False, default=False)
     _failure: Exception | None = field(init=False, default=None)
@@ -200,8 +199,7 @@ class Session:
             self.watch(RunNotice(text))
 
         cache: ReplyCache | None = None
-        asks = any(model.kind == "litellm" for model in plan.models)
-        if self.use_cache and (asks or plan.extractor):
+        if self.use_cache and any(model.kind == "litellm" for model in plan.models):
             cache = ReplyCache(reply_cache_file(), tell)
             stack.callback(cache.close)
         for file in (store.batches, store.calls):
@@ -233,10 +231,6 @@ class Session:
                 model = build(planned, batches=of_model if planned.batch else None)
             self._models[planned.name] = model
             stack.push_async_callback(model.aclose)
-        if plan.extractor is not None:
-            extracting = build(plan.extractor)
-            stack.push_async_callback(extracting.aclose)
-            self._extractor = Extractor(extracting, plan.extractor)
 
     def _note_stopped(self) -> None:
         result = self.result
@@ -339,17 +333,12 @@ class Session:
         request = sample.asking(await self._until_stopped(made))
         answer = await self._answer(model, request)
         fields = self._fields(sample, answer, request, config)
-        record, is_cancelled = await to_its_end(self._judged(sample, fields))
+        record, is_cancelled = await to_its_end(judge_reply(track, sample.item, fields))
         task = asyncio.current_task()
         if is_cancelled and task is not None:
             # It ends at its next wait, which is that for its record.
             task.cancel()
         return record
-
-    async def _judged(self, sample: Sample, fields: Mapping[str, Any]) -> Record:
-        track, item = sample.track, sample.item
-        record = await judge_reply(track, item, fields)
-        return await self._extractor.read(track, item, record) if self._extractor else record
 
     async def _play(self, sample: Sample, model: Model, config: ModelConfig) -> Record:
         track, item = sample.track, sample.item
