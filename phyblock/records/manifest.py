@@ -116,8 +116,7 @@ class Manifest(Line):
     scenes_by_level: dict[int, int] = Field(default_factory=dict)
     """Scenes of each level; one scene may be of several."""
     engine: str | None = None
-    """The physics engine, with its version; null where nothing in the run depends on one, and in
-    runs from before there was a choice (PyBullet)."""
+    """The physics engine, with its version; null where nothing in the run depends on one."""
     versions: dict[str, str] = Field(default_factory=dict)
     """Versions of Python, of libraries, and of the readers that read the replies."""
 

@@ -205,8 +205,8 @@ class Record(Line):
     """The track that asked."""
     model: str
     """The model that was asked."""
-    key: str = ""
-    """Names the item in its track: the scene, or the question; empty in older records of scenes."""
+    key: str
+    """Names the item in its track: the scene, or the question."""
     scene: str
     """The scene that it is about."""
     levels: tuple[Whole, ...]
@@ -233,7 +233,7 @@ class Record(Line):
     time: str = ""
     """Time when it was written, UTC."""
     run: str = ""
-    """Digest of the run that it belongs to; older records have none."""
+    """Digest of the run that it belongs to."""
     shown: ShownScene | None = None
     """The presentation of the scene; null: as in the file."""
     asked: AskedAs | None = None
@@ -302,8 +302,8 @@ class Record(Line):
 
     @property
     def item(self) -> str:
-        """The name of its item inside the track."""
-        return self.key or self.scene
+        """The name of its item inside the track, as tables call it."""
+        return self.key
 
     @property
     def group(self) -> str:

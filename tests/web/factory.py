@@ -92,6 +92,7 @@ def record(
         "sample": f"full_planning/{model}/{scene}/s{seed}",
         "track": "full_planning",
         "model": model,
+        "key": scene,
         "scene": scene,
         "levels": list(LEVELS.get(scene, (2,))),
         "parents": [scene],
