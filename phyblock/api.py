@@ -33,13 +33,11 @@ from phyblock.config.suite import load_suite as read_suite
 from phyblock.config.validation import problems_of
 from phyblock.data import AssemblyTask
 from phyblock.errors import Problem, SpecError
-from phyblock.files import write_named
-from phyblock.resources import bundled
+from phyblock.files import bundled, write_named
 from phyblock.results.load import Run, load_run
 from phyblock.run.estimate import may_bill
-from phyblock.run.events import RunEvent, Stopping
 from phyblock.run.plan import find_models_file, find_suite, make_plan, open_dataset, prompt_dirs
-from phyblock.run.runner import RunResult, Session, check_ready
+from phyblock.run.runner import RunEvent, RunResult, Session, Stopping, check_ready
 from phyblock.sim.pictures import PictureStyle, candidates_png, composite_png, goal_png, goal_style
 from phyblock.text import counted, did_you_mean
 from phyblock.tracks.items import select_tasks

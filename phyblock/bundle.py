@@ -29,16 +29,15 @@ from typing import Any
 from phyblock.errors import DataError, InputError, Problem, SpecError, StoreError, reason_of
 from phyblock.files import (
     OutFolder,
+    bundled,
     digest_of_file,
     load_json,
     open_regular,
     read_bytes,
     write_named,
 )
-from phyblock.records.files import RECORDS, read_records
-from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
+from phyblock.records.files import MANIFEST, RECORDS, Manifest, read_manifest, read_records
 from phyblock.records.record import Record, SentPrompt
-from phyblock.resources import bundled
 from phyblock.results.load import design_of
 from phyblock.run.judge import about_prompt
 from phyblock.run.rescore import judged_anew, recorded_dataset, recorded_suite, reopen_tracks

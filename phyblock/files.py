@@ -1,4 +1,4 @@
-"""Read files within bounds; write them whole, and never over what the user made.
+"""Read files within bounds; write them whole, never over the user's; find what is bundled.
 
 What a user can rely on:
 
@@ -16,6 +16,7 @@ import contextlib
 import errno
 import fcntl
 import hashlib
+import importlib
 import io
 import json
 import math
@@ -28,10 +29,11 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, BinaryIO
 from uuid import uuid4
 
-from phyblock.errors import DataError, Problem, StoreError, reason_of
+from phyblock.errors import DataError, Problem, SpecError, StoreError, reason_of
 
 if TYPE_CHECKING:
     from PIL.Image import Image
+
 
 LARGEST_FILE_BYTES = 64 * 1024 * 1024
 """Default limit of a file that is read whole [bytes]."""
@@ -450,3 +452,42 @@ def _folders(names: Iterable[str]) -> list[str]:
         path = PurePosixPath(f"{name}_" if name.endswith("/") else name)
         folders |= {str(above) for above in path.parents}
     return sorted(folders - {".", "/"})
+
+
+_PACKAGE = Path(__file__).parent
+
+
+def bundled(*parts: str) -> Path:
+    """Return a path inside what comes with the project: `benchmarks/`, `prompts/` or `models.yaml`.
+
+    In an installed wheel they lie in the package, in a checkout beside it.
+    """
+    inside = _PACKAGE / "bundled"
+    return (inside if inside.is_dir() else _PACKAGE.parent).joinpath(*parts)
+
+
+def bundled_sets(file: str) -> list[str]:
+    """Return the names of the bundled data sets that hold a file of this name, sorted."""
+    return sorted(path.parent.name for path in bundled("benchmarks", "data").glob(f"*/{file}"))
+
+
+def cache_dir() -> Path:
+    """Return the user's cache folder: `$PHYBLOCK_CACHE`, else the platform's place for caches."""
+    named = os.environ.get("PHYBLOCK_CACHE")
+    if named:
+        return Path(named).expanduser()
+    return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "phyblock"
+
+
+def reply_cache_file() -> Path:
+    """Return the reply cache that all runs of this user share."""
+    return cache_dir() / "replies.sqlite"
+
+
+def needs(package: str, extra: str, form: str) -> None:
+    """Raise SpecError that names the extra to install where a format's package is not there."""
+    try:
+        importlib.import_module(package)
+    except ImportError as error:
+        name, hint = package.partition(".")[0], f"pip install 'phyblock[{extra}]'"
+        raise SpecError(Problem(f"--to {form}", f"needs the package {name}", hint=hint)) from error

@@ -21,6 +21,9 @@ _MODULES = (
 )
 """Modules that hold a `TRACK`, in the order in which tracks are listed."""
 
+PLUGINS: list[str] = []
+"""Modules that every worker process imports first: what they add is known there as well."""
+
 _registered: dict[str, type[Track]] = {}
 _measures: dict[str, tuple[Any, ...]] = {}
 _baselines: dict[str, dict[str, Callable[..., str]]] = {}

@@ -22,9 +22,9 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
+from phyblock.registry import PLUGINS
+
 T = TypeVar("T")
-PLUGINS: list[str] = []
-"""Modules that every worker imports first: what they add is known there as well."""
 
 
 class WorkerDiedError(RuntimeError):

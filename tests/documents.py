@@ -20,10 +20,8 @@ from pydantic import TypeAdapter
 from phyblock.config.validation import models_in
 from phyblock.data.questions import StoredQuestion
 from phyblock.data.scenes import StoredScene
-from phyblock.records.files import known_records, record_types
-from phyblock.records.line import Line
-from phyblock.records.manifest import Manifest
-from phyblock.records.record import BatchLine, Call, Prompt
+from phyblock.records.files import Manifest, known_records, record_types
+from phyblock.records.record import BatchLine, Call, Line, Prompt
 
 ROOT = Path(__file__).parents[1]
 SCHEMAS = Path("benchmarks", "schemas")

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 from phyblock.data import recorded_models
-from phyblock.models.replay import read_raw_reply
+from phyblock.models.client import read_raw_reply
 
 
 @functools.cache

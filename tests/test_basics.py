@@ -26,7 +26,7 @@ from hypothesis import strategies as st
 from phyblock.data import read_builtin, read_questions
 from phyblock.domain import euler_deg_to_matrix
 from phyblock.errors import DataError, ModelError, Problem
-from phyblock.resources import bundled
+from phyblock.files import bundled
 from phyblock.scoring.pose import Piece, PoseFit, overlap_volume, placed
 from phyblock.sim.geometry import collision_pieces
 from phyblock.stable import plain_sum

@@ -33,8 +33,7 @@ from phyblock.bundle import (
     unpack,
 )
 from phyblock.errors import DataError, StoreError
-from phyblock.records.files import RECORDS, known_records
-from phyblock.records.manifest import MANIFEST, Manifest
+from phyblock.records.files import MANIFEST, RECORDS, Manifest, known_records
 from phyblock.stable import hex_digest
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat

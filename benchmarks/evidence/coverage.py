@@ -17,7 +17,7 @@ from collections import defaultdict
 import numpy as np
 from scipy.special import ndtr, ndtri, stdtr, stdtrit  # type: ignore[import-untyped]
 
-from phyblock.scoring.counts import Floats, Metric, f1_of
+from phyblock.scoring.plan import Floats, Metric, f1_of
 from phyblock.scoring.statistics import Clusters, in_range, jackknife
 from tests.scoring.worlds import World
 

@@ -24,8 +24,8 @@ import numpy as np
 
 from phyblock.data import read_builtin, read_questions
 from phyblock.domain.scene import Block, Scene
+from phyblock.files import bundled
 from phyblock.making.questions.production import problem_of
-from phyblock.resources import bundled
 from phyblock.sim.dynamics import settle
 from phyblock.sim.engine import PHYSICS_VARIABLE, described_engine, installed_engines
 

@@ -16,10 +16,9 @@ import numpy as np
 
 from phyblock.data import AssemblyTask, read_official, recorded_models
 from phyblock.domain import Plan
-from phyblock.models.replay import read_raw_reply
+from phyblock.models.client import read_raw_reply
 from phyblock.parsing.plan import parse_plan
-from phyblock.scoring.counts import micro
-from phyblock.scoring.plan import Goal, match_plan
+from phyblock.scoring.plan import Goal, match_plan, micro
 from phyblock.types import MATCHERS, SETTINGS
 
 

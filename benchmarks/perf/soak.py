@@ -25,7 +25,7 @@ from measure import Cost, run_measured
 from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
 from phyblock.data import read_builtin
-from phyblock.resources import bundled
+from phyblock.files import bundled
 from phyblock.run.plan import make_plan
 
 PHYBLOCK = (sys.executable, "-m", "phyblock")
@@ -35,7 +35,7 @@ import asyncio, sys
 from pathlib import Path
 from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
-from phyblock.resources import bundled
+from phyblock.files import bundled
 from phyblock.run.plan import make_plan
 from phyblock.run.runner import Session
 

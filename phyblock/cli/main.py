@@ -13,9 +13,9 @@ import click
 
 from phyblock.cli.options import Sections, Verbs
 from phyblock.errors import InputError, PhyblockError, Problem, SpecError, StoreError, reason_of
+from phyblock.registry import PLUGINS
 from phyblock.text import counted, plain_lines
 from phyblock.types import QUOTE_HINT
-from phyblock.workers import PLUGINS
 
 _CLI, _MAKING = "phyblock.cli", "phyblock.making.cli"
 _SECTIONS: Sections = {

@@ -21,16 +21,16 @@ from rich.progress import (
 from rich.text import Text
 
 from phyblock.models import ModelEvent
-from phyblock.run.events import (
+from phyblock.run.runner import (
     ModelStopped,
     RunEvent,
     RunNotice,
     RunStarted,
     SampleDone,
     Stopping,
-    Summary,
 )
-from phyblock.scoring.counts import Counts
+from phyblock.run.store import Summary
+from phyblock.scoring.plan import Counts
 from phyblock.text import counted, one_line
 from phyblock.types import FAILURES
 

@@ -21,7 +21,7 @@ from phyblock.cli.options import (
     run_argument,
 )
 from phyblock.errors import Problem, SpecError
-from phyblock.results.summary import REPORT_FILE, TABLES, Summary, kept_summary, sources
+from phyblock.results.text import REPORT_FILE, TABLES, Summary, kept_summary, sources
 from phyblock.text import counted, one_line
 
 _MB = 1e6

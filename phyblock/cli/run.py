@@ -37,9 +37,7 @@ from phyblock.cli.results import show_tables
 from phyblock.config.models import load_models
 from phyblock.files import OutFolder
 from phyblock.models.costs import price_source
-from phyblock.models.litellm_client import be_quiet
-from phyblock.results.summary import REPORT_FILE, TABLES, kept_summary
-from phyblock.results.text import NO_VALUE, Column, TextTable
+from phyblock.results.text import NO_VALUE, REPORT_FILE, TABLES, Column, TextTable, kept_summary
 from phyblock.run.estimate import Estimate, estimate, may_bill
 from phyblock.run.plan import (
     RunPlan,
@@ -48,7 +46,6 @@ from phyblock.run.plan import (
     find_models_file,
     make_plan,
 )
-from phyblock.run.rescore import rescore
 from phyblock.run.runner import RunResult, Session, check_ready
 from phyblock.run.store import held_run
 from phyblock.text import counted, one_line
@@ -130,7 +127,10 @@ def run(
     ):
         console.print("Nothing was asked.")
         return 1
-    be_quiet()
+    if any(model.kind == "litellm" for model in plan.models):
+        from phyblock.models.litellm_client import be_quiet
+
+        be_quiet()
     with ProgressView(console) as view:
         session = Session(plan, folder, view, **asks)
         result = completed(session, _SIGNALS, lambda: view.tick(asks=session.under_way > 0))
@@ -247,6 +247,7 @@ def score(
     The new scores replace the records of RUN in one step. With another parser or matcher they go
     to RUN/scores/PARSER-MATCHER, or to --out, and RUN stays as it is.
     """
+    from phyblock.run.rescore import rescore
 
     console, shown_s = make_console(stderr=True), time.monotonic()
 

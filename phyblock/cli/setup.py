@@ -15,8 +15,7 @@ from phyblock.config.suite import suite_model
 from phyblock.config.yaml import read_yaml
 from phyblock.data import SCENES_FILE, read_builtin, read_official
 from phyblock.errors import InputError, Problem, SpecError
-from phyblock.files import check_free, writing
-from phyblock.resources import bundled, reply_cache_file
+from phyblock.files import bundled, check_free, reply_cache_file, writing
 from phyblock.run.plan import (
     asking_remarks,
     bundled_suites,

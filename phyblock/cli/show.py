@@ -142,7 +142,7 @@ def _print_reply(console: Console, reply: Reply, number: str) -> None:
 
 def _task(run: Path, record: Record, data: Path | None) -> AssemblyTask:
     """Return the scene with its candidates as it was shown; DataError where it is not at hand."""
-    from phyblock.records.manifest import read_manifest
+    from phyblock.records.files import read_manifest
     from phyblock.run.rescore import recorded_dataset
     from phyblock.tracks.items import as_recorded
 

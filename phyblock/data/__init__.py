@@ -23,7 +23,7 @@ from phyblock.data.official import (
 from phyblock.data.questions import QUESTIONS_FILE, read_questions
 from phyblock.data.scenes import SCENES_FILE, read_builtin
 from phyblock.errors import DataError, Problem
-from phyblock.resources import bundled, bundled_sets
+from phyblock.files import bundled, bundled_sets
 
 __all__ = [
     "QUESTIONS_FILE",

@@ -61,7 +61,7 @@ from phyblock.domain import (
 )
 from phyblock.errors import DataError, Problem
 from phyblock.files import load_json
-from phyblock.records.line import Line, decode
+from phyblock.records.record import Line, decode
 
 _GOALS = Path("data", "SCENEs_400_Goal_Jsons")
 _CANDIDATES = Path("data", "SCENEs_400_Cand_Jsons")

@@ -38,7 +38,7 @@ from phyblock.domain.question import (
 )
 from phyblock.domain.scene import Block, Scene
 from phyblock.errors import DataError, Problem
-from phyblock.records.line import Line, decode
+from phyblock.records.record import Line, decode
 from phyblock.types import Background
 
 QUESTIONS_FILE = "questions.jsonl"

@@ -17,10 +17,17 @@ from pydantic import AfterValidator, AliasChoices, Field, StrictInt, TypeAdapter
 from phyblock.config.validation import Fault, OneOf, ShapeName, checked, form
 from phyblock.config.yaml import shown
 from phyblock.data.base import AssemblyTask, Dataset, read_lines, report
-from phyblock.domain.aov import AOVGraph, CycleError
 from phyblock.domain.blocks import Color
-from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, CandidateSet, Scene
-from phyblock.records.line import Line, decode
+from phyblock.domain.scene import (
+    MAX_CANDIDATES,
+    AOVGraph,
+    Block,
+    Candidate,
+    CandidateSet,
+    CycleError,
+    Scene,
+)
+from phyblock.records.record import Line, decode
 
 SCENES_FILE = "scenes.jsonl"
 MAX_BLOCKS = 22

@@ -13,7 +13,6 @@ from phyblock.domain.blocks import (
     symmetries,
     turn_deg,
 )
-from phyblock.domain.plan import Plan, PoseStep
 from phyblock.domain.question import (
     CATEGORIES,
     LETTERS,
@@ -25,7 +24,15 @@ from phyblock.domain.question import (
     Subtask,
     is_picture_option,
 )
-from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, CandidateSet, Scene
+from phyblock.domain.scene import (
+    MAX_CANDIDATES,
+    Block,
+    Candidate,
+    CandidateSet,
+    Plan,
+    PoseStep,
+    Scene,
+)
 
 __all__ = [
     "BLOCK_TYPES",

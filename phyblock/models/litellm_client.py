@@ -30,10 +30,10 @@ from phyblock.models.client import (
     malformed,
     read_completion,
     read_json,
+    read_raw_reply,
 )
 from phyblock.models.costs import map_entry, mapped_providers
 from phyblock.models.keys import KEYLESS, api_key
-from phyblock.models.replay import read_raw_reply
 from phyblock.models.request import Request, wire_messages, wire_params
 from phyblock.records.record import Reply, Usage
 

@@ -1,19 +1,24 @@
-"""A model behind a network, top to bottom: cache, retries, limits, budget, a server's client."""
+"""A model from its configuration to its reply: cache, retries, limits, budget, servers, client."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import random
-from collections.abc import Callable
+import time
+from collections import deque
+from collections.abc import AsyncIterator, Awaitable, Callable, Hashable, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from tenacity import AsyncRetrying, RetryCallState, retry_if_exception_type
 
 from phyblock.config.models import DIRECT_PROVIDERS, ModelConfig
-from phyblock.errors import ModelError, RetryableError, UnavailableError
+from phyblock.errors import ModelError, Problem, RetryableError, SpecError, UnavailableError
 from phyblock.models.cache import ReplyCache, reply_key
+from phyblock.models.client import Client, HttpClient, OpenAIClient
 from phyblock.models.costs import (
+    Budget,
     Estimate,
     ModelBudget,
     cost_usd,
@@ -21,14 +26,108 @@ from phyblock.models.costs import (
     estimate,
     map_entry,
     may_be_billed,
+    tariff_of,
 )
-from phyblock.models.limits import Clock, Limits
-from phyblock.models.request import Journal, Request
-from phyblock.models.servers import Server, Servers
+from phyblock.models.replay import open_baseline, open_replay
+from phyblock.models.request import Journal, Model, Request
 from phyblock.records.record import Call, Reply
+
+if TYPE_CHECKING:
+    from phyblock.models.batch import BatchFiles
 
 _SCHEMA_PROVIDERS = ("predibase", "fireworks_ai", "lm_studio", "nebius", "databricks")
 """Providers whose models, as litellm knows, all accept a schema."""
+
+WINDOW_S = 60.0
+_NAP_S = 1.0
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Time as limits, retries and servers see it; tests give their own."""
+
+    now: Callable[[], float] = time.monotonic
+    sleep: Callable[[float], Awaitable[None]] = asyncio.sleep
+
+
+@dataclass
+class Started:
+    """A request that was started: when [s], and how many tokens it counts for."""
+
+    at_s: float
+    tokens: int
+
+
+class Limits:
+    """All limits of one model: requests under way, and requests and tokens in any 60 s.
+
+    A request larger than `tpm` by itself is let through when nothing was started for a minute, or
+    it could never start. `overall` is shared by all models of a run; `rest_s` says how long no
+    server of the model is to be asked, as after a 429.
+    """
+
+    def __init__(
+        self,
+        most: int,
+        overall: asyncio.Semaphore,
+        rpm: int | None = None,
+        tpm: int | None = None,
+        *,
+        rest_s: Callable[[], float] = lambda: 0.0,
+        clock: Clock | None = None,
+    ) -> None:
+        self._under_way = asyncio.Semaphore(most)
+        self._overall = overall
+        self._rpm = rpm
+        self._tpm = tpm
+        self._rest_s = rest_s
+        self._clock = clock or Clock()
+        self._admission = asyncio.Lock()
+        self._started: deque[Started] = deque()
+        self._tokens = 0
+
+    @contextlib.asynccontextmanager
+    async def slot(self, tokens: int) -> AsyncIterator[Started]:
+        """Hold a place of the model and of the whole run; `tokens` is the estimate for tpm.
+
+        Requests are admitted one after the other; a model that waits for its minute holds no place
+        that another could use.
+        """
+        async with self._under_way:
+            async with self._admission:
+                while (wait_s := max(self._rest_s(), self._window_s(tokens))) > 0:
+                    # In naps, as a server that rests may be heard of earlier.
+                    await self._clock.sleep(min(wait_s, _NAP_S))
+                await self._overall.acquire()
+                started = Started(self._clock.now(), tokens)
+                self._started.append(started)
+                self._tokens += tokens
+            try:
+                yield started
+            finally:
+                self._overall.release()
+
+    def settle(self, started: Started, tokens: int) -> None:
+        """Put the tokens that a request really took in the place of the estimate."""
+        if started.at_s > self._clock.now() - WINDOW_S:
+            self._tokens += tokens - started.tokens
+            started.tokens = tokens
+
+    def _window_s(self, tokens: int) -> float:
+        """Return the seconds until a request of so many tokens may start."""
+        now = self._clock.now()
+        while self._started and self._started[0].at_s <= now - WINDOW_S:
+            self._tokens -= self._started.popleft().tokens
+        must_leave = 0 if self._rpm is None else max(0, len(self._started) - self._rpm + 1)
+        if self._tpm is not None:
+            held = self._tokens
+            for count, started in enumerate(self._started):
+                if held + tokens <= self._tpm:
+                    break
+                held -= started.tokens
+                must_leave = max(must_leave, count + 1)
+        return self._started[must_leave - 1].at_s + WINDOW_S - now if must_leave else 0.0
+
 
 EventKind = Literal["retry", "batch"]
 
@@ -123,6 +222,139 @@ class RetryPolicy:
             before_sleep=before_sleep,
             reraise=True,
         )
+
+
+FAILURES_TO_REST = 5
+_REQUESTS_TO_REST = 2
+"""One request that a server cannot survive is no outage."""
+_LONGEST_REST_S = 15.0
+_GATEWAY = (502, 503, 504)
+_TOO_MUCH = (429, 529)
+
+
+@dataclass(eq=False)
+class Server:
+    """One server: `failures` in a row, of the requests `failed`, show that it is away, since
+    `away_since_s`; it has rested `rests` times since. `refusal` is why it is asked no more.
+    """
+
+    name: str
+    client: Client
+    under_way: int = 0
+    sent: int = 0
+    failures: int = 0
+    failed: set[Hashable] = field(default_factory=set)
+    away_since_s: float = 0.0
+    rests: int = 0
+    rested_at_s: float = float("-inf")
+    rests_until_s: float = float("-inf")
+    was_heard: bool = False
+    refusal: UnavailableError | None = None
+
+
+class Servers:
+    """Chooses among the servers of a model: the least loaded, while one that fails rests.
+
+    What a server says itself, an error 500 or a 429 too, shows that it is there. No connection, a
+    lost one, or a gateway that finds nothing behind it (502, 503, 504) shows that it is not. An
+    answer that does not come in time shows neither: some requests are slow. `tell` is called with
+    what happens to them.
+    """
+
+    def __init__(
+        self, servers: Sequence[Server], policy: RetryPolicy, tell: Callable[[str], None]
+    ) -> None:
+        self.all = tuple(servers)
+        self._policy = policy
+        self._tell = tell
+
+    def usable(self) -> list[Server]:
+        """List the servers that are not given up; raises UnavailableError when there is none."""
+        usable = [server for server in self.all if server.refusal is None]
+        if not usable and (refusal := self.all[-1].refusal) is not None:
+            raise UnavailableError(str(refusal), status=refusal.status, sent=refusal.sent)
+        return usable
+
+    def rest_s(self) -> float:
+        """Return the seconds until some server may be asked; UnavailableError when none is left."""
+        return max(0.0, min(s.rests_until_s for s in self.usable()) - self._policy.clock.now())
+
+    def pick(self, failed: Server | None = None) -> Server:
+        """Return the server to ask: one that does not rest and has the fewest requests under way.
+
+        One that just `failed` the request is asked only where there is no other. One that was away
+        is asked by a single request at a time, until it answers.
+        """
+        now_s = self._policy.clock.now()
+        chosen = min(
+            self.usable(),
+            key=lambda s: (max(0.0, s.rests_until_s - now_s), s is failed, s.under_way, s.sent),
+        )
+        if chosen.rests:
+            chosen.rests_until_s = now_s + self._rest_of(chosen)
+        return chosen
+
+    def heard(self, server: Server) -> None:
+        """Note that a server answered."""
+        if server.rests:
+            lasted_s = self._policy.clock.now() - server.away_since_s
+            self._tell(f"{server.name} answers again after {lasted_s:.0f} s")
+            server.rests_until_s = float("-inf")
+        server.was_heard, server.failures, server.rests = True, 0, 0
+        server.failed.clear()
+
+    def failed(self, server: Server, error: ModelError, request: Hashable, sent_s: float) -> bool:
+        """Note that a request that was sent at `sent_s` failed; True if that is the server's fault,
+        so that another attempt is free.
+
+        Requests that were sent before a server began to rest tell nothing new when they fail.
+        """
+        if isinstance(error, UnavailableError):
+            self._refuse(server, error)
+            return True
+        if error.sent not in ("no", "lost") and error.status not in _GATEWAY:
+            if error.sent == "answered":
+                self.heard(server)
+            return False
+        server.was_heard |= error.status is not None
+        if server.rests and sent_s <= server.rested_at_s:
+            return True
+        now_s = self._policy.clock.now()
+        server.away_since_s = server.away_since_s if server.failures else now_s
+        server.failures += 1
+        server.failed.add(request)
+        if server.failures < FAILURES_TO_REST or len(server.failed) < _REQUESTS_TO_REST:
+            return False
+        server.rests += 1
+        server.rested_at_s = now_s
+        wait_s = max(self._rest_of(server), self._policy.followed_s(error))
+        server.rests_until_s = now_s + wait_s
+        lasted_s, name = now_s - server.away_since_s, server.name
+        tries = FAILURES_TO_REST + server.rests - 1
+        if self._policy.gives_up(error, server.rests, lasted_s):
+            why = f"{name} could not be reached for {lasted_s:.0f} s: {error}"
+            self._refuse(server, UnavailableError(why, sent="no"))
+        elif not server.was_heard and tries >= self._policy.max_connection_failures:
+            why = f"{name} never answered, {tries} times in a row: {error}"
+            self._refuse(server, UnavailableError(why, sent="no"))
+        elif server.rests == 1:
+            self._tell(f"{name} cannot be reached, trying now and then: {error}")
+        return True
+
+    def pause(self, server: Server, error: RetryableError, wait_s: float) -> None:
+        """Stop using a server that reports overload, for a while."""
+        if error.status in _TOO_MUCH:
+            until_s = self._policy.clock.now() + wait_s
+            server.rests_until_s = max(server.rests_until_s, until_s)
+
+    def _refuse(self, server: Server, error: UnavailableError) -> None:
+        is_first, server.refusal = server.refusal is None, error
+        if is_first and any(other.refusal is None for other in self.all):
+            self._tell(f"{server.name} is asked no more: {error}")
+
+    def _rest_of(self, server: Server) -> float:
+        doubled_s = self._policy.base_s * 2.0 ** min(server.rests, 60)
+        return min(_LONGEST_REST_S, self._policy.max_wait_s, doubled_s)
 
 
 @dataclass
@@ -307,3 +539,72 @@ def takes_format(config: ModelConfig) -> bool:
     is_own = config.provider in DIRECT_PROVIDERS and config.has_address
     is_known = is_own or config.provider in _SCHEMA_PROVIDERS
     return is_known or bool(map_entry(config).get("supports_response_schema"))
+
+
+def build_model(
+    config: ModelConfig,
+    *,
+    cache: ReplyCache | None,
+    overall: asyncio.Semaphore | None = None,
+    budget: Budget | None = None,
+    journal: Journal | None = None,
+    observer: Observer = lambda _: None,
+    tell: Tell = lambda _: None,
+    policy: RetryPolicy | None = None,
+    batches: BatchFiles | None = None,
+) -> Model:
+    """Return the model that a configuration describes; nothing is imported or sent before it asks.
+
+    `overall` bounds what all models of a run have under way together; `observer` hears of the
+    model, `tell` of its servers. `batches` is where a model that is asked so keeps them. Raises
+    SpecError for an unknown baseline, a model without a price under a limit or a provider without
+    batches, DataError for missing recordings.
+    """
+    if config.kind == "baseline":
+        return open_baseline(config)
+    if config.kind == "replay":
+        return open_replay(config)
+    if not config.provider:
+        where, hint = f"model {config.name}", "for example openai/gpt-4o-2024-08-06"
+        raise SpecError(Problem(where, "needs a provider", "id", config.id, hint=hint))
+    policy = policy or RetryPolicy()
+    tariff = tariff_of(config)
+    own = (budget or Budget()).of(config.name, tariff, config.max_cost_usd)
+    if own.is_limited and tariff is None:
+        hint = "give it a price in models.yaml, or run without max_cost_usd"
+        message = "has no known price, so that max_cost_usd cannot be kept"
+        raise SpecError(Problem(f"model {config.name}", message, "price", config.id, hint=hint))
+
+    def client(at: ModelConfig, http: HttpClient | None = None) -> Client:
+        if at.is_direct:
+            return OpenAIClient(at, http)
+        from phyblock.models.litellm_client import LitellmClient
+
+        return LitellmClient(at, http)
+
+    shared: dict[str, Any] = {"config": config, "cache": cache, "budget": own, "policy": policy,
+                              "observer": observer}  # fmt: skip
+    if config.batch:
+        from phyblock.models.batch import BatchModel
+
+        assert batches is not None, "batches are kept in a run"
+        return BatchModel(client=lambda http: client(config, http), files=batches, **shared)
+    each = [
+        Server(_origin(address) or config.provider, client(config.at(address)))
+        for address in config.addresses or (None,)
+    ]
+    servers = Servers(each, policy, tell)
+    limits = Limits(
+        config.max_concurrency,
+        overall or asyncio.Semaphore(config.max_concurrency),
+        config.rpm,
+        config.tpm,
+        rest_s=servers.rest_s,
+        clock=policy.clock,
+    )
+    return ChatModel(servers=servers, limits=limits, journal=journal, **shared)
+
+
+def _origin(address: str | None) -> str:
+    """Return scheme, host and port of an address."""
+    return "/".join((address or "").split("/")[:3]).lower()

@@ -12,8 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from phyblock.parsing.structured import AnswerForm
-from phyblock.parsing.text import answer_of, plain_lines
+from phyblock.parsing.text import AnswerForm, answer_of, plain_lines
 
 AnswerProblem = Literal["empty", "thoughts_only", "no_answer"]
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, Literal, get_args
 
-from phyblock.parsing.structured import AnswerForm, whole_number
-from phyblock.parsing.text import answer_of, plain_lines
+from phyblock.parsing.text import AnswerForm, answer_of, plain_lines, whole_number
 
 MoveProblem = Literal["empty", "thoughts_only", "no_move", "several_moves"]
 MOVE_PROBLEMS: tuple[MoveProblem, ...] = get_args(MoveProblem)

@@ -16,8 +16,14 @@ from functools import cached_property
 from typing import Any, Literal
 
 from phyblock.domain import Plan
-from phyblock.parsing.structured import AnswerForm, whole_number
-from phyblock.parsing.text import READER_VERSION, answer_of, is_open, plain_lines
+from phyblock.parsing.text import (
+    READER_VERSION,
+    AnswerForm,
+    answer_of,
+    is_open,
+    plain_lines,
+    whole_number,
+)
 from phyblock.types import PlanParser
 
 PlanProblem = Literal["empty", "thoughts_only", "no_plan"]

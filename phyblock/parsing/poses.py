@@ -14,10 +14,9 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from phyblock.domain import PoseStep
-from phyblock.domain.plan import PosePlan
+from phyblock.domain.scene import PosePlan
 from phyblock.parsing.plan import chosen_list, item_lists, step_lists
-from phyblock.parsing.structured import AnswerForm, whole_number
-from phyblock.parsing.text import answer_of, is_open, plain_lines
+from phyblock.parsing.text import AnswerForm, answer_of, is_open, plain_lines, whole_number
 
 MOST_POSE_STEPS = 100  # Longer plans are not executed: no goal has a quarter of it.
 FARTHEST_PLACE_CM = 1000.0  # Coordinates beyond this are no place on a table.

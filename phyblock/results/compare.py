@@ -40,7 +40,7 @@ from phyblock.results.text import (
     values,
     wholes,
 )
-from phyblock.scoring.counts import Floats
+from phyblock.scoring.plan import Floats
 from phyblock.scoring.statistics import (
     CONFIDENCE,
     NO_COMPONENT,

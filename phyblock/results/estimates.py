@@ -16,7 +16,7 @@ from phyblock.config.suite import Suite
 from phyblock.errors import Problem, StoreError
 from phyblock.records.files import RECORDS
 from phyblock.results.load import Design, Run, track_measures
-from phyblock.scoring.counts import Floats
+from phyblock.scoring.plan import Floats
 from phyblock.scoring.statistics import Clusters, in_range, jackknife
 from phyblock.stable import plain_sum
 from phyblock.tracks.base import kind_of

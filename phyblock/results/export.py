@@ -14,11 +14,10 @@ import pandas as pd
 
 from phyblock.data import Dataset, QuestionTask, find_questions
 from phyblock.domain import LETTERS, SUBTASKS, Question, is_picture_option
-from phyblock.files import OutFolder, writing
+from phyblock.files import OutFolder, needs, writing
 from phyblock.models.request import Image
 from phyblock.records.files import RecordLines, read_prompts, record_types
 from phyblock.records.record import PictureMark, PromptMessage, Record
-from phyblock.resources import needs
 from phyblock.results.load import TOKENS, Run, track_measures
 from phyblock.results.text import to_csv
 from phyblock.sim.pictures import PictureStyle

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import pandas as pd
 
-from phyblock.files import OutFolder
-from phyblock.resources import cache_dir
+from phyblock.files import OutFolder, cache_dir
 from phyblock.results.compare import (
     ITEMS,
     compare_models,

@@ -14,11 +14,17 @@ from numpy.typing import NDArray
 
 from phyblock.config.suite import Suite
 from phyblock.errors import Problem, SpecError
-from phyblock.records.files import run_records
-from phyblock.records.manifest import MANIFEST, Manifest, ManifestModel, read_manifest, suite_of
+from phyblock.records.files import (
+    MANIFEST,
+    Manifest,
+    ManifestModel,
+    read_manifest,
+    run_records,
+    suite_of,
+)
 from phyblock.records.record import Record
 from phyblock.registry import added_measures
-from phyblock.scoring.counts import Floats
+from phyblock.scoring.plan import Floats
 from phyblock.tracks.base import kind_of
 from phyblock.tracks.measures import Cell, Measure, SampleCounts, Way
 from phyblock.types import WITHOUT_REPLY

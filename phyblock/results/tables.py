@@ -30,10 +30,11 @@ from phyblock.results.estimates import (
 )
 from phyblock.results.load import TOKENS, Run, load_run, track_measures
 from phyblock.results.paper import beside_paper, is_as_published
-from phyblock.results.summary import TABLES, Summary
 from phyblock.results.text import (
     NO_VALUE,
+    TABLES,
     Column,
+    Summary,
     Table,
     TextTable,
     captioned,
@@ -196,11 +197,11 @@ def coverage_frame(run: Run) -> pd.DataFrame:
     `expected` samples are `recorded` + `not_run`; the outcomes split `recorded`. Of the `replies`
     (samples that hold one; of step planning, a whole episode together): mean tokens of those that
     tell, with `tokens_unknown` that do not; `cost_usd` what the run paid, the sum of the known
-    prices, NaN where none is, with `cost_unknown` without one; `cached` ones were paid for by another run and cost nothing here;
-    `cost_per_100_usd` what 100 cost at the price of those with a known one, cached ones included;
-    median and 90th percentile of the latency [s] of those for which a request was sent; `attempts`
-    the sum of requests sent for them. NaN where nothing is known. The same frame whenever it is
-    asked for, not to be changed.
+    prices, NaN where none is, with `cost_unknown` without one; `cached` ones were paid for by
+    another run and cost nothing here; `cost_per_100_usd` what 100 cost at the price of those with a
+    known one, cached ones included; median and 90th percentile of the latency [s] of those for
+    which a request was sent; `attempts` the sum of requests sent for them. NaN where nothing is
+    known. The same frame whenever it is asked for, not to be changed.
     """
     if _MADE in run.made:
         return run.made[_MADE]

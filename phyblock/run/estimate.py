@@ -11,6 +11,7 @@ from pathlib import Path
 
 from phyblock.config.models import ModelConfig, Tariff
 from phyblock.config.suite import Variant
+from phyblock.files import reply_cache_file
 from phyblock.models import Estimate as CallEstimate
 from phyblock.models import (
     Image,
@@ -19,12 +20,10 @@ from phyblock.models import (
     is_billed,
     reply_key,
     tariff_of,
-    under_way,
 )
 from phyblock.models import estimate as estimate_call
 from phyblock.models.costs import is_free, most_usd, price_at
 from phyblock.records.files import BatchLines, run_records
-from phyblock.resources import reply_cache_file
 from phyblock.run.plan import RunPlan, Sample
 from phyblock.run.store import held_run
 
@@ -122,9 +121,11 @@ def estimate(
             kind = _kind(record.track, record.way)
             for reply in record.replies:
                 rows[record.model].add_reply(reply.usage.completion_tokens, kind)
-        lines = tuple(line for _, line in BatchLines(folder))
-        batches = [one for m in plan.models if m.batch for one in under_way(lines, m.name)]
-        waiting = {key for one in batches for key in one.most_usd}
+        if lines := tuple(line for _, line in BatchLines(folder)):
+            from phyblock.models.batch import under_way
+
+            batches = [one for m in plan.models if m.batch for one in under_way(lines, m.name)]
+            waiting = {key for one in batches for key in one.most_usd}
     path = reply_cache_file()
     with ReplyCache(path) if use_cache and path.exists() else nullcontext() as cache:
         for sample, outlines in _samples(plan):

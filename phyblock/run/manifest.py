@@ -15,7 +15,7 @@ from phyblock.config.models import HUMAN, ModelConfig
 from phyblock.config.suite import Suite, Variant
 from phyblock.data import UNNUMBERED, Dataset, read_version
 from phyblock.parsing.text import READER_VERSION
-from phyblock.records.manifest import FORMAT, Manifest
+from phyblock.records.files import FORMAT, Manifest
 from phyblock.sim.engine import ENGINES, described_engine
 from phyblock.stable import hex_digest
 from phyblock.tracks import Track, kind_of

@@ -15,10 +15,10 @@ from phyblock.config.yaml import read_yaml
 from phyblock.data import SCENES_FILE, Dataset, read_builtin, read_official, recorded_models
 from phyblock.data.official import match_published
 from phyblock.errors import DataError, Problem, SpecError
-from phyblock.models import Request, known_providers, server_address, takes_format
-from phyblock.records.manifest import MANIFEST, Manifest, read_manifest, suite_of
+from phyblock.files import bundled, bundled_sets
+from phyblock.models import Request, server_address, takes_format
+from phyblock.records.files import MANIFEST, Manifest, read_manifest, suite_of
 from phyblock.registry import track_baselines
-from phyblock.resources import bundled, bundled_sets
 from phyblock.run.manifest import make_manifest
 from phyblock.stable import drawn_bytes
 from phyblock.text import did_you_mean
@@ -302,6 +302,8 @@ def provider_problem(config: ModelConfig, where: str) -> Problem | None:
     """That a model is asked through litellm, which does not know its provider, or None."""
     if config.kind != "litellm" or config.is_direct:
         return None
+    from phyblock.models.litellm_client import known_providers
+
     providers = known_providers(config)
     if config.provider in providers:
         return None

@@ -17,8 +17,7 @@ from phyblock.data import Dataset
 from phyblock.errors import DataError, Problem, SpecError, StoreError
 from phyblock.files import OutFolder
 from phyblock.parsing.plan import reader_version
-from phyblock.records.files import run_records
-from phyblock.records.manifest import MANIFEST, Manifest, read_manifest, suite_of
+from phyblock.records.files import MANIFEST, Manifest, read_manifest, run_records, suite_of
 from phyblock.records.record import AskedTurn, Record, StoredError
 from phyblock.run.judge import about_item, judge_reply, judged
 from phyblock.run.manifest import asked_counts, code_versions

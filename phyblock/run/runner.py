@@ -10,12 +10,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections import deque
-from collections.abc import Coroutine, Mapping
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import (
@@ -26,34 +26,82 @@ from phyblock.errors import (
     StoreError,
     UnavailableError,
 )
+from phyblock.files import reply_cache_file
 from phyblock.models import (
-    BatchFiles,
     Budget,
     HaltedError,
     Model,
+    ModelEvent,
     ReplyCache,
     Request,
     RetryPolicy,
     api_key_status,
     build_model,
     reply_key,
-    under_way,
 )
 from phyblock.records.files import BATCHES
 from phyblock.records.record import Record, Reply
-from phyblock.resources import reply_cache_file
-from phyblock.run.events import (
-    ModelStopped,
-    RunNotice,
-    RunStarted,
-    SampleDone,
-    Stopping,
-    Summary,
-    Watcher,
-)
 from phyblock.run.judge import about_prompt, begun, judge_episode, judge_reply
 from phyblock.run.plan import RunPlan, Sample, provider_problem
-from phyblock.run.store import RunStore
+from phyblock.run.store import RunStore, Summary
+from phyblock.text import counted
+
+if TYPE_CHECKING:
+    from phyblock.models.batch import BatchFiles
+
+
+@dataclass(frozen=True)
+class RunStarted:
+    """Samples in all, and the final records already on disk summed up, by model."""
+
+    expected: Mapping[str, int]
+    earlier: Mapping[str, Sequence[Summary]]
+
+
+@dataclass(frozen=True)
+class SampleDone:
+    """A record was written."""
+
+    record: Record
+
+
+@dataclass(frozen=True)
+class RunNotice:
+    """Something that concerns no single model: a server that is gone, a cache set aside."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class ModelStopped:
+    """A model is asked no more: it is not available."""
+
+    model: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Stopping:
+    """The run takes no new samples: it was interrupted, its cost limit is reached, or an error of
+    our own ends it; `in_flight` calls are waited for.
+    """
+
+    cause: Literal["interrupted", "cost", "error"]
+    reason: str
+    in_flight: int = 0
+
+    @property
+    def text(self) -> str:
+        """Message to a person who stopped it: what it waits for, and how to give that up."""
+        if not self.in_flight:
+            return f"Stopping: {self.reason}."
+        calls = f"{counted(self.in_flight, 'call')} under way"
+        return f"Stopping: {self.reason}; waiting for {calls} (Ctrl-C again to give them up)."
+
+
+RunEvent = RunStarted | SampleDone | ModelEvent | RunNotice | ModelStopped | Stopping
+Watcher = Callable[[RunEvent], None]
+
 
 _Result = TypeVar("_Result")
 
@@ -182,18 +230,11 @@ class Session:
         return queues
 
     def _open_models(self, stack: AsyncExitStack, queues: Mapping[str, deque[Sample]]) -> None:
-        """Build the models that are not present; SpecError for one with a batch under way that is
-        asked singly now.
-        """
+        """Build the models that are not present."""
         plan, store, limits = self.plan, self._store, self.plan.suite.limits
-        message = "has a batch under way, whose questions would be asked twice"
-        hint = f"let it end with batch: true, or remove its lines from {BATCHES} to give it up"
-        if problems := [
-            Problem(f"model {model.name}", message, "batch", waiting[0].shown, hint=hint)
-            for model in plan.models
-            if not model.batch and (waiting := under_way(store.progress.batches, model.name))
-        ]:
-            raise SpecError(problems)
+        batches: BatchFiles | None = None
+        if store.progress.batches or any(model.batch for model in plan.models):
+            batches = self._batch_files()
 
         def tell(text: str) -> None:
             self.watch(RunNotice(text))
@@ -204,13 +245,6 @@ class Session:
             stack.callback(cache.close)
         for file in (store.batches, store.calls):
             stack.push_async_callback(file.drain)
-        batches = BatchFiles(
-            tuple(store.progress.batches),
-            store.batches.put,
-            self.folder,
-            limits.batch_poll_s,
-            frozenset(store.progress.samples),
-        )
         build = partial(
             build_model,
             cache=cache,
@@ -227,10 +261,28 @@ class Session:
             if (present := self.present.get(planned.name)) is not None:
                 model: Model = _Journaled(present, planned, store)
             else:
-                of_model = replace(batches, expected=len(queues[planned.name]))
-                model = build(planned, batches=of_model if planned.batch else None)
+                expected = len(queues[planned.name])
+                model = build(planned, batches=batches and replace(batches, expected=expected))
             self._models[planned.name] = model
             stack.push_async_callback(model.aclose)
+
+    def _batch_files(self) -> BatchFiles:
+        """Return how the run keeps batches; SpecError for a model with one under way that is asked
+        singly now.
+        """
+        from phyblock.models.batch import BatchFiles, under_way
+
+        lines = tuple(self._store.progress.batches)
+        message = "has a batch under way, whose questions would be asked twice"
+        hint = f"let it end with batch: true, or remove its lines from {BATCHES} to give it up"
+        if problems := [
+            Problem(f"model {model.name}", message, "batch", waiting[0].shown, hint=hint)
+            for model in self.plan.models
+            if not model.batch and (waiting := under_way(lines, model.name))
+        ]:
+            raise SpecError(problems)
+        poll_s, recorded = self.plan.suite.limits.batch_poll_s, self._store.progress.samples
+        return BatchFiles(lines, self._store.batches.put, self.folder, poll_s, frozenset(recorded))
 
     def _note_stopped(self) -> None:
         result = self.result

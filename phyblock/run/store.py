@@ -29,37 +29,41 @@ from phyblock.models.request import Image, Message
 from phyblock.records.files import (
     BATCHES,
     CALLS,
+    MANIFEST,
     PROMPTS,
     RECORDS,
     STOPPED,
     BatchLines,
     CallLines,
     Lines,
+    Manifest,
     PromptLines,
     RecordLines,
     Validation,
+    read_manifest,
     read_stopped,
     run_records,
 )
-from phyblock.records.line import Line, encodable
-from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
 from phyblock.records.record import (
     BatchLine,
     Call,
+    Line,
     PictureMark,
     Prompt,
     PromptMessage,
     Record,
     Reply,
     Stopped,
+    encodable,
 )
-from phyblock.run.events import Summary
 from phyblock.run.manifest import code_versions, differences
+from phyblock.scoring.plan import Counts
 from phyblock.stable import hex_digest
 from phyblock.text import counted
 
 LineT = TypeVar("LineT", bound=Line)
 
+_HEADLINE = "aov"
 _OTHER_FOLDER = "choose another folder with --out"
 _APPENDING = "free some space and give the same command again: it goes on from here"
 
@@ -154,6 +158,40 @@ class AppendFile:
             message = "was removed, replaced or changed while the run was writing it"
             hint = f"restore it from a copy; replies that have arrived are in {CALLS}"
             raise StoreError(Problem(str(self._path), message, hint=hint))
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """The part of a record that running figures need; `counts` are of the headline matcher and
+    setting.
+
+    `paid_usd` is None where a price is not known, `cached` None where there is no reply.
+    """
+
+    model: str
+    outcome: str
+    is_answered: bool
+    is_final: bool
+    is_judged: bool
+    counts: Counts | None
+    cached: bool | None
+    paid_usd: float | None
+
+    @classmethod
+    def of(cls, record: Record) -> Summary:
+        """Sum up a record."""
+        headline = next((s for s in record.scores if s.criterion == _HEADLINE), None)
+        reply = record.reply
+        return cls(
+            record.model,
+            record.outcome,
+            record.is_answered,
+            record.is_final,
+            record.is_judged,
+            None if headline is None else Counts(headline.tp, headline.fp, headline.fn),
+            None if reply is None else reply.cached,
+            record.paid_usd,
+        )
 
 
 @dataclass

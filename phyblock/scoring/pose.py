@@ -24,8 +24,7 @@ from phyblock.domain import (
     turn_deg,
 )
 from phyblock.domain.blocks import SHAPES
-from phyblock.scoring.counts import Floats
-from phyblock.scoring.plan import Goal
+from phyblock.scoring.plan import Floats, Goal
 from phyblock.scoring.pose_matching import (
     TOLERANCES_CM,
     TURN_TOLERANCE_DEG,

@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain import Plan
-from phyblock.scoring.counts import Floats
-from phyblock.scoring.plan import Goal, most_placed, steps_back
+from phyblock.scoring.plan import Floats, Goal, most_placed, steps_back
 from phyblock.stable import plain_sum
 
 

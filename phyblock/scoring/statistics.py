@@ -35,7 +35,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from phyblock.scoring.counts import Floats, Metric
+from phyblock.scoring.plan import Floats, Metric
 
 CONFIDENCE = 0.95
 POWER = 0.8

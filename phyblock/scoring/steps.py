@@ -15,8 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from phyblock.domain import CandidateSet, Scene
-from phyblock.scoring.counts import Counts
-from phyblock.scoring.plan import ERROR_TYPES, ErrorType, Goal
+from phyblock.scoring.plan import ERROR_TYPES, Counts, ErrorType, Goal
 from phyblock.types import Gating, Setting
 
 MoveOutcome = Literal["placed", "invalid"] | ErrorType

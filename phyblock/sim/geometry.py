@@ -28,8 +28,7 @@ from phyblock.domain.blocks import (
     Shape,
     euler_deg_to_matrix,
 )
-from phyblock.domain.plan import PoseStep
-from phyblock.domain.scene import Block, Candidate, CandidateSet
+from phyblock.domain.scene import Block, Candidate, CandidateSet, PoseStep
 
 Vectors = NDArray[np.float64]
 

@@ -23,7 +23,7 @@ from phyblock.config.validation import PictureControls
 from phyblock.data import AssemblyTask, Dataset
 from phyblock.errors import Problem, SpecError
 from phyblock.models.request import Image, Message, Request
-from phyblock.parsing.structured import AnswerForm
+from phyblock.parsing.text import AnswerForm
 from phyblock.records.record import Record, Reply, SentPrompt
 from phyblock.registry import added_measures, known_track, known_tracks
 from phyblock.sim.engine import REFERENCE_ENGINE, engine_version, physics_engine

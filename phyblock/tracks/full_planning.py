@@ -13,14 +13,12 @@ from phyblock.config.validation import PictureControls
 from phyblock.data import AssemblyTask, official_prompt
 from phyblock.domain import Block, CandidateSet, Plan, Scene
 from phyblock.errors import DataError, Problem, SpecError
+from phyblock.files import bundled
 from phyblock.parsing.plan import ParsedPlan, parse_plan, plan_form, reader_version
-from phyblock.parsing.structured import AnswerForm
-from phyblock.records.line import Line
-from phyblock.records.record import Record
+from phyblock.parsing.text import AnswerForm
+from phyblock.records.record import Line, Record
 from phyblock.records.record import Score as ScoreLine
-from phyblock.resources import bundled
-from phyblock.scoring.counts import Counts
-from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES, AssemblyScorer, Score
+from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES, AssemblyScorer, Counts, Score
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.stable import drawn_bytes
 from phyblock.tracks.base import Judgement, SceneTrack

@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import yaml
 
-from phyblock.scoring.counts import mean_of, ratio_of
+from phyblock.scoring.plan import mean_of, ratio_of
 
 if TYPE_CHECKING:
     from phyblock.config.suite import Suite
     from phyblock.data import AssemblyTask, Dataset
-    from phyblock.records.manifest import Manifest
+    from phyblock.records.files import Manifest
     from phyblock.records.record import Record
-    from phyblock.scoring.counts import Metric
+    from phyblock.scoring.plan import Metric
     from phyblock.sim.film import FilmStep
 
 Way = tuple[str, str, str]

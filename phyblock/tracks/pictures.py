@@ -7,6 +7,7 @@ import contextlib
 import os
 import threading
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -18,6 +19,7 @@ from phyblock.errors import DataError, Problem, SimulationError
 from phyblock.files import (
     LARGEST_PICTURE_BYTES,
     atomic_write,
+    cache_dir,
     decode_picture,
     picture_size,
     read_bytes,
@@ -25,7 +27,6 @@ from phyblock.files import (
     writing,
 )
 from phyblock.models.request import Image
-from phyblock.resources import cache_dir
 from phyblock.sim.pictures import (
     PictureStyle,
     candidates_key,
@@ -40,7 +41,6 @@ from phyblock.sim.pictures import (
 from phyblock.stable import hex_digest
 from phyblock.tracks.items import ShownTask, goal_of
 from phyblock.types import BACKGROUNDS
-from phyblock.workers import WorkerDiedError, WorkerPool
 
 _Result = TypeVar("_Result")
 _WORKERS = 4
@@ -76,7 +76,7 @@ class Workshop:
         self.rendered = 0
         self._folder = folder or cache_dir() / "pictures"
         self._workers = workers or min(_WORKERS, os.cpu_count() or 1)
-        self._pool: WorkerPool | None = None
+        self._pool: Executor | None = None
         self._alone = asyncio.Lock()
         self._making: dict[str, asyncio.Task[bytes]] = {}
         self._recent: dict[tuple[str, str], Image] = {}
@@ -87,6 +87,8 @@ class Workshop:
 
         Where one was killed it is done once more, alone; SimulationError where it is killed again.
         """
+        from phyblock.workers import WorkerDiedError, WorkerPool
+
         self._pool = self._pool or WorkerPool(self._workers)
         loop = asyncio.get_running_loop()
         with contextlib.suppress(WorkerDiedError):

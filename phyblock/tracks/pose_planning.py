@@ -27,7 +27,8 @@ from phyblock.domain import (
     euler_deg_to_matrix,
     turn_deg,
 )
-from phyblock.domain.plan import PosePlan
+from phyblock.domain.scene import PosePlan
+from phyblock.files import bundled
 from phyblock.models.request import Image
 from phyblock.parsing.poses import (
     FARTHEST_PLACE_CM,
@@ -36,11 +37,8 @@ from phyblock.parsing.poses import (
     parse_poses,
     pose_form,
 )
-from phyblock.parsing.structured import AnswerForm
-from phyblock.parsing.text import READER_VERSION
-from phyblock.records.line import Amount, Line, Whole
-from phyblock.records.record import Course, Record
-from phyblock.resources import bundled
+from phyblock.parsing.text import READER_VERSION, AnswerForm
+from phyblock.records.record import Amount, Course, Line, Record, Whole
 from phyblock.scoring.plan import AssemblyScorer
 from phyblock.scoring.pose import (
     POSE_ERRORS,

@@ -20,10 +20,9 @@ from jinja2 import nodes
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from phyblock.errors import Problem, PromptError, reason_of
-from phyblock.files import read_text
+from phyblock.files import bundled, read_text
 from phyblock.models.request import Image, Message
-from phyblock.parsing.structured import AnswerForm
-from phyblock.resources import bundled
+from phyblock.parsing.text import AnswerForm
 from phyblock.stable import hex_digest
 from phyblock.text import did_you_mean
 

@@ -43,15 +43,13 @@ from phyblock.domain import (
 )
 from phyblock.domain.question import rotated, rotated_label
 from phyblock.errors import DataError, Problem, SpecError
-from phyblock.files import read_picture
+from phyblock.files import bundled, bundled_sets, read_picture
 from phyblock.models.request import Image
 from phyblock.parsing.answer import ParsedAnswer, choice_form, parse_answer
-from phyblock.parsing.structured import AnswerForm
-from phyblock.records.line import Line, Whole
-from phyblock.records.manifest import MANIFEST, Manifest
-from phyblock.records.record import Record
-from phyblock.resources import bundled, bundled_sets
-from phyblock.scoring.counts import chance
+from phyblock.parsing.text import AnswerForm
+from phyblock.records.files import MANIFEST, Manifest
+from phyblock.records.record import Line, Record, Whole
+from phyblock.scoring.plan import chance
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import (
     LETTERED_VERSION,

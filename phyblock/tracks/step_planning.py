@@ -15,12 +15,11 @@ from pydantic import Field
 from phyblock.config.validation import Count, Flag, PictureControls, TemplateName
 from phyblock.data import AssemblyTask
 from phyblock.domain import Block, CandidateSet, Plan, Scene
+from phyblock.files import bundled
 from phyblock.models.request import Image, Message, Request
 from phyblock.parsing.move import MoveProblem, ParsedMove, move_form, parse_move
-from phyblock.parsing.structured import AnswerForm
-from phyblock.records.line import Line, Whole
-from phyblock.records.record import AskedTurn, Course, Record, Reply, SentPrompt
-from phyblock.resources import bundled
+from phyblock.parsing.text import AnswerForm
+from phyblock.records.record import AskedTurn, Course, Line, Record, Reply, SentPrompt, Whole
 from phyblock.scoring.plan import ERROR_TYPES
 from phyblock.scoring.steps import Assembly, MoveOutcome, attempted_counts, placed_counts
 from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, settle

@@ -16,8 +16,7 @@ import pandas as pd
 from phyblock.bundle import portable_manifest
 from phyblock.data import AssemblyTask
 from phyblock.errors import DataError
-from phyblock.records.files import read_stopped
-from phyblock.records.manifest import ManifestModel
+from phyblock.records.files import ManifestModel, read_stopped
 from phyblock.records.record import Record
 from phyblock.results.compare import Side, comparable, compare, ranks
 from phyblock.results.estimates import (

@@ -15,8 +15,7 @@ from pydantic import BaseModel
 from phyblock.bundle import opened_bundle
 from phyblock.errors import DataError, Problem, SpecError, StoreError
 from phyblock.files import LIST, OutFolder, digest_of_file, writing
-from phyblock.records.files import RECORDS
-from phyblock.records.manifest import MANIFEST
+from phyblock.records.files import MANIFEST, RECORDS
 from phyblock.results.load import Run, load_run
 from phyblock.sim.pictures import Lookout, PictureStyle
 from phyblock.tracks.base import CARRYING, kind_of

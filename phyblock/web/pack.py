@@ -25,10 +25,9 @@ import jinja2
 
 from phyblock.data import AssemblyTask
 from phyblock.domain import BLOCK_TYPES, Block, Question
-from phyblock.files import OutFolder, atomic_write, digest_of_file, writing
+from phyblock.files import OutFolder, atomic_write, cache_dir, digest_of_file, writing
 from phyblock.records.files import PromptLines, RecordLines
 from phyblock.records.record import Record, SentPrompt
-from phyblock.resources import cache_dir
 from phyblock.results.load import Run
 from phyblock.sim.geometry import solid_mesh
 from phyblock.sim.pictures import COLOR_RGB

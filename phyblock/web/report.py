@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from phyblock.files import OutFolder, digest_of_file
-from phyblock.records.files import PROMPTS, RECORDS, STOPPED, read_stopped
-from phyblock.records.manifest import MANIFEST
+from phyblock.records.files import MANIFEST, PROMPTS, RECORDS, STOPPED, read_stopped
 from phyblock.results.load import Run
-from phyblock.results.summary import REPORT_FILE, SUMMARY
 from phyblock.results.tables import TablesWritten, coverage_frame, table_files
+from phyblock.results.text import REPORT_FILE, SUMMARY
 from phyblock.tracks.base import kind_of
 from phyblock.types import WITHOUT_REPLY
 from phyblock.web.board import (

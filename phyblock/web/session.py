@@ -25,10 +25,9 @@ from phyblock.config.suite import Suite
 from phyblock.data import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.models import HaltedError, Image, Reply, Request, Usage
-from phyblock.run.events import RunEvent, RunStarted, SampleDone
 from phyblock.run.judge import begun, judge_reply
 from phyblock.run.plan import RunPlan, make_plan
-from phyblock.run.runner import RunResult, Session
+from phyblock.run.runner import RunEvent, RunResult, RunStarted, SampleDone, Session
 from phyblock.tracks.base import SceneTrack, kind_of
 from phyblock.tracks.picking import Pick, Picking
 from phyblock.web.ending import Ending, went

@@ -19,7 +19,7 @@ from phyblock.results.export import export_run
 from phyblock.results.load import load_run
 from phyblock.results.tables import summary_of, write_tables
 from phyblock.results.text import Column, TextTable, to_csv
-from phyblock.run.events import ModelStopped, RunStarted
+from phyblock.run.runner import ModelStopped, RunStarted
 from tests.web.factory import LEVELS, manifest, record, score, write_run
 
 NAME = ":b: [red]x[/red]\n=2 \x1b[31m\u202e|&\r"

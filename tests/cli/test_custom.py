@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from phyblock.resources import bundled
+from phyblock.files import bundled
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace

@@ -9,7 +9,8 @@ import pytest
 import yaml
 
 from phyblock.config.models import ModelConfig
-from phyblock.models import known_providers, litellm_client
+from phyblock.models import litellm_client
+from phyblock.models.litellm_client import known_providers
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace

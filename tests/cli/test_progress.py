@@ -13,7 +13,7 @@ from rich.console import Console
 from phyblock.cli.progress import ProgressView
 from phyblock.models import ModelEvent
 from phyblock.records.files import known_records
-from phyblock.run.events import ModelStopped, RunEvent, RunNotice, RunStarted, SampleDone
+from phyblock.run.runner import ModelStopped, RunEvent, RunNotice, RunStarted, SampleDone
 from tests.web.factory import record
 
 

@@ -17,8 +17,8 @@ from hypothesis import given
 from jsonschema import Draft202012Validator
 from pydantic import ValidationError
 
+from phyblock.config.__main__ import make_schemas
 from phyblock.config.models import SamplingSpec, load_models, resolve_models
-from phyblock.config.schema import make_schemas
 from phyblock.config.suite import load_suite, suite_model
 from phyblock.config.yaml import read_yaml
 from phyblock.errors import SpecError

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.domain.aov import AOVGraph, CycleError
+from phyblock.domain.scene import AOVGraph, CycleError
 from tests.domain.graphs import Edges, acyclic, any_edges
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -16,8 +16,7 @@ from phyblock.errors import DataError
 from phyblock.making.scenes.candidates import NEEDED, make_candidates
 from phyblock.making.scenes.production import Request, draw, shares
 from phyblock.making.scenes.sketch import POSES
-from phyblock.scoring.counts import micro
-from phyblock.scoring.plan import Goal, match_plan
+from phyblock.scoring.plan import Goal, match_plan, micro
 from phyblock.tracks.goal_blind import goal_blind_plans
 from phyblock.types import SETTINGS, Setting
 

@@ -21,10 +21,9 @@ from PIL import Image
 
 from phyblock.cli.main import phyblock
 from phyblock.errors import DataError, InputError, StoreError
-from phyblock.files import LIST
+from phyblock.files import LIST, bundled
 from phyblock.making.scenes.production import Production, Share
 from phyblock.making.workers import open_workers
-from phyblock.resources import bundled
 from phyblock.sim.engine import other_engine
 from tests.workspace import SCENES, tower
 

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from phyblock.data import read_builtin
 from phyblock.domain import Scene
 from phyblock.errors import DataError
+from phyblock.files import bundled
 from phyblock.making.checks import verify_scene
 from phyblock.making.files import check_sums
 from phyblock.making.scenes.completing import GivenScene, ReadScene, complete, derived, read_given
-from phyblock.resources import bundled
 from tests.workspace import SCENES, Workspace
 
 DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))

@@ -15,6 +15,7 @@ from phyblock.domain import LETTERS, Block, BlockType, Color, QuestionPicture, S
 from phyblock.domain.blocks import SHAPES, Euler
 from phyblock.domain.question import Mark
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, turned_form
+from phyblock.files import bundled
 from phyblock.making.questions.base import Draft, UnfairError, four_alike, ranks_among
 from phyblock.making.questions.dynamics import is_on_face, resting_on, stays_at
 from phyblock.making.questions.production import BALANCE, even_letters, keeping_odds
@@ -36,7 +37,6 @@ from phyblock.making.questions.sight import (
 from phyblock.making.questions.structures import is_sure, lowered, with_annex
 from phyblock.making.questions.views import ViewpointMaker
 from phyblock.making.scenes.sketch import POSES, transformed
-from phyblock.resources import bundled
 from phyblock.sim.contact import find_gaps, find_overlaps, support_graph
 from phyblock.sim.question_pictures import least_difference, seen
 from tests.sim.structures import block as solid

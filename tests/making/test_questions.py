@@ -15,6 +15,7 @@ from phyblock.domain import LETTERS, SUBTASKS, Question, Subtask
 from phyblock.domain.blocks import COLORS
 from phyblock.domain.question import rotated
 from phyblock.errors import DataError, StoreError
+from phyblock.files import bundled
 from phyblock.making.files import question_card, write_questions
 from phyblock.making.questions.audit import SubtaskAudit, audit_questions, duplicates_of
 from phyblock.making.questions.base import stem_of
@@ -22,7 +23,6 @@ from phyblock.making.questions.dynamics import OUTCOME_TEXTS
 from phyblock.making.questions.production import PER_SUBTASK, make_questions, problem_of
 from phyblock.making.questions.sight import LEAST_PIXELS
 from phyblock.making.workers import open_workers
-from phyblock.resources import bundled
 from phyblock.sim.contact import find_gaps
 from phyblock.sim.engine import other_engine
 from phyblock.sim.question_pictures import is_inside, least_difference, seen

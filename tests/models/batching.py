@@ -13,7 +13,6 @@ from typing import Any
 from phyblock.config.models import ModelConfig
 from phyblock.errors import BudgetReachedError, ModelError
 from phyblock.models import (
-    BatchFiles,
     Budget,
     ModelEvent,
     Reply,
@@ -22,6 +21,7 @@ from phyblock.models import (
     RetryPolicy,
     build_model,
 )
+from phyblock.models.batch import BatchFiles
 from phyblock.records.record import BatchLine
 from tests.models.factory import QUICK
 

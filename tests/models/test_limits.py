@@ -21,7 +21,7 @@ from phyblock.errors import (
 )
 from phyblock.models import Budget, Reply, ReplyCache, RetryPolicy, reply_key
 from phyblock.models.client import HttpClient
-from phyblock.models.limits import WINDOW_S, Clock, Limits
+from phyblock.models.model import WINDOW_S, Clock, Limits
 from tests.models.factory import ROUTES, make_model, make_request, run
 from tests.servers.chassis import Faults, Running
 

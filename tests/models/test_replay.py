@@ -17,7 +17,7 @@ from phyblock.config.models import ModelConfig
 from phyblock.domain import Candidate, CandidateSet
 from phyblock.errors import DataError, RefusedError, SampleError
 from phyblock.models import Model, Reply, Request, Usage, build_model
-from phyblock.models.replay import read_raw_reply
+from phyblock.models.client import read_raw_reply
 from phyblock.tracks.full_planning import PLAN_RULES, PlanSubject
 from tests.models.factory import CANDIDATES, SCENE, make_request
 from tests.records.damage import plan_record

@@ -18,9 +18,7 @@ from phyblock.errors import (
     UnreachableError,
 )
 from phyblock.models import Budget, Model, Reply, Request, RetryPolicy
-from phyblock.models.limits import Limits
-from phyblock.models.model import ChatModel
-from phyblock.models.servers import FAILURES_TO_REST, Server, Servers
+from phyblock.models.model import FAILURES_TO_REST, ChatModel, Limits, Server, Servers
 from tests.models.factory import ROUTES, ask, make_model, make_request, run, with_fields
 from tests.models.test_limits import FakeTime
 from tests.servers.chassis import Faults, Running, kill, start

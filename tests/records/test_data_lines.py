@@ -13,8 +13,8 @@ from phyblock.data import Dataset, QuestionSet, read_builtin, read_questions
 from phyblock.data.questions import StoredQuestion
 from phyblock.data.scenes import StoredScene
 from phyblock.errors import DataError
-from phyblock.records.line import Line, validated
-from phyblock.resources import bundled
+from phyblock.files import bundled
+from phyblock.records.record import Line, validated
 from tests.data.broken import Raw, sound_scene, with_value
 from tests.documents import ROOT
 from tests.fuzz.strategies import sound_question

@@ -11,8 +11,7 @@ from typing import Any
 import pytest
 
 from phyblock.errors import StoreError
-from phyblock.records.files import Validation, known_records
-from phyblock.records.manifest import MANIFEST, Manifest, read_manifest
+from phyblock.records.files import MANIFEST, Manifest, Validation, known_records, read_manifest
 from phyblock.records.record import Call
 from phyblock.results.load import load_run
 from phyblock.run.rescore import rescore

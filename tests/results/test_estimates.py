@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
 from phyblock.results.estimates import all_estimates, strongest_floor
 from phyblock.results.load import Run
-from phyblock.scoring.counts import Counts, micro
+from phyblock.scoring.plan import Counts, micro
 from tests.web.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
 
 Records = list[dict[str, Any]]

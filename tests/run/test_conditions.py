@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from phyblock.data import AssemblyTask, read_builtin
-from phyblock.scoring.counts import f1_of
+from phyblock.scoring.plan import f1_of
 from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png
 from phyblock.tracks.items import Presentation, shown_order
 from tests.servers.chassis import Running, Seen

@@ -24,12 +24,10 @@ from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
 from phyblock.errors import SimulationError
 from phyblock.records.files import STOPPED
-from phyblock.records.line import Line
-from phyblock.records.record import Record
-from phyblock.run.events import RunEvent, SampleDone, Stopping
+from phyblock.records.record import Line, Record
 from phyblock.run.plan import make_plan
 from phyblock.run.rescore import rescore
-from phyblock.run.runner import Session, to_its_end
+from phyblock.run.runner import RunEvent, SampleDone, Session, Stopping, to_its_end
 from phyblock.run.store import AppendFile
 from phyblock.sim import dynamics
 from phyblock.tracks.full_planning import FullPlanning

@@ -13,7 +13,7 @@ import yaml
 
 from phyblock.data import VERSION_FILE, read_version
 from phyblock.errors import DataError, SpecError
-from phyblock.records.manifest import read_manifest
+from phyblock.records.files import read_manifest
 from phyblock.results.compare import check_alike, compare_runs
 from phyblock.results.estimates import main_measure
 from phyblock.results.load import load_run

@@ -14,7 +14,7 @@ import pytest
 from phyblock.errors import StoreError
 from phyblock.parsing.move import parse_move
 from phyblock.parsing.plan import parse_plan
-from phyblock.records.manifest import read_manifest
+from phyblock.records.files import read_manifest
 from phyblock.registry import known_tracks
 from phyblock.run import manifest, rescore, store
 from tests.run.test_step_runs import by_sample

@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
-from phyblock.scoring.counts import Floats, ratio_of
+from phyblock.scoring.plan import Floats, ratio_of
 from phyblock.types import Setting
 from tests.domain.graphs import acyclic
 

@@ -15,8 +15,7 @@ from phyblock.data import AssemblyTask, read_builtin, read_official
 from phyblock.domain import CATEGORIES, Plan
 from phyblock.parsing.plan import parse_plan
 from phyblock.results.paper import published_table
-from phyblock.scoring.counts import chance
-from phyblock.scoring.plan import AssemblyScorer, Goal, match_plan
+from phyblock.scoring.plan import AssemblyScorer, Goal, chance, match_plan
 from phyblock.types import MATCHERS, PLAN_PARSERS, SETTINGS, PlanParser
 from tests.official_replies import reply_texts
 

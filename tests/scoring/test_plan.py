@@ -10,13 +10,14 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
-from phyblock.scoring.counts import Counts, micro
 from phyblock.scoring.plan import (
     AssemblyScorer,
+    Counts,
     Goal,
     Match,
     level1_counts,
     match_plan,
+    micro,
     most_placed,
 )
 from phyblock.types import LEVEL1_CRITERIA, MATCHERS, SETTINGS, Level1Criterion, Matcher, Setting

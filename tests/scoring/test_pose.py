@@ -24,8 +24,8 @@ from phyblock.domain import (
     symmetries,
     turn_deg,
 )
-from phyblock.domain.aov import AOVGraph
 from phyblock.domain.blocks import SHAPES, BlockType
+from phyblock.domain.scene import AOVGraph
 from phyblock.scoring.plan import Goal, most_placed
 from phyblock.scoring.pose import Laid, Piece, PoseScore, PoseScorer, overlap_volume, placed, volume
 from phyblock.scoring.pose_matching import Motion, Nearness, cheapest, matched

@@ -16,7 +16,7 @@ from scipy import stats
 from scipy.special import gammaincinv  # type: ignore[import-untyped]
 
 from phyblock.data import read_official
-from phyblock.scoring.counts import Floats, f1_of, ratio_of
+from phyblock.scoring.plan import Floats, f1_of, ratio_of
 from phyblock.scoring.statistics import (
     POWER,
     Clusters,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from phyblock.scoring.counts import Floats
+from phyblock.scoring.plan import Floats
 from phyblock.scoring.statistics import Clusters
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from phyblock.data import read_builtin
 from phyblock.domain import SHAPES, Block, BlockType
-from phyblock.resources import bundled
+from phyblock.files import bundled
 from phyblock.sim import balance
 from phyblock.sim.balance import (
     FRICTIONS,

@@ -12,7 +12,7 @@ import yaml
 from phyblock.config.suite import Suite, load_suite
 from phyblock.data import AssemblyTask, Dataset, read_builtin
 from phyblock.domain import Block, Candidate, CandidateSet, Scene
-from phyblock.resources import bundled
+from phyblock.files import bundled
 from phyblock.tracks import open_tracks
 from phyblock.tracks.pictures import Workshop
 

@@ -28,7 +28,7 @@ from phyblock.results.export import export_run
 from phyblock.results.load import Run, load_run, track_measures
 from phyblock.results.tables import write_tables
 from phyblock.run.rescore import rescore
-from phyblock.scoring.counts import mean_of, ratio_of
+from phyblock.scoring.plan import mean_of, ratio_of
 from phyblock.tracks import Judgement, SceneTrack, kind_of
 from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts, TrackReport

@@ -25,8 +25,7 @@ from phyblock.parsing.answer import parse_answer
 from phyblock.parsing.move import parse_move
 from phyblock.parsing.plan import parse_plan
 from phyblock.parsing.poses import parse_poses
-from phyblock.scoring.counts import micro
-from phyblock.scoring.plan import Goal, match_plan
+from phyblock.scoring.plan import Goal, match_plan, micro
 from phyblock.sim.pictures import joined_size_px
 from phyblock.tracks.baselines import FOLDS, PROBES, Folds, Guesses
 from phyblock.tracks.full_planning import PlanSubject, pick_plan

@@ -11,8 +11,7 @@ import yaml
 from hypothesis import settings
 from hypothesis import strategies as st
 
-from phyblock.records.files import known_records
-from phyblock.records.manifest import Manifest
+from phyblock.records.files import Manifest, known_records
 from phyblock.results.load import Run, design_of, frames_of
 from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES
 from phyblock.types import OUTCOMES

@@ -28,13 +28,12 @@ from phyblock.data.scenes import (
     candidate_set,
     triple,
 )
-from phyblock.domain.aov import CycleError
 from phyblock.domain.blocks import KIT_PALETTE, Color
-from phyblock.domain.scene import Block, CandidateSet, Scene
+from phyblock.domain.scene import Block, CandidateSet, CycleError, Scene
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.making.checks import LEVEL_LIMITS, OURS_IN_HASTE, SceneFacts, findings_of
 from phyblock.making.scenes.sketch import Palette, scene_of
-from phyblock.records.line import Line, decode, validated
+from phyblock.records.record import Line, decode, validated
 
 _SUFFIXES = (".yaml", ".yml", ".json", ".jsonl")
 _ALLOWED = f"a file of scenes ({', '.join(_SUFFIXES)}), or a folder of such files"

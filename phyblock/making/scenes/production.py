@@ -18,11 +18,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from phyblock.data import AssemblyTask, read_builtin
-from phyblock.domain.aov import CycleError
 from phyblock.domain.blocks import COLORS
-from phyblock.domain.scene import Block, Kind, Scene
+from phyblock.domain.scene import Block, CycleError, Kind, Scene
 from phyblock.domain.symmetry import SYMMETRIES, fingerprint
 from phyblock.errors import DataError, Problem
+from phyblock.files import bundled
 from phyblock.making.checks import LEVEL_LIMITS, is_acceptable
 from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.designs import BUILDINGS, COMPOSITIONS, CREATURES, beside
@@ -36,7 +36,6 @@ from phyblock.making.scenes.sketch import (
     transformed,
 )
 from phyblock.making.workers import Workers
-from phyblock.resources import bundled
 from phyblock.sim.contact import find_gaps
 from phyblock.stable import drawn_bytes
 

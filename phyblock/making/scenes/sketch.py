@@ -15,9 +15,8 @@ from typing import Literal, TypeVar
 
 import numpy as np
 
-from phyblock.domain.aov import AOVGraph
 from phyblock.domain.blocks import BLOCK_TYPES, COLORS, KIT_PALETTE, SHAPES, BlockType, Color, Euler
-from phyblock.domain.scene import Block, Scene
+from phyblock.domain.scene import AOVGraph, Block, Scene
 from phyblock.domain.symmetry import Symmetry, fingerprint, image_deg, image_m, pose_class
 from phyblock.sim.contact import GROUND, drop_height_m, support_graph, whole_bounds_m
 from phyblock.sim.geometry import corners_m
