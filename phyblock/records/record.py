@@ -197,11 +197,6 @@ class Reply(Line):
         return self.model_validate({**fields, **texts, **money, "usage": counts})
 
     @property
-    def tokens(self) -> int:
-        """Tokens of prompt and reply, as far as they are known."""
-        return (self.usage.prompt_tokens or 0) + (self.usage.completion_tokens or 0)
-
-    @property
     def limit_usd(self) -> float:
         """Amount that a limit counted for it, else its cost unless that was paid elsewhere."""
         if self.billed_usd is not None:

@@ -242,10 +242,9 @@ async def _judged_again(
         return await judge_reply(track, item, {**given, "error": None})
     episode, asked = track.again(item, record), record.asked_turns
     for turn in asked:
-        request = await episode.request()
-        if request is None:
+        if await episode.request() is None:
             break
-        episode.take(request, turn.reply, turn.prompt)
+        episode.take(turn.reply, turn.prompt)
     # What the last reply comes to shows when the next is asked for: blocks are let go.
     goes_on = await episode.request() is not None
     judgement = episode.judgement()

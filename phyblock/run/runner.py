@@ -404,7 +404,7 @@ class Session:
             if not isinstance(answer, Reply):
                 break
             replies.append(answer.storable())
-            episode.take(request, replies[-1], fields["prompt"])
+            episode.take(replies[-1], fields["prompt"])
         return judge_episode(episode, item, fields, replies)
 
     async def _answer(self, model: Model, request: Request) -> Reply | ModelError | None:

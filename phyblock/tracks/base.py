@@ -60,7 +60,7 @@ class Episode(Protocol):
     async def request(self) -> Request | None:
         """Return the next request, or None when the episode has ended."""
 
-    def take(self, request: Request, reply: Reply, prompt: SentPrompt | None = None) -> None:
+    def take(self, reply: Reply, prompt: SentPrompt | None = None) -> None:
         """Go on with the reply to the last request, which was sent with this prompt."""
 
     def judgement(self) -> Judgement:

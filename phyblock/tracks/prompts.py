@@ -28,7 +28,7 @@ from phyblock.text import did_you_mean
 
 _LARGEST_BYTES = 256 * 1024
 _COMMON_BLOCKS = ("system", "user", "caption")
-_ALL_BLOCKS = (*_COMMON_BLOCKS, "answer", "turn", "check")
+_ALL_BLOCKS = (*_COMMON_BLOCKS, "answer")
 """Blocks that bundled templates have; nothing would send another."""
 
 
@@ -96,7 +96,10 @@ class TemplatePrompt:
             # Python compiles what Jinja makes of it, and has bounds of its own.
             raise PromptError(_invalid(path, error)) from error
         self.blocks = tuple(self._template.blocks)
-        self.require("user", "and, if wanted, a block system")
+        if "user" not in self.blocks:
+            found = ", ".join(sorted(self.blocks)) or "no block"
+            allowed = "{% block user %} ... {% endblock %} and, if wanted, a block system"
+            raise PromptError(Problem(str(path), "has no user block", "", found, allowed))
         known = _ALL_BLOCKS if like is None else tuple({*_COMMON_BLOCKS, *like.blocks})
         for node in self._tree.body:
             if isinstance(node, nodes.Block) and node.name not in known:
@@ -113,13 +116,6 @@ class TemplatePrompt:
                     before = part.data[: len(part.data) - len(part.data.lstrip())]
                     return part.lineno + before.count("\n")
         return None
-
-    def require(self, block: str, more: str) -> None:
-        """Raise PromptError where the template lacks a block; `more` is told of what is allowed."""
-        if block not in self.blocks:
-            found = ", ".join(sorted(self.blocks)) or "no block"
-            allowed = f"{{% block {block} %}} ... {{% endblock %}} {more}"
-            raise PromptError(Problem(str(self._path), f"has no {block} block", "", found, allowed))
 
     def messages(
         self, pictures: Sequence[Image], facts: Mapping[str, object]

@@ -7,10 +7,9 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate, takewhile
-from typing import Annotated, Any, ClassVar, Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
-from pydantic import Field
 
 from phyblock.config.validation import Count, Flag, PictureControls, TemplateName
 from phyblock.data import AssemblyTask
@@ -38,9 +37,7 @@ from phyblock.tracks.pictures import Drawing, picture_style
 from phyblock.tracks.prompts import TemplatePrompt
 from phyblock.types import Gating, Physics, Setting
 
-PositiveUsd = Annotated[float, Field(strict=True, gt=0, allow_inf_nan=False)]
 Feedback = Literal["none", "success", "error_type"]
-History = Literal["text", "turns"]
 StepOutcome = MoveOutcome | Literal["done"] | MoveProblem
 """Outcome of a step; a problem is a reply in which no single operation could be parsed."""
 Ending = Literal[
@@ -50,8 +47,6 @@ Ending = Literal[
     "max_steps",
     "max_failures",
     "max_repeats",
-    "max_tokens",
-    "max_cost",
     "unanswered",
 ]
 ENDINGS: tuple[Ending, ...] = get_args(Ending)
@@ -71,26 +66,14 @@ class StepsSpec(PictureControls):
     is recorded and held. strict: a structure that collapses ends the episode."""
     feedback: Feedback = "success"
     """Feedback on each step: none, success or failure, or the type of error."""
-    history: History = "text"
-    """Earlier steps as a text in one message, or as the turns of a conversation."""
-    memory: Count | None = None
-    """Number of earlier steps that are shown; null: all."""
     cot: Flag = True
     """Ask for reasoning before the step."""
-    samples: Count = 1
-    """Number of replies for each step."""
-    vote: Literal["majority"] = "majority"
-    """Rule by which several replies become one step: the most frequent one."""
     max_steps: Count | None = None
     """Most steps; null: twice the number of blocks."""
     max_failures: Count | None = 5
     """Failed steps in a row that end an episode; null: no limit."""
     max_repeats: Count | None = 3
     """Failures in a row of the same step that end an episode; null: no limit."""
-    max_episode_tokens: Count | None = None
-    """Most tokens of an episode, prompts included; null: no limit."""
-    max_episode_usd: PositiveUsd | None = None
-    """Most dollars of an episode; null: no limit."""
     prompt: TemplateName = "default"
     """default, or the path of a .j2 template."""
 
@@ -113,16 +96,10 @@ class MoveParse(Line):
 class EpisodeTurn(AskedTurn):
     """One request of an episode, with its reply and its outcome."""
 
-    key: str = ""
-    """The scene, the step, and the vote where a step has several."""
-    seed: Whole = 0
-    """The seed that was sent."""
-    step: Whole
-    """The step that it belongs to, from 1."""
     parse: MoveParse
     """The operation that was read."""
-    outcome: StepOutcome | None = None
-    """Outcome of the step; null for votes that did not decide it."""
+    outcome: StepOutcome
+    """Outcome of the step."""
     placed: Whole | None = None
     """The goal block, from 0, that was placed."""
     swapped: tuple[tuple[Whole, ...], ...] = ()
@@ -163,7 +140,7 @@ class EpisodeRecord(Record):
         del matcher
         steps = (
             (str(turn.parse.move), None if turn.outcome in ("placed", "done") else turn.outcome)
-            for turn in self.steps
+            for turn in self.turns
         )
         return Course(tuple(steps), self.n_blocks - (self.progress[-1] if self.progress else 0))
 
@@ -176,28 +153,6 @@ class EpisodeRecord(Record):
     def replies(self) -> tuple[Reply, ...]:
         """Those of all turns."""
         return tuple(turn.reply for turn in self.turns) or super().replies
-
-    @property
-    def steps(self) -> tuple[EpisodeTurn, ...]:
-        """The turns that a step was taken with: one of each vote."""
-        return tuple(turn for turn in self.turns if turn.outcome is not None)
-
-
-def majority(replies: Sequence[ParsedMove]) -> int:
-    """Place of the reply that speaks for all: the first with the operation named most often.
-
-    Operations named equally often are taken in the order in which they came. Replies that could
-    not be read have no vote, unless none could be.
-    """
-    votes = Counter((one.move, one.is_done) for one in replies if one.problem is None)
-    if not votes:
-        return 0
-    (chosen, _), *_ = votes.most_common(1)
-    return next(
-        place
-        for place, one in enumerate(replies)
-        if one.problem is None and (one.move, one.is_done) == chosen
-    )
 
 
 @dataclass(frozen=True)
@@ -314,21 +269,14 @@ _REASONS: Mapping[str, str] = {
     "dependency_not_met": "what must be there before it is not there yet",
     "invalid": "no candidate has this number",
 }
-_NO_TEXT = "(no answer)"
-_NOT_TRIED = ("done", *get_args(MoveProblem))
-"""Outcomes of steps in which no move was attempted."""
 
 
 @dataclass(frozen=True)
 class PastStep:
-    """A step that was taken: the operation, what became of it, the reply that stands for it, the
-    picture that it was chosen from (None where none is sent), and the candidate that was named.
-    """
+    """A step that was taken: the operation, its outcome, and the candidate that was named."""
 
     operation: str
     outcome: StepOutcome
-    reply: str
-    seen: Image | None
     move: int | None = None
 
     def report(self, feedback: Feedback) -> str:
@@ -343,8 +291,7 @@ class PastStep:
         return f"it failed, {why}" if why else "it failed, nothing was placed"
 
 
-_LIKELY = PastStep("Move(1)", "placed", "Next plan: Move(1)", None)
-
+_LIKELY = PastStep("Move(1)", "placed", 1)
 
 STEP_OUTCOMES = ("placed", *ERROR_TYPES, "invalid", "unread", "done")
 """Outcome of a step; `unread` are replies in which no single operation could be parsed."""
@@ -385,17 +332,17 @@ def _film(record: EpisodeRecord, task: AssemblyTask | None) -> Iterator[FilmStep
     """Yield the empty ground, every step, wrong ones too, and how the episode ended."""
     yield FilmStep(f"{record.model}, {record.scene}", "plain", None, ())
     blocks, heading = tuple[Block, ...](), StepPlanning.report().heading
-    tones: dict[str | None, Tone] = {"placed": "good", "done": "plain"}
-    for turn in record.steps:
+    tones: dict[str, Tone] = {"placed": "good", "done": "plain"}
+    for turn in record.turns:
         if task is not None:
             blocks = tuple(task.scene.blocks[vertex] for vertex in turn.world)
-        move, outcome = turn.parse.move, turn.outcome or "unread"
+        move, outcome = turn.parse.move, turn.outcome
         candidate = move if isinstance(move, int) else None
         operation = f"Move({move})" if candidate is not None else move or "(no operation)"
         ending = "" if outcome == "done" else f": {heading('step', outcome)}"
         note = f"{len(turn.world)} of {record.n_blocks} placed"
         note += f", read by {turn.parse.rule.replace('_', ' ')}" if turn.parse.rule else ""
-        caption, tone = f"{turn.step}. {operation}{ending}", tones.get(turn.outcome, "bad")
+        caption, tone = f"{turn.n}. {operation}{ending}", tones.get(turn.outcome, "bad")
         yield FilmStep(caption, tone, candidate, blocks, note)
     by = ""
     if record.ending == "collapsed" and task is not None:
@@ -431,10 +378,8 @@ class StepPlanning(SceneTrack):
     spec: StepsSpec
 
     def open(self) -> None:
-        """Select scenes; PromptError where the prompt has no text for turns of a conversation."""
+        """Select scenes."""
         super().open()
-        if self.spec.history == "turns" and isinstance(self.prompt, TemplatePrompt):
-            self.prompt.require("turn", "for the later messages of history: turns")
         self.accepts = self.spec.setting or self.suite.settings[0]
         order, tasks = self.suite.candidates.order, self.dataset.tasks
         self.guess = blind_guesses(order, tasks, self.accepts)
@@ -461,87 +406,61 @@ class StepPlanning(SceneTrack):
 
     def again(self, item: AssemblyTask, record: Record) -> StepEpisode:
         """Return the episode of a record before its first reply; what falls is what fell then."""
-        turns = record.steps if isinstance(record, EpisodeRecord) else ()
+        turns = record.turns if isinstance(record, EpisodeRecord) else ()
         fell = {turn.world: turn.fallen for turn in turns if turn.outcome == "placed"}
         return StepEpisode(self, item, record.seed, {}, with_messages=False, fell=fell)
 
     def outlines(self, item: AssemblyTask) -> Iterator[Request]:
         """Yield as many requests as an episode can have, made without rendering.
 
-        Each step is taken to have placed a block. Only the first request can be a real one, and
-        with several samples none, since their seeds are not those of the run.
+        Each step is taken to have placed a block. Only the first request can be a real one.
         """
         for step in range(self.spec.most_steps(len(item.scene))):
             messages: tuple[Message, ...] = ()
             if self.shop is not None:
                 fixed = self.shop.outlines(self.drawings(item))
                 (current,) = self.shop.outlines((self.draw_state(item, ()),))
-                if step or self.spec.samples > 1:
-                    current = replace(current, data=b"")
-                messages = self.messages(item, fixed, current, [_LIKELY] * step)
-            request = self.asked(item, step, {}, messages, None)
-            yield from (replace(request, seed=sample) for sample in range(self.spec.samples))
+                current = replace(current, data=b"") if step else current
+                messages = self.messages(item, (*fixed, current), [_LIKELY] * step)
+            yield self.asked(item, step, 0, {}, messages)
 
     def asked(
         self,
         item: AssemblyTask,
         step: int,
+        seed: int,
         params: Mapping[str, object],
         messages: tuple[Message, ...],
-        subject: StepSubject | None,
+        subject: StepSubject | None = None,
     ) -> Request:
-        """Return the request of the step after so many, with seed 0."""
+        """Return the request of the step after so many."""
         version = self.prompt.version if messages and self.prompt is not None else ""
         form, key = self.form(item), f"{item.key}/{step + 1}"
         wanted = None if form is None else form.response_format
-        return Request(key, 0, messages, params, version, subject, wanted)
+        return Request(key, seed, messages, params, version, subject, wanted)
 
     def messages(
-        self,
-        item: AssemblyTask,
-        fixed: Sequence[Image],
-        current: Image,
-        past: Sequence[PastStep],
+        self, item: AssemblyTask, pictures: Sequence[Image], past: Sequence[PastStep]
     ) -> tuple[Message, ...]:
-        """Return the messages of the step after `past`; `fixed` are the goal and the candidates.
-
-        Earlier steps are a text in one message, or the turns of a conversation.
-        """
+        """Return the messages of the step after `past`, which they tell as a text."""
         assert isinstance(self.prompt, TemplatePrompt)
-        spec, prompt = self.spec, self.prompt
-        hidden = 0 if spec.memory is None else max(0, len(past) - spec.memory)
+        spec, told = self.spec, [one.report(self.spec.feedback) for one in past]
         facts: dict[str, object] = {
-            **self.facts(item, ()),
+            **self.facts(item, pictures),
+            "step": len(past) + 1,
             "max_steps": spec.most_steps(len(item.scene)),
             "cot": spec.cot,
             "gating": spec.gating,
             "setting": self.accepts,
-            "n_hidden": hidden,
-        }
-        facts["answer"] = prompt.text("answer", facts)
-        shown = list(enumerate(past[hidden:], hidden + 1))
-
-        def first(current: Image, history: Any, told: str, step: int) -> tuple[Message, ...]:
-            pictures = (*fixed, current)
-            more = {"pictures": [picture.label for picture in pictures], "step": step}
-            return prompt.messages(pictures, {**facts, **more, "history": history, "told": told})
-
-        if spec.history == "text":
-            told = [one.report(spec.feedback) for _, one in shown]
-            history = [
+            "told": told[-1] if told else "",
+            "history": [
                 {"step": number, "operation": one.operation, "told": report}
-                for (number, one), report in zip(shown, told, strict=True)
-            ]
-            last = past[-1].report(spec.feedback) if past else ""
-            return first(current, history, last, len(past) + 1)
-        seen = [step.seen or current for _, step in shown] + [current]
-        messages = list(first(seen[0], [], "", hidden + 1))
-        for (number, one), picture in zip(shown, seen[1:], strict=True):
-            of_turn = {"told": one.report(spec.feedback), "step": number + 1, "history": []}
-            text = prompt.text("turn", {**facts, **of_turn, "pictures": [picture.label]})
-            messages.append(Message("assistant", (one.reply.strip() or _NO_TEXT,)))
-            messages.append(Message("user", (picture, text)))
-        return tuple(messages)
+                for number, (one, report) in enumerate(zip(past, told, strict=True), 1)
+            ],
+        }
+        return self.prompt.messages(
+            pictures, {**facts, "answer": self.prompt.text("answer", facts)}
+        )
 
     async def fallen(self, blocks: tuple[Block, ...]) -> tuple[int, ...]:
         """Return the orders of blocks that fall when all are let go at their goal poses."""
@@ -563,8 +482,7 @@ class StepPlanning(SceneTrack):
 class StepEpisode:
     """Asks for one operation after another until the goal stands or a limit is reached.
 
-    With several samples a step, each is a request of its own, and the vote follows the last. What
-    falls is simulated, or told by `fell`, the orders of blocks that fell by the vertices that
+    What falls is simulated, or told by `fell`, the orders of blocks that fell by the vertices that
     stood.
     """
 
@@ -586,8 +504,6 @@ class StepEpisode:
         self._past: list[PastStep] = []
         self._failed: list[PastStep] = []
         self._turns: list[dict[str, Any]] = []
-        self._votes: list[tuple[ParsedMove, str]] = []
-        self._seen: Image | None = None
         self._is_settled = True
 
     async def request(self) -> Request | None:
@@ -600,8 +516,7 @@ class StepEpisode:
         messages: tuple[Message, ...] = ()
         if self._shop is not None:
             drawings = (*track.drawings(task), track.draw_state(task, self._blocks()))
-            *fixed, self._seen = await self._shop.images(drawings)
-            messages = track.messages(task, fixed, self._seen, self._past)
+            messages = track.messages(task, await self._shop.images(drawings), self._past)
         subject = StepSubject(
             task.scene,
             task.candidates,
@@ -611,37 +526,46 @@ class StepEpisode:
             len(self._past),
             functools.partial(track.guess, task),
         )
-        request = track.asked(task, len(self._past), self._params, messages, subject)
-        sample, samples = len(self._votes), self._spec.samples
-        key = request.key if samples == 1 else f"{request.key}.{sample + 1}"
-        return replace(request, key=key, seed=self._seed * samples + sample)
+        return track.asked(task, len(self._past), self._seed, self._params, messages, subject)
 
-    def take(self, request: Request, reply: Reply, prompt: SentPrompt | None = None) -> None:
-        """Go on with the reply to the last request."""
+    def take(self, reply: Reply, prompt: SentPrompt | None = None) -> None:
+        """Take the step that the reply to the last request names."""
         parsed = parse_move(reply.text)
-        move = "Done" if parsed.is_done else parsed.move
-        turn = {
+        move = None if parsed.move is None else self._assembly.move(parsed.move)
+        outcome: StepOutcome = parsed.problem or ("done" if move is None else move.outcome)
+        turn: dict[str, Any] = {
             "n": len(self._turns) + 1,
             "reply": reply,
             "prompt": prompt,
-            "key": request.key,
-            "seed": request.seed,
-            "step": len(self._past) + 1,
-            "parse": {"rule": parsed.rule, "move": move, "problem": parsed.problem},
-            "outcome": None,
-            "placed": None,
+            "parse": {
+                "rule": parsed.rule,
+                "move": "Done" if parsed.is_done else parsed.move,
+                "problem": parsed.problem,
+            },
+            "outcome": outcome,
+            "placed": None if move is None else move.vertex,
         }
-        self._turns.append(turn)
-        self._votes.append((parsed, reply.text))
-        if len(self._votes) == self._spec.samples:
-            self._step()
+        if move is not None:
+            turn["swapped"] = [list(pair) for pair in move.swapped]
+        self._turns.append({**turn, "world": list(self._assembly.vertices)})
+        operation = "Done" if parsed.is_done else f"Move({parsed.move})"
+        operation = "(no operation)" if parsed.problem else operation
+        step = PastStep(operation, outcome, parsed.move)
+        self._past.append(step)
+        self._failed = [] if outcome == "placed" else [*self._failed, step]
+        self._is_settled = outcome != "placed" or self._spec.physics == "off"
+        if self._assembly.is_complete:
+            self.ending = "completed"
+        elif outcome == "done":
+            self.ending = "done"
+        else:
+            self.ending = self._limit()
 
     def judgement(self) -> Judgement:
         """Return the record's fields about the episode; read where any operation could be read."""
         outcomes = [step.outcome for step in self._past]
         progress = accumulate(outcome == "placed" for outcome in outcomes)
-        tried = (turn for turn in self._turns if turn["outcome"] not in (None, *_NOT_TRIED))
-        plan = [turn["parse"]["move"] for turn in tried]
+        plan = [step.move for step in self._past if step.move is not None]
         parse = {"parser": "move", "rule": None, "plan": plan}
         settings = self._track.suite.settings
         fields = {
@@ -655,49 +579,14 @@ class StepEpisode:
         }
         return Judgement(any(turn["parse"]["problem"] is None for turn in self._turns), fields)
 
-    def _step(self) -> None:
-        """Take the step that the votes name, and end where a limit is reached."""
-        at = majority([parsed for parsed, _ in self._votes])
-        parsed, reply = self._votes[at]
-        turn = self._turns[len(self._turns) - len(self._votes) + at]
-        operation = "Done" if parsed.is_done else f"Move({parsed.move})"
-        operation = operation if parsed.problem is None else "(no operation)"
-        if len(self._votes) > 1:
-            # In a conversation the operation alone speaks for all votes.
-            form = None if parsed.problem else self._track.form(self._task)
-            reply = operation if form is None else form.write(operation)
-        self._votes.clear()
-        outcome: StepOutcome = "done"
-        if parsed.problem is not None:
-            outcome = parsed.problem
-        elif parsed.move is not None:
-            move = self._assembly.move(parsed.move)
-            outcome, turn["placed"] = move.outcome, move.vertex
-            turn["swapped"] = [list(pair) for pair in move.swapped]
-        turn["outcome"] = outcome
-        turn["world"] = list(self._assembly.vertices)
-        step = PastStep(operation, outcome, reply, self._seen, parsed.move)
-        self._past.append(step)
-        self._failed = [] if outcome == "placed" else [*self._failed, step]
-        self._is_settled = outcome != "placed" or self._spec.physics == "off"
-        if self._assembly.is_complete:
-            self.ending = "completed"
-        elif outcome == "done":
-            self.ending = "done"
-        else:
-            self.ending = self._limit()
-
     def _limit(self) -> Ending | None:
         """Return the first limit of the suite that is reached, or None."""
-        spec, replies = self._spec, [turn["reply"] for turn in self._turns]
-        moves = [step.move for step in reversed(self._failed)]
+        spec, moves = self._spec, [step.move for step in reversed(self._failed)]
         same = takewhile(lambda move: move is not None and move == moves[0], moves)
-        reached: tuple[tuple[Ending, float, float | None], ...] = (
+        reached: tuple[tuple[Ending, int, int | None], ...] = (
             ("max_repeats", len(list(same)), spec.max_repeats),
             ("max_failures", len(moves), spec.max_failures),
             ("max_steps", len(self._past), spec.most_steps(len(self._task.scene))),
-            ("max_tokens", sum(reply.tokens for reply in replies), spec.max_episode_tokens),
-            ("max_cost", sum(reply.cost_usd or 0.0 for reply in replies), spec.max_episode_usd),
         )
         return next((name for name, n, most in reached if most is not None and n >= most), None)
 
@@ -708,8 +597,7 @@ class StepEpisode:
         else:
             fallen = self._fell.get(tuple(self._assembly.vertices), ())
         self._is_settled = True
-        turn = next(turn for turn in reversed(self._turns) if turn["outcome"] is not None)
-        turn["fallen"] = list(fallen)
+        self._turns[-1]["fallen"] = list(fallen)
         if fallen and self._spec.physics == "strict":
             self.ending = "collapsed"
 

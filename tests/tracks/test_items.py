@@ -19,7 +19,7 @@ from phyblock.domain.symmetry import Symmetry, canonical_form
 from phyblock.errors import DataError, SpecError
 from phyblock.making.scenes.sketch import transformed
 from phyblock.models.request import Image
-from phyblock.records.record import Reply, Usage
+from phyblock.records.record import Reply
 from phyblock.tracks.items import (
     Others,
     Presentation,
@@ -129,10 +129,9 @@ def test_an_episode_goes_the_same_in_either_numbering(
     async def play(task: AssemblyTask, steps: Any) -> dict[str, Any]:
         episode = _track("step_planning").start(task, 0, {}, with_messages=False)
         for step in steps:
-            if (request := await episode.request()) is None:
+            if await episode.request() is None:
                 break
-            used = Usage(prompt_tokens=0, completion_tokens=0)
-            episode.take(request, Reply(text=f"Next plan: Move({step})", usage=used))
+            episode.take(Reply(text=f"Next plan: Move({step})"))
         return episode.judgement().fields
 
     shown = SHUFFLED.of(tasks[place], seed)

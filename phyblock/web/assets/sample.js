@@ -201,10 +201,8 @@ const Sample = (() => {
 
   function turnHead(turn) {
     const move = turn.parse?.move ?? "", isPlaced = turn.outcome === "placed";
-    // Of several replies to a step, one speaks for all.
-    const became = turn.outcome === null || turn.outcome === undefined ? el("span", { class: "muted" }, "outvoted")
-      : el("span", { class: `verdict ${isPlaced ? "right" : "wrong"}` }, `${isPlaced ? "✓" : "✗"} ${Words.named(turn.outcome)}`);
-    return [el("span", { class: "number" }, String(turn.step || turn.n)), became, el("span", { class: "muted" }, move && `said ${move}`)];
+    const became = el("span", { class: `verdict ${isPlaced ? "right" : "wrong"}` }, `${isPlaced ? "✓" : "✗"} ${Words.named(turn.outcome)}`);
+    return [el("span", { class: "number" }, String(turn.n)), became, el("span", { class: "muted" }, move && `said ${move}`)];
   }
 
   function readIn(parse) {
@@ -243,7 +241,7 @@ const Sample = (() => {
     const turns = (record.turns || []).filter((turn) => turn.prompt);
     if (turns.length) {
       return el("ol", { class: "turns" }, turns.map((turn, i) => el("li", {}, el("details", { open: i === 0 },
-        el("summary", {}, `Turn ${turn.n}${turn.step ? `, step ${turn.step}` : ""}`), prompt(turn.prompt)))));
+        el("summary", {}, `Turn ${turn.n}`), prompt(turn.prompt)))));
     }
     if (record.prompt) return prompt(record.prompt);
     const why = Data.isSite ? "A leaderboard holds no prompts; the report of the run has them."

@@ -72,10 +72,10 @@ const Steps = (() => {
     }));
   }
 
-  /** An episode: a step for each, by the reply that decided it. */
+  /** An episode: a step for each turn. */
   function ofTurns(scene, setting, turns) {
     let now = new Set();
-    return ofSets(scene, setting, "turn", turns.filter((turn) => turn.outcome).map((turn) => {
+    return ofSets(scene, setting, "turn", turns.map((turn) => {
       const isPlaced = turn.outcome === "placed", before = now;
       now = new Set(turn.world || now);
       return { number: turn.parse?.move ?? null, vertex: isPlaced ? turn.placed : null,
