@@ -54,7 +54,7 @@ MEMBERS = {MANIFEST: 2 * _MB, RECORDS: 512 * _MB, ABOUT: _MB}
 """Members in their order, with their largest sizes [bytes]."""
 _LARGEST_BYTES = 128 * _MB
 _BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, RuntimeError)
-_SHOWN = ("prompt", "pictures", "examples")
+_SHOWN = ("prompt", "pictures")
 """Parts of a track's identity that say what models were shown."""
 _EARLIEST, _CLOCKS = datetime(2025, 1, 1, tzinfo=UTC), timedelta(days=1)
 """Bounds of times in records: the earliest one, and how far clocks may differ."""
@@ -249,7 +249,7 @@ def _name_of(prompt: object) -> object:
 def _sent(prompt: SentPrompt) -> tuple[object, ...]:
     """Return the fields of a prompt that do not depend on the bytes of its pictures."""
     labels = tuple(image.label for image in prompt.images)
-    return prompt.template, prompt.version, prompt.messages, prompt.examples, labels
+    return prompt.template, prompt.version, prompt.messages, labels
 
 
 def _localized(folder: Path, manifest: Manifest, data: Sequence[Path]) -> Manifest:

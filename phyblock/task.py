@@ -299,7 +299,7 @@ class Episode:
         if self._request is None:
             raise SpecError(Problem(self.task.id, "has ended", hint="call reset() before step()"))
         self._replies.append(Reply(text=well_formed(reply)).storable())
-        self._episode.take(self._request, self._replies[-1])
+        self._episode.take(self._replies[-1])
         self._request = _result(self._episode.request())
         score, before = self.score(), self._value
         self._value = score.value

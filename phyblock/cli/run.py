@@ -170,10 +170,6 @@ def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) ->
     if len(plan.variants) > 1:
         facts.append(f"{len(plan.variants):,} conditions")
     facts.append(counted(len(plan.models), "model"))
-    examples = {plan.suite.at(variant).examples for variant in plan.variants}
-    numbers = sorted({n if isinstance(n, int) else len(n) for n in examples})
-    if numbers != [0]:
-        facts.append(f"{' or '.join(map(str, numbers))} worked examples before each question")
     asked = [row for row in rows if row.model.kind == "litellm"]
     columns: dict[str, Callable[[Estimate], str]] = {
         "samples": lambda row: f"{row.samples:,}",

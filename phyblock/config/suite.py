@@ -71,14 +71,12 @@ FACTORS: Mapping[str, tuple[str, ...] | None] = {
     "view": ("images", "view"),
     "candidate_order": ("candidates", "order"),
     "layout": ("images", "layout"),
-    "examples": ("examples",),
     REPEAT: None,
 }
 """Factors of `vary` with the path of the field that each gives values to; every track names its
 prompt in a field of its own."""
 
 Prompt = Literal["default", "official"] | Template
-ExampleCount = Annotated[int, Field(strict=True, ge=0, le=16)]
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)]
 Level = Annotated[int, Field(strict=True), OneOf(lambda: (1, 2, 3, 4))]
 
@@ -214,14 +212,9 @@ class VarySpec(Section):
     """Orders of the candidates, as candidates.order."""
     layout: Levels[PictureLayout] = ()
     """Layouts of pictures, as images.layout."""
-    examples: Levels[ExampleCount] = ()
-    """Numbers of worked examples, as examples."""
     repeats: Annotated[int, Field(strict=True, ge=1, le=100)] = 1
     """Number of times that the same request is sent. Only the first may be answered from the cache;
     each sends another seed."""
-    design: Literal["crossed", "one_at_a_time"] = "crossed"
-    """crossed: every level with every level of the others. one_at_a_time: each factor alone, the
-    others at their reference. Repeats apply to both."""
 
     def faults(self) -> Iterator[Fault]:
         """Yield that two templates would have the same name in tables."""
@@ -251,13 +244,10 @@ class VarySpec(Section):
         shown = [name for name in self.factors if name != REPEAT]
         levels = [[(name, level) for level in self.names(name)] for name in shown]
         first = tuple(of_factor[0] for of_factor in levels)
-        chosen: Sequence[tuple[tuple[str, str], ...]] = list(product(*levels))
-        if self.design == "one_at_a_time":
-            chosen = [first, *((pair,) for of_factor in levels for pair in of_factor[1:])]
         again = [((REPEAT, name),) if n else () for n, name in enumerate(self.names(REPEAT))]
         return tuple(
             Variant((*(pair for pair in one if pair not in first), *repeat))
-            for one in chosen
+            for one in product(*levels)
             for repeat in again
         )
 
@@ -317,10 +307,6 @@ class Suite(Section):
     answer_format: AnswerFormat = "text"
     """text: lines of text. json_schema: one JSON object, whose schema the prompt states; it is also
     sent as response_format where the provider takes one."""
-    examples: ExampleCount | UniqueSome[Text] = 0
-    """Worked examples before each question, with a right answer: a number (drawn with the smallest
-    seed, never a scene that shares a base scene or its goal with the one asked about), or names of
-    scenes (one that may not be shown is replaced by a drawn one)."""
     images: ImagesSpec = ImagesSpec()
     """The pictures that a model is shown."""
     candidates: CandidatesSpec = CandidatesSpec()

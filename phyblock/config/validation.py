@@ -206,16 +206,6 @@ class PictureControls(Section):
         default=False,
         description="Leave out the picture of the goal; for questions, all pictures.",
     )
-    wrong_image: Flag = Field(
-        default=False,
-        description="Show the goal of another scene, drawn with the seed; the candidates stay.",
-    )
-
-    def faults(self) -> Iterator[Fault]:
-        """Yield that both are set."""
-        if self.blind and self.wrong_image:
-            message = "shows another scene, where blind shows none"
-            yield Fault(message, at=("wrong_image",), hint="set one of them")
 
 
 def read_section(model: type[ModelT], source: YamlSource, more: Sequence[Problem] = ()) -> ModelT:

@@ -59,7 +59,7 @@ class Request:
     `key` names the question inside its `track`: by both a recording is looked up. `params` are
     sampling parameters by their OpenAI names; `prompt_version` hashes the template; `subject` is
     what baselines look at, of the type that its track says. `response_format` asks for JSON, None
-    for text. `examples` are keys of worked examples; `sample` names what it is made for.
+    for text. `sample` names what it is made for.
     """
 
     key: str
@@ -70,7 +70,6 @@ class Request:
     subject: object
     response_format: Mapping[str, object] | None = None
     track: str = ""
-    examples: tuple[str, ...] = ()
     sample: str = ""
 
 

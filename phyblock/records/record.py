@@ -242,8 +242,6 @@ class SentPrompt(Line):
     """Digest of the prompt as sent, which stands in `prompts.jsonl`."""
     images: tuple[SentImage, ...] = ()
     """The pictures in the order sent."""
-    examples: tuple[str, ...] = ()
-    """Keys of the worked examples that were shown before what was asked."""
 
 
 class Score(Line):
@@ -298,8 +296,8 @@ class ShownScene(Line):
 
     order: tuple[Whole, ...]
     """The number in the file of each candidate, in the order shown."""
-    goal: str | None
-    """The scene whose goal was shown; null: none was."""
+    blind: bool
+    """True if its goal was not shown."""
 
 
 class Record(Line):

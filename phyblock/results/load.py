@@ -234,7 +234,7 @@ def design_of(manifest: Manifest, where: str = MANIFEST) -> Design:
     return Design(suite_of(manifest, where), manifest.models, manifest.items, manifest.scenes)
 
 
-_SHOWN_AS = {"circular": "circular", "blind": "blind", "wrong_image": "pictures of another scene"}
+_SHOWN_AS = ("circular", "blind")
 """Options of a track's section of a suite, in words for captions."""
 
 
@@ -321,7 +321,7 @@ class Run:
         words = ["candidates shuffled"] * (
             is_shuffled and "candidate_order" not in suite.vary.factors
         )
-        words += [text for name, text in _SHOWN_AS.items() if held.get(name)]
+        words += [name for name in _SHOWN_AS if held.get(name)]
         words += ["options on one sheet"] * (held.get("options_as") == "letters")
         words += ["answers asked for as JSON"] * (suite.answer_format == "json_schema")
         n = len(suite.vary.variants)

@@ -69,11 +69,8 @@ def about_prompt(request: Request, template: str, digest: str) -> SentPrompt:
         for part in message.parts
         if isinstance(part, Image)
     )
-    examples: dict[str, Any] = {"examples": request.examples} if request.examples else {}
     version = request.prompt_version
-    return SentPrompt(
-        template=template, version=version, messages=digest, images=images, **examples
-    )
+    return SentPrompt(template=template, version=version, messages=digest, images=images)
 
 
 def judged(fields: Mapping[str, Any], item: Item, judgement: Judgement) -> Record:

@@ -32,7 +32,7 @@ from phyblock.types import Matcher, PlanParser
 
 _CHANGED = "is not the data set that the run was made on, or it was changed since"
 _MOVED = "name the folder where it is now with --data"
-_NO_DATA = ("prompt", "pictures", "examples", CARRYING, ENGINE)
+_NO_DATA = ("prompt", "pictures", CARRYING, ENGINE)
 """Parts of a track's identity that are not the data that it asks about."""
 
 

@@ -12,7 +12,7 @@ import functools
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
@@ -22,13 +22,13 @@ from phyblock.config.suite import Suite
 from phyblock.config.validation import PictureControls
 from phyblock.data import AssemblyTask, Dataset
 from phyblock.errors import Problem, SpecError
-from phyblock.models.request import Image, Message, Request
+from phyblock.models.request import Image, Request
 from phyblock.parsing.text import AnswerForm
 from phyblock.records.record import Record, Reply, SentPrompt
 from phyblock.registry import added_measures, known_track, known_tracks
 from phyblock.sim.engine import REFERENCE_ENGINE, engine_version, physics_engine
 from phyblock.stable import hex_digest
-from phyblock.tracks.items import Item, Others, Presentation, ShownTask, select_tasks
+from phyblock.tracks.items import Item, Presentation, ShownTask, select_tasks
 from phyblock.tracks.measures import SampleCounts, TrackReport, read_report
 from phyblock.tracks.picking import Picking
 from phyblock.tracks.pictures import Drawing, Workshop, scene_drawings
@@ -114,13 +114,12 @@ class Track(ABC):
         self.spec: Any = None if self.options is None else suite.section(self.options)
         self.drawn_seeds = suite.seeds[:1]
         self.prompt = None if shop is None else self.open_prompt()
-        self.examples: Mapping[str, tuple[Any, ...]] = {}
         self._drawings: dict[str, tuple[Drawing, ...]] = {}
         self.open()
 
     @abstractmethod
     def open(self) -> None:
-        """Select its items, and worked examples where there are any."""
+        """Select its items."""
 
     @classmethod
     @functools.cache
@@ -216,22 +215,14 @@ class Track(ABC):
         """
         raise NotImplementedError
 
-    def right_answer(self, item: Any) -> str:
-        """Return the answer of a worked example, in the form that is asked for."""
-        raise NotImplementedError
-
     def identity(self) -> dict[str, Any]:
-        """Return what decides its results as JSON: prompt, pictures, examples, physics engine."""
+        """Return what decides its results as JSON: prompt, pictures, physics engine."""
         identity: dict[str, Any] = {"prompt": None, "pictures": None}
         if self.prompt is not None:
-            used = {one.key: one for examples in self.examples.values() for one in examples}
             shown = [self.shown(item, s) for s in self.drawn_seeds for item in self.items]
-            drawn = map(self.drawings, (*shown, *(used[key] for key in sorted(used))))
-            keys = [[one.key for one in drawings] for drawings in drawn if drawings]
+            keys = [[one.key for one in found] for found in map(self.drawings, shown) if found]
             version = {"name": self.prompt.name, "version": self.prompt.version}
             identity = {"prompt": version, "pictures": hex_digest(json.dumps(keys))}
-            if used:
-                identity["examples"] = sorted(used)
         if self.simulates and getattr(self.spec, "physics", "") != "off":
             engine = physics_engine()
             if engine.name != REFERENCE_ENGINE:
@@ -245,9 +236,7 @@ class Track(ABC):
         """Return the request of one sample; without messages for models that need none."""
         if not with_messages or self.shop is None:
             return Request(item.key, seed, (), params, "", self.subject_of(item))
-        shown = (*self.examples.get(item.key, ()), item)
-        images = [await self.shop.images(self.drawings(one)) for one in shown]
-        return self._request(shown, seed, params, images)
+        return self._request(item, seed, params, await self.shop.images(self.drawings(item)))
 
     def outlines(self, item: Any) -> Iterator[Request]:
         """Yield the requests of an item as far as they are known before any is answered.
@@ -258,41 +247,22 @@ class Track(ABC):
         if self.shop is None:
             yield Request(item.key, 0, (), {}, "", self.subject_of(item))
             return
-        shown = (*self.examples.get(item.key, ()), item)
-        images = [self.shop.outlines(self.drawings(one)) for one in shown]
-        yield self._request(shown, 0, {}, images)
+        yield self._request(item, 0, {}, self.shop.outlines(self.drawings(item)))
 
     def _request(
-        self,
-        shown: Sequence[Any],
-        seed: int,
-        params: Mapping[str, object],
-        images: Sequence[tuple[Image, ...]],
+        self, item: Any, seed: int, params: Mapping[str, object], pictures: Sequence[Image]
     ) -> Request:
-        """Return the request about the last item shown, after examples, with pictures of each."""
+        """Return the request about an item with these pictures."""
         assert self.prompt is not None
-        *examples, item = shown
-        turns: list[Message] = []
-        for one, pictures in zip(examples, images, strict=False):
-            *_, asked = self.prompt.messages(pictures, self.facts(one, pictures))
-            parts = tuple(
-                replace(part, label=f"example {one.key}: {part.label}")
-                if isinstance(part, Image)
-                else part
-                for part in asked.parts
-            )
-            turns += [Message("user", parts), Message("assistant", (self.right_answer(one),))]
-        *first, question = self.prompt.messages(images[-1], self.facts(item, images[-1]))
         form = self.form(item)
         return Request(
             item.key,
             seed,
-            (*first, *turns, question),
+            self.prompt.messages(pictures, self.facts(item, pictures)),
             params,
             self.prompt.version,
             self.subject_of(item),
             None if form is None else form.response_format,
-            examples=tuple(one.key for one in examples),
         )
 
     async def work_out(self, work: Callable[[], Any]) -> Any:
@@ -315,14 +285,10 @@ class SceneTrack(Track):
 
     def open(self) -> None:
         """Select scenes evenly over levels."""
-        suite, pool = self.suite, self.dataset.tasks
-        self.items = select_tasks(pool, suite.levels, self.limit)
-        controls = self.spec if isinstance(self.spec, PictureControls) else PictureControls()
-        others: Others[AssemblyTask] | None = None
-        if controls.wrong_image:
-            others = Others(pool, lambda task: task.scene.level)
-            others.check(self.items, "scene", f"{self.section}.wrong_image")
-        self.presentation = Presentation(suite.candidates.order, controls.blind, others)
+        suite = self.suite
+        self.items = select_tasks(self.dataset.tasks, suite.levels, self.limit)
+        is_blind = isinstance(self.spec, PictureControls) and self.spec.blind
+        self.presentation = Presentation(suite.candidates.order, is_blind)
         if not self.presentation.is_plain:
             self.drawn_seeds = suite.seeds
         if self.draws and self.shop is not None and suite.images.source == "dataset":
@@ -342,8 +308,7 @@ class SceneTrack(Track):
         """Return how the scene is shown, where not as the file has it."""
         if not isinstance(item, ShownTask):
             return {}
-        goal = None if item.goal is None else item.goal.key
-        return {"shown": {"order": list(item.order), "goal": goal}}
+        return {"shown": {"order": list(item.order), "blind": item.is_blind}}
 
     def facts(self, item: AssemblyTask, pictures: Sequence[Image]) -> dict[str, object]:
         """Return what templates may use; nothing in it gives an answer away."""
@@ -389,9 +354,6 @@ def open_tracks(
         if kind.template_for(suite.answer_format) is None:
             message, hint = f"{name} cannot be asked for as JSON", "use answer_format: text"
             raise SpecError(Problem(suite.where(field), message, field, "json_schema", hint=hint))
-        if suite.examples and "examples" not in kind.varies:
-            where, message = suite.where("examples"), f"{name} shows no worked examples"
-            raise SpecError(Problem(where, message, "examples", hint="leave them out"))
     return tuple(kind_of(name)(suite, dataset, limit, shop) for name in suite.tracks)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -20,10 +20,9 @@ from phyblock.records.record import Line, Record
 from phyblock.records.record import Score as ScoreLine
 from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES, AssemblyScorer, Counts, Score
 from phyblock.sim.film import FilmStep, Tone
-from phyblock.stable import drawn_bytes
 from phyblock.tracks.base import Judgement, SceneTrack
 from phyblock.tracks.goal_blind import blind_guesses
-from phyblock.tracks.items import examples_of, file_plan
+from phyblock.tracks.items import file_plan
 from phyblock.tracks.measures import SampleCounts, level_cells
 from phyblock.tracks.picking import Picking, candidate_choices
 from phyblock.tracks.prompts import OfficialPrompt, Prompt
@@ -270,30 +269,20 @@ class FullPlanning(SceneTrack):
     record = PlanRecord
     counted = COUNTS
     results: ClassVar = {"cells": level_cells, "film": _film}
-    varies = ("prompt", "background", "view", "candidate_order", "layout", "examples", "repeats")
+    varies = ("prompt", "background", "view", "candidate_order", "layout", "repeats")
 
     def open(self) -> None:
-        """Select scenes, and examples, which are shown as scenes are, with their own goals."""
+        """Select scenes; DataError where the data set is to bring their pictures and lacks some."""
         super().open()
         suite, dataset = self.suite, self.dataset
         self._guess = blind_guesses(suite.candidates.order, dataset.tasks, suite.settings[0])
         self._scorers: dict[object, AssemblyScorer] = {}
-        if self.shop is None:
-            return
-        is_drawn = suite.images.source == "render"
-        if lacking := [task.key for task in self.items if not (is_drawn or task.composite)]:
+        lacking = [task.key for task in self.items if task.composite is None]
+        if self.shop is not None and suite.images.source == "dataset" and lacking:
             message = f"has no picture of {len(lacking)} of {len(self.items)} scenes"
             found = ", ".join(lacking[:8]) + (", ..." if len(lacking) > 8 else "")
             hint, where = "render them: --set images.source=render", str(dataset.root)
             raise DataError(Problem(where, message, "images.source", found, hint=hint))
-        own = replace(self.presentation, others=None)
-        able = (
-            own.of(task, suite.seeds[0])
-            for task in dataset.tasks
-            if (is_drawn or task.composite)
-            and all(task.candidates.index_of(block.look) for block in task.scene.blocks)
-        )
-        self.examples = examples_of(suite, able, self.items, "scene")
 
     def open_prompt(self) -> Prompt:
         """Return the official prompt or a template."""
@@ -313,22 +302,6 @@ class FullPlanning(SceneTrack):
     def subject_of(self, item: AssemblyTask) -> PlanSubject:
         """Return what baselines answer about."""
         return PlanSubject(item.scene, item.candidates, functools.partial(self._guess, item))
-
-    def right_answer(self, item: AssemblyTask) -> str:
-        """Return the answer of a worked example.
-
-        Blocks are placed in a valid order that does not follow that of the file: the next is the
-        ready one whose digest is the least.
-        """
-        order: list[int] = []
-        while ready := item.scene.graph.ready(sum(1 << vertex for vertex in order)):
-            order.append(min(ready, key=lambda v: drawn_bytes("example plan", item.scene.id, v)))
-        subject, form = self.subject_of(item), self.form(item)
-        steps = [needed_candidate(subject, item.scene.blocks[vertex]) for vertex in order]
-        if form is None:
-            return plan_text(steps)
-        reasoning = f"The goal has {len(steps)} blocks. Each is placed once all it rests on is "
-        return form.write(steps, f"{reasoning}there.")
 
     def judge(self, item: AssemblyTask, text: str | None) -> Judgement:
         """Read and score a reply; None, where there is no reply, is scored as an empty plan."""

@@ -1,27 +1,23 @@
 """Items: those that a run asks about, their order, and how a seed shows them.
 
-A seed can show a scene with its candidates in another order, without its goal, or with the goal of
-another one. All that depends on it (pictures, prompt, the reading of a reply, its scores) is made
-from a `ShownTask`, whose candidates are numbered as the model saw them. Only records know the
-numbers in the file. Worked examples are other items with right answers.
+A seed can show a scene with its candidates in another order, or without its goal. All that depends
+on it (pictures, prompt, the reading of a reply, its scores) is made from a `ShownTask`, whose
+candidates are numbered as the model saw them. Only records know the numbers in the file.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
-from typing import Generic, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
-from phyblock.config.suite import Suite
 from phyblock.data import AssemblyTask
 from phyblock.domain import CandidateSet, Scene
-from phyblock.domain.symmetry import fingerprint
-from phyblock.errors import DataError, Problem, SpecError
+from phyblock.errors import DataError, Problem
 from phyblock.records.record import Record
 from phyblock.stable import drawn_bytes
-from phyblock.text import did_you_mean
 from phyblock.types import CandidateOrder
 
 
@@ -91,67 +87,35 @@ def _fair_order(strata: Sequence[int]) -> list[int]:
     return [position for *_, position in places]
 
 
-class Others(Generic[ItemT]):
-    """Items of a pool by their sort; they stand in for an item whose base scenes they share not."""
-
-    def __init__(self, pool: Iterable[ItemT], sort_of: Callable[[ItemT], Hashable]) -> None:
-        self._sort_of = sort_of
-        self._by_sort: dict[Hashable, list[ItemT]] = {}
-        for one in pool:
-            self._by_sort.setdefault(sort_of(one), []).append(one)
-
-    def of(self, item: ItemT) -> list[ItemT]:
-        """Return all that can stand in for an item, in the order of the pool."""
-        same_sort, own = self._by_sort.get(self._sort_of(item), ()), _bases(item)
-        return [one for one in same_sort if own.isdisjoint(_bases(one))]
-
-    def drawn(self, item: ItemT, seed: int) -> ItemT:
-        """Return the one whose picture is shown, which depends on item and seed alone."""
-        others, digest = self.of(item), drawn_bytes("wrong image", seed, item.key)
-        return others[int.from_bytes(digest, "big") % len(others)]
-
-    def check(self, items: Iterable[ItemT], noun: str, field: str) -> None:
-        """Raise SpecError for the first item that has no other; `field` is that of the suite."""
-        lacking = next((item for item in items if not self.of(item)), None)
-        if lacking is not None:
-            message = f"has no {noun} of the same kind about another scene to take pictures from"
-            raise SpecError(Problem(f"{noun} {lacking.key}", message, field))
-
-
-def _bases(item: Item) -> set[str]:
-    return {item.scene.id, *item.scene.parents}
-
-
 @dataclass(frozen=True)
 class ShownTask(AssemblyTask):
     """A task in another form than the file's.
 
-    `candidates` are in the order shown, and `order` holds the number in the file of each of them;
-    `goal` is the task whose goal is shown, None where none is; `seed` drew both.
+    `candidates` are in the order shown, which `seed` drew, and `order` holds the number in the file
+    of each of them; the goal is not shown where it `is_blind`.
     """
 
     order: tuple[int, ...] = ()
-    goal: AssemblyTask | None = None
+    is_blind: bool = False
     seed: int = 0
 
     @property
     def shown_as(self) -> str:
         """A name that tells apart what can be shown of the task."""
-        return f"{self.key} {self.order} {self.goal and self.goal.key}"
+        return f"{self.key} {self.order}"
 
 
 @dataclass(frozen=True)
 class Presentation:
-    """Conditions of scenes: without their goal where `blind`, with that of one of the `others`."""
+    """Conditions of scenes: without their goal where `blind`."""
 
     order: CandidateOrder = "file"
     blind: bool = False
-    others: Others[AssemblyTask] | None = None
 
     @property
     def is_plain(self) -> bool:
         """True if scenes are shown as the file has them."""
-        return self.order == "file" and not self.blind and self.others is None
+        return self.order == "file" and not self.blind
 
     def of(self, task: AssemblyTask, seed: int) -> AssemblyTask:
         """Return the task as a seed shows it; itself where that is as the file has it."""
@@ -160,10 +124,7 @@ class Presentation:
         numbers = tuple(range(1, len(task.candidates) + 1))
         if self.order == "shuffled":
             numbers = shown_order(task, seed)
-        goal = None if self.blind else task
-        if self.others is not None:
-            goal = self.others.drawn(task, seed)
-        return in_order(task, numbers, goal, seed)
+        return in_order(task, numbers, seed, is_blind=self.blind)
 
 
 def shown_order(task: AssemblyTask, seed: int) -> tuple[int, ...]:
@@ -177,9 +138,9 @@ def shown_order(task: AssemblyTask, seed: int) -> tuple[int, ...]:
 
 
 def in_order(
-    task: AssemblyTask, numbers: Sequence[int], goal: AssemblyTask | None, seed: int = 0
+    task: AssemblyTask, numbers: Sequence[int], seed: int = 0, *, is_blind: bool = False
 ) -> ShownTask:
-    """Return the task with the candidates of these numbers in the file, in this order, and a goal.
+    """Return the task with the candidates of these numbers in the file, in this order.
 
     Raises DataError for a number that no candidate has, and for one that is there twice.
     """
@@ -189,17 +150,12 @@ def in_order(
         found, allowed = ", ".join(map(str, numbers)), f"the numbers 1 to {n}, each once"
         raise DataError(Problem(where, message, "shown.order", found, allowed))
     shown = CandidateSet(tuple(task.candidates[number] for number in numbers))
-    return ShownTask(task.scene, shown, task.composite, tuple(numbers), goal, seed)
+    return ShownTask(task.scene, shown, task.composite, tuple(numbers), is_blind, seed)
 
 
 def as_recorded(task: AssemblyTask, record: Record) -> AssemblyTask:
     """Return the task with the candidates that a record says were shown, in their order."""
-    return task if record.shown is None else in_order(task, record.shown.order, task)
-
-
-def goal_of(task: AssemblyTask) -> AssemblyTask | None:
-    """Return the task whose goal is shown, None where none is."""
-    return task.goal if isinstance(task, ShownTask) else task
+    return task if record.shown is None else in_order(task, record.shown.order)
 
 
 def file_plan(task: AssemblyTask, steps: Sequence[int]) -> tuple[int, ...] | None:
@@ -211,61 +167,3 @@ def file_plan(task: AssemblyTask, steps: Sequence[int]) -> tuple[int, ...] | Non
         return None
     n = len(task.order)
     return tuple(task.order[step - 1] if 1 <= step <= n else step for step in steps)
-
-
-def examples_of(
-    suite: Suite,
-    pool: Iterable[ItemT],
-    items: Sequence[ItemT],
-    noun: str,
-    sort_of: Callable[[ItemT], Hashable] = lambda _: None,
-) -> Mapping[str, tuple[ItemT, ...]]:
-    """Return the worked examples that a suite wants of each item, by its key.
-
-    They are tried in one order for all items, so that requests begin alike: those about the scenes
-    that the suite names first, then as the least of its seeds draws; no two are about one scene.
-    None is of another sort than the item, shares a base scene with it, or has its goal, be it
-    turned, mirrored or shifted. Raises SpecError for a scene that the pool has not, and where an
-    item has too few others.
-    """
-    wanted = suite.examples
-    if not wanted:
-        return {}
-    n, named = (wanted, ()) if isinstance(wanted, int) else (len(wanted), wanted)
-    pool = list(pool)
-    known = sorted({one.scene.id for one in pool})
-    problems = []
-    for at, name in enumerate(named):
-        if name not in known:
-            where, message = suite.where("examples", at), "is no scene that an example can be about"
-            allowed = f"scenes, such as {known[0]}" if known else "no scene of these data"
-            hint = did_you_mean(name, known)
-            problems.append(Problem(where, message, f"examples[{at}]", name, allowed, hint))
-    if problems:
-        raise SpecError(problems)
-    seed, goals = min(suite.seeds), dict[str, bytes]()
-
-    def place(one: ItemT) -> tuple[int, bytes]:
-        at = named.index(one.scene.id) if one.scene.id in named else len(named)
-        return at, drawn_bytes("example", seed, one.key)
-
-    def goal(one: ItemT) -> bytes:
-        if one.scene.id not in goals:
-            goals[one.scene.id] = fingerprint(one.scene.blocks)
-        return goals[one.scene.id]
-
-    others, examples = Others(sorted(pool, key=place), sort_of), dict[str, tuple[ItemT, ...]]()
-    for item in items:
-        found: dict[str, ItemT] = {}
-        for one in others.of(item):
-            if one.scene.id not in found and goal(one) != goal(item):
-                found[one.scene.id] = one
-                if len(found) == n:
-                    break
-        if len(found) < n:
-            message = f"{noun} {item.key} has fewer others to be shown as examples"
-            allowed = "others of its kind that share neither base scene nor goal with it"
-            where = suite.where("examples")
-            raise SpecError(Problem(where, message, "examples", str(len(found)), allowed))
-        examples[item.key] = tuple(found.values())
-    return examples

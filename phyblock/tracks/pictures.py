@@ -39,7 +39,7 @@ from phyblock.sim.pictures import (
     to_png,
 )
 from phyblock.stable import hex_digest
-from phyblock.tracks.items import ShownTask, goal_of
+from phyblock.tracks.items import ShownTask
 from phyblock.types import BACKGROUNDS
 
 _Result = TypeVar("_Result")
@@ -214,30 +214,28 @@ def scene_drawings(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, ...
     They are drawn, or cut out of the data set's own composites. A goal that is not shown has no
     part in the size of what is. DataError where the data set is to bring a picture and has none.
     """
-    shown, style = goal_of(task), picture_style(images)
+    is_blind, style = isinstance(task, ShownTask) and task.is_blind, picture_style(images)
     is_drawn = images.source == "render"
     if is_drawn:
-        style = style if shown is None else goal_style(shown.scene, style)
+        style = style if is_blind else goal_style(task.scene, style)
         side = (style.size_px, style.size_px)
         key = candidates_key(task.candidates, style)
         grid = Drawing("candidates", key, partial(candidates_png, task.candidates, style), side)
     else:
         grid = _cut_out(task, "candidates")
-    if shown is None:
+    if is_blind:
         return (grid,)
     if is_drawn:
-        key = goal_key(shown.scene, style)
-        goal = Drawing("goal", key, partial(goal_png, shown.scene, style), side)
+        key = goal_key(task.scene, style)
+        goal = Drawing("goal", key, partial(goal_png, task.scene, style), side)
     else:
-        goal = _cut_out(shown, "goal")
+        goal = _cut_out(task, "goal")
     if images.layout == "separate":
         return (goal, grid) if images.order[0] == "goal" else (grid, goal)
-    join = partial(_joined, goal.make, grid.make)
     if is_drawn:
+        join = partial(_joined, goal.make, grid.make)
         key = hex_digest(f"composite {goal.key} {grid.key}")
         return (Drawing("composite", key, join, joined_size_px(style.size_px)),)
-    if isinstance(task, ShownTask):
-        return (Drawing("composite", f"{grid.key} {goal.key}", join, is_file=True),)
     whole = partial(read_picture, _composite(task))
     return (Drawing("composite", grid.key, whole, is_file=True),)
 

@@ -64,7 +64,7 @@ from phyblock.stable import plain_sum
 from phyblock.text import counted
 from phyblock.tracks.base import CARRYING, ENGINE, Judgement, SceneTrack
 from phyblock.tracks.full_planning import PlanParse, needed_candidate, score_fields
-from phyblock.tracks.items import ShownTask, file_plan, goal_of
+from phyblock.tracks.items import ShownTask, file_plan
 from phyblock.tracks.measures import SampleCounts, level_cells
 from phyblock.tracks.picking import NumberField, Pick, Picking, candidate_choices
 from phyblock.tracks.pictures import Drawing, picture_style
@@ -719,10 +719,10 @@ class PosePlanning(SceneTrack):
             for view in self.spec.views
         }
         drawings = []
-        if (goal := goal_of(item)) is not None:
+        if not (isinstance(item, ShownTask) and item.is_blind):
             for name, view_style in seen.items():
-                style = written_style(goal_style(goal.scene, view_style))
-                key, make = ruled_key(goal.scene, style), partial(ruled_png, goal.scene, style)
+                style = written_style(goal_style(item.scene, view_style))
+                key, make = ruled_key(item.scene, style), partial(ruled_png, item.scene, style)
                 drawings.append(Drawing(f"goal, {name}", key, make, (style.size_px, style.size_px)))
         style = written_style(seen[self.spec.views[0]])
         key, make = kit_key(item.candidates, style), partial(kit_png, item.candidates, style)
@@ -737,7 +737,7 @@ class PosePlanning(SceneTrack):
         if isinstance(shown, ShownTask):
             numbers = tuple(shown.order[number - 1] for number in numbers)
             return replace(shown, candidates=kit, order=numbers)
-        return ShownTask(shown.scene, kit, shown.composite, numbers, shown, seed)
+        return ShownTask(shown.scene, kit, shown.composite, numbers, False, seed)
 
     def identity(self) -> dict[str, Any]:
         """Return what decides its results, with the version of how plans are carried out."""

@@ -61,7 +61,7 @@ from phyblock.sim.question_pictures import (
 from phyblock.stable import hex_digest
 from phyblock.tracks.base import Judgement, Track
 from phyblock.tracks.baselines import Guesses
-from phyblock.tracks.items import Others, examples_of, spread, stratified
+from phyblock.tracks.items import spread, stratified
 from phyblock.tracks.measures import OVERALL, WHOLE, Cell, SampleCounts
 from phyblock.tracks.picking import Choice, Picking
 from phyblock.tracks.pictures import Drawing, picture_style
@@ -125,8 +125,6 @@ class QuestionShown(Line):
     """`images`: pictures of options were each sent by themselves; `letters`: on one sheet."""
     blind: bool = False
     """True if no picture was sent."""
-    wrong_image: bool = False
-    """True if the pictures were those of another scene."""
 
 
 class GivenAnswer(Line):
@@ -307,15 +305,11 @@ def pick_answer(subject: ChoiceSubject) -> Picking:
 
 @dataclass(frozen=True)
 class AskedQuestion:
-    """A question with its options in one order; `rotation` 0 is that of the data set.
-
-    Where `seen` is given, the pictures of that question are shown.
-    """
+    """A question with its options in one order; `rotation` 0 is that of the data set."""
 
     task: QuestionTask
     rotation: int = 0
     is_one_of_many: bool = False
-    seen: QuestionTask | None = None
 
     @functools.cached_property
     def question(self) -> Question:
@@ -326,11 +320,6 @@ class AskedQuestion:
     def key(self) -> str:
         """The question's id, with the rotation where all are asked."""
         return f"{self.task.key}-r{self.rotation}" if self.is_one_of_many else self.task.key
-
-    @property
-    def shown_as(self) -> str:
-        """A name that tells apart what can be shown of the question."""
-        return f"{self.key} {self.seen and self.seen.key}"
 
     @property
     def scene(self) -> Scene:
@@ -416,7 +405,7 @@ class Vqa(Track):
     baselines = CHOICE_RULES
     by_hand = staticmethod(pick_answer)
     record = ChoiceRecord
-    varies = ("prompt", "background", "examples", "repeats")
+    varies = ("prompt", "background", "repeats")
     counted = COUNTS
     results: ClassVar = {
         "code": {"accuracy": {"chance": _guessing}},
@@ -427,7 +416,7 @@ class Vqa(Track):
     spec: VqaSpec
 
     def open(self) -> None:
-        """Select questions; SpecError where there is none, or wrong pictures cannot be had."""
+        """Select questions; SpecError where there is none."""
         suite, spec = self.suite, self.spec
         self.questions = known = open_questions(
             spec.format, suite.files.folders[self.name], self.dataset
@@ -446,37 +435,19 @@ class Vqa(Track):
             for rotation in range(spec.rotations)
         )
         self._guesses = Guesses([task.question for task in known.tasks])
-        self._others = Others(known.tasks, _sort_of) if spec.wrong_image else None
-        if self._others is not None:
-            self._others.check(tasks, "question", "vqa.wrong_image")
-            self.drawn_seeds = suite.seeds
-        if self.shop is not None:
-            pool = map(AskedQuestion, known.tasks)
-            self.examples = examples_of(suite, pool, self.items, "question", _subtask_of)
-
-    def shown(self, item: AskedQuestion, seed: int) -> AskedQuestion:
-        """Return the question, with pictures of another scene where a suite wants them.
-
-        Which other one depends on the question and the seed alone, so it is the same for all
-        models and for all rotations.
-        """
-        if self._others is None:
-            return item
-        return replace(item, seen=self._others.drawn(item.task, seed))
 
     def draw(self, item: AskedQuestion) -> tuple[Drawing, ...]:
         """Return the pictures of a question as a suite wants them."""
         if self.spec.blind:
             return ()
-        seen = item if item.seen is None else AskedQuestion(item.seen, item.rotation)
         images = self.suite.images
         style, ground = picture_style(images), images.background
-        return question_drawings(seen, style, self.spec.options_as, ground)
+        return question_drawings(item, style, self.spec.options_as, ground)
 
     def about(self, item: AskedQuestion) -> dict[str, Any]:
         """Return the question and how it is shown."""
         asked = {name: getattr(item.question, name) for name in ("id", "subtask", "category")}
-        shown = {name: getattr(self.spec, name) for name in ("options_as", "blind", "wrong_image")}
+        shown = {name: getattr(self.spec, name) for name in ("options_as", "blind")}
         return {"question": {**asked, "rotation": item.rotation, **shown}}
 
     def identity(self) -> dict[str, Any]:
@@ -515,14 +486,6 @@ class Vqa(Track):
         question = item.question
         return ChoiceSubject(question, lambda probe: self._guesses.guess(probe, question))
 
-    def right_answer(self, item: AskedQuestion) -> str:
-        """Return the answer of a worked example."""
-        form, letters = self.form(item), item.question.answer_letters
-        if form is None:
-            return choice_text(item.question.answer)
-        value = list(letters) if item.question.subtask == "OR" else letters
-        return form.write(value, f"The right answer is {', '.join(letters)}.")
-
     def judge(self, item: AskedQuestion, text: str | None) -> Judgement:
         """Read and score a reply; None, where there is no reply, is no answer."""
         question, parsed = item.question, ParsedAnswer(None, None)
@@ -536,19 +499,6 @@ class Vqa(Track):
             "answer": {"right": right, "given": given, "correct": given == right},
         }
         return Judgement(parsed.rule is not None, fields)
-
-
-def _subtask_of(item: AskedQuestion) -> Subtask:
-    return item.task.question.subtask
-
-
-def _sort_of(task: QuestionTask) -> tuple[object, ...]:
-    """Return what pictures must share to stand in for one another: a text may speak of place B."""
-    marks = sorted(
-        (picture.label, *sorted(mark.letter for mark in picture.marks))
-        for picture in task.question.pictures
-    )
-    return (task.question.subtask, frozenset(task.files), *marks)
 
 
 def open_questions(format_name: str, path: Path, dataset: Dataset) -> QuestionSet:

@@ -28,7 +28,7 @@ _DATA = "data/"
 _PARTIAL = re.compile(r"\.[0-9a-f]{32}\.part")
 _MAY_DIFFER = ("pictures",)
 """Parts of a track's identity: digests of pictures, which change with their size."""
-_CONTROLS = frozenset({"blind", "wrong_image", "prompt", "path"})
+_CONTROLS = frozenset({"blind", "prompt", "path"})
 """Parts of a track's section of the suite that are shown with the run, or known by their digest."""
 _HINTS = {
     "sha256": "give all runs the same levels and --limit, or make a site of each",

@@ -19,7 +19,7 @@ from phyblock.domain import LETTERS, SUBTASKS, Question, Scene, Subtask
 from phyblock.domain.question import rotated
 from phyblock.models.request import Image, Request
 from phyblock.sim.pictures import PictureStyle
-from phyblock.sim.question_pictures import question_key, question_png
+from phyblock.sim.question_pictures import question_key
 from phyblock.tracks import questions
 from phyblock.tracks.pictures import Workshop
 from phyblock.tracks.questions import (
@@ -119,41 +119,6 @@ def _meaning(question: Question, index: int) -> object:
             if mark.letter == letter:
                 return mark.position_m
     return question.options[index]
-
-
-def test_wrong_pictures_are_of_another_scene_and_depend_on_the_seed_alone(
-    question_set: QuestionSet, shop: Workshop
-) -> None:
-    own = {r.key: r for r in ask(opened(question_set, shop))}
-    rules = {"wrong_image": True}
-    seen = [
-        {r.key: r for r in ask(opened(question_set, shop, **rules), seed=seed)}
-        for seed in (0, 0, 1)
-    ]
-    assert own.keys() == seen[0].keys()
-    for key, request in own.items():
-        wrong = seen[0][key]
-        assert [i.label for i in images(wrong)] == [i.label for i in images(request)]
-        assert not {i.sha256 for i in images(wrong)} & {i.sha256 for i in images(request)}
-        assert text_of(wrong) == text_of(request)
-        assert wrong.messages == seen[1][key].messages
-    assert any(seen[2][key].messages != seen[0][key].messages for key in own)
-
-
-def test_wrong_pictures_have_the_marks_that_the_text_speaks_of(
-    question_set: QuestionSet, shop: Workshop
-) -> None:
-    """Of two other questions about places, one marks none: it never stands in."""
-    first, second, third, *_ = [t for t in question_set.tasks if t.question.subtask == "AD"]
-    scene, *rest = second.question.pictures
-    bare = replace(second.question, pictures=(replace(scene, marks=()), *rest))
-    three = of_tasks(question_set, [first, replace(second, question=bare), third])
-    track = opened(three, shop, wrong_image=True, per_subtask=1)
-    for seed in range(8):
-        (request,) = ask(track, seed=seed)
-        sent = {image.label: image.data for image in images(request)}
-        shown = {picture.label: picture for picture in third.question.pictures}
-        assert sent == {label: question_png(recipe, STYLE) for label, recipe in shown.items()}
 
 
 def test_questions_keep_their_background_unless_a_suite_gives_one(

@@ -61,10 +61,10 @@ const Sample = (() => {
       panels.map(({ strip }, i) => [heading(samples[i]), strip]).flat());
   }
 
-  function about(scene, { levels, record, entry, scene: name }) {
+  function about(scene, { levels, record, entry }) {
     const words = [Words.count(scene.blocks.length, "block"), `level${levels.length > 1 ? "s" : ""} ${levels.join(" and ")}`];
     const { shown } = record;
-    if (shown && shown.goal !== name) words.push(shown.goal ? `shown was the goal of ${shown.goal}` : "no goal was shown");
+    if (shown?.blind) words.push("no goal was shown");
     else if (entry.kind === "replay") words.push("redrawn");
     return words.join(", ");
   }
@@ -124,7 +124,7 @@ const Sample = (() => {
 
   /** A picture of the question: the one that was sent, where it is at hand, else drawn. */
   function pictureOf(question, label, { record }) {
-    const isAsEntered = turned(question, record) === 0 && !record.question?.wrong_image;
+    const isAsEntered = turned(question, record) === 0;
     const image = isAsEntered ? record.prompt?.images.find((one) => one.label === label) : null;
     if (image?.file) return sentPicture(image);
     const { blocks, framed, marks, view } = question.pictures.find((one) => one.label === label) || {};
@@ -191,8 +191,7 @@ const Sample = (() => {
   }
 
   function verdict({ correct, given: letters, right }, outcome, shown) {
-    const notes = [shown?.rotation && `options rotated by ${shown.rotation}`, shown?.blind && "sent without pictures",
-      shown?.wrong_image && "sent with pictures of another scene"].filter(Boolean);
+    const notes = [shown?.rotation && `options rotated by ${shown.rotation}`, shown?.blind && "sent without pictures"].filter(Boolean);
     return el("section", { class: "card answer" }, el("p", { class: "facts" },
       el("span", { class: `verdict ${correct ? "right" : "wrong"}` }, correct ? "✓ Right" : "✗ Wrong"),
       fact("Answered", letters ?? "nothing"), fact("Right is", right),
