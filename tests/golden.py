@@ -53,7 +53,6 @@ SUITES: dict[str, dict[str, Any]] = {
     "steps": {"tracks": ["step_planning"]},
     "steps-json": {"tracks": ["step_planning"], "answer_format": "json_schema"},
     "poses": {"tracks": ["pose_planning"]},
-    "poses-free": {"tracks": ["pose_planning"], "pose": {"rotation": "free", "views": ["oblique"]}},
     "questions": {"tracks": ["vqa"]},
     "questions-letters": {
         "tracks": ["vqa"],

@@ -30,7 +30,7 @@ from phyblock.errors import DataError, Problem
 from phyblock.scoring.pose import blocks_reached
 from phyblock.scoring.steps import Assembly
 from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, ExecutedStep, Executor, Settled, Site
-from phyblock.sim.geometry import center_cm, put, upright
+from phyblock.sim.geometry import center_cm, put
 from phyblock.sim.pictures import (
     LARGEST_PX,
     SMALLEST_PX,
@@ -41,7 +41,7 @@ from phyblock.sim.pictures import (
 )
 from phyblock.sim.ruled import RuledFloor, kit_sheet
 from phyblock.text import some_of
-from phyblock.types import GATINGS, SETTINGS, Background, Gating, Physics, PoseRotation, Setting
+from phyblock.types import GATINGS, SETTINGS, Background, Gating, Physics, Setting
 
 Observation = dict[str, NDArray[Any]]
 Observe = Literal["pictures", "state"]
@@ -57,7 +57,7 @@ _KEPT_PICTURES = 64
 """Pictures of one scene that are kept; 50 MB at 512 pixels."""
 _SMALLEST_PX = 16
 _LEVELS = (1, 2, 3, 4)
-_CM, _HALF_TURN_DEG = 100.0, 180.0
+_CM = 100.0
 _NEAR = (1.0, 10.0)
 """Distance and turn within which a block has reached its place [cm, degrees]."""
 
@@ -160,23 +160,21 @@ class _BlockPlay:
 class _PosePlay:
     """Building with poses, after `begin`: blocks are let go where actions say, with the tolerances
     of `ExecutionLimits`; a goal block is reached by one of its kind within `_NEAR`.
-
-    Where actions turn blocks, each kind is a candidate once, upright.
     """
 
-    def __init__(self, style: PictureStyle, rotation: PoseRotation, *, is_strict: bool) -> None:
-        self._style, self._is_strict, self._is_free = style, is_strict, rotation == "free"
-        self._parts = ("center_m", "half_turns") if self._is_free else ("center_m",)
-        parts = {name: spaces.Box(-1.0, 1.0, (3,), np.float64) for name in self._parts}
-        number = spaces.Discrete(MAX_CANDIDATES + 1)
-        self.action_space = spaces.Dict({"block": number, **parts})
+    def __init__(self, style: PictureStyle, *, is_strict: bool) -> None:
+        self._style, self._is_strict = style, is_strict
+        number, center = (
+            spaces.Discrete(MAX_CANDIDATES + 1),
+            spaces.Box(-1.0, 1.0, (3,), np.float64),
+        )
+        self.action_space = spaces.Dict({"block": number, "center_m": center})
         self._stack = contextlib.ExitStack()
         self._task: AssemblyTask | None = None
 
     def begin(self, task: AssemblyTask) -> None:
         if self._task is not task:
-            self._task, self._scene = task, task.scene
-            self.candidates = upright(task.candidates)[0] if self._is_free else task.candidates
+            self._task, self._scene, self.candidates = task, task.scene, task.candidates
             self._floor: RuledFloor | None = None
         self._stack.close()
         self._executor = self._stack.enter_context(Executor())
@@ -186,24 +184,20 @@ class _PosePlay:
 
     def act(self, action: Any) -> tuple[str, float, bool] | None:
         """Put a block and let it go; worth the goal blocks newly reached, less those lost."""
-        names = ("block", *self._parts)
-        if not isinstance(action, Mapping) or set(action) != set(names):
-            raise ValueError(f"action is {action!r}; allowed: a mapping of {', '.join(names)}")
+        if not isinstance(action, Mapping) or set(action) != {"block", "center_m"}:
+            raise ValueError(f"action is {action!r}; allowed: a mapping of block, center_m")
         number = int(action["block"])
         if not 0 <= number <= MAX_CANDIDATES:
             raise ValueError(f"action block {number} is outside 0..{MAX_CANDIDATES}")
-        values = []
-        for name, unit in zip(self._parts, (_CM, _HALF_TURN_DEG), strict=False):
-            found = np.asarray(action[name], dtype=np.float64)
-            if found.shape != (3,) or not np.all(np.abs(found) <= 1):
-                allowed = "3 numbers from -1 to 1"
-                raise ValueError(f"action {name} is {action[name]!r}; allowed: {allowed}")
-            x, y, z = (found * unit).tolist()
-            values.append((x, y, z))
+        center = np.asarray(action["center_m"], dtype=np.float64)
+        if center.shape != (3,) or not np.all(np.abs(center) <= 1):
+            allowed = "3 numbers from -1 to 1"
+            raise ValueError(f"action center_m is {action['center_m']!r}; allowed: {allowed}")
         self._last = None
         if number == DONE:
             return None
-        self._last = self._executor.step(put(PoseStep(number, *values), self.candidates))
+        x, y, z = (center * _CM).tolist()
+        self._last = self._executor.step(put(PoseStep(number, (x, y, z)), self.candidates))
         self._named.append(number)
         before, self._reached = self._reached, self._count(self._scene.blocks)
         end = self._last.end
@@ -225,7 +219,7 @@ class _PosePlay:
 
     def right_moves(self) -> tuple[dict[str, Any], ...]:
         """The actions that put a goal block not reached on what is, those of low layers first."""
-        scene, kit = self._scene, self.candidates
+        scene = self._scene
         is_there = [self._count((block,)) == 1 for block in scene.blocks]
         needs, layers = scene.graph.depends_on, scene.graph.layers
         ready = [
@@ -235,12 +229,9 @@ class _PosePlay:
         ]
         moves = []
         for block in (scene.blocks[v] for v in sorted(ready, key=lambda v: layers[v])):
-            number = kit.first_of(block.kind) if self._is_free else kit.index_of(block.look)
-            if number is not None:
-                turns = (np.array(block.euler_deg) / _HALF_TURN_DEG + 1) % 2 - 1
-                values = (np.array(center_cm(block)) / _CM, turns)
-                parts = dict(zip(self._parts, values, strict=False))
-                moves.append({"block": np.int64(number), **parts})
+            if (number := self.candidates.index_of(block.look)) is not None:
+                center = np.array(center_cm(block)) / _CM
+                moves.append({"block": np.int64(number), "center_m": center})
         return tuple(moves)
 
     def image(self, blocks: tuple[Block, ...]) -> Image.Image:
@@ -292,7 +283,6 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         physics: Physics = "settle",
         observe: Observe = "pictures",
         action: Action = "block",
-        rotation: PoseRotation = "candidate",
         size_px: int = 512,
         background: Background = "checkerboard",
         max_steps: int | None = None,
@@ -301,8 +291,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
     ) -> None:
         """Play `data`, a data set (see `read_tasks`) or tasks: scenes of `levels` (None: of all),
         or one `scene`. With `action="pose"` a block is put where the action says,
-        turned as its candidate is or, with `rotation="free"`, as the action says; `setting` and
-        `gating` are of `action="block"` alone.
+        turned as its candidate is; `setting` and `gating` are of `action="block"` alone.
 
         Raises DataError for a data set or scene that is not there, ValueError for an option that
         is not among those allowed, a limit below 1, or no tasks at all.
@@ -313,12 +302,9 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
             ("physics", physics, get_args(Physics)),
             ("observe", observe, get_args(Observe)),
             ("action", action, get_args(Action)),
-            ("rotation", rotation, get_args(PoseRotation)),
         ):
             if value not in allowed:
                 raise ValueError(f"{name} is {value!r}; allowed: {', '.join(allowed)}")
-        if action == "block" and rotation != "candidate":
-            raise ValueError(f"rotation is {rotation!r}, which needs action='pose'")
         if action == "pose" and (setting != "A" or gating != "aov"):
             raise ValueError("setting and gating are of action='block'; leave them out")
         if action == "pose" and physics == "off":
@@ -346,7 +332,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         style = PictureStyle(size_px * self._shrink, background)
         self._task = next(iter(self._tasks.values()))
         self._play: _BlockPlay | _PosePlay = (
-            _PosePlay(style, rotation, is_strict=physics == "strict")
+            _PosePlay(style, is_strict=physics == "strict")
             if action == "pose"
             else _BlockPlay(style, setting, gating, physics)
         )

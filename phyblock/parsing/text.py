@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-READER_VERSION = 7  # Of all readers; it goes up when any reply can be read otherwise than before.
+READER_VERSION = 8  # Of all readers; it goes up when any reply can be read otherwise than before.
 
 _NAMES = r"(?:think(?:ing)?|thoughts?|reasoning|scratchpad|analysis|reflection)"
 _THINKING = re.compile(

@@ -36,7 +36,7 @@ from phyblock.scoring.pose_matching import (
     matched,
 )
 from phyblock.stable import plain_sum
-from phyblock.types import Setting, StepEnd
+from phyblock.types import StepEnd
 
 PoseFrame = Literal["absolute", "aligned"]
 POSE_FRAMES: tuple[PoseFrame, ...] = get_args(PoseFrame)
@@ -91,21 +91,19 @@ class PoseScore:
 class PoseScorer:
     """Scores plans with poses for one scene; build once, use for every model and seed.
 
-    With setting A candidates keep their orientation; with B steps bring one of their own, which
-    counts within its tolerance. `pieces_of` gives the convex pieces of a block in its body frame.
+    Steps are turned as their candidates are. `pieces_of` gives the convex pieces of a block in its
+    body frame.
     """
 
     def __init__(
         self,
         scene: Scene,
         candidates: CandidateSet,
-        setting: Setting,
         pieces_of: Callable[[BlockType], Sequence[Piece]],
     ) -> None:
         self._types = {n: one.type for n, one in enumerate(candidates.candidates, 1)}
         self._blocks = scene.blocks
-        self.goal = Goal(scene, candidates, setting)
-        self._turns = setting == "B"
+        self.goal = Goal(scene, candidates, "A")
         self._pieces_of = pieces_of
         self._poses = _poses([(b.type, b.position_m, b.euler_deg) for b in scene.blocks])
 
@@ -122,7 +120,7 @@ class PoseScorer:
         for place, step in enumerate(steps):
             equal[place, list(self.goal.equal_to[step.candidate])] = True
         alike = tuple(symmetries(block_type) for block_type in types)
-        alignment = Alignment(poses, self._poses, equal, alike, self._turns)
+        alignment = Alignment(poses, self._poses, equal, alike)
         numbers = [step.candidate for step in steps]
         absolute = self._scored("absolute", numbers, types, alignment, Motion())
         aligned: PoseScore | None = None

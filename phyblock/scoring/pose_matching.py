@@ -1,13 +1,12 @@
 """Matching the steps of a plan with poses to goal blocks, and moving the whole plan to fit best.
 
 A step is matched to an unplaced, ready block that equals its candidate: as many steps as setting A
-(or B) lets place a block. Of all such matchings it is one under which steps are within the most
-tolerances together, and of those one under which they lie nearest.
+lets place a block. Of all such matchings it is one under which steps are within the most tolerances
+together, and of those one under which they lie nearest.
 
-For the motion, every pair of steps laid upon a pair of equal goal blocks is a hypothesis, and where
-steps bring a rotation, so is every step laid upon one; the best are drawn nearer by weighted least
-squares over the blocks that they match. The result does not depend on where the plan was or how it
-was turned.
+For the motion, every pair of steps laid upon a pair of equal goal blocks is a hypothesis; the best
+are drawn nearer by weighted least squares over the blocks that they match. The result does not
+depend on where the plan was or how it was turned.
 """
 
 from __future__ import annotations
@@ -186,13 +185,13 @@ class Poses:
     centers_cm: Floats
     rotations: Floats
 
-    def moved(self, motion: Motion, *, turns: bool) -> Poses:
-        """All of them turned and then shifted together; with `turns` each turns along."""
+    def moved(self, motion: Motion) -> Poses:
+        """All places turned and then shifted together; each keeps its rotation."""
         cosine, sine = np.cos(motion.turn_rad), np.sin(motion.turn_rad)
         matrix = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
         centers = self.centers_cm @ matrix.T
         centers[:, :2] += motion.shift_cm
-        return Poses(centers, matrix @ self.rotations if turns else self.rotations)
+        return Poses(centers, self.rotations)
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,19 +199,17 @@ class Alignment:
     """The steps of a plan against a goal, and the motions of the whole plan between them.
 
     `equal` (steps, blocks) is true where a step's candidate equals a block; `symmetries` are those
-    (k, 3, 3) of each step's block. With `turns` the rotation of each step turns along with the
-    plan; without, candidates keep the orientation in which they were shown.
+    (k, 3, 3) of each step's block. Candidates keep the orientation in which they were shown.
     """
 
     steps: Poses
     goal: Poses
     equal: NDArray[np.bool_]
     symmetries: tuple[Floats, ...]
-    turns: bool
 
     def moved(self, motion: Motion) -> tuple[Poses, Nearness]:
         """The steps after `motion`, and their nearness to the goal blocks."""
-        steps = self.steps if motion == Motion() else self.steps.moved(motion, turns=self.turns)
+        steps = self.steps if motion == Motion() else self.steps.moved(motion)
         apart = steps.centers_cm[:, None] - self.goal.centers_cm[None]
         distance = np.sqrt((apart**2).sum(axis=-1))
         turn = np.zeros(self.equal.shape)
@@ -295,44 +292,10 @@ class Alignment:
         middle = (p[step[first]] + p[step[second]]) / 2
         target = (q[vertex[first]] + q[vertex[second]]) / 2
         shift = target - _turned(middle, turn)
-        if not self.turns:
-            if len(turn):
-                # One step alone tells no turn.
-                return turn, shift
-            alone, turn_alone = np.arange(len(step)), np.zeros(len(step))
-        else:
-            alone, turn_alone = self._single_turns(step, vertex)
-        shift_alone = q[vertex[alone]] - _turned(p[step[alone]], turn_alone)
-        return np.concatenate([turn, turn_alone]), np.concatenate([shift, shift_alone])
-
-    def _single_turns(
-        self, step: NDArray[np.int64], vertex: NDArray[np.int64]
-    ) -> tuple[NDArray[np.int64], Floats]:
-        """Turns that bring the rotation of a step nearest to that of its block, and their pairs.
-
-        A pair has as many turns as the symmetry of its block lets be best.
-        """
-        places, found = [], []
-        for place, (s, v) in enumerate(zip(step, vertex, strict=True)):
-            a, b, c = self._trace_parts(s, v)
-            reached = np.hypot(a, b) + c
-            best = reached > reached.max() - _TRACE_SLACK
-            for turn in sorted(set(np.round(np.arctan2(b[best], a[best]), _DIGITS).tolist())):
-                places.append(place)
-                found.append(turn)
-        return np.array(places), np.array(found)
-
-    def _trace_parts(self, step: int, vertex: int) -> tuple[Floats, Floats, Floats]:
-        """Numbers a, b, c for each symmetry of the step's block.
-
-        After a turn by t the trace of goal⁻¹ · step is a cos t + b sin t + c.
-        """
-        both = self.steps.rotations[step] @ self.symmetries[step] @ self.goal.rotations[vertex].T
-        return (
-            both[..., 0, 0] + both[..., 1, 1],
-            both[..., 0, 1] - both[..., 1, 0],
-            both[..., 2, 2],
-        )
+        if len(turn):
+            return turn, shift
+        # One step alone tells no turn.
+        return np.zeros(len(step)), q[vertex] - p[step]
 
     def _likeliest(self, turns_rad: Floats, shifts_cm: Floats) -> tuple[Floats, Floats]:
         """The hypotheses under which most steps have an equal block near, each by itself."""
@@ -353,12 +316,6 @@ class Alignment:
         distance = np.where(self.equal, np.sqrt(apart), np.inf)
         chosen = ranked(distance)[:_MOST_TURNED]
         turns_rad, shifts_cm, distance = turns_rad[chosen], shifts_cm[chosen], distance[chosen]
-        if self.turns:
-            for step, vertex in zip(*np.nonzero(self.equal), strict=True):
-                a, b, c = self._trace_parts(step, vertex)
-                t = turns_rad[:, None]
-                trace = (np.cos(t) * a + np.sin(t) * b + c).max(axis=1)
-                distance[_angle_deg(trace) > TURN_TOLERANCE_DEG, step, vertex] = np.inf
         chosen = ranked(distance)[:_MOST_TRIED]
         return turns_rad[chosen], shifts_cm[chosen]
 

@@ -28,7 +28,7 @@ from phyblock.domain.blocks import (
     Shape,
     euler_deg_to_matrix,
 )
-from phyblock.domain.scene import Block, Candidate, CandidateSet, PoseStep
+from phyblock.domain.scene import Block, CandidateSet, PoseStep
 
 Vectors = NDArray[np.float64]
 
@@ -275,19 +275,8 @@ def put(step: PoseStep, candidates: CandidateSet) -> Block | None:
     if not 1 <= step.candidate <= len(candidates):
         return None
     candidate = candidates[step.candidate]
-    euler = candidate.euler_deg if step.euler_deg is None else step.euler_deg
-    place = origin_m(candidate.type, euler, step.center_cm)
-    return Block(1, candidate.type, candidate.color, place, euler, (), 1)
-
-
-def upright(candidates: CandidateSet) -> tuple[CandidateSet, tuple[int, ...]]:
-    """Each kind once, upright, and the number of its first candidate."""
-    first: dict[tuple[str, str], int] = {}
-    for number, one in enumerate(candidates.candidates, 1):
-        first.setdefault(one.kind, number)
-    kinds = [candidates[number].kind for number in first.values()]
-    kit = CandidateSet(tuple(Candidate(kind, color, UPRIGHT) for kind, color in kinds))
-    return kit, tuple(first.values())
+    place = origin_m(candidate.type, candidate.euler_deg, step.center_cm)
+    return Block(1, candidate.type, candidate.color, place, candidate.euler_deg, (), 1)
 
 
 @functools.lru_cache(maxsize=4096)

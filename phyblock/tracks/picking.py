@@ -34,7 +34,7 @@ class Choice:
 @dataclass(frozen=True)
 class NumberField:
     """A number that goes with every pick: its name and unit, from `-most` to `most` with so many
-    `decimals`. Keys change it by `step`, or by `leap`. `start` stands in it at first.
+    `decimals`. Keys change it by `step`, or by `leap`.
     """
 
     name: str
@@ -43,7 +43,6 @@ class NumberField:
     decimals: int
     step: float
     leap: float
-    start: float | None = None
 
     def allows(self, value: float) -> bool:
         """True for a number within the bounds and with no more decimals; NaN is refused."""

@@ -19,17 +19,12 @@ from phyblock.data import AssemblyTask
 from phyblock.domain import (
     Block,
     BlockType,
-    Candidate,
     CandidateSet,
     Plan,
     PoseStep,
     Scene,
-    euler_deg_to_matrix,
-    turn_deg,
 )
-from phyblock.domain.scene import PosePlan
 from phyblock.files import bundled
-from phyblock.models.request import Image
 from phyblock.parsing.poses import (
     FARTHEST_PLACE_CM,
     MOST_POSE_STEPS,
@@ -50,25 +45,23 @@ from phyblock.scoring.pose import (
     blocks_reached,
     pose_errors,
 )
-from phyblock.scoring.pose_matching import TOLERANCES_CM, TURN_TOLERANCE_DEG
+from phyblock.scoring.pose_matching import TOLERANCES_CM
 from phyblock.sim.balance import MARGIN_M, is_balanced
 from phyblock.sim.camera import VIEWS
 from phyblock.sim.contact import voxel_iou
 from phyblock.sim.dynamics import ExecutionLimits, execute, groups
 from phyblock.sim.engine import Pose, described_engine
-from phyblock.sim.film import FilmStep, Tone
-from phyblock.sim.geometry import box_height_cm, center_cm, collision_pieces, origin_m, put, upright
+from phyblock.sim.geometry import box_height_cm, center_cm, collision_pieces, put
 from phyblock.sim.pictures import goal_style
 from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
 from phyblock.stable import plain_sum
-from phyblock.text import counted
 from phyblock.tracks.base import CARRYING, ENGINE, Judgement, SceneTrack
 from phyblock.tracks.full_planning import PlanParse, needed_candidate, score_fields
 from phyblock.tracks.items import ShownTask, file_plan
 from phyblock.tracks.measures import SampleCounts, level_cells
 from phyblock.tracks.picking import NumberField, Pick, Picking, candidate_choices
 from phyblock.tracks.pictures import Drawing, picture_style
-from phyblock.types import REFUSED_ENDS, STEP_ENDS, Matcher, PoseRotation, Setting, StepEnd, View
+from phyblock.types import STEP_ENDS, Matcher, Setting, StepEnd, View
 
 CARRY_VERSION = 3
 """Version of the execution of plans and of how its end is measured; it goes up where some plan may
@@ -100,9 +93,6 @@ Angle = Annotated[float, Field(strict=True, gt=0, le=90, allow_inf_nan=False)]
 class PoseSpec(PictureControls):
     """The pose_planning track: the form of requests, and the tolerances of execution."""
 
-    rotation: PoseRotation = "candidate"
-    """candidate: blocks keep the orientation in which they are shown, and steps give a number and a
-    place. free: each kind is shown once, upright, and steps give a rotation as well."""
     views: Annotated[UniqueSome[View], checked(_oblique_first)] = ("oblique", "top")
     """Views of the goal, one picture each: oblique first, then any of front, side and top.
     Candidates are shown in the first view."""
@@ -120,11 +110,6 @@ class PoseSpec(PictureControls):
     """The same for its rotation [degrees]."""
     prompt: TemplateName = "default"
     """default, or the path of a .j2 template."""
-
-    @property
-    def is_free(self) -> bool:
-        """True if steps bring a rotation."""
-        return self.rotation == "free"
 
     @property
     def limits(self) -> ExecutionLimits:
@@ -145,8 +130,6 @@ class GivenStep(Line):
     """Number of the candidate, as it was shown."""
     center_cm: tuple[Amount, Amount, Amount]
     """x, y and z of the middle of the block's box [cm]."""
-    euler_deg: tuple[Amount, Amount, Amount] | None = None
-    """Its rotation, extrinsic x-y-z angles [degrees]; null: as the candidate is shown."""
 
 
 class PoseParse(PlanParse):
@@ -206,8 +189,6 @@ class StepOutcome(Line):
 class PoseOutcome(Line):
     """The score of a plan with poses."""
 
-    rotation: PoseRotation
-    """As in the suite's section `pose`."""
     right: dict[str, tuple[Whole, ...]]
     """By frame, `absolute` or `aligned`: right steps within 0.5, 1, 2 and 4 cm."""
     shift_cm: tuple[Amount, Amount]
@@ -273,23 +254,6 @@ def rests_of(
     return tuple(rests)
 
 
-def worlds_of(
-    put: Sequence[Block | None], steps: Sequence[StepOutcome]
-) -> tuple[tuple[Block, ...], ...]:
-    """Return the blocks after each step, to within 1 mm and 1 degree."""
-    lying: dict[int, Block] = {}
-    worlds = []
-    for number, (block, step) in enumerate(zip(put, steps, strict=True), 1):
-        if block is not None and step.end not in REFUSED_ENDS:
-            lying[number] = replace(block, order=number)
-        for rest in step.rests:
-            one = lying[rest.step]
-            place = origin_m(one.type, rest.euler_deg, rest.center_cm)
-            lying[rest.step] = replace(one, position_m=place, euler_deg=rest.euler_deg)
-        worlds.append(tuple(lying.values()))
-    return tuple(worlds)
-
-
 _END = ("end", "moved_cm", "turned_deg", "gap_cm", "overlap_cm", "knocked", "rests")
 _WHOLE = ("reached", "iou", "completed", "engine")
 
@@ -306,13 +270,13 @@ def judge_poses(
 
     A plan that an `earlier` record holds, executed with the same tolerances, ended as it did.
     """
-    parsed, n = ParsedPoses(PosePlan(), None), len(item.candidates)
+    parsed, n = ParsedPoses((), None), len(item.candidates)
     if text is not None:
-        parsed = parse_poses(text, n, free=spec.is_free)
-    given = parsed.plan.steps
+        parsed = parse_poses(text, n)
+    given = parsed.steps
     kept = [step for step in given if 1 <= step.candidate <= n]
     blocks = [put(step, item.candidates) for step in given]
-    scorer = _scorer(item.scene, item.candidates, "B" if spec.is_free else "A")
+    scorer = _scorer(item.scene, item.candidates)
     laid = (
         Laid(step.candidate, block.position_m, block.euler_deg)
         for step, block in zip(given, blocks, strict=True)
@@ -325,12 +289,10 @@ def judge_poses(
     numbers, ends = [step.candidate for step in given], [step["end"] for step in ended]
     errors = pose_errors(scorer.goal, numbers, fits, ends)
     # The plan without its poses, under every setting and matcher.
-    named, candidates = [step.candidate for step in kept], item.candidates
-    if spec.is_free:
-        named, candidates = _as_candidates(item, kept)
-    plan_scorer = AssemblyScorer(item.scene, candidates, settings)
-    scores = plan_scorer.score(Plan(tuple(named)), matchers, None)
-    motion, plan = poses[-1].motion, [step.candidate for step in kept]
+    plan = [step.candidate for step in kept]
+    plan_scorer = AssemblyScorer(item.scene, item.candidates, settings)
+    scores = plan_scorer.score(Plan(tuple(plan)), matchers, None)
+    motion = poses[-1].motion
     parse = {
         "parser": "poses",
         "rule": parsed.rule,
@@ -339,15 +301,9 @@ def judge_poses(
         "dropped": [number for number in numbers if not 1 <= number <= n],
         "version": READER_VERSION,
         "problem": parsed.problem,
-        "steps": [
-            {"block": step.candidate, "center_cm": step.center_cm, "euler_deg": step.euler_deg}
-            if spec.is_free
-            else {"block": step.candidate, "center_cm": step.center_cm}
-            for step in given
-        ],
+        "steps": [{"block": step.candidate, "center_cm": step.center_cm} for step in given],
     }
     pose = {
-        "rotation": spec.rotation,
         "right": {score.frame: list(score.right) for score in poses},
         "shift_cm": [round(part, _DIGITS) + 0.0 for part in motion.shift_cm],
         "turn_deg": round(math.degrees(motion.turn_rad), _DIGITS) + 0.0,
@@ -373,7 +329,7 @@ def _ended_before(
     if record is None or record.pose is None or record.parse is None:
         return None
     pose = record.pose
-    known = [PoseStep(s.block, s.center_cm, s.euler_deg) for s in record.parse.steps]
+    known = [PoseStep(s.block, s.center_cm) for s in record.parse.steps]
     if known != list(given) or len(pose.steps) != len(known):
         return None
     if dict(pose.limits) != spec.tolerances:
@@ -407,30 +363,8 @@ def pieces_of(block_type: BlockType) -> tuple[Piece, ...]:
 
 
 @functools.lru_cache(maxsize=32)
-def _scorer(scene: Scene, candidates: CandidateSet, setting: Setting) -> PoseScorer:
-    return PoseScorer(scene, candidates, setting, pieces_of)
-
-
-def _as_candidates(item: AssemblyTask, kept: Sequence[PoseStep]) -> tuple[list[int], CandidateSet]:
-    """Return steps with rotations as numbers of candidates that are turned so.
-
-    One that is within the tolerance of how some block of the goal is turned is turned just so.
-    """
-    numbers: list[int] = []
-    found: dict[Candidate, int] = {}
-    for step in kept:
-        one = item.candidates[step.candidate]
-        turned = replace(one, euler_deg=step.euler_deg or one.euler_deg)
-        mine = np.array(euler_deg_to_matrix(turned.euler_deg))
-        near = [
-            (turn_deg(one.type, mine, np.array(euler_deg_to_matrix(block.euler_deg))), place)
-            for place, block in enumerate(item.scene.blocks)
-            if block.kind == one.kind
-        ]
-        if near and min(near)[0] <= TURN_TOLERANCE_DEG:
-            turned = replace(one, euler_deg=item.scene.blocks[min(near)[1]].euler_deg)
-        numbers.append(found.setdefault(turned, len(found) + 1))
-    return numbers, CandidateSet(tuple(found))
+def _scorer(scene: Scene, candidates: CandidateSet) -> PoseScorer:
+    return PoseScorer(scene, candidates, pieces_of)
 
 
 def buildable_order(scene: Scene, wanted: Sequence[int]) -> list[int]:
@@ -457,25 +391,22 @@ def buildable_order(scene: Scene, wanted: Sequence[int]) -> list[int]:
 
 @dataclass(frozen=True)
 class PoseSubject:
-    """A plan with poses is asked for; with `is_free` its steps bring a rotation."""
+    """A plan with poses is asked for."""
 
     scene: Scene
     candidates: CandidateSet
-    is_free: bool
 
 
 def written(steps: Iterable[PoseStep]) -> str:
     """Steps in the form that the prompt asks for."""
-    return "\n".join(f"Step{n}: {_line(step)}" for n, step in enumerate(steps, 1))
+    return "\n".join(
+        f"Step{n}: block {step.candidate} at ({', '.join(map(_number, step.center_cm))})"
+        for n, step in enumerate(steps, 1)
+    )
 
 
-def _line(step: PoseStep) -> str:
-    turned = "" if step.euler_deg is None else f" turned ({_numbers(step.euler_deg)})"
-    return f"block {step.candidate} at ({_numbers(step.center_cm)}){turned}"
-
-
-def _numbers(values: Sequence[float]) -> str:
-    return ", ".join(f"{round(value, 4) + 0.0:g}" for value in values)
+def _number(value: float) -> str:
+    return f"{round(value, 4) + 0.0:g}"
 
 
 def _built(
@@ -492,16 +423,10 @@ def _built(
     drawn = rng.random(len(blocks)).tolist()
     wanted = sorted(range(len(blocks)), key=lambda vertex: (layers[vertex], drawn[vertex]))
     order = buildable_order(subject.scene, wanted)
-    return written(_step(subject, blocks[v], move(blocks[v], center_cm(blocks[v]))) for v in order)
-
-
-def _step(subject: PoseSubject, block: Block, center: Center) -> PoseStep:
-    candidates = subject.candidates
-    if subject.is_free:
-        number, euler = candidates.first_of(block.kind), block.euler_deg
-        if number is not None:
-            return PoseStep(number, center, euler)
-    return PoseStep(needed_candidate(subject, block), center)
+    return written(
+        PoseStep(needed_candidate(subject, blocks[v]), move(blocks[v], center_cm(blocks[v])))
+        for v in order
+    )
 
 
 def _noisy(sigma_cm: float) -> Callable[[PoseSubject, np.random.Generator], str]:
@@ -544,9 +469,9 @@ def _random(subject: PoseSubject, rng: np.random.Generator) -> str:
         number = int(rng.integers(1, len(subject.candidates) + 1))
         x, y = rng.uniform(-_RANDOM_REACH_CM, _RANDOM_REACH_CM, 2)
         z = rng.uniform(0.0, _RANDOM_REACH_CM)
-        turns = [90.0 * float(turn) for turn in rng.integers(0, 4, 3)]
-        euler = (turns[0], turns[1], turns[2]) if subject.is_free else None
-        steps.append(PoseStep(number, (float(x), float(y), float(z)), euler))
+        # Drawn and not used, so that answers stay those that were drawn with turns.
+        rng.integers(0, 4, 3)
+        steps.append(PoseStep(number, (float(x), float(y), float(z))))
     return written(steps)
 
 
@@ -562,16 +487,11 @@ POSE_RULES: Mapping[str, Callable[..., str]] = {
 
 
 def pick_poses(subject: PoseSubject) -> Picking:
-    """Return the choices of a person: any candidates, each as often as needed, with its place, and
-    its turn where that is free, at first as the sheet of blocks shows it.
-    """
-    fields = [NumberField(name, "cm", FARTHEST_PLACE_CM, 2, 0.5, 5.0) for name in "xyz"]
-    if subject.is_free:
-        fields += [NumberField(f"r{n}", "degrees", 360.0, 1, 15.0, 90.0, 0.0) for n in "xyz"]
+    """Return the choices of a person: any candidates, each as often as needed, with its place."""
 
     def step(pick: Pick) -> PoseStep:
-        x, y, z, *turn = pick.numbers
-        return PoseStep(pick.place + 1, (x, y, z), (turn[0], turn[1], turn[2]) if turn else None)
+        x, y, z = pick.numbers
+        return PoseStep(pick.place + 1, (x, y, z))
 
     return Picking(
         candidate_choices(len(subject.candidates), (KIT_LABEL,)),
@@ -580,7 +500,7 @@ def pick_poses(subject: PoseSubject) -> Picking:
         repeats=True,
         noun="step",
         write=lambda picks: written(map(step, picks)),
-        fields=tuple(fields),
+        fields=tuple(NumberField(name, "cm", FARTHEST_PLACE_CM, 2, 0.5, 5.0) for name in "xyz"),
         task="Pick the blocks that build the goal, in order, and say where the center of each is.",
     )
 
@@ -636,62 +556,6 @@ COUNTS = (
 )
 
 
-def _film(record: PoseRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
-    """Yield the plan as given, the world after each step, and the end."""
-    given, pose = record.parse.steps if record.parse else (), record.pose
-    if pose is None or not given:
-        yield FilmStep(f"there is no plan: {_no_plan(record)}", "bad", None, ())
-        return
-    worlds: list[tuple[Block, ...]] = [() for _ in given]
-    blocks: list[Block | None] = []
-    if task is not None:
-        candidates = upright(task.candidates)[0] if pose.rotation == "free" else task.candidates
-        steps = [PoseStep(one.block, one.center_cm, one.euler_deg) for one in given]
-        blocks = [put(step, candidates) for step in steps]
-        worlds = list(worlds_of(blocks, pose.steps))
-    first = tuple(block for block in blocks if block is not None)
-    yield FilmStep(f"{record.model}, {record.scene}: the plan as given", "plain", None, first)
-    for n, (one, step, world) in enumerate(zip(given, pose.steps, worlds, strict=True), 1):
-        tone: Tone = "good" if step.error is None else "bad"
-        caption = f"{n}. block {one.block}: {_ended(step)}"
-        if step.error is not None and step.end == "stands":
-            caption += f", but {_heading(step.error)}"
-        yield FilmStep(caption, tone, one.block, world, _where(one, step))
-    reached = f"{pose.reached} of {counted(record.n_blocks, 'block')} reached"
-    tone = "good" if pose.completed else "bad"
-    yield FilmStep(f"{reached}, IoU {pose.iou:.2f}", tone, None, worlds[-1])
-
-
-def _no_plan(record: PoseRecord) -> str:
-    """Return why there is not one step."""
-    if record.error is not None:
-        return record.error.message
-    if record.parse is not None and record.parse.problem is not None:
-        return f"nothing could be read out of the reply ({record.parse.problem})"
-    return "there is no reply"
-
-
-def _where(given: GivenStep, step: StepOutcome) -> str:
-    """Return where a step puts its block, how far that is off, and what is wrong with it."""
-    told = [f"at ({', '.join(f'{part:g}' for part in given.center_cm)}) cm"]
-    told += [] if step.position_cm is None else [f"off by {step.position_cm:.2f} cm"]
-    told += [] if step.error is None else [_heading(step.error)]
-    return ", ".join(told)
-
-
-def _ended(step: StepOutcome) -> str:
-    if step.end == "falls":
-        return f"falls, {step.moved_cm:.1f} cm from its place"
-    if step.end == "knocks_over":
-        return f"knocks over {', '.join(map(str, step.knocked))}"
-    plain = {"under_floor": "under the floor", "no_block": "no such block"}
-    return plain.get(step.end, step.end)
-
-
-def _heading(error: str) -> str:
-    return PosePlanning.report().heading("pose", error).lower()
-
-
 class PosePlanning(SceneTrack):
     """Asks for a whole plan with the place of every block, and carries it out."""
 
@@ -704,7 +568,7 @@ class PosePlanning(SceneTrack):
     by_hand = staticmethod(pick_poses)
     record = PoseRecord
     counted = COUNTS
-    results: ClassVar = {"cells": level_cells, "film": _film}
+    results: ClassVar = {"cells": level_cells}
     varies = ("prompt", "background", "candidate_order", "repeats")
     simulates = True
     draws = True
@@ -728,17 +592,6 @@ class PosePlanning(SceneTrack):
         key, make = kit_key(item.candidates, style), partial(kit_png, item.candidates, style)
         return (*drawings, Drawing(KIT_LABEL, key, make, (style.size_px, style.size_px)))
 
-    def shown(self, item: AssemblyTask, seed: int) -> AssemblyTask:
-        """Return the scene as a seed shows it; with a free rotation each kind once, upright."""
-        shown = super().shown(item, seed)
-        if not self.spec.is_free:
-            return shown
-        kit, numbers = upright(shown.candidates)
-        if isinstance(shown, ShownTask):
-            numbers = tuple(shown.order[number - 1] for number in numbers)
-            return replace(shown, candidates=kit, order=numbers)
-        return ShownTask(shown.scene, kit, shown.composite, numbers, False, seed)
-
     def identity(self) -> dict[str, Any]:
         """Return what decides its results, with the version of how plans are carried out."""
         return {**super().identity(), CARRYING: CARRY_VERSION}
@@ -747,15 +600,11 @@ class PosePlanning(SceneTrack):
         """Return the form in which a plan is asked for; None where that is text."""
         if self.suite.answer_format == "text":
             return None
-        return pose_form(len(item.candidates), free=self.spec.is_free)
-
-    def facts(self, item: AssemblyTask, pictures: Sequence[Image]) -> dict[str, object]:
-        """Return the variables of templates; nothing in it gives an answer away."""
-        return {**super().facts(item, pictures), "rotation": self.spec.rotation}
+        return pose_form(len(item.candidates))
 
     def subject_of(self, item: AssemblyTask) -> PoseSubject:
         """Return what baselines answer about."""
-        return PoseSubject(item.scene, item.candidates, self.spec.is_free)
+        return PoseSubject(item.scene, item.candidates)
 
     def judge(self, item: AssemblyTask, text: str | None) -> Judgement:
         """Read, score and carry out a reply; None, where there is none, is an empty plan."""

@@ -55,9 +55,9 @@ def solve(env: PhyBlockEnv, info: dict[str, Any]) -> tuple[float, dict[str, Any]
         {"observe": "state"},
         {"observe": "state", "physics": "strict"},
         {"action": "pose", "size_px": 32},
-        {"action": "pose", "rotation": "free", "observe": "state", "physics": "strict"},
+        {"action": "pose", "observe": "state", "physics": "strict"},
     ],
-    ids=["pictures", "state", "strict", "poses", "free poses"],
+    ids=["pictures", "state", "strict", "poses", "strict poses"],
 )
 def test_gymnasium_finds_nothing_wrong(options: dict[str, Any]) -> None:
     env = gymnasium.make(phyblock.env.ENV_ID, render_mode="rgb_array", **options)
@@ -155,7 +155,6 @@ def test_what_physics_does_with_what_cannot_stand(
         ({"render_mode": "human"}, "render_mode is 'human'; allowed: rgb_array, or None"),
         ({"max_steps": 0}, "max_steps is 0"),
         ({"data": ()}, "no tasks"),
-        ({"rotation": "free"}, "needs action='pose'"),
         ({"action": "pose", "physics": "off"}, "allowed: settle, strict"),
         ({"action": "pose", "setting": "B"}, "leave them out"),
         ({"levels": (2, 9)}, r"levels is \(2, 9\); allowed: several of \(1, 2, 3, 4\)"),
@@ -180,10 +179,9 @@ def test_nothing_is_carried_out_after_the_end(limit: dict[str, int]) -> None:
     assert len(info["chosen"]) == 1
 
 
-@pytest.mark.parametrize("rotation", ["candidate", "free"])
-def test_who_knows_the_poses_reaches_every_block(rotation: Any) -> None:
+def test_who_knows_the_poses_reaches_every_block() -> None:
     tasks = [task for task in SOME if len(task.scene) < 9][:3]
-    env = PhyBlockEnv(tasks, action="pose", rotation=rotation, observe="state", physics="strict")
+    env = PhyBlockEnv(tasks, action="pose", observe="state", physics="strict")
     for task in tasks:
         _, info = env.reset(options={"scene": task.scene.id})
         total, info = solve(env, info)

@@ -22,7 +22,7 @@ READERS: dict[str, Callable[[str], Any]] = {
     "move": parse_move,
     "choice": lambda text: parse_answer(text, TEXTS, is_ordering=False),
     "order": lambda text: parse_answer(text, TEXTS, is_ordering=True),
-    "poses": lambda text: parse_poses(text, 16, free=True),
+    "poses": lambda text: parse_poses(text, 16),
 }
 _PIECES = (
     "Step1: Move block with index 7  \n|Step|step 12 & |Steps 1, 2 and 3|block |# Layer 1:\n|"

@@ -13,7 +13,6 @@ from phyblock.parsing.poses import MOST_POSE_STEPS, parse_poses, pose_form
 
 TWO = "Step1: block 3 at (5, 10, 2.5)\nStep2: block 5 at (0, -5, 7.5)"
 STEPS = [(3, (5.0, 10.0, 2.5)), (5, (0.0, -5.0, 7.5))]
-TURNED = TWO.replace("2.5)", "2.5) turned (0, 90, 0)").replace("7.5)", "7.5) turned (0, 0, -45.5)")
 IN_JSON = json.dumps(
     {"plan": [{"block": n, "x": x, "y": y, "z": z} for n, (x, y, z) in STEPS], "reasoning": "{"}
 )
@@ -37,7 +36,7 @@ READ = [
     "Step1: block 3 at (50 mm, 100 mm, 25 mm)\nStep2: block 5 at (0, -5, 7.5)",
     "Step1: block 3 at (0.05, 0.1, 0.025) m\nStep2: block 5 at (0.0, -0.05, 0.075) meters",
     "Step1: block 3 at (5., 1e1, +2.5)\nStep2: block 5 at (0, -5, 75e-1), on block 3",
-    "Step1: block 3 at (5, 10, 2.5) in a corner\nStep2: block 5 at (0, -5, 7.5) turned (0, 0, 0)",
+    "Step1: block 3 at (5, 10, 2.5) in a corner\nStep2: block 5 at (0, -5, 7.5)",
     "| Step | Block | x | y | z |\n|---|---|---|---|---|\n| 1 | 3 | 5 | 10 | 2.5 |\n"
     "| 2 | 5 | 0 | -5 | 7.5 |",
     IN_JSON,
@@ -47,17 +46,9 @@ READ = [
 
 @pytest.mark.parametrize("text", READ)
 def test_a_plan_is_read_in_whatever_decoration(text: str) -> None:
-    parsed = parse_poses(text, 16, free=False)
+    parsed = parse_poses(text, 16)
     assert parsed.problem is None
-    assert [(step.candidate, pytest.approx(step.center_cm)) for step in parsed.plan.steps] == STEPS
-
-
-@pytest.mark.parametrize(
-    "text", [TURNED, TURNED.replace("0)", "0\u00b0)"), TURNED.replace("turned", "|")]
-)
-def test_rotations_are_read_where_they_are_asked_for(text: str) -> None:
-    plan = parse_poses(text, 16, free=True).plan
-    assert [step.euler_deg for step in plan.steps] == [(0, 90, 0), (0, 0, -45.5)]
+    assert [(step.candidate, pytest.approx(step.center_cm)) for step in parsed.steps] == STEPS
 
 
 def one(rest: str) -> str:
@@ -85,7 +76,7 @@ def one(rest: str) -> str:
         (one("(2 in, 4 in, 1 in)"), "other_unit"),
         (one("(2, 4, 1) inches"), "other_unit"),
         (one("(50 mm, 10 cm, 2 cm)"), "other_unit"),
-        (one("(5, 5, 5) turned (0, 0, 90)"), "turned"),
+        (one("(5, 5, 5) turned (0, 0, 90)"), "unclear_step"),
         ('{"plan": [{"block": 3, "x": 1, "y": 2}]}', "unclear_step"),
         ('{"plan": [{"block": 3, "x": 1, "y": 2, "z": NaN}]}', "out_of_range"),
         ('{"plan": [{"block": 3, "x": 1, "y": 2, "z": "3"}]}', "unclear_step"),
@@ -94,35 +85,21 @@ def one(rest: str) -> str:
     ],
 )
 def test_a_step_that_cannot_be_read_is_the_problem_of_the_plan(text: str, problem: str) -> None:
-    parsed = parse_poses(text, 16, free=False)
-    assert (parsed.plan.steps, parsed.rule, parsed.problem) == ((), None, problem)
-
-
-def test_a_rotation_that_is_asked_for_must_be_there() -> None:
-    assert parse_poses(TWO, 16, free=True).problem == "missing_rotation"
-    assert parse_poses(IN_JSON, 16, free=True).problem == "missing_rotation"
+    parsed = parse_poses(text, 16)
+    assert (parsed.steps, parsed.rule, parsed.problem) == ((), None, problem)
 
 
 lengths = st.integers(-100_000, 100_000).map(lambda n: n / 100)
-angles = st.integers(-3600, 3600).map(lambda n: n / 10)
-steps = st.builds(
-    PoseStep,
-    st.integers(1, 16),
-    st.tuples(lengths, lengths, lengths),
-    st.tuples(angles, angles, angles),
-)
+steps = st.builds(PoseStep, st.integers(1, 16), st.tuples(lengths, lengths, lengths))
 
 
 @given(st.lists(steps, min_size=1, max_size=MOST_POSE_STEPS), st.booleans())
 def test_every_plan_of_the_asked_forms_is_read_as_it_is_written(
     plan: list[PoseStep], is_json: bool
 ) -> None:
-    names = ("x", "y", "z", "rx", "ry", "rz")
-    lines, items = [], []
-    for i, step in enumerate(plan, 1):
-        assert step.euler_deg is not None
-        lines.append(f"Step{i}: block {step.candidate} at {step.center_cm} turned {step.euler_deg}")
-        values = zip(names, (*step.center_cm, *step.euler_deg), strict=True)
-        items.append({"block": step.candidate, **dict(values)})
-    text = pose_form(16, free=True).write(items) if is_json else "\n".join(lines)
-    assert parse_poses(text, 16, free=True).plan.steps == tuple(plan)
+    lines = [f"Step{i}: block {one.candidate} at {one.center_cm}" for i, one in enumerate(plan, 1)]
+    items = [
+        {"block": one.candidate, **dict(zip("xyz", one.center_cm, strict=True))} for one in plan
+    ]
+    text = pose_form(16).write(items) if is_json else "\n".join(lines)
+    assert parse_poses(text, 16).steps == tuple(plan)

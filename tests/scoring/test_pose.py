@@ -31,7 +31,6 @@ from phyblock.scoring.pose import Laid, Piece, PoseScore, PoseScorer, overlap_vo
 from phyblock.scoring.pose_matching import Motion, Nearness, cheapest, matched
 from phyblock.sim.engine import quat_xyzw_to_euler_deg
 from phyblock.sim.geometry import collision_pieces
-from phyblock.types import SETTINGS, Setting
 
 KINDS: tuple[BlockType, ...] = ("cube", "cuboid2", "triangle", "arch")
 
@@ -79,11 +78,11 @@ def noisy(steps: list[Laid], rng: np.random.Generator, sigma_m: float) -> list[L
     return [replace(step, position_m=off(step)) for step in steps]
 
 
-def turned(step: Laid, angle_deg: float, shift_m: tuple[float, float], *, along: bool) -> Laid:
+def turned(step: Laid, angle_deg: float, shift_m: tuple[float, float]) -> Laid:
+    """Only the place is turned: candidates keep how they were shown."""
     matrix = euler_deg_to_matrix((0.0, 0.0, angle_deg))
     x, y, z = matrix @ np.array(step.position_m)
-    euler = (0.0, 0.0, step.euler_deg[2] + angle_deg) if along else step.euler_deg
-    return Laid(step.candidate, (x + shift_m[0], y + shift_m[1], z), euler)
+    return replace(step, position_m=(x + shift_m[0], y + shift_m[1], z))
 
 
 def summary(score: PoseScore) -> tuple[object, ...]:
@@ -94,15 +93,13 @@ def summary(score: PoseScore) -> tuple[object, ...]:
 
 
 @settings(max_examples=20, deadline=None)
-@given(scenes(), st.integers(0, 99), st.sampled_from(["A", "B"]))
+@given(scenes(), st.integers(0, 99))
 def test_a_valid_order_at_true_poses_is_wholly_right(
-    drawn: tuple[Scene, CandidateSet], seed: int, setting: Setting
+    drawn: tuple[Scene, CandidateSet], seed: int
 ) -> None:
     scene, candidates = drawn
     order = scene.graph.random_order(np.random.default_rng(seed))
-    for score in PoseScorer(scene, candidates, setting, pieces).score(
-        laid(scene, candidates, list(order))
-    ):
+    for score in PoseScorer(scene, candidates, pieces).score(laid(scene, candidates, list(order))):
         assert score.right == (len(scene),) * 4
         assert all(fit is not None and fit.iou in (1, None) for fit in score.fits)
 
@@ -117,7 +114,7 @@ def test_no_more_steps_are_right_than_without_poses_and_wider_tolerances_lose_no
     steps = noisy(laid(scene, candidates, vertices), np.random.default_rng(seed), sigma_m)
     goal = Goal(scene, candidates, "A")
     most = most_placed(goal, Plan(tuple(step.candidate for step in steps)))
-    for score in PoseScorer(scene, candidates, "A", pieces).score(steps):
+    for score in PoseScorer(scene, candidates, pieces).score(steps):
         assert sum(fit is not None for fit in score.fits) == most
         assert list(score.right) == sorted(score.right)
         assert score.right[-1] <= most
@@ -130,7 +127,6 @@ def test_no_more_steps_are_right_than_without_poses_and_wider_tolerances_lose_no
     st.sampled_from([0.0, 0.003, 0.012]),
     st.floats(-180, 180),
     st.tuples(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8)),
-    st.sampled_from(["A", "B"]),
 )
 def test_aligned_does_not_change_when_the_whole_plan_is_shifted_and_turned(
     drawn: tuple[Scene, CandidateSet],
@@ -138,17 +134,14 @@ def test_aligned_does_not_change_when_the_whole_plan_is_shifted_and_turned(
     sigma_m: float,
     angle_deg: float,
     shift_m: tuple[float, float],
-    setting: Setting,
 ) -> None:
-    """Under A candidates keep how they were shown, so that places alone are turned. Meters away
-    none stands where it should: what is aligned there is what was sought.
-    """
+    """Meters away none stands where it should: what is aligned there is what was sought."""
     scene, candidates = drawn
     rng = np.random.default_rng(seed)
     steps = noisy(laid(scene, candidates, list(scene.graph.random_order(rng))), rng, sigma_m)
-    scorer = PoseScorer(scene, candidates, setting, pieces)
-    away = [turned(step, 0.0, (5.0, 0.0), along=True) for step in steps]
-    moved = [turned(step, angle_deg, shift_m, along=setting == "B") for step in away]
+    scorer = PoseScorer(scene, candidates, pieces)
+    away = [turned(step, 0.0, (5.0, 0.0)) for step in steps]
+    moved = [turned(step, angle_deg, shift_m) for step in away]
     here, one, other = (scorer.score(plan)[1] for plan in (steps, away, moved))
     assert one.right == other.right
     assert sum(here.right) >= sum(one.right)
@@ -168,11 +161,10 @@ def test_the_best_motion_of_a_plan_is_no_worse_than_none(
     steps = noisy(
         laid(scene, candidates, order), np.random.default_rng(random.getrandbits(32)), sigma_m
     )
-    for setting in SETTINGS:
-        absolute, aligned = PoseScorer(scene, candidates, setting, pieces).score(steps)
-        assert sum(aligned.right) >= sum(absolute.right)
-        if aligned.motion == Motion():
-            assert aligned.right == absolute.right
+    absolute, aligned = PoseScorer(scene, candidates, pieces).score(steps)
+    assert sum(aligned.right) >= sum(absolute.right)
+    if aligned.motion == Motion():
+        assert aligned.right == absolute.right
 
 
 @settings(max_examples=20, deadline=None)
@@ -192,8 +184,8 @@ def test_symmetries_and_the_order_of_equal_blocks_in_the_file_change_nothing(
         )
     blocks = data.draw(st.permutations(scene.blocks))
     shuffled = replace(scene, blocks=tuple(blocks))
-    one = PoseScorer(scene, candidates, "B", pieces).score(steps)
-    two = PoseScorer(shuffled, candidates, "B", pieces).score(other)
+    one = PoseScorer(scene, candidates, pieces).score(steps)
+    two = PoseScorer(shuffled, candidates, pieces).score(other)
     assert [summary(score) for score in one] == [summary(score) for score in two]
 
 
@@ -207,7 +199,7 @@ def test_a_goal_that_looks_the_same_after_half_a_turn_is_met_whichever_way(seed:
     scene = Scene("s", (2,), (one, two), ("s",))
     steps = noisy(laid(scene, candidates, [0, 1]), np.random.default_rng(seed), 0.012)
     scores = [
-        PoseScorer(replace(scene, blocks=blocks), candidates, "B", pieces).score(steps)
+        PoseScorer(replace(scene, blocks=blocks), candidates, pieces).score(steps)
         for blocks in ((one, two), (two, one))
     ]
     assert [summary(score) for score in scores[0]] == [summary(score) for score in scores[1]]
@@ -306,7 +298,7 @@ def test_two_cubes_half_a_cube_apart_share_a_third() -> None:
     block = Block(1, "cube", "red", (0.0, 0.0, 0.025), (0.0, 0.0, 0.0), (), 1)
     candidates = CandidateSet((Candidate("cube", "red", (0.0, 0.0, 0.0)),))
     scene = Scene("s", (2,), (block,), ("s",))
-    scorer = PoseScorer(scene, candidates, "A", pieces)
+    scorer = PoseScorer(scene, candidates, pieces)
     absolute, aligned = scorer.score([Laid(1, (0.025, 0.0, 0.025), (0.0, 0.0, 0.0))])
     assert absolute.fits[0] is not None
     assert absolute.fits[0].iou == pytest.approx(1 / 3, abs=1e-4)

@@ -45,7 +45,6 @@ def workspace(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> W
     write_questions(made.root / "questions", asked)
     made.write_suite(
         tracks=["full_planning", "vqa", "pose_planning"],
-        pose={"rotation": "free"},
         vqa={"path": "./questions", "subtasks": list(SUBTASKS)},
         seeds=[3, 4],
     )
@@ -217,9 +216,9 @@ def end_on_a_phone(page: Page, run: Path) -> None:
     page.get_by_role("heading", name="How it went").wait_for()
     assert len(answered(run)) == 10
     assert [*map(said, answered(run)[7:])] == [
-        poses("3 at (0, 0, 2.5) turned (0, 0, 90)"),
-        poses("5 at (-0.5, 1.25, 5) turned (0, 0, 0)"),
-        poses("1 at (0, 0, 0) turned (0, 0, 0)"),
+        poses("3 at (0, 0, 2.5)"),
+        poses("5 at (-0.5, 1.25, 5)"),
+        poses("1 at (0, 0, 0)"),
     ]
     assert {record["question"]["subtask"]: said(record) for record in answered(run)[3:7]} == {
         "SH": "Answer: B",
@@ -268,7 +267,6 @@ def give_places_by_touch(page: Page) -> None:
     z.focus()
     for _ in range(5):
         page.keyboard.press("ArrowUp")
-    page.get_by_label("rz, ° of step 1").fill("90")
     submit.tap()
 
 

@@ -122,7 +122,7 @@ const Picker = (() => {
       if (!isOne && picks.list.length >= most) return paint("No more can be picked");
       change(isOne ? `Picked ${name}` : `${noun} ${picks.list.length + 1}: ${name}`, (all) => {
         if (isOne) all.length = 0;
-        all.push({ place, texts: fields.map((one) => String(one.start ?? "")) });
+        all.push({ place, texts: fields.map(() => "") });
       });
       return chips.lastElementChild?.scrollIntoView({ block: "nearest" });
     }

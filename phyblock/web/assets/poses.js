@@ -22,7 +22,7 @@ const Poses = (() => {
   function put(scene, given, number) {
     const candidate = scene.candidates[given.block - 1];
     if (!candidate) return null;
-    const turned = { ...candidate, candidate: given.block, euler: given.euler_deg || candidate.euler };
+    const turned = { ...candidate, candidate: given.block };
     return { ...Solid.boxedAt(turned, inMeters(given.center_cm)), key: number };
   }
 
@@ -105,9 +105,8 @@ const Poses = (() => {
     };
   }
 
-  function placeOf({ center_cm: center, euler_deg: euler }) {
-    const turned = euler ? `, turned (${euler.join(", ")}) degrees` : "";
-    return `Put at (${center.map((value) => Number(value.toFixed(2))).join(", ")}) cm${turned}.`;
+  function placeOf({ center_cm: center }) {
+    return `Put at (${center.map((value) => Number(value.toFixed(2))).join(", ")}) cm.`;
   }
 
   function offOf(scene, outcome) {

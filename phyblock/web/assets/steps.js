@@ -144,13 +144,10 @@ const Steps = (() => {
   }
 
   /** The scene with its candidates in the order in which they were shown. */
-  function asShown(scene, { shown, pose }) {
+  function asShown(scene, { shown }) {
     if (!shown || !scene) return scene;
-    const isUpright = pose?.rotation === "free";
-    const candidates = shown.order.map((n) => scene.candidates[n - 1])
-      .map((one) => (isUpright ? { ...one, euler: [0, 0, 0] } : one));
-    const number = (block) => (isUpright ? candidates.findIndex((one) => sameKind(one, block))
-      : shown.order.indexOf(block.candidate)) + 1;
+    const candidates = shown.order.map((n) => scene.candidates[n - 1]);
+    const number = (block) => shown.order.indexOf(block.candidate) + 1;
     return { ...scene, candidates, blocks: scene.blocks.map((block) => ({ ...block, candidate: number(block) })) };
   }
 
