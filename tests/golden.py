@@ -54,13 +54,13 @@ SUITES: dict[str, dict[str, Any]] = {
     "steps-json": {"tracks": ["step_planning"], "answer_format": "json_schema"},
     "poses": {"tracks": ["pose_planning"]},
     "questions": {"tracks": ["vqa"]},
-    "questions-letters": {
+    "questions-json": {
         "tracks": ["vqa"],
         "answer_format": "json_schema",
-        "vqa": {"options_as": "letters", "circular": True},
+        "vqa": {"circular": True},
     },
 }
-_LIMITS = {"questions": 16, "questions-letters": 16}
+_LIMITS = {"questions": 16, "questions-json": 16}
 
 
 def rows_digests(path: Path) -> dict[str, str]:

@@ -27,11 +27,11 @@ from phyblock.data import read_builtin, read_questions
 from phyblock.domain import euler_deg_to_matrix
 from phyblock.errors import DataError, ModelError, Problem
 from phyblock.files import bundled
+from phyblock.making.questions.text_probe import text_features
 from phyblock.scoring.pose import Piece, PoseFit, overlap_volume, placed
 from phyblock.sim.geometry import collision_pieces
 from phyblock.stable import plain_sum
 from phyblock.text import counted, csv_cell, one_line
-from phyblock.tracks.baselines import text_features
 from phyblock.tracks.pose_planning import FITS
 from phyblock.workers import WorkerDiedError, WorkerPool
 
@@ -104,7 +104,7 @@ def test_values_are_added_one_after_another(values: list[float]) -> None:
 
 
 def texts() -> list[Any]:
-    """Features of options' texts, by which drafts are kept and the text-only probe answers."""
+    """Features of options' texts, by which drafts are kept and the text probe answers."""
     scenes = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
     tasks = read_questions(bundled("benchmarks", "data", "phyblock-vqa"), scenes).tasks[::5]
     return [text_features(task.question.text, task.question.options) for task in tasks]

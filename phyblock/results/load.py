@@ -322,7 +322,6 @@ class Run:
             is_shuffled and "candidate_order" not in suite.vary.factors
         )
         words += [name for name in _SHOWN_AS if held.get(name)]
-        words += ["options on one sheet"] * (held.get("options_as") == "letters")
         words += ["answers asked for as JSON"] * (suite.answer_format == "json_schema")
         n = len(suite.vary.variants)
         return (*words, *([f"asked in {n:,} ways"] if n > 1 else []))

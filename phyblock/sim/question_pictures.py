@@ -21,8 +21,6 @@ from PIL import Image, ImageDraw, ImageFont
 
 from phyblock.domain.question import Mark, QuestionPicture
 from phyblock.domain.scene import Block, Scene
-from phyblock.files import decode_picture
-from phyblock.sim.backgrounds import DARK_INK, LIGHT_INK
 from phyblock.sim.camera import Camera, Window
 from phyblock.sim.geometry import drawn_mesh
 from phyblock.sim.pictures import (
@@ -32,7 +30,6 @@ from phyblock.sim.pictures import (
     camera_for,
     close_camera,
     drawn_m,
-    gap_px,
     looks,
     on_the_floor,
     picture,
@@ -44,8 +41,6 @@ from phyblock.stable import hex_digest
 
 QUESTION_RENDER_VERSION = 2
 """Raised whenever the same recipe gives other pixels, so that stored pictures are made again."""
-LETTERED_VERSION = 1
-"""Raised whenever the same pictures give another sheet, so that stored sheets are made again."""
 BLOCK_LABEL = "block"  # The label of a picture that shows one block by itself.
 SEEN_PX = 256  # Side of the pictures that are compared.
 MARKS_APART_PX = 18.0  # Targets are this far apart at the least, in pixels of `SEEN_PX`.
@@ -67,9 +62,6 @@ _DISTANCES = (2.1, 2.8, 3.6, 4.6)
 _ROUNDS = 4
 _DARK, _LIGHT = (18, 20, 26, 255), (255, 255, 255, 255)
 _BLOCKED = 1000.0
-_COLUMNS = 2
-_BADGE = 0.11
-_MARGIN = 0.02
 
 Point = tuple[float, float]
 
@@ -222,31 +214,6 @@ def _cost(
         cost += 2 * _BLOCKED * (math.dist(place, target) < 1.9 * radius)
         cost += _BLOCKED * (from_line(target) < 0.7 * radius)
     return cost
-
-
-def lettered_sheet_png(pictures: Sequence[bytes], letters: str, side_px: int) -> bytes:
-    """PNG with pictures in rows of two, `side_px` wide, a letter on each."""
-    sheet = Image.new("RGB", sheet_size_px(len(pictures), side_px), "white")
-    step = side_px + gap_px(side_px)
-    side, start = max(18, round(side_px * _BADGE)), round(side_px * _MARGIN)
-    font = ImageFont.load_default(size=0.78 * side)
-    for number, (data, letter) in enumerate(zip(pictures, letters, strict=True)):
-        row, column = divmod(number, _COLUMNS)
-        with decode_picture(data, f"picture {letter}") as one:
-            cell = one.convert("RGB").resize((side_px, side_px), Image.Resampling.LANCZOS)
-        draw, box = ImageDraw.Draw(cell), (start, start, start + side, start + side)
-        rim = max(1, side // 24)
-        draw.rounded_rectangle(box, side // 5, fill=LIGHT_INK, outline=DARK_INK, width=rim)
-        middle = (start + side / 2, start + side / 2)
-        draw.text(middle, letter, DARK_INK, font=font, anchor="mm")
-        sheet.paste(cell, (column * step, row * step))
-    return to_png(sheet)
-
-
-def sheet_size_px(n: int, side_px: int) -> tuple[int, int]:
-    """Width and height of a lettered sheet of `n` pictures."""
-    columns, rows, gap = min(n, _COLUMNS), -(-n // _COLUMNS), gap_px(side_px)
-    return columns * side_px + (columns - 1) * gap, rows * side_px + (rows - 1) * gap
 
 
 class Top(NamedTuple):

@@ -1,4 +1,4 @@
-"""Guesses at questions from their texts alone.
+"""Guesses at questions from other questions of their set.
 
 Guesses are told the answers of other questions only: questions are split into folds by the base
 scene they are about, and those of a fold are answered by rules learned from questions whose scenes
@@ -9,23 +9,15 @@ in those held out. Only what lies above chance tells of a shortcut.
 
 from __future__ import annotations
 
-import itertools
-import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
 
 from phyblock.domain.question import Question, Subtask, is_picture_option
-from phyblock.errors import Problem, SpecError
-from phyblock.stable import plain_sum
 
 Rule = Callable[[Question], tuple[int, ...]]
 """A guess: the indices that `Question.answer` would hold."""
 FOLDS = 5
 """Parts that a set is learned in: each is answered by what the other four teach."""
-_SEED, _STRENGTH, _CROSSED = 0, 0.05, 0.25
-_WORD = re.compile(r"[a-z]+|\d+(?:\.\d+)?")
-_NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
 class Folds:
@@ -51,17 +43,19 @@ class Folds:
 
 
 class Guesses:
-    """Guesses of each probe at questions of a set, or at rotations of them; made when asked."""
+    """Guesses at questions of a set, or at rotations of them, by rules that `learn` makes."""
 
-    def __init__(self, questions: Sequence[Question]) -> None:
-        self._folds = Folds(questions)
-        self._rules: dict[tuple[str, Subtask, int], Rule] = {}
+    def __init__(
+        self, questions: Sequence[Question], learn: Callable[[Sequence[Question]], Rule]
+    ) -> None:
+        self._folds, self._learn = Folds(questions), learn
+        self._rules: dict[tuple[Subtask, int], Rule] = {}
 
-    def guess(self, probe: str, question: Question) -> tuple[int, ...]:
-        """Return the guess of one probe; KeyError for an unknown one, SpecError as `text_rule`."""
-        name = (probe, question.subtask, self._folds.of(question))
+    def guess(self, question: Question) -> tuple[int, ...]:
+        """Return the guess of the rule that was learned from questions about other scenes."""
+        name = (question.subtask, self._folds.of(question))
         if name not in self._rules:
-            self._rules[name] = PROBES[probe](self._folds.known(name[2], question.subtask))
+            self._rules[name] = self._learn(self._folds.known(name[1], question.subtask))
         return self._rules[name](question)
 
 
@@ -86,95 +80,6 @@ def majority_rule(known: Sequence[Question]) -> Rule:
         return (max(ties, key=lambda index: (letters[(index,)], -index)),)
 
     return guess
-
-
-def text_rule(known: Sequence[Question]) -> Rule:
-    """Learn a logistic regression over the words of question and option, their numbers and
-    likeness: the option that it gives the highest odds. An order is the most frequent one.
-
-    Raises SpecError where scikit-learn is not installed.
-    """
-    majority = majority_rule(known)
-    single = [question for question in known if len(question.answer) == 1]
-    if not single:
-        return majority
-    try:
-        from sklearn.feature_extraction import DictVectorizer  # type: ignore[import-untyped]
-        from sklearn.linear_model import LogisticRegression  # type: ignore[import-untyped]
-    except ImportError as error:
-        message = "the text-only probe needs scikit-learn, which is not installed"
-        problem = Problem("text-only", message, hint="pip install 'phyblock[audit]'")
-        raise SpecError(problem) from error
-    vectorizer = DictVectorizer()
-    regression = LogisticRegression(C=_STRENGTH, max_iter=1000, random_state=_SEED)
-    rows = [features for q in single for features in text_features(q.text, q.options)]
-    is_right = [index in q.answer for q in single for index in range(len(q.options))]
-    regression.fit(vectorizer.fit_transform(rows), is_right)
-
-    def guess(question: Question) -> tuple[int, ...]:
-        if question.subtask == "OR":
-            return majority(question)
-        rows = vectorizer.transform(text_features(question.text, question.options))
-        odds: Any = regression.decision_function(rows).tolist()
-        return (max(range(len(odds)), key=odds.__getitem__),)
-
-    return guess
-
-
-PROBES: Mapping[str, Callable[[Sequence[Question]], Rule]] = {
-    "majority": majority_rule,
-    "text-only": text_rule,
-}
-"""Learners of a rule from known questions of one subtask, by the name of the baseline."""
-
-
-def text_features(text: str, options: Sequence[str]) -> list[Mapping[str, float]]:
-    """Return features of each option beside one another and the text that asks, by name; 0 where a
-    name is missing.
-
-    These are the shortcuts that multiple-choice questions are known for: words that are right
-    often, the largest or the middle number, the option that shares most with the others, the
-    longest one. Letters are not among them: how often each is right is counted, not learned.
-    """
-    words = [_WORD.findall(option.lower()) for option in options]
-    asked = set(_WORD.findall(text.lower()))
-    found = [_NUMBER.findall(option) for option in options]
-    numbers = [float(one[0]) if len(one) == 1 else None for one in found]
-    lengths = [len(option) for option in options]
-    shared = [
-        plain_sum(_overlap(one, other) for k, other in enumerate(words) if k != j)
-        for j, one in enumerate(words)
-    ]
-    rows: list[Mapping[str, float]] = []
-    for i, mine in enumerate(words):
-        pairs = [" ".join(pair) for pair in itertools.pairwise(mine)]
-        whole = " ".join(mine)
-        rows.append(
-            {
-                **{f"option {word}": 1.0 for word in [*mine, *pairs, whole]},
-                **{f"asked {one} option {whole}": _CROSSED for one in asked},
-                "likeness": shared[i],
-                "most alike": float(shared[i] == max(shared) > min(shared)),
-                "least alike": float(shared[i] == min(shared) < max(shared)),
-                **_rank("number", numbers, i),
-                **_rank("length", lengths, i),
-                "asked about": float(len(asked.intersection(mine))),
-            }
-        )
-    return rows
-
-
-def _rank(name: str, values: Sequence[float | None], i: int) -> dict[str, float]:
-    known = [value for value in values if value is not None]
-    mine = values[i]
-    if mine is None or len(known) < len(values) or len(set(known)) < 2:
-        return {}
-    return {f"{name} rank {sum(value < mine for value in known)}": 1.0}
-
-
-def _overlap(one: Sequence[str], other: Sequence[str]) -> float:
-    union = set(one) | set(other)
-    return len(set(one) & set(other)) / len(union) if union else 0.0
 
 
 def _bases(question: Question) -> tuple[str, ...]:

@@ -52,15 +52,12 @@ from phyblock.records.record import Line, Record, Whole
 from phyblock.scoring.plan import chance
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import (
-    LETTERED_VERSION,
-    lettered_sheet_png,
     question_key,
     question_png,
-    sheet_size_px,
 )
 from phyblock.stable import hex_digest
 from phyblock.tracks.base import Judgement, Track
-from phyblock.tracks.baselines import Guesses
+from phyblock.tracks.baselines import Guesses, majority_rule
 from phyblock.tracks.items import spread, stratified
 from phyblock.tracks.measures import OVERALL, WHOLE, Cell, SampleCounts
 from phyblock.tracks.picking import Choice, Picking
@@ -70,7 +67,6 @@ from phyblock.types import Background, DataFormat
 
 BUILTIN_QUESTIONS = "phyblock-vqa"
 """The bundled question set that is used when a suite names none."""
-OptionsAs = Literal["images", "letters"]
 
 
 class VqaSpec(PictureControls):
@@ -86,8 +82,6 @@ class VqaSpec(PictureControls):
     """Subtasks to ask about."""
     per_subtask: Count | None = None
     """Most questions of each subtask; null: all."""
-    options_as: OptionsAs = "images"
-    """Pictures of options. images: each sent by itself. letters: all on one lettered sheet."""
     circular: Flag = False
     """Ask every rotation of the options; a question is right only if all are."""
     prompt: TemplateName = "default"
@@ -121,8 +115,6 @@ class QuestionShown(Line):
     """The category of the subtask."""
     rotation: Whole = 0
     """Number of places by which its options were rotated."""
-    options_as: str = ""
-    """`images`: pictures of options were each sent by themselves; `letters`: on one sheet."""
     blind: bool = False
     """True if no picture was sent."""
 
@@ -255,12 +247,11 @@ def _guessing(suite: Suite, cell: str) -> float:
 class ChoiceSubject:
     """One of several options is asked for, of a question as it is shown.
 
-    `guess` returns what a rule over the whole question set answers, by the rule's name: 0-based
-    indices as in `question.answer`.
+    `guess` returns what `majority_rule` answers: 0-based indices as in `question.answer`.
     """
 
     question: Question
-    guess: Callable[[str], tuple[int, ...]] = field(compare=False)
+    guess: Callable[[], tuple[int, ...]] = field(compare=False)
 
 
 def _random_choice(subject: ChoiceSubject, rng: np.random.Generator) -> str:
@@ -278,8 +269,7 @@ def choice_text(indices: Iterable[int]) -> str:
 CHOICE_RULES: Mapping[str, Callable[..., str]] = {
     "random": _random_choice,
     "oracle": lambda subject, _: choice_text(subject.question.answer),
-    "majority": lambda subject, _: choice_text(subject.guess("majority")),
-    "text-only": lambda subject, _: choice_text(subject.guess("text-only")),
+    "majority": lambda subject, _: choice_text(subject.guess()),
 }
 
 
@@ -327,22 +317,13 @@ class AskedQuestion:
         return self.task.scene
 
 
-SHEET = "options"
-"""The label of the sheet that holds all options."""
-_MOST_CELL_PX = 1024
-
-
 def question_drawings(
-    item: AskedQuestion,
-    style: PictureStyle,
-    options_as: OptionsAs = "images",
-    background: Background | None = None,
+    item: AskedQuestion, style: PictureStyle, background: Background | None = None
 ) -> tuple[Drawing, ...]:
     """Return the pictures of a question: scene, one block alone where there is one, options.
 
-    Options that are pictures are sent apart (`images`), or all on one sheet (`letters`). Questions
-    bring backgrounds of their own, which `background` overrides; those that bring none have the
-    style's. DataError for a picture that is not there.
+    Questions bring backgrounds of their own, which `background` overrides; those that bring none
+    have the style's. DataError for a picture that is not there.
     """
     recipes = {recipe.label: recipe for recipe in item.question.pictures}
     n, files = len(item.question.options), item.task.files
@@ -357,19 +338,7 @@ def question_drawings(
             recipe = replace(recipe, background=background or recipe.background)
             key, make = question_key(recipe, style), partial(question_png, recipe, style)
             drawings[label] = Drawing(label, key, make, (style.size_px, style.size_px))
-    options = [drawing for label, drawing in drawings.items() if label in LETTERS]
-    if not options or options_as == "images":
-        return tuple(drawings.values())
-    cell_px, letters = min(style.size_px, _MOST_CELL_PX), "".join(one.label for one in options)
-    parts = " ".join(drawing.key for drawing in options)
-    key = hex_digest(f"sheet {LETTERED_VERSION} {cell_px} {letters} {parts}")
-    make = partial(_sheet, tuple(drawing.make for drawing in options), letters, cell_px)
-    sheet = Drawing(SHEET, key, make, sheet_size_px(len(options), cell_px))
-    return (*(one for label, one in drawings.items() if label not in LETTERS), sheet)
-
-
-def _sheet(makes: Sequence[Callable[[], bytes]], letters: str, side_px: int) -> bytes:
-    return lettered_sheet_png([make() for make in makes], letters, side_px)
+    return tuple(drawings.values())
 
 
 def question_items(
@@ -434,21 +403,19 @@ class Vqa(Track):
             for task in tasks
             for rotation in range(spec.rotations)
         )
-        self._guesses = Guesses([task.question for task in known.tasks])
+        self._guesses = Guesses([task.question for task in known.tasks], majority_rule)
 
     def draw(self, item: AskedQuestion) -> tuple[Drawing, ...]:
         """Return the pictures of a question as a suite wants them."""
         if self.spec.blind:
             return ()
         images = self.suite.images
-        style, ground = picture_style(images), images.background
-        return question_drawings(item, style, self.spec.options_as, ground)
+        return question_drawings(item, picture_style(images), images.background)
 
     def about(self, item: AskedQuestion) -> dict[str, Any]:
         """Return the question and how it is shown."""
         asked = {name: getattr(item.question, name) for name in ("id", "subtask", "category")}
-        shown = {name: getattr(self.spec, name) for name in ("options_as", "blind")}
-        return {"question": {**asked, "rotation": item.rotation, **shown}}
+        return {"question": {**asked, "rotation": item.rotation, "blind": self.spec.blind}}
 
     def identity(self) -> dict[str, Any]:
         """Return digests of all questions, of those asked, the prompt and the pictures."""
@@ -484,7 +451,7 @@ class Vqa(Track):
     def subject_of(self, item: AskedQuestion) -> ChoiceSubject:
         """Return what baselines answer about."""
         question = item.question
-        return ChoiceSubject(question, lambda probe: self._guesses.guess(probe, question))
+        return ChoiceSubject(question, lambda: self._guesses.guess(question))
 
     def judge(self, item: AskedQuestion, text: str | None) -> Judgement:
         """Read and score a reply; None, where there is no reply, is no answer."""

@@ -135,7 +135,7 @@ def test_questions_keep_their_background_unless_a_suite_gives_one(
     ):
         style = replace(STYLE, background=drawn)
         item = AskedQuestion(QuestionTask(question))
-        drawn = question_drawings(item, STYLE, "images", ground)  # type: ignore[arg-type]
+        drawn = question_drawings(item, STYLE, ground)  # type: ignore[arg-type]
         assert [one.key for one in drawn] == [question_key(picture, style) for picture in bare]
 
 
@@ -150,7 +150,7 @@ def test_a_reply_that_cannot_be_read_is_wrong(question_set: QuestionSet) -> None
 def test_random_answers_are_spread_over_all_that_can_be_given(question_set: QuestionSet) -> None:
     rng, found = np.random.default_rng(0), {}
     for item in opened(question_set, None).items:
-        subject = ChoiceSubject(item.question, lambda _: (0,))
+        subject = ChoiceSubject(item.question, lambda: (0,))
         found[item.question.subtask] = {CHOICE_RULES["random"](subject, rng) for _ in range(300)}
     sizes = {len(texts) for name, texts in found.items() if name != "OR"}
     assert (sizes, len(found["OR"])) == ({4}, 24)

@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 from phyblock.domain.question import LETTERS, SUBTASKS, Question, QuestionPicture, Subtask
 from phyblock.making.questions.base import stem_of
 from phyblock.making.questions.production import BALANCE
+from phyblock.making.questions.text_probe import text_rule
 from phyblock.sim.question_pictures import changed_pixels, seen
-from phyblock.tracks.baselines import FOLDS, Folds, Guesses
+from phyblock.tracks.baselines import FOLDS, Folds, Guesses, majority_rule
 
 Floats = NDArray[np.float64]
 GUESSABLE = 0.35
@@ -83,7 +84,8 @@ def audit_questions(questions: Sequence[Question]) -> Iterator[SubtaskAudit]:
 
     Raises SpecError where scikit-learn, which the text probe uses, is not installed.
     """
-    guesses, folds = Guesses(questions), Folds(questions)
+    folds = Folds(questions)
+    readers = {"majority": Guesses(questions, majority_rule), "text": Guesses(questions, text_rule)}
     repeated = duplicates_of(questions)
     for subtask in SUBTASKS:
         mine = [question for question in questions if question.subtask == subtask]
@@ -91,8 +93,8 @@ def audit_questions(questions: Sequence[Question]) -> Iterator[SubtaskAudit]:
             continue
         n, first = len(mine), Counter(question.answer[0] for question in mine)
         probes = {
-            name: Probe(sum(guesses.guess(rule, q) == q.answer for q in mine), n)
-            for name, rule in (("majority", "majority"), ("text", "text-only"))
+            name: Probe(sum(guesses.guess(q) == q.answer for q in mine), n)
+            for name, guesses in readers.items()
         }
         if pictures := picture_probe(mine, folds):
             probes["pictures"] = pictures

@@ -32,9 +32,9 @@ from phyblock.making.questions.relations import (
     PositionMaker,
     RotationMaker,
 )
+from phyblock.making.questions.text_probe import text_features
 from phyblock.making.questions.views import OrderingMaker, ViewpointMaker
 from phyblock.making.workers import Workers
-from phyblock.tracks.baselines import text_features
 from phyblock.types import BACKGROUNDS, Background
 
 MAKERS: dict[Subtask, Maker] = {
