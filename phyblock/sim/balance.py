@@ -13,7 +13,8 @@ lemma), for a solver may stop early. Linear programming settles the rest.
 long blocks heavier or lighter by `MASS_FACTORS`, with all that lies between, so that no verdict
 hangs on an edge that a weight is nearly over. Weights alone do not tell a block that rests on two
 edges with nothing over them, so what stands has to stand on smaller contacts too: those that are
-left wherever two blocks are off by up to the margin from one another.
+left wherever two blocks are off by up to the margin from one another. `prove` gives the forces, or
+the motion of a fall, for `certificate` to check, which trusts nothing here but the contacts.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import functools
 import math
 from collections.abc import Sequence
 from itertools import combinations
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,11 +31,14 @@ from numpy.typing import NDArray
 from phyblock.domain.blocks import FRICTION, SHAPES, BlockType, euler_deg_to_matrix
 from phyblock.domain.scene import Block
 from phyblock.errors import PhyblockError
+from phyblock.sim import certificate
+from phyblock.sim.certificate import Body, Contact, Falls, Stands, Structure
 from phyblock.sim.contact import (
     CONTACT_TOLERANCE_M,
     bounds_m,
     boxes_near,
     contact_corners_m,
+    find_overlaps,
     piece_pairs,
     pieces_of,
 )
@@ -43,10 +47,11 @@ from phyblock.sim.geometry import cross
 Floats = NDArray[np.float64]
 
 MARGIN_M = 0.005  # Distance by which every weight may be off its place [m].
-FRICTIONS = (0.28, 0.45)  # The least and the most friction that a verdict has to hold under.
+FRICTIONS = (certificate.LITTLE / 100, certificate.MUCH / 100)
+"""The least and the most friction that a verdict has to hold under."""
 Masses = tuple[tuple[BlockType, float], ...]
 """Types of which every block has so many times its mass."""
-MASS_FACTORS = (0.87, 1.15)
+MASS_FACTORS = (certificate.LIGHT / 100, certificate.HEAVY / 100)
 """Long blocks may have so many times their mass at the least, and at the most."""
 MASSES: tuple[Masses, ...] = tuple(
     tuple((block_type, factor) for block_type, shape in SHAPES.items() if shape.is_long)
@@ -59,7 +64,8 @@ _TOLERANCE = 1e-5
 _PROOF = 1e4  # A residual is a proof for forces that add up to so many times all weights, no more.
 _UP = np.array([0.0, 0.0, 1.0])
 _STEEP = 0.9
-_SAME_GAP_M = 1e-4
+_SAME_GAP_M, _NEARLY_SAME_M = 1e-4, 1e-3
+_EXACT, _SPARE = 1e-11, 1e-7
 _KEPT = 2048
 
 
@@ -69,17 +75,142 @@ def surely_stands(blocks: Sequence[Block]) -> bool:
 
 
 def surely_falls(blocks: Sequence[Block]) -> bool:
-    """True if blocks fall with weights off by up to `MARGIN_M`, much friction, any masses.
+    """True if blocks fall with weights off by up to `MARGIN_M`, much friction, any masses."""
+    forces = _forces(blocks, FRICTIONS[1])
+    if not forces.size:
+        return bool(blocks)
+    return bool(_least_imbalance(blocks, forces).fun >= _TOLERANCE)
 
-    One linear program has forces, shifts (of all long blocks, of all others) and the mass of long
-    blocks as its unknowns, and no solution.
+
+class Proven(NamedTuple):
+    """Blocks as a proof takes them, and the proof."""
+
+    structure: Structure
+    proof: Stands | Falls
+
+    @property
+    def stands(self) -> bool:
+        """True if the blocks stand, False if they fall."""
+        return isinstance(self.proof, Stands)
+
+
+def prove(blocks: Sequence[Block]) -> Proven | None:
+    """Return a proof that blocks stand or fall, which was checked; None: statics leave it open.
+
+    Nothing is proven of blocks that overlap, for they push one another apart.
+    """
+    return prove_standing(blocks) or prove_fall(blocks)
+
+
+def prove_standing(blocks: Sequence[Block]) -> Proven | None:
+    """Return a proof that blocks stand, which was checked, or None."""
+    if not blocks or find_overlaps(blocks):
+        return None
+    plain, narrow = _contacts(blocks), _contacts(blocks, MARGIN_M)
+    proof = _standing(blocks, plain, narrow)
+    if proof is None:
+        return None
+    structure = Structure(_bodies(blocks), _stated(plain), _stated(narrow), ())
+    return Proven(structure, proof) if certificate.proves(proof, structure) else None
+
+
+def prove_fall(blocks: Sequence[Block]) -> Proven | None:
+    """Return a proof that blocks fall, which was checked, or None."""
+    if not blocks or find_overlaps(blocks):
+        return None
+    wide = _contacts(blocks, -MARGIN_M)
+    # More friction than is proven, as numbers are rounded.
+    solution = _least_imbalance(blocks, _matrix(wide, len(blocks), FRICTIONS[1] + _SPARE))
+    motion = _exact(
+        -solution.eqlin.marginals.reshape(-1, 3) * np.tile([[1.0], [10.0]], (len(blocks), 1))
+    )
+    proof = Falls(tuple(zip(motion[::2], motion[1::2], strict=True)))
+    structure = Structure(_bodies(blocks), (), (), _stated(wide))
+    return Proven(structure, proof) if certificate.proves(proof, structure) else None
+
+
+def _standing(blocks: Sequence[Block], plain: _Contacts, narrow: _Contacts) -> Stands | None:
+    """Forces that bear every load of a proof, where there are any."""
+    forces = []
+    shifts_m = np.array(certificate.SHIFTS) / certificate.ONE
+    for met, places_m in ((narrow, np.zeros((1, 2))), (plain, shifts_m)):
+        unit = _matrix(met, len(blocks), FRICTIONS[0] - _SPARE)
+        loads = [_weights(blocks, at_m, kg) for at_m in places_m for kg in MASSES]
+        pushes = _pushes(unit, np.column_stack(loads)) if unit.size else None
+        if pushes is None:
+            return None
+        edges = met.edges(FRICTIONS[0] - _SPARE)
+        pushes = pushes.reshape(*edges.shape[:2], -1)
+        forces[:0] = map(_exact, np.einsum("kel,kec->lkc", pushes, edges))
+    return Stands(tuple(forces))
+
+
+def is_balanced(
+    blocks: Sequence[Block],
+    friction: float = FRICTION,
+    margin_m: float = 0.0,
+    masses: Sequence[Masses] = ((),),
+) -> bool:
+    """True if contacts can bear all weights, whichever of the masses blocks have.
+
+    With a margin [m], also all weights moved by up to so much to any side, and those in their place
+    where every contact is narrower by it. The former is asked at the corners of an octagon: of two
+    shifts, or masses, that can be borne, what lies between is borne by the mean of their forces.
+    """
+    shifts = margin_m / math.cos(math.pi / 8) * _SIDES if margin_m else np.zeros((1, 2))
+    loads = [_weights(blocks, at, kg) for at in shifts for kg in masses]
+    if not _bears(_forces(blocks, friction), *loads):
+        return False
+    narrow = _forces(blocks, friction, margin_m) if margin_m else np.empty((0, 0))
+    return not margin_m or _bears(narrow, *(_weights(blocks, (0, 0), kg) for kg in masses))
+
+
+def _bears(forces: Floats, *weights: Floats) -> bool:
+    """True if some sum of the forces, each as large as need be, balances each of the weights."""
+    if not forces.size:
+        return not weights[0].size
+    return _pushes(forces, np.column_stack(weights)) is not None
+
+
+def _pushes(forces: Floats, weights: Floats) -> Floats | None:
+    """How much of each force, (k, m), balances weights (6 n, m); None where some are not borne."""
+    from scipy.optimize import nnls  # type: ignore[import-untyped]
+
+    # The least sum of squares is often one without a pull, and found for all weights at once.
+    some = forces @ forces.T
+    pushes = forces.T @ np.linalg.lstsq(some, weights, rcond=1e-13)[0]
+    pushes += forces.T @ np.linalg.lstsq(some, weights - forces @ pushes, rcond=1e-13)[0]
+    is_borne = (pushes.min(axis=0) >= 0) & (np.abs(weights - forces @ pushes).max(axis=0) < _EXACT)
+    for number in np.flatnonzero(~is_borne):
+        weight = weights[:, number]
+        try:
+            pushes[:, number], _ = nnls(forces, weight)
+        except RuntimeError:  # It found no end, which says nothing of whether there is a balance.
+            left = np.zeros(0)
+        else:
+            left = weight - forces @ pushes[:, number]
+            if float(np.linalg.norm(left)) < _TOLERANCE:
+                continue
+            # A sum of forces, each of which `left` is at odds with, does nothing that it asks for.
+            if _PROOF * float((left @ forces).max()) < float(left @ weight):
+                return None
+        solution = _least_residual(forces, weight)
+        if solution.fun >= _TOLERANCE:
+            return None
+        pushes[:, number] = solution.x[: forces.shape[1]]
+    return pushes
+
+
+def _least_imbalance(blocks: Sequence[Block], forces: Floats) -> Any:
+    """The solution of a linear program: what forces leave unborne of weights off by up to
+    `MARGIN_M`, at the least.
+
+    It has forces, shifts (of all long blocks, of all others) and the mass of long blocks as its
+    unknowns.
     """
     # SciPy takes a third of a second to import, which a run that asks nobody does without.
     from scipy import sparse  # type: ignore[import-untyped]
 
-    forces = _forces(blocks, FRICTIONS[1])
-    if not forces.size:
-        return bool(blocks)
     is_long = np.array([SHAPES[block.type].is_long for block in blocks])
     masses = np.array([SHAPES[block.type].mass_kg for block in blocks])
     loads = []
@@ -96,47 +227,7 @@ def surely_falls(blocks: Sequence[Block]) -> bool:
     free = (None, None)
     bounds = [(0, None)] * count + [(1.0, 1.0), free, free, MASS_FACTORS, free, free]
     unknown = np.hstack([forces, *(-load for load in loads)])
-    left = _least_residual(unknown, np.zeros(len(unknown)), bounds, shifts)
-    return left >= _TOLERANCE
-
-
-def is_balanced(
-    blocks: Sequence[Block],
-    friction: float = FRICTION,
-    margin_m: float = 0.0,
-    masses: Sequence[Masses] = ((),),
-) -> bool:
-    """True if contacts can bear all weights, whichever of the masses blocks have.
-
-    With a margin [m], also all weights moved by up to so much to any side, and those in their place
-    where every contact is narrower by it. The former is asked at the corners of an octagon: of two
-    shifts, or masses, that can be borne, what lies between is borne by the mean of their forces.
-    """
-    forces = _forces(blocks, friction)
-    shifts = margin_m / math.cos(math.pi / 8) * _SIDES if margin_m else np.zeros((1, 2))
-    if not all(_bears(forces, _weights(blocks, at, kg)) for at in shifts for kg in masses):
-        return False
-    narrow = _forces(blocks, friction, margin_m) if margin_m else forces
-    return not margin_m or all(_bears(narrow, _weights(blocks, (0, 0), kg)) for kg in masses)
-
-
-def _bears(forces: Floats, weights: Floats) -> bool:
-    """True if some sum of the forces, each as large as need be, balances all weights."""
-    if not forces.size:
-        return not weights.size
-    from scipy.optimize import nnls  # type: ignore[import-untyped]
-
-    try:
-        pushes, _ = nnls(forces, weights)
-    except RuntimeError:  # It found no end, which says nothing of whether there is a balance.
-        return _least_residual(forces, weights) < _TOLERANCE
-    left = weights - forces @ pushes
-    if float(np.linalg.norm(left)) < _TOLERANCE:
-        return True
-    # A sum of forces, each of which `left` is at odds with, does nothing that `left` asks for.
-    if _PROOF * float((left @ forces).max()) < float(left @ weights):
-        return False
-    return _least_residual(forces, weights) < _TOLERANCE
+    return _least_residual(unknown, np.zeros(len(unknown)), bounds, shifts)
 
 
 def _least_residual(
@@ -144,8 +235,8 @@ def _least_residual(
     target: Floats,
     bounds: Sequence[tuple[float | None, float | None]] | None = None,
     at_most_zero: Any = None,
-) -> float:
-    """The least residual of a target, as a sum, by linear programming, which always ends."""
+) -> Any:
+    """The solution of linear programming, which always ends, for the least residual, as a sum."""
     from scipy import sparse
     from scipy.optimize import linprog
 
@@ -161,60 +252,127 @@ def _least_residual(
         b_ub=np.zeros(within.shape[0]),
         bounds=[*(bounds or [(0.0, None)] * count), *slack],
         method="highs",
+        options={"dual_feasibility_tolerance": 1e-10},
     )
     if solution.status != 0:
         raise PhyblockError(f"statics of {rows // 6} blocks are not decided: {solution.message}")
-    return float(solution.fun)
+    return solution
 
 
 def _weights(
     blocks: Sequence[Block], shift_m: Sequence[float] | Floats, masses: Masses = ()
 ) -> Floats:
-    """The force up that each block needs, and its moment, shape (6 n,), of a whole weight of 1."""
-    factors = dict(masses)
-    weights = np.array([SHAPES[b.type].mass_kg * factors.get(b.type, 1.0) for b in blocks])
-    return _needs(blocks, weights / weights.sum(), shift_m)
+    """The force up that each block needs, and its moment, shape (6 n,); all plain ones weigh 1."""
+    factors, kg = dict(masses), np.array([SHAPES[b.type].mass_kg for b in blocks])
+    heavier = np.array([factors.get(b.type, 1.0) for b in blocks])
+    return _needs(blocks, kg * heavier / kg.sum(), shift_m)
 
 
 def _needs(
     blocks: Sequence[Block], weights: Floats, shift_m: Sequence[float] | Floats = (0.0, 0.0)
 ) -> Floats:
     """The force up that each block of some weight needs, and its moment, shape (6 n,)."""
-    centers = np.zeros((len(blocks), 3))
-    for center, b in zip(centers, blocks, strict=True):
-        center += euler_deg_to_matrix(b.euler_deg) @ np.array(SHAPES[b.type].center_of_mass_m)
-        center += b.position_m
+    centers = _centers_m(blocks)
     centers[:, :2] += shift_m
     return _wrenches(centers, np.outer(weights, _UP)).ravel()
 
 
-def _forces(blocks: Sequence[Block], friction: float, margin_m: float = 0.0) -> Floats:
-    """Effect of a unit of force along each edge of each cone on each block, shape (6 n, k)."""
-    contacts: list[tuple[int | None, int, Floats, Floats]] = [
-        (None, i, corners, _UP) for i, b in enumerate(blocks) for corners in _on_floor(b)
+def _centers_m(blocks: Sequence[Block]) -> Floats:
+    """The centers of mass of blocks, shape (n, 3) [m]."""
+    centers = np.zeros((len(blocks), 3))
+    for center, b in zip(centers, blocks, strict=True):
+        center += euler_deg_to_matrix(b.euler_deg) @ np.array(SHAPES[b.type].center_of_mass_m)
+        center += b.position_m
+    return centers
+
+
+class _Contacts(NamedTuple):
+    """Corners of contacts: who pushes whom (the ground is -1), places (k, 3) [m], and directions
+    (k, 3, 3): the normal, from one to the other, and two at right angles to it.
+    """
+
+    below: NDArray[np.int64]
+    above: NDArray[np.int64]
+    places_m: Floats
+    axes: Floats
+    is_wide: bool
+
+    def edges(self, friction: float) -> Floats:
+        """Edges of a pyramid in the cone of friction of each, or, of a wide one, round it."""
+        ways = (
+            [(1, 1), (1, -1), (-1, 1), (-1, -1)]
+            if self.is_wide
+            else [(1, 0), (-1, 0), (0, 1), (0, -1)]
+        )
+        return self.axes[:, None, 0] + friction * np.einsum("es,ksc->kec", ways, self.axes[:, 1:])
+
+
+def _contacts(blocks: Sequence[Block], margin_m: float = 0.0) -> _Contacts:
+    """All contacts of blocks, narrower by a margin, or wider where it is negative."""
+    is_wide = margin_m < 0
+    found = [
+        (certificate.GROUND, i, corners, _UP)
+        for i, b in enumerate(blocks)
+        for corners in _on_floor(b)
     ]
     for (below, one), (above, other) in combinations(enumerate(blocks), 2):
-        contacts += [(below, above, *place) for place in _between(one, other, margin_m)]
-    columns = []
-    for pusher, pushed, corners_m, normal in contacts:
+        found += [(below, above, *place) for place in _between(one, other, margin_m)]
+    axes = []
+    for *_, corners, normal in found:
         helper = _UP if abs(normal[2]) < _STEEP else np.array([1.0, 0.0, 0.0])
         side = cross(normal, helper)
         side /= np.linalg.norm(side)
-        across = cross(normal, side)
-        edges = normal + friction * np.stack([side, -side, across, -across])
-        places = np.repeat(corners_m, len(edges), axis=0)
-        wrenches = _wrenches(places, np.tile(edges, (len(corners_m), 1)))
-        column = np.zeros((len(wrenches), len(blocks), 6))
-        column[:, pushed] = wrenches
-        if pusher is not None:
-            column[:, pusher] = -wrenches
-        columns.append(column.reshape(len(wrenches), -1))
-    return np.concatenate(columns).T if columns else np.empty((0, 0))
+        axes.append(np.tile(np.stack([normal, side, cross(normal, side)]), (len(corners), 1, 1)))
+    if not found:
+        none = np.empty(0, dtype=np.int64)
+        return _Contacts(none, none, np.empty((0, 3)), np.empty((0, 3, 3)), is_wide)
+    below, above = (
+        np.repeat([one[i] for one in found], [len(one[2]) for one in found]) for i in (0, 1)
+    )
+    places = np.concatenate([one[2] for one in found])
+    return _Contacts(below, above, places, np.concatenate(axes), is_wide)
+
+
+def _forces(blocks: Sequence[Block], friction: float, margin_m: float = 0.0) -> Floats:
+    """Effect of a unit of force along each edge of each cone on each block, shape (6 n, k)."""
+    return _matrix(_contacts(blocks, margin_m), len(blocks), friction)
+
+
+def _matrix(met: _Contacts, count: int, friction: float) -> Floats:
+    """As `_forces`, of the contacts of so many blocks."""
+    edges = met.edges(friction)
+    wrenches = _wrenches(met.places_m[:, None], edges)
+    columns = np.zeros((len(edges), edges.shape[1], count, 6))
+    at = np.arange(len(edges))
+    is_block = met.below != certificate.GROUND
+    columns[at, :, met.above] = wrenches
+    columns[at[is_block], :, met.below[is_block]] = -wrenches[is_block]
+    return columns.reshape(4 * len(edges), 6 * count).T
 
 
 def _wrenches(at_m: Floats, force: Floats) -> Floats:
-    """Forces (k, 3) and their moments about the origin in decimeters, shape (k, 6)."""
-    return np.hstack([force, 10 * cross(at_m, force)])
+    """Forces (..., 3) and their moments about the origin in decimeters, shape (..., 6)."""
+    return np.concatenate([force, 10 * cross(at_m, force)], axis=-1)
+
+
+def _exact(vectors: Floats) -> tuple[certificate.Vector, ...]:
+    """Vectors (k, 3) as integers over `certificate.ONE`."""
+    return tuple(map(tuple, np.rint(vectors * certificate.ONE).astype(np.int64).tolist()))
+
+
+def _bodies(blocks: Sequence[Block]) -> tuple[Body, ...]:
+    """Blocks as a proof takes them."""
+    kg = [SHAPES[block.type].mass_kg for block in blocks]
+    weights = [round(one / sum(kg) * certificate.ONE) for one in kg]
+    is_long = [SHAPES[block.type].is_long for block in blocks]
+    return tuple(map(Body, weights, is_long, _exact(_centers_m(blocks))))
+
+
+def _stated(met: _Contacts) -> tuple[Contact, ...]:
+    """Contacts as a proof takes them."""
+    normals, *sides = (_exact(met.axes[:, axis]) for axis in range(3))
+    who = (met.below.tolist(), met.above.tolist())
+    return tuple(map(Contact, *who, _exact(met.places_m), normals, zip(*sides, strict=True)))
 
 
 @functools.lru_cache(maxsize=_KEPT)
@@ -235,13 +393,18 @@ def _between(one: Block, other: Block, margin_m: float) -> tuple[tuple[Floats, F
     """Corners and normal of each contact of two blocks, the normal from the first on."""
     if not boxes_near(bounds_m(one), bounds_m(other), CONTACT_TOLERANCE_M):
         return ()
-    met = []
+    met, is_wide = [], margin_m < 0
     for first, second, axes in piece_pairs(one, other):
         if not -2 * CONTACT_TOLERANCE_M <= axes.gap_m <= CONTACT_TOLERANCE_M:
             continue
-        best = axes.directions[axes.gaps_m > axes.gap_m - _SAME_GAP_M]
-        direction = best[int(np.argmax(np.abs(best[:, 2])))]
-        corners = contact_corners_m(first, second, direction, margin_m)
-        if abs(direction[2]) >= _LEAST_VERTICAL and len(corners):
-            met.append((corners, direction))
+        near_m = _NEARLY_SAME_M if is_wide else _SAME_GAP_M
+        best = axes.directions[axes.gaps_m > axes.gap_m - near_m]
+        # A fall needs all directions that blocks may push in; a balance takes the one most upright.
+        if not is_wide:
+            best = best[[int(np.argmax(np.abs(best[:, 2])))]]
+            best = best[np.abs(best[:, 2]) >= _LEAST_VERTICAL]
+        for direction in np.unique(best.round(9), axis=0) if is_wide else best:
+            corners = contact_corners_m(first, second, direction, margin_m)
+            if len(corners):
+                met.append((corners, direction))
     return tuple(met)

@@ -219,10 +219,15 @@ def contact_corners_m(
 
     `direction` (3,) is the contact's normal, from the first to the second; none where they meet in
     less than a line. With a margin [m], half of it is left out along the rims of either piece, as
-    is certain to touch where they may be off by so much from one another.
+    is certain to touch where they may be off by so much from one another; with a negative one it
+    is added, as may touch then.
     """
     lower, upper, shared, basis = _patches(first, second, direction)
-    if margin_m:
+    if margin_m < 0:
+        ways = -margin_m / 2 * np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
+        wider = [_hull((one[:, None] + ways).reshape(-1, 2)) for one in (lower, upper)]
+        shared = _clip(*wider)
+    elif margin_m:
         for outline in (lower, upper):
             shared = _clip(shared, outline, margin_m / 2)
     if len(shared) < 2:
