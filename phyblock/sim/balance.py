@@ -131,7 +131,7 @@ def prove_fall(blocks: Sequence[Block]) -> Proven | None:
 
 def _standing(blocks: Sequence[Block], plain: _Contacts, narrow: _Contacts) -> Stands | None:
     """Forces that bear every load of a proof, where there are any."""
-    forces = []
+    forces: list[tuple[certificate.Vector, ...]] = []
     shifts_m = np.array(certificate.SHIFTS) / certificate.ONE
     for met, places_m in ((narrow, np.zeros((1, 2))), (plain, shifts_m)):
         unit = _matrix(met, len(blocks), FRICTIONS[0] - _SPARE)
@@ -326,11 +326,9 @@ def _contacts(blocks: Sequence[Block], margin_m: float = 0.0) -> _Contacts:
     if not found:
         none = np.empty(0, dtype=np.int64)
         return _Contacts(none, none, np.empty((0, 3)), np.empty((0, 3, 3)), is_wide)
-    below, above = (
-        np.repeat([one[i] for one in found], [len(one[2]) for one in found]) for i in (0, 1)
-    )
-    places = np.concatenate([one[2] for one in found])
-    return _Contacts(below, above, places, np.concatenate(axes), is_wide)
+    pairs, corners_m = np.array([one[:2] for one in found]), [one[2] for one in found]
+    below, above = np.repeat(pairs, list(map(len, corners_m)), axis=0).T
+    return _Contacts(below, above, np.concatenate(corners_m), np.concatenate(axes), is_wide)
 
 
 def _forces(blocks: Sequence[Block], friction: float, margin_m: float = 0.0) -> Floats:

@@ -121,9 +121,9 @@ def _bears(
         if push < 0 or 100**2 * aside > LITTLE**2 * push**2:
             return False
         wrench = (*(ONE * part for part in force), *_cross(contact.place, force))
-        for body, sign in ((contact.above, 100), (contact.below, -100)):
-            if body != GROUND:
-                left[body] = [a + sign * b for a, b in zip(left[body], wrench, strict=True)]
+        for number, sign in ((contact.above, 100), (contact.below, -100)):
+            if number != GROUND:
+                left[number] = [a + sign * b for a, b in zip(left[number], wrench, strict=True)]
     most = sum(body.weight for body in structure.bodies) * ONE * 100 // _REMAINDER
     return all(abs(part) <= most for parts in left for part in parts)
 

@@ -225,8 +225,8 @@ def contact_corners_m(
     lower, upper, shared, basis = _patches(first, second, direction)
     if margin_m < 0:
         ways = -margin_m / 2 * np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
-        wider = [_hull((one[:, None] + ways).reshape(-1, 2)) for one in (lower, upper)]
-        shared = _clip(*wider)
+        lower, upper = (_hull((one[:, None] + ways).reshape(-1, 2)) for one in (lower, upper))
+        shared = _clip(lower, upper)
     elif margin_m:
         for outline in (lower, upper):
             shared = _clip(shared, outline, margin_m / 2)
