@@ -21,8 +21,8 @@ import numpy as np
 
 from phyblock.data import read_builtin
 from phyblock.domain import Block
+from phyblock.files import bundled
 from phyblock.making.scenes.production import split_tasks
-from phyblock.resources import bundled
 from phyblock.sim.balance import prove
 from phyblock.sim.contact import bounds_m, drop_height_m
 from phyblock.sim.dynamics import Site, groups
