@@ -10,6 +10,7 @@ a row a sample, `.estimates` every value with its interval, `.tables` maps names
 from __future__ import annotations
 
 from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -39,7 +40,18 @@ __all__ = [
     "tasks",
     "verify",
 ]
-_OF_TASK = ("Episode", "Score", "Task", "Tasks", "Turn", "generate", "tasks", "verify")
+_HOMES = {
+    "PhyblockError": "errors",
+    **dict.fromkeys(("Picture", "Run", "SceneTask", "Suite"), "api"),
+    **dict.fromkeys(("load_run", "load_suite", "render", "run_suite"), "api"),
+    **dict.fromkeys(("Episode", "Score", "Task", "Tasks", "Turn"), "task"),
+    **dict.fromkeys(("generate", "tasks", "verify"), "task"),
+}
+"""The module of each name."""
+if find_spec("verifiers"):
+    # It finds a taskset and its environment among the names that a package exports.
+    __all__ += ["VerifiersEnv", "VerifiersTaskset"]
+    _HOMES |= dict.fromkeys(("VerifiersEnv", "VerifiersTaskset"), "integrations.verifiers")
 
 
 def __getattr__(name: str) -> object:
@@ -48,10 +60,9 @@ def __getattr__(name: str) -> object:
         from importlib.metadata import version
 
         return version("phyblock")
-    if name not in __all__:
+    if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    of = "errors" if name == "PhyblockError" else "task" if name in _OF_TASK else "api"
-    return getattr(import_module(f"phyblock.{of}"), name)
+    return getattr(import_module(f"phyblock.{_HOMES[name]}"), name)
 
 
 def __dir__() -> list[str]:

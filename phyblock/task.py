@@ -177,6 +177,12 @@ class Task:
         return self.item.scene.level
 
     @property
+    def part(self) -> str:
+        """The part of the track that it is filed under: the level, or the subtask of a question."""
+        question = self.track.about(self.item).get("question")
+        return question["subtask"] if question else f"level {self.level}"
+
+    @property
     def base_scene(self) -> str:
         """The first scene that its scene was made from, by which errors cluster."""
         return (self.item.scene.parents or (self.item.scene.id,))[0]
@@ -236,6 +242,9 @@ class Task:
 
     def _start(self, *, shows: bool) -> Any:
         return self.track.start(self.item, self.seed, {}, with_messages=shows)
+
+    def __deepcopy__(self, _: object) -> Task:
+        return self
 
     def __repr__(self) -> str:
         return f"<task {self.id}: level {self.level}>"
@@ -375,14 +384,16 @@ def tasks(
     seed: Annotated[int, Field(ge=0)] = 0,
     data: SkipValidation[str | Path | Dataset | Iterable[AssemblyTask] | None] = None,
     limit: Annotated[int, Field(ge=1)] | None = None,
+    first: Annotated[int, Field(ge=0)] = 0,
 ) -> Tasks:
     """Return the tasks of a track: `full_planning`, `step_planning`, `pose_planning` or `vqa`.
 
     The split `test` is the built-in set, or `data`: a data set's name or folder, or scenes. `train`
     and `dev` are made from the seed and share no structure with the test set or with one another;
-    they have no end, unless a `limit` makes them a finite set at once. `overrides` are `KEY=VALUE`
-    texts for the track's bundled suite, as for `--set`. `limit` keeps so many, spread over levels
-    or subtasks. Raises SpecError, DataError or PromptError with what is wrong.
+    they have no end and begin at place `first`, unless a `limit` makes them a finite set at once.
+    `overrides` are `KEY=VALUE` texts for the track's bundled suite, as for `--set`. `limit` keeps
+    so many, spread over levels or subtasks. Raises SpecError, DataError or PromptError with what is
+    wrong.
     """
     if track not in known_tracks():
         allowed, hint = ", ".join(known_tracks()), did_you_mean(track, known_tracks())
@@ -401,7 +412,7 @@ def tasks(
     limit = suite.limit if limit is None else limit
     dataset = data if isinstance(data, Dataset) else None
     if split != "test":
-        stream = partial(split_tasks, split, seed, levels=suite.levels)
+        stream = partial(split_tasks, split, seed, levels=suite.levels, first=first)
         if limit is None:
             return Tasks(suite, split, stream, {})
         dataset = Dataset(split, Path(split), tuple(itertools.islice(stream(), limit)))

@@ -17,7 +17,7 @@ from phyblock.registry import PLUGINS
 from phyblock.text import counted, plain_lines
 from phyblock.types import QUOTE_HINT
 
-_CLI, _MAKING = "phyblock.cli", "phyblock.making.cli"
+_CLI, _MAKING, _MORE = "phyblock.cli", "phyblock.making.cli", "phyblock.integrations"
 _SECTIONS: Sections = {
     "Run": {
         "init": (f"{_CLI}.setup:init", "Lay out a folder: a suite, models.yaml, prompts."),
@@ -35,7 +35,7 @@ _SECTIONS: Sections = {
         "figures": (f"{_CLI}.results:figures", "Draw figures for a paper, as PDF and SVG."),
     },
     "Share": {
-        "export": (f"{_CLI}.results:export", "Write a run, or questions, for other tools."),
+        "export": (f"{_MORE}.cli:export", "Write a run, scenes or questions for other tools."),
         "bundle": (f"{_CLI}.results:bundle", "Write a run as one file that others can verify."),
         "verify": (f"{_CLI}.results:verify", "Score a bundle again and compare."),
         "site": (f"{_CLI}.results:site", "Put runs and bundles into a leaderboard."),

@@ -13,7 +13,6 @@ import click
 
 from phyblock.cli.console import make_console, print_path, print_table, shown_path
 from phyblock.cli.options import (
-    NAME_OR_PATH,
     UserPath,
     data_folders_option,
     data_option,
@@ -209,74 +208,6 @@ def figures(
         print_path(console, file)
     if not drawn:
         console.print("The run has no numbers for a figure.")
-
-
-_RUN_FORMS = ("hf", "csv", "parquet")
-
-
-@click.command()
-@click.argument("run", type=UserPath(), required=False)
-@click.option(
-    *("--to", "form"),
-    required=True,
-    metavar="FORMAT",
-    help=f"Of a run: {', '.join(_RUN_FORMS)}. Of questions: vlmevalkit, hf.",
-)
-@click.option(
-    "--questions",
-    is_flag=False,
-    flag_value="",
-    metavar="[SET]",
-    help="Write questions with their pictures: a folder, or a bundled set.",
-)
-@click.option("--out", type=UserPath(), metavar="DIR", help="Folder. [default: RUN/export/FORMAT]")
-@click.option(
-    "--data",
-    type=NAME_OR_PATH,
-    default="phyblock-400",
-    help="With --questions: the scenes they are about.",
-)
-@click.option(
-    "--limit", type=click.IntRange(min=1), help="With --questions: N, spread over subtasks."
-)
-@click.option(
-    *("--size", "size_px"),
-    type=click.IntRange(128, 2048),
-    default=512,
-    help="With --questions: edge of a picture in pixels.",
-)
-def export(
-    run: Path | None,
-    form: str,
-    questions: str | None,
-    out: Path | None,
-    data: str,
-    limit: int | None,
-    size_px: int,
-) -> None:
-    """Write the records of the folder RUN, or questions with their pictures, for other tools.
-
-    hf: a Hugging Face dataset. csv, parquet: a row a sample. vlmevalkit: a TSV file of questions.
-    """
-    from phyblock.data import read_data_set
-    from phyblock.results.export import EXPORT_FILES, export_questions, export_run
-    from phyblock.results.load import load_run
-
-    forms = _RUN_FORMS if questions is None else tuple(EXPORT_FILES)
-    if form not in forms:
-        raise click.BadParameter(f"{form!r} is not one of {', '.join(forms)}.", param_hint="--to")
-    if (run is None) == (questions is None):
-        raise click.UsageError("Name the folder of a run, or --questions.")
-    if run is not None:
-        files = export_run(load_run(run), form, out)
-    else:
-        assert questions is not None
-        if out is None:
-            raise click.UsageError("--questions needs --out: the folder to write.")
-        questions = questions or "phyblock-vqa"
-        files = export_questions(form, out, questions, read_data_set(data), limit, size_px)
-    for file in files:
-        print_path(make_console(), file)
 
 
 @click.command()

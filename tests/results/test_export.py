@@ -16,7 +16,9 @@ from PIL import Image as PillowImage
 
 from phyblock.data import Dataset, QuestionSet, read_builtin, read_questions
 from phyblock.domain import LETTERS, is_picture_option
-from phyblock.results.export import export_frame, export_questions, export_run
+from phyblock.integrations import huggingface
+from phyblock.integrations.files import write_vlmevalkit
+from phyblock.results.export import export_frame, export_run
 from phyblock.results.load import load_run
 from tests.vqa_set import write_questions
 from tests.web.factory import LEVELS, manifest, record, score, write_run
@@ -89,12 +91,10 @@ def test_csv_and_parquet_come_back_as_the_same_rows(folder: Path) -> None:
 def test_a_hugging_face_dataset_has_the_right_rows(folder: Path, tmp_path: Path) -> None:
     datasets = pytest.importorskip("datasets", reason=HF)
     frame = export_frame(load_run(folder))
-    parquet, saved = export_run(load_run(folder), "hf", tmp_path / "out")
-    from_disk = datasets.load_from_disk(str(saved))
-    loaded = datasets.load_dataset(
-        "parquet", data_files=str(parquet), cache_dir=str(tmp_path / "cache"), split="train"
-    )
-    for rows in (from_disk, loaded):
+    parquet, _ = huggingface.write_records(load_run(folder))
+    assert parquet == folder / "export" / "hf" / "records.parquet"
+    cache = str(tmp_path / "cache")
+    for rows in [datasets.load_dataset(str(parquet.parent), cache_dir=cache, split="train")]:
         assert rows.column_names == list(frame.columns)
         assert rows["sample"][:] == frame["sample"].tolist()
         assert rows["levels"][0] == [1, 2]
@@ -124,7 +124,7 @@ def test_tsv_files_are_as_vlmevalkit_reads_them(
     question_set: QuestionSet, scenes: Dataset, tmp_path: Path
 ) -> None:
     out, asked_of = tmp_path / "out", str(question_set.root)
-    files = export_questions("vlmevalkit", out, asked_of, scenes, None, 128)
+    files = write_vlmevalkit(out, asked_of, str(scenes.root), None, 128)
     choice, ordering = (rows_of(file) for file in files)
     asked = {task.key: task.question for task in question_set.tasks}
     assert {row["index"] for row in (*choice, *ordering)} == set(asked)
@@ -158,15 +158,26 @@ def test_a_hugging_face_dataset_has_questions_and_pictures(
 ) -> None:
     datasets = pytest.importorskip("datasets", reason=HF)
     out, asked_of = tmp_path / "out", str(question_set.root)
-    saved, parquet = export_questions("hf", out, asked_of, scenes, None, 128)
-    assert (saved, parquet) == (out / "dataset", out / "questions.parquet")
-    from_disk = datasets.load_from_disk(str(saved))
-    loaded = datasets.load_dataset(
-        str(tmp_path / "out"), cache_dir=str(tmp_path / "cache"), split="train"
-    )
-    for rows in (from_disk, loaded):
+    parquet, _ = huggingface.write_questions(out, asked_of, str(scenes.root), None, 128)
+    cache = str(tmp_path / "cache")
+    for rows in [datasets.load_dataset(str(parquet.parent), cache_dir=cache, split="test")]:
         assert rows["id"][:] == [task.key for task in question_set.tasks]
         for row, task in zip(rows, question_set.tasks, strict=True):
             assert row["answer"] == task.question.answer_letters
             assert row["options"] == list(task.question.options)
             assert [image.size for image in row["images"]] == [(128, 128)] * len(row["labels"])
+
+
+def test_scenes_with_their_pictures_and_all_that_is_known_of_them(
+    scenes: Dataset, tmp_path: Path
+) -> None:
+    datasets = pytest.importorskip("datasets", reason=HF)
+    parquet, card = huggingface.write_scenes(tmp_path / "out", str(scenes.root), None, 128)
+    cache = str(tmp_path / "cache")
+    rows = datasets.load_dataset(str(parquet.parent), cache_dir=cache, split="test")
+    assert "configs:" in card.read_text("utf-8")
+    lines = (scenes.root / "scenes.jsonl").read_text("utf-8").splitlines()
+    assert [json.loads(one)["id"] for one in rows["scene"]] == rows["id"][:]
+    assert len(rows) == len(lines)
+    for name in ("goal", "candidates"):
+        assert rows[0][name].size == (128, 128)

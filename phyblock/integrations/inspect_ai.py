@@ -1,0 +1,148 @@
+"""Tasks for Inspect: `inspect eval phyblock/full_planning --model openai/gpt-4o`.
+
+The entry point `inspect_ai` of phyblock names this module. Samples hold the keys of tasks; prompts
+are those of a run and are made as a sample begins, so that a limit draws few pictures.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from typing import Any
+
+from inspect_ai import Task as InspectTask
+from inspect_ai import model, task
+from inspect_ai.dataset import MemoryDataset, Sample
+from inspect_ai.scorer import Metric, Score, Scorer, Target, grouped, mean, metric, scorer, stderr
+from inspect_ai.solver import Generate, Solver, TaskState, solver
+
+from phyblock.task import Split, Tasks, tasks
+
+_REPLIES = "replies"
+_ROLES = {
+    "system": model.ChatMessageSystem,
+    "user": model.ChatMessageUser,
+    "assistant": model.ChatMessageAssistant,
+}
+
+
+@metric
+def by_part() -> Metric:
+    """Means by level or subtask and of all, with standard errors clustered by base scene."""
+    error = stderr(cluster="base_scene")
+    found = (
+        grouped(mean(), "part"),
+        grouped(error, "part", all_label="all stderr", name_template="{group_name} stderr"),
+    )
+    return lambda scores: {name: v for one in found for name, v in one(scores).items()}
+
+
+@task
+def full_planning(**options: Any) -> InspectTask:
+    """Plans: a whole plan in one reply."""
+    return _task("full_planning", **options)
+
+
+@task
+def step_planning(**options: Any) -> InspectTask:
+    """Episodes: one block a reply, in the simulator."""
+    return _task("step_planning", **options)
+
+
+@task
+def pose_planning(**options: Any) -> InspectTask:
+    """Plans that say where every block goes, carried out by physics."""
+    return _task("pose_planning", **options)
+
+
+@task
+def vqa(**options: Any) -> InspectTask:
+    """Questions with four options on physical understanding."""
+    return _task("vqa", **options)
+
+
+def _task(
+    track: str,
+    split: Split = "test",
+    levels: Sequence[int] | None = None,
+    seed: int = 0,
+    data: str | None = None,
+    items: int | None = None,
+    overrides: Sequence[str] = (),
+) -> InspectTask:
+    """Return the task of a track; `items` is the limit of `phyblock.tasks`, for levels in turn."""
+    asked = tasks(track, *overrides, split=split, levels=levels, seed=seed, data=data, limit=items)
+    sampling = asked.suite.sampling
+    samples = [
+        Sample(
+            input=one.id,
+            id=one.key,
+            metadata={"part": one.part, "scene": one.item.scene.id, "base_scene": one.base_scene},
+        )
+        for one in asked
+    ]
+    return InspectTask(
+        dataset=MemoryDataset(samples, name=asked.name),
+        solver=ask(asked),
+        scorer=worth(asked),
+        config=model.GenerateConfig(
+            temperature=sampling.temperature, top_p=sampling.top_p, max_tokens=sampling.max_tokens
+        ),
+    )
+
+
+def _chat(messages: Sequence[dict[str, Any]]) -> list[model.ChatMessage]:
+    """Return messages in OpenAI's form as Inspect has them."""
+
+    def content(parts: Any) -> Any:
+        if isinstance(parts, str):
+            return parts
+        return [
+            model.ContentText(text=part["text"])
+            if part["type"] == "text"
+            else model.ContentImage(image=part["image_url"]["url"])
+            for part in parts
+        ]
+
+    return [_ROLES[one["role"]](content=content(one["content"])) for one in messages]
+
+
+@solver
+def ask(asked: Tasks) -> Solver:
+    """Ask as a run does; play episodes to their end."""
+
+    async def solve(state: TaskState, generate: Generate) -> TaskState:
+        one = asked[str(state.sample_id)]
+        if not one.plays:
+            state.messages = _chat(await asyncio.to_thread(one.messages))
+            return await generate(state)
+        replies: list[str] = []
+        episode = await asyncio.to_thread(one.episode)
+        while not episode.done:
+            state.messages = _chat(episode.messages)
+            state = await generate(state)
+            replies.append(state.output.completion)
+            await asyncio.to_thread(episode.step, replies[-1])
+        state.store.set(_REPLIES, replies)
+        return state
+
+    return solve
+
+
+@scorer(metrics={"*": [by_part()]})
+def worth(asked: Tasks) -> Scorer:
+    """Score by the track's own judgement; 1 in `success` says that all is right."""
+
+    async def score(state: TaskState, target: Target) -> Score:
+        del target
+        one = asked[str(state.sample_id)]
+        reply = state.store.get(_REPLIES) if one.plays else state.output.completion
+        found = await asyncio.to_thread(one.score, reply)
+        return Score(
+            value={found.measure: found.value, "success": float(found.success)},
+            answer=found.record.said,
+            explanation=found.problem,
+            metadata=found.as_json(),
+        )
+
+    return score

@@ -1,0 +1,123 @@
+"""A taskset for verifiers: `vf-eval phyblock --env.taskset.track full_planning`.
+
+Plans, plans with poses and questions are asked once; episodes are conversations, in which the
+world answers as the user. Rewards are made of the trace alone, so that it can be scored again.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+from collections.abc import Iterator
+from typing import Any, Literal
+
+import verifiers.v1 as vf
+from verifiers.v1.types import content_text
+
+from phyblock.task import Score, Split, Task, tasks
+
+__all__ = ["VerifiersEnv", "VerifiersTaskset"]
+
+
+class VerifiersConfig(vf.TasksetConfig):
+    """Arguments of `phyblock.tasks`; without a limit, `train` and `dev` have no end."""
+
+    track: Literal["full_planning", "step_planning", "pose_planning", "vqa"] = "full_planning"
+    split: Split = "train"
+    levels: tuple[int, ...] | None = None
+    seed: int = 0
+    data: str | None = None
+    limit: int | None = None
+    overrides: tuple[str, ...] = ()
+
+    def read(self, first: int = 0) -> Iterator[Task]:
+        """Yield the tasks from a place on; in a stream, none before it is made."""
+        kept = {"split", "levels", "seed", "data", "limit"}
+        found = tasks(self.track, *self.overrides, **self.model_dump(include=kept), first=first)
+        return iter(found) if found.is_endless else itertools.islice(found, first, None)
+
+
+class VerifiersData(vf.TaskData):
+    """A task by its place in what the configuration gives."""
+
+    place: int
+    source: VerifiersConfig
+
+
+class VerifiersTask(vf.Task[VerifiersData, vf.State, vf.TaskConfig]):
+    """A task, and the worth of what was said."""
+
+    asked: Task | None = None
+
+    def found(self) -> Task:
+        """Return the task of phyblock; of a trace that was stored, made anew."""
+        if self.asked is None:
+            self.asked = next(self.data.source.read(self.data.place))
+        return self.asked
+
+    def worth(self, trace: vf.Trace) -> Score:
+        """Return the score of the replies in a trace."""
+        asked = self.found()
+        replies = [content_text(one.content) for one in trace.assistant_messages]
+        return asked.score(replies if asked.plays else replies[-1] if replies else None)
+
+    @vf.reward
+    async def value(self, trace: vf.Trace) -> float:
+        """The headline measure of the track."""
+        return (await asyncio.to_thread(self.worth, trace)).value
+
+    @vf.metric
+    async def success(self, trace: vf.Trace) -> float:
+        """1 if all is right."""
+        return float((await asyncio.to_thread(self.worth, trace)).success)
+
+
+class VerifiersTaskset(vf.Taskset[VerifiersTask, VerifiersConfig]):
+    """The tasks of a track."""
+
+    def __init__(self, config: VerifiersConfig) -> None:
+        super().__init__(config)
+        self.INFINITE = config.split != "test" and config.limit is None
+
+    def load(self) -> Iterator[VerifiersTask]:
+        """Yield tasks, each made when it is asked for."""
+        for place, one in enumerate(self.config.read()):
+            system, *messages = one.messages()
+            data = VerifiersData(
+                name=one.id,
+                id=one.key,
+                prompt=messages,
+                system_prompt=system["content"],
+                place=place,
+                source=self.config,
+            )
+            made = VerifiersTask(data, self.config.task)
+            made.asked = one
+            yield made
+
+
+class VerifiersEnvConfig(vf.EnvConfig):
+    """One model, without tools."""
+
+    agent: vf.AgentConfig = vf.AgentConfig(harness={"id": "null"})
+
+
+class VerifiersEnv(vf.Env[VerifiersEnvConfig]):
+    """Asks once, or plays the world of an episode."""
+
+    async def run(self, task: VerifiersTask, agents: Any) -> None:
+        """Run a task to its end."""
+        asked = task.found()
+        if not asked.plays:
+            await agents.agent.run(task)
+            return
+        episode = await asyncio.to_thread(asked.episode)
+        async with agents.agent.interaction(task) as interaction:
+            segment = await interaction.turn()
+            while not segment.terminated:
+                turn = await asyncio.to_thread(episode.step, segment.last_reply)
+                if turn.done:
+                    break
+                segment = await interaction.turn(
+                    [one for one in turn.messages if one["role"] == "user"]
+                )

@@ -1,0 +1,140 @@
+"""Every integration gives a reply the score that the scorer of plans gives it, to the last bit.
+
+A framework that is not installed is skipped; docs/integrations.md says how each is installed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import phyblock
+from phyblock.parsing.plan import parse_plan
+from phyblock.scoring.plan import AssemblyScorer
+from tests.official_replies import reply_texts
+
+Scores = dict[tuple[str, str], float]
+OVERRIDES = ("parser=official", "scoring.matchers=[paper]", "images.size_px=128")
+
+
+@pytest.fixture(scope="module")
+def known(official_checkout: Path) -> phyblock.Tasks:
+    return phyblock.tasks("full_planning", *OVERRIDES, data=official_checkout)
+
+
+@pytest.fixture(scope="module")
+def expected(official_checkout: Path, known: phyblock.Tasks) -> Scores:
+    """F1 of every recorded reply, by the scorer alone."""
+    scorers: dict[str, AssemblyScorer] = {}
+    found: Scores = {}
+    for (model, key), text in reply_texts(official_checkout).items():
+        item: Any = known[key].item
+        scorer = scorers.setdefault(key, AssemblyScorer(item.scene, item.candidates, ("A",)))
+        plan = parse_plan(text, len(item.candidates), "official").plan
+        (score,) = scorer.score(plan, ("paper",), None)
+        found[model, key] = score.counts.f1 or 0.0
+    assert len(found) == 3190
+    return found
+
+
+def check(checkout: Path, expected: Scores, score: Callable[[str, str], float]) -> None:
+    replies = reply_texts(checkout)
+    assert {name: score(name[1], text) for name, text in replies.items()} == expected
+
+
+def test_tasks(official_checkout: Path, known: phyblock.Tasks, expected: Scores) -> None:
+    check(official_checkout, expected, lambda key, text: known[key].score(text).value)
+
+
+def test_inspect(official_checkout: Path, known: phyblock.Tasks, expected: Scores) -> None:
+    pytest.importorskip("inspect_ai", reason="inspect_ai is not installed")
+    from inspect_ai.model import ModelName, ModelOutput
+    from inspect_ai.scorer import Target
+    from inspect_ai.solver import TaskState
+
+    from phyblock.integrations.inspect_ai import worth
+
+    scorer = worth(known)
+
+    def score(key: str, text: str) -> float:
+        output = ModelOutput.from_content("recorded", text)
+        state = TaskState(ModelName("none/recorded"), key, 0, key, [], output=output)
+        found = asyncio.run(scorer(state, Target("")))
+        assert found is not None
+        return float(found.value["f1"])
+
+    check(official_checkout, expected, score)
+
+
+def test_verifiers(official_checkout: Path, expected: Scores) -> None:
+    pytest.importorskip("verifiers", reason="verifiers is not installed")
+    import verifiers.v1 as vf
+    from verifiers.v1.graph import MessageNode
+
+    from phyblock.integrations.verifiers import VerifiersConfig, VerifiersTaskset
+
+    config = VerifiersConfig(
+        split="test", data=str(official_checkout), overrides=OVERRIDES, limit=None
+    )
+    by_key = {task.data.id: task for task in VerifiersTaskset(config)}
+
+    def score(key: str, text: str) -> float:
+        said = MessageNode(message=vf.AssistantMessage(content=text), sampled=True)
+        trace = vf.Trace.model_construct(nodes=[said])
+        return asyncio.run(by_key[key].value(trace))
+
+    check(official_checkout, expected, score)
+    assert VerifiersTaskset(VerifiersConfig(limit=None)).INFINITE
+    stored = type(by_key["000"])(by_key["000"].data)
+    assert stored.found().key == "000"
+
+
+def test_openenv(official_checkout: Path, known: phyblock.Tasks, expected: Scores) -> None:
+    pytest.importorskip("openenv", reason="openenv is not installed")
+    from phyblock.integrations.openenv import PhyBlockEnvironment, Reply
+
+    environment = PhyBlockEnvironment(known)
+
+    def score(key: str, text: str) -> float:
+        assert environment.reset(key=key).messages
+        return float(environment.step(Reply(text=text)).reward or 0.0)
+
+    check(official_checkout, expected, score)
+    with pytest.raises(RuntimeError, match="reset"):
+        environment.step(Reply(text=""))
+
+
+def test_trl(official_checkout: Path, known: phyblock.Tasks, expected: Scores) -> None:
+    pytest.importorskip("datasets", reason="datasets is not installed")
+    from phyblock.integrations.trl import dataset, reward
+
+    worth = reward(known)
+
+    def score(key: str, text: str) -> float:
+        (found,) = worth(completions=[[{"role": "assistant", "content": text}]], key=[key])
+        return found
+
+    check(official_checkout, expected, score)
+    rows = dataset(phyblock.tasks("full_planning", "images.size_px=128", limit=2))
+    assert [part["type"] for part in rows[0]["prompt"][1]["content"]] == ["image", "text"]
+    assert rows[0]["images"][0].size == (264, 128)
+    with pytest.raises(ValueError, match="cannot be rows"):
+        dataset(phyblock.tasks("step_planning", limit=2))
+
+
+def test_lmms_eval(tmp_path: Path) -> None:
+    from phyblock.integrations import files
+
+    written = files.write_lmms_eval(tmp_path, 4)
+    assert {one.name for one in written} >= {"vqa.yaml", "vqa.jsonl", "utils.py"}
+    for task in phyblock.tasks("vqa", limit=4):
+        row = {"track": "vqa", "key": task.key}
+        assert str(row).replace("'", '"') in (tmp_path / "vqa.jsonl").read_text("utf-8")
+        for reply in ("Answer: A", "Answer: B", f"Answer: {files.doc_to_target(row)}"):
+            assert files.process_results(row, [reply])["value"] == task.score(reply).value
+        assert len(files.doc_to_visual(row)) == len(task.pictures)
+        assert files.doc_to_text(row)
