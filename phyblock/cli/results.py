@@ -68,11 +68,11 @@ def report(
         console.print("No model of the run has a row in the paper's tables.")
     for name, table in tables.items():
         if form == "text":
-            print_table(console, table.view)
+            print_table(console, table)
         elif form == "md":
-            click.echo(to_markdown(table.view))
+            click.echo(to_markdown(table))
         else:
-            click.echo(to_latex(table.view, f"phyblock-{name}"))
+            click.echo(to_latex(table, f"phyblock-{name}"))
 
 
 def _check_names(run: Path, names: Sequence[str], known: Iterable[str], noun: str) -> None:
@@ -157,7 +157,7 @@ def compare(
     else:
         comparison = compare_runs(first, load_run(other), models, track, measure)
     console = make_console()
-    print_table(console, compare_view(comparison).view)
+    print_table(console, compare_view(comparison))
     if len(comparison.ranks) > 2:
         print_table(console, ranks_view(comparison))
     if comparison.table[["a", "b"]].drop_duplicates().shape[0] == 1:

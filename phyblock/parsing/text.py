@@ -128,11 +128,6 @@ class AnswerForm(Generic[MeaningT]):
         first = f'"{REASONING}": "...", ' if self.reasons else ""
         return f'{{{first}"{self.key}": {self.example_value}}}'
 
-    def write(self, value: Any, reasoning: str = "") -> str:
-        """Return the reply that gives a value in the form."""
-        first = {REASONING: reasoning} if self.reasons else {}
-        return json.dumps({**first, self.key: value}, ensure_ascii=False)
-
     def read(self, answer: str) -> MeaningT | None:
         """Return the answer of the last JSON object that holds one, wherever it stands, or None."""
         starts = [brace.start() for brace in re.finditer(r"\{", answer)]

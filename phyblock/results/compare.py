@@ -29,7 +29,6 @@ from phyblock.results.text import (
     NO_VALUE,
     Column,
     Row,
-    Table,
     TextTable,
     intervals,
     level_name,
@@ -473,7 +472,7 @@ def ranks(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:
     )
 
 
-def compare_view(found: Comparison) -> Table:
+def compare_view(found: Comparison) -> TextTable:
     """Show a row a pair and part; the part is left out where there is but one."""
     group = in_unit(found.name, found.unit)
     columns = [texts("a", "A", once=True), texts("b", "B", once=True)]
@@ -492,7 +491,7 @@ def compare_view(found: Comparison) -> Table:
         wholes("same", "same", "Samples"),
     ]
     title = "Models compared on the same samples"
-    return Table.of(found.table, title, columns, _notes(found))
+    return TextTable.of(found.table, title, columns, _notes(found))
 
 
 def _notes(found: Comparison) -> Iterator[str]:
@@ -529,7 +528,7 @@ def ranks_view(found: Comparison) -> TextTable:
         Column("Rank", show=ranks),
     ]
     note = "All ranges hold at once with 95 % confidence, by the comparisons above."
-    return Table.of(found.ranks, "Ranks that each model may have", columns, [note]).view
+    return TextTable.of(found.ranks, "Ranks that each model may have", columns, [note])
 
 
 def p_text(p: float) -> str:
@@ -659,7 +658,7 @@ def factor_name(factor: str) -> str:
     return names.get(factor, factor.replace("_", " "))
 
 
-def sensitivity_table(run: Run) -> Table | None:
+def sensitivity_table(run: Run) -> TextTable | None:
     """Return standard deviations with intervals, a row a model and factor; None where none is."""
     table, tracks = sensitivity_frame(run), run.design.suite.tracks
     if table.empty:
@@ -678,7 +677,7 @@ def sensitivity_table(run: Run) -> Table | None:
         "score over levels, beyond the shift and noise; asked again: of one question repeated. One "
         "factor alone without repeats cannot be told from noise in single items."
     )
-    return Table.of(table, f"Effect of the presentation{run.design.of_suite}", columns, notes)
+    return TextTable.of(table, f"Effect of the presentation{run.design.of_suite}", columns, notes)
 
 
 def sizes_text(table: pd.DataFrame) -> str:

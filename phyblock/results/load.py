@@ -290,7 +290,8 @@ class Run:
         """Return the numbers of a table by its name; KeyError for one that the run has not."""
         from phyblock.results.tables import make_tables
 
-        return make_tables(self, [name])[name].frame
+        frame: pd.DataFrame = make_tables(self, [name])[name].frame
+        return frame
 
     def compare(
         self,

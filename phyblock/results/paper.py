@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 
 import numpy as np
@@ -12,7 +12,7 @@ import yaml
 
 from phyblock.results.estimates import headline_rows, pooled_in, track_estimates
 from phyblock.results.load import Run
-from phyblock.results.text import Table, number, texts, values
+from phyblock.results.text import TextTable, number, texts, values
 from phyblock.tracks.measures import CELL, OVERALL
 
 _FOLDER = files("phyblock.results") / "published"
@@ -122,7 +122,7 @@ def _ours(run: Run, table: int) -> pd.DataFrame:
     return rows
 
 
-def beside_paper(run: Run, table: int) -> Table | None:
+def beside_paper(run: Run, table: int) -> TextTable | None:
     """Return our numbers beside a table of the paper; None where it has no model of the run."""
     frame, paper = published_frame(run, table), _TABLES[table]
     if frame.empty:
@@ -150,4 +150,5 @@ def beside_paper(run: Run, table: int) -> Table | None:
         largest = number(compared.abs().max(), 3)
         notes.insert(0, f"Largest absolute difference of {len(compared)} cells: {largest}.")
     caption = f"Our numbers beside the paper's Table {table}{run.design.of_suite} (%)"
-    return Table(frame, Table.of(pd.DataFrame([*rows.values()]), caption, columns, notes).view)
+    made = TextTable.of(pd.DataFrame([*rows.values()]), caption, columns, notes)
+    return replace(made, frame=frame)

@@ -35,7 +35,6 @@ from phyblock.results.text import (
     TABLES,
     Column,
     Summary,
-    Table,
     TextTable,
     captioned,
     intervals,
@@ -73,7 +72,7 @@ def _layouts(run: Run, track: str) -> Mapping[str, Layout]:
     return {**own, f"{track}_measures": further}
 
 
-def filled(run: Run, track: str, layout: Layout) -> Table:
+def filled(run: Run, track: str, layout: Layout) -> TextTable:
     """Fill a layout with the estimates of a track in the headline setting and matcher."""
     measures, cells = {one.name: one for one in track_measures(track)}, run.cells(track)
     known: dict[tuple[str, ...], Mapping[Hashable, Any]] = {}
@@ -104,7 +103,9 @@ def filled(run: Run, track: str, layout: Layout) -> Table:
     fields += [one.column for one in shown]
     caption = captioned(f"{layout.caption}{run.design.of_suite}", run.presentation(track))
     notes = (*track_notes(run, track), *layout.notes, *_sample_notes(run, track))
-    return Table.of(pd.DataFrame(rows, columns=None if rows else ["model"]), caption, fields, notes)
+    return TextTable.of(
+        pd.DataFrame(rows, columns=None if rows else ["model"]), caption, fields, notes
+    )
 
 
 @dataclass(frozen=True)
@@ -240,20 +241,20 @@ def coverage_frame(run: Run) -> pd.DataFrame:
     return run.made[_MADE]
 
 
-def coverage_table(run: Run) -> Table:
+def coverage_table(run: Run) -> TextTable:
     """Return the outcomes of every model's samples."""
     table = coverage_frame(run)
     fields = [texts("model", "Model"), *track_name(run.design.suite.tracks)]
     for name in ("expected", "not_run", *OUTCOMES):
         fields.append(wholes(name, _HEADINGS.get(name, name.replace("_", " ").capitalize())))
     notes = ["The last line of records.jsonl was cut off and is ignored."] if run.is_cut else []
-    return Table.of(table[_COVERAGE], f"Coverage{run.design.of_suite}", fields, notes)
+    return TextTable.of(table[_COVERAGE], f"Coverage{run.design.of_suite}", fields, notes)
 
 
 _HEADINGS = {"ok": "OK", "parse_failure": "Unparsed", "api_error": "API error"}
 
 
-def cost_table(run: Run) -> Table:
+def cost_table(run: Run) -> TextTable:
     """Return tokens, dollars and seconds of every model."""
 
     def dollars(key: str, heading: str) -> Column:
@@ -276,7 +277,7 @@ def cost_table(run: Run) -> Table:
         if kind_of(name).plays
     ]
     title = f"Tokens, cost and latency{run.design.of_suite}"
-    return Table.of(coverage_frame(run)[_COST], title, fields, notes)
+    return TextTable.of(coverage_frame(run)[_COST], title, fields, notes)
 
 
 def _dollars(amount: float) -> str:
@@ -289,7 +290,7 @@ class TablesWritten:
 
     folder: Path
     files: tuple[Path, ...]
-    tables: Mapping[str, Table]
+    tables: Mapping[str, TextTable]
     run: Run = field(repr=False)
 
 
@@ -326,13 +327,13 @@ def table_names(run: Run) -> tuple[str, ...]:
             *_FURTHER)  # fmt: skip
 
 
-def make_tables(run: Run, names: Sequence[str] | None = None) -> dict[str, Table]:
+def make_tables(run: Run, names: Sequence[str] | None = None) -> dict[str, TextTable]:
     """Make the tables of these names that the run has values for; of None, those that it writes.
 
     A run writes the tables of its tracks, the effect of varied presentation, coverage if it is not
     complete, cost, and the paper's numbers if it counts as the paper does.
     """
-    wanted, made = set(table_names(run) if names is None else names), dict[str, Table | None]()
+    wanted, made = set(table_names(run) if names is None else names), dict[str, TextTable | None]()
     for track in run.design.suite.tracks if run.design.models else ():
         for name, layout in _layouts(run, track).items():
             if name in wanted:
@@ -356,7 +357,7 @@ def summary_of(run: Run) -> Summary:
     tables = [headline_table(run, track, coverage) for track in tracks]
     lacking = (coverage["ok"] < coverage["recorded"]).to_numpy()
     if lacking.any():
-        view = coverage_table(run).view
+        view = coverage_table(run)
         rows = tuple(row for row, is_short in zip(view.rows, lacking, strict=True) if is_short)
         cells = [{row[n] for row in rows} for n in range(len(view.columns))]
         none = [c.name for c, of in zip(view.columns, cells, strict=True) if of == {"0"}]
@@ -398,7 +399,7 @@ def headline_table(run: Run, track: str, coverage: pd.DataFrame) -> TextTable:
     if any(row["not_run"] for row in mine.values()):
         fields.append(Column("Samples", show=lambda row: str(row["samples"])))
     caption = captioned(f"{kind.title}{run.design.of_suite}{unit}", run.presentation(track))
-    return Table.of(pd.DataFrame(rows), caption, fields).view
+    return TextTable.of(pd.DataFrame(rows), caption, fields)
 
 
 def blind_sentence(run: Run, track: str) -> str:

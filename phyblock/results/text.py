@@ -8,7 +8,7 @@ import math
 import re
 from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -46,7 +46,8 @@ class Column:
 
 @dataclass(frozen=True)
 class TextTable:
-    """Cells as they are shown, row by row, with a caption and notes, each on one line.
+    """Cells as they are shown, row by row, with a caption and notes, each on one line; `frame` has
+    the numbers, where they are kept.
 
     Names that models and people gave stand in them: newlines and control characters become spaces.
     """
@@ -55,6 +56,7 @@ class TextTable:
     columns: tuple[Column, ...]
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
+    frame: Any = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         columns = (replace(c, name=one_line(c.name), group=one_line(c.group)) for c in self.columns)
@@ -62,6 +64,29 @@ class TextTable:
         object.__setattr__(self, "columns", tuple(columns))
         object.__setattr__(self, "rows", tuple(tuple(map(one_line, row)) for row in self.rows))
         object.__setattr__(self, "notes", tuple(map(one_line, self.notes)))
+
+    @classmethod
+    def of(
+        cls, frame: pd.DataFrame, caption: str, columns: Sequence[Column], notes: Iterable[str] = ()
+    ) -> TextTable:
+        """Return the table with a text for each row of the frame and column."""
+        rows, above = [], None
+        for row in frame.to_dict("records"):
+            texts = [column.show(row) for column in columns]
+            told = [text for text, column in zip(texts, columns, strict=True) if column.once]
+            if told == above:
+                texts = ["" if c.once else text for text, c in zip(texts, columns, strict=True)]
+            above = told
+            rows.append(tuple(texts))
+        return cls(caption, tuple(columns), tuple(rows), tuple(notes), frame)
+
+    def files(self, name: str, label: str, float_format: str = "%.6f") -> dict[str, str | bytes]:
+        """Return the table as CSV, Markdown and LaTeX, by name of the file."""
+        return {
+            f"{name}.csv": to_csv(self.frame, float_format),
+            f"{name}.md": to_markdown(self),
+            f"{name}.tex": to_latex(self, f"phyblock-{label}"),
+        }
 
     def plain(self) -> dict[str, Any]:
         """Return the table as plain values, as JSON holds it."""
@@ -87,37 +112,6 @@ class TextTable:
             columns=tuple(self.columns[place] for place in kept),
             rows=tuple(tuple(row[place] for place in kept) for row in self.rows),
         )
-
-
-@dataclass(frozen=True, eq=False)
-class Table:
-    """A table of a run: its numbers, and how people read it."""
-
-    frame: pd.DataFrame
-    view: TextTable
-
-    @classmethod
-    def of(
-        cls, frame: pd.DataFrame, caption: str, columns: Sequence[Column], notes: Iterable[str] = ()
-    ) -> Table:
-        """Return the table with a text for each row of the frame and column."""
-        rows, above = [], None
-        for row in frame.to_dict("records"):
-            texts = [column.show(row) for column in columns]
-            told = [text for text, column in zip(texts, columns, strict=True) if column.once]
-            if told == above:
-                texts = ["" if c.once else text for text, c in zip(texts, columns, strict=True)]
-            above = told
-            rows.append(tuple(texts))
-        return cls(frame, TextTable(caption, tuple(columns), tuple(rows), tuple(notes)))
-
-    def files(self, name: str, label: str, float_format: str = "%.6f") -> dict[str, str | bytes]:
-        """Return the table as CSV, Markdown and LaTeX, by name of the file."""
-        return {
-            f"{name}.csv": to_csv(self.frame, float_format),
-            f"{name}.md": to_markdown(self.view),
-            f"{name}.tex": to_latex(self.view, f"phyblock-{label}"),
-        }
 
 
 def texts(key: str, heading: str, *, once: bool = False) -> Column:

@@ -11,6 +11,7 @@ depend on where the plan was or how it was turned.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -162,7 +163,6 @@ _MOST_TRIED = 12
 _ROUNDS = 5
 _DIGITS = 6
 _PLACE_DIGITS = 3
-_TRACE_SLACK = 1e-4
 
 
 @dataclass(frozen=True)
@@ -185,14 +185,6 @@ class Poses:
     centers_cm: Floats
     rotations: Floats
 
-    def moved(self, motion: Motion) -> Poses:
-        """All places turned and then shifted together; each keeps its rotation."""
-        cosine, sine = np.cos(motion.turn_rad), np.sin(motion.turn_rad)
-        matrix = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-        centers = self.centers_cm @ matrix.T
-        centers[:, :2] += motion.shift_cm
-        return Poses(centers, self.rotations)
-
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
@@ -209,15 +201,25 @@ class Alignment:
 
     def moved(self, motion: Motion) -> tuple[Poses, Nearness]:
         """The steps after `motion`, and their nearness to the goal blocks."""
-        steps = self.steps if motion == Motion() else self.steps.moved(motion)
-        apart = steps.centers_cm[:, None] - self.goal.centers_cm[None]
+        centers = self.steps.centers_cm
+        if motion != Motion():
+            cosine, sine = np.cos(motion.turn_rad), np.sin(motion.turn_rad)
+            centers = centers @ np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0, 0, 1]])
+            centers[:, :2] += motion.shift_cm
+        apart = centers[:, None] - self.goal.centers_cm[None]
         distance = np.sqrt((apart**2).sum(axis=-1))
+        steps = Poses(centers, self.steps.rotations)
+        return steps, Nearness(distance, self._turn_deg, self.equal)
+
+    @functools.cached_property
+    def _turn_deg(self) -> Floats:
+        """The least turn of each step from each goal block, which no motion changes."""
         turn = np.zeros(self.equal.shape)
         for step, rotations in enumerate(self.symmetries):
-            same = steps.rotations[step] @ rotations
+            same = self.steps.rotations[step] @ rotations
             traces = np.einsum("kij,gij->gk", same, self.goal.rotations)
             turn[step] = _angle_deg(traces.max(axis=1))
-        return steps, Nearness(distance, turn, self.equal)
+        return turn
 
     def likely_motions(self) -> list[tuple[int, Motion]]:
         """Motions, each with the number of tolerances its steps are within in any order.

@@ -28,7 +28,7 @@ from phyblock.records.record import Record, Reply, SentPrompt
 from phyblock.registry import added_measures, known_track, known_tracks
 from phyblock.sim.engine import REFERENCE_ENGINE, engine_version, physics_engine
 from phyblock.stable import hex_digest
-from phyblock.tracks.items import Item, Presentation, ShownTask, select_tasks
+from phyblock.tracks.items import Item, ShownTask, presented, select_tasks
 from phyblock.tracks.measures import SampleCounts, TrackReport, read_report
 from phyblock.tracks.picking import Picking
 from phyblock.tracks.pictures import Drawing, Workshop, scene_drawings
@@ -287,9 +287,8 @@ class SceneTrack(Track):
         """Select scenes evenly over levels."""
         suite = self.suite
         self.items = select_tasks(self.dataset.tasks, suite.levels, self.limit)
-        is_blind = isinstance(self.spec, PictureControls) and self.spec.blind
-        self.presentation = Presentation(suite.candidates.order, is_blind)
-        if not self.presentation.is_plain:
+        self.is_blind = isinstance(self.spec, PictureControls) and self.spec.blind
+        if self.is_blind or suite.candidates.order != "file":
             self.drawn_seeds = suite.seeds
         if self.draws and self.shop is not None and suite.images.source == "dataset":
             where, message = suite.where("images", "source"), f"{self.name} draws its own pictures"
@@ -302,7 +301,7 @@ class SceneTrack(Track):
 
     def shown(self, item: AssemblyTask, seed: int) -> AssemblyTask:
         """Return the scene as a seed shows it."""
-        return self.presentation.of(item, seed)
+        return presented(item, seed, self.suite.candidates.order, is_blind=self.is_blind)
 
     def about(self, item: AssemblyTask) -> dict[str, Any]:
         """Return how the scene is shown, where not as the file has it."""
@@ -317,7 +316,7 @@ class SceneTrack(Track):
             "pictures": [picture.label for picture in pictures],
             "n_candidates": len(item.candidates),
             "candidate_scale": None if images.source == "dataset" else images.candidate_scale,
-            "is_blind": self.presentation.blind,
+            "is_blind": self.is_blind,
             **form_facts(self.form(item)),
         }
 

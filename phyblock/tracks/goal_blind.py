@@ -19,7 +19,7 @@ from phyblock.data import AssemblyTask
 from phyblock.domain import Candidate, CandidateSet, Plan, Scene
 from phyblock.domain.scene import Kind
 from phyblock.scoring.plan import Goal, most_placed
-from phyblock.tracks.items import Presentation, ShownTask
+from phyblock.tracks.items import ShownTask, presented
 from phyblock.types import CandidateOrder, Setting
 
 Floats = NDArray[np.float64]
@@ -224,6 +224,6 @@ def blind_guesses(
 def _learned(
     pool: tuple[AssemblyTask, ...], order: CandidateOrder, seed: int, setting: Setting
 ) -> dict[str, Plan]:
-    shown = [Presentation(order).of(one, seed) for one in pool]
+    shown = [presented(one, seed, order) for one in pool]
     candidates = {one.key: one.candidates for one in shown}
     return goal_blind_plans([one.scene for one in shown], candidates, setting)

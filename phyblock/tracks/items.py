@@ -105,26 +105,14 @@ class ShownTask(AssemblyTask):
         return f"{self.key} {self.order}"
 
 
-@dataclass(frozen=True)
-class Presentation:
-    """Conditions of scenes: without their goal where `blind`."""
-
-    order: CandidateOrder = "file"
-    blind: bool = False
-
-    @property
-    def is_plain(self) -> bool:
-        """True if scenes are shown as the file has them."""
-        return self.order == "file" and not self.blind
-
-    def of(self, task: AssemblyTask, seed: int) -> AssemblyTask:
-        """Return the task as a seed shows it; itself where that is as the file has it."""
-        if self.is_plain:
-            return task
-        numbers = tuple(range(1, len(task.candidates) + 1))
-        if self.order == "shuffled":
-            numbers = shown_order(task, seed)
-        return in_order(task, numbers, seed, is_blind=self.blind)
+def presented(
+    task: AssemblyTask, seed: int, order: CandidateOrder, *, is_blind: bool = False
+) -> AssemblyTask:
+    """Return the task as a seed shows it; itself where that is as the file has it."""
+    if order == "shuffled":
+        return in_order(task, shown_order(task, seed), seed, is_blind=is_blind)
+    numbers = range(1, len(task.candidates) + 1)
+    return in_order(task, numbers, seed, is_blind=True) if is_blind else task
 
 
 def shown_order(task: AssemblyTask, seed: int) -> tuple[int, ...]:

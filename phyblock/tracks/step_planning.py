@@ -22,7 +22,7 @@ from phyblock.records.record import AskedTurn, Course, Line, Record, Reply, Sent
 from phyblock.scoring.plan import ERROR_TYPES
 from phyblock.scoring.steps import Assembly, MoveOutcome, attempted_counts, placed_counts
 from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, settle
-from phyblock.sim.engine import REFERENCE_ENGINE, described_engine
+from phyblock.sim.engine import described_engine
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.pictures import goal_style
 from phyblock.sim.question_pictures import question_key, question_png, state_picture
@@ -122,8 +122,7 @@ class EpisodeRecord(Record):
     setting: str = ""
     """The setting under which a move succeeds."""
     engine: str | None = None
-    """The physics engine, with its version; null where nothing was simulated, and in records from
-    before there was a choice (PyBullet)."""
+    """The physics engine, with its version; null where nothing was simulated."""
     ending: Ending = "unanswered"
     """The ending."""
     outcomes: tuple[StepOutcome, ...] = ()
@@ -347,10 +346,8 @@ def _film(record: EpisodeRecord, task: AssemblyTask | None) -> Iterator[FilmStep
     by = ""
     if record.ending == "collapsed" and task is not None:
         blocks = settle(blocks).blocks
-        # Older records say no engine, and no version of it.
-        engine, now = record.engine or REFERENCE_ENGINE, described_engine()
-        if engine not in (now, now.partition(" ")[0]):
-            by = f" (falls in {now}, not {engine})"
+        if record.engine != (now := described_engine()):
+            by = f" (falls in {now}, not {record.engine})"
     placed = record.progress[-1] if record.progress else 0
     how = f"{placed} of {counted(record.n_blocks, 'block')} placed; ended: "
     tone = "good" if record.ending == "completed" else "bad"

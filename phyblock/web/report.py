@@ -130,5 +130,5 @@ def _about(written: TablesWritten) -> dict[str, Any]:
         "about": f"The whole suite: {about}" if manifest.limit and about else about,
         "facts": [(name, text) for name, text in facts.items() if text],
         "cautions": cautions(run),
-        "tables": [table.view.plain() for table in written.tables.values()],
+        "tables": [table.plain() for table in written.tables.values()],
     }

@@ -106,6 +106,6 @@ def test_text_before_the_asked_line_changes_nothing(text: str, letter: str, form
 def test_the_json_form_is_read_as_it_is_written(order: list[str]) -> None:
     for value, is_ordering in ((order, True), (order[0], False)):
         form = choice_form(TEXTS, is_ordering)
-        text = form.write(value, "It is {A}.")
+        text = json.dumps({"reasoning": "It is {A}.", form.key: value})
         assert json.loads(text)["answer"] == value
         assert parse_answer(text, TEXTS, is_ordering).letters == "".join(value)

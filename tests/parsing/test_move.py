@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.parsing.move import move_form, parse_move
+from phyblock.parsing.move import parse_move
 
 REPLIES: list[tuple[str, str]] = [
     ("Move(3)", "3 line"),
@@ -61,6 +63,8 @@ def test_what_stands_before_the_asked_form_changes_nothing(
     number: int, text: str, is_json: bool
 ) -> None:
     asked = (
-        move_form(16).write(f"Move({number})", text) if is_json else f"Next plan: Move({number})"
+        json.dumps({"reasoning": text, "operation": f"Move({number})"})
+        if is_json
+        else f"Next plan: Move({number})"
     )
     assert parse_move(f"{text}\n{asked}").move == number

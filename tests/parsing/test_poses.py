@@ -101,5 +101,5 @@ def test_every_plan_of_the_asked_forms_is_read_as_it_is_written(
     items = [
         {"block": one.candidate, **dict(zip("xyz", one.center_cm, strict=True))} for one in plan
     ]
-    text = pose_form(16).write(items) if is_json else "\n".join(lines)
+    text = json.dumps({"reasoning": "", pose_form(16).key: items}) if is_json else "\n".join(lines)
     assert parse_poses(text, 16).steps == tuple(plan)

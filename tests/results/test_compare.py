@@ -226,7 +226,7 @@ def test_the_figure_and_the_table_show_the_same_components() -> None:
             assert drawn == pytest.approx({m: table.loc[(factor, m), part] for m in models})
     shown = sensitivity_table(run)
     assert shown is not None
-    for row in shown.view.rows:
+    for row in shown.rows:
         if row[1] in VARY:
             wanted = table.loc[(row[1], row[0])]
             assert (row[2], row[4]) == (number(wanted["shift"]), number(wanted["single"]))
@@ -239,4 +239,4 @@ def test_a_model_that_was_barely_asked_changes_nothing_of_others() -> None:
     assert set(table.loc[table["model"] == "barely", "n_items"]) == {2}
     shown = sensitivity_table(run)
     assert shown is not None
-    assert any("2 to 12 items" in note for note in shown.view.notes)
+    assert any("2 to 12 items" in note for note in shown.notes)

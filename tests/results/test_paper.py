@@ -34,8 +34,8 @@ def test_each_published_model_has_15_cells() -> None:
     assert by_cell.loc["3", "n"].tolist() == [0, 0, 0]
     beside = beside_paper(run, 1)
     assert beside is not None
-    assert len(beside.view.rows) == 3
-    assert beside.view.notes[0] == "Largest absolute difference of 6 cells: 25.200."
+    assert len(beside.rows) == 3
+    assert beside.notes[0] == "Largest absolute difference of 6 cells: 25.200."
 
 
 def test_setting_a_is_compared_whatever_the_headline() -> None:

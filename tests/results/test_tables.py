@@ -45,9 +45,9 @@ def shown_numbers(run: Run, track: str) -> int:
     for table in make_tables(run, list(kind_of(track).report().tables)).values():
         if "model" not in table.frame or "expected" in table.frame or "replies" in table.frame:
             continue
-        assert len(table.frame) == len(table.view.rows)
+        assert len(table.frame) == len(table.rows)
         numbers = table.frame.drop(columns=["part"], errors="ignore").set_index("model")
-        texts = " ".join(text for row in table.view.rows for text in row)
+        texts = " ".join(text for row in table.rows for text in row)
         for model, row in numbers.iterrows():
             for value in row.dropna():
                 assert round(float(value), 6) in known[str(model)]
@@ -93,7 +93,7 @@ def test_replies_that_are_missing_and_seeds_that_were_refused_stand_under_tables
     ]
     for missing, how in (("count", "counted as wrong"), ("skip", "left out")):
         run = run_of(records, manifest(missing=missing))
-        notes = make_tables(run, ["table1"])["table1"].view.notes
+        notes = make_tables(run, ["table1"])["table1"].notes
         assert f"Without a reply, {how}: alpha 1 API errors and 1 missing replies." in notes
         assert "alpha: seed unsupported, seeds are independent repeats." in notes
         assert "Values pool the samples of 2 seeds." in notes
@@ -126,7 +126,7 @@ def test_an_unknown_cost_is_never_shown_as_zero() -> None:
         record("dear", cost_usd=1234.5),
         record("cached", cost_usd=0.25, cached=True, attempts=0),
     ]
-    view = make_tables(run_of(records, facts), ["cost"])["cost"].view
+    view = make_tables(run_of(records, facts), ["cost"])["cost"]
     places = [n for n, column in enumerate(view.columns) if column.group == "Cost (USD)"]
     assert {row[0]: tuple(row[n] for n in places) for row in view.rows} == {
         "unknown": (NO_VALUE, NO_VALUE),

@@ -13,7 +13,7 @@ import yaml
 from phyblock.data import AssemblyTask, read_builtin
 from phyblock.scoring.plan import f1_of
 from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png
-from phyblock.tracks.items import Presentation, shown_order
+from phyblock.tracks.items import presented, shown_order
 from tests.servers.chassis import Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Raw, Workspace
@@ -65,8 +65,8 @@ def overall_f1(workspace: Workspace) -> dict[str, float]:
 
 
 def test_a_model_that_looks_is_right_in_every_order(workspace: Workspace) -> None:
-    tasks, showing = tasks_of(workspace), Presentation("shuffled")
-    shown = [showing.of(task, seed) for task in tasks.values() for seed in SEEDS]
+    tasks = tasks_of(workspace)
+    shown = [presented(task, seed, "shuffled") for task in tasks.values() for seed in SEEDS]
     answers = {
         (digest(goal_png(one.scene, STYLE)), digest(candidates_png(one.candidates, STYLE))): (
             plan_of(one)

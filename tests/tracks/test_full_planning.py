@@ -16,7 +16,7 @@ from phyblock.data import AssemblyTask
 from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.tracks.full_planning import pose_choices, pose_counts
 from phyblock.tracks.goal_blind import goal_blind_plans
-from phyblock.tracks.items import Presentation
+from phyblock.tracks.items import presented
 from tests.tracks.opened import track_of
 
 
@@ -80,7 +80,7 @@ def test_facts_hold_what_is_shown_alone(track: Any) -> None:
 def test_learned_plans_are_those_of_the_order_shown(tasks: tuple[AssemblyTask, ...]) -> None:
     track = track_of("full_planning", tasks, limit=2, candidates={"order": "shuffled"})
     for seed in (0, 7):
-        shown = [Presentation("shuffled").of(task, seed) for task in tasks]
+        shown = [presented(task, seed, "shuffled") for task in tasks]
         plans = goal_blind_plans(
             [one.scene for one in shown], {one.key: one.candidates for one in shown}, "A"
         )

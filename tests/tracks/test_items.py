@@ -14,9 +14,9 @@ from phyblock.data import AssemblyTask
 from phyblock.errors import DataError
 from phyblock.records.record import Reply
 from phyblock.tracks.items import (
-    Presentation,
     file_plan,
     in_order,
+    presented,
     shown_order,
     spread,
     stratified,
@@ -24,7 +24,6 @@ from phyblock.tracks.items import (
 from tests.tracks.opened import track_of
 
 SIZES = st.lists(st.integers(1, 200), min_size=1, max_size=4)
-SHUFFLED = Presentation("shuffled")
 seeds = st.integers(0, 2**31 - 1)
 plans = st.lists(st.integers(-1, 18), max_size=8)
 
@@ -60,7 +59,7 @@ def test_an_order_has_every_candidate_once_and_is_that_of_scene_and_seed(
     orders = [shown_order(task, seed) for task in tasks]
     for task, order in zip(tasks, orders, strict=True):
         assert sorted(order) == list(range(1, len(task.candidates) + 1))
-        shown = SHUFFLED.of(task, seed)
+        shown = presented(task, seed, "shuffled")
         assert [shown.candidates[n] for n in range(1, 17)] == [task.candidates[n] for n in order]
         about = _track("full_planning").about(shown)
         assert about == {"shown": {"order": list(order), "blind": False}}
@@ -84,7 +83,7 @@ def test_a_plan_is_worth_the_same_in_either_numbering(
         return "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(steps, 1))
 
     task, track = tasks[place], _track("full_planning")
-    shown = SHUFFLED.of(task, seed)
+    shown = presented(task, seed, "shuffled")
     here = track.judge(shown, text(plan)).fields
     in_file = here["parse"]["file_plan"]
     again = track.judge(task, text(in_file)).fields
@@ -117,7 +116,7 @@ def test_an_episode_goes_the_same_in_either_numbering(
             episode.take(Reply(text=f"Next plan: Move({step})"))
         return episode.judgement().fields
 
-    shown = SHUFFLED.of(tasks[place], seed)
+    shown = presented(tasks[place], seed, "shuffled")
     here = asyncio.run(play(shown, moves))
     there = asyncio.run(play(tasks[place], file_plan(shown, moves)))
     for name in ("scores", "outcomes", "ending", "progress"):
@@ -128,7 +127,7 @@ def test_an_episode_goes_the_same_in_either_numbering(
 def test_a_plain_presentation_changes_nothing(
     tasks: tuple[AssemblyTask, ...],
 ) -> None:
-    assert all(Presentation().of(task, 5) is task for task in tasks)
+    assert all(presented(task, 5, "file") is task for task in tasks)
     assert file_plan(tasks[0], [1, 2]) is None
     plain, blind = (
         track_of("full_planning", tasks, seeds=[0, 1], full_planning={"blind": is_blind})

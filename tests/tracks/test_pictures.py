@@ -17,7 +17,7 @@ from phyblock.data import AssemblyTask, read_official
 from phyblock.errors import DataError, StoreError
 from phyblock.models.request import Image
 from phyblock.sim.pictures import candidates_png
-from phyblock.tracks.items import Presentation
+from phyblock.tracks.items import presented
 from phyblock.tracks.pictures import Workshop, picture_style, scene_drawings
 from tests.fuzz.strategies import png_header
 
@@ -101,7 +101,7 @@ def test_pictures_follow_what_is_shown(
         return asyncio.run(shop.images(scene_drawings(task, images)))
 
     plain = sent(tasks[0])
-    blind = Presentation("shuffled", blind=True).of(tasks[0], 1)
+    blind = presented(tasks[0], 1, "shuffled", is_blind=True)
     (grid,) = sent(blind)
     assert grid.data == candidates_png(blind.candidates, style)
     assert shop.outlines(scene_drawings(blind, images)) == (grid,)
@@ -148,7 +148,7 @@ def test_pictures_of_the_data_set_can_leave_out_the_goal(
 ) -> None:
     pool = [one for one in read_official(official_checkout).tasks if one.composite is not None]
     task = pool[0]
-    blind = Presentation(blind=True).of(task, 0)
+    blind = presented(task, 0, "file", is_blind=True)
     separate = ImagesSpec(source="dataset", layout="separate")
 
     def sent(images: ImagesSpec, task: AssemblyTask) -> tuple[Image, ...]:

@@ -126,7 +126,7 @@ def test_an_episode_goes_the_same_way_in_json(operations: list[str]) -> None:
     text, asked = (made(form, **OPEN) for form in ("text", "json_schema"))
     form = asked.form(task)
     assert form is not None
-    told = [form.write(operation, "Move(2) comes later.") for operation in operations]
+    told = [json.dumps({"reasoning": "Move(2) comes later.", form.key: one}) for one in operations]
     (one, _), (other, requests) = (
         play(task, scripted(*operations), text),
         play(task, scripted(*told), asked),
