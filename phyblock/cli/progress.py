@@ -35,6 +35,8 @@ from phyblock.text import counted, one_line
 from phyblock.types import FAILURES
 
 _LINE_EVERY_S = 10.0
+_SHOWN_EVERY_S = 0.1
+"""Answers that come faster are shown together."""
 _SPEED_OVER_S = 600.0
 """Answers of so long decide how long the rest takes."""
 
@@ -89,6 +91,9 @@ class ProgressView:
         self._tallies: dict[str, Tally] = {}
         self._started_s = self._last_line_s = now()
         self._has_asked = False
+        # Rich looks at the environment whenever it is asked.
+        self._is_terminal = console.is_terminal
+        self._shown_s = -math.inf
         self._progress = Progress(
             TextColumn("{task.description}", markup=False),
             BarColumn(complete_style="cyan", finished_style="green"),
@@ -97,7 +102,7 @@ class ProgressView:
             TextColumn("{task.fields[facts]}", style="dim", markup=False),
             console=console,
             transient=True,
-            disable=not console.is_terminal,
+            disable=not self._is_terminal,
             speed_estimate_period=_SPEED_OVER_S,
             get_time=now,
         )
@@ -143,17 +148,18 @@ class ProgressView:
             self._print(f"{event.model} stopped: {event.reason}", style="red")
         elif isinstance(event, RunNotice | Stopping):
             self._print(event.text)
-        self.tick()
+        if not isinstance(event, SampleDone) or self._now() - self._shown_s >= _SHOWN_EVERY_S:
+            self.tick()
 
     def tick(self, *, asks: bool = False) -> None:
         """Print what is due; called several times a second. `asks`: calls are under way."""
-        now_s = self._now()
+        self._shown_s = now_s = self._now()
         self._has_asked |= asks
         preparing = "" if self._has_asked else self._preparing(now_s)
         for tally in self._tallies.values():
             self._progress.update(tally.task.id, facts=preparing or tally.facts)
         self._log_retries(now_s)
-        if not self._console.is_terminal and now_s - self._last_line_s >= _LINE_EVERY_S:
+        if not self._is_terminal and now_s - self._last_line_s >= _LINE_EVERY_S:
             self._last_line_s = now_s
             self._print(self._line(now_s))
 

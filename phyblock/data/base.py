@@ -130,6 +130,11 @@ def read_data(path: Path, allowed: str = "") -> bytes:
         raise DataError(Problem(str(path), message, allowed=allowed)) from error
 
 
+def read_set(path: Path) -> bytes:
+    """Return the bytes of the file of lines of a data set; DataError as `read_data`."""
+    return read_data(path, f"a folder with {path.name}, or the name of a bundled set")
+
+
 def report(faults: Iterable[Fault], where: str) -> None:
     """Raise DataError with these faults of what stands at a place, if there are any."""
     if problems := [
@@ -167,15 +172,18 @@ def read_each(
 
 
 def read_lines(
-    path: Path, noun: str, read: Callable[[bytes, str], _T], name: Callable[[_T], str]
+    path: Path,
+    content: bytes,
+    noun: str,
+    read: Callable[[bytes, str], _T],
+    name: Callable[[_T], str],
 ) -> list[_T]:
-    """Return what `read` makes of every line of a file and its place.
+    """Return what `read` makes of every line of the content of a file, and its place.
 
     Raises DataError with everything that is wrong: what `read` raises, a name that stands twice, a
     file of no `noun`.
     """
-    allowed = f"a folder with {path.name}, or the name of a bundled set"
-    data = read_data(path, allowed).removesuffix(b"\n")
+    data = content.removesuffix(b"\n")
     if b"\0" in data or not data:
         raise DataError(Problem(str(path), f"holds no {noun}s", allowed=f"one {noun} a line"))
     places = ((f"{path}:{n}", line) for n, line in enumerate(data.split(b"\n"), 1))

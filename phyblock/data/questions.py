@@ -14,7 +14,7 @@ from pydantic import Field, StrictInt, TypeAdapter
 
 from phyblock.config.validation import BackgroundName, Fault, ShapeName, SubtaskName, checked
 from phyblock.config.yaml import shown
-from phyblock.data.base import Dataset, QuestionSet, QuestionTask, read_lines, report
+from phyblock.data.base import Dataset, QuestionSet, QuestionTask, read_lines, read_set, report
 from phyblock.data.scenes import (
     MAX_BLOCKS,
     Angles,
@@ -316,7 +316,7 @@ def read_questions(folder: Path, scenes: Dataset) -> QuestionSet:
 
     path = folder / QUESTIONS_FILE
     try:
-        tasks = read_lines(path, "question", read, lambda task: task.key)
+        tasks = read_lines(path, read_set(path), "question", read, lambda task: task.key)
     except DataError as error:
         elsewhere = [one for one in error.problems if one.message == _NO_SCENE]
         if len(elsewhere) < max(_FEW, len(error.problems) / 2):

@@ -16,7 +16,7 @@ from pydantic import AfterValidator, AliasChoices, Field, StrictInt, TypeAdapter
 
 from phyblock.config.validation import Fault, OneOf, ShapeName, checked, form
 from phyblock.config.yaml import shown
-from phyblock.data.base import AssemblyTask, Dataset, read_lines, report
+from phyblock.data.base import AssemblyTask, Dataset, read_lines, read_set, report
 from phyblock.domain.blocks import Color
 from phyblock.domain.scene import (
     MAX_CANDIDATES,
@@ -263,11 +263,17 @@ def task_of(
 
 def read_builtin(folder: Path) -> Dataset:
     """Return all scenes of a data set folder; DataError with everything that is wrong in it."""
+    return _read_scenes(folder, read_set(folder / SCENES_FILE))
+
+
+@functools.lru_cache(2)
+def _read_scenes(folder: Path, content: bytes) -> Dataset:
+    """Return the scenes in a folder's file of this content, which a command reads several times."""
     adapter = TypeAdapter(StoredScene)
 
     def read(line: bytes, where: str) -> AssemblyTask:
         stored = decode(adapter, line, where, StoredScene)
         return task_of(stored.scene(), candidate_set(stored.candidates), where)
 
-    tasks = read_lines(folder / SCENES_FILE, "scene", read, lambda task: task.key)
+    tasks = read_lines(folder / SCENES_FILE, content, "scene", read, lambda task: task.key)
     return Dataset(folder.name, folder, tuple(sorted(tasks, key=lambda task: task.key)))

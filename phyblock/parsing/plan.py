@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Literal
 
 from phyblock.domain import Plan
@@ -25,6 +25,9 @@ from phyblock.parsing.text import (
     whole_number,
 )
 from phyblock.types import PlanParser
+
+_REPLIES_KEPT = 1024
+"""Rules, and models at several seeds, often give the same reply."""
 
 PlanProblem = Literal["empty", "thoughts_only", "no_plan"]
 
@@ -44,6 +47,7 @@ class ParsedPlan:
     truncated: bool = False
 
 
+@lru_cache(_REPLIES_KEPT)
 def parse_plan(text: str, n_candidates: int, parser: PlanParser = "steps") -> ParsedPlan:
     """Read the plan out of a reply to a question with candidates 1..n_candidates."""
     if parser == "official":

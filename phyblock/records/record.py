@@ -189,12 +189,12 @@ class Reply(Line):
         It is paid for: an absurd number in it is one that is not known, and characters that no
         file could hold become "?".
         """
-        fields = self.model_dump()
+        fields = dict(self)
         texts = {name: encodable(text) for name, text in fields.items() if isinstance(text, str)}
-        usage = fields["usage"].items()
-        counts = {name: _within(count, -LARGEST_WHOLE) for name, count in usage}
+        counts = {name: _within(count, -LARGEST_WHOLE) for name, count in self.usage}
         money = {name: _within(fields[name], 0) for name in ("cost_usd", "billed_usd")}
-        return self.model_validate({**fields, **texts, **money, "usage": counts})
+        usage = Usage.model_construct(**counts)
+        return self.model_construct(**{**fields, **texts, **money, "usage": usage})
 
     @property
     def limit_usd(self) -> float:

@@ -134,7 +134,8 @@ class Goal:
     `kinds` all blocks by type and color, `kind_of_look` the kind of each group that the setting
     takes for equal; `above[v]` v and all that depends on it, directly or not, `below[v]` v and all
     that it depends on. `unlocks[v]` are the vertices that directly depend on v: equal blocks that
-    unlock the same ones are interchangeable when both are ready.
+    unlock the same ones are interchangeable when both are ready. `ways[i]` holds, for each vertex
+    of `equal_to[i]`, the vertex, its mask, and the mask of it and what it directly depends on.
     """
 
     def __init__(self, scene: Scene, candidates: CandidateSet, setting: Setting) -> None:
@@ -162,10 +163,16 @@ class Goal:
         self.below = tuple(below)
         self.above = tuple(sum((below[w] >> v & 1) << w for w in range(n)) for v in range(n))
         self.unlocks = [tuple(w for w in range(n) if v in graph.depends_on[w]) for v in range(n)]
+        needs = [mask | 1 << v for v, mask in enumerate(graph.needed_masks)]
+        self.ways = {
+            index: [(v, 1 << v, needs[v]) for v in vertices]
+            for index, vertices in self.equal_to.items()
+        }
 
     def choices(self, index: int, placed: int) -> list[int]:
         """Ready goal vertices, in file order, that candidate `index` could be placed as."""
-        return [v for v in self.equal_to[index] if self.graph.is_ready(v, placed)]
+        free = ~placed
+        return [v for v, itself, needed in self.ways[index] if needed & free == itself]
 
     def distinct(self, vertices: Sequence[int]) -> list[int]:
         """The first of each group of vertices that unlock the same blocks."""
@@ -283,7 +290,11 @@ def most_placed(goal: Goal, plan: Plan) -> int:
     """
     frontier = {0}
     for index in plan.steps:
-        if goal.equal[index]:
+        ways = goal.ways[index]
+        if len(ways) == 1:
+            ((_, itself, needed),) = ways
+            frontier = {p | itself if needed & ~p == itself else p for p in frontier}
+        elif ways:
             reached: set[int] = set()
             for placed in frontier:
                 choices = goal.distinct(goal.choices(index, placed))

@@ -9,6 +9,7 @@ import functools
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain, product
 from typing import Any
 
@@ -94,14 +95,10 @@ def goal_blind_plans(
     kin = related(scenes)
     goals = [Goal(scene, candidates[scene.id], setting) for scene in scenes]
     offered = [units(candidates[scene.id], setting) for scene in scenes]
-    heights = [of.tolist() for of in _heights(scenes, offered, goals, kin)]
-    ways = []
-    for key in keys:
-        likely = [of.tolist() for of in chances(offered, goals, kin, key)]
-        # By height; or all once by height, then all a second time.
-        for way in product(_THRESHOLDS, (False, True), {False, repeats}):
-            both = zip(offered, likely, heights, strict=True)
-            ways.append([_plan(*of_scene, *way) for of_scene in both])
+    heights = _heights(scenes, offered, goals, kin)
+    likely = zip(*(chances(offered, goals, kin, key) for key in keys), strict=True)
+    plans_of = map(partial(_plans, repeats=repeats), offered, likely, heights)
+    ways = list(zip(*plans_of, strict=True))
 
     @functools.cache
     def score(place: int, plan: Plan) -> tuple[int, int]:
@@ -183,23 +180,30 @@ def _left_out(
         yield rest[rows[place]], rest.sum(axis=0)
 
 
-def _plan(
-    offered: Sequence[Unit],
-    likely: Sequence[Sequence[float]],
-    heights: Sequence[float],
-    least: float,
-    in_rounds: bool,
-    again: bool,
-) -> Plan:
-    """Return the candidates of units that are likely enough, or of the likeliest, by height."""
-    wanted = min(least, max(row[0] for row in likely))
-    named = [
-        (*((copy, height) if in_rounds else (height, copy)), unit.numbers[copy % len(unit.numbers)])
-        for unit, row, height in zip(offered, likely, heights, strict=True)
-        for copy, chance in enumerate(row)
-        if chance >= wanted and ((again and least > 0) or copy < len(unit.numbers))
-    ]
-    return Plan(tuple(number for *_, number in sorted(named)))
+def _plans(
+    offered: Sequence[Unit], by_key: Sequence[Floats], heights: Floats, *, repeats: bool
+) -> list[Plan]:
+    """Return the plans of every way: the candidates of units that are likely enough, or of the
+    likeliest, by height; or all of them once by height, then all a second time.
+    """
+    copies = by_key[0].shape[1]
+    own = np.array([len(unit.numbers) for unit in offered])
+    unit, copy = (of.ravel() for of in np.indices((len(offered), copies)))
+    number = np.array([one.numbers[n % len(one.numbers)] for one in offered
+                       for n in range(copies)])  # fmt: skip
+    height, is_first = heights[unit], copy < own[unit]
+    orders = (np.lexsort((number, copy, height)), np.lexsort((number, height, copy)))
+    plans = []
+    for likely in by_key:
+        least = np.minimum(_THRESHOLDS, likely[:, 0].max())
+        any_copy = likely.ravel() >= least[:, None]
+        first = any_copy & is_first
+        # Where every unit is likely enough, none is named again.
+        any_copy[0] = first[0]
+        sorted_by = [(number[by], any_copy[:, by], first[:, by]) for by in orders]
+        for n, (numbers, *named), again in product(range(len(least)), sorted_by, {False, repeats}):
+            plans.append(Plan(tuple(numbers[named[not again][n]].tolist())))
+    return plans
 
 
 def blind_guesses(
