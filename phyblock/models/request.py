@@ -22,6 +22,8 @@ from phyblock.records.record import Call, Reply
 from phyblock.stable import hex_digest
 from phyblock.types import ImageDetail, Role
 
+_MARK = secrets.token_hex(16)
+"""Stands for a picture in a body until it is put in: no text holds it, as nobody knows it."""
 _MAGIC = (
     (b"\x89PNG\r\n\x1a\n", "image/png"),
     (b"\xff\xd8\xff", "image/jpeg"),
@@ -153,11 +155,10 @@ def json_body(
 
     def placeholder(image: Image) -> str:
         pictures.append(data_uri(image).encode())
-        return mark
+        return _MARK
 
-    mark = secrets.token_hex(16)
     body = {**fields, "messages": wire_messages(messages, detail, placeholder)}
-    first, *others = json.dumps(body, allow_nan=False).encode().split(mark.encode())
+    first, *others = json.dumps(body, allow_nan=False).encode().split(_MARK.encode())
     return b"".join((first, *itertools.chain(*zip(pictures, others, strict=True))))
 
 
