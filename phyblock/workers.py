@@ -79,6 +79,8 @@ class _Worker:
             stdin=subprocess.DEVNULL,
             pass_fds=(theirs.fileno(),),
             start_new_session=True,
+            # Threads of BLAS in every process would wait for one another on small matrices.
+            env={"OPENBLAS_NUM_THREADS": "1", **os.environ},
         )
         theirs.close()
 

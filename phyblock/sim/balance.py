@@ -35,6 +35,9 @@ from phyblock.sim import certificate
 from phyblock.sim.certificate import Body, Contact, Falls, Stands, Structure
 from phyblock.sim.contact import (
     CONTACT_TOLERANCE_M,
+    Turned,
+    at,
+    beside,
     bounds_m,
     boxes_near,
     contact_corners_m,
@@ -65,8 +68,9 @@ _PROOF = 1e4  # A residual is a proof for forces that add up to so many times al
 _UP = np.array([0.0, 0.0, 1.0])
 _STEEP = 0.9
 _SAME_GAP_M, _NEARLY_SAME_M = 1e-4, 1e-3
-_EXACT, _SPARE = 1e-11, 1e-7
-_KEPT = 2048
+_EXACT, _SPARE, _RIDGE = 1e-11, 1e-7, 1e-9
+_ROUNDS = 6
+_KEPT = 1 << 15
 
 
 def surely_stands(blocks: Sequence[Block]) -> bool:
@@ -176,13 +180,21 @@ def _pushes(forces: Floats, weights: Floats) -> Floats | None:
     """How much of each force, (k, m), balances weights (6 n, m); None where some are not borne."""
     from scipy.optimize import nnls  # type: ignore[import-untyped]
 
-    # The least sum of squares is often one without a pull, and found for all weights at once.
-    some = forces @ forces.T
-    pushes = forces.T @ np.linalg.lstsq(some, weights, rcond=1e-13)[0]
-    pushes += forces.T @ np.linalg.lstsq(some, weights - forces @ pushes, rcond=1e-13)[0]
-    is_borne = (pushes.min(axis=0) >= 0) & (np.abs(weights - forces @ pushes).max(axis=0) < _EXACT)
+    pushes, is_borne = _least_squares(forces, weights)
     for number in np.flatnonzero(~is_borne):
-        weight = weights[:, number]
+        weight, used = weights[:, number], np.ones(forces.shape[1], dtype=bool)
+        # Without what would have to pull, others may push enough.
+        for _ in range(_ROUNDS):
+            used &= pushes[:, number] > 0
+            some, is_found = _least_squares(forces[:, used], weight[:, None])
+            pushes[:, number] = 0.0
+            pushes[used, number] = some[:, 0]
+            if is_found[0]:
+                break
+        else:
+            is_found = is_borne[number : number + 1]
+        if is_found[0]:
+            continue
         try:
             pushes[:, number], _ = nnls(forces, weight)
         except RuntimeError:  # It found no end, which says nothing of whether there is a balance.
@@ -199,6 +211,21 @@ def _pushes(forces: Floats, weights: Floats) -> Floats | None:
             return None
         pushes[:, number] = solution.x[: forces.shape[1]]
     return pushes
+
+
+def _least_squares(forces: Floats, weights: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """The least sum of squares of pushes (k, m) and pulls that bears weights, and True for each
+    that it does bear, without a pull.
+    """
+    from scipy.linalg import cho_factor, cho_solve  # type: ignore[import-untyped]
+
+    square = forces @ forces.T
+    factor = cho_factor(square + _RIDGE * np.eye(len(square)), check_finite=False)
+    pushes = np.zeros((forces.shape[1], weights.shape[1]))
+    for _ in range(3):
+        pushes += forces.T @ cho_solve(factor, weights - forces @ pushes, check_finite=False)
+    left = np.abs(weights - forces @ pushes).max(axis=0)
+    return pushes, (pushes.min(axis=0, initial=0.0) >= 0) & (left < _EXACT)
 
 
 def _least_imbalance(blocks: Sequence[Block], forces: Floats) -> Any:
@@ -316,7 +343,11 @@ def _contacts(blocks: Sequence[Block], margin_m: float = 0.0) -> _Contacts:
         for corners in _on_floor(b)
     ]
     for (below, one), (above, other) in combinations(enumerate(blocks), 2):
-        found += [(below, above, *place) for place in _between(one, other, margin_m)]
+        if boxes_near(bounds_m(one), bounds_m(other), CONTACT_TOLERANCE_M):
+            found += [
+                (below, above, corners + one.position_m, normal)
+                for corners, normal in _between(*beside(one, other), margin_m)
+            ]
     axes = []
     for *_, corners, normal in found:
         helper = _UP if abs(normal[2]) < _STEEP else np.array([1.0, 0.0, 0.0])
@@ -387,12 +418,14 @@ def _on_floor(block: Block) -> tuple[Floats, ...]:
 
 
 @functools.lru_cache(maxsize=_KEPT)
-def _between(one: Block, other: Block, margin_m: float) -> tuple[tuple[Floats, Floats], ...]:
-    """Corners and normal of each contact of two blocks, the normal from the first on."""
-    if not boxes_near(bounds_m(one), bounds_m(other), CONTACT_TOLERANCE_M):
-        return ()
+def _between(
+    one: Turned, other: Turned, way_m: tuple[float, float, float], margin_m: float
+) -> tuple[tuple[Floats, Floats], ...]:
+    """Corners and normal of each contact of two blocks, from the first one's place, the normal
+    from it on.
+    """
     met, is_wide = [], margin_m < 0
-    for first, second, axes in piece_pairs(one, other):
+    for first, second, axes in piece_pairs(at(one), at(other, way_m)):
         if not -2 * CONTACT_TOLERANCE_M <= axes.gap_m <= CONTACT_TOLERANCE_M:
             continue
         near_m = _NEARLY_SAME_M if is_wide else _SAME_GAP_M

@@ -117,10 +117,11 @@ def _bears(
         left.append([0, 0, -weight * ONE, -y * weight, x * weight, 0])
     for contact, force in zip(contacts, forces, strict=True):
         push = _dot(force, contact.normal)
-        aside = sum(_dot(force, side) ** 2 for side in contact.sides)
+        aside = _dot(force, contact.sides[0]) ** 2 + _dot(force, contact.sides[1]) ** 2
         if push < 0 or 100**2 * aside > LITTLE**2 * push**2:
             return False
-        wrench = (*(ONE * part for part in force), *_cross(contact.place, force))
+        x, y, z = force
+        wrench = (ONE * x, ONE * y, ONE * z, *_cross(contact.place, force))
         for number, sign in ((contact.above, 100), (contact.below, -100)):
             if number != GROUND:
                 left[number] = [a + sign * b for a, b in zip(left[number], wrench, strict=True)]

@@ -126,7 +126,7 @@ def find_overlaps(
     """Pairs of blocks that share space deeper than `tolerance_m` [m]; blocks in the ground too."""
     found = [Overlap(GROUND, block.order, -float(bounds_m(block)[0, 2])) for block in blocks]
     for first, second in _near_pairs(blocks, 0.0):
-        depth_m = -min(axes.gap_m for _, _, axes in piece_pairs(first, second))
+        depth_m = -min(axes.gap_m for axes in pair_axes(first, second))
         found.append(Overlap(first.order, second.order, depth_m))
     return tuple(one for one in found if one.depth_m > tolerance_m)
 
@@ -146,7 +146,7 @@ def drop_height_m(block: Block, others: Sequence[Block]) -> float:
         reach[0, 2] -= clearance
         if not boxes_near(bounds_m(other), reach, 0.0):
             continue
-        for _, _, axes in piece_pairs(other, block):
+        for axes in pair_axes(other, block):
             fall = drop_m(axes)
             # The block starts clear of the other, or overlaps it.
             if fall is not None and fall < clearance and (fall >= 0 or axes.gap_m < 0):
@@ -166,8 +166,7 @@ def support_graph(blocks: Sequence[Block]) -> dict[int, frozenset[int]]:
             rests_on[block.order].add(GROUND)
     on_rims: dict[int, set[int]] = {block.order: set() for block in blocks}
     for first, second in _near_pairs(blocks, CONTACT_TOLERANCE_M):
-        for one, other, axes in piece_pairs(first, second):
-            rise, is_rim = _contact_rise(one, other, axes)
+        for rise, is_rim in _rises(*beside(first, second)):
             carried = on_rims if is_rim else rests_on
             if rise > 0:
                 carried[second.order].add(first.order)
@@ -180,6 +179,47 @@ def _near_pairs(blocks: Sequence[Block], reach_m: float) -> Iterator[tuple[Block
     """Pairs whose boxes come within `reach_m` of one another."""
     pairs = combinations(blocks, 2)
     return ((a, b) for a, b in pairs if boxes_near(bounds_m(a), bounds_m(b), reach_m))
+
+
+_KEPT_PAIRS = 1 << 16
+Turned = tuple[BlockType, Euler]
+"""A block by its type and angles, wherever it is."""
+
+
+def beside(first: Block, second: Block) -> tuple[Turned, Turned, tuple[float, float, float]]:
+    """Return all that two blocks are to one another: each as it is turned, and the way between."""
+    (a, b, c), (x, y, z) = first.position_m, second.position_m
+    way = (round(x - a, 10) + 0.0, round(y - b, 10) + 0.0, round(z - c, 10) + 0.0)
+    return (first.type, first.euler_deg), (second.type, second.euler_deg), way
+
+
+def at(turned: Turned, place_m: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Block:
+    """A block that is turned so at a place, by default the origin."""
+    return Block(1, turned[0], "red", place_m, turned[1], (), 1)
+
+
+def pair_axes(first: Block, second: Block) -> tuple[Axes, ...]:
+    """What can separate each pair of pieces of two blocks."""
+    turned, other, _ = beside(first, second)
+    way_m = np.subtract(second.position_m, first.position_m)
+    return tuple(
+        Axes(axes.directions, axes.gaps_m + axes.directions @ way_m)
+        for axes in _axes_at_one_place(turned, other)
+    )
+
+
+@functools.lru_cache(maxsize=_KEPT)
+def _axes_at_one_place(first: Turned, second: Turned) -> tuple[Axes, ...]:
+    return tuple(axes for _, _, axes in piece_pairs(at(first), at(second)))
+
+
+@functools.lru_cache(maxsize=_KEPT_PAIRS)
+def _rises(
+    first: Turned, second: Turned, way_m: tuple[float, float, float]
+) -> tuple[tuple[float, bool], ...]:
+    """Rise of the contact of each pair of pieces that touch, and True where it is a rim's."""
+    found = (_contact_rise(*pair) for pair in piece_pairs(at(first), at(second, way_m)))
+    return tuple(one for one in found if one[0])
 
 
 def piece_pairs(first: Block, second: Block) -> Iterator[tuple[ConvexPiece, ConvexPiece, Axes]]:
