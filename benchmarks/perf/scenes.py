@@ -20,7 +20,7 @@ from itertools import chain, islice
 import numpy as np
 
 from phyblock.data import read_builtin
-from phyblock.domain import Block
+from phyblock.domain import Block, Scene
 from phyblock.files import bundled
 from phyblock.making.scenes.production import split_tasks
 from phyblock.sim.balance import prove
@@ -58,6 +58,18 @@ def let_down(
     return [*others, replace(above, position_m=(x, y, 1.0 - drop_height_m(above, others)))]
 
 
+def drawn(seed: int, spent: Counter[str]) -> Iterator[Scene]:
+    """Scenes of the endless split; counts them, and the time that they take."""
+    tasks = split_tasks("train", seed)
+    next(tasks)  # Imports, and reads the built-in set.
+    while True:
+        start = time.process_time()
+        scene = next(tasks).scene
+        spent["making"] += time.process_time() - start
+        spent["scenes"] += 1
+        yield scene
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--states", type=int, default=1000)
@@ -66,13 +78,14 @@ def main() -> int:
     rng = np.random.default_rng(options.seed)
     data = read_builtin(bundled("benchmarks", "data", "phyblock-400")).tasks
     known = [data[int(i)].scene for i in rng.permutation(len(data))]
-    made = (task.scene for task in split_tasks("train", options.seed))
-    scenes = chain.from_iterable(zip(known, made, strict=False))
+    spent: Counter[str] = Counter()
+    made = drawn(options.seed, spent)
+    scenes = chain.from_iterable(zip(made, known, strict=False))
     found = islice(
         chain.from_iterable(states(scene.blocks, rng) for scene in scenes), options.states
     )
     counts: Counter[tuple[str, bool | None]] = Counter()
-    quarrels, spent = 0, Counter[str]()
+    quarrels = 0
     with ExitStack() as stack:
         sites = {}
         for name in installed_engines():
@@ -100,6 +113,8 @@ def main() -> int:
         print(f"{kind:15}{sum(of):6} groups: {of[0]} stand, {of[1]} fall, {of[2]} undecided")
     undecided = sum(count for (_, verdict), count in counts.items() if verdict is None)
     print(f"undecided: {undecided / total:.1%} of {total}; quarrels with an engine: {quarrels}")
+    made_count, made_s = spent.pop("scenes"), spent.pop("making")
+    print(f"{made_count:.0f} scenes made, {made_count / made_s:.2f} a CPU second, pictures checked")
     for name, seconds in spent.items():
         ratio = seconds / spent["statics"]
         print(f"{name:10}{total / seconds:8.1f} groups a CPU second, {ratio:.1f} times the statics")
