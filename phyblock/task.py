@@ -31,7 +31,6 @@ from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.production import Production, builtin_forms, shares, split_tasks
 from phyblock.making.scenes.sketch import PALETTES, Palette
 from phyblock.making.workers import open_workers
-from phyblock.models.request import Image as SentPicture
 from phyblock.models.request import Request, wire_messages
 from phyblock.records.record import Record, Reply
 from phyblock.registry import added_measures, known_track, known_tracks
@@ -206,7 +205,7 @@ class Task:
     @property
     def pictures(self) -> dict[str, Image.Image]:
         """The pictures by their labels, in the order sent."""
-        return pictures_of(self.request())
+        return {one.label: Image.open(io.BytesIO(one.data)) for one in self.request().images}
 
     @property
     def answer_schema(self) -> Mapping[str, Any] | None:
@@ -250,16 +249,6 @@ class Task:
         return f"<task {self.id}: level {self.level}>"
 
 
-def pictures_of(request: Request) -> dict[str, Image.Image]:
-    """Return the pictures of a request by their labels, in the order sent."""
-    parts = (part for message in request.messages for part in message.parts)
-    return {
-        part.label: Image.open(io.BytesIO(part.data))
-        for part in parts
-        if isinstance(part, SentPicture)
-    }
-
-
 class Turn(NamedTuple):
     """A step of an episode: the next messages, what it added to the score, and how it went."""
 
@@ -273,6 +262,7 @@ class Episode:
     """A task of several turns, played by replies. One thread plays it.
 
     Rewards are differences of `Score.value`, so that they sum to that of the whole episode.
+    `request` is the one that waits for a reply, None at the end.
     """
 
     def __init__(self, task: Task, *, shows: bool = True) -> None:
@@ -290,26 +280,26 @@ class Episode:
         self._episode = self.task._start(shows=self._shows)
         self._replies: list[Reply] = []
         self._value = 0.0
-        self._request: Request | None = _result(self._episode.request())
+        self.request: Request | None = _result(self._episode.request())
         return self.messages
 
     @property
     def messages(self) -> list[dict[str, Any]]:
         """The messages of the turn that waits for a reply; none at the end."""
-        return [] if self._request is None else wire_messages(self._request.messages, None)
+        return [] if self.request is None else wire_messages(self.request.messages, None)
 
     @property
     def done(self) -> bool:
         """True if it has ended."""
-        return self._request is None
+        return self.request is None
 
     def step(self, reply: str) -> Turn:
         """Take a step with a reply; SpecError where the episode has ended."""
-        if self._request is None:
+        if self.request is None:
             raise SpecError(Problem(self.task.id, "has ended", hint="call reset() before step()"))
         self._replies.append(Reply(text=well_formed(reply)).storable())
         self._episode.take(self._replies[-1])
-        self._request = _result(self._episode.request())
+        self.request = _result(self._episode.request())
         score, before = self.score(), self._value
         self._value = score.value
         outcomes = getattr(score.record, "outcomes", None) or (score.outcome,)

@@ -11,15 +11,20 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
 import phyblock
+from phyblock.domain import PoseStep
 from phyblock.registry import track_baselines
+from phyblock.sim.geometry import box_height_cm
 from phyblock.stable import drawn_bytes
 from phyblock.tracks.full_planning import plan_text
+from phyblock.tracks.pose_planning import written
 
-Reply = Callable[[phyblock.Task], str]
+Reply = Callable[[Any], str]
+SIMULATED = ("pose_planning", "step_planning")
 
 
 def rule(name: str) -> Reply:
@@ -38,9 +43,9 @@ def hidden(name: str, after: str) -> Reply:
     return lambda task: f"<think>\n{rule(name)(task)}\n</think>\n{after}"
 
 
-def listed(*numbers: int, times: int = 1) -> Reply:
-    """Return a plan of these candidates, of all where none are named, several times over."""
-    return lambda task: plan_text((numbers or range(1, len(task.item.candidates) + 1)) * times)  # type: ignore[operator, attr-defined]
+def every(times: int = 1) -> Reply:
+    """Return a plan of all candidates, several times over."""
+    return lambda task: plan_text([*range(1, len(task.item.candidates) + 1)] * times)
 
 
 def both(first: Reply, second: Reply) -> Reply:
@@ -50,37 +55,34 @@ def both(first: Reply, second: Reply) -> Reply:
 
 def backwards(task: phyblock.Task) -> str:
     """Return all candidates, the last first."""
-    return plan_text(range(len(task.item.candidates), 0, -1))  # type: ignore[attr-defined]
+    return plan_text(range(len(task.item.candidates), 0, -1))
 
 
-def of_another(task: phyblock.Task) -> str:
-    """Return a structure that stands: that of a pile, moved away from where the goal is."""
-    return rule("stack")(task).replace("at (0, 0,", "at (3, 3,")
+def in_a_row(task: phyblock.Task) -> str:
+    """Return all candidates on the floor, 15 cm apart: each stands, whatever the goal is."""
+    places = enumerate(task.item.candidates.candidates, 1)
+    return written(PoseStep(n, (15.0 * (n - 8), 0.0, box_height_cm(one) / 2)) for n, one in places)
 
 
-ALL_TWICE = "all candidates, each twice"
 ATTACKS: dict[str, dict[str, Reply]] = {
     "full_planning": {
-        "all candidates": rule("all-candidates"),
-        ALL_TWICE: lambda task: plan_text([*range(1, len(task.item.candidates) + 1)] * 2),  # type: ignore[attr-defined]
-        "one step 40 times": listed(1, times=40),
-        "two orders in one reply": both(rule("all-candidates"), backwards),
-        "goal-blind, then all candidates": both(rule("goal-blind"), rule("all-candidates")),
+        "all candidates, each twice": every(2),
+        "one step 40 times": lambda _: plan_text([1] * 40),
+        "two orders in one reply": both(every(), backwards),
+        "goal-blind, then all candidates": both(rule("goal-blind"), every()),
         "right plan in the reasoning, none behind": hidden("oracle", "I am done."),
         "right plan in the reasoning, all behind": lambda t: hidden("oracle", backwards(t))(t),
     },
     "vqa": {
         "all letters": lambda _: "Answer: A, B, C, D",
         "each letter in a sentence": lambda _: "\n".join(f"Answer: {c}" for c in "ABCD"),
-        "always A": lambda _: "Answer: A",
         "right answer in the reasoning, none behind": hidden("oracle", "I cannot tell."),
         "right answer in the reasoning, D behind": hidden("oracle", "Answer: D"),
     },
     "pose_planning": {
-        "stands, and is wrong: all in one pile": rule("stack"),
-        "stands, and is wrong: a pile elsewhere": of_another,
-        "nothing stands or falls: no step": lambda _: "I place no block.",
+        "stands and is wrong: all in a row": in_a_row,
         "right plan in the reasoning, none behind": hidden("oracle", "I am done."),
+        "right plan in the reasoning, a row behind": lambda t: hidden("oracle", in_a_row(t))(t),
     },
 }
 EPISODES: dict[str, Sequence[str]] = {
@@ -93,22 +95,28 @@ EPISODES: dict[str, Sequence[str]] = {
 
 def means(limit: int, physics_limit: int) -> Iterator[tuple[str, str, float, float, str]]:
     """Yield track, attack, mean reward, share of successes, and what it is."""
-    for track, attacks in ATTACKS.items():
-        found = phyblock.tasks(track, limit=physics_limit if track == "pose_planning" else limit)
-        known = track_baselines(type(found[0].track))
-        floors = [name for name in type(found[0].track).report().floors if name in known]
-        replies = {f"baseline {name}": rule(name) for name in floors if name != "text-only"}
-        for name, reply in {**replies, **attacks}.items():
-            scores = [task.score(reply(task)) for task in found]
+    for track, attacks in {**ATTACKS, "step_planning": EPISODES}.items():
+        found = phyblock.tasks(track, limit=physics_limit if track in SIMULATED else limit)
+        floors = [name for name in type(found[0].track).report().floors if name != "text-only"]
+        for name in (*floors, *attacks):
+            scores = [scored(task, attacks.get(name), name) for task in found]
             value, success = (
                 np.mean([getattr(s, a) for s in scores]) for a in ("value", "success")
             )
-            yield track, name, float(value), float(success), "floor" if name in replies else ""
-    found = phyblock.tasks("step_planning", limit=physics_limit)
-    for name, said in EPISODES.items():
-        scores = [task.score(said) for task in found]
-        value, success = (np.mean([getattr(s, a) for s in scores]) for a in ("value", "success"))
-        yield "step_planning", name, float(value), float(success), ""
+            what = "" if name in attacks else "floor"
+            yield track, name, float(value), float(success), what
+
+
+def scored(task: phyblock.Task, attack: Reply | Sequence[str] | None, name: str) -> phyblock.Score:
+    """Return the score of an attack, or of the baseline of this name."""
+    if attack is not None or not task.plays:
+        reply = attack or rule(name)
+        return task.score(reply(task) if callable(reply) else reply)
+    episode, answer = phyblock.Episode(task, shows=False), track_baselines(type(task.track))[name]
+    while (request := episode.request) is not None:
+        seed = int.from_bytes(drawn_bytes(f"{name}|{request.seed}|{request.key}"), "big")
+        episode.step(answer(request.subject, np.random.default_rng(seed)))
+    return episode.score()
 
 
 def main() -> None:

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
+from typing import cast
 
 import click
 
 from phyblock.cli.console import make_console, print_path
 from phyblock.cli.options import NAME_OR_PATH, UserPath
 
-_FORMS = {"a run": "csv, parquet, hf", "scenes": "hf", "questions": "hf, vlmevalkit",
-          "tasks": "lmms-eval"}  # fmt: skip
+_OF_RUN, _OF_SCENES, _OF_QUESTIONS = ("csv", "parquet", "hf"), ("hf",), ("hf", "vlmevalkit")
+_HELP = "Of a run: csv, parquet, hf; of scenes: hf; of questions: hf, vlmevalkit; else lmms-eval."
 
 
 @click.command()
 @click.argument("run", type=UserPath(), required=False)
-@click.option(
-    *("--to", "form"),
-    required=True,
-    metavar="FORMAT",
-    help="; ".join(f"of {what}: {forms}" for what, forms in _FORMS.items()) + ".",
-)
+@click.option("--to", "form", required=True, metavar="FORMAT", help=_HELP)
 @click.option(
     "--questions",
     is_flag=False,
@@ -59,23 +56,23 @@ def export(
     from phyblock.results.export import export_run
     from phyblock.results.load import load_run
 
-    what = "a run" if run else "scenes" if scenes else "questions" if questions else "tasks"
     if (run is not None) + scenes + (questions is not None) > 1:
         raise click.UsageError("Name the folder of a run, --scenes or --questions.")
-    if form not in _FORMS[what].split(", "):
-        message = f"{form!r} is not one of {_FORMS[what]}, the formats of {what}."
-        raise click.BadParameter(message, param_hint="--to")
+    if run is None and out is None:
+        raise click.UsageError("--out is missing: the folder to write.")
+    of_others = _OF_QUESTIONS if questions else ("lmms-eval",)
+    forms = _OF_RUN if run else _OF_SCENES if scenes else of_others
+    if form not in forms:
+        raise click.BadParameter(f"{form!r} is not one of {', '.join(forms)}.", param_hint="--to")
     if run is not None:
-        write = huggingface.write_records if form == "hf" else None
-        made = write(load_run(run), out) if write else export_run(load_run(run), form, out)
-    elif out is None:
-        raise click.UsageError(f"{what.capitalize()} need --out: the folder to write.")
+        write = huggingface.write_records if form == "hf" else partial(export_run, form=form)
+        made = write(load_run(run), folder=out)
     elif scenes:
-        made = huggingface.write_scenes(out, data, limit, size_px)
-    elif questions is None:
-        made = files.write_lmms_eval(out, limit)
-    else:
+        made = huggingface.write_scenes(cast(Path, out), data, limit, size_px)
+    elif questions is not None:
         write_set = huggingface.write_questions if form == "hf" else files.write_vlmevalkit
-        made = write_set(out, questions, data, limit, size_px)
+        made = write_set(cast(Path, out), questions, data, limit, size_px)
+    else:
+        made = files.write_lmms_eval(cast(Path, out), limit)
     for file in made:
         print_path(make_console(), file)

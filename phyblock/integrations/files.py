@@ -14,7 +14,7 @@ from PIL import Image
 
 from phyblock.domain import LETTERS, is_picture_option
 from phyblock.files import OutFolder, writing
-from phyblock.integrations.huggingface import pictures_of, question_tasks
+from phyblock.integrations.huggingface import question_tasks
 from phyblock.task import Task, Tasks, tasks
 
 TSV_FILES = MCQ_FILE, ORDERING_FILE = "PhyBlock_MCQ.tsv", "PhyBlock_Ordering.tsv"
@@ -27,7 +27,7 @@ test_split: test
 output_type: generate_until
 doc_to_visual: !function utils.doc_to_visual
 doc_to_text: !function utils.doc_to_text
-doc_to_target: !function utils.doc_to_target
+doc_to_target: key
 process_results: !function utils.process_results
 generation_kwargs: {{max_new_tokens: 4096, temperature: 0, do_sample: false}}
 metric_list:
@@ -35,12 +35,7 @@ metric_list:
 - {{metric: success, aggregation: mean, higher_is_better: true}}
 metadata: {{version: 1.0}}
 """
-_LMMS_UTILS = """from phyblock.integrations.files import (
-    doc_to_target,
-    doc_to_text,
-    doc_to_visual,
-    process_results,
-)
+_LMMS_UTILS = """from phyblock.integrations.files import doc_to_text, doc_to_visual, process_results
 """
 
 
@@ -69,7 +64,7 @@ def write_vlmevalkit(
 
 
 def _tsv_row(task: Task, question: Any) -> Sequence[str]:
-    images = pictures_of(task)
+    images = task.request().images
     labels = [image.label for image in images]
     coded = [base64.b64encode(image.data).decode() for image in images]
     names = [f"{question.id}-{label}.png" for label in labels]
@@ -116,15 +111,8 @@ def doc_to_visual(doc: Mapping[str, str]) -> list[Image.Image]:
 
 def doc_to_text(doc: Mapping[str, str], _: object = None) -> str:
     """Return the text of a row, behind its pictures: the prompt of a run."""
-    parts: list[str] = []
-    for message in _task(doc).request().messages:
-        parts += [part for part in message.parts if isinstance(part, str)]
-    return "\n\n".join(parts)
-
-
-def doc_to_target(doc: Mapping[str, str]) -> str:
-    """Return the right letters of a question; of others nothing, as several plans are right."""
-    return str(_task(doc).score(None).record.target)
+    parts = (part for message in _task(doc).request().messages for part in message.parts)
+    return "\n\n".join(part for part in parts if isinstance(part, str))
 
 
 def process_results(doc: Mapping[str, str], results: Sequence[str]) -> dict[str, float]:

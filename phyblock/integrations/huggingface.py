@@ -12,7 +12,6 @@ from typing import Any
 
 from phyblock.data.scenes import StoredScene
 from phyblock.files import OutFolder, needs, writing
-from phyblock.models.request import Image
 from phyblock.results.export import export_run
 from phyblock.results.load import Run
 from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png, goal_style
@@ -84,7 +83,7 @@ def write_questions(
 
     def row(task: Task) -> dict[str, Any]:
         item: Any = task.item
-        asked, images = item.question, pictures_of(task)
+        asked, images = item.question, task.request().images
         return {
             **{name: getattr(asked, name) for name in ("id", "subtask", "category", "wording")},
             "scene": asked.scene.id,
@@ -105,12 +104,6 @@ def question_tasks(questions: str, data: str, limit: int | None, size_px: int) -
     """Yield the questions of a bundled set or folder, with pictures of a size."""
     given = (f"vqa.path={json.dumps(questions)}", f"images.size_px={size_px}")
     yield from tasks("vqa", *given, data=data, limit=limit)
-
-
-def pictures_of(task: Task) -> list[Image]:
-    """Return the pictures of a task as they are sent."""
-    parts = (part for message in task.request().messages for part in message.parts)
-    return [part for part in parts if isinstance(part, Image)]
 
 
 def _write(

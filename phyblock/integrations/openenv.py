@@ -76,21 +76,16 @@ class PhyBlockEnvironment(Environment[Reply, Asked, State]):
         if self._task is None:
             raise RuntimeError("reset() begins a task")
         self._state.step_count += 1
+        told: dict[str, Any] = {"key": self._task.key}
         if self._episode is not None:
-            turn = self._episode.step(action.text)
-            score, reward, done = self._episode.score(), turn.reward, turn.done
+            turn, score = self._episode.step(action.text), self._episode.score()
+            told |= {"messages": turn.messages, "reward": turn.reward, "done": turn.done}
         else:
-            score, done = self._task.score(action.text), True
-            reward, turn = score.value, None
-        shown = Asked(
-            key=self._task.key,
-            messages=tuple(turn.messages) if turn else (),
-            score=score.as_json() if done else None,
-            reward=reward,
-            done=done,
-        )
-        self._task = None if done else self._task
-        return shown
+            score = self._task.score(action.text)
+            told |= {"reward": score.value, "done": True}
+        if told["done"]:
+            self._task, told["score"] = None, score.as_json()
+        return Asked(**told)
 
     @property
     def state(self) -> State:

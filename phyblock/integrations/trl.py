@@ -25,7 +25,7 @@ _FEATURES = {
 def dataset(tasks: Tasks) -> Dataset:
     """Return a finite set as rows: `prompt`, `images` in the order of its picture parts, `key`.
 
-    Raises ValueError for a stream and for episodes, which TRL's trainers do not take.
+    ValueError for a stream and for episodes, which TRL's trainers do not take.
     """
     if tasks.is_endless or any(task.plays for task in tasks):
         raise ValueError(f"{tasks!r} cannot be rows: a finite set of what is asked once can")

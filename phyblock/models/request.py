@@ -74,6 +74,12 @@ class Request:
     track: str = ""
     sample: str = ""
 
+    @property
+    def images(self) -> tuple[Image, ...]:
+        """The pictures in the order sent."""
+        parts = itertools.chain.from_iterable(message.parts for message in self.messages)
+        return tuple(part for part in parts if isinstance(part, Image))
+
 
 class Model(Protocol):
     """Anything that answers requests: a provider, a recording, a baseline."""

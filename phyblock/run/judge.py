@@ -13,7 +13,7 @@ from phyblock.errors import (
     SampleError,
     SimulationError,
 )
-from phyblock.models import Image, Request
+from phyblock.models import Request
 from phyblock.records.files import known_records
 from phyblock.records.record import (
     ErrorKind,
@@ -65,9 +65,7 @@ def about_prompt(request: Request, template: str, digest: str) -> SentPrompt:
         SentImage(
             label=part.label, sha256=part.sha256, width_px=part.width_px, height_px=part.height_px
         )
-        for message in request.messages
-        for part in message.parts
-        if isinstance(part, Image)
+        for part in request.images
     )
     version = request.prompt_version
     return SentPrompt(template=template, version=version, messages=digest, images=images)

@@ -6,6 +6,11 @@ A framework that is not installed is skipped; docs/integrations.md says how each
 from __future__ import annotations
 
 import asyncio
+import re
+import socket
+import subprocess
+import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,6 +24,14 @@ from tests.official_replies import reply_texts
 
 Scores = dict[tuple[str, str], float]
 OVERRIDES = ("parser=official", "scoring.matchers=[paper]", "images.size_px=128")
+
+
+def example(heading: str) -> str:
+    """Return the Python of a section of the page about integrations."""
+    page = (Path(__file__).parents[2] / "docs" / "integrations.md").read_text("utf-8")
+    found = re.search(rf"## {heading}\n.*?```python\n(.*?)```", page, re.DOTALL)
+    assert found is not None
+    return found[1]
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +83,22 @@ def test_inspect(official_checkout: Path, known: phyblock.Tasks, expected: Score
     check(official_checkout, expected, score)
 
 
+@pytest.mark.filterwarnings("ignore")  # Its streams are closed by the collector of garbage.
+def test_an_eval_of_inspect(tmp_path: Path) -> None:
+    inspect_ai = pytest.importorskip("inspect_ai", reason="inspect_ai is not installed")
+    from phyblock.integrations import inspect_ai as ours
+
+    for track in (ours.full_planning, ours.step_planning):
+        asked = track(items=4, overrides=("images.size_px=128",))
+        (log,) = inspect_ai.eval(asked, "mockllm/model", log_dir=str(tmp_path), display="none")
+        assert log.status == "success", log.error
+        found = {one.name: one.metrics for one in log.results.scores}
+        assert set(found) == {"f1", "success"}
+        assert {"all", "all stderr", "level 3", "level 3 stderr"} <= {
+            name.removeprefix("by_part_") for name in found["f1"]
+        }
+
+
 def test_verifiers(official_checkout: Path, expected: Scores) -> None:
     pytest.importorskip("verifiers", reason="verifiers is not installed")
     import verifiers.v1 as vf
@@ -108,6 +137,25 @@ def test_openenv(official_checkout: Path, known: phyblock.Tasks, expected: Score
         environment.step(Reply(text=""))
 
 
+def test_a_server_of_openenv(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("openenv", reason="openenv is not installed")
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    call = "-m uvicorn --factory phyblock.integrations.openenv:app --log-level error --port"
+    with subprocess.Popen([sys.executable, *call.split(), str(port)]) as server:
+        try:
+            for _ in range(600):
+                with socket.socket() as probe:
+                    if probe.connect_ex(("127.0.0.1", port)) == 0:
+                        break
+                time.sleep(0.1)
+            exec(example("OpenEnv").replace("localhost:8000", f"127.0.0.1:{port}"), {})
+        finally:
+            server.terminate()
+    assert "'measure': 'f1'" in capsys.readouterr().out
+
+
 def test_trl(official_checkout: Path, known: phyblock.Tasks, expected: Scores) -> None:
     pytest.importorskip("datasets", reason="datasets is not installed")
     from phyblock.integrations.trl import dataset, reward
@@ -119,6 +167,12 @@ def test_trl(official_checkout: Path, known: phyblock.Tasks, expected: Scores) -
         return found
 
     check(official_checkout, expected, score)
+    names: dict[str, Any] = {}
+    exec(example("TRL"), names)
+    first = names["tasks"][0]
+    assert names["worth"](["Step 1: Move block with index 1"], [first.key]) == [
+        first.score("Step 1: Move block with index 1").value
+    ]
     rows = dataset(phyblock.tasks("full_planning", "images.size_px=128", limit=2))
     assert [part["type"] for part in rows[0]["prompt"][1]["content"]] == ["image", "text"]
     assert rows[0]["images"][0].size == (264, 128)
@@ -134,7 +188,7 @@ def test_lmms_eval(tmp_path: Path) -> None:
     for task in phyblock.tasks("vqa", limit=4):
         row = {"track": "vqa", "key": task.key}
         assert str(row).replace("'", '"') in (tmp_path / "vqa.jsonl").read_text("utf-8")
-        for reply in ("Answer: A", "Answer: B", f"Answer: {files.doc_to_target(row)}"):
+        for reply in ("Answer: A", "Answer: B", "I do not know."):
             assert files.process_results(row, [reply])["value"] == task.score(reply).value
         assert len(files.doc_to_visual(row)) == len(task.pictures)
         assert files.doc_to_text(row)
