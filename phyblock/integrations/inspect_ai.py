@@ -13,7 +13,18 @@ from typing import Any
 from inspect_ai import Task as InspectTask
 from inspect_ai import model, task
 from inspect_ai.dataset import MemoryDataset, Sample
-from inspect_ai.scorer import Metric, Score, Scorer, Target, grouped, mean, metric, scorer, stderr
+from inspect_ai.scorer import (
+    Metric,
+    SampleScore,
+    Score,
+    Scorer,
+    Target,
+    grouped,
+    mean,
+    metric,
+    scorer,
+    stderr,
+)
 from inspect_ai.solver import Generate, Solver, TaskState, solver
 
 from phyblock.task import Split, Tasks, tasks
@@ -34,7 +45,11 @@ def by_part() -> Metric:
         grouped(mean(), "part"),
         grouped(error, "part", all_label="all stderr", name_template="{group_name} stderr"),
     )
-    return lambda scores: {name: v for one in found for name, v in one(scores).items()}
+
+    def both(scores: list[SampleScore]) -> Any:
+        return {name: value for one in found for name, value in one(scores).items()}
+
+    return both
 
 
 @task

@@ -6,6 +6,8 @@ A framework that is not installed is skipped; docs/integrations.md says how each
 from __future__ import annotations
 
 import asyncio
+import json
+import os
 import re
 import socket
 import subprocess
@@ -21,6 +23,8 @@ import phyblock
 from phyblock.parsing.plan import parse_plan
 from phyblock.scoring.plan import AssemblyScorer
 from tests.official_replies import reply_texts
+from tests.servers.chassis import Running
+from tests.servers.openai_chat import OpenAIChat
 
 Scores = dict[tuple[str, str], float]
 OVERRIDES = ("parser=official", "scoring.matchers=[paper]", "images.size_px=128")
@@ -83,20 +87,21 @@ def test_inspect(official_checkout: Path, known: phyblock.Tasks, expected: Score
     check(official_checkout, expected, score)
 
 
-@pytest.mark.filterwarnings("ignore")  # Its streams are closed by the collector of garbage.
-def test_an_eval_of_inspect(tmp_path: Path) -> None:
-    inspect_ai = pytest.importorskip("inspect_ai", reason="inspect_ai is not installed")
-    from phyblock.integrations import inspect_ai as ours
-
-    for track in (ours.full_planning, ours.step_planning):
-        asked = track(items=4, overrides=("images.size_px=128",))
-        (log,) = inspect_ai.eval(asked, "mockllm/model", log_dir=str(tmp_path), display="none")
-        assert log.status == "success", log.error
-        found = {one.name: one.metrics for one in log.results.scores}
-        assert set(found) == {"f1", "success"}
-        assert {"all", "all stderr", "level 3", "level 3 stderr"} <= {
-            name.removeprefix("by_part_") for name in found["f1"]
-        }
+@pytest.mark.parametrize("track", ["full_planning", "step_planning"])
+def test_an_eval_of_inspect(track: str, tmp_path: Path) -> None:
+    pytest.importorskip("inspect_ai", reason="inspect_ai is not installed")
+    with Running(OpenAIChat()) as running:
+        call = f"""-m inspect_ai eval phyblock/{track} -T items=4 -T overrides=[images.size_px=128]
+            --model openai/scripted --model-base-url {running.url}/v1 -M responses_api=false
+            --log-format json --log-dir {tmp_path}"""
+        env = {**os.environ, "OPENAI_API_KEY": "sk-nobody"}
+        subprocess.run([sys.executable, *call.split()], check=True, cwd=tmp_path, env=env)
+    (path,) = tmp_path.glob("*.json")
+    log = json.loads(path.read_text("utf-8"))
+    found = {one["name"]: one["metrics"] for one in log["results"]["scores"]}
+    assert set(found) == {"f1", "success"}
+    names = {name.partition("by_part_")[2] for name in found["f1"]}
+    assert {"all", "all stderr", "level 3", "level 3 stderr"} <= names
 
 
 def test_verifiers(official_checkout: Path, expected: Scores) -> None:
@@ -175,7 +180,7 @@ def test_trl(official_checkout: Path, known: phyblock.Tasks, expected: Scores) -
     ]
     rows = dataset(phyblock.tasks("full_planning", "images.size_px=128", limit=2))
     assert [part["type"] for part in rows[0]["prompt"][1]["content"]] == ["image", "text"]
-    assert rows[0]["images"][0].size == (264, 128)
+    assert rows[0]["images"][0].size == (258, 128)
     with pytest.raises(ValueError, match="cannot be rows"):
         dataset(phyblock.tasks("step_planning", limit=2))
 
