@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
 from click.testing import CliRunner, Result
 from PIL import Image
@@ -88,6 +89,29 @@ def test_a_set_holds_nothing_of_those_that_it_excludes(folder: Path, tmp_path: P
     assert (
         "of 3 scenes: 0 equal, 3 equal but for colors" in scenes("compare", folder, painted).stdout
     )
+
+
+def test_a_season_is_made_again_from_what_was_revealed_and_from_nothing_else(
+    tmp_path: Path,
+) -> None:
+    scenes("commit", "--out", tmp_path, "--", "--count", 2, "--levels", 2, *ALONE)
+    commitment, secret = tmp_path / "commitment.json", tmp_path / "secret.txt"
+    assert secret.read_text().strip() not in commitment.read_text()
+    words = ("reveal", commitment, secret, "--public")
+    made = []
+    for name, public in (("one", "beacon 7"), ("two", "beacon 7"), ("other", "beacon 8")):
+        *command, _ = scenes(*words, public).stdout.split()[2:]
+        scenes(*command, tmp_path / name)
+        made.append((tmp_path / name / "scenes.jsonl").read_bytes())
+    assert made[0] == made[1] != made[2]
+    with pytest.raises(click.UsageError, match="give all"):
+        scenes("commit", "--out", tmp_path / "bad", "--", "--levels", 7)
+    secret.write_text("guessed")
+    with pytest.raises(DataError, match="secret_sha256"):
+        scenes(*words, "beacon 7")
+    commitment.write_text(commitment.read_text().replace('"code_sha256": "', '"code_sha256": "x'))
+    with pytest.raises(DataError, match="code_sha256"):
+        scenes(*words, "beacon 7")
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 import shlex
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import cast
 
 import click
+from pydantic import TypeAdapter
 
 from phyblock.cli.console import make_console, print_rows, shown_path
 from phyblock.cli.options import NAME_OR_PATH, UserPath
@@ -22,10 +24,18 @@ from phyblock.data import (
     read_builtin,
     read_data_set,
 )
+from phyblock.data.base import read_data
 from phyblock.domain.scene import Scene
 from phyblock.domain.symmetry import fingerprint
 from phyblock.errors import DataError, Problem
-from phyblock.files import OutFolder, check_free, make_folder, write_named
+from phyblock.files import (
+    OutFolder,
+    atomic_write,
+    check_free,
+    make_folder,
+    write_named,
+    writing,
+)
 from phyblock.making.checks import (
     AUDITED,
     VERIFIED,
@@ -57,8 +67,11 @@ from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.completing import Completed, ReadScene, complete, palette_of, read_given
 from phyblock.making.scenes.production import Production, builtin_forms, shares
 from phyblock.making.scenes.sketch import PALETTES, Palette, colorless
+from phyblock.making.season import Commitment, code_digest, season_seed
 from phyblock.making.workers import open_workers
+from phyblock.records.record import decode
 from phyblock.sim.camera import VIEWS
+from phyblock.sim.engine import described_engine
 from phyblock.sim.film import assembly_gif
 from phyblock.sim.pictures import (
     PictureStyle,
@@ -67,6 +80,7 @@ from phyblock.sim.pictures import (
     goal_png,
     visible_shares,
 )
+from phyblock.stable import hex_digest
 from phyblock.text import counted, did_you_mean, some_of
 from phyblock.types import BACKGROUNDS
 
@@ -131,6 +145,47 @@ def generate(
     known = "the built-in set or an excluded one" if exclude else "the built-in set"
     click.echo(f"{counted(production.rejected, 'draft')} rejected: a scene of {known}")
     print_engine()
+
+
+@scenes.command("commit")
+@click.argument("arguments", nargs=-1, metavar="-- [ARGUMENT]...")
+@click.option("--out", "-o", type=UserPath(), required=True, metavar="DIR", help="Folder to write.")
+def commit(arguments: tuple[str, ...], out: Path) -> None:
+    """Commit to a set, by ARGUMENTS of generate, whose seed nobody can choose or know yet.
+
+    Writes DIR/secret.txt, to be kept, and DIR/commitment.json, to be published with a word on
+    which later public value counts: digests of the secret and of phyblock's code.
+    """
+    generate.make_context("generate", [*arguments, "--out", "."])
+    files = (out / "secret.txt", out / "commitment.json")
+    check_free(files, "give another --out")
+    secret = secrets.token_hex(32)
+    commitment = Commitment(
+        secret_sha256=hex_digest(secret),
+        code_sha256=code_digest(),
+        engine=described_engine(),
+        arguments=shlex.join(arguments),
+    )
+    make_folder(out)
+    with writing(out):
+        atomic_write(files[0], f"{secret}\n")
+        atomic_write(files[1], f"{commitment.as_json()}\n")
+    click.echo(f"publish {shown_path(files[1])}; keep {shown_path(files[0])}")
+
+
+@scenes.command("reveal")
+@click.argument("commitment", type=UserPath())
+@click.argument("secret", type=UserPath())
+@click.option("--public", required=True, metavar="VALUE", help="The public value that came later.")
+def reveal(commitment: Path, secret: Path, public: str) -> None:
+    """Print the command that makes the set of a COMMITMENT, once its SECRET is told.
+
+    Refuses another secret, other code, or another physics engine than was committed to.
+    """
+    meant = decode(TypeAdapter(Commitment), read_data(commitment), str(commitment), Commitment)
+    told = read_data(secret).decode("ascii", "replace").strip()
+    seed = season_seed(meant, told, public, str(commitment))
+    click.echo(f"phyblock scenes generate {meant.arguments} --seed {seed} --out DIR")
 
 
 @scenes.command("compare")

@@ -1,0 +1,56 @@
+"""Seasons: a set that nobody could choose or know before, and that anyone can make again.
+
+A maker publishes the digests of a secret and of the code, then waits for a value that nobody rules,
+such as a beacon's. The seed of the set is the digest of both.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+
+import phyblock
+from phyblock.errors import DataError, Problem
+from phyblock.records.record import Line
+from phyblock.sim.engine import described_engine
+from phyblock.stable import hex_digest
+
+_Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+
+class Commitment(Line, extra="forbid"):
+    """All that is settled before a season; to be published."""
+
+    secret_sha256: _Digest
+    code_sha256: _Digest
+    engine: str
+    arguments: str
+    """Of `phyblock scenes generate`, but for seed and folder."""
+
+
+def code_digest() -> str:
+    """Return the digest of the package's own files, in the order of their names."""
+    root = Path(phyblock.__file__).parent
+    files = (path for path in root.rglob("*") if path.suffix in (".py", ".md", ".yaml"))
+    named = sorted((path.relative_to(root).as_posix(), path) for path in files)
+    named = [(name, path) for name, path in named if not name.startswith("bundled/")]
+    return hex_digest("".join(f"{hex_digest(path.read_bytes())} {name}\n" for name, path in named))
+
+
+def season_seed(commitment: Commitment, secret: str, public: str, where: str) -> int:
+    """Return the seed of a season; DataError where secret, code or engine are not those meant."""
+    meant = (
+        ("secret_sha256", commitment.secret_sha256, hex_digest(secret)),
+        ("code_sha256", commitment.code_sha256, code_digest()),
+        ("engine", commitment.engine, described_engine()),
+    )
+    problems = [
+        Problem(where, "is not what was committed to", field, found, committed)
+        for field, committed, found in meant
+        if found != committed
+    ]
+    if problems:
+        raise DataError(problems)
+    return int(hex_digest(f"{secret}\n{public}")[:16], 16)
