@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from typing import Any, Literal
 
 import verifiers.v1 as vf
+from pydantic import Field
 from verifiers.v1.types import content_text
 
 from phyblock.task import Score, Split, Task, tasks
@@ -24,11 +25,11 @@ class VerifiersConfig(vf.TasksetConfig):
 
     track: Literal["full_planning", "step_planning", "pose_planning", "vqa"] = "full_planning"
     split: Split = "train"
-    levels: tuple[int, ...] | None = None
+    levels: list[int] | None = None
     seed: int = 0
     data: str | None = None
     limit: int | None = None
-    overrides: tuple[str, ...] = ()
+    overrides: list[str] = Field(default_factory=list)
 
     def read(self, first: int = 0) -> Iterator[Task]:
         """Yield the tasks from a place on; in a stream, none before it is made."""

@@ -112,7 +112,7 @@ def test_verifiers(official_checkout: Path, expected: Scores) -> None:
     from phyblock.integrations.verifiers import VerifiersConfig, VerifiersTaskset
 
     config = VerifiersConfig(
-        split="test", data=str(official_checkout), overrides=OVERRIDES, limit=None
+        split="test", data=str(official_checkout), overrides=list(OVERRIDES), limit=None
     )
     by_key = {task.data.id: task for task in VerifiersTaskset(config)}
 
