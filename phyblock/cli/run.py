@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 import time
 from collections.abc import Callable, Sequence
@@ -131,9 +132,13 @@ def run(
         from phyblock.models.litellm_client import be_quiet
 
         be_quiet()
+    # Suite, scenes and modules stay to the end: looking through them for garbage again and again
+    # takes a tenth of a run. So do records, while tables are made of them.
+    gc.freeze()
     with ProgressView(console) as view:
         session = Session(plan, folder, view, **asks)
         result = completed(session, _SIGNALS, lambda: view.tick(asks=session.under_way > 0))
+    gc.freeze()
     made = show_tables(folder, page=not no_report, anew=False, keep=not result.left)
     code = _conclude(console, folder, result, view)
     print_path(console, made)
