@@ -29,7 +29,6 @@ from inspect_ai.solver import Generate, Solver, TaskState, solver
 
 from phyblock.task import Split, Tasks, tasks
 
-_REPLIES = "replies"
 _ROLES = {
     "system": model.ChatMessageSystem,
     "user": model.ChatMessageUser,
@@ -138,7 +137,7 @@ def ask(asked: Tasks) -> Solver:
             state = await generate(state)
             replies.append(state.output.completion)
             await asyncio.to_thread(episode.step, replies[-1])
-        state.store.set(_REPLIES, replies)
+        state.store.set("replies", replies)
         return state
 
     return solve
@@ -151,7 +150,7 @@ def worth(asked: Tasks) -> Scorer:
     async def score(state: TaskState, target: Target) -> Score:
         del target
         one = asked[str(state.sample_id)]
-        reply = state.store.get(_REPLIES) if one.plays else state.output.completion
+        reply = state.store.get("replies") if one.plays else state.output.completion
         found = await asyncio.to_thread(one.score, reply)
         return Score(
             value={found.measure: found.value, "success": float(found.success)},

@@ -21,7 +21,6 @@ from openenv.core.env_server.types import Action, Observation, State
 
 from phyblock.task import Episode, Task, Tasks, tasks
 
-_DEFAULT = '{"track": "full_planning"}'
 _MOST_SESSIONS = 64
 
 
@@ -109,7 +108,7 @@ class PhyBlockClient(EnvClient[Reply, Asked, State]):
 
 def app() -> Any:
     """Return the server; its sessions share the tasks."""
-    given = json.loads(os.environ.get("PHYBLOCK_TASKS", _DEFAULT))
+    given = json.loads(os.environ.get("PHYBLOCK_TASKS", '{"track": "full_planning"}'))
     known = tasks(given.pop("track"), *given.pop("overrides", ()), **given)
     return create_app(
         lambda: PhyBlockEnvironment(known),
