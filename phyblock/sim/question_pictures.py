@@ -260,6 +260,11 @@ def shown_pixels(recipe: QuestionPicture, shot: Shot) -> dict[int, int]:
     return {b.order: int(n) for b, n in zip(recipe.blocks, counts, strict=True)}
 
 
+def filled(recipe: QuestionPicture) -> float:
+    """The share of a picture that its blocks fill."""
+    return float((seen(replace(recipe, marks=())).block >= 0).mean())
+
+
 def is_inside(recipe: QuestionPicture) -> bool:
     """True if no block or mark comes near the picture's edge."""
     points = [drawn_m(block) for block in drawn_blocks(recipe)]

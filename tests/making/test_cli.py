@@ -192,7 +192,7 @@ def asked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     some = "".join(f"{line}\n" for line in lines.splitlines()[5::33])
     (folder / "scenes.jsonl").write_text(some, encoding="utf-8")
     told = vqa("generate", "--data", folder, "--out", folder / "q", *SMALL)
-    assert "8 questions in 2 subtasks" in told.stdout
+    assert "8 questions in 2 subtasks, " in told.stdout
     assert ("made with" in told.stderr) == bool(other_engine())
     return folder
 

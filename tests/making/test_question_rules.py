@@ -16,7 +16,7 @@ from phyblock.domain.blocks import SHAPES, Euler
 from phyblock.domain.question import Mark
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, turned_form
 from phyblock.files import bundled
-from phyblock.making.questions.base import Draft, UnfairError, four_alike, ranks_among
+from phyblock.making.questions.base import WORDINGS, Draft, UnfairError, four_alike, ranks_among
 from phyblock.making.questions.dynamics import is_on_face, resting_on, stays_at
 from phyblock.making.questions.production import BALANCE, even_letters, keeping_odds
 from phyblock.making.questions.properties import layers_of, sure_blocks
@@ -93,8 +93,8 @@ def test_a_name_fits_its_block_alone_and_speaks_of_what_it_may(
         ("rightmost cube", (0, 0.2, 0.025), 45.0, (2,)),
         ("leftmost cube", (0, 0.2, 0.025), 225.0, (2,)),
         ("leftmost cube", (0, 0, 0.075), 45.0, ()),
-        ("topmost cube", (0, 0, 0.075), 45.0, (2,)),
-        ("topmost cube", (0, 0.06, 0.025), 45.0, ()),
+        ("highest cube", (0, 0, 0.075), 45.0, (2,)),
+        ("highest cube", (0, 0.06, 0.025), 45.0, ()),
         ("blue cube resting on the red cube", (0, 0, 0.075), 45.0, (2,)),
         ("blue cube in layer 2", (0, 0, 0.075), 45.0, (2,)),
     ],
@@ -218,7 +218,7 @@ def test_a_block_stays_where_the_plank_does_not_tip(
 def test_options_of_viewpoints_differ_in_colors_at_one_height_alone() -> None:
     maker, rng = ViewpointMaker(), np.random.default_rng(5)
     found = [draft for scene in SCENES[::40] for draft in maker.drafts(scene, rng)]
-    assert {draft.kind for draft in found} == {"vp-match", "vp-side"}
+    assert {draft.wording for draft in found} == {"vp-match", "vp-side"}
     for draft in found:
         options = [option for option in draft.options if isinstance(option, QuestionPicture)]
         held = [
@@ -275,11 +275,12 @@ def test_every_letter_is_right_about_as_often(count: int, seed: int) -> None:
         assert low // 100 <= letters[index] <= -(-high // 100)
 
 
+WORDINGS["told"] = "{text}"
 SHAPE_TEXTS = ("cube", "arch", "cylinder", "prism", "half cylinder")
 
 
 def told(base: str, text: str, options: tuple[str, ...]) -> Draft:
-    return Draft(Scene(base, (1,), (), (base,)), text, options, (), "", "", {})
+    return Draft(Scene(base, (1,), (), (base,)), "told", options, (), {"text": text})
 
 
 def pool(count: int, odds: tuple[float, ...], seed: int) -> list[Draft]:

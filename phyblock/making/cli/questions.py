@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 from collections import Counter
 from pathlib import Path
 
@@ -12,7 +13,14 @@ from PIL import Image
 
 from phyblock.cli.console import make_console, print_rows, shown_path
 from phyblock.cli.options import NAME_OR_PATH, UserPath
-from phyblock.data import QuestionSet, find_questions, read_data_set, read_questions
+from phyblock.data import (
+    VERSION_FILE,
+    QuestionSet,
+    find_questions,
+    read_data_set,
+    read_questions,
+    read_version,
+)
 from phyblock.domain import LETTERS, SUBTASK_NAMES, SUBTASKS, Question, Subtask
 from phyblock.errors import DataError, Problem
 from phyblock.files import write_named
@@ -27,6 +35,7 @@ from phyblock.making.cli.options import (
 )
 from phyblock.making.files import (
     QUESTION_FILES,
+    QUESTION_SET_VERSION,
     check_out,
     check_sums,
     question_card,
@@ -64,7 +73,7 @@ def questions() -> None:
     "--per-subtask",
     type=click.IntRange(1),
     metavar="N",
-    help="Questions of each subtask; by default 150, of ordering and affordance 50.",
+    help="Questions of each subtask; by default 150.",
 )
 @making_options
 def generate(
@@ -82,7 +91,7 @@ def generate(
     on any Python, any number of processes or a cluster.
     """
     check_out(out, QUESTION_FILES)
-    wanted = {subtask: per_subtask or PER_SUBTASK.get(subtask, 150) for subtask in subtasks}
+    wanted = dict.fromkeys(subtasks, per_subtask or PER_SUBTASK)
     read = read_data_set(data)
     originals = {task.scene.id: task.scene for task in read.tasks}
     with open_workers(jobs, ray_address) as workers:
@@ -94,7 +103,8 @@ def generate(
         command += f" --per-subtask {per_subtask}"
     write_questions(out, made, originals, question_card(out.name, read.name, made, command))
     outcome = f"{counted(len(made), 'question')} in {counted(len(subtasks), 'subtask')}"
-    click.echo(f"{outcome}: {shown_path(out)}")
+    each_s = sum(os.times()[:4]) / len(made)
+    click.echo(f"{outcome}, {each_s:.1f} CPU seconds each: {shown_path(out)}")
     print_engine()
 
 
@@ -106,11 +116,17 @@ def verify(questions: str, data: str, jobs: int) -> None:
     """Derive every answer of PATH again, from scene, pictures and simulator.
 
     PATH is a folder with questions.jsonl or a bundled set, by default the built-in phyblock-vqa.
-    Exits with 1 when an answer differs, or a question is not fair.
+    Exits with 1 when an answer differs, or a question is not fair. Of a set that an earlier
+    version made, only the checksums are checked.
     """
     read = _read(questions, data)
+    version = read_version(read.root)
     # Questions about one scene follow one another, so that pictures are shared.
     asked = sorted((task.question for task in read.tasks), key=lambda question: question.scene.id)
+    if (read.root / VERSION_FILE).is_file() and version < QUESTION_SET_VERSION:
+        asked = []
+        known = f"this one derives those of version {QUESTION_SET_VERSION}"
+        click.echo(f"Version {version} of the makers derived the answers; {known}.")
     problems = mapped(problem_of, asked, jobs, "Verifying", "questions")
     counts = Counter(question.subtask for question in asked)
     failed = Counter(q.subtask for q, p in zip(asked, problems, strict=True) if p)
@@ -206,6 +222,8 @@ def audit(questions: str, data: str) -> None:
         "Percent. A to D: how often the letter is right (ordering: comes first). Probes: accuracy "
         "with a 95 % interval."
     )
+    for name, probe in ((n, p) for one in audits for n, p in one.probes.items() if "," in n):
+        console.print(f"{name}: {_shown(probe)} of {probe.n}")
     findings = [finding for one in audits for finding in one.findings()]
     for finding in findings:
         console.print(finding, soft_wrap=True)

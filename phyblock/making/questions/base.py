@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -32,22 +32,12 @@ View = tuple[float, float]
 Option = str | QuestionPicture | Mark
 """A text; a picture, labeled later; or a place, which is marked in the first picture."""
 
-_TEXTS: dict[str, Any] = yaml.safe_load(
+WORDINGS: dict[str, str] = yaml.safe_load(
     Path(__file__).with_name("wordings.yaml").read_text(encoding="utf-8")
 )
-WORDS: Mapping[str, Any] = _TEXTS.pop("words")
+"""The text of each kind of question; words in braces are slots."""
+WORDS: Mapping[str, Any] = WORDINGS.pop("words")  # type: ignore[assignment]
 """Words that options and slots are made of."""
-WORDINGS: dict[str, str] = {}
-"""All templates by id: kind and number (`rp-corner-2`)."""
-
-
-def add_wordings(stem: str, texts: Sequence[str]) -> None:
-    """Add templates under the ids `stem-1`, `stem-2` and so on."""
-    WORDINGS.update({f"{stem}-{number}": text for number, text in enumerate(texts, 1)})
-
-
-for _stem in _TEXTS:
-    add_wordings(_stem, _TEXTS[_stem])
 
 
 class UnfairError(PhyblockError):
@@ -59,44 +49,26 @@ class Draft:
     """A fair question whose options have no letters yet.
 
     `scene` is the scene as shown; `options` has the right one first, or for ordering all four in
-    the right order. Selection takes an even share of each `kind`. `evidence` is what JSON can
-    hold; its `slots` fill the template `wording` to give `text`. `looks` are measures of options
+    the right order. `slots` fill the template of the `wording`. `facts` are further evidence, which
+    JSON can hold. Selection takes an even share of each `kind`. `looks` are measures of options
     that are no texts, a row each, by which a reader might guess: drafts are dropped until these
-    tell nothing.
+    tell nothing. Of the same base scenes there is one question of a wording, slots and `about`.
     """
 
     scene: Scene
-    text: str
+    wording: str
     options: tuple[Option, ...]
     pictures: tuple[QuestionPicture, ...]
-    wording: str
-    kind: str
-    evidence: Mapping[str, Any]
-    looks: tuple[tuple[float, ...], ...] = field(default=())
+    slots: Slots = field(default_factory=dict)
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    kind: str = ""
+    looks: tuple[tuple[float, ...], ...] = ()
+    about: Hashable = None
 
-
-def draft(
-    scene: Scene,
-    rng: np.random.Generator,
-    stem: str,
-    options: Sequence[Option],
-    pictures: Sequence[QuestionPicture],
-    slots: Slots,
-    *,
-    kind: str = "",
-    looks: Sequence[Sequence[float]] = (),
-    facts: Mapping[str, Any] | None = None,
-) -> Draft:
-    """Return a draft in a wording drawn from those of a stem, the right option first.
-
-    Without a `kind` the stem is its kind. `facts` are evidence beside the slots.
-    """
-    wording = pick(rng, [name for name in WORDINGS if stem_of(name) == stem])
-    return Draft(
-        *(scene, fill_template(WORDINGS[wording], slots), tuple(options), tuple(pictures)),
-        *(wording, kind or stem, {"slots": dict(slots), **(facts or {})}),
-        looks=tuple(tuple(row) for row in looks),
-    )
+    @property
+    def text(self) -> str:
+        """The wording with its slots filled."""
+        return fill_template(WORDINGS[self.wording], self.slots)
 
 
 class Maker(ABC):
@@ -105,13 +77,16 @@ class Maker(ABC):
     subtask: Subtask
     spare: float = 1.5
     """Scenes are asked until there are so many times the drafts that are wanted."""
+    doubtful: float = 1.05
+    """So many times the questions that are wanted are chosen, as some are refused in the end."""
     drafts_a_scene: int = 1
     """The most drafts that are taken of one scene."""
 
     @abstractmethod
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-        """Propose questions about a scene, in an order drawn with `rng`; those are kept whose
-        answer `rederive` finds.
+        """Propose questions about a scene, in an order drawn with `rng`, without a simulation.
+
+        Of these, those are kept that are selected and whose answer `rederive` finds.
         """
 
     @abstractmethod
@@ -141,8 +116,8 @@ class StaticMaker(Maker):
     """Makes questions about one picture, from views drawn for each scene."""
 
     spare = 20.0
-    views_a_scene: int = 1
-    drafts_a_view: int = 12
+    views_a_scene: int = 3
+    drafts_a_view: int = 8
 
     def __init_subclass__(cls) -> None:
         """Derive the most drafts of a scene from those of a view."""
@@ -174,8 +149,9 @@ class StaticMaker(Maker):
                 continue
             options = one.options or self.offer(one, right, rng)
             if right in options:
-                first, pictures = right_first(right, options), [one.picture]
-                yield draft(one.scene, rng, one.stem, first, pictures, one.slots, kind=one.kind)
+                first = tuple(right_first(right, options))
+                pictures, kind = (one.picture,), one.kind or one.stem
+                yield Draft(one.scene, one.stem, first, pictures, one.slots, kind=kind)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Return the answer from the one picture and the slots of the text alone."""
@@ -186,14 +162,9 @@ class StaticMaker(Maker):
         low, high = ELEVATIONS_DEG
         if not low <= picture.view_deg[1] <= high:
             raise UnfairError(f"is not seen from {low} to {high} degrees above the floor")
-        stem = stem_of(question.wording)
-        right = self.right(Asked(stem, question.scene, picture, slots, question.options))
+        asked = Asked(question.wording, question.scene, picture, slots, question.options)
+        right = self.right(asked)
         return only_index([option == right for option in question.options])
-
-
-def stem_of(wording: str) -> str:
-    """Return what all wordings of a kind share: `rp-corner` of `rp-corner-2`."""
-    return wording.rsplit("-", 1)[0]
 
 
 def fill_template(template: str, slots: Slots) -> str:

@@ -1,13 +1,14 @@
-"""CF, PD, AD: what moves when a block goes, comes, or is pushed, by statics and simulation.
+"""CF, PD, AD: what moves when a block goes, comes, or is pushed.
+
+Questions are proposed by statics alone; simulations confirm those that are selected.
 
 CF: the block that goes is marked in the picture, so that no word of the question hints at the
-answer. Most questions break the naive rule that what rests on a block falls with it and nothing
-else: supports that are one too many, and weights that hold what they stand on. Nor is it enough to
-ask what rests on nothing else: a plank may need each of two supports.
+answer. It supports others, all of the scene; or, as a kind of its own, it is a weight that holds
+what it rests on.
 
-PD: all four next steps add the same block to an unfinished structure, let down where it first
-touches; right and wrong places are drawn alike, all over the structure. Or a block is pushed to the
-right or left as seen, and other pictures show what other pushes close by lead to.
+PD: four pictures show the same blocks laid on an unfinished structure, of which one stays, or one
+falls: what is right in one kind of question is wrong in the other. Or a block is pushed to the
+right or left as seen, and all pictures show what pushes of it or its neighbors lead to.
 
 AD: all places are on flat faces, and no more central where the block stays than elsewhere. Where it
 stays it comes down on the face that is marked. Elsewhere a plank tips under it, as far as such
@@ -22,21 +23,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from phyblock.domain.blocks import (
     BLOCK_TYPES,
     COLORS,
     SHAPES,
     BlockType,
-    Color,
     Euler,
     euler_deg_to_matrix,
 )
 from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions import base, sight
-from phyblock.making.questions.base import Draft, Maker, UnfairError, View, draft, pick, shuffled
+from phyblock.making.questions.base import Draft, Maker, UnfairError, View, pick, shuffled
 from phyblock.making.questions.structures import (
+    arrangements,
     group_of,
     is_sure,
     lowered,
@@ -49,7 +51,7 @@ from phyblock.making.questions.structures import (
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.camera import view_axes
-from phyblock.sim.contact import bounds_m, boxes_near, support_graph, whole_bounds_m
+from phyblock.sim.contact import bounds_m, boxes_near, support_graph
 from phyblock.sim.dynamics import groups
 from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import drawn_mesh
@@ -74,57 +76,48 @@ from phyblock.sim.question_pictures import (
 
 TAKEN = "X"
 """The letter of the block that is taken away or pushed."""
+Ints = NDArray[np.int64]
 Lot = frozenset[int]
 """Orders of blocks that move."""
 OUTCOME_TEXTS: tuple[str, ...] = tuple(base.WORDS["outcomes_of_removal"])
 """Outcomes of a removal, by the number of other blocks that do not stay; all are offered."""
 _ALL_SEEN = 0.12
-_STRUCTURES_TRIED, _VIEWS_TRIED, _REMOVALS_TRIED = 6, 3, 6
-_SORTS = ((False, False), (False, True), (True, False), (True, True))
-"""True where what rests on the block goes with it, and where what rests on nothing else does."""
-_SHARES = (0.35, 0.25, 0.25, 0.15)
-"""Shares of removals of each sort that are looked for: each rule is right in four cases of ten."""
-_STAYS_ASKED = 0.25
-"""That none moves is found more often than it is asked."""
+_VIEWS_TRIED, _REMOVALS_TRIED = 3, 4
+_WEIGHTS_ASKED = 0.25
+"""Of so many scenes the block that goes is a weight put on top."""
 _MOST_LOTS, _MOST_TOGETHER = 40, 3
-_COLORS: tuple[tuple[Color, Color, Color], ...] = (
-    ("red", "yellow", "blue"),
-    ("orange", "blue", "green"),
-    ("yellow", "blue", "red"),
-    ("blue", "orange", "green"),
-    ("green", "orange", "blue"),
-    ("red", "blue", "yellow"),
-)
+_COLORS = tuple(itertools.permutations(sight.PLAIN_COLORS))
 """The colors of what moves, of what stays, and of the block that is taken away."""
 
 
 class CounterfactualMaker(Maker):
-    """Kinds: `cf-count` (texts) and `cf-color` (what moves, by colors)."""
+    """Kinds: `cf-count` (texts) and `cf-color` (what moves, by colors), where a support of the
+    scene goes; `cf-weight` (texts), where a weight put on it goes. The former are asked as often
+    where what rests on the block is what moves as where it is not.
+    """
 
     subtask: Subtask = "CF"
+    spare, doubtful = 6.0, 1.2
+    drafts_a_scene = 3
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Ask about removals from the scene, or from a part of it with an annex."""
-        sort = _SORTS[int(rng.choice(len(_SORTS), p=_SHARES))]
-        propose = pick(rng, (_count, _color))
-        for number in range(_STRUCTURES_TRIED):
-            blocks = (with_annex(scene, rng) if number else scene.blocks) or ()
-            added = [block for block in blocks if block.order > len(scene)]
-            for order in shuffled(rng, sight.orders_of(added or blocks))[:_REMOVALS_TRIED]:
-                group = group_of(blocks, order)
-                left = [block for block in group if block.order != order]
-                naive = [resting_on(group, order, only=only) for only in (False, True)]
-                # What statics alone say; a simulation decides.
-                falls = not is_balanced(left)
-                if not left or tuple(bool(lot) is falls for lot in naive) != sort:
-                    continue
-                shown = _pictured(blocks, order, rng)
-                outcome = sure_removal(blocks, order) if shown else None
-                if shown and outcome:
-                    moved = frozenset(outcome.moved)
-                    is_asked = moved or rng.random() < _STAYS_ASKED
-                    if is_asked and tuple(moved == lot for lot in naive) == sort:
-                        yield from propose(scene, shown, order, moved, rng)
+        is_weight = rng.random() < _WEIGHTS_ASKED
+        blocks = (with_annex(scene, rng) if is_weight else scene.blocks) or ()
+        below = _below(blocks)
+        carrying = frozenset[int]().union(*below.values())
+        asked = [o for o in below if (o > len(scene)) is is_weight and (o in carrying) != is_weight]
+        for order in shuffled(rng, asked)[:_REMOVALS_TRIED]:
+            shown = _pictured(blocks, order, rng)
+            moved = falling(group_of(blocks, order), order) if shown else None
+            if shown is None or moved is None or not sight.are_seen(shown, moved, sight.COUNTED):
+                continue
+            if is_weight:
+                yield _count(scene, shown, order, moved, rng, "cf-weight", "cf-weight")
+                return
+            kind = "plain" if moved == resting_on(blocks, order) else "odd"
+            yield _count(scene, shown, order, moved, rng, "cf-count", f"cf-count-{kind}")
+            yield from _color(scene, shown, order, moved, rng, f"cf-color-{kind}")
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Simulate the removal again."""
@@ -136,7 +129,7 @@ class CounterfactualMaker(Maker):
         sight.require_seen(
             shown, sight.NAMED, [block for block in shown.blocks if block.order == order]
         )
-        if base.stem_of(question.wording) == "cf-count":
+        if question.wording != "cf-color":
             right = _outcome_text(len(outcome.moved))
             return base.only_index([option == right for option in question.options])
         told = [
@@ -144,6 +137,28 @@ class CounterfactualMaker(Maker):
             for one in sight.option_pictures(question)
         ]
         return base.only_index([one == set(outcome.moved) for one in told])
+
+
+def falling(blocks: Sequence[Block], order: int) -> Lot | None:
+    """Return the orders of the blocks that by statics move when one goes; None where unsure.
+
+    These are blocks next to it, with all that rests on them.
+    """
+    left, below = [block for block in blocks if block.order != order], _below(tuple(blocks))
+    near = [o for o in below if order in below[o]] or [o for o in below[order] if o in below]
+    with_load = [(frozenset({o}) | resting_on(blocks, o)) - {order} for o in near]
+    lots = {
+        frozenset[int]().union(*some)
+        for count in range(len(with_load) + 1)
+        for some in itertools.combinations(with_load, count)
+    }
+    for lot in sorted(lots, key=sorted):
+        still = [block for block in left if block.order not in lot]
+        loose = groups([block for block in left if block.order in lot])
+        is_so = is_balanced(still) and not any(is_balanced([*still, *one]) for one in loose)
+        if is_so and surely_stands(blocks) and is_sure(left, lot):
+            return lot
+    return None
 
 
 def _outcome_text(count: int) -> str:
@@ -167,18 +182,37 @@ def _pictured(
 
 
 def _count(
-    scene: Scene, shown: QuestionPicture, order: int, moved: Lot, rng: np.random.Generator
-) -> Iterator[Draft]:
+    scene: Scene,
+    shown: QuestionPicture,
+    order: int,
+    moved: Lot,
+    rng: np.random.Generator,
+    stem: str,
+    kind: str,
+) -> Draft:
     """Ask how many blocks move."""
     right, *others = base.right_first(_outcome_text(len(moved)), OUTCOME_TEXTS)
-    options = [right, *shuffled(rng, others)]
-    if sight.are_seen(shown, moved, sight.COUNTED):
-        facts = {"removed": order, "moved": sorted(moved)}
-        yield draft(scene, rng, "cf-count", options, [shown], {}, facts=facts)
+    options = (right, *shuffled(rng, others))
+    tops_m = {block.order: float(bounds_m(block)[1, 2]) for block in shown.blocks}
+    bins = (int(3.99 * tops_m[order] / max(tops_m.values())), min(len(shown.blocks) // 4, 3))
+    looks = np.zeros((len(options), len(options), len(bins), 4))
+    for row, option in enumerate(options):
+        looks[row, OUTCOME_TEXTS.index(option), range(len(bins)), bins] = 1.0
+    facts, rows = {"removed": order, "moved": sorted(moved)}, looks.reshape(len(options), -1)
+    return Draft(
+        *(scene, stem, options, (shown,), {}, facts, kind),
+        looks=tuple(map(tuple, rows.tolist())),
+        about=order,
+    )
 
 
 def _color(
-    scene: Scene, shown: QuestionPicture, order: int, moved: Lot, rng: np.random.Generator
+    scene: Scene,
+    shown: QuestionPicture,
+    order: int,
+    moved: Lot,
+    rng: np.random.Generator,
+    kind: str,
 ) -> Iterator[Draft]:
     """Ask which blocks move, by pictures that color them."""
     plain = replace(shown, marks=())
@@ -193,12 +227,12 @@ def _color(
         color = {b.order: colors[b.order not in lot] for b in plain.blocks} | {order: colors[2]}
         return replace(plain, blocks=tuple(replace(b, color=color[b.order]) for b in plain.blocks))
 
-    options = [colored(lots[place]) for place in four]
-    if options and sight.are_seen(shown, moved, sight.COUNTED) and sight.are_told_apart(options):
+    options = tuple(colored(lots[place]) for place in four)
+    if options and sight.are_told_apart(options):
         slots: dict[str, str] = dict(zip(("color", "other", "taken"), colors, strict=True))
         facts = {"removed": order, "moved": sorted(moved)}
-        looks = measures[four].tolist()
-        yield draft(scene, rng, "cf-color", options, [shown], slots, looks=looks, facts=facts)
+        looks = tuple(map(tuple, measures[four].tolist()))
+        yield Draft(scene, "cf-color", options, (shown,), slots, facts, kind, looks, order)
 
 
 def _other_lots(
@@ -266,24 +300,25 @@ def sure_removal(blocks: tuple[Block, ...], order: int) -> Outcome | None:
 
 # PD
 
-_ROOM_M = 0.06
-
 
 class PredictiveMaker(Maker):
-    """Kinds: `pd-next` (the next step) and `pd-push` (the settled scene after a push)."""
+    """Kinds: `pd-next` and `pd-fall` (next steps), `pd-push` (the settled scene after a push)."""
 
     subtask: Subtask = "PD"
+    spare, doubtful = 3.0, 1.7
+    drafts_a_scene = 4
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Ask for a next step or about a push, as drawn, where one is fair."""
-        yield from pick(rng, (_next_steps, _pushes))(scene, rng)
+        yield from (_pushes if rng.random() < _PUSHES_ASKED else _next_steps)(scene, rng)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Decide by statics and simulation."""
         slots = base.slots_of(question)
         shown, options = sight.picture_of(question, "scene"), sight.option_pictures(question)
-        if base.stem_of(question.wording) == "pd-next":
-            return base.only_index([_can_follow(shown, one) for one in options])
+        if question.wording != "pd-push":
+            stays = [_can_follow(shown, one) for one in options]
+            return base.only_index([one is (question.wording == "pd-next") for one in stays])
         push = _meant_push(shown, sight.marked_order(shown, TAKEN), slots["direction"])
         outcome = _sure_push(shown.blocks, push)
         if outcome is None:
@@ -292,127 +327,82 @@ class PredictiveMaker(Maker):
         return base.only_index([_story(shown.blocks, one, push) == expected for one in options])
 
 
-def _with_room(blocks: Sequence[Block], above_m: float = 0.0) -> tuple[Block, ...]:
-    """Return the blocks to frame a picture on for floor all round, and some air above [m]."""
-    low, high = whole_bounds_m(blocks)
-    first = max(block.order for block in blocks) + 1
-    z = round(float(high[2]) + above_m, 4) if above_m else 0.0125
-    sides = itertools.product(*((low[i] - _ROOM_M, high[i] + _ROOM_M) for i in (0, 1)))
-    places = ((round(float(x), 4), round(float(y), 4), z) for x, y in sides)
-    corners = (
-        Block(first + i, "cuboid1", "red", place, (0.0, 0.0, 0.0), (), 1)
-        for i, place in enumerate(places)
-    )
-    return (*blocks, *corners)
+def _framed(every: Sequence[Sequence[Block]]) -> tuple[Block, ...]:
+    """Return the blocks of all pictures that are compared, to frame a camera on."""
+    poses = {(block.type, block.position_m, block.euler_deg): block for s in every for block in s}
+    return tuple(replace(block, order=i) for i, block in enumerate(poses.values(), 1))
 
 
 # Next steps
 
-_STEP_RINGS_M = (0.0025, 0.005, 0.01)
-"""The verdict on a next step holds all round it, this far off [m]."""
-_STAGES_TRIED, _STEPS_TRIED, _PROPOSED, _STEPS_KEPT = 3, 60, 3, 8
-_STAGES_ANNEXED, _MOST_LEFT = 0.5, 6
-_STEP_M, _MOST_STEPS, _LEAST_HEIGHT_M, _ABOVE_M = 0.0125, 6, 0.02, 0.03
-_LEAST_SHOWN = 250
-_ELEVATIONS_DEG = (34, 48)
-"""High enough to tell what lies behind from what lies above."""
+_PUSHES_ASKED, _STAGES_TRIED, _MOST_WAYS = 0.45, 6, 8
+_LEAST_DIFFERENCE = 2 * sight.LEAST_PIXELS
+_ELEVATIONS_DEG = (20, 38)
 
 
 def _next_steps(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-    """Propose a stage of building, a block to come, one place where it stays and three others."""
+    """Propose a stage of building and ways to go on, of which one stays, and of which one falls."""
+    drafts: list[Draft] = []
     for _ in range(_STAGES_TRIED):
-        stage, block = _stage(scene, rng)
-        view, framed = base.drawn_view(rng, _ELEVATIONS_DEG), _with_room(stage, _ABOVE_M)
-        shown = QuestionPicture("scene", stage, view, framed=framed)
-        staying, falling = _steps(shown, block, rng)
-        pictures = [*staying, *falling]
-        start, shots = seen(shown), [seen(one) for one in pictures]
-        unlike = np.array([[float(differing_pixels(a, b)) for b in shots] for a in shots])
-        measures = np.array([_looks_of_step(start, shot) for shot in shots])
-        for _ in range(_PROPOSED if staying else 0):
-            four = base.four_alike(measures, unlike, sight.LEAST_PIXELS, rng, rights=len(staying))
-            if four:
-                options, looks = [pictures[i] for i in four], measures[four].tolist()
-                facts = {"placed": sight.orders_of(stage), "next": block.order}
-                yield draft(scene, rng, "pd-next", options, [shown], {}, looks=looks, facts=facts)
-
-
-def _stage(scene: Scene, rng: np.random.Generator) -> tuple[tuple[Block, ...], Block]:
-    """Return the blocks placed so far, and one more of the scene's."""
-    annexed = with_annex(scene, rng) if rng.random() < _STAGES_ANNEXED else None
-    if annexed and all(map(surely_stands, groups(annexed))):
-        number = max(block.order for block in annexed) + 1
-        return annexed, replace(pick(rng, scene.blocks), order=number)
-    order, most = scene.graph.random_order(rng), max(1, len(scene) - 1)
-    count = int(rng.integers(max(1, len(scene) - _MOST_LEFT), most + 1))
-    stage = tuple(scene.blocks[vertex] for vertex in sorted(order[:count]))
-    number = max(sight.orders_of(scene.blocks)) + 1
-    left = [scene.blocks[vertex] for vertex in order[count:]]
-    return stage, pick(rng, left) if left else replace(scene.blocks[0], order=number)
-
-
-def _steps(
-    shown: QuestionPicture, block: Block, rng: np.random.Generator
-) -> tuple[list[QuestionPicture], list[QuestionPicture]]:
-    """Return pictures of the block let down where it stays by statics, and where not."""
-    found: dict[bool, list[QuestionPicture]] = {True: [], False: []}
-    start = seen(shown)
-    for _ in range(_STEPS_TRIED):
-        under = bounds_m(pick(rng, shown.blocks)).mean(axis=0)
-        steps = rng.integers(-_MOST_STEPS, _MOST_STEPS + 1, size=2)
-        x, y = (float(under[i]) + _STEP_M * int(steps[i]) for i in (0, 1))
-        put = lowered(block, shown.blocks, x, y)
-        picture = replace(shown, blocks=(*shown.blocks, put))
-        if bounds_m(put)[0, 2] < _LEAST_HEIGHT_M or not is_inside(picture):
+        stage, staying, falling = arrangements(scene, rng, _MOST_WAYS)
+        if min(len(staying), len(falling)) < len(LETTERS) - 1:
             continue
-        stays = stays_round(put, shown.blocks, _STEP_RINGS_M[-1:])
-        if stays is None or len(found[stays]) == _STEPS_KEPT:
-            continue
-        shot = seen(picture)
-        is_shown = shown_pixels(picture, shot)[put.order] >= _LEAST_SHOWN
-        is_new = is_shown and differing_pixels(start, shot) >= sight.LEAST_PIXELS
-        if is_new and sight.are_seen(picture, [put.order], sight.COUNTED):
-            found[stays].append(picture)
-    return found[True], found[False]
+        for stem, some, others in (("pd-next", staying, falling), ("pd-fall", falling, staying)):
+            every = [blocks for blocks, _ in (*some, *others)]
+            view = base.drawn_view(rng, _ELEVATIONS_DEG)
+            plain = QuestionPicture("scene", stage, view, framed=_framed(every))
+            pictures = [replace(plain, blocks=blocks) for blocks in every]
+            shots = [seen(one) for one in pictures]
+            unlike = np.array([[float(differing_pixels(a, b)) for b in shots] for a in shots])
+            laid = [20 * looks for _, looks in (*some, *others)]
+            measures = np.hstack([laid, [[*_looks_of(plain, shot)] for shot in shots]])
+            four = base.four_alike(measures, unlike, _LEAST_DIFFERENCE, rng, rights=len(some))
+            options = [pictures[i] for i in four]
+            if options and all(
+                sight.are_seen(one, sight.orders_of(one.blocks), _ALL_SEEN) for one in options
+            ):
+                framed = _framed([one.blocks for one in options])
+                shown, *options = (replace(one, framed=framed) for one in (plain, *options))
+                facts = {"placed": sight.orders_of(stage)}
+                kept = tuple(map(tuple, measures[four].tolist()))
+                drafts.append(Draft(scene, stem, tuple(options), (shown,), {}, facts, looks=kept))
+        if drafts:
+            break
+    yield from drafts
 
 
-def _looks_of_step(first: Shot, shot: Shot) -> tuple[float, ...]:
-    """Return measures of what a step adds to a picture: how much of it shows, and where."""
-    shown, side = shot.block >= 0, len(shot.block) / 10
-    area = max(int((first.block >= 0).sum()), 1) / 5
-    rows, columns = np.nonzero(shown)
-    new_rows, new_columns = np.nonzero(changed_pixels(first, shot))
-    return (
-        len(rows) / area,
-        len(new_rows) / area,
-        *(float(x) / side for x in (columns.mean(), rows.mean(), np.ptp(columns), rows.min())),
-        *(float(x) / side for x in (new_columns.mean(), new_rows.mean())),
-    )
+def _looks_of(plain: QuestionPicture, shot: Shot) -> Iterator[float]:
+    """Yield measures of what a picture changes: how much of it, and where."""
+    area = max(int((seen(plain).block >= 0).sum()), 1) / 5
+    for mask in (shot.block >= 0, changed_pixels(seen(plain), shot)):
+        rows, columns = np.nonzero(mask)
+        yield len(rows) / area
+        yield from (float(x) * 10 / len(shot.block) for x in _spread(rows, columns))
+
+
+def _spread(rows: Ints, columns: Ints) -> tuple[float, ...]:
+    """Return middle and extent of a mask, in pixels; zeros where it is empty."""
+    if not len(rows):
+        return (0.0,) * 4
+    return columns.mean(), rows.mean(), float(np.ptp(columns)), float(np.ptp(rows))
 
 
 def _can_follow(shown: QuestionPicture, option: QuestionPicture) -> bool:
-    """True if one block was added so that all stays; UnfairError when that is not sure."""
+    """True if blocks were added so that all stays; UnfairError when that is not sure."""
     placed = {block.order for block in shown.blocks}
     added = [block for block in option.blocks if block.order not in placed]
     kept = tuple(block for block in option.blocks if block.order in placed)
-    if len(added) != 1 or not sight.same_blocks(kept, shown.blocks):
-        raise UnfairError(f"picture {option.label} does not add one block")
-    stays = _stays(kept, added[0])
+    if not added or not sight.same_blocks(kept, shown.blocks):
+        raise UnfairError(f"picture {option.label} does not add to the structure")
+    stays = verdict(option.blocks, added[0].order)
     if stays is None:
         raise UnfairError(f"it is not sure whether all stays in picture {option.label}")
     return stays
 
 
-@functools.lru_cache(maxsize=64)
-def _stays(stage: tuple[Block, ...], put: Block) -> bool | None:
-    """True if a block put down stays, by simulation too, and likewise up to 1 cm off; or None."""
-    stays = stays_round(put, stage, _STEP_RINGS_M)
-    return stays if verdict((*stage, put), put.order) is stays else None
-
-
 # Pushes
 
-_PUSHED_TRIED, _PUSHES_TRIED = 3, 9
+_PUSHES_TRIED, _OF_A_SCENE = 10, 3
 _FRONTS_DEG = (0.0, 90.0, 180.0, 270.0)
 _ELEVATIONS_DEG_PUSHES = (20, 32)
 _DIRECTIONS: Mapping[str, int] = base.WORDS["directions"]
@@ -422,35 +412,63 @@ _LEVEL_M, _DOWN_M = 0.004, 0.008
 
 
 def _pushes(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-    """Propose pushes of which a picture from the front, back or a side shows every block."""
-    for front_deg in shuffled(rng, _FRONTS_DEG):
-        view = (front_deg, base.drawn_view(rng, _ELEVATIONS_DEG_PUSHES)[1])
-        plain = QuestionPicture("scene", scene.blocks, view, framed=_with_room(scene.blocks))
-        shot = seen(plain)
-        if min(shown_pixels(plain, shot).values()) >= _LEAST_SHOWN_PUSHES:
-            break
-    else:
+    """Propose pushes of neighbors, seen from the front, back or a side, and what each leads to."""
+    block = pick(rng, scene.blocks)
+    view = (pick(rng, _FRONTS_DEG), base.drawn_view(rng, _ELEVATIONS_DEG_PUSHES)[1])
+    plain = QuestionPicture("scene", scene.blocks, view)
+    told = _told_apart(plain, block.order, rng)
+    plain = replace(plain, framed=_framed([scene.blocks, *(blocks for *_, blocks in told)]))
+    shot = seen(plain)
+    is_shown = min(shown_pixels(plain, shot).values()) >= _LEAST_SHOWN_PUSHES
+    if len(told) < len(LETTERS) or not is_shown:
         return
-    for block in shuffled(rng, scene.blocks)[:_PUSHED_TRIED]:
-        told = _told_apart(plain, block.order, rng)
-        if len(told) < len(LETTERS):
-            continue
-        (order, direction), _ = told.pop(int(rng.integers(len(told))))
+    pictures = [replace(plain, blocks=blocks) for *_, blocks in told]
+    shots = [seen(one) for one in pictures]
+    unlike = np.array([[float(differing_pixels(a, b)) for b in shots] for a in shots])
+    for number in rng.permutation(len(told))[:_OF_A_SCENE].tolist():
+        order, direction, _ = told[number]
         mark = block_mark(plain, shot, order, TAKEN)
-        outcome = _sure_push(scene.blocks, _meant_push(plain, order, direction)) if mark else None
-        if mark and outcome:
-            right = replace(plain, blocks=outcome.settled)
-            options = [right, *(picture for _, picture in told)]
-            if sight.are_told_apart(options):
-                shown, slots = [replace(plain, marks=(mark,))], {"direction": direction}
-                facts = {"pushed": order, "moved": list(outcome.moved)}
-                yield draft(scene, rng, "pd-push", options, shown, slots, facts=facts)
+        if mark is None:
+            continue
+        here = mark_pixel(plain, mark.position_m)
+        measures = np.array([_looks_of_push(plain, s, here, direction) for s in shots])
+        turn = [number, *(i for i in range(len(told)) if i != number)]
+        four = base.four_alike(measures[turn], unlike[np.ix_(turn, turn)], sight.LEAST_PIXELS, rng)
+        framed = _framed([scene.blocks, *(pictures[turn[i]].blocks for i in four)])
+        options = tuple(replace(pictures[turn[i]], framed=framed) for i in four)
+        if four and sight.are_told_apart([replace(plain, framed=framed), *options]):
+            shown = (replace(plain, marks=(mark,), framed=framed),)
+            slots = {"direction": direction}
+            looks = tuple(map(tuple, measures[turn][four].tolist()))
+            yield Draft(
+                scene, "pd-push", options, shown, slots, {"pushed": order}, "", looks, order
+            )
+
+
+def _looks_of_push(
+    plain: QuestionPicture, shot: Shot, here: tuple[int, int], direction: str
+) -> list[float]:
+    """Return measures of an outcome, from the mark and the way of the push: area, place, way."""
+    size, sign = len(shot.block) / 10, _DIRECTIONS[direction]
+    start = seen(plain)
+    changed = changed_pixels(start, shot)
+    rows, columns = np.nonzero(changed)
+    x, y, wide, high = _spread(rows, columns)
+    way = [float(np.mean(np.nonzero(one.block >= 0), axis=1)[1]) for one in (start, shot)]
+    far = float(np.hypot(rows - here[0], columns - here[1]).min(initial=size))
+    return [
+        len(rows) / size**2,
+        *((x - here[1]) * sign / size, (y - here[0]) / size, wide / size, high / size),
+        float(np.hypot(x - here[1], y - here[0])) / size,
+        far / size,
+        (way[1] - way[0]) * sign,
+    ]
 
 
 def _told_apart(
     plain: QuestionPicture, order: int, rng: np.random.Generator
-) -> list[tuple[tuple[int, str], QuestionPicture]]:
-    """Return four pushes of a block or what it touches, each with a picture of its own story."""
+) -> list[tuple[int, str, tuple[Block, ...]]]:
+    """Return pushes of a block or what it touches, and what comes of each: a story of its own."""
     boxes = {block.order: bounds_m(block) for block in plain.blocks}
     touching = [one for one, box in boxes.items() if boxes_near(box, boxes[order], _TOUCH_M)]
     pushes = shuffled(rng, [*itertools.product(touching, _DIRECTIONS)])[:_PUSHES_TRIED]
@@ -459,27 +477,24 @@ def _told_apart(
         for group in groups(plain.blocks, _REACH_M)
         if any(block.order == order for block in group)
     )
-    found: list[tuple[tuple[int, str], QuestionPicture]] = []
+    found: list[tuple[int, str, tuple[Block, ...]]] = []
     stories: set[object] = set()
     axis = _meant_push(plain, order, next(iter(_DIRECTIONS)))
     for number, (one, direction) in enumerate(pushes):
-        if len(found) == len(LETTERS) or len(found) + len(pushes) - number < len(LETTERS):
+        if len(found) + len(pushes) - number < len(LETTERS):
             break
         outcome = after(near, _meant_push(plain, one, direction), OUTCOME_SETTINGS[:1])
         if not outcome.is_clear or one not in outcome.moved:
             continue
         settled = {block.order: block for block in outcome.settled}
         blocks = tuple(settled.get(block.order, block) for block in plain.blocks)
-        picture = replace(plain, blocks=blocks)
         try:
-            story = _story(plain.blocks, picture, axis)
+            story = _story(plain.blocks, replace(plain, blocks=blocks), axis)
         except UnfairError:
             continue
-        if story not in stories and sight.are_told_apart(
-            [plain, *(one for _, one in found), picture]
-        ):
+        if story not in stories:
             stories.add(story)
-            found.append(((one, direction), picture))
+            found.append((one, direction, blocks))
     return found
 
 
@@ -530,12 +545,12 @@ def _story(blocks: Sequence[Block], picture: QuestionPicture, push: Push) -> tup
 
 Place = tuple[float, float, float]
 """A point of the world [m]."""
-_PLACE_RINGS_M = (0.00125, 0.0025, 0.005)
+_PLACE_RING_M = 0.005
 """The verdict on a place holds all round it, this far off [m]."""
-_ANNEXED, _BLOCKS_TRIED = 0.6, 3
+_ANNEXED, _STRUCTURES_TRIED, _PROPOSED = 0.6, 3, 6
 _STEP_PX, _APART_PX, _FLAT_RISE = 5, 18.0, 0.99
 _OFF_CENTER_M, _MOST_OF_A_FACE = 0.001, 0.8
-_PLACES_TRIED, _GIVEN_UP, _SORT = 90, 24, 10
+_PLACES_TRIED, _GIVEN_UP, _SORT = 60, 20, 8
 _SAME_HEIGHT_M, _CLEARLY_HIGHER_M = 0.001, 0.01
 
 
@@ -543,6 +558,7 @@ class AffordanceMaker(Maker):
     """Kind: `ad-place`."""
 
     subtask: Subtask = "AD"
+    spare, doubtful = 1.6, 1.1
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Propose a block in a pose drawn, one place where it stays, and three where not."""
@@ -554,24 +570,25 @@ class AffordanceMaker(Maker):
             if not all(map(surely_stands, groups(blocks))):
                 continue
             tops = visible_tops(plain, seen(plain), _STEP_PX, _FLAT_RISE)
-            for _ in range(_BLOCKS_TRIED):
-                block = _drawn_block(plain, rng)
-                staying, wrong = _by_statics(plain, block, shuffled(rng, tops))
-                both = [*staying, *wrong]
-                pixels = np.array([mark_pixel(plain, top.position_m) for top in both], dtype=float)
-                for _ in range(_PROPOSED if staying and wrong else 0):
-                    unlike = np.linalg.norm(pixels[:, None] - pixels, axis=2)
-                    measures = np.array([_looks_of_place(plain, top) for top in both])
-                    four = base.four_alike(measures, unlike, _APART_PX, rng, rights=len(staying))
-                    if four:
-                        alone = QuestionPicture(BLOCK_LABEL, (block,), plain.view_deg)
-                        marks = [Mark("A", both[i].position_m) for i in four]
-                        slots, looks = {"size": _size(block)}, measures[four].tolist()
-                        facts = {"block": block.type, "euler": list(block.euler_deg)}
-                        shown = [plain, alone]
-                        yield draft(
-                            scene, rng, "ad-place", marks, shown, slots, looks=looks, facts=facts
-                        )
+            block = _drawn_block(plain, rng)
+            staying, wrong = _by_statics(plain, block, shuffled(rng, tops))
+            both = [*staying, *wrong]
+            if not staying or not wrong:
+                continue
+            pixels = np.array([mark_pixel(plain, top.position_m) for top in both], dtype=float)
+            unlike = np.linalg.norm(pixels[:, None] - pixels, axis=2)
+            measures = np.array([_looks_of_place(plain, top) for top in both])
+            for _ in range(_PROPOSED):
+                four = base.four_alike(measures, unlike, _APART_PX, rng, rights=len(staying))
+                puts = [lowered(block, blocks, *both[i].position_m[:2]) for i in four]
+                if four and None not in (stays_round(one, blocks, _PLACE_RING_M) for one in puts):
+                    shown = (plain, QuestionPicture(BLOCK_LABEL, (block,), plain.view_deg))
+                    marks = tuple(Mark("A", both[i].position_m) for i in four)
+                    looks = tuple(map(tuple, measures[four].tolist()))
+                    facts = {"block": block.type, "euler": list(block.euler_deg)}
+                    slots = {"size": _size(block)}
+                    yield Draft(scene, "ad-place", marks, shown, slots, facts, "", looks)
+                    return
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Decide by statics and simulation of the block at every place, and statics all round."""
@@ -634,7 +651,7 @@ def shows_solid(block: Block, view: View) -> bool:
 def _size(block: Block) -> str:
     """Return length, width and height of a block as it is turned, to half a centimeter."""
     *level, high = (round(float(side) * 200) / 2 for side in np.diff(bounds_m(block), axis=0)[0])
-    return f"{max(level):g} cm by {min(level):g} cm, and {high:g} cm in height"
+    return f"{max(level):g} by {min(level):g} cm, {high:g} cm high"
 
 
 def _by_statics(
@@ -690,11 +707,11 @@ def stays_at(plain: QuestionPicture, block: Block, at: Place) -> bool | None:
     stays on another than the one that is marked.
     """
     put = lowered(block, plain.blocks, *at[:2])
-    around = lowered_round(put, plain.blocks, _PLACE_RINGS_M[-1:])
+    around = lowered_round(put, plain.blocks, _PLACE_RING_M)
     is_on = is_on_face(plain, put, at)
     if is_on is None or any(_is_as_high(one, at) is not is_on for one in around):
         return None
-    stays = stays_round(put, plain.blocks, _PLACE_RINGS_M)
+    stays = stays_round(put, plain.blocks, _PLACE_RING_M)
     if verdict((*plain.blocks, put), put.order) is not stays or (stays and not is_on):
         return None
     return stays

@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from phyblock.domain.question import LETTERS, SUBTASKS, Mark, Question, QuestionPicture, Subtask
+from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.errors import DataError, PhyblockError, Problem
-from phyblock.making.questions.base import Draft, Floats, Maker, StaticMaker, pick, shuffled
+from phyblock.making.questions.base import Draft, Floats, Maker, pick, shuffled
 from phyblock.making.questions.dynamics import AffordanceMaker, CounterfactualMaker, PredictiveMaker
 from phyblock.making.questions.properties import PropertyMaker, SizeMaker, TallyMaker
 from phyblock.making.questions.relations import (
@@ -35,6 +35,7 @@ from phyblock.making.questions.relations import (
 from phyblock.making.questions.text_probe import text_features
 from phyblock.making.questions.views import OrderingMaker, ViewpointMaker
 from phyblock.making.workers import Workers
+from phyblock.sim.question_pictures import filled
 from phyblock.types import BACKGROUNDS, Background
 
 MAKERS: dict[Subtask, Maker] = {
@@ -47,8 +48,10 @@ MAKERS: dict[Subtask, Maker] = {
     )
 }
 """The makers of questions, by subtask; plugins add theirs."""
-PER_SUBTASK: Mapping[Subtask, int] = {s: 50 if s in ("OR", "AD") else 150 for s in SUBTASKS}
-"""Questions of each subtask in the built-in set: 2,200 together, as in the paper."""
+PER_SUBTASK = 150
+"""Questions of each subtask, where no other number is asked for."""
+_LEAST_FILLED = 0.05
+"""The least share of a picture that its blocks fill."""
 _DIGITS = 6
 _PLACES = range(len(LETTERS))
 
@@ -77,7 +80,11 @@ def make_questions(
             if len(pool) >= MAKERS[subtask].spare * count:
                 break
         rng = _rng(seed, subtask, "choice")
-        taken = select(pool, count, rng)
+        chosen = select(pool, math.ceil(MAKERS[subtask].doubtful * count), rng)
+        asked = (as_question("", subtask, one, _PLACES, BACKGROUNDS[0]) for one in chosen)
+        found = zip(chosen, workers.map(problem_of, asked), strict=True)
+        sure = (one for one, problem in found if problem is None)
+        taken = list(islice(track(sure, count, f"Deriving {subtask}"), count))
         if len(taken) < count:
             message = f"the scenes give no more than {len(taken)} of {count} questions"
             short.append(Problem(subtask, message, hint="ask for fewer, or give more scenes"))
@@ -92,14 +99,7 @@ def scene_drafts(task: tuple[Subtask, int, Scene]) -> list[Draft]:
     subtask, seed, scene = task
     maker = MAKERS[subtask]
     drafts = maker.drafts(scene, _rng(seed, subtask, scene.id))
-    if not isinstance(maker, StaticMaker):
-        drafts = (one for one in drafts if problem_of(_first(subtask, one)) is None)
     return list(islice(drafts, maker.drafts_a_scene))
-
-
-def _first(subtask: Subtask, one: Draft) -> Question:
-    """Return a draft as the question whose first option is right, or which is in order."""
-    return as_question("", subtask, one, _PLACES, BACKGROUNDS[0])
 
 
 def _rng(seed: int, *parts: str) -> np.random.Generator:
@@ -154,7 +154,7 @@ def as_question(
         answer=tuple(places) if subtask == "OR" else (places[0],),
         pictures=tuple(replace(_tidy(one), background=background) for one in pictures),
         wording=draft.wording,
-        evidence=dict(draft.evidence),
+        evidence={"slots": dict(draft.slots), **draft.facts},
     )
 
 
@@ -183,6 +183,9 @@ def problem_of(question: Question) -> str | None:
     maker = MAKERS.get(question.subtask)
     if maker is None:
         return "its subtask is made by no rule"
+    small = [one.label for one in question.pictures if filled(one) < _LEAST_FILLED]
+    if small:
+        return f"blocks fill less than {_LEAST_FILLED:.0%} of the pictures {small}"
     try:
         derived = maker.rederive(question)
     except PhyblockError as error:
@@ -198,20 +201,22 @@ def problem_of(question: Question) -> str | None:
 _LOOKED_AT = 100
 _SPREAD = 20
 """So many times the drafts that are wanted of a kind are looked at, where the pool has them,"""
-_SPARE = 2
+_SPARE = 1.2
 """and so many times the drafts that are wanted are kept at the least."""
 BALANCE = (0.22, 0.28)
 """Shares of right answers that every letter is to stay within."""
 
 
 def select(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[Draft]:
-    """Return at most `count` drafts, no two the same question about the same scene."""
-    left = _spread(pool, count, rng)
-    rank = rng.random(len(left)) / np.maximum(keeping_odds(left), 1e-9)
-    most = max(1.0, *np.sort(rank)[: _SPARE * count][-1:])
-    left = [one for one, place in zip(left, rank, strict=True) if place <= most]
+    """Return at most `count` drafts, no two of one view, or the same question of base scenes."""
+    every = _spread(pool, count, rng)
+    rank = rng.random(len(every)) / np.maximum(keeping_odds(every), 1e-9)
+    most = max(int((rank <= 1).sum()), round(_SPARE * count))
+    left, rest = (
+        [every[i] for i in some] for some in np.split(rank.argsort(kind="stable"), [most])
+    )
     members: dict[Hashable, set[Hashable]] = defaultdict(set)
-    for one in left:
+    for one in every:
         for group, member, _ in _even(one):
             members[group].add(member)
     counts: Counter[tuple[Hashable, Hashable]] = Counter()
@@ -224,15 +229,18 @@ def select(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[
             cost += weight * (counts[group, member] - sum(others) / len(others))
         return cost
 
-    taken: dict[Hashable, Draft] = {}
-    while left and len(taken) < count:
+    taken: list[Draft] = []
+    known: set[Hashable] = set()
+    while (left or rest) and len(taken) < count:
+        left = left or [rest.pop(0)]
         size = min(_LOOKED_AT, len(left))
         drawn = rng.choice(len(left), size=size, replace=False).tolist()
         chosen = left.pop(min(drawn, key=lambda i: cost(left[i])))
-        if _identity(chosen) not in taken:
-            taken[_identity(chosen)] = chosen
+        if known.isdisjoint(_identities(chosen)):
+            taken.append(chosen)
+            known.update(_identities(chosen))
             counts.update((group, member) for group, member, _ in _even(chosen))
-    return list(taken.values())
+    return taken
 
 
 def _spread(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[Draft]:
@@ -251,7 +259,6 @@ def _spread(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list
 def _even(draft: Draft) -> Iterator[tuple[Hashable, Hashable, float]]:
     """Yield groups, the draft's member of each, and weights: members should be as frequent."""
     yield "kind", draft.kind, 6.0
-    yield ("wording", draft.kind), draft.wording, 2.0
     if texts := _texts(draft):
         yield ("options", draft.kind), frozenset(texts), 0.2
     else:
@@ -264,12 +271,11 @@ def _texts(draft: Draft) -> tuple[str, ...]:
     return tuple(option for option in draft.options if isinstance(option, str))
 
 
-def _identity(draft: Draft) -> Hashable:
-    """Return scene, colors, what is asked about and pictures, but not the words around them."""
-    colors = tuple(block.color for block in draft.scene.blocks)
-    slots = tuple(sorted(draft.evidence["slots"].items()))
-    options = frozenset(option for option in draft.options if not isinstance(option, str))
-    return (draft.scene.id, colors, draft.kind, slots, draft.pictures, options)
+def _identities(draft: Draft) -> list[Hashable]:
+    """Return what no other question may share: scene and view, or base scenes and what is asked."""
+    asked = (draft.scene.parents, draft.wording, tuple(sorted(draft.slots.items())), draft.about)
+    views = [("view", draft.scene.id, one.view_deg) for one in draft.pictures[:1]]
+    return [asked, *views]
 
 
 def even_letters(count: int, rng: np.random.Generator) -> list[int]:
@@ -303,7 +309,7 @@ def keeping_odds(drafts: Sequence[Draft]) -> Floats:
 
     odds = np.ones(len(drafts))
     telling = [i for i, one in enumerate(drafts) if _texts(one) or one.looks]
-    base_of = {i: (drafts[i].scene.parents or (drafts[i].scene.id,))[0] for i in telling}
+    base_of = {i: (*drafts[i].scene.parents, drafts[i].scene.id)[0] for i in telling}
     half_of = {base: n % 2 for n, base in enumerate(sorted(set(base_of.values())))}
     halves = [[i for i in telling if half_of[base_of[i]] == half] for half in (0, 1)]
 

@@ -41,7 +41,9 @@ class PropertyMaker(StaticMaker):
             picture = sight.goal_picture(shown, view)
             block = next(b for b in shown.blocks if b.order == order)
             if name := sight.drawn_name(rng, block, picture, self._features):
-                yield Asked(self.subtask.lower(), shown, picture, {"block": name})
+                about = next((word for word in ("most", "layer", "resting") if word in name), "")
+                stem = self.subtask.lower()
+                yield Asked(stem, shown, picture, {"block": name}, kind=f"{stem} {about}")
 
     def right(self, asked: Asked) -> str:
         """Return the shape or color of the block that the text names."""
@@ -58,7 +60,7 @@ class PropertyMaker(StaticMaker):
 
     def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
         """Return the right shape or color and three others."""
-        words: Sequence[str] = list(sight.SHAPE_WORDS) if asked.stem == "sh" else COLORS
+        words: Sequence[str] = list(sight.SHAPE_WORDS) if asked.stem == "sh" else sight.NAMED_COLORS
         return [right, *base.shuffled(rng, [word for word in words if word != right])[:3]]
 
 
@@ -74,10 +76,10 @@ def _volume_m3(block: Block) -> float:
 
 _COMPARISONS: Mapping[str, tuple[str, Callable[[Block], float], int]] = {
     "tallest": ("si-height", sight.height_m, 1),
-    "flattest": ("si-height", sight.height_m, -1),
+    "shortest": ("si-height", sight.height_m, -1),
     "longest": ("si-length", _length_m, 1),
-    "largest": ("si-volume", _volume_m3, 1),
-    "smallest": ("si-volume", _volume_m3, -1),
+    "the most space": ("si-volume", _volume_m3, 1),
+    "the least space": ("si-volume", _volume_m3, -1),
 }
 """Stems of wordings, measures, and whether most or least of them is asked for."""
 _LEAST_RATIO, _EXACT, _TRIES = 1.3, 0.01, 6
@@ -90,10 +92,12 @@ class SizeMaker(StaticMaker):
     subtask: Subtask = "SI"
 
     def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
-        """Compare four blocks, and two, in turns."""
+        """Compare four blocks, where there are no others, and two, in turns."""
         studied = sight.seen_blocks(sight.goal_picture(scene, view), sight.STUDIED)
         for number in range(2 * _TRIES):
             chosen = base.shuffled(rng, studied)[: 2 if number % 2 else 4]
+            if len(chosen) not in (2, len(scene)):
+                continue
             shown = sight.with_own_colors(scene, sight.orders_of(chosen), rng)
             colors = {block.order: block.color for block in shown.blocks}
             named = [f"{colors[block.order]} block" for block in chosen]
@@ -122,7 +126,7 @@ class SizeMaker(StaticMaker):
         sizes = [measure(block) for block in blocks]
         most, next_one = sorted(sizes, key=lambda size: -sign * size)[:2]
         if max(most, next_one) < _LEAST_RATIO * min(most, next_one):
-            raise UnfairError(f"two of the blocks are about as {asked.slots['comparison']}")
+            raise UnfairError("two of the blocks are about as large")
         return asked.options[sizes.index(most)]
 
     def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
@@ -224,11 +228,10 @@ def _fitting(picture: QuestionPicture, slots: Slots) -> int:
 
 
 def _layer_of_block(picture: QuestionPicture, slots: Slots) -> int:
-    block, layers = sight.resolve_one(slots["block"], picture), layers_of(picture.blocks)
+    block = sight.resolve_one(slots["block"], picture)
     sight.require_seen(picture, sight.NAMED, [block])
-    under = [one for one in picture.blocks if layers[one.order] < layers[block.order]]
-    sight.require_seen(picture, sight.COUNTED, under)
-    return layers[block.order]
+    sight.require_supports_seen(picture, [block])
+    return layers_of(picture.blocks)[block.order]
 
 
 def _colors(picture: QuestionPicture) -> list[str]:
@@ -261,23 +264,11 @@ class Tally:
 
 
 TALLIES: Mapping[str, Tally] = {
-    "nu": Tally(_fitting, range(1, 13), _sorts),
+    "nu": Tally(_fitting, range(1, 13), _sorts, is_recolored=True),
     "oc-all": Tally(lambda p, _: len(_all(p)), range(2, 25)),
     "oc-hidden": Tally(lambda p, _: sure_blocks(p), range(2, 25)),
     "oc-ground": Tally(lambda p, _: len(_on_ground(_all(p))), range(1, 13)),
     "oc-raised": Tally(lambda p, _: len(_all(p)) - len(_on_ground(p.blocks)), range(1, 17)),
-    "oc-other": Tally(
-        lambda p, s: sum(block.color != s["color"] for block in _all(p)),
-        range(1, 19),
-        lambda p: [{"color": color} for color in _colors(p)],
-        is_recolored=True,
-    ),
-    "oc-pair": Tally(
-        lambda p, s: sum(block.color in (s["color"], s["other"]) for block in _all(p)),
-        range(1, 15),
-        lambda p: [{"color": a, "other": b} for a in _colors(p) for b in _colors(p) if a != b],
-        is_recolored=True,
-    ),
     "lc-all": Tally(lambda p, _: max(layers_of(_all(p)).values()), range(1, 9)),
     "lc-block": Tally(
         _layer_of_block,
@@ -313,8 +304,6 @@ _SLOTS_TRIED = {"nu": 12}
 
 class TallyMaker(StaticMaker):
     """NU, OC, LC or TC: the ways of counting whose stems begin with the subtask."""
-
-    views_a_scene = 2
 
     def __init__(self, subtask: Subtask) -> None:
         self.subtask = subtask

@@ -22,7 +22,7 @@ from phyblock.making.questions import base, sight
 from phyblock.making.questions.base import Asked, Floats, StaticMaker, T, UnfairError, View, pick
 from phyblock.sim.balance import surely_stands
 from phyblock.sim.camera import view_axes
-from phyblock.sim.contact import GROUND, bounds_m, boxes_near, support_graph, whole_bounds_m
+from phyblock.sim.contact import bounds_m, boxes_near, support_graph, whole_bounds_m
 
 _RECOLORED = 6
 """So many times the blocks of a view are given other colors, and with these other names."""
@@ -64,7 +64,7 @@ _PLACES: Mapping[str, Sequence[str]] = {
     "rp-upright": base.WORDS["places_upright"],
 }
 _CLEAR_M, _ABOVE_M, _LEVEL_M, _GAP_M = 0.03, 0.015, 0.005, 0.024
-_SIDES = ("farthest left", "farthest right")
+_SIDES = ("farthest to the left", "farthest to the right")
 _RANKED = ("rp-highest", "rp-lowest", "rp-front", "rp-back")
 _NEARER = 0.75
 """The nearest block is at most this share of the next one's distance away."""
@@ -74,7 +74,6 @@ class PositionMaker(StaticMaker):
     """RP: where one block is from another as seen in the picture; the outermost, the nearest."""
 
     subtask: Subtask = "RP"
-    drafts_a_view = 16
 
     def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
         """Ask about pairs of blocks, and for one of four."""
@@ -115,6 +114,7 @@ class PositionMaker(StaticMaker):
             sign = -1.0 if asked.stem in ("rp-highest", "rp-back") else 1.0
             away = _floor_axes(asked.picture.view_deg)[1]
             is_upright = asked.stem in _RANKED[:2]
+            sight.require_supports_seen(asked.picture, four if is_upright else ())
             far = [_top_m(b) if is_upright else float(sight.center_m(b) @ away) for b in four]
             reach = [sign * one for one in far]
             is_clear = asked.stem in _RANKED and sorted(reach)[1] - min(reach) >= _GAP_M
@@ -160,7 +160,8 @@ def _upright(one: Block, other: Block, view: View) -> int:
 # AP
 
 _SIDE_M, _EXACT_CM, _LONGER = 0.001, 0.1, 1.3
-_SCALES: Mapping[str, str] = base.WORDS["scales"]
+_SCALES: Sequence[BlockType] = ("cube", "cylinder", "arch")
+"""Types whose size the prompt says; one of them is to be seen."""
 _STEP_CM, _LONGEST_CM, _PLACE_STEP_CM = 2.5, 50.0, 5.0
 _APART = (1.2, 2.0)
 """Values that are options together: each at least and at most so many times the one before."""
@@ -240,20 +241,17 @@ def length_axis(block: Block) -> int:
 class DistanceMaker(StaticMaker):
     """AP: heights, distances and places in centimeters, on the blocks' grid.
 
-    A block of known size, named in the text, stands in the picture as the scale.
+    A block whose size the prompt says is in the picture as the scale.
     """
 
     subtask: Subtask = "AP"
-    views_a_scene = 2
 
     def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
         """Ask for heights of blocks and distances of pairs."""
         for shown, picture, named in _named(scene, view, rng, 2):
-            types = {block.type for block in sight.seen_blocks(picture, sight.NAMED)}
-            scales = [text for kind, text in _SCALES.items() if kind in types]
-            for stem in (*LENGTHS, "ap-place") if scales else ():
+            for stem in (*LENGTHS, "ap-place"):
                 for one, other in _pairs(list(named.values()), rng):
-                    slots = {"block": one, "scale": pick(rng, scales)}
+                    slots = {"block": one}
                     if stem in _HEIGHTS:
                         yield Asked(stem, shown, picture, slots, kind="height")
                         break
@@ -264,9 +262,9 @@ class DistanceMaker(StaticMaker):
         picture, slots = asked.picture, asked.slots
         names = ("block",) if asked.stem in _HEIGHTS else ("block", "other")
         blocks = _resolved(picture, [slots[name] for name in names])
-        shown = sight.seen_blocks(picture, sight.NAMED)
-        if slots["scale"] not in [_SCALES.get(block.type) for block in shown]:
-            raise UnfairError("the block that gives the scale cannot be seen")
+        sight.require_supports_seen(picture, blocks)
+        if not any(one.type in _SCALES for one in sight.seen_blocks(picture, sight.NAMED)):
+            raise UnfairError("no block that gives the scale can be seen")
         if asked.stem == "ap-place":
             one, other = blocks
             _require_joined(one, other, picture.blocks)
@@ -310,13 +308,11 @@ def _ladders() -> Sequence[Sequence[str]]:
 
 # RD
 
-Below = Mapping[int, frozenset[int]]
-"""The orders that each block rests on, by its order."""
-_RELATIONS: Mapping[str, Callable[[int, int, Below], bool]] = {
+_RELATIONS: Mapping[str, Callable[[int, int, sight.Below], bool]] = {
     "rd-on": lambda block, anchor, below: anchor in below[block],
     "rd-under": lambda block, anchor, below: block in below[anchor],
-    "rd-needed": lambda block, anchor, below: block in _all_below(anchor, below),
-    "rd-carried": lambda block, anchor, below: anchor in _all_below(block, below),
+    "rd-needed": lambda block, anchor, below: block in sight.all_below(anchor, below),
+    "rd-carried": lambda block, anchor, below: anchor in sight.all_below(block, below),
 }
 
 
@@ -324,7 +320,6 @@ class DependencyMaker(StaticMaker):
     """RD: exactly one of four blocks has the relation; contacts are found in the geometry."""
 
     subtask: Subtask = "RD"
-    drafts_a_view = 16
 
     def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
         """Ask about one block with four to choose from, drawn again and again."""
@@ -348,16 +343,6 @@ class DependencyMaker(StaticMaker):
         is_related = _RELATIONS[asked.stem]
         (index,) = base.only_index([is_related(b.order, anchor.order, below) for b in four])
         return asked.options[index]
-
-
-def _all_below(order: int, below: Below) -> set[int]:
-    found: set[int] = set()
-    waiting = [order]
-    while waiting:
-        new = below[waiting.pop()] - {GROUND} - found
-        found |= new
-        waiting += new
-    return found
 
 
 # RR

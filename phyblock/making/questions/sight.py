@@ -15,12 +15,12 @@ from typing import Literal
 
 import numpy as np
 
-from phyblock.domain.blocks import COLORS, SHAPES, BlockType, euler_deg_to_matrix
+from phyblock.domain.blocks import COLORS, SHAPES, BlockType, Color, euler_deg_to_matrix
 from phyblock.domain.question import LETTERS, Question, QuestionPicture
 from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions.base import Floats, Slots, UnfairError, View, pick, shuffled
 from phyblock.sim.camera import view_axes
-from phyblock.sim.contact import bounds_m
+from phyblock.sim.contact import GROUND, bounds_m, support_graph
 from phyblock.sim.engine import Pose
 from phyblock.sim.pictures import PictureStyle, drawn_m, goal_camera, shoot, visible_shares
 from phyblock.sim.question_pictures import is_inside, least_difference, seen, seen_order
@@ -43,6 +43,12 @@ _MIDDLE_GAP, _EDGE_GAP = 0.1, 0.05
 _SAME_M, _SAME_DEG = 0.002, 2.0
 
 
+PLAIN_COLORS: tuple[Color, ...] = ("red", "yellow", "blue")
+"""Colors that everybody tells apart, for marks of what is meant."""
+NAMED_COLORS: tuple[Color, ...] = (*PLAIN_COLORS, "orange")
+"""Without green: to some it looks like orange, to others like yellow."""
+
+
 def orders_of(blocks: Sequence[Block]) -> list[int]:
     """Return the orders of blocks."""
     return [block.order for block in blocks]
@@ -50,13 +56,14 @@ def orders_of(blocks: Sequence[Block]) -> list[int]:
 
 def recolored(scene: Scene, rng: np.random.Generator) -> Scene:
     """Return the scene with a color drawn for every block, so that color tells no shape."""
-    drawn = zip(scene.blocks, rng.integers(len(COLORS), size=len(scene)), strict=True)
-    return replace(scene, blocks=tuple(replace(block, color=COLORS[i]) for block, i in drawn))
+    drawn = zip(scene.blocks, rng.integers(len(NAMED_COLORS), size=len(scene)), strict=True)
+    blocks = (replace(block, color=NAMED_COLORS[i]) for block, i in drawn)
+    return replace(scene, blocks=tuple(blocks))
 
 
 def with_own_colors(scene: Scene, orders: Sequence[int], rng: np.random.Generator) -> Scene:
     """Return the scene with a color of its own for each of up to four blocks."""
-    colors = shuffled(rng, COLORS)
+    colors = shuffled(rng, NAMED_COLORS)
     own, left = dict(zip(orders, colors, strict=False)), colors[len(orders) :]
     blocks = (
         replace(block, color=own.get(block.order) or left[int(rng.integers(len(left)))])
@@ -139,6 +146,28 @@ def require_seen(
     hidden = [order for order in sorted(orders) if seen_share[order] < least]
     if hidden:
         raise UnfairError(f"blocks {hidden} show less than {least:.0%} of themselves")
+
+
+Below = Mapping[int, frozenset[int]]
+"""The orders that each block rests on, by its order."""
+
+
+def all_below(order: int, below: Below) -> set[int]:
+    """Return the orders of all that a block rests on, directly or not, without the ground."""
+    found: set[int] = set()
+    waiting = [order]
+    while waiting:
+        new = below[waiting.pop()] - {GROUND} - found
+        found |= new
+        waiting += new
+    return found
+
+
+def require_supports_seen(picture: QuestionPicture, blocks: Sequence[Block]) -> None:
+    """Raise UnfairError unless all that the blocks rest on shows enough to tell their height."""
+    below = support_graph(picture.blocks)
+    under = {order for block in blocks for order in all_below(block.order, below)}
+    require_seen(picture, COUNTED, [block for block in picture.blocks if block.order in under])
 
 
 def require_shapes_seen(picture: QuestionPicture) -> None:
@@ -257,7 +286,7 @@ SHAPE_WORDS: dict[str, tuple[BlockType, ...]] = {
 }
 """The types that each word names."""
 _NOUNS = {**SHAPE_WORDS, "block": sum(SHAPE_WORDS.values(), ())}
-_SIDE_WORDS = ("leftmost", "rightmost", "topmost")
+_SIDE_WORDS = ("leftmost", "rightmost", "highest")
 _TOP_GAP_M = 0.02
 _NAMES_DRAWN_FROM = 3
 _SIMPLE = rf"(?:(?:{'|'.join(COLORS)}) )?(?:{'|'.join(_NOUNS)})"
@@ -298,7 +327,7 @@ def resolve(text: str, picture: QuestionPicture, loosely: bool = False) -> tuple
     if support is not None:
         below = resolve(support, picture, loosely)
         fitting = [b for b in fitting if len(below) == 1 and set(b.depend) == set(below)]
-    if side == "topmost" and fitting:
+    if side == "highest" and fitting:
         tops_m = [float(bounds_m(block)[1, 2]) for block in fitting]
         close = [b for b, m in zip(fitting, tops_m, strict=True) if max(tops_m) - m < _TOP_GAP_M]
         fitting = close if len(close) == 1 else []

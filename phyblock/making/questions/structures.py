@@ -2,63 +2,97 @@
 
 The structures of the data set are built so that they stand at every step; few of their blocks
 rest on more than they need, and none is held by a weight. An annex is a plank laid on a flat top,
-off its middle as likely as not, with weights on it and perhaps a column under its free end: drawn
-at random, it is a balance, a cantilever with a counterweight, or a bridge with a support too many.
+off its middle as likely as not, with weights on it: a balance, or a cantilever held by one.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from phyblock.domain.blocks import COLORS, SHAPES, BlockType, Euler
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.base import pick
+from phyblock.making.questions.base import Floats, pick
 from phyblock.sim.balance import MARGIN_M, is_balanced, surely_falls, surely_stands
 from phyblock.sim.contact import bounds_m, drop_height_m, find_gaps, find_overlaps
 from phyblock.sim.dynamics import groups
 from phyblock.sim.geometry import corners_m
 from phyblock.sim.outcomes import holds
-from phyblock.stable import plain_sum
 
 _UNIT_M = 0.0125
-_TRIED, _PLANS_TRIED, _MOST_LEFT_OUT, _MOST_WEIGHTS = 16, 60, 5, 3
+_TRIED, _PLANS_TRIED, _MOST_LEFT_OUT = 16, 60, 5
 _FLAT_M, _LEAST_TOP_M, _HIGHEST_M = 0.0005, 0.045, 0.2
-_PROPPED = 0.4
 _PLANKS: tuple[BlockType, ...] = ("cuboid3", "cuboid3", "cuboid2")
 _FLAT: Euler = (0.0, 0.0, 0.0)
 _WEIGHTS: tuple[tuple[BlockType, Euler], ...] = (
     *(("cube", _FLAT), ("cube", _FLAT), ("cuboid1", _FLAT), ("cylinder", _FLAT)),
     *(("cuboid2", (0.0, 90.0, 0.0)), ("cuboid2", (0.0, 0.0, 90.0))),
 )
-_PIECES: tuple[BlockType, ...] = ("cylinder", "cube", "cuboid1")
 _LIFT_M, _DIRECTIONS = 0.6, 8
 
 
+Way = tuple[tuple[Block, ...], Floats]
+"""Blocks, and measures of how some were laid by which these might stand out."""
+
+
 def with_annex(scene: Scene, rng: np.random.Generator) -> tuple[Block, ...] | None:
-    """Return a structure nearly done, and a few blocks more on one of its tops, or None.
+    """Return a structure nearly done with a plank and weights on one of its tops, or None.
 
     Nothing overlaps or hangs free, and all is in balance. Blocks that are not of the scene have
     orders above its own.
     """
     for _ in range(_TRIED):
-        order = scene.graph.random_order(rng)
-        kept = len(order) - int(rng.integers(min(_MOST_LEFT_OUT, len(order) - 1) + 1))
-        base = tuple(scene.blocks[vertex] for vertex in sorted(order[:kept]))
-        carrying = {order for block in base for order in block.depend}
-        tops = [block for block in base if block.order not in carrying and _is_flat(block)]
-        if not tops:
-            continue
-        first = max(block.order for block in scene.blocks) + 1
-        added = _annex(pick(rng, tops), rng)
-        blocks = (*base, *(replace(block, order=first + i) for i, block in enumerate(added)))
-        is_sound = added and not find_overlaps(blocks) and not find_gaps(blocks)
-        if is_sound and is_balanced(blocks):
-            return blocks
+        for blocks, _ in arrangements(scene, rng, 1)[1]:
+            if is_balanced(blocks):
+                return blocks
     return None
+
+
+def arrangements(
+    scene: Scene, rng: np.random.Generator, most: int
+) -> tuple[tuple[Block, ...], list[Way], list[Way]]:
+    """Return a structure nearly done, and ways of laying a plank with two weights on one of its
+    tops: at most so many that stay, and that fall.
+
+    All ways are of the same blocks along the same line; a lever decides, with a margin.
+    """
+    order = scene.graph.random_order(rng)
+    kept = len(order) - int(rng.integers(min(_MOST_LEFT_OUT, max(len(order) - 2, 0)) + 1))
+    base = tuple(scene.blocks[vertex] for vertex in sorted(order[:kept]))
+    carrying = {order for block in base for order in block.depend}
+    tops = [block for block in base if block.order not in carrying and _is_flat(block)]
+    found: dict[bool, list[Way]] = {True: [], False: []}
+    if not tops:
+        return base, [], []
+    top, along, first = pick(rng, tops), int(rng.integers(2)), max(b.order for b in scene.blocks)
+    low, high = bounds_m(top)
+    middle, reach_m = (low + high) / 2, float(high[along] - low[along]) / 2
+    kinds = [(pick(rng, _PLANKS), _FLAT), pick(rng, _WEIGHTS), pick(rng, _WEIGHTS)]
+    masses = [SHAPES[block_type].mass_kg for block_type, _ in kinds]
+    half = round(SHAPES[kinds[0][0]].sides_m[0] / _UNIT_M / 2)
+    loose = [
+        Block(first + i, block_type, pick(rng, COLORS), (0.0, 0.0, float(high[2])), turned, (), 1)
+        for i, (block_type, (roll, pitch, yaw)) in enumerate(kinds, 1)
+        for turned in [(roll, pitch, (yaw + 90.0 * along) % 180.0)]
+    ]
+    for _ in range(_PLANS_TRIED):
+        off, *steps = rng.integers(1 - half, half, size=len(loose)).tolist()
+        offs_m = _UNIT_M * np.array([off, *(off + step for step in steps)])
+        lean_m = abs(float(np.average(offs_m, weights=masses)))
+        stays = lean_m <= reach_m - MARGIN_M
+        if (not stays and lean_m <= reach_m + MARGIN_M) or len(found[stays]) == most:
+            continue
+        blocks = base
+        for block, off_m in zip(loose, offs_m.tolist(), strict=True):
+            x, y = (float(middle[i]) + (off_m if i == along else 0.0) for i in (0, 1))
+            blocks = (*blocks, lowered(block, blocks[len(base) :][:1] or [top], x, y))
+        if not find_overlaps(blocks) and not find_gaps(blocks):
+            looks = [*offs_m, *np.abs(offs_m), *(offs_m[1:] - offs_m[0]), np.ptp(offs_m)]
+            found[stays].append((blocks, np.array(looks)))
+    return base, found[True], found[False]
 
 
 def _is_flat(block: Block) -> bool:
@@ -69,59 +103,6 @@ def _is_flat(block: Block) -> bool:
     is_square = all(abs(angle % 90.0) < 1e-6 for angle in block.euler_deg)
     is_wide = bool(np.ptp(top, axis=0).min() >= _LEAST_TOP_M)
     return is_square and is_wide and highest <= _HIGHEST_M
-
-
-def _annex(top: Block, rng: np.random.Generator) -> list[Block]:
-    """Return a plank along x or y on a top, and weights on it of which one at least is needed.
-
-    Or with a column under one end, where the weights may be any.
-    """
-    along = int(rng.integers(2))
-    low, high = bounds_m(top)
-    middle, reach_m = (low + high) / 2, float(high[along] - low[along]) / 2
-
-    def put(block_type: BlockType, euler_deg: Euler, steps: int, onto: Sequence[Block]) -> Block:
-        roll, pitch, yaw = euler_deg
-        turned = (roll, pitch, (yaw + 90.0 * along) % 180.0)
-        block = Block(0, block_type, pick(rng, COLORS), (0.0, 0.0, float(high[2])), turned, (), 1)
-        x, y = (float(middle[i]) + (_UNIT_M * steps if i == along else 0.0) for i in (0, 1))
-        return lowered(block, onto, x, y)
-
-    def leans_m(blocks: Sequence[Block]) -> float:
-        """Return how far the blocks' center is from the middle of the top, along the plank."""
-        masses = [SHAPES[block.type].mass_kg for block in blocks]
-        offs = [float(bounds_m(block).mean(axis=0)[along] - middle[along]) for block in blocks]
-        return abs(plain_sum(m * x for m, x in zip(masses, offs, strict=True)) / plain_sum(masses))
-
-    is_propped = rng.random() < _PROPPED
-    for _ in range(_PLANS_TRIED):
-        kind = pick(rng, _PLANKS)
-        half = round(SHAPES[kind].sides_m[0] / _UNIT_M / 2)
-        off = int(rng.integers(-half, half + 1))
-        plank = put(kind, _FLAT, off, [top])
-        weights = [
-            put(*pick(rng, _WEIGHTS), off + int(rng.integers(2 - half, half - 1)), [plank])
-            for _ in range(int(rng.integers(_MOST_WEIGHTS + 1)))
-        ]
-        every = [plank, *weights]
-        if is_propped:
-            return [*every, *_column(plank, put, off + (half - 2 if off > 0 else 2 - half))]
-        fewer = ([one for one in every if one is not weight] for weight in weights)
-        is_needed = any(leans_m(some) > reach_m + MARGIN_M for some in fewer)
-        if is_needed and leans_m(every) <= reach_m - MARGIN_M:
-            return every
-    return []
-
-
-def _column(plank: Block, put: Callable[..., Block], steps: int) -> list[Block]:
-    """Return pieces from the floor up to a plank; they overlap it or leave a gap where none fit."""
-    column: list[Block] = []
-    left_m = float(bounds_m(plank)[0, 2])
-    for piece in _PIECES:
-        while left_m >= SHAPES[piece].sides_m[2] - _FLAT_M:
-            column.append(put(piece, _FLAT, steps, column))
-            left_m -= SHAPES[piece].sides_m[2]
-    return column
 
 
 def lowered(block: Block, onto: Sequence[Block], x_m: float, y_m: float) -> Block:
@@ -137,22 +118,20 @@ def lowered(block: Block, onto: Sequence[Block], x_m: float, y_m: float) -> Bloc
     return replace(lifted, position_m=(x, y, round(lifted.position_m[2] - fall, 6)))
 
 
-def lowered_round(put: Block, onto: Sequence[Block], rings_m: Sequence[float]) -> Iterator[Block]:
-    """Yield the block let down anew all round, in eight directions for each ring [m]."""
+def lowered_round(put: Block, onto: Sequence[Block], radius_m: float) -> Iterator[Block]:
+    """Yield the block let down anew all round, so far off [m] in eight directions."""
     x, y, _ = bounds_m(put).mean(axis=0).tolist()
-    for radius_m in rings_m:
-        for number in range(_DIRECTIONS):
-            angle = 2 * math.pi * number / _DIRECTIONS
-            at = (x + radius_m * math.cos(angle), y + radius_m * math.sin(angle))
-            yield lowered(put, onto, *at)
+    for number in range(_DIRECTIONS):
+        angle = 2 * math.pi * number / _DIRECTIONS
+        yield lowered(put, onto, x + radius_m * math.cos(angle), y + radius_m * math.sin(angle))
 
 
-def stays_round(put: Block, onto: Sequence[Block], rings_m: Sequence[float]) -> bool | None:
+def stays_round(put: Block, onto: Sequence[Block], radius_m: float) -> bool | None:
     """True if by statics a block let down stays, and likewise all round; None where unsure."""
     stays = surely_stays((*onto, put), put.order)
     is_alike = stays is not None and all(
         is_balanced(group_of((*onto, moved), moved.order)) is stays
-        for moved in lowered_round(put, onto, rings_m)
+        for moved in lowered_round(put, onto, radius_m)
     )
     return stays if is_alike else None
 

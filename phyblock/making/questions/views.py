@@ -24,7 +24,7 @@ from phyblock.domain.question import LETTERS, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import turned_form
 from phyblock.making.questions import base, sight
-from phyblock.making.questions.base import Draft, Floats, Maker, UnfairError, View, draft, pick
+from phyblock.making.questions.base import Draft, Floats, Maker, UnfairError, View, pick
 from phyblock.sim.question_pictures import is_inside, least_difference, seen, shown_pixels
 
 # VP
@@ -58,7 +58,7 @@ class ViewpointMaker(Maker):
         """Compare the blocks in the pictures, whichever side they are seen from."""
         slots = base.slots_of(question)
         shown, options = sight.picture_of(question, "scene"), sight.option_pictures(question)
-        if base.stem_of(question.wording) == "vp-side":
+        if question.wording == "vp-side":
             if shown.view_deg[0] not in _FRONTS_DEG:
                 raise UnfairError("the first picture is not straight from the front")
             azimuth = _from_side(shown.view_deg, slots["side_words"])[0]
@@ -95,7 +95,7 @@ def _colorings(
             right = int(rng.integers(len(four)))
             dealt = [options[right], *options[:right], *options[right + 1 :]]
             slots = {"side_words": side} if side else {}
-            yield draft(scene, rng, stem, dealt, [shown[right]], slots)
+            yield Draft(scene, stem, tuple(dealt), (shown[right],), slots)
             return
 
 
@@ -131,16 +131,11 @@ def _histogram(blocks: Sequence[Block], pixels: dict[int, int]) -> Floats:
 
 # OR
 
-_LEAST_BLOCKS, _VIEWS_TRIED, _CUTS_TRIED = 6, 4, 150
+_LEAST_BLOCKS, _VIEWS_TRIED, _CUTS_TRIED = 6, 4, 400
 _GO_ON = 0.75
-_PAIRS: tuple[tuple[Color, Color], ...] = (
-    ("yellow", "blue"),
-    ("orange", "blue"),
-    ("red", "yellow"),
-    ("blue", "orange"),
-    ("green", "orange"),
-    ("yellow", "green"),
-)
+_MOST_SORTED, _MOST_RISING = 4, 2
+"""So many more of the six pairs of stages, at the most, rise in some measure, or in height."""
+_PAIRS = tuple(itertools.permutations(sight.PLAIN_COLORS, 2))
 """The color of a stage and that of all else."""
 Stages = Sequence[frozenset[int]]
 
@@ -177,7 +172,7 @@ class OrderingMaker(Maker):
                 ordered = options if kind == "or-build" else options[::-1]
                 slots: dict[str, str] = {"color": pair[0], "other": pair[1]}
                 facts = {"stages": [sorted(stage) for stage in stages]}
-                yield draft(scene, rng, kind, ordered, [], slots, facts=facts)
+                yield Draft(scene, kind, tuple(ordered), (), slots, facts)
                 return
 
     def rederive(self, question: Question) -> tuple[int, ...]:
@@ -191,7 +186,7 @@ class OrderingMaker(Maker):
         order = _only_order(scene, stages)
         if order is None:
             raise UnfairError("what rests on what leaves more than one order, or none")
-        return order if base.stem_of(question.wording) == "or-build" else order[::-1]
+        return order if question.wording == "or-build" else order[::-1]
 
 
 def _cut(scene: Scene, rng: np.random.Generator) -> Stages:
@@ -226,13 +221,14 @@ def _only_order(scene: Scene, stages: Stages) -> tuple[int, ...] | None:
 
 
 def _is_sorted_by_eye(plain: QuestionPicture, stages: Stages) -> bool:
-    """True if size or height of what is highlighted, either way round, gives the order."""
+    """True if size, height or place of what is highlighted tells much of the order, either way."""
     shown, looks = seen(plain).block, []
     for stage in stages:
         blocks = [(i, b.position_m[2]) for i, b in enumerate(plain.blocks) if b.order in stage]
-        rows = np.nonzero(np.isin(shown, [i for i, _ in blocks]))[0]
+        rows, columns = np.nonzero(np.isin(shown, [i for i, _ in blocks]))
         heights = [height for _, height in blocks]
         levels = (float(np.mean(heights)), max(heights), min(heights))
-        looks.append((len(stage), len(rows), *levels, rows.mean(), rows.min(), rows.max()))
-    columns = map(list, zip(*looks, strict=True))
-    return any(column in (sorted(column), sorted(column)[::-1]) for column in columns)
+        looks.append((*levels, rows.mean(), rows.min(), rows.max(), columns.mean(), len(rows)))
+    steps = (np.sign(np.subtract(b, a)) for a, b in itertools.combinations(looks, 2))
+    sorted_by = np.abs(np.sum(list(steps), axis=0))
+    return bool(sorted_by.max() > _MOST_SORTED or sorted_by[0] > _MOST_RISING)
