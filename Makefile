@@ -13,7 +13,7 @@ FAULTS ?= 510
 KILLS ?= 36
 
 # `make test-pythons`: a part of the tests on the oldest and the newest other Python that is here.
-.PHONY: run test test-all test-pythons fuzz check docs lock clean
+.PHONY: run test test-all test-pythons fuzz check docs tutorials lock clean
 
 $(RUNS): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; \
@@ -52,6 +52,9 @@ check: $(TESTS)
 # The documentation site, in build/docs-site; a broken link is an error.
 docs: $(TESTS)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
+
+# Follows the tutorials of the documentation.
+tutorials: $(TESTS)
 	$(BIN)/python -m pytest -n 2 -q -m '' tests/docs
 
 LOCK := $(BIN)/uv pip compile pyproject.toml --universal --python-version 3.11 \

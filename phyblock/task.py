@@ -59,13 +59,16 @@ def _result(work: Coroutine[Any, Any, _T]) -> _T:
     raise RuntimeError("the coroutine waits for an event loop")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Score:
     """The worth of a reply: its record as a run would keep it, read by one setting and matcher."""
 
     record: Record
     setting: str
     matcher: str
+
+    def __repr__(self) -> str:
+        return f"<score: {self.measure} {self.value:.3f}, {self.problem or self.outcome}>"
 
     @property
     def measure(self) -> str:
@@ -214,14 +217,20 @@ class Task:
         return None if form is None else form.schema
 
     def score(self, reply: str | Sequence[str] | None) -> Score:
-        """Return the score of a reply, of an episode's replies in order, or of none."""
+        """Return the score of a reply, of an episode's replies in order, or of none.
+
+        Raises SpecError for anything else.
+        """
         if self.plays:
             episode = Episode(self, shows=False)
             for one in [reply] if isinstance(reply, str) else reply or ():
                 if episode.step(one).done:
                     break
             return episode.score()
-        assert reply is None or isinstance(reply, str), "one reply"
+        if not (reply is None or isinstance(reply, str)):
+            raise SpecError(
+                Problem(self.id, "takes one reply", "reply", repr(reply), "a text, None")
+            )
         record = _result(judge_reply(self.track, self.item, self._begun(reply)))
         return self._scored(record)
 

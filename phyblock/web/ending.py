@@ -16,7 +16,7 @@ from phyblock.records.files import read_records
 from phyblock.records.record import Record
 from phyblock.results.compare import check_alike, comparable
 from phyblock.results.estimates import strongest_floor
-from phyblock.results.load import Run, load_run
+from phyblock.results.load import load_run
 from phyblock.results.text import number
 from phyblock.sim.film import FilmStep
 from phyblock.sim.pictures import Lookout, PictureStyle, to_png
@@ -27,7 +27,7 @@ from phyblock.web.card import card_png
 
 CARD = "card.png"
 _BUILT = re.compile(r"built/(\d{1,9})\.png")
-_SIZE_PX = 320
+_SIZE_PX, _GAP_PX = 320, 8
 
 
 class Ending:
@@ -40,8 +40,8 @@ class Ending:
     def __init__(
         self, folder: Path, person: str, beside: Sequence[Path], tasks: Sequence[AssemblyTask]
     ) -> None:
-        self._run, self._person = load_run(folder), person
-        self._others = [load_run(path) for path in beside]
+        self._runs = [load_run(path) for path in (folder, *beside)]
+        self._run, self._person = self._runs[0], person
         self._tasks = {task.scene.id: task for task in tasks}
         records = [one for one in read_records(folder) if one.model == person]
         self._films = {
@@ -80,9 +80,9 @@ class Ending:
         """Return the goal on the left and what was built on the right."""
         task, last = self._films[number]
         lookout = Lookout(task.scene, PictureStyle(_SIZE_PX))
-        pair = Image.new("RGB", (2 * _SIZE_PX, _SIZE_PX))
+        pair = Image.new("RGB", (2 * _SIZE_PX + _GAP_PX, _SIZE_PX), "#ffffff")
         for place, blocks in enumerate((task.scene.blocks, last.blocks)):
-            pair.paste(lookout.image(blocks), (place * _SIZE_PX, 0))
+            pair.paste(lookout.image(blocks), (place * (_SIZE_PX + _GAP_PX), 0))
         return pair
 
     def _track(self, track: str, records: Sequence[Record]) -> dict[str, Any]:
@@ -111,7 +111,7 @@ class Ending:
             "item": kind.item,
             "measure": measure.heading,
             "unit": measure.unit,
-            "line": self._line(track, means),
+            "line": self._line(track, {name: value for name, value, _ in means}),
             "means": means,
             "rows": rows,
         }
@@ -120,7 +120,9 @@ class Ending:
         """Return the person's value of each item, and those of all others by name."""
         what = comparable(self._run, track)
         part, found = what.parts[-1], dict[str, dict[str, float]]()
-        for other in (one for one in self._runs if track in one.design.suite.tracks):
+        for other in self._runs:
+            if track not in other.design.suite.tracks:
+                continue
             try:
                 check_alike(other, self._run, [part.cell], track, what.measure)
             except SpecError as error:
@@ -131,19 +133,15 @@ class Ending:
                 found.setdefault(model, {str(item): float(mean) for item, mean in means.items()})
         return found.pop(self._person, {}), found
 
-    @property
-    def _runs(self) -> list[Run]:
-        return [self._run, *self._others]
-
-    def _line(self, track: str, means: Sequence[tuple[str, float, int]]) -> list[tuple[str, float]]:
+    def _line(self, track: str, means: Mapping[str, float]) -> list[tuple[str, float]]:
         """Return the person, the strongest rule that never sees the goal, and the best model."""
         floor = strongest_floor(self._run, track)
         rules = set().union(*(one.design.baselines for one in self._runs))
-        models = [one for one in means if one[0] != "You" and one[0] not in rules]
-        chosen = [one for one in means if one[0] in ("You", floor and floor.name)]
-        chosen.sort(key=lambda one: one[0] != "You")
-        line = [(name, value) for name, value, _ in chosen]
-        return line + [(f"best model {name}", value) for name, value, _ in models[:1]]
+        line = [(name, value) for name, value in means.items() if name == "You"]
+        if floor is not None:
+            line.append((floor.name, means.get(floor.name, floor.value)))
+        models = [name for name in means if name not in rules and name != "You"]
+        return line + [(f"best model {name}", means[name]) for name in models[:1]]
 
 
 def went(record: Record, matcher: str) -> dict[str, Any]:

@@ -38,8 +38,8 @@ _HINTS = {
 """Hints by the last part of the name of what differs."""
 _FAILURES = 4
 _ABOUT = (
-    "A vision-language model sees a picture of a structure and sixteen numbered blocks, and says "
-    "which blocks to place, in which order."
+    "Can vision-language models build what they see? A model gets a picture of a structure and of "
+    "sixteen numbered blocks, and names the blocks to place, in order."
 )
 
 

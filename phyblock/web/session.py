@@ -83,17 +83,6 @@ class Given:
     took_s: float
 
 
-def picking_of(request: Request, suite: Suite) -> Picking:
-    """Return the choices that answer a request of a suite.
-
-    Nothing tells how grids are cut in pictures that a data set brings: they are not clicked in.
-    """
-    by_hand = kind_of(request.track).by_hand
-    assert by_hand is not None, "a plan has only tracks that can be answered by hand"
-    picking = by_hand(request.subject)
-    return picking if suite.images.source == "render" else picking.without_cells()
-
-
 class PersonModel:
     """A model that answers a request with the reply that a person's picks make at a page.
 
@@ -125,7 +114,12 @@ class PersonModel:
         self._session.warmed(went(record, self._plan.suite.scoring.matchers[0]))
 
     async def _answered(self, request: Request, *, is_warm_up: bool = False) -> Reply:
-        picking = picking_of(request, self._plan.suite)
+        by_hand = kind_of(request.track).by_hand
+        assert by_hand is not None, "a plan has only tracks that can be answered by hand"
+        picking = by_hand(request.subject)
+        if self._plan.suite.images.source != "render":
+            # Nothing tells how grids are cut in pictures that a data set brings.
+            picking = picking.without_cells()
         given = await self._session.ask(request, picking, is_warm_up=is_warm_up)
         return Reply(
             text=picking.reply(given.picks),
@@ -151,17 +145,6 @@ def _spare_scene(plan: RunPlan) -> AssemblyTask | None:
     return next((task for task in spare if 1 in task.scene.levels), None)
 
 
-@dataclass(frozen=True)
-class Place:
-    """The place of a question: the item's number from 1, of how many, and the turn there; the
-    number of a warm-up is 0.
-    """
-
-    number: int
-    of: int
-    turn: int = 1
-
-
 def pictures_of(request: Request) -> tuple[Image, ...]:
     """Return every picture of a request in the order sent."""
     return tuple(
@@ -170,12 +153,12 @@ def pictures_of(request: Request) -> tuple[Image, ...]:
 
 
 def shown(
-    request: Request, picking: Picking, place: Place, addresses: Sequence[str]
+    request: Request, picking: Picking, place: Mapping[str, int], addresses: Sequence[str]
 ) -> dict[str, Any]:
     """Return a question as the page takes it: the messages that a model is sent, and the choices.
 
-    Nothing else of an item is in it: no name, no scene, no answer. `addresses` are those of its
-    pictures, in order.
+    Nothing else of an item is in it: no name, no scene, no answer. `place` is the number of the
+    item (0: a warm-up), of how many, and the turn there; `addresses` are those of its pictures.
     """
     pictures, left = pictures_of(request), iter(addresses)
     last = {picture.label: (n, picture) for n, picture in enumerate(pictures)}
@@ -196,7 +179,7 @@ def shown(
         ]
         choices.append({"name": choice.name, "text": choice.text, "spots": spots})
     return {
-        **asdict(place),
+        **place,
         "messages": [
             {"role": message.role, "parts": [part_of(part) for part in message.parts]}
             for message in request.messages
@@ -217,7 +200,7 @@ class _Asked:
 
     request: Request
     picking: Picking
-    place: Place
+    place: Mapping[str, int]
     answer: Future[Given]
     before_s: float = 0.0
     since_s: float | None = None
@@ -290,7 +273,8 @@ class PlaySession:
             if self._phase == "closed":
                 raise HaltedError("the session was closed")
             self._turns += not is_warm_up
-            place = Place(0 if is_warm_up else self.done + 1, self._of, max(1, self._turns))
+            number = 0 if is_warm_up else self.done + 1
+            place = {"number": number, "of": self._of, "turn": max(1, self._turns)}
             self._asked = _Asked(request, picking, place, answer)
             if self._phase == "waiting":
                 self._go_to("question")

@@ -233,7 +233,7 @@ def end_on_a_phone(page: Page, run: Path) -> None:
     assert "oracle\t100.0" in page.locator("table").first.inner_text()
     built = page.get_by_alt_text("what you built").first
     built.scroll_into_view_if_needed()
-    assert built.evaluate("image => image.decode().then(() => image.naturalWidth)") == 640
+    assert built.evaluate("image => image.decode().then(() => image.naturalWidth)") == 648
     with page.expect_download() as download:
         page.get_by_role("link", name="Save a picture").tap()
     assert Path(download.value.path()).read_bytes().startswith(b"\x89PNG")

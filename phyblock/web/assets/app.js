@@ -1,8 +1,7 @@
-/* The page: what the address names is shown; theme, keyboard, Back and Forward, paper. */
+/* The page: what the address names is shown; keyboard, Back and Forward, paper. */
 "use strict";
 
 const App = (() => {
-  const THEME = "phyblock-theme";
   const WAIT_MS = 250;
   const VIEWS = { results: Results.view, model: Views.model, scenes: Views.scenes, scene: Views.scene, samples: List.view };
   const root = document.documentElement;
@@ -69,7 +68,7 @@ const App = (() => {
       if (link.hash === `#${view}`) link.setAttribute("aria-current", "page");
       else link.removeAttribute("aria-current");
     }
-    document.title = [...new Set([place.querySelector("h1")?.textContent, Data.board.title])].filter(Boolean).join(" · ");
+    document.title = [...new Set([[...place.querySelectorAll("h1")].find((one) => one.checkVisibility())?.textContent, Data.board.title])].filter(Boolean).join(" · ");
     if (isSame) document.getElementById(focused)?.focus({ preventScroll: true });
     else if (mine > 1) {
       window.scrollTo(0, 0);
@@ -83,34 +82,7 @@ const App = (() => {
     Sample.player?.tell();
   }
 
-  // ---- theme, keys, paper
-
-  /** Browsers may forbid storage to pages from disk; the theme is then not remembered. */
-  function stored(name) {
-    try {
-      if (name) localStorage.setItem(THEME, name);
-      return localStorage.getItem(THEME);
-    } catch {
-      return null;
-    }
-  }
-
-  function theme(name) {
-    root.dataset.theme = name;
-    document.getElementById("theme").setAttribute("aria-pressed", String(name === "dark"));
-    redraw();
-  }
-
-  function startTheme() {
-    const dark = matchMedia("(prefers-color-scheme: dark)"), kept = stored();
-    document.getElementById("theme").addEventListener("click", () => {
-      const name = (root.dataset.theme ? root.dataset.theme === "dark" : dark.matches) ? "light" : "dark";
-      stored(name);
-      theme(name);
-    });
-    if (kept === "light" || kept === "dark") theme(kept);
-    dark.addEventListener("change", () => redraw());
-  }
+  // ---- keys, paper
 
   const step = (by) => Sample.player?.stopAt(Sample.player.at + by);
   const KEYS = {
@@ -140,7 +112,7 @@ const App = (() => {
   }
 
   function start() {
-    startTheme();
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => redraw());
     startPrint();
     document.addEventListener("keydown", onKey);
     document.querySelector(".skip").addEventListener("click", (event) => {

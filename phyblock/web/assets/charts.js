@@ -31,7 +31,7 @@ const Charts = (() => {
     const hasSolved = track.best !== null;
     const columns = [["rank", "Rank"], ["text", "Model"], ["bar-head", el("span", { class: "labels" }, lines.map(([name, value, kind]) =>
       // Moved by the same share of its width, a label stays within its column.
-      el("span", { class: kind, style: { left: at(value), transform: `translateX(-${at(value)})` } }, `${name} ${number(value)}`)))],
+      el("span", { class: kind, style: { left: at(value), transform: `translateX(-${at(value)})` } }, `${name} ${number(value)}`, kind === "floor" ? el("span", { class: "why" }, ", which never sees the goal") : null)))],
     ["", `${track.main}${track.unit ? ` (${track.unit})` : ""}`], hasSolved && ["", "Solved of all"],
     levels.length && ["text", "Levels 1 to 4"]].filter(Boolean);
     const bar = (row) => {
@@ -83,15 +83,15 @@ const Charts = (() => {
     const line = ([row, at]) => svg("a", { href: App.address("model", { m: row.name }), class: row === floor ? "floor" : "model" },
       svg("polyline", { points: levels.map((level, i) => `${x(i)},${y(valueOf(row, level))}`).join(" ") }),
       levels.map((level, i) => svg("circle", { cx: x(i), cy: y(valueOf(row, level)), r: 3 })),
-      svg("line", { class: "leader", x1: x(levels.length - 1) + 5, y1: y(valueOf(row, end)), x2: width - right + 14, y2: at - 4 }),
-      svg("text", { x: width - right + 17, y: at }, row.name.length > 28 ? `${row.name.slice(0, 27)}…` : row.name));
+      svg("line", { class: "leader", x1: x(levels.length - 1) + 5, y1: y(valueOf(row, end)), x2: width - right + 24, y2: at - 4 }),
+      svg("text", { x: width - right + 28, y: at }, row.name.length > 28 ? `${row.name.slice(0, 27)}…` : row.name));
     const ticks = Array.from({ length: Math.floor(most / step) + 1 }, (_, n) => n * step);
     const drawing = svg("svg", { viewBox: `0 0 ${width} ${Math.max(height, below + 6)}`, class: "slope", role: "group", "aria-label": `${track.main} by level; the table of all numbers has them too` },
       ticks.map((value) => [svg("line", { class: "grid", x1: left, x2: width - right, y1: y(value), y2: y(value) }),
         svg("text", { x: left - 8, y: y(value) + 4, class: "end" }, number(value, 0))]),
       levels.map((level, i) => svg("text", { x: x(i), y: height - 10, class: "middle" }, level.heading)), labels.map(line));
     return [el("h3", {}, "By level"), floor ? el("p", { class: "muted" }, `Dashed: ${floor.name}, which never sees the goal.`) : null,
-      scrolled("Chart by level", drawing)];
+      scrolled(`${track.title} by level`, drawing)];
   }
 
   /** A bar a model: its wrong steps by type, each a way to its samples. */

@@ -39,7 +39,7 @@ const List = (() => {
     const detail = el("div", { class: "detail", tabindex: 0, role: "region", "aria-label": "The sample" });
     const button = (text, act, more = {}) => el("button", { type: "button", class: "quiet", onclick: act, ...more }, text);
     const frame = el("div", { class: "workspace" },
-      el("aside", { "aria-label": "List of samples" },
+      el("aside", { "aria-label": "List of samples" }, el("h1", {}, "Samples"),
         el("label", { class: "choice" }, el("span", {}, "Find; Enter: in replies too"), find), form, status, list,
         el("p", { class: "keys muted" }, [["J", "K", "next, previous"], ["Space", "play"], ["←", "→", "step"], ["/", "search"]]
           .map((keys) => [keys.slice(0, -1).map((key) => el("kbd", {}, key)), ` ${keys.at(-1)} `]))),

@@ -104,7 +104,7 @@
   function item(row, track) {
     return el("li", { class: "card" }, el("h3", {}, `${row.key}: ${number(row.value)} ${track.unit}`),
       row.picture && el("figure", {}, el("figcaption", { class: "pair" }, el("span", {}, "Goal"), el("span", {}, "You")),
-        el("img", { src: row.picture, loading: "lazy", width: 640, height: 320, alt: "The goal on the left, what you built on the right" })), given(row),
+        el("img", { src: row.picture, loading: "lazy", width: 648, height: 320, alt: "The goal on the left, what you built on the right" })), given(row),
       el("p", { class: "muted" }, row.took_s === null ? null : `You took ${Math.round(row.took_s)} s. `,
         el("a", { href: `report.html#samples?s=${encodeURIComponent(row.sample)}`, target: "_blank", "aria-label": `Replay ${row.key}` }, "Replay")));
   }

@@ -17,7 +17,7 @@ const Results = (() => {
     show(failures, hero).catch(() => hero?.remove());
     return [
       isSite ? el("section", { class: "hero" }, el("div", { class: "hero-text" }, intro(board),
-        el("p", { class: "finding" }, board.tracks[0].finding),
+        findings(board.tracks[0]).slice(0, 2),
         el("p", { class: "muted" }, "Try it yourself: ", el("code", {}, "phyblock play quick"), " gives you the models' own tasks in a browser.")), hero)
         : el("section", {}, intro(board), cautions(board.cautions), listOf(board.facts)),
       ...board.tracks.map((track) => ofTrack(track, isSite && track === board.tracks[0])),
@@ -39,16 +39,16 @@ const Results = (() => {
     const id = `ranking-${track.name}`;
     if (!Data.mainOf(track)) return el("p", { class: "muted" }, `Nothing is scored in ${track.title}.`);
     return el("section", { id, "aria-label": track.title }, el("h2", {}, track.title),
-      isSaid ? null : sentences(track).map((sentence, i) => el("p", { class: i ? null : "finding" }, sentence)),
+      isSaid ? null : findings(track),
       Charts.bars(track),
       el("details", { class: "more" }, el("summary", {}, "All numbers: intervals, settings, tokens and cost"), Table.numbers(track)),
-      el("ul", { class: "notes" }, [...track.notes, "Thin bars are 95 % intervals: jackknife over base scenes. Ranks are ranges: paired tests of every pair of models, corrected for their number (Holm). Baselines have no rank, nor have models that were not asked about every sample.",
+      el("ul", { class: "notes" }, [...track.notes, "Thin bars are 95 % intervals: jackknife over base scenes; a dark bar lies beyond the line with all of its interval. Ranks are ranges: paired tests of every pair of models, corrected for their number (Holm). Baselines have no rank, nor have models that were not asked about every sample.",
         track.physics && "What fell is taken from the records; physics is not run again."].filter(Boolean).map((note) => el("li", {}, note))),
       Charts.slope(track), Charts.losses(track));
   }
 
   /** How the models stand to a rule that never sees the goal, which one is best, which error is most frequent. */
-  function sentences(track) {
+  function findings(track) {
     const main = Data.mainOf(track), models = Charts.ranked(track).filter((row) => Data.isModel(row) && row.values[main.id]);
     const [best] = models, [value, lo, hi] = best?.values[main.id] || [], unit = track.unit ? ` ${track.unit}` : "";
     const wrong = track.errors.map((name) => [name, models.reduce((sum, row) => sum + (row.facts[track.name].errors[name] || 0) / models.length, 0)]);
@@ -58,7 +58,7 @@ const Results = (() => {
       track.finding,
       best && `Best: ${best.name}, ${track.main} ${number(value)}${unit}${lo === null ? "" : ` (${number(lo)} to ${number(hi)})`}${others}.`,
       error && `Most frequent error: ${Words.named(error[0])}, ${number(error[1], 0)} % of wrong steps in the mean of models.`,
-    ].filter(Boolean);
+    ].filter(Boolean).map((sentence, i) => el("p", { class: i ? null : "finding" }, sentence));
   }
 
   // ---- what it looks like

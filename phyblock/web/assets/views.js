@@ -20,7 +20,7 @@ const Views = (() => {
       listOf([
         ["Kind", kinds[row.kind] || row.kind], ["Parameters", row.size_b && `${row.size_b} billion`],
         ...runs.flatMap((run) => [["Run", `${run.suite || "run"} ${run.id}, begun ${run.date || "on an unknown day"}`],
-          ["Independently re-scored", run.verified ? "yes, from a bundle" : "no: taken from a run folder"],
+          ["Independently re-scored", !Data.isSite ? null : run.verified ? "yes, from a bundle" : "no: taken from a run folder"],
           ["Not verified", run.unverified.join(" ")], ["Seeds", run.seeds], ["Asked how", run.asked.join(", ")]]),
       ]),
       ...board.tracks.filter((track) => row.facts[track.name]).map((track) => ofTrack(row, place, track)),
@@ -150,7 +150,7 @@ const Views = (() => {
     if (place < 0) return unknown("scene", words.get("s"));
     const drawn = await Data.scene(place), items = index.items.scene.flatMap((one, item) => (one === place ? [item] : []));
     return [
-      el("h1", {}, words.get("s")),
+      el("h1", {}, `Scene ${words.get("s")}`),
       el("div", { class: "scene-head" },
         drawn ? el("figure", {}, Stage.picture(`The goal, ${Words.count(drawn.blocks.length, "block")}`, [drawn.blocks]))
           : el("p", { class: "notice" }, index.lacking || "The scene is not at hand."),
