@@ -65,7 +65,11 @@ def report(
         _check_names(run, names, table_names(loaded), "table")
         tables = make_tables(loaded, names or table_names(loaded))
     if not tables:
-        console.print("No model of the run has a row in the paper's tables.")
+        is_other = loaded.design.suite.dataset.format != "official"
+        others = "The paper's tables are of the official scenes; this run is of others."
+        console.print(
+            others if is_other else "No model of the run has a row in the paper's tables."
+        )
     for name, table in tables.items():
         if form == "text":
             print_table(console, table)
@@ -158,11 +162,11 @@ def compare(
         comparison = compare_runs(first, load_run(other), models, track, measure)
     console = make_console()
     print_table(console, compare_view(comparison))
-    if len(comparison.ranks) > 2:
-        print_table(console, ranks_view(comparison))
     if comparison.table[["a", "b"]].drop_duplicates().shape[0] == 1:
         for line in flipped_lines(comparison):
             console.print(line)
+    elif len(comparison.ranks):
+        print_table(console, ranks_view(comparison))
     if out is not None:
         write_comparison(comparison, out)
         print_path(console, out)

@@ -300,7 +300,7 @@ class Suite(Section):
     word recorded, for every folder of recorded replies in the official data."""
     baselines: Unique[Annotated[str, OneOf(baseline_names)]] = ("goal-blind", "random")
     """Built-in baselines that are scored beside the models of full_planning, where every track of
-    the suite has them; they cost nothing. []: none."""
+    the suite has them; they cost nothing. []: none. A run of baselines alone has those it names."""
     prompt: Prompt = "default"
     """default; official (read out of the official checkout); or the path of a .j2 template,
     relative to the suite file."""

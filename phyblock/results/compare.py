@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -21,6 +21,7 @@ from phyblock.results.estimates import (
     counted_rows,
     headline_columns,
     main_measure,
+    main_values,
     pooled_in,
     track_notes,
 )
@@ -28,7 +29,6 @@ from phyblock.results.load import Design, Run, checked_models, track_measures
 from phyblock.results.text import (
     NO_VALUE,
     Column,
-    Row,
     TextTable,
     intervals,
     level_name,
@@ -62,6 +62,7 @@ from phyblock.tracks.base import kind_of, kinds
 from phyblock.tracks.measures import SCORED_BY, Cell, Measure, in_unit
 
 _LEVEL = 1 - CONFIDENCE
+_TOO_FEW = "too few base scenes to tell"
 _KEYS = ["scene", "item", "seed", "variant"]
 _FLIPPED = ["a", "b", *_KEYS, "right", "value_a", "value_b"]
 
@@ -130,6 +131,13 @@ class Side:
     label: str
     model: str
     run: Run
+
+    def has_rank(self, track: str) -> bool:
+        """True for a model, no baseline, that has a value and a record of every sample."""
+        records, design = self.run.records, self.run.design
+        mine = (records["model"] == self.model) & (records["track"] == track)
+        is_whole = mine.sum() == design.samples(track) and self.model not in design.baselines
+        return is_whole and self.model in main_values(self.run, track)
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,12 +310,13 @@ class Comparison:
     all rows), verdict, detectable (the difference that a single test finds in four of five cases)
     and detectable_holm (the same at the first step of Holm's correction) [in `unit`; NaN where that
     is more than values can differ by], better, worse and same (samples on which a has the better,
-    worse, same value), n_samples, n_scenes, n_clusters. `ranks` has one row a model where all pairs
-    of several models were compared as a whole: model, value, best and worst rank that the model may
-    have. `flipped` has one row a pair and sample that one side alone got wholly right: a, b, scene,
-    item (scene or question), seed, variant (what differs from the reference of the run), right
-    (that side's label), value_a, value_b; by a measure without a best value it has none. `name` is
-    what the values are called, `unit` theirs, `how` says what they are.
+    worse, same value), n_samples, n_scenes, n_clusters. There is no lo and hi where there are too
+    few base scenes to tell. `ranks` has one row for each model that has a rank where all pairs were
+    compared as a whole: model, value, best and worst rank that it may have. `flipped` has one row a
+    pair and sample that one side alone got wholly right: a, b, scene, item (scene or question),
+    seed, variant (what differs from the reference of the run), right (that side's label), value_a,
+    value_b; by a measure without a best value it has none. `name` is what the values are called,
+    `unit` theirs, `how` says what they are.
     """
 
     table: pd.DataFrame
@@ -404,7 +413,7 @@ def compare(
     table, measure = with_verdicts(pd.DataFrame(rows), what.measure), what.measure
     flipped = pd.concat([flip for flip in flips if len(flip)] or flips[:1], ignore_index=True)
     how = " ".join([what.how, *_asked(runs, what.track)])
-    ranked = ranks(table, measure)
+    ranked = _ranks(table, measure, {side.label for side in sides if side.has_rank(what.track)})
     return Comparison(table, flipped, ranked, measure.heading, measure.unit, how)
 
 
@@ -427,6 +436,8 @@ def with_verdicts(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:
     n_tests = int(table["p"].notna().sum())
     judged = table.assign(p_holm=holm(table["p"]))
     judged["verdict"] = [_verdict(row, measure, n_tests) for row in judged.to_dict("records")]
+    # Of so few base scenes an interval would say more than its test can.
+    judged.loc[judged["verdict"] == _TOO_FEW, ["lo", "hi"]] = np.nan
     levels = {"detectable": _LEVEL, "detectable_holm": _LEVEL / max(n_tests, 1)}
     for name, level in levels.items():
         judged[name] = detectable(table["se"], table["n_clusters"], level, measure.most_apart)
@@ -443,33 +454,56 @@ def _verdict(row: Mapping[Any, Any], measure: Measure, n_tests: int) -> str:
     if row["p_holm"] >= _LEVEL:
         # So few base scenes give no p value that the correction leaves below the level.
         too_few = n_tests * least_p(row["n_clusters"]) >= _LEVEL
-        return "too few base scenes to tell" if too_few else "cannot tell"
+        return _TOO_FEW if too_few else "cannot tell"
     a_is_better = (row["difference"] > 0) == (measure.better == "higher")
     return f"{row['a' if a_is_better else 'b']} is better"
 
 
-def ranks(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:
-    """Return the ranks that each model may have, the best first: model, value, best, worst.
+def rank_ranges_of(sides: Sequence[Side], track: str) -> dict[str, tuple[int, int]]:
+    """Return the best and the worst rank in a track of those sides that have one, by label.
 
-    Out of a table that compares every pair of its models as a whole; empty for any other.
+    Raises SpecError for runs that cannot be compared.
+    """
+    ranked = [side for side in sides if side.has_rank(track)]
+    if len(ranked) < 2:
+        return {side.label: (1, 1) for side in ranked}
+    what = comparable(ranked[0].run, track)
+    rows = compare(list(combinations(ranked, 2)), what.parts[-1:], what).ranks.to_dict("records")
+    return {str(row["model"]): (int(row["best"]), int(row["worst"])) for row in rows}
+
+
+def _ranks(table: pd.DataFrame, measure: Measure, ranked: Set[str]) -> pd.DataFrame:
+    """Return the ranks that `ranked` models may have, the best first: model, value, best, worst.
+
+    Out of a table that compares every pair of its models as a whole; empty for any other. Tests
+    are corrected for the pairs of ranked models; a pair without a test is not told apart.
     """
     whole = table[table["part"] == table["part"].iloc[-1]] if len(table) else table
-    names = list(dict.fromkeys([*whole["a"], *whole["b"]]))
-    n, columns = len(names), ["model", "value", "best", "worst"]
-    if len(whole) != n * (n - 1) // 2 or whole["p"].isna().any():
+    every = list(dict.fromkeys([*whole["a"], *whole["b"]]))
+    columns = ["model", "value", "best", "worst"]
+    if len(whole) != len(every) * (len(every) - 1) // 2:
         return pd.DataFrame(columns=columns)
-    is_better, known = np.zeros((n, n), dtype=bool), dict.fromkeys(names, np.nan)
-    for row in whole.to_dict("records"):
+    names, known = [name for name in every if name in ranked], dict[str, float]()
+    pairs = whole[whole["a"].isin(ranked) & whole["b"].isin(ranked)]
+    # A single ranked model has its value from a pair with another side.
+    for row in (pairs if len(pairs) else whole).to_dict("records"):
+        known |= {row["a"]: row["value_a"], row["b"]: row["value_b"]}
+    is_better = np.zeros((len(names), len(names)), dtype=bool)
+    for row, p in zip(pairs.to_dict("records"), holm(pairs["p"]), strict=True):
         a, b = names.index(row["a"]), names.index(row["b"])
         a_is_better = (row["difference"] > 0) == (measure.better == "higher")
-        is_better[(a, b) if a_is_better else (b, a)] = row["p_holm"] < _LEVEL
-        known |= {row["a"]: row["value_a"], row["b"]: row["value_b"]}
+        is_better[(a, b) if a_is_better else (b, a)] = p < _LEVEL
     ranges = rank_ranges(is_better)
     rows = [(name, known[name], *ranges[place]) for place, name in enumerate(names)]
     is_ascending = measure.better == "lower"
     return pd.DataFrame(rows, columns=columns).sort_values(
         "value", ascending=is_ascending, ignore_index=True, kind="stable"
     )
+
+
+def rank_text(best: int, worst: int) -> str:
+    """Return a range of ranks as tables show it."""
+    return str(best) if best == worst else f"{best}\N{EN DASH}{worst}"
 
 
 def compare_view(found: Comparison) -> TextTable:
@@ -518,16 +552,15 @@ def _notes(found: Comparison) -> Iterator[str]:
 
 def ranks_view(found: Comparison) -> TextTable:
     """Show the rank that each model may have, out of `Comparison.ranks`, the best first."""
-
-    def ranks(row: Row) -> str:
-        return " to ".join(str(n) for n in sorted({row["best"], row["worst"]}))
-
     columns = [
         texts("model", "Model"),
         values("value", in_unit(found.name, found.unit)),
-        Column("Rank", show=ranks),
+        Column("Rank", show=lambda row: rank_text(row["best"], row["worst"])),
     ]
-    note = "All ranges hold at once with 95 % confidence, by the comparisons above."
+    note = (
+        "All ranges hold at once with 95 % confidence, by the comparisons of these models (Holm). "
+        "Baselines have no rank, nor have models that are not complete."
+    )
     return TextTable.of(found.ranks, "Ranks that each model may have", columns, [note])
 
 

@@ -81,11 +81,10 @@ def published_frame(run: Run, table: int) -> pd.DataFrame:
 
 
 def is_as_published(run: Run) -> bool:
-    """True if a run counts official scenes as the paper's Table 1 does."""
+    """True if a run counts as the paper's Table 1 does."""
     suite = run.design.suite
     return (
-        suite.dataset.format == "official"
-        and "paper" in suite.scoring.matchers
+        "paper" in suite.scoring.matchers
         and (1 not in suite.levels or suite.scoring.level1 == "membership")
         and _SETTING in suite.settings
     )
@@ -123,9 +122,11 @@ def _ours(run: Run, table: int) -> pd.DataFrame:
 
 
 def beside_paper(run: Run, table: int) -> TextTable | None:
-    """Return our numbers beside a table of the paper; None where it has no model of the run."""
+    """Return our numbers beside a table of the paper; None where it has no model of the run, and
+    for a run on other scenes than the official ones.
+    """
     frame, paper = published_frame(run, table), _TABLES[table]
-    if frame.empty:
+    if frame.empty or run.design.suite.dataset.format != "official":
         return None
     rows: dict[tuple[str, str], dict[str, object]] = {}
     for model in dict.fromkeys(frame["model"]):

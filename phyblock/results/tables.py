@@ -13,7 +13,7 @@ import pandas as pd
 
 from phyblock.files import OutFolder
 from phyblock.registry import added_measures
-from phyblock.results.compare import sensitivity_table
+from phyblock.results.compare import Side, rank_ranges_of, rank_text, sensitivity_table
 from phyblock.results.estimates import (
     HeadlineColumn,
     Value,
@@ -373,7 +373,8 @@ def headline_table(run: Run, track: str, coverage: pd.DataFrame) -> TextTable:
     """Show models by the main column of a track, the best first, and the columns beside it: where
     its measure stands in several cells, as by level, these alone.
 
-    Baselines have no rank, nor have models with samples that were not asked.
+    A rank is a range, as in `compare` and on the page. Baselines have none, nor have models with
+    samples that were not asked.
     """
     kind, main = kind_of(track), main_column(run, track)
     others = [one for one in headline_columns(run, track) if one != main]
@@ -383,13 +384,12 @@ def headline_table(run: Run, track: str, coverage: pd.DataFrame) -> TextTable:
     unit = " (%)" if {units[column.measure] for column in columns} == {"%"} else ""
     known, ranked = headline_of(run, track), main_values(run, track, ranked=True)
     mine = coverage[coverage["track"] == track].set_index("model").to_dict("index")
-    rows, rank = [], 0
+    ranks = rank_ranges_of([Side(name, name, run) for name in run.design.model_names], track)
+    rows = []
     for model in dict.fromkeys((*ranked, *run.design.model_names)):
-        has_rank = model in ranked and model not in run.design.baselines
-        has_rank = has_rank and not mine[model]["not_run"]
-        rank += has_rank
         found = [known.get((model, column.heading), _NONE) for column in columns]
-        row: dict[str, Any] = {"rank": str(rank) if has_rank else "", "model": model}
+        rank = rank_text(*ranks[model]) if model in ranks else ""
+        row: dict[str, Any] = {"rank": rank, "model": model}
         row |= {column.heading: value.value for column, value in zip(columns, found, strict=True)}
         samples = f"{mine[model]['recorded']:,}/{mine[model]['expected']:,}"
         rows.append({**row, "lo": found[0].lo, "hi": found[0].hi, "samples": samples})
@@ -416,6 +416,6 @@ def blind_sentence(run: Run, track: str) -> str:
     verb = "is" if len(above) == 1 else "are"
     text = f"{sum(above)} of {counted(len(above), 'model')} {verb} above {named}"
     if not above:
-        text = f"The strongest baseline that never sees the goal is {named}"
+        text = f"The strongest baseline here that never sees the goal is {named}"
     title = f"{kind_of(track).title}: " if len(run.design.suite.tracks) > 1 else ""
     return f"{title}{text}."

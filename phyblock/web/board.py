@@ -7,7 +7,6 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from phyblock.data import AssemblyTask
 from phyblock.errors import DataError
 from phyblock.records.files import ManifestModel, read_stopped
 from phyblock.records.record import Record
-from phyblock.results.compare import Side, comparable, compare, ranks
+from phyblock.results.compare import Side, comparable, rank_ranges_of
 from phyblock.results.estimates import (
     Floor,
     Value,
@@ -237,29 +236,6 @@ def _facts_of(
     return found
 
 
-def rank_ranges_of(
-    track: str, entries: Sequence[Entry], runs: Sequence[SiteRun], values: AllValues
-) -> Mapping[str, tuple[int, int]]:
-    """Return best and worst rank of entries in a track, by name, Holm-corrected over all pairs.
-
-    `entries` are those with a value in it. Only models have ranks, of which no sample was left out;
-    {} where there are not two. A pair without a sample in common is not told apart. Raises
-    SpecError for runs that cannot be compared.
-    """
-    sides = []
-    for entry in entries:
-        facts = values[entry.runs[track], track].facts[entry.model.name]
-        if not entry.model.is_baseline and facts["done"] == facts["expected"]:
-            sides.append(Side(entry.name, entry.model.name, runs[entry.runs[track]].run))
-    if len(sides) < 2:
-        return {}
-    what = comparable(sides[0].run, track)
-    table = compare(list(combinations(sides, 2)), what.parts[-1:], what).table
-    known = table.assign(p=table["p"].fillna(1.0), p_holm=table["p_holm"].fillna(1.0))
-    rows = ranks(known, what.measure).to_dict("records")
-    return {str(row["model"]): (int(row["best"]), int(row["worst"])) for row in rows}
-
-
 def board_of(
     runs: Sequence[SiteRun], entries: Sequence[Entry], values: AllValues
 ) -> dict[str, Any]:
@@ -298,7 +274,8 @@ def board_of(
             for e in ranked
             if not e.model.is_baseline
         ]
-        ranges[track] = rank_ranges_of(track, ranked, runs, values)
+        sides = [Side(e.name, e.model.name, runs[e.runs[track]].run) for e in ranked]
+        ranges[track] = rank_ranges_of(sides, track)
         tracks.append(_track(track, run, models))
     lacking = {key: shortfalls(runs[key[0]].run, key[1]) for key in values}
     rows = []

@@ -139,7 +139,7 @@ def test_a_model_with_samples_that_were_not_asked_has_no_rank(
     assert (first[1], second[1]) == ("best", "worse")
     n = len(levels)
     if is_whole:
-        assert (first[0], second[0]) == ("1", "2")
+        assert (first[0], second[0]) == ("1\N{EN DASH}2", "1\N{EN DASH}2")
     else:
         assert (first[0], second[0]) == ("", "1")
         assert (first[2], second[2]) == (f"{n - 1}/{n}", f"{n}/{n}")

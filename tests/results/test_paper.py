@@ -32,7 +32,9 @@ def test_each_published_model_has_15_cells() -> None:
     assert cell["difference"] == pytest.approx(-25.2)
     assert by_cell.loc["3", "ours"].isna().all()
     assert by_cell.loc["3", "n"].tolist() == [0, 0, 0]
-    beside = beside_paper(run, 1)
+    assert beside_paper(run, 1) is None  # of other scenes than the paper's
+    facts["suite"]["dataset"] = {"format": "official", "path": "checkout"}
+    beside = beside_paper(run_of([record("mine", "001", scores=scores)], facts), 1)
     assert beside is not None
     assert len(beside.rows) == 3
     assert beside.notes[0] == "Largest absolute difference of 6 cells: 25.200."

@@ -179,14 +179,17 @@ def test_the_summary_ranks_models_and_says_who_is_above_the_blind_baseline() -> 
         for name, n in tp.items()
         for scene in ("002", "003")
     ]
-    summary = summary_of(run_of(records, facts))
+    run = run_of(records, facts)
+    summary = summary_of(run)
     (table,) = summary.tables
     assert [row[:3] for row in table.rows] == [
-        ("1", "beta", "100.0"),
+        ("1\N{EN DASH}2", "beta", "100.0"),
         ("", "goal-blind", "50.0"),
-        ("2", "alpha", "25.0"),
+        ("1\N{EN DASH}2", "alpha", "25.0"),
         ("", "random", "0.0"),
     ]
+    ranks = compare_models(run).ranks
+    assert ranks[["model", "best", "worst"]].values.tolist() == [["beta", 1, 2], ["alpha", 1, 2]]
     (sentence,) = summary.blind
     assert sentence.endswith("of 2 models are above goal-blind (50.0).")
 

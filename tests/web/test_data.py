@@ -241,6 +241,7 @@ def test_only_whole_models_have_ranks() -> None:
     assert ranks == {"a": [1, 2], "b": [2, 3], "c": [1, 3]}
     run = planned(rules=["rule"], rule=4, a=3, b=1)
     assert ranks_of(run) == {"rule": None, "a": [1, 1], "b": [2, 2]}
+    assert ranks_of(planned(rules=["rule"], rule=4, a=3)) == {"rule": None, "a": [1, 1]}
     run = planned(left_out=SCENES[1:], cherry=4, a=3, b=1)
     assert ranks_of(run) == {"cherry": None, "a": [1, 1], "b": [2, 2]}
     lacking = board(run)["cherry"]["lacking"]["full_planning"]
