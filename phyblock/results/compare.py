@@ -132,13 +132,6 @@ class Side:
     model: str
     run: Run
 
-    def has_rank(self, track: str) -> bool:
-        """True for a model, no baseline, that has a value and a record of every sample."""
-        records, design = self.run.records, self.run.design
-        mine = (records["model"] == self.model) & (records["track"] == track)
-        is_whole = mine.sum() == design.samples(track) and self.model not in design.baselines
-        return is_whole and self.model in main_values(self.run, track)
-
 
 @dataclass(frozen=True, eq=False)
 class Samples:
@@ -413,7 +406,7 @@ def compare(
     table, measure = with_verdicts(pd.DataFrame(rows), what.measure), what.measure
     flipped = pd.concat([flip for flip in flips if len(flip)] or flips[:1], ignore_index=True)
     how = " ".join([what.how, *_asked(runs, what.track)])
-    ranked = _ranks(table, measure, {side.label for side in sides if side.has_rank(what.track)})
+    ranked = _ranks(table, measure, {side.label for side in _with_rank(sides, what.track)})
     return Comparison(table, flipped, ranked, measure.heading, measure.unit, how)
 
 
@@ -464,12 +457,22 @@ def rank_ranges_of(sides: Sequence[Side], track: str) -> dict[str, tuple[int, in
 
     Raises SpecError for runs that cannot be compared.
     """
-    ranked = [side for side in sides if side.has_rank(track)]
+    ranked = _with_rank(sides, track)
     if len(ranked) < 2:
         return {side.label: (1, 1) for side in ranked}
     what = comparable(ranked[0].run, track)
     rows = compare(list(combinations(ranked, 2)), what.parts[-1:], what).ranks.to_dict("records")
     return {str(row["model"]): (int(row["best"]), int(row["worst"])) for row in rows}
+
+
+def _with_rank(sides: Sequence[Side], track: str) -> list[Side]:
+    """Return the sides that are models, no baselines, with a value and a record of every sample."""
+    able = {}
+    for run in {id(side.run): side.run for side in sides}.values():
+        recorded = run.records.loc[run.records["track"] == track, "model"].value_counts()
+        whole = recorded.index[recorded == run.design.samples(track)]
+        able[id(run)] = main_values(run, track).keys() & {*whole} - run.design.baselines
+    return [side for side in sides if side.model in able[id(side.run)]]
 
 
 def _ranks(table: pd.DataFrame, measure: Measure, ranked: Set[str]) -> pd.DataFrame:

@@ -190,6 +190,11 @@ def test_blind_baselines_are_scored_beside_models_without_being_named(
     assert (done.code, done.err) == (0, "")
     assert [record["model"] for record in workspace.records()] == ["again", *blind]
     assert "0 of 1 model is above goal-blind" in done.out
+    # A run of baselines alone has those that it names.
+    workspace.write_yaml("suite.yaml", {**suite, "models": ["random"]})
+    workspace.out = workspace.root / "alone"
+    assert workspace.run().code == 0
+    assert {record["model"] for record in workspace.records()} == {"random"}
 
 
 def test_a_recording_of_another_order_is_refused(workspace: Workspace) -> None:
