@@ -1,7 +1,7 @@
 """Seasons: a set that nobody could choose or know before, and that anyone can make again.
 
-A maker publishes the digests of a secret and of the code, then waits for a value that nobody rules,
-such as a beacon's. The seed of the set is the digest of both.
+A maker publishes the digests of a secret and of the code, then waits for a value that nobody
+controls, such as a beacon's. The seed of the set is the digest of both.
 """
 
 from __future__ import annotations
@@ -12,7 +12,9 @@ from typing import Annotated
 from pydantic import Field
 
 import phyblock
+from phyblock.data import SCENES_FILE, find_data_set
 from phyblock.errors import DataError, Problem
+from phyblock.files import bundled_sets
 from phyblock.records.record import Line
 from phyblock.sim.engine import described_engine
 from phyblock.stable import hex_digest
@@ -28,14 +30,17 @@ class Commitment(Line, extra="forbid"):
     engine: str
     arguments: str
     """Of `phyblock scenes generate`, but for seed and folder."""
+    public: str
+    """The later public value that counts, in words."""
 
 
 def code_digest() -> str:
-    """Return the digest of the package's own files, in the order of their names."""
+    """Return the digest of the package's own files and the built-in scenes, by their names."""
     root = Path(phyblock.__file__).parent
     files = (path for path in root.rglob("*") if path.suffix in (".py", ".md", ".yaml"))
     named = sorted((path.relative_to(root).as_posix(), path) for path in files)
     named = [(name, path) for name, path in named if not name.startswith("bundled/")]
+    named += [(name, find_data_set(name) / SCENES_FILE) for name in bundled_sets(SCENES_FILE)]
     return hex_digest("".join(f"{hex_digest(path.read_bytes())} {name}\n" for name, path in named))
 
 

@@ -4,9 +4,9 @@ Every number is an exact rational: an integer over `ONE`. Places are in meters, 
 in the weight of the whole. `balance` writes down a `Structure`, as blocks touch, and finds proofs
 in floating point; nothing of how they were found has to be trusted.
 
-`Stands` holds forces, inside the cones of friction, that bear all weights but for a billionth:
-wherever weights are off by `MARGIN` and long blocks lighter or heavier, and where every contact is
-narrower by the margin. `Falls` holds a motion of every block that releases energy, and that no
+`Stands` holds forces, inside the cones of friction, that bear all weights but for a billionth, with
+long blocks lighter or heavier: where all weights together are off by `MARGIN` to any side, and
+where they are in place and every contact is narrower by the margin. `Falls` holds a motion of every block that releases energy, and that no
 force in any contact, made wider by the margin, works against (Farkas' lemma): a balance would take
 forces that add up to `_STRONGEST` times the weight.
 """

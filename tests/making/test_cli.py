@@ -94,18 +94,31 @@ def test_a_set_holds_nothing_of_those_that_it_excludes(folder: Path, tmp_path: P
 def test_a_season_is_made_again_from_what_was_revealed_and_from_nothing_else(
     tmp_path: Path,
 ) -> None:
-    scenes("commit", "--out", tmp_path, "--", "--count", 2, "--levels", 2, *ALONE)
+    begin = ("commit", "--public", "round 7 of a beacon", "--out")
+    scenes(*begin, tmp_path, "--", "--count", 2, "--levels", 2)
     commitment, secret = tmp_path / "commitment.json", tmp_path / "secret.txt"
     assert secret.read_text().strip() not in commitment.read_text()
     words = ("reveal", commitment, secret, "--public")
     made = []
     for name, public in (("one", "beacon 7"), ("two", "beacon 7"), ("other", "beacon 8")):
         *command, _ = scenes(*words, public).stdout.split()[2:]
-        scenes(*command, tmp_path / name)
+        scenes(*command, tmp_path / name, *ALONE)
         made.append((tmp_path / name / "scenes.jsonl").read_bytes())
     assert made[0] == made[1] != made[2]
-    with pytest.raises(click.UsageError, match="give all"):
-        scenes("commit", "--out", tmp_path / "bad", "--", "--levels", 7)
+    assert secret.stat().st_mode & 0o077 == 0
+    for bad, message in (
+        (("--levels", 7), "give all"),
+        (("--seed", 5), "no --seed"),
+        (("--out", "foo"), "no --out"),
+        (("--exclude", tmp_path / "one"), "can change before the season"),
+    ):
+        with pytest.raises(click.UsageError, match=message):
+            scenes(*begin, tmp_path / "bad", "--", *bad)
+    text = commitment.read_text()
+    commitment.write_text(text.replace("--count 2", "--count 1 ; echo"))
+    with pytest.raises(click.UsageError, match="unexpected extra argument"):
+        scenes(*words, "beacon 7")
+    commitment.write_text(text)
     secret.write_text("guessed")
     with pytest.raises(DataError, match="secret_sha256"):
         scenes(*words, "beacon 7")

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import cast
 
 import click
+from click.core import ParameterSource
 from pydantic import TypeAdapter
 
 from phyblock.cli.console import make_console, print_rows, shown_path
@@ -31,6 +32,7 @@ from phyblock.errors import DataError, Problem
 from phyblock.files import (
     OutFolder,
     atomic_write,
+    bundled_sets,
     check_free,
     make_folder,
     write_named,
@@ -149,14 +151,17 @@ def generate(
 
 @scenes.command("commit")
 @click.argument("arguments", nargs=-1, metavar="-- [ARGUMENT]...")
+@click.option(
+    "--public", required=True, metavar="TEXT", help="The later public value that counts, in words."
+)
 @click.option("--out", "-o", type=UserPath(), required=True, metavar="DIR", help="Folder to write.")
-def commit(arguments: tuple[str, ...], out: Path) -> None:
+def commit(arguments: tuple[str, ...], public: str, out: Path) -> None:
     """Commit to a set, by ARGUMENTS of generate, whose seed nobody can choose or know yet.
 
-    Writes DIR/secret.txt, to be kept, and DIR/commitment.json, to be published with a word on
-    which later public value counts: digests of the secret and of phyblock's code.
+    Writes DIR/secret.txt, to be kept, and DIR/commitment.json, to be published: digests of the
+    secret, of phyblock's code and of the built-in scenes, and which later public value counts.
     """
-    generate.make_context("generate", [*arguments, "--out", "."])
+    settled = season_arguments(arguments)
     files = (out / "secret.txt", out / "commitment.json")
     check_free(files, "give another --out")
     secret = secrets.token_hex(32)
@@ -164,11 +169,13 @@ def commit(arguments: tuple[str, ...], out: Path) -> None:
         secret_sha256=hex_digest(secret),
         code_sha256=code_digest(),
         engine=described_engine(),
-        arguments=shlex.join(arguments),
+        arguments=settled,
+        public=public,
     )
     make_folder(out)
     with writing(out):
         atomic_write(files[0], f"{secret}\n")
+        files[0].chmod(0o600)
         atomic_write(files[1], f"{commitment.as_json()}\n")
     click.echo(f"publish {shown_path(files[1])}; keep {shown_path(files[0])}")
 
@@ -178,14 +185,34 @@ def commit(arguments: tuple[str, ...], out: Path) -> None:
 @click.argument("secret", type=UserPath())
 @click.option("--public", required=True, metavar="VALUE", help="The public value that came later.")
 def reveal(commitment: Path, secret: Path, public: str) -> None:
-    """Print the command that makes the set of a COMMITMENT, once its SECRET is told.
+    """Print the command that makes the set of a COMMITMENT, once its SECRET is revealed.
 
     Refuses another secret, other code, or another physics engine than was committed to.
     """
     meant = decode(TypeAdapter(Commitment), read_data(commitment), str(commitment), Commitment)
-    told = read_data(secret).decode("ascii", "replace").strip()
-    seed = season_seed(meant, told, public, str(commitment))
-    click.echo(f"phyblock scenes generate {meant.arguments} --seed {seed} --out DIR")
+    revealed = read_data(secret).decode("ascii", "replace").strip()
+    seed = season_seed(meant, revealed, public, str(commitment))
+    settled = season_arguments(shlex.split(meant.arguments))
+    click.echo(f"phyblock scenes generate {settled} --seed {seed} --out DIR")
+
+
+def season_arguments(words: Sequence[str]) -> str:
+    """Return arguments of generate in one form; UsageError where they name a seed, a folder, or a
+    set that its maker could still change.
+    """
+    context = generate.make_context("generate", ["--out", ".", *words])
+    given = context.params
+    if context.get_parameter_source("seed") is not ParameterSource.DEFAULT:
+        raise click.UsageError("A season has no --seed: its secret and the public value give one.")
+    if given["out"] != Path("."):
+        raise click.UsageError("A season has no --out of generate: reveal prints the command.")
+    bundled = bundled_sets(SCENES_FILE)
+    if others := [name for name in given["exclude"] if name not in bundled]:
+        message = f"{others[0]} can change before the season: exclude a bundled set"
+        raise click.UsageError(f"{message} ({', '.join(bundled)}).")
+    levels = ",".join(sorted(given["levels"]))
+    settled = f"--count {given['count']} --levels {levels} --palette {given['palette']}"
+    return settled + "".join(f" --exclude {name}" for name in given["exclude"])
 
 
 @scenes.command("compare")
