@@ -6,9 +6,9 @@ in floating point; nothing of how they were found has to be trusted.
 
 `Stands` holds forces, inside the cones of friction, that bear all weights but for a billionth, with
 long blocks lighter or heavier: where all weights together are off by `MARGIN` to any side, and
-where they are in place and every contact is narrower by the margin. `Falls` holds a motion of every block that releases energy, and that no
-force in any contact, made wider by the margin, works against (Farkas' lemma): a balance would take
-forces that add up to `_STRONGEST` times the weight.
+where they are in place and every contact is narrower by the margin. `Falls` holds a motion of every
+block that releases energy, and that no force in any contact, made wider by the margin, works
+against (Farkas' lemma): a balance would take forces that add up to `_STRONGEST` times the weight.
 """
 
 from __future__ import annotations
