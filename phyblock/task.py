@@ -8,15 +8,14 @@ from several threads; each process opens its own.
 from __future__ import annotations
 
 import io
-import itertools
 import json
 import math
 from collections import Counter
 from collections.abc import Callable, Coroutine, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, TypeVar
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, overload
 
 import numpy as np
 from PIL import Image
@@ -45,6 +44,8 @@ Split = Literal["test", "train", "dev"]
 _SUITES = {"step_planning": "steps", "vqa": "vqa", "pose_planning": "pose"}
 """Bundled suites that say how a track asks; others ask as `full` does."""
 _LEVELS = (1, 2, 3, 4)
+_MOST_REPEATS = 50
+"""Scenes in a row that a set holds already, after which a split has no others."""
 _T = TypeVar("_T")
 
 
@@ -221,16 +222,15 @@ class Task:
 
         Raises SpecError for anything else.
         """
-        if self.plays:
+        if self.plays and (reply is None or isinstance(reply, Sequence)):
             episode = Episode(self, shows=False)
             for one in [reply] if isinstance(reply, str) else reply or ():
                 if episode.step(one).done:
                     break
             return episode.score()
         if not (reply is None or isinstance(reply, str)):
-            raise SpecError(
-                Problem(self.id, "takes one reply", "reply", repr(reply), "a text, None")
-            )
+            allowed = "a text, None" + (", a list of texts" if self.plays else "")
+            raise SpecError(Problem(self.id, "cannot be scored", "reply", repr(reply), allowed))
         record = _result(judge_reply(self.track, self.item, self._begun(reply)))
         return self._scored(record)
 
@@ -303,9 +303,11 @@ class Episode:
         return self.request is None
 
     def step(self, reply: str) -> Turn:
-        """Take a step with a reply; SpecError where the episode has ended."""
+        """Take a step with a reply; SpecError where the episode has ended, or for no text."""
         if self.request is None:
             raise SpecError(Problem(self.task.id, "has ended", hint="call reset() before step()"))
+        if not isinstance(reply, str):
+            raise SpecError(Problem(self.task.id, "takes texts", "reply", repr(reply)))
         self._replies.append(Reply(text=well_formed(reply)).storable())
         self._episode.take(self._replies[-1])
         self.request = _result(self._episode.request())
@@ -325,14 +327,15 @@ class Episode:
 class Tasks:
     """The tasks of a track in one split: a finite set, by place or key, or a stream without end.
 
-    A stream begins anew with each iteration; each of its tasks has a track of its own, so that
-    nothing is kept of those that are done.
+    A stream begins anew with each iteration, and makes a task by its place; each has a track of
+    its own, so that nothing is kept of those that are done.
     """
 
     suite: Suite
     name: str
-    source: Callable[[], Iterator[AssemblyTask]] | None
+    source: Callable[..., Iterator[AssemblyTask]] | None
     found: Mapping[str, Task]
+    first: int = 0
 
     @property
     def is_endless(self) -> bool:
@@ -340,11 +343,12 @@ class Tasks:
         return self.source is not None
 
     def __iter__(self) -> Iterator[Task]:
-        if self.source is None:
-            yield from self.found.values()
-            return
+        yield from self._streamed(0) if self.is_endless else self.found.values()
+
+    def _streamed(self, place: int) -> Iterator[Task]:
+        assert self.source is not None, "a stream has a source"
         shop = LocalShop()
-        for scene in self.source():
+        for scene in self.source(first=self.first + place):
             yield from _opened(self.suite, Dataset(self.name, Path(self.name), (scene,)), shop)
 
     def __len__(self) -> int:
@@ -352,13 +356,25 @@ class Tasks:
             raise TypeError(f"{self!r} has no length: give a limit")
         return len(self.found)
 
-    def __getitem__(self, key: int | str) -> Task:
-        """Return a task by its place or its key; SpecError for a key that is not there."""
-        if isinstance(key, int):
+    @overload
+    def __getitem__(self, key: int | str) -> Task: ...
+    @overload
+    def __getitem__(self, key: slice) -> Tasks: ...
+    def __getitem__(self, key: int | str | slice) -> Task | Tasks:
+        """Return a task by its place or its key, or a finite set's tasks by a slice.
+
+        Raises SpecError for what is not there, IndexError for a place behind the last.
+        """
+        if isinstance(key, slice) and not self.is_endless:
+            return replace(self, found=dict(list(self.found.items())[key]))
+        if isinstance(key, int) and not self.is_endless:
             return list(self.found.values())[key]
-        if key not in self.found:
-            hint = did_you_mean(key, list(self.found))
-            raise SpecError(Problem(repr(self), "has no such task", "", key, hint=hint))
+        if isinstance(key, int) and key >= 0:
+            return next(self._streamed(key))
+        if not isinstance(key, str) or key not in self.found:
+            hint = did_you_mean(str(key), list(self.found))
+            hint = "a stream has tasks by place: 0, 1, ..." if self.is_endless else hint
+            raise SpecError(Problem(repr(self), "has no such task", "", str(key), hint=hint))
         return self.found[key]
 
     def __repr__(self) -> str:
@@ -389,17 +405,17 @@ def tasks(
 
     The split `test` is the built-in set, or `data`: a data set's name or folder, or scenes. `train`
     and `dev` are made from the seed and share no structure with the test set or with one another;
-    they have no end and begin at place `first`, unless a `limit` makes them a finite set at once.
-    `overrides` are `KEY=VALUE` texts for the track's bundled suite, as for `--set`. `limit` keeps
-    so many, spread over levels or subtasks. Raises SpecError, DataError or PromptError with what is
-    wrong.
+    they have no end and begin at place `first`, unless a `limit` makes them a finite set of so many
+    scenes. `overrides` are `KEY=VALUE` texts for the track's bundled suite, as for `--set`. Of the
+    test set, `limit` keeps so many, spread over levels or subtasks. Raises SpecError, DataError or
+    PromptError with what is wrong.
     """
     if track not in known_tracks():
         allowed, hint = ", ".join(known_tracks()), did_you_mean(track, known_tracks())
         raise SpecError(Problem("tasks", "is no track", "track", track, allowed, hint))
     if split != "test" and (data is not None or track == "vqa"):
         message = "takes no data" if data is not None else "has no questions"
-        hint = "make questions with phyblock questions generate, and give vqa.path=FOLDER"
+        hint = 'make a set with phyblock questions generate; give split="test", vqa.path=FOLDER'
         raise SpecError(Problem("tasks", message, "split", split, hint="" if data else hint))
     said = [f"tracks=[{track}]", f"seeds=[{seed}]"]
     said += [] if levels is None else [f"levels={list(levels)}"]
@@ -408,18 +424,55 @@ def tasks(
         form = "builtin" if (folder / SCENES_FILE).is_file() else "official"
         said += [f"dataset.format={form}", f"dataset.path={json.dumps(str(folder))}"]
     suite = load_suite(_SUITES.get(track, "full"), *said, *overrides).loaded
+    if suite.tracks != (track,):
+        message = "does not go with the track that is asked for"
+        raise SpecError(Problem("tasks", message, "tracks", ", ".join(suite.tracks), track))
     limit = suite.limit if limit is None else limit
-    dataset = data if isinstance(data, Dataset) else None
+    if first and (split == "test" or limit is not None):
+        message = "is the place where a stream begins; this is a finite set"
+        raise SpecError(Problem("tasks", message, "first", str(first), hint="use a slice"))
+    dataset = None
     if split != "test":
-        stream = partial(split_tasks, split, seed, levels=suite.levels, first=first)
+        stream = partial(split_tasks, split, seed, levels=suite.levels)
         if limit is None:
-            return Tasks(suite, split, stream, {})
-        dataset = Dataset(split, Path(split), tuple(itertools.islice(stream(), limit)))
-    elif data is not None and not isinstance(data, str | Path | Dataset):
-        dataset = Dataset("data", Path("data"), tuple(data))
+            return Tasks(suite, split, stream, {}, first)
+        dataset = Dataset(split, Path(split), _distinct(stream(), limit))
+    elif data is not None and not isinstance(data, str | Path):
+        dataset = _given(data)
     dataset = dataset or open_dataset(suite.dataset.format, suite.files.dataset)
     found = _opened(suite, dataset, LocalShop(), limit)
     return Tasks(suite, dataset.name, None, {task.key: task for task in found})
+
+
+def _distinct(scenes: Iterator[AssemblyTask], limit: int) -> tuple[AssemblyTask, ...]:
+    """Return the first scenes, each once; SpecError where no others come."""
+    found: dict[str, AssemblyTask] = {}
+    repeats = 0
+    while len(found) < limit:
+        scene = next(scenes)
+        repeats = repeats + 1 if scene.key in found else 0
+        found.setdefault(scene.key, scene)
+        if repeats == _MOST_REPEATS:
+            message = f"the rules seem to give {len(found)} scenes in these levels, and no more"
+            raise SpecError(Problem("tasks", message, "limit", str(limit)))
+    return tuple(found.values())
+
+
+def _given(data: Any) -> Dataset:
+    """Return a caller's scenes as a data set; SpecError for other things, and for repeats."""
+    allowed = "the name or folder of a data set, a Dataset, or scenes"
+    if not isinstance(data, Dataset | Iterable):
+        raise SpecError(Problem("tasks", "is no data", "data", repr(data), allowed))
+    dataset = data if isinstance(data, Dataset) else Dataset("data", Path("data"), tuple(data))
+    known: set[str] = set()
+    for place, one in enumerate(dataset.tasks):
+        field = f"data[{place}]"
+        if not isinstance(one, AssemblyTask):
+            raise SpecError(Problem("tasks", "is no scene", field, repr(one), allowed))
+        if one.key in known:
+            raise SpecError(Problem("tasks", "comes a second time", field, one.key))
+        known.add(one.key)
+    return dataset
 
 
 @checked

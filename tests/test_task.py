@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import itertools
 import pickle
+import re
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -14,6 +16,7 @@ import phyblock
 from phyblock.errors import SpecError
 from phyblock.records.files import read_manifest, run_records
 from phyblock.records.record import Record
+from phyblock.task import _distinct
 from phyblock.tracks.pictures import Workshop
 
 TRACKS = {"full_planning": "quick", "step_planning": "steps", "pose_planning": "pose", "vqa": "vqa"}
@@ -109,6 +112,43 @@ def test_streams_hold_no_scene_of_the_test_set_and_begin_anywhere() -> None:
     assert first[0].score(None).outcome == "missing"
     with pytest.raises(TypeError, match="give a limit"):
         len(stream)
+
+
+def test_finite_sets_hold_each_scene_once_and_have_slices() -> None:
+    stream = phyblock.tasks("full_planning", split="train", levels=[1], seed=1)
+    drawn = [one.key for one in itertools.islice(stream, 3)]
+    assert drawn[2] == drawn[0], "the scene comes again"
+    assert stream[1].key == drawn[1]
+    finite = phyblock.tasks("full_planning", split="train", levels=[1], seed=1, limit=3)
+    assert [one.key for one in finite][:2] == drawn[:2]
+    assert len(finite) == 3
+    assert [one.key for one in finite[1:]] == [finite[1].key, finite[2].key]
+    with pytest.raises(SpecError, match="give 1 scenes"):
+        _distinct(itertools.repeat(finite[0].track.dataset.tasks[0]), 2)
+
+
+def test_what_is_wrong_with_tasks_and_replies_is_named() -> None:
+    finite = phyblock.tasks("full_planning", limit=1)
+    stream = phyblock.tasks("full_planning", split="train")
+    scene = finite[0].track.dataset.tasks[0]
+    steps = phyblock.tasks("step_planning", limit=1)[0]
+    wrong: dict[str, Callable[[], object]] = {
+        "first: is the place": lambda: phyblock.tasks("full_planning", first=1),
+        "found: 2": lambda: phyblock.tasks("full_planning", split="dev", limit=1, first=2),
+        "data: is no data": lambda: phyblock.tasks("full_planning", data=5),  # type: ignore[arg-type]
+        "data[0]: is no scene": lambda: phyblock.tasks("full_planning", data=[1]),  # type: ignore[list-item]
+        "data[1]: comes a second": lambda: phyblock.tasks("full_planning", data=[scene, scene]),
+        "tracks: does not go": lambda: phyblock.tasks("full_planning", "tracks=[vqa]"),
+        'split="test", vqa.path': lambda: phyblock.tasks("vqa", split="train"),
+        "takes texts": lambda: steps.episode().step(None),  # type: ignore[arg-type]
+        "reply: cannot be scored": lambda: steps.score(5),  # type: ignore[arg-type]
+        "by place": lambda: stream[:2],
+        "found: -1": lambda: stream[-1],
+        "found: None": lambda: finite[None],  # type: ignore[call-overload]
+    }
+    for said, call in wrong.items():
+        with pytest.raises(SpecError, match=re.escape(said)):
+            call()
 
 
 def test_answers_can_be_asked_for_as_json() -> None:

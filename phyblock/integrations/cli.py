@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import cast
 
 import click
+from click.core import ParameterSource
 
 from phyblock.cli.console import make_console, print_path
 from phyblock.cli.options import NAME_OR_PATH, UserPath
@@ -64,6 +65,11 @@ def export(
     forms = _OF_RUN if run else _OF_SCENES if scenes else of_others
     if form not in forms:
         raise click.BadParameter(f"{form!r} is not one of {', '.join(forms)}.", param_hint="--to")
+    of_text = ("data", "size_px") if form == "lmms-eval" else ()
+    for name in ("data", "limit", "size_px") if run else of_text:
+        if click.get_current_context().get_parameter_source(name) != ParameterSource.DEFAULT:
+            option, kind = name.removesuffix("_px"), "a run" if run else form
+            raise click.UsageError(f"--{option} says nothing of {kind}: leave it out.")
     if run is not None:
         write = huggingface.write_records if form == "hf" else partial(export_run, form=form)
         made = write(load_run(run), folder=out)

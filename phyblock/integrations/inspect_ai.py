@@ -78,14 +78,21 @@ def vqa(**options: Any) -> InspectTask:
 def _task(
     track: str,
     split: Split = "test",
-    levels: Sequence[int] | None = None,
+    levels: Any = None,
     seed: int = 0,
     data: str | None = None,
     items: int | None = None,
-    overrides: Sequence[str] = (),
+    overrides: Any = (),
 ) -> InspectTask:
-    """Return the task of a track; `items` is the limit of `phyblock.tasks`, for levels in turn."""
-    asked = tasks(track, *overrides, split=split, levels=levels, seed=seed, data=data, limit=items)
+    """Return the task of a track; `items` is the limit of `phyblock.tasks`, for levels in turn.
+
+    `-T` gives one value as itself, and several between commas as texts: `1,2` is ['1', '2'].
+    """
+    found = overrides if isinstance(overrides, list | tuple) else [overrides]
+    if levels is not None:
+        several = levels if isinstance(levels, list | tuple) else [levels]
+        levels = [int(one) if str(one).isdecimal() else one for one in several]
+    asked = tasks(track, *found, split=split, levels=levels, seed=seed, data=data, limit=items)
     sampling = asked.suite.sampling
     samples = [
         Sample(
@@ -97,8 +104,8 @@ def _task(
     ]
     return InspectTask(
         dataset=MemoryDataset(samples, name=asked.name),
-        solver=ask(asked),
-        scorer=worth(asked),
+        solver=prompt_model(asked),
+        scorer=phyblock_scorer(asked),
         config=model.GenerateConfig(
             temperature=sampling.temperature, top_p=sampling.top_p, max_tokens=sampling.max_tokens
         ),
@@ -122,7 +129,7 @@ def _chat(messages: Sequence[dict[str, Any]]) -> list[model.ChatMessage]:
 
 
 @solver
-def ask(asked: Tasks) -> Solver:
+def prompt_model(asked: Tasks) -> Solver:
     """Ask as a run does; play episodes to their end."""
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:
@@ -136,15 +143,15 @@ def ask(asked: Tasks) -> Solver:
             state.messages = _chat(episode.messages)
             state = await generate(state)
             replies.append(state.output.completion)
+            state.store.set("replies", list(replies))  # A limit may stop the sample at any turn.
             await asyncio.to_thread(episode.step, replies[-1])
-        state.store.set("replies", replies)
         return state
 
     return solve
 
 
 @scorer(metrics={"*": [by_part()]})
-def worth(asked: Tasks) -> Scorer:
+def phyblock_scorer(asked: Tasks) -> Scorer:
     """Score by the track's own judgement; 1 in `success` says that all is right."""
 
     async def score(state: TaskState, target: Target) -> Score:

@@ -11,6 +11,8 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import threading
+from collections.abc import Iterator
 from typing import Any
 
 from openenv.core import EnvClient
@@ -19,18 +21,19 @@ from openenv.core.env_server.http_server import create_app
 from openenv.core.env_server.interfaces import Environment
 from openenv.core.env_server.types import Action, Observation, State
 
+from phyblock.errors import Problem, SpecError
 from phyblock.task import Episode, Task, Tasks, tasks
 
 _MOST_SESSIONS = 64
 
 
-class Reply(Action):
+class PhyBlockAction(Action):
     """The text that a model gave."""
 
     text: str
 
 
-class Asked(Observation):
+class PhyBlockObservation(Observation):
     """The messages that wait for a reply, in OpenAI's form; at the end none, and the score."""
 
     key: str
@@ -38,14 +41,29 @@ class Asked(Observation):
     score: dict[str, Any] | None = None
 
 
-class PhyBlockEnvironment(Environment[Reply, Asked, State]):
-    """One task an episode: asked once, or played turn by turn. Rewards sum to the score."""
+class TasksInTurn(Iterator[Task]):
+    """All tasks in order, over and over, for sessions in several threads: each gets the next."""
+
+    def __init__(self, known: Tasks) -> None:
+        self._lock = threading.Lock()
+        self._tasks = itertools.chain.from_iterable(itertools.repeat(known))
+
+    def __next__(self) -> Task:
+        with self._lock:
+            return next(self._tasks)
+
+
+class PhyBlockEnvironment(Environment[PhyBlockAction, PhyBlockObservation, State]):
+    """One task an episode: asked once, or played turn by turn. Rewards sum to the score.
+
+    Environments that are given the same `in_turn` share the order of tasks.
+    """
 
     SUPPORTS_CONCURRENT_SESSIONS = True
 
-    def __init__(self, known: Tasks) -> None:
+    def __init__(self, known: Tasks, in_turn: TasksInTurn | None = None) -> None:
         super().__init__()
-        self._known, self._stream, self._state = known, iter(known), State()
+        self._known, self._in_turn, self._state = known, in_turn or TasksInTurn(known), State()
         self._task: Task | None = None
         self._episode: Episode | None = None
 
@@ -55,21 +73,25 @@ class PhyBlockEnvironment(Environment[Reply, Asked, State]):
         episode_id: str | None = None,
         key: str | None = None,
         **_: Any,
-    ) -> Asked:
-        """Begin a task: that of a key, of the seed's place in a finite set, else the next."""
+    ) -> PhyBlockObservation:
+        """Begin a task: that of a key, of the seed's place, else the next in turn.
+
+        In a finite set, places are counted round; in a stream, that of a place is made anew.
+        """
         if key is not None:
             self._task = self._known[key]
-        elif seed is not None and not self._known.is_endless:
-            self._task = self._known[seed % len(self._known)]
+        elif seed is not None:
+            self._task = self._known[seed if self._known.is_endless else seed % len(self._known)]
         else:
-            self._stream = itertools.chain(self._stream, iter(self._known))
-            self._task = next(self._stream)
+            self._task = next(self._in_turn)
         self._state = State(episode_id=episode_id)
         self._episode = self._task.episode() if self._task.plays else None
         first = self._episode.messages if self._episode else self._task.messages()
-        return Asked(key=self._task.key, messages=tuple(first))
+        return PhyBlockObservation(key=self._task.key, messages=tuple(first))
 
-    def step(self, action: Reply, timeout_s: float | None = None, **_: Any) -> Asked:
+    def step(
+        self, action: PhyBlockAction, timeout_s: float | None = None, **_: Any
+    ) -> PhyBlockObservation:
         """Take a reply; RuntimeError before a reset and after the end."""
         del timeout_s
         if self._task is None:
@@ -84,7 +106,7 @@ class PhyBlockEnvironment(Environment[Reply, Asked, State]):
             told |= {"reward": score.value, "done": True}
         if told["done"]:
             self._task, told["score"] = None, score.as_json()
-        return Asked(**told)
+        return PhyBlockObservation(**told)
 
     @property
     def state(self) -> State:
@@ -92,28 +114,48 @@ class PhyBlockEnvironment(Environment[Reply, Asked, State]):
         return self._state
 
 
-class PhyBlockClient(EnvClient[Reply, Asked, State]):
+class PhyBlockClient(EnvClient[PhyBlockAction, PhyBlockObservation, State]):
     """A client of the server, asynchronous or with `.sync()`."""
 
-    def _step_payload(self, action: Reply) -> dict[str, Any]:
+    def _step_payload(self, action: PhyBlockAction) -> dict[str, Any]:
         return {"text": action.text}
 
-    def _parse_result(self, payload: dict[str, Any]) -> StepResult[Asked]:
+    def _parse_result(self, payload: dict[str, Any]) -> StepResult[PhyBlockObservation]:
         ends = {"reward": payload.get("reward"), "done": payload.get("done", False)}
-        return StepResult(observation=Asked(**{**payload["observation"], **ends}), **ends)
+        return StepResult(
+            observation=PhyBlockObservation(**{**payload["observation"], **ends}), **ends
+        )
 
     def _parse_state(self, payload: dict[str, Any]) -> State:
         return State(**payload)
 
 
+def tasks_of_environment() -> Tasks:
+    """Return the tasks that `PHYBLOCK_TASKS` names; SpecError where it does not."""
+    text = os.environ.get("PHYBLOCK_TASKS", '{"track": "full_planning"}')
+    try:
+        given = json.loads(text)
+    except ValueError:
+        given = None
+    if not isinstance(given, dict) or "track" not in given:
+        allowed = 'a JSON object: {"track": "full_planning", ...}'
+        raise SpecError(Problem("PHYBLOCK_TASKS", "names no track", "", text, allowed))
+    overrides = given.pop("overrides", ())
+    overrides = [overrides] if isinstance(overrides, str) else overrides
+    known = tasks(given.pop("track"), *overrides, **given)
+    if not (known.is_endless or len(known)):
+        raise SpecError(Problem("PHYBLOCK_TASKS", "leaves no task", "", text))
+    return known
+
+
 def app() -> Any:
-    """Return the server; its sessions share the tasks."""
-    given = json.loads(os.environ.get("PHYBLOCK_TASKS", '{"track": "full_planning"}'))
-    known = tasks(given.pop("track"), *given.pop("overrides", ()), **given)
+    """Return the server; its sessions share the tasks and their order."""
+    known = tasks_of_environment()
+    in_turn = TasksInTurn(known)
     return create_app(
-        lambda: PhyBlockEnvironment(known),
-        Reply,
-        Asked,
+        lambda: PhyBlockEnvironment(known, in_turn),
+        PhyBlockAction,
+        PhyBlockObservation,
         env_name="phyblock",
         max_concurrent_envs=_MOST_SESSIONS,
     )

@@ -7,7 +7,6 @@ world answers as the user. Rewards are made of the trace alone, so that it can b
 from __future__ import annotations
 
 import asyncio
-import itertools
 from collections.abc import Iterator
 from typing import Any, Literal
 
@@ -15,7 +14,7 @@ import verifiers.v1 as vf
 from pydantic import Field
 from verifiers.v1.types import content_text
 
-from phyblock.task import Score, Split, Task, tasks
+from phyblock.task import Score, Split, Task, Tasks, tasks
 
 __all__ = ["VerifiersEnv", "VerifiersTaskset"]
 
@@ -31,11 +30,10 @@ class VerifiersConfig(vf.TasksetConfig):
     limit: int | None = None
     overrides: list[str] = Field(default_factory=list)
 
-    def read(self, first: int = 0) -> Iterator[Task]:
-        """Yield the tasks from a place on; in a stream, none before it is made."""
+    def read(self) -> Tasks:
+        """Return the tasks."""
         kept = {"split", "levels", "seed", "data", "limit"}
-        found = tasks(self.track, *self.overrides, **self.model_dump(include=kept), first=first)
-        return iter(found) if found.is_endless else itertools.islice(found, first, None)
+        return tasks(self.track, *self.overrides, **self.model_dump(include=kept))
 
 
 class VerifiersData(vf.TaskData):
@@ -53,7 +51,7 @@ class VerifiersTask(vf.Task[VerifiersData, vf.State, vf.TaskConfig]):
     def found(self) -> Task:
         """Return the task of phyblock; of a trace that was stored, made anew."""
         if self.asked is None:
-            self.asked = next(self.data.source.read(self.data.place))
+            self.asked = self.data.source.read()[self.data.place]
         return self.asked
 
     def worth(self, trace: vf.Trace) -> Score:

@@ -6,6 +6,7 @@ A framework that is not installed is skipped; docs/integrations.md says how each
 from __future__ import annotations
 
 import asyncio
+import itertools
 import json
 import os
 import re
@@ -20,6 +21,7 @@ from typing import Any
 import pytest
 
 import phyblock
+from phyblock.errors import SpecError
 from phyblock.parsing.plan import parse_plan
 from phyblock.scoring.plan import AssemblyScorer
 from tests.official_replies import reply_texts
@@ -73,9 +75,9 @@ def test_inspect(official_checkout: Path, known: phyblock.Tasks, expected: Score
     from inspect_ai.scorer import Target
     from inspect_ai.solver import TaskState
 
-    from phyblock.integrations.inspect_ai import worth
+    from phyblock.integrations.inspect_ai import phyblock_scorer
 
-    scorer = worth(known)
+    scorer = phyblock_scorer(known)
 
     def score(key: str, text: str) -> float:
         output = ModelOutput.from_content("recorded", text)
@@ -104,6 +106,42 @@ def test_an_eval_of_inspect(track: str, tmp_path: Path) -> None:
     assert {"all", "all stderr", "level 3", "level 3 stderr"} <= names
 
 
+@pytest.mark.parametrize(
+    ("levels", "overrides"),
+    [
+        ("1,2", "images.size_px=128"),
+        ("2", "images.size_px=128,limit=9"),
+        ("[1,2]", '["seeds=[1]"]'),
+    ],
+)
+def test_arguments_of_inspect(levels: str, overrides: str) -> None:
+    pytest.importorskip("inspect_ai", reason="inspect_ai is not installed")
+    from inspect_ai._cli.util import parse_cli_args
+
+    from phyblock.integrations.inspect_ai import full_planning
+
+    given = parse_cli_args([f"levels={levels}", f"overrides={overrides}", "items=4"])
+    parts = {one.metadata["part"] for one in full_planning(**given).dataset}
+    assert parts == {f"level {level}" for level in levels if level.isdecimal()}
+
+
+def test_a_sample_of_inspect_that_a_limit_stops_keeps_its_replies(tmp_path: Path) -> None:
+    pytest.importorskip("inspect_ai", reason="inspect_ai is not installed")
+    with Running(OpenAIChat()) as running:
+        call = f"""-m inspect_ai eval phyblock/step_planning -T items=1 --turn-limit 2
+            -T overrides=images.size_px=128 --model openai/scripted
+            --model-base-url {running.url}/v1 -M responses_api=false
+            --log-format json --log-dir {tmp_path}"""
+        env = {**os.environ, "OPENAI_API_KEY": "sk-nobody"}
+        subprocess.run([sys.executable, *call.split()], check=True, cwd=tmp_path, env=env)
+    (path,) = tmp_path.glob("*.json")
+    (sample,) = json.loads(path.read_text("utf-8"))["samples"]
+    assert sample["limit"]["type"] == "turn"
+    assert len(sample["store"]["replies"]) == 2
+    score = sample["scores"]["phyblock_scorer"]
+    assert score["metadata"]["outcome"] != "missing"
+
+
 def test_verifiers(official_checkout: Path, expected: Scores) -> None:
     pytest.importorskip("verifiers", reason="verifiers is not installed")
     import verifiers.v1 as vf
@@ -125,21 +163,46 @@ def test_verifiers(official_checkout: Path, expected: Scores) -> None:
     assert VerifiersTaskset(VerifiersConfig(limit=None)).INFINITE
     stored = type(by_key["000"])(by_key["000"].data)
     assert stored.found().key == "000"
+    for limit in (3, None):
+        drawn = VerifiersTaskset(VerifiersConfig(split="train", levels=[1], seed=2, limit=limit))
+        for task in itertools.islice(drawn, 3):
+            assert type(task)(task.data).found().key == task.data.id
 
 
 def test_openenv(official_checkout: Path, known: phyblock.Tasks, expected: Scores) -> None:
     pytest.importorskip("openenv", reason="openenv is not installed")
-    from phyblock.integrations.openenv import PhyBlockEnvironment, Reply
+    from phyblock.integrations.openenv import PhyBlockAction, PhyBlockEnvironment, TasksInTurn
 
     environment = PhyBlockEnvironment(known)
 
     def score(key: str, text: str) -> float:
         assert environment.reset(key=key).messages
-        return float(environment.step(Reply(text=text)).reward or 0.0)
+        return float(environment.step(PhyBlockAction(text=text)).reward or 0.0)
 
     check(official_checkout, expected, score)
     with pytest.raises(RuntimeError, match="reset"):
-        environment.step(Reply(text=""))
+        environment.step(PhyBlockAction(text=""))
+    stream = phyblock.tasks("full_planning", split="train", levels=[1], seed=2)
+    for source in (stream, known[:3]):
+        keys = [one.key for one in itertools.islice(source, 3)]
+        in_turn = TasksInTurn(source)
+        several = [PhyBlockEnvironment(source, in_turn) for _ in keys]
+        assert [one.reset().key for one in several] == keys
+        assert several[0].reset(seed=1).key == keys[1]
+    assert several[1].reset().key == keys[0]
+
+
+@pytest.mark.parametrize("text", ["full_planning", "[1]", "{}"])
+def test_tasks_of_an_environment(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("openenv", reason="openenv is not installed")
+    from phyblock.integrations.openenv import tasks_of_environment
+
+    monkeypatch.setenv("PHYBLOCK_TASKS", text)
+    with pytest.raises(SpecError, match="PHYBLOCK_TASKS"):
+        tasks_of_environment()
+    given = {"track": "full_planning", "overrides": "images.size_px=128", "limit": 2}
+    monkeypatch.setenv("PHYBLOCK_TASKS", json.dumps(given))
+    assert len(tasks_of_environment()) == 2
 
 
 def test_a_server_of_openenv(capsys: pytest.CaptureFixture[str]) -> None:
