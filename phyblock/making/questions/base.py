@@ -151,7 +151,7 @@ class StaticMaker(Maker):
             if right in options:
                 first = tuple(right_first(right, options))
                 pictures, kind = (one.picture,), one.kind or one.stem
-                yield Draft(one.scene, one.stem, first, pictures, one.slots, kind=kind)
+                yield Draft(one.scene, one.stem, first, pictures, dict(one.slots), kind=kind)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Return the answer from the one picture and the slots of the text alone."""
