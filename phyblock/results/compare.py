@@ -62,7 +62,6 @@ from phyblock.tracks.base import kind_of, kinds
 from phyblock.tracks.measures import SCORED_BY, Cell, Measure, in_unit
 
 _LEVEL = 1 - CONFIDENCE
-_TOO_FEW = "too few base scenes to tell"
 _KEYS = ["scene", "item", "seed", "variant"]
 _FLIPPED = ["a", "b", *_KEYS, "right", "value_a", "value_b"]
 
@@ -303,13 +302,12 @@ class Comparison:
     all rows), verdict, detectable (the difference that a single test finds in four of five cases)
     and detectable_holm (the same at the first step of Holm's correction) [in `unit`; NaN where that
     is more than values can differ by], better, worse and same (samples on which a has the better,
-    worse, same value), n_samples, n_scenes, n_clusters. There is no lo and hi where there are too
-    few base scenes to tell. `ranks` has one row for each model that has a rank where all pairs were
-    compared as a whole: model, value, best and worst rank that it may have. `flipped` has one row a
-    pair and sample that one side alone got wholly right: a, b, scene, item (scene or question),
-    seed, variant (what differs from the reference of the run), right (that side's label), value_a,
-    value_b; by a measure without a best value it has none. `name` is what the values are called,
-    `unit` theirs, `how` says what they are.
+    worse, same value), n_samples, n_scenes, n_clusters. `ranks` has one row for each model that has
+    a rank where all pairs were compared as a whole: model, value, best and worst rank that it may
+    have. `flipped` has one row a pair and sample that one side alone got wholly right: a, b, scene,
+    item (scene or question), seed, variant (what differs from the reference of the run), right
+    (that side's label), value_a, value_b; by a measure without a best value it has none. `name` is
+    what the values are called, `unit` theirs, `how` says what they are.
     """
 
     table: pd.DataFrame
@@ -429,8 +427,6 @@ def with_verdicts(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:
     n_tests = int(table["p"].notna().sum())
     judged = table.assign(p_holm=holm(table["p"]))
     judged["verdict"] = [_verdict(row, measure, n_tests) for row in judged.to_dict("records")]
-    # Of so few base scenes an interval would say more than its test can.
-    judged.loc[judged["verdict"] == _TOO_FEW, ["lo", "hi"]] = np.nan
     levels = {"detectable": _LEVEL, "detectable_holm": _LEVEL / max(n_tests, 1)}
     for name, level in levels.items():
         judged[name] = detectable(table["se"], table["n_clusters"], level, measure.most_apart)
@@ -447,7 +443,7 @@ def _verdict(row: Mapping[Any, Any], measure: Measure, n_tests: int) -> str:
     if row["p_holm"] >= _LEVEL:
         # So few base scenes give no p value that the correction leaves below the level.
         too_few = n_tests * least_p(row["n_clusters"]) >= _LEVEL
-        return _TOO_FEW if too_few else "cannot tell"
+        return "too few base scenes to tell" if too_few else "cannot tell"
     a_is_better = (row["difference"] > 0) == (measure.better == "higher")
     return f"{row['a' if a_is_better else 'b']} is better"
 
