@@ -1,6 +1,6 @@
-"""What a reward gives to replies that know nothing of the goal, or hide what they know.
+"""Rewards of replies that know nothing of the goal, or hide what they know.
 
-    python -m benchmarks.evidence.attacks [--limit 400] [--physics-limit 40]
+    python -m benchmarks.evidence.attacks [--limit 400] [--physics-limit 16]
 
 Prints, as Markdown, the mean reward of each attack beside the floor of its track: the best of the
 blind baselines that the track names. Attacks that hold a right answer hold it where no answer may
@@ -97,7 +97,7 @@ def means(limit: int, physics_limit: int) -> Iterator[tuple[str, str, float, flo
     """Yield track, attack, mean reward, share of successes, and what it is."""
     for track, attacks in {**ATTACKS, "step_planning": EPISODES}.items():
         found = phyblock.tasks(track, limit=physics_limit if track in SIMULATED else limit)
-        floors = [name for name in type(found[0].track).report().floors if name != "text-only"]
+        floors = type(found[0].track).report().floors
         for name in (*floors, *attacks):
             scores = [scored(task, attacks.get(name), name) for task in found]
             value, success = (
@@ -123,7 +123,7 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--limit", type=int, default=400)
-    parser.add_argument("--physics-limit", type=int, default=40)
+    parser.add_argument("--physics-limit", type=int, default=16)
     given = parser.parse_args()
     print("| track | reply | mean reward | success | |\n|---|---|---|---|---|")
     for track, name, value, success, what in means(given.limit, given.physics_limit):

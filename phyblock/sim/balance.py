@@ -177,7 +177,7 @@ def _bears(forces: Floats, *weights: Floats) -> bool:
 
 
 def _pushes(forces: Floats, weights: Floats) -> Floats | None:
-    """How much of each force, (k, m), balances weights (6 n, m); None where some are not borne."""
+    """Return the shares of forces, (k, m), that balance weights (6 n, m); None if none do."""
     from scipy.optimize import nnls  # type: ignore[import-untyped]
 
     pushes, is_borne = _least_squares(forces, weights)

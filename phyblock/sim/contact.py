@@ -199,7 +199,7 @@ def at(turned: Turned, place_m: tuple[float, float, float] = (0.0, 0.0, 0.0)) ->
 
 
 def pair_axes(first: Block, second: Block) -> tuple[Axes, ...]:
-    """What can separate each pair of pieces of two blocks."""
+    """Return the axes that can separate each pair of pieces of two blocks."""
     turned, other, _ = beside(first, second)
     way_m = np.subtract(second.position_m, first.position_m)
     return tuple(

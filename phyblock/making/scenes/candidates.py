@@ -77,7 +77,7 @@ def make_candidates(
     others = {one: rate for one, rate in _rates(palette).items() if one.look not in needed}
 
     def waiting(one: Candidate) -> float:
-        """When a candidate comes up: an exponential waiting time (Efraimidis and Spirakis 2006)."""
+        """Draw a candidate's exponential waiting time (Efraimidis and Spirakis 2006)."""
         return -math.log(_drawn(one, f"{salt}/drawn")) / others[one]
 
     def place(one: Candidate) -> tuple[int, float]:
