@@ -31,7 +31,7 @@ _SIZE_PX, _GAP_PX = 320, 8
 
 
 class Ending:
-    """The content of the page after the end: a part for each track, in it the means of the person, the
+    """The page after the end: a part for each track, in it the means of the person, the
     rules and the models of this run and those `beside` it, and a row for each item.
 
     Of a run that cannot be compared a note says why. Pictures are drawn as they are asked for.
