@@ -31,7 +31,7 @@ from phyblock.config.models import load_models
 from phyblock.config.suite import Suite as ConfigSuite
 from phyblock.config.suite import load_suite as read_suite
 from phyblock.config.validation import problems_of
-from phyblock.data import AssemblyTask
+from phyblock.data.base import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.files import bundled, write_named
 from phyblock.results.load import Run, load_run

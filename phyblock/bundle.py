@@ -42,8 +42,8 @@ from phyblock.results.load import design_of
 from phyblock.run.judge import about_prompt
 from phyblock.run.rescore import judged_anew, recorded_dataset, recorded_suite, reopen_tracks
 from phyblock.run.store import manifest_text, prompt_of, record_lines
-from phyblock.tracks import Item, Track, kind_of
-from phyblock.tracks.base import simulating
+from phyblock.tracks.base import Track, kind_of, simulating
+from phyblock.tracks.items import Item
 
 BUNDLE_FILE = "bundle.zip"
 """Its name in the run's folder, unless another place is named."""

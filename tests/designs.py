@@ -6,7 +6,7 @@ import functools
 
 import numpy as np
 
-from phyblock.domain import Scene
+from phyblock.domain.scene import Scene
 from phyblock.making.scenes.sketch import Draft, make_scene
 
 _BOTH_LEVELS = ("l1-cottage", "l1-dolmen")

@@ -6,7 +6,7 @@ import functools
 import json
 from pathlib import Path
 
-from phyblock.data import recorded_models
+from phyblock.data.official import recorded_models
 from phyblock.models.client import read_raw_reply
 
 

@@ -23,8 +23,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.data import read_builtin, read_questions
-from phyblock.domain import euler_deg_to_matrix
+from phyblock.data.questions import read_questions
+from phyblock.data.scenes import read_builtin
+from phyblock.domain.blocks import euler_deg_to_matrix
 from phyblock.errors import DataError, ModelError, Problem
 from phyblock.files import bundled
 from phyblock.making.questions.text_probe import text_features

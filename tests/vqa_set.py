@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
+from phyblock.domain.question import CATEGORIES, LETTERS, SUBTASKS
 from tests.workspace import SCENES, Raw
 
 VIEW = [45, 22]

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 import phyblock
-from phyblock.domain import PoseStep
+from phyblock.domain.scene import PoseStep
 from phyblock.registry import track_baselines
 from phyblock.sim.geometry import box_height_cm
 from phyblock.stable import drawn_bytes

@@ -22,7 +22,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from phyblock.data import read_builtin, read_questions
+from phyblock.data.questions import read_questions
+from phyblock.data.scenes import read_builtin
 from phyblock.domain.scene import Block, Scene
 from phyblock.files import bundled
 from phyblock.making.questions.production import problem_of

@@ -14,8 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from phyblock.data import AssemblyTask, read_official, recorded_models
-from phyblock.domain import Plan
+from phyblock.data.base import AssemblyTask
+from phyblock.data.official import read_official, recorded_models
+from phyblock.domain.scene import Plan
 from phyblock.models.client import read_raw_reply
 from phyblock.parsing.plan import parse_plan
 from phyblock.scoring.plan import Goal, match_plan, micro

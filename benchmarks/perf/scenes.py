@@ -19,8 +19,8 @@ from itertools import chain, islice
 
 import numpy as np
 
-from phyblock.data import read_builtin
-from phyblock.domain import Block, Scene
+from phyblock.data.scenes import read_builtin
+from phyblock.domain.scene import Block, Scene
 from phyblock.files import bundled
 from phyblock.making.scenes.production import split_tasks
 from phyblock.sim.balance import prove

@@ -24,7 +24,7 @@ from measure import Cost, run_measured
 
 from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
-from phyblock.data import read_builtin
+from phyblock.data.scenes import read_builtin
 from phyblock.files import bundled
 from phyblock.run.plan import make_plan
 

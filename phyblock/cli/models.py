@@ -21,19 +21,12 @@ from phyblock.config.models import (
 )
 from phyblock.config.suite import Suite
 from phyblock.errors import ModelError, Problem, SpecError
-from phyblock.models import (
-    Image,
-    Message,
-    Reply,
-    Request,
-    RetryPolicy,
-    api_key_status,
-    build_model,
-    ends_on,
-    is_billed,
-    tariff_of,
-)
+from phyblock.models.costs import ends_on, is_billed, tariff_of
+from phyblock.models.keys import api_key_status
 from phyblock.models.litellm_client import be_quiet
+from phyblock.models.model import RetryPolicy, build_model
+from phyblock.models.request import Image, Message, Request
+from phyblock.records.record import Reply
 from phyblock.registry import baseline_names
 from phyblock.run.plan import find_models_file, to_config
 from phyblock.text import counted, did_you_mean

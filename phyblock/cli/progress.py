@@ -20,7 +20,7 @@ from rich.progress import (
 )
 from rich.text import Text
 
-from phyblock.models import ModelEvent
+from phyblock.models.model import ModelEvent
 from phyblock.run.runner import (
     ModelStopped,
     RunEvent,

@@ -50,7 +50,7 @@ from phyblock.run.plan import (
 from phyblock.run.runner import RunResult, Session, check_ready
 from phyblock.run.store import held_run
 from phyblock.text import counted, one_line
-from phyblock.tracks import kind_of
+from phyblock.tracks.base import kind_of
 from phyblock.types import MATCHERS, PLAN_PARSERS, Matcher, PlanParser
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)

@@ -13,7 +13,8 @@ from phyblock.cli.options import UserPath, models_file_option, sets_option
 from phyblock.config.models import RECORDED, load_models
 from phyblock.config.suite import suite_model
 from phyblock.config.yaml import read_yaml
-from phyblock.data import SCENES_FILE, read_builtin, read_official
+from phyblock.data.official import read_official
+from phyblock.data.scenes import SCENES_FILE, read_builtin
 from phyblock.errors import InputError, Problem, SpecError
 from phyblock.files import bundled, check_free, reply_cache_file, writing
 from phyblock.run.plan import (
@@ -25,7 +26,7 @@ from phyblock.run.plan import (
     model_problems,
 )
 from phyblock.text import counted
-from phyblock.tracks import kind_of
+from phyblock.tracks.base import kind_of
 
 _FILES = (
     ("models.yaml",),
@@ -148,7 +149,7 @@ def cache() -> None:
 @cache.command()
 def stats() -> None:
     """Show the number of cached replies of each model, and the size of the file."""
-    from phyblock.models import ReplyCache
+    from phyblock.models.cache import ReplyCache
 
     console = make_console()
     with ReplyCache(reply_cache_file()) as opened:
@@ -166,7 +167,7 @@ def stats() -> None:
 @click.option("--yes", is_flag=True, help="Do not ask.")
 def clear(model: str | None, yes: bool) -> None:
     """Delete cached replies; repeated calls will be billed."""
-    from phyblock.models import ReplyCache
+    from phyblock.models.cache import ReplyCache
 
     which = f"replies of {model}" if model else "all replies"
     if not yes:

@@ -14,7 +14,7 @@ from phyblock.errors import DataError, Problem, StoreError
 from phyblock.text import counted, one_line, some_of
 
 if TYPE_CHECKING:
-    from phyblock.data import AssemblyTask
+    from phyblock.data.base import AssemblyTask
     from phyblock.records.record import Record, Reply
 
 _STYLES = {"plain": "", "good": "green", "bad": "red"}
@@ -43,7 +43,7 @@ def show(run: Path, sample: str, gif: Path | None, size: int, data: Path | None)
     enough.
     """
     from phyblock.files import write_named
-    from phyblock.tracks import kind_of
+    from phyblock.tracks.base import kind_of
 
     record = _find(run, sample)
     film = kind_of(record.track).report().film

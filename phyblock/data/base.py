@@ -17,7 +17,8 @@ from typing import TypeVar
 
 from phyblock.config.validation import Fault
 from phyblock.config.yaml import dotted
-from phyblock.domain import CandidateSet, Question, Scene
+from phyblock.domain.question import Question
+from phyblock.domain.scene import CandidateSet, Scene
 from phyblock.errors import DataError, Problem, reason_of
 from phyblock.files import LARGEST_PICTURE_BYTES, read_bytes
 from phyblock.stable import hex_digest

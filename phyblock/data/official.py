@@ -47,18 +47,16 @@ from phyblock.data.scenes import (
     task_of,
     triple,
 )
-from phyblock.domain import (
+from phyblock.domain.question import (
     LETTERS,
-    MAX_CANDIDATES,
     SUBTASK_NAMES,
     SUBTASKS,
-    CandidateSet,
     Question,
     QuestionPicture,
-    Scene,
     Subtask,
     is_picture_option,
 )
+from phyblock.domain.scene import MAX_CANDIDATES, CandidateSet, Scene
 from phyblock.errors import DataError, Problem
 from phyblock.files import load_json
 from phyblock.records.record import Line, decode

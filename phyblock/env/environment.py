@@ -24,8 +24,10 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from PIL import Image
 
-from phyblock.data import AssemblyTask, read_data_set
-from phyblock.domain import BLOCK_TYPES, COLORS, MAX_CANDIDATES, Block, Candidate, PoseStep
+from phyblock.data.base import AssemblyTask
+from phyblock.data.lookup import read_data_set
+from phyblock.domain.blocks import BLOCK_TYPES, COLORS
+from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, PoseStep
 from phyblock.errors import DataError, Problem
 from phyblock.scoring.pose import blocks_reached
 from phyblock.scoring.steps import Assembly

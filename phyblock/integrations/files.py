@@ -12,7 +12,7 @@ from typing import Any
 
 from PIL import Image
 
-from phyblock.domain import LETTERS, is_picture_option
+from phyblock.domain.question import LETTERS, is_picture_option
 from phyblock.files import OutFolder, writing
 from phyblock.integrations.huggingface import question_tasks
 from phyblock.task import Task, Tasks, tasks

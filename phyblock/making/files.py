@@ -8,7 +8,7 @@ from pathlib import Path
 
 from jinja2 import Environment, StrictUndefined
 
-from phyblock.data import VERSION_FILE
+from phyblock.data.base import VERSION_FILE
 from phyblock.data.questions import StoredQuestion
 from phyblock.data.scenes import StoredScene
 from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Question

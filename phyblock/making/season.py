@@ -12,7 +12,8 @@ from typing import Annotated
 from pydantic import Field
 
 import phyblock
-from phyblock.data import SCENES_FILE, find_data_set
+from phyblock.data.lookup import find_data_set
+from phyblock.data.scenes import SCENES_FILE
 from phyblock.errors import DataError, Problem
 from phyblock.files import bundled_sets
 from phyblock.records.record import Line

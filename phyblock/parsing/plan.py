@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any, Literal
 
-from phyblock.domain import Plan
+from phyblock.domain.scene import Plan
 from phyblock.parsing.text import (
     READER_VERSION,
     AnswerForm,

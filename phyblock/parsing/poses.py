@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from phyblock.domain import PoseStep
+from phyblock.domain.scene import PoseStep
 from phyblock.parsing.plan import chosen_list, item_lists, step_lists
 from phyblock.parsing.text import AnswerForm, answer_of, is_open, plain_lines, whole_number
 

@@ -12,17 +12,11 @@ from pathlib import Path
 from phyblock.config.models import ModelConfig, Tariff
 from phyblock.config.suite import Variant
 from phyblock.files import reply_cache_file
-from phyblock.models import Estimate as CallEstimate
-from phyblock.models import (
-    Image,
-    ReplyCache,
-    Request,
-    is_billed,
-    reply_key,
-    tariff_of,
-)
-from phyblock.models import estimate as estimate_call
-from phyblock.models.costs import is_free, most_usd, price_at
+from phyblock.models.cache import ReplyCache, reply_key
+from phyblock.models.costs import Estimate as CallEstimate
+from phyblock.models.costs import estimate as estimate_call
+from phyblock.models.costs import is_billed, is_free, most_usd, price_at, tariff_of
+from phyblock.models.request import Image, Request
 from phyblock.records.files import BatchLines, run_records
 from phyblock.run.plan import RunPlan, Sample
 from phyblock.run.store import held_run

@@ -13,7 +13,7 @@ from phyblock.errors import (
     SampleError,
     SimulationError,
 )
-from phyblock.models import Request
+from phyblock.models.request import Request
 from phyblock.records.files import known_records
 from phyblock.records.record import (
     ErrorKind,
@@ -25,8 +25,8 @@ from phyblock.records.record import (
     Usage,
 )
 from phyblock.stable import plain_sum
-from phyblock.tracks import Item, Judgement, Track
-from phyblock.tracks.base import Episode, count_sample
+from phyblock.tracks.base import Episode, Judgement, Track, count_sample
+from phyblock.tracks.items import Item
 from phyblock.types import Outcome
 
 _N = TypeVar("_N", int, float)

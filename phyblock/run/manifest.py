@@ -13,13 +13,12 @@ from typing import Any
 
 from phyblock.config.models import HUMAN, ModelConfig
 from phyblock.config.suite import Suite, Variant
-from phyblock.data import UNNUMBERED, Dataset, read_version
+from phyblock.data.base import UNNUMBERED, Dataset, read_version
 from phyblock.parsing.text import READER_VERSION
 from phyblock.records.files import FORMAT, Manifest
 from phyblock.sim.engine import ENGINES, described_engine
 from phyblock.stable import hex_digest
-from phyblock.tracks import Track, kind_of
-from phyblock.tracks.base import simulating
+from phyblock.tracks.base import Track, kind_of, simulating
 
 _ENGINES = (engine.distribution for engine in ENGINES.values())
 _LIBRARIES = ("litellm", *_ENGINES, "numpy", "pillow", "jinja2")

@@ -12,19 +12,21 @@ from pathlib import Path
 from phyblock.config.models import RECORDED, ModelConfig, resolve_models, with_members
 from phyblock.config.suite import Suite, Variant
 from phyblock.config.yaml import read_yaml
-from phyblock.data import SCENES_FILE, Dataset, read_builtin, read_official, recorded_models
-from phyblock.data.official import match_published
+from phyblock.data.base import Dataset
+from phyblock.data.official import match_published, read_official, recorded_models
+from phyblock.data.scenes import SCENES_FILE, read_builtin
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.files import bundled, bundled_sets
-from phyblock.models import Request, server_address, takes_format
+from phyblock.models.keys import server_address
+from phyblock.models.model import takes_format
+from phyblock.models.request import Request
 from phyblock.records.files import MANIFEST, Manifest, read_manifest, suite_of
 from phyblock.registry import track_baselines
 from phyblock.run.manifest import make_manifest
 from phyblock.stable import drawn_bytes
 from phyblock.text import did_you_mean
-from phyblock.tracks import Item, Track, kind_of, open_tracks
-from phyblock.tracks.base import template_prompt
-from phyblock.tracks.items import interleaved, select_tasks
+from phyblock.tracks.base import Track, kind_of, open_tracks, template_prompt
+from phyblock.tracks.items import Item, interleaved, select_tasks
 from phyblock.tracks.pictures import Workshop
 
 _SEEDS = 2**31

@@ -13,7 +13,7 @@ from typing import Any
 
 from phyblock.config.suite import Suite, SuiteFiles
 from phyblock.config.yaml import YamlSource
-from phyblock.data import Dataset
+from phyblock.data.base import Dataset
 from phyblock.errors import DataError, Problem, SpecError, StoreError
 from phyblock.files import OutFolder
 from phyblock.parsing.plan import reader_version
@@ -24,9 +24,8 @@ from phyblock.run.manifest import asked_counts, code_versions
 from phyblock.run.plan import open_dataset
 from phyblock.run.store import check_place, locked, write_run
 from phyblock.text import counted
-from phyblock.tracks import Item, Track, kind_of, open_tracks
-from phyblock.tracks.base import CARRYING, ENGINE
-from phyblock.tracks.items import select_tasks
+from phyblock.tracks.base import CARRYING, ENGINE, Track, kind_of, open_tracks
+from phyblock.tracks.items import Item, select_tasks
 from phyblock.tracks.pictures import Workshop
 from phyblock.types import Matcher, PlanParser
 

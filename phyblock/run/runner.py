@@ -27,18 +27,11 @@ from phyblock.errors import (
     UnavailableError,
 )
 from phyblock.files import reply_cache_file
-from phyblock.models import (
-    Budget,
-    HaltedError,
-    Model,
-    ModelEvent,
-    ReplyCache,
-    Request,
-    RetryPolicy,
-    api_key_status,
-    build_model,
-    reply_key,
-)
+from phyblock.models.cache import ReplyCache, reply_key
+from phyblock.models.costs import Budget
+from phyblock.models.keys import api_key_status
+from phyblock.models.model import ModelEvent, RetryPolicy, build_model
+from phyblock.models.request import HaltedError, Model, Request
 from phyblock.records.files import BATCHES
 from phyblock.records.record import Record, Reply
 from phyblock.run.judge import about_prompt, begun, judge_episode, judge_reply

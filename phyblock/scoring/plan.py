@@ -18,8 +18,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.domain import CandidateSet, Plan, Scene
 from phyblock.domain.question import Subtask
+from phyblock.domain.scene import CandidateSet, Plan, Scene
 from phyblock.types import Criterion, Level1Criterion, Matcher, Setting
 
 Floats = NDArray[np.float64]

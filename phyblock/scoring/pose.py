@@ -13,17 +13,15 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
-from phyblock.domain import (
-    Block,
+from phyblock.domain.blocks import (
+    SHAPES,
     BlockType,
-    CandidateSet,
     Euler,
-    Scene,
     euler_deg_to_matrix,
     symmetries,
     turn_deg,
 )
-from phyblock.domain.blocks import SHAPES
+from phyblock.domain.scene import Block, CandidateSet, Scene
 from phyblock.scoring.plan import Floats, Goal
 from phyblock.scoring.pose_matching import (
     TOLERANCES_CM,

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.domain import Plan
+from phyblock.domain.scene import Plan
 from phyblock.scoring.plan import Floats, Goal, most_placed, steps_back
 from phyblock.stable import plain_sum
 

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from phyblock.domain import CandidateSet, Scene
+from phyblock.domain.scene import CandidateSet, Scene
 from phyblock.scoring.plan import ERROR_TYPES, Counts, ErrorType, Goal
 from phyblock.types import Gating, Setting
 

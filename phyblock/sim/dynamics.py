@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.domain import Block
+from phyblock.domain.scene import Block
 from phyblock.errors import SimulationError
 from phyblock.sim.balance import prove_standing
 from phyblock.sim.contact import FIT_TOLERANCE_M, bounds_m, boxes_near, drop_height_m, piece_pairs

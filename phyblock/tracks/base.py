@@ -20,7 +20,7 @@ from pydantic import BaseModel
 
 from phyblock.config.suite import Suite
 from phyblock.config.validation import PictureControls
-from phyblock.data import AssemblyTask, Dataset
+from phyblock.data.base import AssemblyTask, Dataset
 from phyblock.errors import Problem, SpecError
 from phyblock.models.request import Image, Request
 from phyblock.parsing.text import AnswerForm

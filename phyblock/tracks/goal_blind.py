@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.data import AssemblyTask
-from phyblock.domain import Candidate, CandidateSet, Plan, Scene
-from phyblock.domain.scene import Kind
+from phyblock.data.base import AssemblyTask
+from phyblock.domain.scene import Candidate, CandidateSet, Kind, Plan, Scene
 from phyblock.scoring.plan import Goal, most_placed
 from phyblock.tracks.items import ShownTask, presented
 from phyblock.types import CandidateOrder, Setting

@@ -13,8 +13,8 @@ from fractions import Fraction
 from functools import partial
 from typing import Protocol, TypeVar
 
-from phyblock.data import AssemblyTask
-from phyblock.domain import CandidateSet, Scene
+from phyblock.data.base import AssemblyTask
+from phyblock.domain.scene import CandidateSet, Scene
 from phyblock.errors import DataError, Problem
 from phyblock.records.record import Record
 from phyblock.stable import drawn_bytes

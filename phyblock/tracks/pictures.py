@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from phyblock.config.suite import ImagesSpec
-from phyblock.data import AssemblyTask
+from phyblock.data.base import AssemblyTask
 from phyblock.errors import DataError, Problem, SimulationError
 from phyblock.files import (
     LARGEST_PICTURE_BYTES,

@@ -15,15 +15,9 @@ import numpy as np
 from pydantic import Field
 
 from phyblock.config.validation import Fault, PictureControls, TemplateName, UniqueSome, checked
-from phyblock.data import AssemblyTask
-from phyblock.domain import (
-    Block,
-    BlockType,
-    CandidateSet,
-    Plan,
-    PoseStep,
-    Scene,
-)
+from phyblock.data.base import AssemblyTask
+from phyblock.domain.blocks import BlockType
+from phyblock.domain.scene import Block, CandidateSet, Plan, PoseStep, Scene
 from phyblock.files import bundled
 from phyblock.parsing.poses import (
     FARTHEST_PLACE_CM,

@@ -23,25 +23,21 @@ from phyblock.config.validation import (
     TemplateName,
     UniqueSome,
 )
-from phyblock.data import (
-    QUESTIONS_FILE,
-    Dataset,
-    QuestionSet,
-    QuestionTask,
-    read_official_questions,
-    read_questions,
-)
-from phyblock.domain import (
+from phyblock.data.base import Dataset, QuestionSet, QuestionTask
+from phyblock.data.official import read_official_questions
+from phyblock.data.questions import QUESTIONS_FILE, read_questions
+from phyblock.domain.question import (
     CATEGORIES,
     LETTERS,
     SUBTASK_NAMES,
     SUBTASKS,
     Question,
-    Scene,
     Subtask,
     is_picture_option,
+    rotated,
+    rotated_label,
 )
-from phyblock.domain.question import rotated, rotated_label
+from phyblock.domain.scene import Scene
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.files import bundled, bundled_sets, read_picture
 from phyblock.models.request import Image

@@ -12,8 +12,8 @@ from typing import Any, ClassVar, Literal, get_args
 import numpy as np
 
 from phyblock.config.validation import Count, Flag, PictureControls, TemplateName
-from phyblock.data import AssemblyTask
-from phyblock.domain import Block, CandidateSet, Plan, Scene
+from phyblock.data.base import AssemblyTask
+from phyblock.domain.scene import Block, CandidateSet, Plan, Scene
 from phyblock.files import bundled
 from phyblock.models.request import Image, Message, Request
 from phyblock.parsing.move import MoveProblem, ParsedMove, move_form, parse_move

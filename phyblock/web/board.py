@@ -13,7 +13,7 @@ from typing import Any
 import pandas as pd
 
 from phyblock.bundle import portable_manifest
-from phyblock.data import AssemblyTask
+from phyblock.data.base import AssemblyTask
 from phyblock.errors import DataError
 from phyblock.records.files import ManifestModel, read_stopped
 from phyblock.records.record import Record

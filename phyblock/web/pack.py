@@ -23,8 +23,10 @@ from typing import Any, NamedTuple
 
 import jinja2
 
-from phyblock.data import AssemblyTask
-from phyblock.domain import BLOCK_TYPES, Block, Question
+from phyblock.data.base import AssemblyTask
+from phyblock.domain.blocks import BLOCK_TYPES
+from phyblock.domain.question import Question
+from phyblock.domain.scene import Block
 from phyblock.files import OutFolder, atomic_write, cache_dir, digest_of_file, writing
 from phyblock.records.files import PromptLines, RecordLines
 from phyblock.records.record import Record, SentPrompt

@@ -22,9 +22,10 @@ from pydantic import JsonValue
 
 from phyblock.config.models import HUMAN, ModelConfig
 from phyblock.config.suite import Suite
-from phyblock.data import AssemblyTask
+from phyblock.data.base import AssemblyTask
 from phyblock.errors import Problem, SpecError
-from phyblock.models import HaltedError, Image, Reply, Request, Usage
+from phyblock.models.request import HaltedError, Image, Request
+from phyblock.records.record import Reply, Usage
 from phyblock.run.judge import begun, judge_reply
 from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.runner import RunEvent, RunResult, RunStarted, SampleDone, Session

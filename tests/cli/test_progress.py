@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from phyblock.cli.progress import ProgressView
-from phyblock.models import ModelEvent
+from phyblock.models.model import ModelEvent
 from phyblock.records.files import known_records
 from phyblock.run.runner import ModelStopped, RunEvent, RunNotice, RunStarted, SampleDone
 from tests.web.factory import record

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from phyblock.data import read_builtin
+from phyblock.data.scenes import read_builtin
 from phyblock.records.files import read_records
 from phyblock.tracks.step_planning import EpisodeRecord, StepPlanning
 from tests.servers.chassis import Running

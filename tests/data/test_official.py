@@ -14,15 +14,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from phyblock.data import (
-    Dataset,
+from phyblock.data.base import Dataset
+from phyblock.data.official import (
+    match_published,
     official_prompt,
-    read_builtin,
     read_official,
     read_official_questions,
     recorded_models,
 )
-from phyblock.data.official import match_published
+from phyblock.data.scenes import read_builtin
 from phyblock.errors import DataError, Problem
 from phyblock.results.paper import published_table
 from tests.data.broken import Raw, sound_scene, with_value, write_checkout, write_scenes

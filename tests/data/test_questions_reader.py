@@ -11,8 +11,11 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 
-from phyblock.data import Dataset, QuestionTask, read_builtin, read_questions
-from phyblock.domain import Block, Mark, QuestionPicture
+from phyblock.data.base import Dataset, QuestionTask
+from phyblock.data.questions import read_questions
+from phyblock.data.scenes import read_builtin
+from phyblock.domain.question import Mark, QuestionPicture
+from phyblock.domain.scene import Block
 from phyblock.errors import DataError
 from tests.data.broken import sound_scene, without, write_scenes
 from tests.fuzz.strategies import QUESTIONS

@@ -16,22 +16,19 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from phyblock.data import read_official
-from phyblock.domain import (
+from phyblock.data.official import read_official
+from phyblock.domain.blocks import (
     BLOCK_TYPES,
     COLORS,
     KIT_PALETTE,
     SHAPES,
-    Block,
     BlockType,
-    Candidate,
-    CandidateSet,
     Euler,
-    Plan,
-    Scene,
+    euler_deg_to_quat_xyzw,
+    orientation_class,
     quat_xyzw_to_matrix,
 )
-from phyblock.domain.blocks import euler_deg_to_quat_xyzw, orientation_class
+from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
 
 ANGLES = st.floats(-720, 720)
 EULERS = st.tuples(ANGLES, ANGLES, ANGLES)

@@ -12,7 +12,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import phyblock.env
-from phyblock.domain import BLOCK_TYPES, COLORS, PoseStep
+from phyblock.domain.blocks import BLOCK_TYPES, COLORS
+from phyblock.domain.scene import PoseStep
 from phyblock.env import DONE, PhyBlockEnv, read_tasks
 from phyblock.scoring.pose import blocks_reached
 from phyblock.sim.dynamics import execute

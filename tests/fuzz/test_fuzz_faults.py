@@ -20,7 +20,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.errors import SampleError
-from phyblock.models import Budget, Reply
+from phyblock.models.costs import Budget
+from phyblock.records.record import Reply
 from tests.fuzz.laws import (
     Broken,
     Ended,

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from phyblock.data import read_builtin, read_official
-from phyblock.domain import Block, CandidateSet, Scene
+from phyblock.data.official import read_official
+from phyblock.data.scenes import read_builtin
+from phyblock.domain.scene import Block, CandidateSet, Scene
 from phyblock.domain.symmetry import Symmetry
 from phyblock.making.checks import (
     AUDITED,

@@ -11,8 +11,8 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.data import read_builtin
-from phyblock.domain import Scene
+from phyblock.data.scenes import read_builtin
+from phyblock.domain.scene import Scene
 from phyblock.errors import DataError
 from phyblock.files import bundled
 from phyblock.making.checks import verify_scene

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.data import read_builtin
-from phyblock.domain import LETTERS, Block, BlockType, Color, QuestionPicture, Scene
-from phyblock.domain.blocks import SHAPES, Euler
-from phyblock.domain.question import Mark
+from phyblock.data.scenes import read_builtin
+from phyblock.domain.blocks import SHAPES, BlockType, Color, Euler
+from phyblock.domain.question import LETTERS, Mark, QuestionPicture
+from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, turned_form
 from phyblock.files import bundled
 from phyblock.making.questions.base import WORDINGS, Draft, UnfairError, four_alike, ranks_among

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from phyblock.data import QuestionSet, read_builtin, read_questions
-from phyblock.data.questions import StoredQuestion
-from phyblock.domain import LETTERS, SUBTASKS, Question, Subtask
+from phyblock.data.base import QuestionSet
+from phyblock.data.questions import StoredQuestion, read_questions
+from phyblock.data.scenes import read_builtin
 from phyblock.domain.blocks import COLORS
-from phyblock.domain.question import rotated
+from phyblock.domain.question import LETTERS, SUBTASKS, Question, Subtask, rotated
 from phyblock.errors import DataError, StoreError
 from phyblock.files import bundled
 from phyblock.making.files import question_card, write_questions

@@ -11,7 +11,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from phyblock.domain import BLOCK_TYPES, KIT_PALETTE, SHAPES, Block, Scene
+from phyblock.domain.blocks import BLOCK_TYPES, KIT_PALETTE, SHAPES
+from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, canonical_form
 from phyblock.making.checks import FORM, PHYSICS, SceneFacts, check_set, findings_of
 from phyblock.making.scenes.designs import BUILDINGS, COMPOSITIONS, CREATURES, beside

@@ -12,17 +12,12 @@ from typing import Any
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import BudgetReachedError, ModelError
-from phyblock.models import (
-    Budget,
-    ModelEvent,
-    Reply,
-    ReplyCache,
-    Request,
-    RetryPolicy,
-    build_model,
-)
 from phyblock.models.batch import BatchFiles
-from phyblock.records.record import BatchLine
+from phyblock.models.cache import ReplyCache
+from phyblock.models.costs import Budget
+from phyblock.models.model import ModelEvent, RetryPolicy, build_model
+from phyblock.models.request import Request
+from phyblock.records.record import BatchLine, Reply
 from tests.models.factory import QUICK
 
 POLL_S = 0.01

@@ -8,20 +8,13 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from phyblock.config.models import ModelConfig
-from phyblock.domain import Block, Candidate, CandidateSet, Scene
+from phyblock.domain.scene import Block, Candidate, CandidateSet, Scene
 from phyblock.errors import ModelError
-from phyblock.models import (
-    Budget,
-    Image,
-    Message,
-    Model,
-    ModelEvent,
-    Reply,
-    ReplyCache,
-    Request,
-    RetryPolicy,
-    build_model,
-)
+from phyblock.models.cache import ReplyCache
+from phyblock.models.costs import Budget
+from phyblock.models.model import ModelEvent, RetryPolicy, build_model
+from phyblock.models.request import Image, Message, Model, Request
+from phyblock.records.record import Reply
 from phyblock.tracks.full_planning import PlanSubject
 from tests.servers.anthropic_messages import AnthropicMessages
 from tests.servers.chassis import LocalServer

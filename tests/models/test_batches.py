@@ -17,7 +17,6 @@ from hypothesis import strategies as st
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import BudgetReachedError, SampleError, UnavailableError
-from phyblock.models import Budget, Reply, ReplyCache, Request
 from phyblock.models.batch import (
     Batch,
     UnsureError,
@@ -27,7 +26,10 @@ from phyblock.models.batch import (
     under_way,
 )  # fmt: skip
 from phyblock.models.batch_providers import PROVIDERS, UNREADABLE, _joined
-from phyblock.records.record import BatchLine
+from phyblock.models.cache import ReplyCache
+from phyblock.models.costs import Budget
+from phyblock.models.request import Request
+from phyblock.records.record import BatchLine, Reply
 from tests.models.batching import Disk, Killing, command, run_command
 from tests.models.factory import KEY, QUICK, ROUTES, ask, make_model, make_request, with_fields
 from tests.servers.batches import (

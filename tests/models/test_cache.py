@@ -17,7 +17,9 @@ from hypothesis import strategies as st
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import StoreError
-from phyblock.models import Image, Message, Reply, ReplyCache, Request, Usage, reply_key
+from phyblock.models.cache import ReplyCache, reply_key
+from phyblock.models.request import Image, Message, Request
+from phyblock.records.record import Reply, Usage
 from tests.models.factory import ROUTES, ask, make_model, make_request, with_fields
 from tests.servers.chassis import Faults, Running
 

@@ -13,21 +13,23 @@ from hypothesis import strategies as st
 
 from phyblock.config.models import ModelConfig, Price, Tariff, Tier
 from phyblock.errors import BudgetReachedError, RetryableError, SpecError
-from phyblock.models import (
+from phyblock.models.cache import ReplyCache
+from phyblock.models.costs import (
     Budget,
     Estimate,
-    Image,
-    Message,
-    Reply,
-    ReplyCache,
-    Request,
-    Usage,
-    build_model,
+    cost_usd,
+    counted,
     estimate,
     is_billed,
+    map_entry,
+    most_usd,
+    picture_tokens,
+    price_at,
     tariff_of,
 )
-from phyblock.models.costs import cost_usd, counted, map_entry, most_usd, picture_tokens, price_at
+from phyblock.models.model import build_model
+from phyblock.models.request import Image, Message, Request
+from phyblock.records.record import Reply, Usage
 from phyblock.tracks.full_planning import PlanSubject
 from tests.models.factory import (
     CANDIDATES,

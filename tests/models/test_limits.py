@@ -19,9 +19,11 @@ from phyblock.errors import (
     StoreError,
     UnavailableError,
 )
-from phyblock.models import Budget, Reply, ReplyCache, RetryPolicy, reply_key
+from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.client import HttpClient
-from phyblock.models.model import WINDOW_S, Clock, Limits
+from phyblock.models.costs import Budget
+from phyblock.models.model import WINDOW_S, Clock, Limits, RetryPolicy
+from phyblock.records.record import Reply
 from tests.models.factory import ROUTES, make_model, make_request, run
 from tests.servers.chassis import Faults, Running
 

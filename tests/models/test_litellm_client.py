@@ -20,11 +20,13 @@ from aiohttp import web
 from phyblock.config.models import ModelConfig, group_names, load_models
 from phyblock.config.suite import Suite
 from phyblock.errors import ModelError, RetryableError, UnavailableError
-from phyblock.models import Message, Reply, RetryPolicy, ends_on
 from phyblock.models.client import Answer, HttpClient
-from phyblock.models.costs import map_entry
+from phyblock.models.costs import ends_on, map_entry
 from phyblock.models.keys import KEYLESS
 from phyblock.models.litellm_client import LitellmClient
+from phyblock.models.model import RetryPolicy
+from phyblock.models.request import Message
+from phyblock.records.record import Reply
 from phyblock.run.plan import to_config
 from tests.models.factory import KEY_VARIABLE, ROUTES, ask, make_model, make_request, reply_of
 from tests.servers.chassis import Faults, Running

@@ -14,10 +14,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.config.models import ModelConfig
-from phyblock.domain import Candidate, CandidateSet
+from phyblock.domain.scene import Candidate, CandidateSet
 from phyblock.errors import DataError, RefusedError, SampleError
-from phyblock.models import Model, Reply, Request, Usage, build_model
 from phyblock.models.client import read_raw_reply
+from phyblock.models.model import build_model
+from phyblock.models.request import Model, Request
+from phyblock.records.record import Reply, Usage
 from phyblock.tracks.full_planning import PLAN_RULES, PlanSubject
 from tests.models.factory import CANDIDATES, SCENE, make_request
 from tests.records.damage import plan_record

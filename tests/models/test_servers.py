@@ -17,8 +17,10 @@ from phyblock.errors import (
     UnavailableError,
     UnreachableError,
 )
-from phyblock.models import Budget, Model, Reply, Request, RetryPolicy
-from phyblock.models.model import FAILURES_TO_REST, ChatModel, Limits, Server, Servers
+from phyblock.models.costs import Budget
+from phyblock.models.model import FAILURES_TO_REST, ChatModel, Limits, RetryPolicy, Server, Servers
+from phyblock.models.request import Model, Request
+from phyblock.records.record import Reply
 from tests.models.factory import ROUTES, ask, make_model, make_request, run, with_fields
 from tests.models.test_limits import FakeTime
 from tests.servers.chassis import Faults, Running, kill, start

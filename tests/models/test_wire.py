@@ -27,12 +27,13 @@ from phyblock.errors import (
     UnavailableError,
     UnreachableError,
 )
-from phyblock.models import Image, Message, Model, ModelEvent, Reply, Request, RetryPolicy
 from phyblock.models.client import shown
-from phyblock.models.request import json_body, wire_messages
+from phyblock.models.model import ModelEvent, RetryPolicy
+from phyblock.models.request import Image, Message, Model, Request, json_body, wire_messages
 from phyblock.parsing.answer import choice_form
 from phyblock.parsing.move import move_form
 from phyblock.parsing.plan import plan_form
+from phyblock.records.record import Reply
 from phyblock.run.plan import to_config
 from phyblock.types import ImageDetail
 from tests.models.factory import (

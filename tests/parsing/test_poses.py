@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.domain import PoseStep
+from phyblock.domain.scene import PoseStep
 from phyblock.parsing.poses import MOST_POSE_STEPS, parse_poses, pose_form
 
 TWO = "Step1: block 3 at (5, 10, 2.5)\nStep2: block 5 at (0, -5, 7.5)"

@@ -9,9 +9,9 @@ from typing import Any
 import jsonschema
 import pytest
 
-from phyblock.data import Dataset, QuestionSet, read_builtin, read_questions
-from phyblock.data.questions import StoredQuestion
-from phyblock.data.scenes import StoredScene
+from phyblock.data.base import Dataset, QuestionSet
+from phyblock.data.questions import StoredQuestion, read_questions
+from phyblock.data.scenes import StoredScene, read_builtin
 from phyblock.errors import DataError
 from phyblock.files import bundled
 from phyblock.records.record import Line, validated

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.domain import CATEGORIES, LETTERS, SUBTASKS
+from phyblock.domain.question import CATEGORIES, LETTERS, SUBTASKS
 from phyblock.results.estimates import all_estimates, strongest_floor
 from phyblock.results.load import Run
 from phyblock.scoring.plan import Counts, micro

@@ -14,8 +14,10 @@ import pandas as pd
 import pytest
 from PIL import Image as PillowImage
 
-from phyblock.data import Dataset, QuestionSet, read_builtin, read_questions
-from phyblock.domain import LETTERS, is_picture_option
+from phyblock.data.base import Dataset, QuestionSet
+from phyblock.data.questions import read_questions
+from phyblock.data.scenes import read_builtin
+from phyblock.domain.question import LETTERS, is_picture_option
 from phyblock.integrations import huggingface
 from phyblock.integrations.files import write_vlmevalkit
 from phyblock.results.export import export_frame, export_run

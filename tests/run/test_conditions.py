@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import yaml
 
-from phyblock.data import AssemblyTask, read_builtin
+from phyblock.data.base import AssemblyTask
+from phyblock.data.scenes import read_builtin
 from phyblock.scoring.plan import f1_of
 from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png
 from phyblock.tracks.items import presented, shown_order

@@ -19,7 +19,7 @@ from phyblock.cli.run import print_estimate
 from phyblock.config.models import ModelConfig, Tariff, load_models
 from phyblock.config.suite import load_suite
 from phyblock.files import bundled
-from phyblock.models import Estimate as CallEstimate
+from phyblock.models.costs import Estimate as CallEstimate
 from phyblock.models.costs import text_tokens
 from phyblock.run.estimate import Estimate, estimate
 from phyblock.run.plan import RunPlan, make_plan

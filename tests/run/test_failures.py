@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from aiohttp import web
 
-from phyblock.models import ReplyCache
+from phyblock.models.cache import ReplyCache
 from phyblock.records.files import STOPPED, read_stopped
 from phyblock.results.load import load_run
 from tests.servers.chassis import ISSUE_MIX, Faults, Running, Seen

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from phyblock.data import VERSION_FILE, read_version
+from phyblock.data.base import VERSION_FILE, read_version
 from phyblock.errors import DataError, SpecError
 from phyblock.records.files import read_manifest
 from phyblock.results.compare import check_alike, compare_runs

@@ -8,7 +8,7 @@ import pytest
 
 from phyblock.config.models import ModelConfig
 from phyblock.config.suite import Suite
-from phyblock.models import reply_key
+from phyblock.models.cache import reply_key
 from phyblock.run.plan import to_config
 from tests.models.factory import ask, make_model, make_request
 from tests.servers.anthropic_messages import AnthropicMessages

@@ -12,8 +12,9 @@ from typing import Any
 import pytest
 from PIL import Image as PillowImage
 
-from phyblock.data import read_builtin, read_questions
-from phyblock.domain import LETTERS, Question
+from phyblock.data.questions import read_questions
+from phyblock.data.scenes import read_builtin
+from phyblock.domain.question import LETTERS, Question
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_png
 from tests.fork_server import Done

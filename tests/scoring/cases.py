@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from hypothesis import strategies as st
 
-from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
+from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring.plan import Floats, ratio_of
 from phyblock.types import Setting
 from tests.domain.graphs import acyclic

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
+from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring.plan import (
     BLOCK_OUTCOMES,
     ERROR_TYPES,

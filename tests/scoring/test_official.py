@@ -11,8 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from phyblock.data import AssemblyTask, read_builtin, read_official
-from phyblock.domain import CATEGORIES, Plan
+from phyblock.data.base import AssemblyTask
+from phyblock.data.official import read_official
+from phyblock.data.scenes import read_builtin
+from phyblock.domain.question import CATEGORIES
+from phyblock.domain.scene import Plan
 from phyblock.parsing.plan import parse_plan
 from phyblock.results.paper import published_table
 from phyblock.scoring.plan import AssemblyScorer, Goal, chance, match_plan

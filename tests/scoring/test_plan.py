@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from phyblock.domain import Block, Candidate, CandidateSet, Plan, Scene
+from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring.plan import (
     AssemblyScorer,
     Counts,

@@ -13,19 +13,15 @@ from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]
 from scipy.spatial.transform import Rotation
 
-from phyblock.domain import (
+from phyblock.domain.blocks import (
     BLOCK_TYPES,
-    Block,
-    Candidate,
-    CandidateSet,
-    Plan,
-    Scene,
+    SHAPES,
+    BlockType,
     euler_deg_to_matrix,
     symmetries,
     turn_deg,
 )
-from phyblock.domain.blocks import SHAPES, BlockType
-from phyblock.domain.scene import AOVGraph
+from phyblock.domain.scene import AOVGraph, Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring.plan import Goal, most_placed
 from phyblock.scoring.pose import Laid, Piece, PoseScore, PoseScorer, overlap_volume, placed, volume
 from phyblock.scoring.pose_matching import Motion, Nearness, cheapest, matched

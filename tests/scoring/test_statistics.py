@@ -15,7 +15,7 @@ from hypothesis.extra import numpy as hnp
 from scipy import stats
 from scipy.special import gammaincinv  # type: ignore[import-untyped]
 
-from phyblock.data import read_official
+from phyblock.data.official import read_official
 from phyblock.scoring.plan import Floats, f1_of, ratio_of
 from phyblock.scoring.statistics import (
     POWER,

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from hypothesis import strategies as st
 
-from phyblock.domain import BLOCK_TYPES, Block, BlockType, Color, Euler, Scene
+from phyblock.domain.blocks import BLOCK_TYPES, BlockType, Color, Euler
+from phyblock.domain.scene import Block, Scene
 
 angles_deg = st.floats(-180, 180, allow_nan=False)
 eulers = st.tuples(angles_deg, angles_deg, angles_deg)

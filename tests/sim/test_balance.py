@@ -11,8 +11,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from phyblock.data import read_builtin
-from phyblock.domain import SHAPES, Block, BlockType
+from phyblock.data.scenes import read_builtin
+from phyblock.domain.blocks import SHAPES, BlockType
+from phyblock.domain.scene import Block
 from phyblock.files import bundled
 from phyblock.sim import balance
 from phyblock.sim.balance import (

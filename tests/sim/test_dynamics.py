@@ -13,8 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from phyblock.data import read_builtin, read_official
-from phyblock.domain import Block, BlockType
+from phyblock.data.official import read_official
+from phyblock.data.scenes import read_builtin
+from phyblock.domain.blocks import BlockType
+from phyblock.domain.scene import Block
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim.contact import drop_height_m
 from phyblock.sim.dynamics import (

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from phyblock.domain import SHAPES, Block, BlockType, euler_deg_to_matrix
+from phyblock.domain.blocks import SHAPES, BlockType, euler_deg_to_matrix
+from phyblock.domain.scene import Block
 from phyblock.errors import InputError
 from phyblock.scoring.pose import blocks_reached, overlap_volume, placed
 from phyblock.sim.contact import VOXEL_M, filled_voxels, voxel_iou

@@ -14,17 +14,17 @@ from numpy.testing import assert_allclose
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
-from phyblock.data import read_official
-from phyblock.domain import (
+from phyblock.data.official import read_official
+from phyblock.domain.blocks import (
     BLOCK_TYPES,
     KIT_PALETTE,
     SHAPES,
-    Block,
     BlockType,
     Color,
+    euler_deg_to_quat_xyzw,
     quat_xyzw_to_matrix,
 )
-from phyblock.domain.blocks import euler_deg_to_quat_xyzw
+from phyblock.domain.scene import Block
 from phyblock.sim.contact import (
     GROUND,
     drop_m,

@@ -20,9 +20,11 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
-from phyblock.data import read_builtin, read_questions
-from phyblock.domain import BLOCK_TYPES, KIT_PALETTE, Block, Candidate, CandidateSet, Color, Scene
+from phyblock.data.questions import read_questions
+from phyblock.data.scenes import read_builtin
+from phyblock.domain.blocks import BLOCK_TYPES, KIT_PALETTE, Color
 from phyblock.domain.question import Mark, QuestionPicture
+from phyblock.domain.scene import Block, Candidate, CandidateSet, Scene
 from phyblock.errors import DataError
 from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.sketch import POSES

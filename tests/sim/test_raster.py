@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import phyblock.sim
-from phyblock.domain import BLOCK_TYPES, Block, quat_xyzw_to_matrix
+from phyblock.domain.blocks import BLOCK_TYPES, quat_xyzw_to_matrix
+from phyblock.domain.scene import Block
 from phyblock.sim.camera import FULL_WINDOW, Camera, frame, view_axes
 from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import drawn_mesh

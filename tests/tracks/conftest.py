@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from phyblock.data import AssemblyTask, read_builtin
+from phyblock.data.base import AssemblyTask
+from phyblock.data.scenes import read_builtin
 from phyblock.tracks.pictures import Workshop
 from tests.data.broken import write_scenes
 from tests.workspace import SCENES

@@ -10,10 +10,11 @@ from typing import Any
 import yaml
 
 from phyblock.config.suite import Suite, load_suite
-from phyblock.data import AssemblyTask, Dataset, read_builtin
-from phyblock.domain import Block, Candidate, CandidateSet, Scene
+from phyblock.data.base import AssemblyTask, Dataset
+from phyblock.data.scenes import read_builtin
+from phyblock.domain.scene import Block, Candidate, CandidateSet, Scene
 from phyblock.files import bundled
-from phyblock.tracks import open_tracks
+from phyblock.tracks.base import open_tracks
 from phyblock.tracks.pictures import Workshop
 
 DATA = bundled("benchmarks", "data")

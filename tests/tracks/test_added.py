@@ -19,7 +19,7 @@ import pytest
 
 from phyblock import registry
 from phyblock.cli.main import phyblock
-from phyblock.data import AssemblyTask
+from phyblock.data.base import AssemblyTask
 from phyblock.errors import SpecError, StoreError
 from phyblock.records.record import Record
 from phyblock.results.compare import comparable, compare_models
@@ -29,7 +29,7 @@ from phyblock.results.load import Run, load_run, track_measures
 from phyblock.results.tables import write_tables
 from phyblock.run.rescore import rescore
 from phyblock.scoring.plan import mean_of, ratio_of
-from phyblock.tracks import Judgement, SceneTrack, kind_of
+from phyblock.tracks.base import Judgement, SceneTrack, kind_of
 from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts, TrackReport
 from phyblock.web.board import SiteRun, Sources, all_values, board_of, entries_of, values_of

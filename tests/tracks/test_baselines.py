@@ -11,17 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.domain import (
-    COLORS,
-    KIT_PALETTE,
-    LETTERS,
-    Block,
-    Candidate,
-    CandidateSet,
-    Plan,
-    Question,
-    Scene,
-)
+from phyblock.domain.blocks import COLORS, KIT_PALETTE
+from phyblock.domain.question import LETTERS, Question
+from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.making.questions.text_probe import text_rule
 from phyblock.parsing.answer import parse_answer
 from phyblock.parsing.move import parse_move

@@ -16,8 +16,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.cli.main import phyblock
-from phyblock.data import AssemblyTask
-from phyblock.domain import Block, Candidate, CandidateSet, PoseStep
+from phyblock.data.base import AssemblyTask
+from phyblock.domain.scene import Block, Candidate, CandidateSet, PoseStep
 from phyblock.errors import SpecError, StoreError
 from phyblock.parsing.poses import parse_poses
 from phyblock.records.files import known_records

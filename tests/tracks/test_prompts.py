@@ -10,11 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.data import official_prompt, recorded_models
+from phyblock.data.official import official_prompt, recorded_models
 from phyblock.errors import PromptError
 from phyblock.models.request import Image, Message
-from phyblock.tracks import TemplatePrompt
-from phyblock.tracks.prompts import OfficialPrompt
+from phyblock.tracks.prompts import OfficialPrompt, TemplatePrompt
 from tests.fuzz.strategies import TEMPLATES
 
 GOAL, GRID = Image(b"goal", "goal", 8, 8), Image(b"grid", "candidates", 8, 8)

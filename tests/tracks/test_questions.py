@@ -14,9 +14,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.data import QuestionSet, QuestionTask, read_builtin, read_questions
-from phyblock.domain import LETTERS, SUBTASKS, Question, Scene, Subtask
-from phyblock.domain.question import rotated
+from phyblock.data.base import QuestionSet, QuestionTask
+from phyblock.data.questions import read_questions
+from phyblock.data.scenes import read_builtin
+from phyblock.domain.question import LETTERS, SUBTASKS, Question, Subtask, rotated
+from phyblock.domain.scene import Scene
 from phyblock.models.request import Image, Request
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_key

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from phyblock.config.suite import load_suite
 from phyblock.errors import SpecError
-from phyblock.models import HaltedError, Image, Message, Request
+from phyblock.models.request import HaltedError, Image, Message, Request
 from phyblock.run.runner import RunResult
 from phyblock.tracks.picking import Choice, Pick, Picking
 from phyblock.web.server import LARGEST_BODY_BYTES, Server

@@ -13,15 +13,10 @@ from PIL import Image
 
 from phyblock.cli.console import make_console, print_rows, shown_path
 from phyblock.cli.options import NAME_OR_PATH, UserPath
-from phyblock.data import (
-    VERSION_FILE,
-    QuestionSet,
-    find_questions,
-    read_data_set,
-    read_questions,
-    read_version,
-)
-from phyblock.domain import LETTERS, SUBTASK_NAMES, SUBTASKS, Question, Subtask
+from phyblock.data.base import VERSION_FILE, QuestionSet, read_version
+from phyblock.data.lookup import find_questions, read_data_set
+from phyblock.data.questions import read_questions
+from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Question, Subtask
 from phyblock.errors import DataError, Problem
 from phyblock.files import write_named
 from phyblock.making.cli.options import (

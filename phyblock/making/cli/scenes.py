@@ -17,15 +17,9 @@ from pydantic import TypeAdapter
 
 from phyblock.cli.console import make_console, print_rows, shown_path
 from phyblock.cli.options import NAME_OR_PATH, UserPath
-from phyblock.data import (
-    SCENES_FILE,
-    AssemblyTask,
-    Dataset,
-    find_data_set,
-    read_builtin,
-    read_data_set,
-)
-from phyblock.data.base import read_data
+from phyblock.data.base import AssemblyTask, Dataset, read_data
+from phyblock.data.lookup import find_data_set, read_data_set
+from phyblock.data.scenes import SCENES_FILE, read_builtin
 from phyblock.domain.scene import Scene
 from phyblock.domain.symmetry import fingerprint
 from phyblock.errors import DataError, Problem

@@ -17,7 +17,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from phyblock.data import AssemblyTask, read_builtin
+from phyblock.data.base import AssemblyTask
+from phyblock.data.scenes import read_builtin
 from phyblock.domain.blocks import COLORS
 from phyblock.domain.scene import Block, CycleError, Kind, Scene
 from phyblock.domain.symmetry import SYMMETRIES, fingerprint
