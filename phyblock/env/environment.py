@@ -12,6 +12,7 @@ the position of its center [m], 0 for candidates. Rows that hold no block are 0.
 from __future__ import annotations
 
 import contextlib
+import string
 from collections import OrderedDict
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict
@@ -24,11 +25,14 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from PIL import Image
 
-from phyblock.data.base import AssemblyTask
+from phyblock.config.suite import load_suite
+from phyblock.data.base import AssemblyTask, Dataset
 from phyblock.data.lookup import read_data_set
 from phyblock.domain.blocks import BLOCK_TYPES, COLORS
 from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, PoseStep
 from phyblock.errors import DataError, Problem
+from phyblock.files import bundled
+from phyblock.models.request import Image as SentImage
 from phyblock.scoring.pose import blocks_reached
 from phyblock.scoring.steps import Assembly
 from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, ExecutedStep, Executor, Settled, Site
@@ -43,10 +47,12 @@ from phyblock.sim.pictures import (
 )
 from phyblock.sim.ruled import RuledFloor, kit_sheet
 from phyblock.text import some_of
+from phyblock.tracks.pictures import LocalShop
+from phyblock.tracks.step_planning import PastStep, StepOutcome, StepPlanning
 from phyblock.types import GATINGS, SETTINGS, Background, Gating, Physics, Setting
 
-Observation = dict[str, NDArray[Any]]
-Observe = Literal["pictures", "state"]
+Observation = dict[str, Any]
+Observe = Literal["pictures", "state", "text"]
 Action = Literal["block", "pose"]
 
 DONE = 0
@@ -55,8 +61,11 @@ MOST_BLOCKS = 64
 """Rows of a goal; built-in ones have 22 blocks at most."""
 TRAITS = 9
 """There, type, color, three angles, three coordinates."""
+_PICTURES = ("goal", "candidates", "current")
+"""Pictures of an observation, as the prompt of step planning names them, in its order."""
 _KEPT_PICTURES = 64
 """Pictures of one scene that are kept; 50 MB at 512 pixels."""
+_MOST_CHARACTERS = 1 << 20
 _SMALLEST_PX = 16
 _LEVELS = (1, 2, 3, 4)
 _CM = 100.0
@@ -263,8 +272,9 @@ class _PosePlay:
 class PhyBlockEnv(gymnasium.Env[Observation, Any]):
     """Builds one scene an episode, block by block.
 
-    Observations are pictures (`current`, `goal`, `candidates`: RGB, shape (size, size, 3), uint8)
-    or, with `observe="state"`, numbers alone (`goal` and `candidates`: a row a block, float32, see
+    Observations are pictures (`current`, `goal`, `candidates`: RGB, shape (size, size, 3), uint8),
+    with `observe="text"` also `text`, the prompt of step planning about them. With
+    `observe="state"` they are numbers alone (`goal` and `candidates`: a row a block, float32, see
     the module; `placed`: number of blocks placed as each candidate, shape (16,), uint8; `left`: the
     share of steps that is left, shape (1,), float32; where actions are poses also `world`: the
     blocks where they lie, rows as in `goal`).
@@ -309,6 +319,8 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
                 raise ValueError(f"{name} is {value!r}; allowed: {', '.join(allowed)}")
         if action == "pose" and (setting != "A" or gating != "aov"):
             raise ValueError("setting and gating are of action='block'; leave them out")
+        if action == "pose" and observe == "text":
+            raise ValueError("observe is 'text'; the prompt of a step is of action='block' alone")
         if action == "pose" and physics == "off":
             raise ValueError("physics is 'off'; a pose is carried out: allowed: settle, strict")
         for name, most in (("max_steps", max_steps), ("max_failures", max_failures)):
@@ -343,12 +355,20 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         self._pictures: OrderedDict[tuple[Block, ...] | None, NDArray[np.uint8]] = OrderedDict()
         self._steps = self._most_steps = self._failures = 0
         self._outcome, self._is_over = "begun", False
+        self._prompter: StepPlanning | None = None
+        if observe == "text":
+            rules = {"setting": setting, "gating": gating, "max_steps": max_steps or "null"}
+            said = [f"steps.{name}={value}" for name, value in rules.items()]
+            path, folder = bundled("benchmarks", "steps.yaml"), bundled("benchmarks", "data")
+            known, suite = Dataset("env", path, tasks), load_suite(path, said, data_dir=folder)
+            self._prompter = StepPlanning(suite, known, shop=LocalShop())
         self._begin(self._task)
         self.action_space = self._play.action_space
         parts: dict[str, spaces.Space[Any]] = {
-            name: spaces.Box(0, 255, (size_px, size_px, 3), np.uint8)
-            for name in ("current", "goal", "candidates")
+            name: spaces.Box(0, 255, (size_px, size_px, 3), np.uint8) for name in _PICTURES
         }
+        if observe == "text":
+            parts["text"] = spaces.Text(_MOST_CHARACTERS, charset=string.printable)
         if observe == "state":
             goal = spaces.Box(-360.0, 360.0, (MOST_BLOCKS, TRAITS), np.float32)
             parts = {
@@ -391,6 +411,8 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
             self._outcome, self._is_over = "done", True
             return self._observation(), 0.0, True, False, self._info()
         self._outcome, reward, is_right = acted
+        if self._prompter is not None:
+            self._past.append(PastStep(f"Move({action})", cast(StepOutcome, self._outcome)))
         self._failures = 0 if is_right else self._failures + 1
         ended = self._play.has_ended
         cut = self._steps >= self._most_steps or self._failures == self._max_failures
@@ -410,15 +432,19 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         return self._play.right_moves()
 
     def action_masks(self) -> NDArray[np.bool_]:
-        """The numbers that mean something in this scene, shape (17,): Done, and its candidates."""
-        mask: NDArray[np.bool_] = np.arange(MAX_CANDIDATES + 1) <= len(self._play.candidates)
-        return mask
+        """The numbers that mean something in this scene, shape (17,): Done, and its candidates.
+
+        `info["action_mask"]` has the same as Gymnasium's spaces sample by: int8.
+        """
+        return self._mask.astype(bool)
 
     def _begin(self, task: AssemblyTask) -> None:
         self._play.begin(task)
         self._steps = self._failures = 0
         self._outcome, self._is_over = "begun", False
+        self._past: list[PastStep] = []
         self._most_steps = self._max_steps or 2 * len(task.scene)
+        self._mask = (np.arange(MAX_CANDIDATES + 1) <= len(task.candidates)).astype(np.int8)
         if task is not self._task:
             self._task = task
             self._pictures.clear()
@@ -431,12 +457,10 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
 
     def _observation(self) -> Observation:
         play, goal = self._play, self._task.scene.blocks
-        if self._observe == "pictures":
-            return {
-                "current": self._picture(play.blocks).copy(),
-                "goal": self._picture(goal).copy(),
-                "candidates": self._picture(None).copy(),
-            }
+        if self._observe != "state":
+            shown = zip(_PICTURES, (goal, None, play.blocks), strict=True)
+            seen: Observation = {name: self._picture(blocks).copy() for name, blocks in shown}
+            return seen if self._prompter is None else {**seen, "text": self._text(self._prompter)}
         if len(goal) > MOST_BLOCKS:
             raise ValueError(f"a goal of {len(goal)} blocks; at most {MOST_BLOCKS} fit in a state")
         placed = np.bincount(play.chosen, minlength=MAX_CANDIDATES + 1)[1:]
@@ -451,6 +475,16 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
             # Of more than there are rows, those that came last.
             state["world"] = _rows(play.blocks[-MOST_BLOCKS:], MOST_BLOCKS)
         return state
+
+    def _text(self, track: StepPlanning) -> str:
+        """The prompt of the next step, with `[picture: goal]` where the goal is, and so on."""
+        pictures = [SentImage(b"", name, 0, 0) for name in _PICTURES]
+        messages = track.messages(self._task, pictures, self._past)
+        return "\n\n".join(
+            part if isinstance(part, str) else f"[picture: {part.label}]"
+            for message in messages
+            for part in message.parts
+        )
 
     def _picture(self, blocks: tuple[Block, ...] | None) -> NDArray[np.uint8]:
         """A picture of blocks, or of the candidates; those unused for longest make room."""
@@ -471,5 +505,6 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
             "n_blocks": len(self._task.scene),
             "chosen": self._play.chosen,
             "right_moves": self.right_moves(),
+            "action_mask": self._mask.copy(),
             **self._play.info(),
         }

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +12,12 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from PIL import Image
 
+import phyblock
 import phyblock.env
 from phyblock.domain.blocks import BLOCK_TYPES, COLORS
-from phyblock.domain.scene import PoseStep
+from phyblock.domain.scene import CandidateSet, PoseStep
 from phyblock.env import DONE, PhyBlockEnv, read_tasks
 from phyblock.scoring.pose import blocks_reached
 from phyblock.sim.dynamics import execute
@@ -54,11 +58,12 @@ def solve(env: PhyBlockEnv, info: dict[str, Any]) -> tuple[float, dict[str, Any]
     [
         {"size_px": 32},
         {"observe": "state"},
+        {"observe": "text", "size_px": 32},
         {"observe": "state", "physics": "strict"},
         {"action": "pose", "size_px": 32},
         {"action": "pose", "observe": "state", "physics": "strict"},
     ],
-    ids=["pictures", "state", "strict", "poses", "strict poses"],
+    ids=["pictures", "state", "text", "strict", "poses", "strict poses"],
 )
 def test_gymnasium_finds_nothing_wrong(options: dict[str, Any]) -> None:
     env = gymnasium.make(phyblock.env.ENV_ID, render_mode="rgb_array", **options)
@@ -83,7 +88,7 @@ def test_the_same_seed_gives_the_same_episodes() -> None:
     first, second = (rollout(PhyBlockEnv(SOME, observe="state"), 7) for _ in range(2))
     assert len(first) == len(second)
     for one, other in zip(first, second, strict=True):
-        assert one[1:] == other[1:]
+        assert repr(one[1:]) == repr(other[1:])
         assert all(np.array_equal(one[0][name], other[0][name]) for name in one[0])
     scenes = {seen[-1]["scene"] for seen in first}
     assert len(scenes) > 1
@@ -101,6 +106,41 @@ def test_a_state_holds_the_goal_and_the_candidates() -> None:
             assert row[3:6] == pytest.approx(block.euler_deg, abs=1e-3)
             assert row[6:] == pytest.approx(block.position_m, abs=1e-5)
         assert env.action_masks().sum() == 1 + len(task.candidates)
+    env.close()
+
+
+def test_a_text_is_the_prompt_of_step_planning_after_the_same_steps() -> None:
+    suite = ("candidates.order=file", "images.size_px=128", "steps.max_steps=12")
+    task = next(iter(phyblock.tasks("step_planning", *suite, data=SOME[:1])))
+    env = PhyBlockEnv(SOME[:1], observe="text", size_px=128, max_steps=12)
+    episode, (observation, info) = task.episode(), env.reset()
+    wrong = next(n for n in range(1, 17) if n not in info["right_moves"])
+    for action in (wrong, info["right_moves"][0], 99):
+        sent = [part for message in episode.request.messages for part in message.parts]  # type: ignore[union-attr]
+        shown = [p if isinstance(p, str) else f"[picture: {p.label}]" for p in sent]
+        assert observation["text"] == "\n\n".join(shown)
+        for picture in (part for part in sent if not isinstance(part, str)):
+            pixels = np.asarray(Image.open(io.BytesIO(picture.data)).convert("RGB"))
+            assert np.array_equal(pixels, observation[picture.label])
+        if action < 17:
+            episode.step(f"Next plan: Move({action})")
+            observation = env.step(action)[0]
+    env.close()
+
+
+@pytest.mark.parametrize("options", [{}, {"action": "pose"}], ids=["blocks", "poses"])
+def test_masked_samples_name_candidates_of_the_scene(options: dict[str, Any]) -> None:
+    short = replace(SOME[0], candidates=CandidateSet(SOME[0].candidates.candidates[:5]))
+    env = PhyBlockEnv([short], observe="state", **options)
+    _, info = env.reset()
+    mask = info["action_mask"]
+    assert mask.tolist() == env.action_masks().tolist() == [1] * 6 + [0] * 11
+    if options:
+        actions = [env.action_space.sample({"block": mask, "center_m": None}) for _ in range(60)]
+        numbers = {int(action["block"]) for action in actions}
+    else:
+        numbers = {int(env.action_space.sample(mask)) for _ in range(60)}
+    assert numbers == set(range(6))
     env.close()
 
 
@@ -158,6 +198,7 @@ def test_what_physics_does_with_what_cannot_stand(
         ({"data": ()}, "no tasks"),
         ({"action": "pose", "physics": "off"}, "allowed: settle, strict"),
         ({"action": "pose", "setting": "B"}, "leave them out"),
+        ({"action": "pose", "observe": "text"}, "of action='block' alone"),
         ({"levels": (2, 9)}, r"levels is \(2, 9\); allowed: several of \(1, 2, 3, 4\)"),
     ],
 )
