@@ -1,6 +1,6 @@
-"""JSON Schemas of the lines of runs and data, made from their models.
+"""JSON Schemas of suites, models files, and the lines of runs and data, made from their models.
 
-    python -m tests.documents      write benchmarks/schemas again
+    python -m tests.documents [FOLDER]      write benchmarks/schemas again
 
 The documentation makes its tables of fields from them; a test compares them with the models.
 """
@@ -8,53 +8,57 @@ The documentation makes its tables of fields from them; a test compares them wit
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+import sys
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter
-
-from phyblock.config.__main__ import field_docs, with_parts
-from phyblock.data.questions import StoredQuestion
-from phyblock.data.scenes import StoredScene
-from phyblock.records.files import Manifest, known_records, record_types
-from phyblock.records.record import BatchLine, Call, Line, Prompt
+from pydantic import BaseModel, TypeAdapter
 
 ROOT = Path(__file__).parents[1]
-SCHEMAS = Path("benchmarks", "schemas")
+SCHEMAS = ROOT / "benchmarks" / "schemas"
+DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
-def make_documents() -> dict[Path, str]:
-    """Return every file with its content as it should be."""
-    made: dict[Path, str] = {}
-    lines: dict[str, tuple[str, TypeAdapter[Any], Sequence[type[Line]]]] = {
-        "record": ("record", known_records(), record_types()),
-        "call": ("call", TypeAdapter(Call), (Call,)),
-        "prompt": ("prompt", TypeAdapter(Prompt), (Prompt,)),
-        "batch": ("batch", TypeAdapter(BatchLine), (BatchLine,)),
-        "manifest": ("run.yaml", TypeAdapter(Manifest), (Manifest,)),
-        "scene": ("scene", TypeAdapter(StoredScene), (StoredScene,)),
-        "question": ("question", TypeAdapter(StoredQuestion), (StoredQuestion,)),
+def write_schemas(folder: Path) -> None:
+    """Write every schema; for a process that has imported none of the models."""
+    # The docstring below a field describes it. It is read here alone: to read the source of every
+    # model takes a tenth of a short command.
+    BaseModel.model_config["use_attribute_docstrings"] = True
+    from phyblock.config.models import ModelsFile
+    from phyblock.config.suite import suite_model
+    from phyblock.data.questions import StoredQuestion
+    from phyblock.data.scenes import StoredScene
+    from phyblock.records.files import Manifest, known_records
+    from phyblock.records.record import BatchLine, Call, Prompt
+
+    documents: dict[str, tuple[str, TypeAdapter[Any]]] = {
+        "suite": ("suite", TypeAdapter(suite_model())),
+        "models": ("models", TypeAdapter(ModelsFile)),
+        "record": ("record", known_records()),
+        "call": ("call", TypeAdapter(Call)),
+        "prompt": ("prompt", TypeAdapter(Prompt)),
+        "batch": ("batch", TypeAdapter(BatchLine)),
+        "manifest": ("run.yaml", TypeAdapter(Manifest)),
+        "scene": ("scene", TypeAdapter(StoredScene)),
+        "question": ("question", TypeAdapter(StoredQuestion)),
     }
-    for name, (title, adapter, kinds) in lines.items():
-        text = json.dumps(_schema(title, adapter, kinds), indent=2, ensure_ascii=False) + "\n"
-        made[SCHEMAS / f"{name}.schema.json"] = text
-    return made
+    for name, (title, adapter) in documents.items():
+        made = {"$schema": DRAFT, **plain(adapter.json_schema()), "title": f"phyblock {title}"}
+        text = json.dumps(made, indent=2, ensure_ascii=False) + "\n"
+        (folder / f"{name}.schema.json").write_text(text, encoding="utf-8")
 
 
-def _schema(title: str, adapter: TypeAdapter[Any], kinds: Sequence[type[Line]]) -> dict[str, Any]:
-    schema = adapter.json_schema()
-    known = {kind.__name__: kind for kind in with_parts(kinds)}
-    for name, part in {**schema.get("$defs", {}), schema.get("title", ""): schema}.items():
-        if name in known:
-            for field, described in part["properties"].items():
-                described.pop("title", None)
-                described["description"] = field_docs(known[name])[field]
-    draft = "https://json-schema.org/draft/2020-12/schema"
-    return {"$schema": draft, **schema, "title": f"phyblock {title}"}
+def plain(node: Any) -> Any:
+    """Return a schema without the titles that pydantic makes out of names, each text on a line."""
+    if isinstance(node, list):
+        return [plain(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    if isinstance(text := node.get("description"), str):
+        node = {**node, "description": " ".join(text.split())}
+    named = {key: plain(value) for key, value in node.items()}
+    return {key: value for key, value in named.items() if key != "title" or isinstance(value, dict)}
 
 
 if __name__ == "__main__":
-    for written, text in make_documents().items():
-        (ROOT / written).write_text(text, encoding="utf-8")
-        print(written)
+    write_schemas(Path(sys.argv[1]) if len(sys.argv) > 1 else SCHEMAS)
