@@ -163,6 +163,22 @@ DATA: tuple[Bad, ...] = (
     Bad("cut-png", checkout(png()[:-40]), ("000.png", "is not a readable picture")),
 )  # fmt: skip
 MODELS: tuple[Bad, ...] = (
+    Bad("no-rule", options("--models", "repeat"), ("repeat", "has no rule for full_planning")),
+    Bad("engine", command(*FRESH, "--models", "random", "--set", "tracks=[step_planning]"),
+        ("PHYBLOCK_PHYSICS: is not known", "found: bullet", "allowed: "),
+        env=(("PHYBLOCK_PHYSICS", "bullet"),)),
+    Bad("drawn-goal", lambda here: [*checkout(png())(here), "--set", "tracks=[step_planning]"],
+        ("step_planning draws its own pictures", "images.source=render")),
+    Bad("two-addresses",
+        file("models.yaml", "".join(
+            f"{name}: {{id: hosted_vllm/m, api_base: 'http://127.0.0.1:{port}/v1'}}\n"
+            for name, port in (("alpha", 9), ("beta", 10))
+        ), *FRESH, "--models", "alpha,beta"), ("beta: api_base: is alpha at another address",)),
+    Bad("batched-steps",
+        file("models.yaml",
+             "m: {id: openai/gpt-4o, api_base: 'http://127.0.0.1:9/v1', batch: true}\n",
+             *FRESH, "--models", "m", "--set", "tracks=[step_planning]"),
+        ("is asked in batches, and step_planning plays episodes of several turns",)),
     Bad("jinja", template("{% block user %}{{ "), ("mine.j2:1", "is not valid Jinja")),
     Bad("undefined", template(user_block("{{ solution }}")),
         ("mine.j2:2: ", "block user", "solution", "n_candidates"), writes=("fresh",)),

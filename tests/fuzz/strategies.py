@@ -30,7 +30,7 @@ INPUTS = int(os.environ.get("PHYBLOCK_FUZZ_INPUTS", "60"))
 """Bad inputs that are tried, over all kinds."""
 FAULTS = int(os.environ.get("PHYBLOCK_FUZZ_FAULTS", "40"))
 """Faults of servers that runs meet, over all tracks and transports."""
-KILLS = int(os.environ.get("PHYBLOCK_FUZZ_KILLS", "36"))
+KILLS = int(os.environ.get("PHYBLOCK_FUZZ_KILLS", "6"))
 """Kills of runs, over all tracks."""
 
 Test = Callable[..., Any]

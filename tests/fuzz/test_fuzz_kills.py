@@ -1,6 +1,6 @@
 """kill -9 at random moments of each track, with one server and with four that fail, die and come
 back: nothing answered is lost, and of what was answered no more is asked again than was under way
-when a kill or a death came.
+when a kill or a death came; what was billed is known, and records are those of a quiet run.
 """
 
 from __future__ import annotations
@@ -19,12 +19,15 @@ import pytest
 
 from tests.fuzz.laws import Ledger, LedgerAgent, LedgerChat, kept_in
 from tests.fuzz.strategies import KILLS, SEED
-from tests.run.test_kill import CALL_USD, PRICE, counted_usd
+from tests.run.test_step_runs import by_sample
 from tests.servers.chassis import FAULTS, Faults, Running
 from tests.vqa_set import questions, vqa_suite, write_questions
 from tests.workspace import SCENES, Workspace
 
 AT_ONCE = 6
+PRICE = {"input": 10.0, "output": 100.0}
+CALL_USD = 1000 * PRICE["input"] / 1e6 + 40 * PRICE["output"] / 1e6
+"""The server counts 1,000 tokens in and 40 out for every call."""
 TRACKS: dict[str, tuple[int, dict[str, Any]]] = {
     "full_planning": (5, {}),
     "vqa": (8, vqa_suite(subtasks=["SH", "CO"])),
@@ -47,12 +50,26 @@ def on_disk(workspace: Workspace) -> set[tuple[str, str]]:
     return found
 
 
+def counted_usd(workspace: Workspace) -> tuple[float, int]:
+    """Return the cost of a run's calls, those without an end at their most, and their number."""
+    path = workspace.out / "calls.jsonl"
+    lines = path.read_bytes().split(b"\n")[:-1] if path.exists() else ()
+    calls = {call["call"]: call for call in map(json.loads, lines)}
+    open_calls = [call for call in calls.values() if not call.get("ended")]
+    ended_usd = sum(call["billed_usd"] for call in calls.values() if call.get("ended"))
+    return ended_usd + sum(call["most_usd"] for call in open_calls), len(open_calls)
+
+
 def run_until_killed(
-    workspace: Workspace, servers: Sequence[Running], ledger: Ledger, draw: random.Random
+    workspace: Workspace,
+    servers: Sequence[Running],
+    ledger: Ledger,
+    draw: random.Random,
+    options: Sequence[str],
 ) -> tuple[int, int]:
     """A run that is killed; of several servers some die and come back before: deaths of both."""
     deaths = 0
-    with workspace.start("--yes") as process:
+    with workspace.start("--yes", *options) as process:
         for _ in range(1 if len(servers) == 1 else 4):
             target = len(ledger.entries) + draw.randrange(1, _ASKED_PER_EVENT)
             give_up_s = time.monotonic() + _LONGEST_WAIT_S
@@ -79,11 +96,21 @@ def run_until_killed(
 
 
 @pytest.mark.fuzz
-@pytest.mark.slow
-@pytest.mark.parametrize("count", [1, 4])
-@pytest.mark.parametrize("track", TRACKS)
+@pytest.mark.parametrize(
+    ("track", "count", "options"),
+    [
+        ("full_planning", 1, ()),
+        ("step_planning", 1, ("--no-cache",)),
+        pytest.param("vqa", 1, ("--no-cache",), marks=pytest.mark.slow),
+        *(pytest.param(track, 4, (), marks=pytest.mark.slow) for track in TRACKS),
+    ],
+)
 def test_kills(
-    workspace: Workspace, tallies: dict[str, Counter[str]], track: str, count: int
+    workspace: Workspace,
+    tallies: dict[str, Counter[str]],
+    track: str,
+    count: int,
+    options: tuple[str, ...],
 ) -> None:
     asked_per_seed, fields = TRACKS[track]
     rounds = -(-KILLS // len(TRACKS))
@@ -109,24 +136,31 @@ def test_kills(
             # The order of the addresses may change.
             order = draw.sample(bases, count)
             workspace.write_models("", "alpha", api_base=order, price=PRICE, max_tokens=1000)
-            deaths, killed = run_until_killed(workspace, servers, ledger, draw)
+            deaths, killed = run_until_killed(workspace, servers, ledger, draw, options)
             tally.update({"deaths of servers": deaths, "kills": killed})
             missing = ledger.that_came_to("reply") - on_disk(workspace)
             assert len(missing) <= AT_ONCE * (deaths + killed), "more is lost than was under way"
             under_way.update(missing)
-            known_usd, _ = counted_usd(workspace)
+            known_usd, unanswered = counted_usd(workspace)
             billed_usd = CALL_USD * sum(entry.comes_to == "reply" for entry in ledger.entries)
             assert known_usd >= billed_usd - 1e-9, "less is known than was billed"
         for server in servers:
             server.come_back()
-        done = workspace.run("--yes")
-    assert done.code == 0, done.out + done.err
-    assert not ledger.that_came_to("reply") - kept_in(workspace.out)
-    replies = Counter(entry.key for entry in ledger.entries if entry.comes_to == "reply")
-    if count == 1:
-        assert tally["kills"] == rounds, "a run ended before it was killed"
-        twice = {key: times for key, times in replies.items() if times > 1 + under_way[key]}
-        assert not twice, "asked again, though its reply stood on disk"
-    again = sum(replies.values()) - len(replies)
-    assert again <= AT_ONCE * (tally["deaths of servers"] + tally["kills"])
-    tallies[f"kills, {track}, {count}"] = tally + Counter({"asked again": again}) + ledger.faults
+        done = workspace.run("--yes", *options)
+        assert done.code == 0, done.out + done.err
+        stored = workspace.records()
+        assert len(stored) == len(by_sample(stored))
+        assert not ledger.that_came_to("reply") - kept_in(workspace.out)
+        replies = Counter(entry.key for entry in ledger.entries if entry.comes_to == "reply")
+        if count == 1:
+            assert (f"{unanswered} call" in done.out) == (unanswered > 0)
+            assert tally["kills"] == rounds, "a run ended before it was killed"
+            twice = {key: times for key, times in replies.items() if times > 1 + under_way[key]}
+            assert not twice, "asked again, though its reply stood on disk"
+        again = sum(replies.values()) - len(replies)
+        assert again <= AT_ONCE * (tally["deaths of servers"] + tally["kills"])
+        tallies[f"kills, {track}, {count}"] = tally + Counter({"again": again}) + ledger.faults
+        if options:
+            workspace.out = workspace.root / "quiet"
+            assert workspace.run("--yes", *options).code == 0
+            assert by_sample(workspace.records()) == by_sample(stored)

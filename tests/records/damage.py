@@ -67,7 +67,7 @@ YAML_TEXTS: dict[str, str] = {
     "&e [*d, *d, *d, *d, *d, *d, *d, *d], &f [*e, *e, *e, *e, *e, *e, *e, *e], "
     "&g [*f, *f, *f, *f, *f, *f, *f, *f], [*g, *g, *g, *g, *g, *g, *g, *g]]",
     "anchor-of-itself": "&a [*a]",
-    "deep": "[" * 9999 + "]" * 9999,
+    "deep": "[" * 2000 + "]" * 2000,
     "binary": "!!binary aGVsbG8=",
     "set": "!!set {a, b}",
     "pairs": "!!pairs [a: 1]",

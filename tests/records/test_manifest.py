@@ -22,7 +22,7 @@ IDENTITY = "5eed" * 16
 
 
 @pytest.mark.parametrize("name", YAML_TEXTS)
-@pytest.mark.parametrize("field", ["mine", "limit", "scenes", "suite", "scenes_by_level"])
+@pytest.mark.parametrize("field", ["mine", "scenes_by_level"])
 def test_what_no_run_writes_is_refused_in_words(tmp_path: Path, name: str, field: str) -> None:
     (tmp_path / MANIFEST).write_text(f"identity: x\n{field}: {YAML_TEXTS[name]}\n")
     with pytest.raises(StoreError, match=r"run\.yaml"):

@@ -1,8 +1,9 @@
-"""Runs that end before their time, by Ctrl-C or a mistake of ours: all answers are kept."""
+"""Runs that end before their time, by Ctrl-C, a kill or a mistake of ours: all answers are kept."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import select
 import signal
@@ -13,25 +14,23 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 from aiohttp import web
 
 from phyblock.api import run_suite
 from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
-from phyblock.errors import SimulationError
 from phyblock.records.files import STOPPED
 from phyblock.records.record import Line, Record
 from phyblock.run.plan import make_plan
 from phyblock.run.rescore import rescore
-from phyblock.run.runner import RunEvent, SampleDone, Session, Stopping, to_its_end
+from phyblock.run.runner import RunEvent, SampleDone, Session, Stopping
 from phyblock.run.store import AppendFile
 from phyblock.sim import dynamics
 from phyblock.tracks.full_planning import FullPlanning
-from phyblock.tracks.pictures import Workshop
 from phyblock.tracks.pose_planning import PosePlanning
 from tests.fork_server import Forked
 from tests.run.killing import killed
@@ -98,43 +97,6 @@ def test_calls_under_way_are_waited_for_and_nothing_more_is_asked(
         assert (again.code, again.out) == (0, done.out)
         assert server.requests == SAMPLES
         assert workspace.files() == before
-
-
-def test_calls_that_wait_for_their_turn_are_not_sent_any_more(workspace: Workspace) -> None:
-    with Running(OpenAIChat(holds=True)) as running:
-        server = running.server
-        prepare(workspace, running.url, "alpha", "beta")
-        code, _, _ = interrupted(workspace.start(), server, signal.SIGINT)
-    assert code == 130
-    assert server.requests == AT_ONCE
-    assert len(workspace.records()) == AT_ONCE
-
-
-def test_a_wait_before_another_attempt_is_given_up(workspace: Workspace) -> None:
-    with Running(OpenAIChat(Faults(rate_limited=1.0, retry_after="100"))) as running:
-        server = running.server
-        prepare(workspace, running.url, "alpha")
-        process = workspace.start()
-        wait_for(lambda: server.requests == AT_ONCE and not server.at_once)
-        process.send_signal(signal.SIGINT)
-        code, out, err = ended(process)
-    assert (code, err) == (130, "")
-    assert f"0 of {SAMPLES} samples are done" in out
-    assert not workspace.records()
-    assert server.requests == AT_ONCE
-
-
-def test_a_wait_for_a_server_that_cannot_be_reached_is_given_up(workspace: Workspace) -> None:
-    prepare(workspace, "http://127.0.0.1:9", "alpha")
-    process = workspace.start()
-    assert process.stdout is not None
-    while "http://127.0.0.1:9 cannot be reached" not in process.stdout.readline():
-        assert process.poll() is None
-    process.send_signal(signal.SIGINT)
-    code, out, err = ended(process)
-    assert (code, err) == (130, "")
-    assert f"0 of {SAMPLES} samples are done (interrupted)" in out
-    assert not workspace.records()
 
 
 def test_a_second_interrupt_ends_at_once(workspace: Workspace) -> None:
@@ -319,42 +281,6 @@ def test_an_impatient_cancellation_keeps_all_that_was_answered(
     assert sorted(record["sample"] for record in workspace.records()) == sorted(answered)
 
 
-def test_work_of_a_worker_that_was_killed_is_done_again_once(tmp_path: Path) -> None:
-    async def work() -> None:
-        assert await shop.work_out(partial(killed, tmp_path, 1)) == "done"
-        with pytest.raises(SimulationError, match="killed twice"):
-            await shop.work_out(partial(killed, tmp_path, 3))
-
-    shop = Workshop(1)
-    try:
-        asyncio.run(work())
-    finally:
-        shop.close()
-
-
-def test_what_must_be_done_is_done_though_nobody_waits() -> None:
-    done = []
-
-    async def work() -> str:
-        await asyncio.sleep(0.05)
-        done.append("work")
-        return "record"
-
-    async def wait() -> tuple[str, bool]:
-        return await to_its_end(work())
-
-    async def cancelled() -> tuple[str, bool]:
-        waiting = asyncio.create_task(wait())
-        for _ in range(3):
-            await asyncio.sleep(0.01)
-            waiting.cancel()
-        return await waiting
-
-    assert asyncio.run(cancelled()) == ("record", True)
-    assert done == ["work"]
-    assert asyncio.run(wait()) == ("record", False)
-
-
 def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
     inside: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -410,3 +336,26 @@ def test_a_reply_that_is_being_judged_at_a_second_interrupt_is_recorded(
     call("run", "suite.yaml", "--out", "out", "--no-report", "--limit", "1")
     assert "(interrupted)" in capsys.readouterr().out
     assert [record["outcome"] for record in workspace.records()] == ["ok"]
+
+
+def test_no_process_outlives_a_killed_run(workspace: Workspace) -> None:
+    """Pictures are drawn by processes of the run's own."""
+    (workspace.cache / "pictures").unlink()
+    with Running(OpenAIChat()) as running:
+        prepare(workspace, running.url, "alpha")
+        with workspace.start("--yes") as process:
+            family: list[psutil.Process] = []
+            while not any("phyblock.workers" in " ".join(words_of(child)) for child in family):
+                assert process.poll() is None
+                family = psutil.Process(process.pid).children(recursive=True)
+                time.sleep(0.01)
+            os.kill(process.pid, signal.SIGKILL)
+            process.wait()
+        _, alive = psutil.wait_procs(family, timeout=30)
+    assert not alive
+
+
+def words_of(process: psutil.Process) -> list[str]:
+    with contextlib.suppress(psutil.NoSuchProcess):
+        return process.cmdline()
+    return []

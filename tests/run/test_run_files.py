@@ -6,7 +6,6 @@ import errno
 import hashlib
 import json
 import os
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -28,7 +27,7 @@ from phyblock.records.files import (
 from phyblock.records.record import Call, Reply
 from phyblock.run.plan import make_plan
 from phyblock.run.store import AppendFile, Progress, RunStore
-from tests.servers.chassis import Faults, Running
+from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
 
@@ -72,25 +71,6 @@ def test_a_file_that_somebody_changes_meanwhile_is_not_written_on(
         file.check()
     file.close()
     assert (path.read_bytes() if path.exists() else None) == left
-
-
-def test_a_run_whose_records_are_taken_away_asks_no_more_and_says_so(workspace: Workspace) -> None:
-    with Running(OpenAIChat(Faults(latency_s=0.02))) as running:
-        server = running.server
-        workspace.write_models(running.url, "alpha", max_concurrency=2)
-        workspace.write_suite(models=["alpha"], seeds=list(range(20)))
-        with workspace.start("--yes") as process:
-            while process.poll() is None and server.requests < 10:
-                time.sleep(0.002)
-            (workspace.out / "records.jsonl").unlink()
-            _, errors = process.communicate()
-        assert process.returncode == 2
-        assert "records.jsonl: was removed, replaced or changed" in errors
-        assert server.requests < 100
-        asked = server.requests
-        assert workspace.run("--yes").code == 0
-        assert server.requests == 100 < asked + 100
-    assert len(workspace.records()) == 100
 
 
 @pytest.mark.parametrize("lines", [RecordLines, CallLines, PromptLines, BatchLines])

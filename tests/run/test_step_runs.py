@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-import random
-import signal
-import time
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -55,14 +50,6 @@ def pictures(seen: Seen) -> list[str]:
     return [part[1] for part in seen.parts if not isinstance(part, str)]
 
 
-def on_disk(workspace: Workspace, name: str) -> list[dict[str, Any]]:
-    """The whole lines of a file of the run, if it is there yet."""
-    with contextlib.suppress(FileNotFoundError):
-        lines = (workspace.out / name).read_bytes().split(b"\n")[:-1]
-        return [json.loads(line) for line in lines]
-    return []
-
-
 def test_the_server_sees_goal_candidates_current_picture_and_history(workspace: Workspace) -> None:
     with Running(StepAgent()) as running:
         prepare(workspace, running.url)
@@ -103,88 +90,6 @@ def test_faults_change_nothing(workspace: Workspace) -> None:
             assert workspace.run("--no-cache", *FEW).code == 0
             found.append(by_sample(workspace.records()))
     assert found[0] == found[1]
-
-
-@pytest.mark.parametrize(
-    ("kills", "seeds", "physics"),
-    [(2, 2, "off"), pytest.param(12, 16, "settle", marks=pytest.mark.slow)],
-)
-def test_a_killed_run_goes_on_in_the_middle_of_episodes(
-    workspace: Workspace, kills: int, seeds: int, physics: str
-) -> None:
-    """No answered turn is asked again, cache or not, and records are those of a quiet run."""
-    draw = random.Random(kills)
-    with Running(StepAgent(Faults(latency_s=0.03))) as running:
-        server = running.server
-        prepare(workspace, running.url, seeds=list(range(seeds)), steps={"physics": physics})
-        middle = 0
-        for _ in range(kills):
-            target = len(server.seen) + draw.randrange(3, 15 * seeds // kills)
-            with workspace.start("--no-cache") as process:
-                while process.poll() is None and len(server.seen) < target:
-                    time.sleep(0.002)
-                time.sleep(draw.random() / 20)
-                process.kill()
-                process.communicate()
-            assert process.returncode == -signal.SIGKILL
-            while server.at_once:
-                time.sleep(0.02)
-            kept = [call for call in on_disk(workspace, "calls.jsonl") if call.get("reply")]
-            finished = {record["sample"] for record in on_disk(workspace, "records.jsonl")}
-            middle += len({turn["sample"] for turn in kept} - finished)
-            answered = {turn["reply"]["reasoning"] for turn in kept}
-            asked = len(server.seen)
-            assert len({one.sample for one in server.seen} - answered) <= AT_ONCE * kills
-            running_total = (asked, answered)
-        assert middle > 0, "no kill fell into an episode"
-        done = workspace.run("--no-cache")
-        assert (done.code, done.err) == (0, "")
-        asked, answered = running_total
-        assert answered.isdisjoint(one.sample for one in server.seen[asked:])
-        killed = by_sample(workspace.records())
-
-        workspace.out = workspace.root / "quiet"
-        assert workspace.run("--no-cache").code == 0
-        quiet = by_sample(workspace.records())
-    assert killed == quiet
-
-
-@pytest.mark.parametrize(("mode", "outcome"), [("length", "truncated"), ("filtered", "refusal")])
-def test_an_episode_of_which_no_reply_is_whole_is_no_parse_failure(
-    workspace: Workspace, mode: str, outcome: str
-) -> None:
-    with Running(StepAgent(Faults(mode=mode))) as running:
-        prepare(workspace, running.url)
-        assert workspace.run(*FEW).code == 0
-    assert {record["outcome"] for record in workspace.records()} == {outcome}
-
-
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"tracks": ["full_planning", "step_planning"], "models": ["repeat"]}, "has no rule for"),
-        ({"models": ["majority"]}, "has no rule for step_planning"),
-        ({"steps": {"max_steps": 0}}, "steps.max_steps"),
-    ],
-)
-def test_what_cannot_be_played_is_said(
-    workspace: Workspace, fields: dict[str, Any], message: str
-) -> None:
-    prepare(workspace, "http://nowhere", **fields)
-    done = workspace.run("--dry-run")
-    assert (done.code, len(done.errors)) == (2, 1)
-    assert message in done.errors[0]
-
-
-def test_a_goal_that_is_not_drawn_is_no_match_for_states_that_are(
-    workspace: Workspace, official_checkout: Path
-) -> None:
-    official = {"format": "official", "path": str(official_checkout)}
-    prepare(workspace, "http://nowhere", dataset=official, images={"source": "dataset"})
-    done = workspace.run("--dry-run")
-    assert (done.code, len(done.errors)) == (2, 1)
-    assert "step_planning draws its own pictures" in done.errors[0]
-    assert "images.source=render" in done.errors[0]
 
 
 SMALL = ("--set", "images.size_px=128", "--set", "seeds=[0]", "--no-report")
@@ -240,14 +145,3 @@ def test_runs_in_two_engines_are_scored_anywhere_and_never_compared(
     runs = [load_run(out) for out in (usual, other)]
     with pytest.raises(SpecError, match="physics: cannot be compared"):
         compare_runs(*runs, ())
-
-
-def test_an_unknown_engine_is_refused_before_anything_is_made(workspace: Workspace) -> None:
-    args = ("--out", workspace.out, "--models", "oracle", *SMALL, *DATA)
-    done = workspace.phyblock("run", "steps", *args, env={"PHYBLOCK_PHYSICS": "bullet"})
-    assert done.code == 2
-    assert done.errors == [
-        "error: PHYBLOCK_PHYSICS: is not known\n    found: bullet\n"
-        f"    allowed: {', '.join(ENGINES)}"
-    ]
-    assert not workspace.out.exists()
