@@ -63,8 +63,6 @@ class Tolerances:
 
 OURS = Tolerances()
 """For scenes made here."""
-OURS_IN_HASTE = Tolerances(quiet_s=0.5)
-"""For scenes that are being made: the same, but a trial ends once all is at rest (see `cards/`)."""
 # The last step of a foreign scene is left to the trial of the finished structure: what falls there
 # shall be told once. 2 mm cannot be seen in a picture.
 FOREIGN = Tolerances(fit_m=0.002, last_step=False, quiet_s=0.5)
@@ -299,9 +297,9 @@ def findings_of(facts: SceneFacts, names: Iterable[str]) -> Iterator[Finding]:
 def is_acceptable(scene: Scene, palette: tuple[Kind, ...]) -> bool:
     """True if a scene could enter a data set, each of its blocks to be seen in the goal picture.
 
-    It ends at the first fault, and a trial ends once all is at rest, at both time steps.
+    It ends at the first fault.
     """
-    facts = SceneFacts(scene, None, OURS_IN_HASTE, palette)
+    facts = SceneFacts(scene, palette=palette)
     return next(findings_of(facts, (*FORM, "hidden", *PHYSICS)), None) is None
 
 

@@ -3,18 +3,15 @@
 Blocks stand when forces in their contacts can bear every weight: each force inside the cone of
 friction, all forces and moments of a block in balance. That is a set of linear equations in
 forces that only push, each cone as a pyramid of four edges. Where such forces exist, rigid bodies
-may stand; where none exist, they cannot.
-
-Non-negative least squares (Lawson and Hanson, 1974) look for forces. Those that it gives are put
-into the equations, and that there are none is believed only where the residual proves it (Farkas'
-lemma), for a solver may stop early. Linear programming settles the rest.
+may stand; where none exist, they cannot. Least squares find them in most cases, linear programming
+settles the rest.
 
 `surely_stands` and `surely_falls` ask so with all weights off by up to `MARGIN_M` to any side and
-long blocks heavier or lighter by `MASS_FACTORS`, with all that lies between, so that no verdict
-hangs on an edge that a weight is nearly over. Weights alone do not tell a block that rests on two
-edges with nothing over them, so what stands has to stand on smaller contacts too: those that are
-left wherever two blocks are off by up to the margin from one another. `prove` gives the forces, or
-the motion of a fall, for `certificate` to check, which trusts nothing here but the contacts.
+long blocks heavier or lighter, with all that lies between, so that no verdict hangs on an edge
+that a weight is nearly over. Weights alone do not tell a block that rests on two edges with nothing
+over them, so what stands has to stand on smaller contacts too: those that are left wherever two
+blocks are off by up to the margin from one another. `prove` gives the forces, or the motion of a
+fall, for `certificate` to check, which trusts nothing here but the contacts.
 """
 
 from __future__ import annotations
@@ -28,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.domain.blocks import FRICTION, SHAPES, BlockType, euler_deg_to_matrix
+from phyblock.domain.blocks import FRICTION, SHAPES, euler_deg_to_matrix
 from phyblock.domain.scene import Block
 from phyblock.errors import PhyblockError
 from phyblock.sim import certificate
@@ -49,33 +46,34 @@ from phyblock.sim.geometry import cross
 
 Floats = NDArray[np.float64]
 
-MARGIN_M = 0.005  # Distance by which every weight may be off its place [m].
+MARGIN_M = round(certificate.MARGIN / certificate.ONE, 9)
+"""Distance by which every weight may be off its place [m]."""
 FRICTIONS = (certificate.LITTLE / 100, certificate.MUCH / 100)
 """The least and the most friction that a verdict has to hold under."""
-Masses = tuple[tuple[BlockType, float], ...]
-"""Types of which every block has so many times its mass."""
 MASS_FACTORS = (certificate.LIGHT / 100, certificate.HEAVY / 100)
 """Long blocks may have so many times their mass at the least, and at the most."""
-MASSES: tuple[Masses, ...] = tuple(
-    tuple((block_type, factor) for block_type, shape in SHAPES.items() if shape.is_long)
-    for factor in reversed(MASS_FACTORS)
-)
-"""Factors of mass at the ends of that range: long blocks heavier, and lighter."""
-_SIDES = np.array([(math.cos(a), math.sin(a)) for a in np.arange(8) * math.pi / 4])
+SHIFTS_M = np.array(certificate.SHIFTS) / certificate.ONE
+"""Corners round all places (x, y) that a weight may have beside its own [m]."""
 _LEAST_VERTICAL = 0.15
 _TOLERANCE = 1e-5
-_PROOF = 1e4  # A residual is a proof for forces that add up to so many times all weights, no more.
 _UP = np.array([0.0, 0.0, 1.0])
 _STEEP = 0.9
 _SAME_GAP_M, _NEARLY_SAME_M = 1e-4, 1e-3
-_EXACT, _SPARE, _RIDGE = 1e-11, 1e-7, 1e-9
+_EXACT, _RIDGE = 1e-11, 1e-9
+_LITTLE, _MUCH = FRICTIONS[0] - 1e-7, FRICTIONS[1] + 1e-7
+"""Beyond what is proven, as numbers of proofs are rounded."""
 _ROUNDS = 6
 _KEPT = 1 << 15
 
 
+def is_balanced(blocks: Sequence[Block]) -> bool:
+    """True if contacts can bear all weights as they are."""
+    return _pushes(_forces(blocks, FRICTION), _weights(blocks)[:, None]) is not None
+
+
 def surely_stands(blocks: Sequence[Block]) -> bool:
     """True if blocks are in balance with a margin of `MARGIN_M`, little friction, any masses."""
-    return is_balanced(blocks, FRICTIONS[0], MARGIN_M, MASSES)
+    return _borne(blocks) is not None
 
 
 def surely_falls(blocks: Sequence[Block]) -> bool:
@@ -110,11 +108,15 @@ def prove_standing(blocks: Sequence[Block]) -> Proven | None:
     """Return a proof that blocks stand, which was checked, or None."""
     if not blocks or find_overlaps(blocks):
         return None
-    plain, narrow = _contacts(blocks), _contacts(blocks, MARGIN_M)
-    proof = _standing(blocks, plain, narrow)
-    if proof is None:
+    if (borne := _borne(blocks)) is None:
         return None
-    structure = Structure(_bodies(blocks), _stated(plain), _stated(narrow), ())
+    forces = []
+    for met, shares in borne:
+        edges = met.edges(_LITTLE)
+        forces += [*np.einsum("kel,kec->lkc", shares.reshape(*edges.shape[:2], -1), edges)]
+    proof = Stands(tuple(map(_exact, forces)))
+    plain, narrow = (_stated(met) for met, _ in borne)
+    structure = Structure(_bodies(blocks), plain, narrow, ())
     return Proven(structure, proof) if certificate.proves(proof, structure) else None
 
 
@@ -123,8 +125,7 @@ def prove_fall(blocks: Sequence[Block]) -> Proven | None:
     if not blocks or find_overlaps(blocks):
         return None
     wide = _contacts(blocks, -MARGIN_M)
-    # More friction than is proven, as numbers are rounded.
-    solution = _least_imbalance(blocks, _matrix(wide, len(blocks), FRICTIONS[1] + _SPARE))
+    solution = _least_imbalance(blocks, _matrix(wide, len(blocks), _MUCH))
     motion = _exact(
         -solution.eqlin.marginals.reshape(-1, 3) * np.tile([[1.0], [10.0]], (len(blocks), 1))
     )
@@ -133,53 +134,28 @@ def prove_fall(blocks: Sequence[Block]) -> Proven | None:
     return Proven(structure, proof) if certificate.proves(proof, structure) else None
 
 
-def _standing(blocks: Sequence[Block], plain: _Contacts, narrow: _Contacts) -> Stands | None:
-    """Forces that bear every load of a proof, where there are any."""
-    forces: list[tuple[certificate.Vector, ...]] = []
-    shifts_m = np.array(certificate.SHIFTS) / certificate.ONE
-    for met, places_m in ((narrow, np.zeros((1, 2))), (plain, shifts_m)):
-        unit = _matrix(met, len(blocks), FRICTIONS[0] - _SPARE)
-        loads = [_weights(blocks, at_m, kg) for at_m in places_m for kg in MASSES]
-        pushes = _pushes(unit, np.column_stack(loads)) if unit.size else None
+def _borne(blocks: Sequence[Block]) -> list[tuple[_Contacts, Floats]] | None:
+    """The contacts as they are, and narrower, each with shares of forces (k, m) that bear its part
+    of `certificate.LOADS`; None where there are none.
+
+    Of two shifts, or masses, that can be borne, what lies between is borne by the mean of their
+    forces.
+    """
+    found: list[tuple[_Contacts, Floats]] = []
+    for margin_m, shifts_m in ((MARGIN_M, np.zeros((1, 2))), (0.0, SHIFTS_M)):
+        met = _contacts(blocks, margin_m)
+        loads = [_weights(blocks, at_m, mass) for at_m in shifts_m for mass in MASS_FACTORS[::-1]]
+        pushes = _pushes(_matrix(met, len(blocks), _LITTLE), np.column_stack(loads))
         if pushes is None:
             return None
-        edges = met.edges(FRICTIONS[0] - _SPARE)
-        pushes = pushes.reshape(*edges.shape[:2], -1)
-        forces[:0] = map(_exact, np.einsum("kel,kec->lkc", pushes, edges))
-    return Stands(tuple(forces))
-
-
-def is_balanced(
-    blocks: Sequence[Block],
-    friction: float = FRICTION,
-    margin_m: float = 0.0,
-    masses: Sequence[Masses] = ((),),
-) -> bool:
-    """True if contacts can bear all weights, whichever of the masses blocks have.
-
-    With a margin [m], also all weights moved by up to so much to any side, and those in their place
-    where every contact is narrower by it. The former is asked at the corners of an octagon: of two
-    shifts, or masses, that can be borne, what lies between is borne by the mean of their forces.
-    """
-    shifts = margin_m / math.cos(math.pi / 8) * _SIDES if margin_m else np.zeros((1, 2))
-    loads = [_weights(blocks, at, kg) for at in shifts for kg in masses]
-    if not _bears(_forces(blocks, friction), *loads):
-        return False
-    narrow = _forces(blocks, friction, margin_m) if margin_m else np.empty((0, 0))
-    return not margin_m or _bears(narrow, *(_weights(blocks, (0, 0), kg) for kg in masses))
-
-
-def _bears(forces: Floats, *weights: Floats) -> bool:
-    """True if some sum of the forces, each as large as need be, balances each of the weights."""
-    if not forces.size:
-        return not weights[0].size
-    return _pushes(forces, np.column_stack(weights)) is not None
+        found.insert(0, (met, pushes))
+    return found
 
 
 def _pushes(forces: Floats, weights: Floats) -> Floats | None:
     """Return the shares of forces, (k, m), that balance weights (6 n, m); None if none do."""
-    from scipy.optimize import nnls  # type: ignore[import-untyped]
-
+    if not forces.size:
+        return None if weights.size else np.zeros((0, weights.shape[1]))
     pushes, is_borne = _least_squares(forces, weights)
     for number in np.flatnonzero(~is_borne):
         weight, used = weights[:, number], np.ones(forces.shape[1], dtype=bool)
@@ -192,24 +168,10 @@ def _pushes(forces: Floats, weights: Floats) -> Floats | None:
             if is_found[0]:
                 break
         else:
-            is_found = is_borne[number : number + 1]
-        if is_found[0]:
-            continue
-        try:
-            pushes[:, number], _ = nnls(forces, weight)
-        except RuntimeError:  # It found no end, which says nothing of whether there is a balance.
-            left = np.zeros(0)
-        else:
-            left = weight - forces @ pushes[:, number]
-            if float(np.linalg.norm(left)) < _TOLERANCE:
-                continue
-            # A sum of forces, each of which `left` is at odds with, does nothing that it asks for.
-            if _PROOF * float((left @ forces).max()) < float(left @ weight):
+            solution = _least_residual(forces, weight)
+            if solution.fun >= _TOLERANCE:
                 return None
-        solution = _least_residual(forces, weight)
-        if solution.fun >= _TOLERANCE:
-            return None
-        pushes[:, number] = solution.x[: forces.shape[1]]
+            pushes[:, number] = solution.x[: forces.shape[1]]
     return pushes
 
 
@@ -217,6 +179,7 @@ def _least_squares(forces: Floats, weights: Floats) -> tuple[Floats, NDArray[np.
     """The least sum of squares of pushes (k, m) and pulls that bears weights, and True for each
     that it does bear, without a pull.
     """
+    # SciPy takes a third of a second to import, which a run that asks nobody does without.
     from scipy.linalg import cho_factor, cho_solve  # type: ignore[import-untyped]
 
     square = forces @ forces.T
@@ -232,52 +195,35 @@ def _least_imbalance(blocks: Sequence[Block], forces: Floats) -> Any:
     """The solution of a linear program: what forces leave unborne of weights off by up to
     `MARGIN_M`, at the least.
 
-    It has forces, shifts (of all long blocks, of all others) and the mass of long blocks as its
-    unknowns.
+    It has forces as its unknowns, and the weight of all long blocks, and of all others, at each
+    corner of `SHIFTS_M`: their sum is the mass, their mean the place.
     """
-    # SciPy takes a third of a second to import, which a run that asks nobody does without.
-    from scipy import sparse  # type: ignore[import-untyped]
-
-    is_long = np.array([SHAPES[block.type].is_long for block in blocks])
-    masses = np.array([SHAPES[block.type].mass_kg for block in blocks])
-    loads = []
-    for chosen in (~is_long, is_long):  # What they need, and its growth for `MARGIN_M` along x, y.
-        weights = masses * chosen / masses.sum()
-        needs = _needs(blocks, weights)
-        steps = [_needs(blocks, weights, MARGIN_M * side) - needs for side in np.eye(2)]
-        loads.append(np.column_stack([needs, *steps]))
-    count = forces.shape[1]
-    # A mass, and the mass times each part of its shift: the shift alone would not be linear.
-    octagon = np.column_stack([-np.ones(len(_SIDES)), _SIDES])
-    both = sparse.csr_matrix(np.kron(np.eye(2), octagon))
-    shifts = sparse.hstack([sparse.csr_matrix((16, count)), both])
-    free = (None, None)
-    bounds = [(0, None)] * count + [(1.0, 1.0), free, free, MASS_FACTORS, free, free]
-    unknown = np.hstack([forces, *(-load for load in loads)])
-    return _least_residual(unknown, np.zeros(len(unknown)), bounds, shifts)
+    others, whole = (
+        np.column_stack([_weights(blocks, at_m, mass) for at_m in SHIFTS_M]) for mass in (0.0, 1.0)
+    )
+    sums = np.hstack([np.zeros((2, forces.shape[1])), np.kron(np.eye(2), np.ones(len(SHIFTS_M)))])
+    least, most = zip((1.0, 1.0), MASS_FACTORS, strict=True)
+    unknown = np.hstack([forces, -others, others - whole])
+    limits = np.vstack([sums, -sums]), np.array([*most, *(-one for one in least)])
+    return _least_residual(unknown, np.zeros(len(unknown)), limits)
 
 
 def _least_residual(
-    unknown: Floats,
-    target: Floats,
-    bounds: Sequence[tuple[float | None, float | None]] | None = None,
-    at_most_zero: Any = None,
+    unknown: Floats, target: Floats, limits: tuple[Floats, Floats] | None = None
 ) -> Any:
     """The solution of linear programming, which always ends, for the least residual, as a sum."""
-    from scipy import sparse
-    from scipy.optimize import linprog
+    from scipy import sparse  # type: ignore[import-untyped]
+    from scipy.optimize import linprog  # type: ignore[import-untyped]
 
     rows, count = unknown.shape
     left_over = sparse.identity(rows)
-    slack = [(0.0, None)] * (2 * rows)
-    within = sparse.csr_matrix((0, count)) if at_most_zero is None else at_most_zero
+    within, most = limits or (np.zeros((0, count)), np.zeros(0))
     solution = linprog(
         np.concatenate([np.zeros(count), np.ones(2 * rows)]),
         A_eq=sparse.hstack([sparse.csr_matrix(unknown), left_over, -left_over]),
         b_eq=target,
-        A_ub=sparse.hstack([within, sparse.csr_matrix((within.shape[0], 2 * rows))]),
-        b_ub=np.zeros(within.shape[0]),
-        bounds=[*(bounds or [(0.0, None)] * count), *slack],
+        A_ub=np.hstack([within, np.zeros((len(within), 2 * rows))]),
+        b_ub=most,
         method="highs",
         options={"dual_feasibility_tolerance": 1e-10},
     )
@@ -287,21 +233,17 @@ def _least_residual(
 
 
 def _weights(
-    blocks: Sequence[Block], shift_m: Sequence[float] | Floats, masses: Masses = ()
+    blocks: Sequence[Block], shift_m: Sequence[float] | Floats = (0.0, 0.0), long: float = 1.0
 ) -> Floats:
-    """The force up that each block needs, and its moment, shape (6 n,); all plain ones weigh 1."""
-    factors, kg = dict(masses), np.array([SHAPES[b.type].mass_kg for b in blocks])
-    heavier = np.array([factors.get(b.type, 1.0) for b in blocks])
-    return _needs(blocks, kg * heavier / kg.sum(), shift_m)
+    """The force up that each block needs, and its moment, shape (6 n,); all plain ones weigh 1.
 
-
-def _needs(
-    blocks: Sequence[Block], weights: Floats, shift_m: Sequence[float] | Floats = (0.0, 0.0)
-) -> Floats:
-    """The force up that each block of some weight needs, and its moment, shape (6 n,)."""
+    Long blocks have so many times their mass.
+    """
+    kg = np.array([SHAPES[b.type].mass_kg for b in blocks])
+    factors = np.array([long if SHAPES[b.type].is_long else 1.0 for b in blocks])
     centers = _centers_m(blocks)
     centers[:, :2] += shift_m
-    return _wrenches(centers, np.outer(weights, _UP)).ravel()
+    return _wrenches(centers, np.outer(kg * factors / kg.sum(), _UP)).ravel()
 
 
 def _centers_m(blocks: Sequence[Block]) -> Floats:

@@ -11,8 +11,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from phyblock.domain.blocks import SHAPES
 from phyblock.domain.scene import Block
-from phyblock.sim.balance import FRICTIONS, MASSES
+from phyblock.sim.balance import FRICTIONS, MASS_FACTORS
 from phyblock.sim.dynamics import groups, moments, wait
 from phyblock.sim.engine import GRAVITY_M_S2, Physics, Pose, World
 
@@ -35,10 +36,14 @@ def _leaning(physics: Physics, downhill: tuple[float, float]) -> Physics:
 
 
 _ACROSS = math.sqrt(0.75)
+_LIGHTER, _HEAVIER = (
+    tuple((block_type, factor) for block_type, shape in SHAPES.items() if shape.is_long)
+    for factor in MASS_FACTORS
+)
 OUTCOME_SETTINGS: tuple[Physics, ...] = (
     Physics(1 / 240, 50, 0.35),
-    _leaning(Physics(1 / 200, 50, FRICTIONS[1], mass_factors=MASSES[0]), (0.0, 1.0)),
-    _leaning(Physics(1 / 300, 80, FRICTIONS[0], mass_factors=MASSES[1]), (_ACROSS, -0.5)),
+    _leaning(Physics(1 / 200, 50, FRICTIONS[1], mass_factors=_HEAVIER), (0.0, 1.0)),
+    _leaning(Physics(1 / 300, 80, FRICTIONS[0], mass_factors=_LIGHTER), (_ACROSS, -0.5)),
     _leaning(Physics(1 / 480, 100, 0.35), (-_ACROSS, -0.5)),
 )
 """Settings that every outcome is tried under; the first gives the settled poses."""

@@ -40,7 +40,7 @@ from phyblock.scoring.pose import (
     pose_errors,
 )
 from phyblock.scoring.pose_matching import TOLERANCES_CM
-from phyblock.sim.balance import MARGIN_M, is_balanced
+from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.camera import VIEWS
 from phyblock.sim.contact import voxel_iou
 from phyblock.sim.dynamics import ExecutionLimits, execute, groups
@@ -365,20 +365,20 @@ def buildable_order(scene: Scene, wanted: Sequence[int]) -> list[int]:
     """Return the vertices of a scene in a valid order, as near to the `wanted` one, which is valid
     too, as balance lets it be.
 
-    Each step takes the first block with which what stands is in balance with every weight off by
-    `MARGIN_M`, else the first with which it is in balance at all, else the first.
+    Each step takes the first block with which all surely stands, else the first with which it is
+    in balance at all, else the first.
     """
     order: list[int] = []
 
-    def is_steady(vertex: int, margin_m: float) -> bool:
+    def holds(vertex: int, verdict: Callable[[Sequence[Block]], bool]) -> bool:
         placed = [replace(scene.blocks[v], order=n) for n, v in enumerate((*order, vertex))]
         hanging = next(group for group in groups(placed) if placed[-1] in group)
-        return is_balanced(hanging, margin_m=margin_m)
+        return verdict(hanging)
 
     needs = scene.graph.depends_on
     while len(order) < len(scene):
         ready = [v for v in wanted if v not in order and needs[v] <= set(order)]
-        steady = (v for margin_m in (MARGIN_M, 0.0) for v in ready if is_steady(v, margin_m))
+        steady = (v for rule in (surely_stands, is_balanced) for v in ready if holds(v, rule))
         order.append(next(steady, ready[0]))
     return order
 

@@ -31,7 +31,7 @@ from phyblock.data.scenes import (
 from phyblock.domain.blocks import KIT_PALETTE, Color
 from phyblock.domain.scene import Block, CandidateSet, CycleError, Scene
 from phyblock.errors import DataError, Problem, SpecError
-from phyblock.making.checks import LEVEL_LIMITS, OURS_IN_HASTE, SceneFacts, findings_of
+from phyblock.making.checks import LEVEL_LIMITS, SceneFacts, findings_of
 from phyblock.making.scenes.sketch import Palette, scene_of
 from phyblock.records.record import Line, decode, validated
 
@@ -91,7 +91,7 @@ def complete(read: ReadScene) -> Completed:
     given = read.given
     scene = derived(read.name, given, read.where)
     offered = None if given.candidates is None else candidate_set(given.candidates)
-    facts = SceneFacts(scene, offered, OURS_IN_HASTE)
+    facts = SceneFacts(scene, offered)
     # What overlaps or floats falls as well; that is reported once.
     found = [*findings_of(facts, ("overlap", "floating", "order", "candidates"))]
     found = found or [*findings_of(facts, ("unstable step", "unstable"))]
