@@ -36,11 +36,18 @@ from phyblock.files import (
     read_bytes,
     write_named,
 )
-from phyblock.records.files import MANIFEST, RECORDS, Manifest, read_manifest, read_records
+from phyblock.records.files import (
+    MANIFEST,
+    RECORDS,
+    Manifest,
+    read_manifest,
+    read_records,
+    suite_of,
+)
 from phyblock.records.record import Record, SentPrompt
 from phyblock.results.load import design_of
 from phyblock.run.judge import about_prompt
-from phyblock.run.rescore import judged_anew, recorded_dataset, recorded_suite, reopen_tracks
+from phyblock.run.rescore import judged_anew, recorded_dataset, reopen_tracks
 from phyblock.run.store import manifest_text, prompt_of, record_lines
 from phyblock.tracks.base import Track, kind_of, simulating
 from phyblock.tracks.items import Item
@@ -200,7 +207,7 @@ class _Prompts:
         self._tracks: dict[tuple[str, str], tuple[Track, dict[str, Item]] | None] = {}
         """By condition and name, with items by key; None where the prompts are not known here."""
         self._known: dict[tuple[object, ...], tuple[object, ...]] = {}
-        suite = recorded_suite(folder, manifest)
+        suite = suite_of(manifest, str(folder / MANIFEST))
         dataset = recorded_dataset(folder, manifest)
         for variant in dict.fromkeys(one.shown for one in suite.vary.variants):
             for name, was in manifest.variants.get(variant.key, manifest.tracks).items():
@@ -258,7 +265,7 @@ def _localized(folder: Path, manifest: Manifest, data: Sequence[Path]) -> Manife
     The first of the folders `data`, or of the sets that come with phyblock, that holds what was
     asked is taken. Raises DataError that names what is missing, StoreError for no plan.
     """
-    suite = recorded_suite(folder, manifest)
+    suite = suite_of(manifest, str(folder / MANIFEST))
     for part, noun in (("dataset", "data set"), ("questions", "questions")):
         if (held := getattr(manifest, part)) is None:
             continue

@@ -26,7 +26,6 @@ MissingPolicy = Literal["count", "skip"]
 
 PlanParser = Literal["steps", "official"]
 """Parsers of plans."""
-PLAN_PARSERS: tuple[PlanParser, ...] = get_args(PlanParser)
 
 AnswerFormat = Literal["text", "json_schema"]
 """Form of answers: lines of text, or JSON that follows a schema."""

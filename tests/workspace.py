@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -176,6 +177,12 @@ class Workspace:
         """
         less = () if page else ("--no-report",)
         return self.phyblock("run", "suite.yaml", "--out", self.out, *less, *args, **options)
+
+    def scored(self, name: str = "scored") -> Path:
+        """Copy the run, score the copy again, and return it."""
+        copy = shutil.copytree(self.out, self.root / name)
+        assert self.phyblock("score", copy).code == 0
+        return copy
 
     def start(self, *args: str | Path) -> Forked:
         """Start `run` and return at once; the process leads a group of its own."""

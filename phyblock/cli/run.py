@@ -7,7 +7,7 @@ import signal
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import click
 from rich.console import Console
@@ -23,7 +23,6 @@ from phyblock.cli.console import (
 from phyblock.cli.options import (
     INTERRUPTED,
     NAME_OR_PATH,
-    UserPath,
     data_option,
     limit_option,
     models_file_option,
@@ -51,7 +50,6 @@ from phyblock.run.runner import RunResult, Session, check_ready
 from phyblock.run.store import held_run
 from phyblock.text import counted, one_line
 from phyblock.tracks.base import kind_of
-from phyblock.types import MATCHERS, PLAN_PARSERS, Matcher, PlanParser
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _LINE_EVERY_S = 2.0
@@ -235,18 +233,12 @@ def _dollars(cost_usd: float | None) -> str:
 
 @click.command()
 @run_argument
-@click.option("--parser", type=click.Choice(PLAN_PARSERS), help="Parser to read replies with.")
-@click.option("--matcher", type=click.Choice(MATCHERS), help="Matcher of the headline numbers.")
-@click.option("--out", type=UserPath(), metavar="DIR", help="Folder for the new scores.")
 @data_option
-def score(
-    run: Path, parser: str | None, matcher: str | None, out: Path | None, data: Path | None
-) -> None:
+def score(run: Path, data: Path | None) -> None:
     """Read and score the stored replies of the folder RUN again, and count every measure again.
     Calls no model.
 
-    The new scores replace the records of RUN in one step. With another parser or matcher they go
-    to RUN/scores/PARSER-MATCHER, or to --out, and RUN stays as it is.
+    The new scores replace the records of RUN in one step.
     """
     from phyblock.run.rescore import rescore
 
@@ -258,6 +250,5 @@ def score(
             shown_s = time.monotonic()
             console.print(f"scored {done:,} samples")
 
-    chosen = cast("PlanParser | None", parser), cast("Matcher | None", matcher)
-    folder = rescore(run, *chosen, out, data, console.print, progress)
-    print_path(make_console(), show_tables(folder, data=data))
+    rescore(run, data, console.print, progress)
+    print_path(make_console(), show_tables(run, data=data))

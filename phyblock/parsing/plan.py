@@ -17,7 +17,6 @@ from typing import Any, Literal
 
 from phyblock.domain.scene import Plan
 from phyblock.parsing.text import (
-    READER_VERSION,
     AnswerForm,
     answer_of,
     is_open,
@@ -63,11 +62,6 @@ def parse_plan(text: str, n_candidates: int, parser: PlanParser = "steps") -> Pa
     kept = tuple(n for n in numbers if 1 <= n <= n_candidates)
     dropped = tuple(n for n in numbers if not 1 <= n <= n_candidates)
     return ParsedPlan(Plan(kept), rule, dropped, truncated=is_cut)
-
-
-def reader_version(parser: PlanParser) -> int:
-    """Return the version of a plan parser; `official` never changes."""
-    return 1 if parser == "official" else READER_VERSION
 
 
 def plan_form(n_candidates: int) -> AnswerForm[list[int]]:

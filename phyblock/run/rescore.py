@@ -14,20 +14,17 @@ from typing import Any
 from phyblock.config.suite import Suite, SuiteFiles
 from phyblock.config.yaml import YamlSource
 from phyblock.data.base import Dataset
-from phyblock.errors import DataError, Problem, SpecError, StoreError
-from phyblock.files import OutFolder
-from phyblock.parsing.plan import reader_version
+from phyblock.errors import DataError, Problem, StoreError
 from phyblock.records.files import MANIFEST, Manifest, read_manifest, run_records, suite_of
 from phyblock.records.record import AskedTurn, Record, StoredError
 from phyblock.run.judge import about_item, judge_reply, judged
 from phyblock.run.manifest import asked_counts, code_versions
 from phyblock.run.plan import open_dataset
-from phyblock.run.store import check_place, locked, write_run
+from phyblock.run.store import locked, write_run
 from phyblock.text import counted
 from phyblock.tracks.base import CARRYING, ENGINE, Track, kind_of, open_tracks
 from phyblock.tracks.items import Item, select_tasks
 from phyblock.tracks.pictures import Workshop
-from phyblock.types import Matcher, PlanParser
 
 _CHANGED = "is not the data set that the run was made on, or it was changed since"
 _MOVED = "name the folder where it is now with --data"
@@ -37,42 +34,21 @@ _NO_DATA = ("prompt", "pictures", CARRYING, ENGINE)
 
 def rescore(
     folder: Path,
-    parser: PlanParser | None = None,
-    matcher: Matcher | None = None,
-    out: Path | None = None,
     data: Path | None = None,
     tell: Callable[[str], object] = lambda _: None,
     watch: Callable[[int], object] = lambda _: None,
-) -> Path:
-    """Judge every stored reply of a run again and return the folder that holds the scores.
+) -> None:
+    """Judge every stored reply of a run again and replace its records in one step.
 
-    Without `out`, another parser or another headline matcher, these replace the records of the run
-    in one step. Else they become a run folder of their own, `<run>/scores/<parser>-<matcher>` when
-    `out` is None. `data` is where the data set is now, if it has moved. An episode in which today's
-    code would ask something else stays as it was and is no longer final: `tell` is called with how
-    many there are, `watch` with the number of records that are done.
-    Raises SpecError for a parser that cannot read what was asked for, StoreError for a folder that
-    is no run or cannot be written, DataError when the data are not what the run was made on.
+    `data` is where the data set is now, if it has moved. An episode in which today's code would ask
+    something else stays as it was and is no longer final: `tell` is called with how many there are,
+    `watch` with the number of records that are done. Raises StoreError for a folder that is no run
+    or cannot be written, DataError when the data are not what the run was made on.
     """
     manifest = read_manifest(folder)
-    suite = recorded_suite(folder, manifest, parser, matcher)
-    headline = suite.scoring.matchers[0]
-    changes: dict[str, Any] = {}
-    in_place = out is None and suite == recorded_suite(folder, manifest)
-    target = folder
-    if not in_place:
-        target = out or folder / f"scores/{suite.parser}-{headline}"
-        by = f"{suite.parser} {reader_version(suite.parser)}, {headline}"
-        changes["identity"] = f"{manifest.identity} scored by {by}"
-        changes["suite"] = suite.model_dump(mode="json")
-        if out is None:
-            OutFolder(folder).check([f"{target.relative_to(folder)}/"])
-        check_place(target)
-        if (target / MANIFEST).exists() and read_manifest(target).identity != changes["identity"]:
-            hint = "choose another folder with --out"
-            raise StoreError(Problem(str(target), "holds another run", hint=hint))
+    suite = suite_of(manifest, str(folder / MANIFEST))
     tracks = _by_condition(folder, manifest, suite, recorded_dataset(folder, manifest, data))
-    changes["versions"] = {**manifest.versions, **code_versions()}
+    versions = {**manifest.versions, **code_versions()}
     diverged: Counter[str] = Counter()
 
     def records() -> Iterator[Record]:
@@ -82,13 +58,12 @@ def rescore(
             yield again
 
     with locked(folder):
-        write_run(target, manifest.model_copy(update=changes), records())
+        write_run(folder, manifest.model_copy(update={"versions": versions}), records())
     for name, count in (+diverged).items():
         tell(
             f"{kind_of(name).title}: in {counted(count, 'episode')} this version would have asked "
             "something else; phyblock run asks on from there"
         )
-    return target
 
 
 def judged_anew(folder: Path) -> tuple[Manifest, Iterator[Record]]:
@@ -99,34 +74,12 @@ def judged_anew(folder: Path) -> tuple[Manifest, Iterator[Record]]:
     written. Raises as `rescore`, and StoreError for an episode that would go otherwise.
     """
     manifest = read_manifest(folder)
-    suite = recorded_suite(folder, manifest)
+    suite = suite_of(manifest, str(folder / MANIFEST))
     dataset = recorded_dataset(folder, manifest)
     tracks = _by_condition(folder, manifest, suite, dataset)
     changes = asked_counts(suite, _asked_about(manifest, dataset), tracks[""].values())
     records = (again for _, again in _judged(folder, manifest, tracks, strict=True))
     return manifest.model_copy(update=changes), records
-
-
-def recorded_suite(
-    folder: Path,
-    manifest: Manifest,
-    parser: PlanParser | None = None,
-    matcher: Matcher | None = None,
-) -> Suite:
-    """Return the suite of the run in `folder`, with parser and headline matcher where named.
-
-    Raises StoreError for a suite that is none, SpecError for a parser that cannot read what was
-    asked for.
-    """
-    suite = suite_of(manifest, str(folder / MANIFEST))
-    if parser == "official" and suite.answer_format == "json_schema":
-        message = "asked for JSON, which the official expression does not read"
-        raise SpecError(Problem(str(folder), message, "--parser", parser, "steps"))
-    matchers = suite.scoring.matchers
-    if matcher is not None:
-        matchers = (matcher, *(name for name in matchers if name != matcher))
-    scoring = suite.scoring.model_copy(update={"matchers": matchers})
-    return suite.model_copy(update={"scoring": scoring, "parser": parser or suite.parser})
 
 
 def recorded_dataset(folder: Path, manifest: Manifest, data: Path | None = None) -> Dataset:

@@ -15,8 +15,8 @@ from phyblock.data.official import official_prompt
 from phyblock.domain.scene import Block, CandidateSet, Plan, Scene
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.files import bundled
-from phyblock.parsing.plan import ParsedPlan, parse_plan, plan_form, reader_version
-from phyblock.parsing.text import AnswerForm
+from phyblock.parsing.plan import ParsedPlan, parse_plan, plan_form
+from phyblock.parsing.text import READER_VERSION, AnswerForm
 from phyblock.records.record import Line, Record
 from phyblock.records.record import Score as ScoreLine
 from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES, AssemblyScorer, Counts, Score
@@ -319,7 +319,7 @@ class FullPlanning(SceneTrack):
             "plan": parsed.plan.steps,
             "file_plan": file_plan(item, parsed.plan.steps),
             "dropped": parsed.dropped,
-            "version": reader_version(suite.parser),
+            "version": 1 if suite.parser == "official" else READER_VERSION,
             "problem": parsed.problem,
             "truncated": parsed.truncated,
         }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from shutil import copytree
 
 from tests.cli.breakage import (
     FAKE_KEY,
@@ -108,7 +107,6 @@ OPTIONS: tuple[Bad, ...] = (
     Bad("limit-word", options("--limit", "few"), ("--limit", "few")),
     Bad("verb", command("rum"), ("rum", "run")),
     Bad("check", command("models", "check", "alpah"), ("alpah", "did you mean alpha?")),
-    Bad("parser", command("score", "out", "--parser", "mine"), ("--parser", "steps", "official")),
     Bad("validate", many_files, (), messages=3),
     Bad("validate-pipe", pipe("p.yaml", "validate", "p.yaml"), ("p.yaml: there is no such suite",)),
     Bad("validate-device", command("validate", "/dev/zero"), ("/dev/zero: there is no such",)),
@@ -276,9 +274,6 @@ FOLDERS: tuple[Bad, ...] = (
     Bad("lost-data", after(lambda made: (made.root / "data").rename(made.root / "moved"),
         "score", "out"),
         ("data: ", "is not there", "--data")),
-    Bad("score-over-run", after(lambda made: copytree(made.out, made.root / "precious"),
-        "score", "out", "--out", "precious"), ("precious: holds another run", "--out")),
-    Bad("score-over-self", command("score", "out", "--out", "out"), ("out: holds another run",)),
     Bad("full-disk", command(*FRESH, "--no-cache", "--models", "random,oracle"),
         ("fresh/records.jsonl", "cannot be written: File too large", "it goes on from here"),
         writes=("fresh",), bytes_left=6000),
@@ -286,8 +281,6 @@ FOLDERS: tuple[Bad, ...] = (
         ("fresh", "cannot be written"), writes=("fresh",), bytes_left=100),
     Bad("full-tables", command("report", "out"), ("out", "cannot be written"),
         writes=("out/tables",), bytes_left=100),
-    Bad("full-scores", command("score", "out", "--parser", "official"),
-        ("out/scores", "cannot be written"), writes=("out/scores",), bytes_left=100),
     Bad("full-records", command("score", "out"), ("out/records.jsonl", "cannot be written"),
         bytes_left=100),
     Bad("full-init", command("init", "new"), ("new", "cannot be written"),

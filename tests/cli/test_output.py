@@ -244,7 +244,7 @@ def test_a_run_begins_in_no_folder_of_another(
         ("run", ""),
         ("run", "quick", "--models-file", ""),
         ("report", ""),
-        ("score", "run", "--out", ""),
+        ("bundle", "run", "--out", ""),
         ("export", "run", "--to", "csv", "--out", ""),
         ("scenes", "render", "phyblock-400", "--out", ""),
         ("show", "run", "sample", "--gif", ""),
@@ -327,18 +327,6 @@ def test_reports_that_are_written_at_once_all_come_to_their_end(finished: Path) 
     (build,) = (path for path in (finished / "report").iterdir())
     assert {path.name for path in build.iterdir()} >= {"samples.js", "records-0.js"}
     assert f"report/{build.name}" in pages[0].read_text(encoding="utf-8")
-
-
-def test_scores_go_to_no_folder_of_another(suite: Workspace) -> None:
-    call("run", suite.root / "suite.yaml", "--out", suite.out, "--no-report")
-    put(suite.root / "theirs" / "notes.txt")
-    with pytest.raises(StoreError, match="is not empty and holds no run"):
-        call("score", suite.out, "--out", suite.root / "theirs")
-    link(suite.out / "scores")
-    before = files(suite.root)
-    with pytest.raises(StoreError, match=r"scores: .*it is a link"):
-        call("score", suite.out, "--parser", "official")
-    assert files(suite.root) == before
 
 
 WRITING: dict[str, tuple[tuple[str, ...], str, str]] = {

@@ -225,7 +225,7 @@ _OF_RUNS_PERCENT = 10
 _OF_RUN = {
     "out": (
         ("report", "out", "--print"),
-        ("score", "out", "--out", "fresh"),
+        ("score", "out"),
         ("export", "out", "--to", "csv", "--out", "fresh"),
         ("compare", "out"),
         ("report", "out"),
@@ -239,7 +239,7 @@ _OF_RUN = {
     ),
     "asked": (
         ("report", "asked", "--print"),
-        ("score", "asked", "--out", "fresh"),
+        ("score", "asked"),
         ("run", "questions.yaml", "--out", "asked", "--no-report"),
     ),
 }  # fmt: skip

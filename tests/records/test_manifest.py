@@ -56,12 +56,10 @@ def renamed(**changes: Any) -> Raw:
     return {**record, "sample": "/".join(parts)}
 
 
-def test_a_run_takes_its_own_records_and_those_scored_elsewhere() -> None:
+def test_a_run_takes_its_own_records() -> None:
     plain, signed = plan_record(), {**plan_record(), "run": IDENTITY[:16]}
-    samples = {plain["sample"]}
-    for identity in (IDENTITY, f"{IDENTITY} scored by official, paper"):
-        for record in (plain, signed):
-            assert differs(Validation(facts(identity=identity), samples), record) is None
+    for record in (plain, signed):
+        assert differs(Validation(facts(identity=IDENTITY), {plain["sample"]}), record) is None
 
 
 @pytest.mark.parametrize(
@@ -105,7 +103,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Worksp
 
 READERS: dict[str, Callable[[Path], object]] = {
     "load": load_run,
-    "score": lambda folder: rescore(folder, "official", None, folder / "again"),
+    "score": rescore,
 }
 
 

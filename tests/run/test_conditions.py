@@ -115,8 +115,7 @@ def check_records(records: list[Raw], tasks: dict[str, AssemblyTask]) -> None:
 
 def check_scored_again(workspace: Workspace) -> None:
     """Stored replies are read in the numbers that were shown, by `score` and on the page."""
-    scored = workspace.root / "scored"
-    assert workspace.phyblock("score", workspace.out, "--out", scored).code == 0
+    scored = workspace.scored()
     assert [r["scores"] for r in workspace.records(scored)] == [
         r["scores"] for r in workspace.records()
     ]
@@ -311,8 +310,7 @@ def check_repeats(records: list[Raw], server: OpenAIChat) -> None:
 
 
 def check_variants_scored_again(workspace: Workspace) -> None:
-    scored = workspace.root / "scored"
-    assert workspace.phyblock("score", workspace.out, "--out", scored).code == 0
+    scored = workspace.scored()
     first, again = ([r["scores"] for r in workspace.records(f)] for f in (workspace.out, scored))
     assert first == again
     asked = [r["prompt"] for r in workspace.records() if r["model"] == "alpha"]
@@ -359,8 +357,7 @@ def test_questions_and_episodes_vary_what_they_know(workspace: Workspace) -> Non
     assert len({way["step_planning"]["pictures"] for way in ways.values()}) == 2
     assert len({tuple(r["parse"]["plan"]) for r in records if r["model"] == "random"}) > 1
     assert {r["factor"] for r in workspace.rows("sensitivity")} == {"view", "repeats", "items"}
-    scored = workspace.root / "scored"
-    assert workspace.phyblock("score", workspace.out, "--out", scored).code == 0
+    workspace.scored()
     workspace.write_yaml("models.yaml", {"old": {"replay": "./out"}})
     refused = workspace.run("--models", "old", "--out", workspace.root / "other")
     assert refused.code == 2

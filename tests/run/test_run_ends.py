@@ -309,13 +309,15 @@ def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
     # A plan that takes too long is given up, in a worker or without one, and says so.
     monkeypatch.setattr(PosePlanning, "judge_apart", whole)
     monkeypatch.setattr(dynamics, "LONGEST_S", -1.0)
-    kept = workspace.records(rescore(workspace.out, None, None, workspace.root / "slow"))
+    rescore(workspace.out)
+    kept = workspace.records()
     given_up = next(record for record in kept if record["sample"] == lost["sample"])
     assert given_up["error"]["kind"] == "unjudged"
     assert "step 1 was not reached within -1 s" in given_up["error"]["message"]
     assert given_up["reply"] == lost["reply"]
     monkeypatch.undo()
-    again = workspace.records(rescore(workspace.out, None, None, workspace.root / "again"))
+    rescore(workspace.out)
+    again = workspace.records()
     assert {record["outcome"] for record in again} == {"ok"}
     assert all(record["pose"]["completed"] and record["error"] is None for record in again)
 

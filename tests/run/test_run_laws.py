@@ -16,7 +16,6 @@ from phyblock.records.files import read_manifest
 from phyblock.results.compare import check_alike, compare_runs
 from phyblock.results.estimates import main_measure
 from phyblock.results.load import load_run
-from phyblock.results.tables import write_tables
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.web.factory import manifest, run_of
@@ -84,24 +83,6 @@ def test_scoring_again_by_the_same_rules_changes_nothing(copy: Workspace) -> Non
     assert lasting(copy.files()) == lasting(before)
 
 
-def test_another_parser_scores_the_same_replies(copy: Workspace) -> None:
-    before = copy.files()
-    done = copy.phyblock("score", "out", "--parser", "official", "--matcher", "paper")
-    assert (done.code, done.err) == (0, "")
-    again = copy.out / "scores" / "official-paper"
-    records = copy.records(again)
-    assert {record["parse"]["parser"] for record in records} == {"official"}
-    assert [record["reply"] for record in records] == [r["reply"] for r in copy.records()]
-    assert "matcher paper" in copy.tables(again)["table1.md"].decode()
-    after = copy.files()
-    assert {name: after[name] for name in before} == before
-    # Its tables are rebuilt like any run's.
-    told = copy.tables(again)
-    shutil.rmtree(again / "tables")
-    write_tables(again)
-    assert copy.tables(again) == told
-
-
 def test_replies_from_the_cache_are_worth_the_same(copy: Workspace) -> None:
     # The server is gone: whatever is answered comes from the cache.
     first = scores(copy.records())
@@ -115,6 +96,19 @@ def test_replies_from_the_cache_are_worth_the_same(copy: Workspace) -> None:
     assert {name: copy.tables()[name] for name in SCORED} == {
         name: copy.tables(copy.root / "out")[name] for name in SCORED
     }
+
+
+def test_other_rules_score_the_same_replies_without_a_call(copy: Workspace) -> None:
+    first = [record.get("reply", {}).get("text") for record in copy.records()]
+    copy.out = copy.root / "official"
+    rules = ("--set", "parser=official", "--set", "scoring.matchers=[paper]")
+    done = copy.run(*rules)
+    assert (done.code, done.err) == (0, "")
+    records = copy.records()
+    assert {record["parse"]["parser"] for record in records} == {"official"}
+    assert sorted(map(str, first)) == sorted(str(r.get("reply", {}).get("text")) for r in records)
+    assert all(r["reply"]["cached"] for r in records if r["model"] == "alpha")
+    assert "matcher paper" in copy.tables()["table1.md"].decode()
 
 
 def test_without_the_cache_it_is_neither_read_nor_written(copy: Workspace) -> None:

@@ -6,6 +6,7 @@ import csv
 import json
 import math
 import re
+import shutil
 import sys
 from collections import Counter
 from collections.abc import Iterator
@@ -99,8 +100,8 @@ def test_scoring_again_fills_in_what_older_records_lack(
         known = {row["measure"] for row in csv.DictReader(file)}
     assert known.isdisjoint({"needless", "distance", "blocks_order"})
     assert {"success", "macro_f1"} <= known
-    scored = here.root / "scored"
-    command("score", here.out, "--out", scored)
+    scored = Path(shutil.copytree(here.out, here.root / "scored"))
+    command("score", scored)
     write_tables(scored)
     with (scored / "tables" / "estimates.csv").open(newline="") as file:
         rows = [row for row in csv.DictReader(file) if row["measure"] == "needless"]
@@ -144,12 +145,14 @@ def test_scoring_again_counts_in_every_track(
     folders = [here.root / name for name in ("out", "same", "new", "scored")]
     old, same, new, scored = folders
     assert not command("run", "suite.yaml", "--out", old, "--no-report")
-    rescore(old, None, None, same)
+    shutil.copytree(old, same)
+    rescore(same)
     counted = SampleCounts("sampled", ("part", "whole"), sample=counts)
     registry.add_measure(track, Measure("part", "Part", counted, ratio_of, "a part"))
     request.addfinalizer(lambda: registry.remove_measure(track, "part"))
     assert not command("run", "suite.yaml", "--out", new, "--no-report")
-    rescore(old, None, None, scored)
+    shutil.copytree(old, scored)
+    rescore(scored)
     before, unchanged, fresh, again = map(here.records, folders)
     assert unchanged == before
     counts_now = {line["sample"]: line["counts"] for line in fresh}
@@ -170,7 +173,8 @@ def test_an_episode_that_would_have_asked_otherwise_is_no_longer_final(
     lines[0]["turns"][0]["reply"]["text"] = "Done"
     path.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
     told: list[str] = []
-    first, *others = here.records(rescore(here.out, out=here.root / "scored", tell=told.append))
+    rescore(here.out, tell=told.append)
+    first, *others = here.records()
     assert [text.partition(" this")[0] for text in told] == ["Step planning: in 1 episode"]
     assert (first["outcome"], first["error"]["kind"]) == ("api_error", "retryable")
     assert first["turns"] == lines[0]["turns"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import functools
+import shutil
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -243,7 +244,9 @@ def test_a_run_that_was_cut_goes_on_and_is_scored_again_without_an_engine(
     # What fell when it was asked is what fell: nothing is carried out again.
     monkeypatch.setattr(pose_track, "execute", None)
     monkeypatch.setattr(pose_track, "CARRY_VERSION", pose_track.CARRY_VERSION + 1)
-    again = rescore(workspace.out, None, None, workspace.root / "again")
+    again = workspace.root / "again"
+    shutil.copytree(workspace.out, again)
+    rescore(again)
     with pytest.raises(StoreError, match=r"pose_planning\.carrying"):
         phyblock.main(run, standalone_mode=False)
     assert by_sample(workspace.records(again)) == whole
