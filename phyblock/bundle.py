@@ -48,7 +48,7 @@ from phyblock.records.record import Record, SentPrompt
 from phyblock.results.load import design_of
 from phyblock.run.judge import about_prompt
 from phyblock.run.rescore import judged_anew, recorded_dataset, reopen_tracks
-from phyblock.run.store import manifest_text, prompt_of, record_lines
+from phyblock.run.store import manifest_text, prompt_fields, record_lines
 from phyblock.tracks.base import Track, kind_of, simulating
 from phyblock.tracks.items import Item
 
@@ -243,7 +243,7 @@ class _Prompts:
         if key not in self._known:
             shown = track.shown(items[record.item], record.seed)
             request = next(iter(track.outlines(shown)))
-            digest = prompt_of(request.messages).sha256
+            digest = prompt_fields(request.messages)["sha256"]
             self._known[key] = _sent(about_prompt(request, track.prompt_name, digest))
         return self._known[key] == _sent(prompt)
 

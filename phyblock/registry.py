@@ -6,6 +6,7 @@ baselines) without importing them: a track's package is loaded when it is first 
 
 from __future__ import annotations
 
+import functools
 import importlib
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
@@ -29,10 +30,15 @@ _measures: dict[str, tuple[Any, ...]] = {}
 _baselines: dict[str, dict[str, Callable[..., str]]] = {}
 
 
+@functools.cache
+def _built_in() -> Mapping[str, type[Track]]:
+    tracks = [importlib.import_module(module).TRACK for module in _MODULES]
+    return {kind.name: kind for kind in tracks}
+
+
 def known_tracks() -> Mapping[str, type[Track]]:
     """Every track by name, the built-in ones first."""
-    built_in = [importlib.import_module(module).TRACK for module in _MODULES]
-    return {kind.name: kind for kind in built_in} | _registered
+    return {**_built_in(), **_registered}
 
 
 def known_track(name: str) -> type[Track]:

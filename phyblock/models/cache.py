@@ -99,7 +99,7 @@ class ReplyCache:
         if row is None:
             return None
         try:
-            found = {**json.loads(row[0]), "cached": True, "attempts": 0}
+            found = {**json.loads(row[0].decode()), "cached": True, "attempts": 0}
             return Reply.model_validate(found, strict=True)
         except (ValueError, TypeError, RecursionError) as error:
             if self._tell is not None:

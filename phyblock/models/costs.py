@@ -19,10 +19,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
-import yaml
-
 from phyblock.config.models import ModelConfig, Price, Rate, Tariff, host_of
 from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
+from phyblock.files import read_own_yaml
 from phyblock.models.keys import KEYLESS, api_key_status
 from phyblock.models.request import Image, Request, wire_params
 from phyblock.records.record import Reply, Usage
@@ -468,7 +467,6 @@ def _picture_rules() -> list[tuple[re.Pattern[str], dict[str, PictureRule]]]:
     def rule(told: Any) -> PictureRule:
         return PictureRule(**told) if isinstance(told, dict) else PictureRule(plus=told)
 
-    text = Path(__file__).with_name("pictures.yaml").read_text(encoding="utf-8")
     return [
         (
             re.compile(rf"(^|\.){entry['model']}"),
@@ -477,7 +475,7 @@ def _picture_rules() -> list[tuple[re.Pattern[str], dict[str, PictureRule]]]:
                 for name, told in {"": entry["usual"], **entry.get("details", {})}.items()
             },
         )
-        for entry in yaml.safe_load(text)
+        for entry in read_own_yaml(Path(__file__).with_name("pictures.yaml"))
     ]
 
 

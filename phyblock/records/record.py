@@ -113,7 +113,7 @@ def not_a(noun: str, error: InputError, hint: str) -> StoreError:
 
 def encodable(text: str) -> str:
     """Return text that UTF-8 can hold: lone surrogates, as of a broken reply, become "?"."""
-    return text.encode("utf-8", "replace").decode("utf-8")
+    return text if text.isascii() else text.encode("utf-8", "replace").decode("utf-8")
 
 
 def _well_formed(value: Any) -> Any:

@@ -339,13 +339,15 @@ def headline_of(run: Run, track: str, design: Design | None = None) -> dict[tupl
     """
     scale = {measure.name: measure.scale for measure in track_measures(track)}
     rows = headline_rows(track_estimates(run, track), design or run.design)
+    fields = ("measure", CELL, "criterion", "model", "value", "lo", "hi")
+    listed = list(zip(*(rows[name].tolist() for name in fields), strict=True))
     values = {}
     for column in headline_columns(run, track):
-        mine = rows[(rows["measure"] == column.measure) & (rows[CELL] == column.cell)]
-        for row in mine.to_dict("records"):
-            if column.criterion in ("", row["criterion"]):
-                numbers = (scale[column.measure] * float(row[n]) for n in ("value", "lo", "hi"))
-                values[str(row["model"]), column.heading] = Value(*numbers)
+        for measure, cell, criterion, model, *numbers in listed:
+            is_here = (measure, cell) == (column.measure, column.cell)
+            if is_here and column.criterion in ("", criterion):
+                shown = (scale[measure] * float(number) for number in numbers)
+                values[str(model), column.heading] = Value(*shown)
     return values
 
 

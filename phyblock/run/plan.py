@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -43,7 +44,7 @@ class Sample:
     seed: int
     variant: Variant = field(default_factory=Variant)
 
-    @property
+    @functools.cached_property
     def id(self) -> str:
         """Its name inside the run."""
         whole = f"{self.track.name}/{self.model}/{self.item.key}/s{self.seed}"
@@ -99,11 +100,15 @@ class RunPlan:
         """Yield all samples of a model: seed by seed, in each the conditions, in each of these the
         tracks in the suite's order, of each its items interleaved over levels and scenes.
         """
+        asked = [
+            (variant, track, interleaved(track.items))
+            for variant, tracks in self.variants.items()
+            for track in tracks
+        ]
         for seed in self.suite.seeds:
-            for variant, tracks in self.variants.items():
-                for track in tracks:
-                    for item in interleaved(track.items):
-                        yield Sample(track, model, item, seed, variant)
+            for variant, track, items in asked:
+                for item in items:
+                    yield Sample(track, model, item, seed, variant)
 
     def close(self) -> None:
         """Release what tracks hold."""

@@ -48,9 +48,6 @@ from phyblock.records.record import (
     BatchLine,
     Call,
     Line,
-    PictureMark,
-    Prompt,
-    PromptMessage,
     Record,
     Reply,
     Stopped,
@@ -281,7 +278,10 @@ class RunStore:
                 self.calls = self._file(calls, self.progress.add_call)
                 self.batches = self._file(BatchLines(folder), self.progress.batches.append)
                 # Prompts can be made again.
-                self._prompts = self._file(PromptLines(folder), self._know, sync=False)
+                known = self._prompts_known
+                self._prompts = self._file(
+                    PromptLines(folder), lambda prompt: known.add(prompt.sha256), sync=False
+                )
         except StoreError:
             self.close()
             raise
@@ -317,11 +317,12 @@ class RunStore:
 
     def keep_prompt(self, messages: Sequence[Message]) -> str:
         """Write a prompt unless it is there, and return its digest; StoreError as `append`."""
-        prompt = prompt_of(messages)
-        if prompt.sha256 not in self._prompts_known:
-            self._know(prompt)
-            self._prompts.append([prompt.fields()])
-        return prompt.sha256
+        prompt = prompt_fields(messages)
+        digest: str = prompt["sha256"]
+        if digest not in self._prompts_known:
+            self._prompts_known.add(digest)
+            self._prompts.append([prompt])
+        return digest
 
     def note_stopped(self, models: Mapping[str, str], run: str, asked: Collection[str]) -> None:
         """Keep why the models `asked` about, or the whole run, were stopped, for whoever reads it.
@@ -337,9 +338,6 @@ class RunStore:
             folder.write({STOPPED: json.dumps(stopped.fields(), indent=2) + "\n"})
         else:
             folder.remove([STOPPED])
-
-    def _know(self, prompt: Prompt) -> None:
-        self._prompts_known.add(prompt.sha256)
 
     def _file(
         self, lines: Lines[LineT], take: Callable[[LineT], object], *, sync: bool = True
@@ -473,18 +471,17 @@ def _json_line(fields: Mapping[str, Any]) -> str:
     return json.dumps(fields, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
 
 
-def prompt_of(messages: Sequence[Message]) -> Prompt:
-    """Return messages as they are kept, with the labels of pictures in their place."""
-    content = tuple(
-        PromptMessage(
-            role=message.role,
-            parts=tuple(
-                PictureMark(image=part.label) if isinstance(part, Image) else encodable(part)
+def prompt_fields(messages: Sequence[Message]) -> dict[str, Any]:
+    """Return the fields of a `Prompt` of messages, with the labels of pictures in their place."""
+    fields = [
+        {
+            "role": message.role,
+            "parts": [
+                {"image": part.label} if isinstance(part, Image) else encodable(part)
                 for part in message.parts
-            ),
-        )
+            ],
+        }
         for message in messages
-    )
-    fields = [message.fields() for message in content]
+    ]
     digest = hex_digest(json.dumps(fields, sort_keys=True, separators=(",", ":")))
-    return Prompt(sha256=digest, messages=content)
+    return {"sha256": digest, "messages": fields}

@@ -132,8 +132,7 @@ class Goal:
     `equal_to[i]` holds the goal vertices, in file order, that equal candidate i (1-based). All else
     are bit masks of vertices: `equal[i]` the same, `of_kind[i]` those of its type and color,
     `kinds` all blocks by type and color, `kind_of_look` the kind of each group that the setting
-    takes for equal; `above[v]` v and all that depends on it, directly or not, `below[v]` v and all
-    that it depends on. `unlocks[v]` are the vertices that directly depend on v: equal blocks that
+    takes for equal. `unlocks[v]` are the vertices that directly depend on v: equal blocks that
     unlock the same ones are interchangeable when both are ready. `ways[i]` holds, for each vertex
     of `equal_to[i]`, the vertex, its mask, and the mask of it and what it directly depends on.
     """
@@ -142,32 +141,41 @@ class Goal:
         attribute = "look" if setting == "A" else "kind"
         self.graph = graph = scene.graph
         n = len(graph)
-        looks = [getattr(block, attribute) for block in scene.blocks]
-        kinds = [block.kind for block in scene.blocks]
+        looks = _groups(getattr(block, attribute) for block in scene.blocks)
+        kinds = _groups(block.kind for block in scene.blocks)
         self.equal_to: dict[int, tuple[int, ...]] = {}
         self.equal: dict[int, int] = {}
         self.of_kind: dict[int, int] = {}
         for index, candidate in enumerate(candidates.candidates, 1):
-            look, kind = getattr(candidate, attribute), candidate.kind
-            self.equal_to[index] = tuple(v for v in range(n) if looks[v] == look)
-            self.equal[index] = sum(1 << v for v in self.equal_to[index])
-            self.of_kind[index] = sum(1 << v for v in range(n) if kinds[v] == kind)
-        self.kinds = _groups(kinds)
+            self.equal[index] = equal = looks.get(getattr(candidate, attribute), 0)
+            self.equal_to[index] = tuple(v for v in range(n) if equal >> v & 1)
+            self.of_kind[index] = kinds.get(candidate.kind, 0)
+        self.kinds = tuple(kinds.values())
         self.kind_of_look = {
-            look: kind for look in _groups(looks) for kind in self.kinds if look & kind
+            look: kind for look in looks.values() for kind in self.kinds if look & kind
         }
-        below = [1 << v for v in range(n)]
-        for vertex in sorted(range(n), key=graph.layers.__getitem__):
-            for other in graph.depends_on[vertex]:
-                below[vertex] |= below[other]
-        self.below = tuple(below)
-        self.above = tuple(sum((below[w] >> v & 1) << w for w in range(n)) for v in range(n))
         self.unlocks = [tuple(w for w in range(n) if v in graph.depends_on[w]) for v in range(n)]
         needs = [mask | 1 << v for v, mask in enumerate(graph.needed_masks)]
         self.ways = {
             index: [(v, 1 << v, needs[v]) for v in vertices]
             for index, vertices in self.equal_to.items()
         }
+
+    @functools.cached_property
+    def below(self) -> tuple[int, ...]:
+        """For each vertex, the bit mask of it and all that it depends on."""
+        graph = self.graph
+        below = [1 << v for v in range(len(graph))]
+        for vertex in sorted(range(len(graph)), key=graph.layers.__getitem__):
+            for other in graph.depends_on[vertex]:
+                below[vertex] |= below[other]
+        return tuple(below)
+
+    @functools.cached_property
+    def above(self) -> tuple[int, ...]:
+        """For each vertex, the bit mask of it and all that depends on it."""
+        n, below = len(self.graph), self.below
+        return tuple(sum((below[w] >> v & 1) << w for w in range(n)) for v in range(n))
 
     def choices(self, index: int, placed: int) -> list[int]:
         """Ready goal vertices, in file order, that candidate `index` could be placed as."""
@@ -191,12 +199,12 @@ class Goal:
         return "dependency_not_met"
 
 
-def _groups(values: Iterable[Hashable]) -> tuple[int, ...]:
-    """Bit masks of the places that have the same value."""
+def _groups(values: Iterable[Hashable]) -> dict[Hashable, int]:
+    """Bit mask of the places that have a value, by value."""
     groups: dict[Hashable, int] = {}
     for place, value in enumerate(values):
         groups[value] = groups.get(value, 0) | 1 << place
-    return tuple(groups.values())
+    return groups
 
 
 @dataclass(frozen=True)
@@ -289,16 +297,18 @@ def most_placed(goal: Goal, plan: Plan) -> int:
     Quicker than `match_plan`; raises KeyError for a step that is no candidate.
     """
     frontier = {0}
-    for index in plan.steps:
-        ways = goal.ways[index]
+    for ways in map(goal.ways.__getitem__, plan.steps):
         if len(ways) == 1:
             ((_, itself, needed),) = ways
             frontier = {p | itself if needed & ~p == itself else p for p in frontier}
         elif ways:
             reached: set[int] = set()
             for placed in frontier:
-                choices = goal.distinct(goal.choices(index, placed))
-                reached.update([placed | 1 << vertex for vertex in choices] or [placed])
+                free = ~placed
+                ready = [(v, itself) for v, itself, needed in ways if needed & free == itself]
+                if len(ready) > 1:
+                    ready = list({goal.unlocks[way[0]]: way for way in reversed(ready)}.values())
+                reached.update([placed | itself for _, itself in ready] or [placed])
             frontier = reached
     return max(mask.bit_count() for mask in frontier)
 

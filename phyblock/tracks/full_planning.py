@@ -179,12 +179,13 @@ def pose_choices(
     that no candidate has name nothing.
     """
     needed = {block.look for block in scene.blocks}
+    offered = [(one.kind, one.look in needed) for one in candidates.candidates]
     chosen: dict[Any, bool] = {}
     for step in steps:
-        if 1 <= step <= len(candidates):
-            chosen.setdefault(candidates[step].kind, candidates[step].look in needed)
-    for kind in sorted({block.kind for block in scene.blocks} & set(chosen)):
-        right = [one.look in needed for one in candidates.candidates if one.kind == kind]
+        if 1 <= step <= len(offered):
+            chosen.setdefault(*offered[step - 1])
+    for kind in sorted({block.kind for block in scene.blocks} & chosen.keys()):
+        right = [is_right for of, is_right in offered if of == kind]
         if not all(right):
             yield right[0], chosen[kind]
 

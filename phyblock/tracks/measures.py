@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import yaml
 
+from phyblock.files import read_own_yaml
 from phyblock.scoring.plan import mean_of, ratio_of
 
 if TYPE_CHECKING:
@@ -260,7 +260,7 @@ def read_report(
     the `mean_of` others of its counts, or the `difference_of` two. `code` has the fields of
     measures, by name, that are functions.
     """
-    told = yaml.safe_load(Path(__file__).with_name(f"{track}.yaml").read_text(encoding="utf-8"))
+    told = read_own_yaml(Path(__file__).with_name(f"{track}.yaml"))
     by_name, measures = {counted.name: counted for counted in counts}, dict[str, Measure]()
     for group in told.pop("measures"):
         for name, own in group.pop("of").items():
