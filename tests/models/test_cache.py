@@ -189,7 +189,8 @@ def test_a_row_that_is_no_reply_is_missing_and_is_overwritten(
 WRITER = """
 import sys
 from pathlib import Path
-from phyblock.models import Reply, ReplyCache
+from phyblock.models.cache import ReplyCache
+from phyblock.records.record import Reply
 with ReplyCache(Path(sys.argv[1])) as cache:
     for number in range(int(sys.argv[3])):
         cache.put(f"{sys.argv[2]}-{number}", "openai/m", Reply(text=f"reply {number}"))
