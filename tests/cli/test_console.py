@@ -5,10 +5,8 @@ from __future__ import annotations
 import csv
 import io
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.cells import cell_len
@@ -17,8 +15,8 @@ from phyblock.cli.console import make_console, print_table
 from phyblock.cli.progress import ProgressView
 from phyblock.results.export import export_run
 from phyblock.results.load import load_run
-from phyblock.results.tables import summary_of, write_tables
-from phyblock.results.text import Column, TextTable, to_csv
+from phyblock.results.tables import write_tables
+from phyblock.results.text import Column, TextTable
 from phyblock.run.runner import ModelStopped, RunStarted
 from tests.web.factory import LEVELS, manifest, record, score, write_run
 
@@ -100,48 +98,3 @@ def test_no_cell_of_any_csv_is_a_formula(tmp_path: Path) -> None:
                         float(cell)
     assert checked > len(LEVELS)
     assert pd.read_csv(exported[0])["reply"][0] == "'-2+3+cmd|' /C calc'!A0"
-
-
-def test_numbers_and_gaps_in_a_csv_stay() -> None:
-    frame = pd.DataFrame(
-        {
-            "a": [1, None, "=x"],
-            "b": [-1.5, 2.0, None],
-            "c": pd.array(["-x", None, "-2"], dtype="string"),
-        }
-    )
-    assert to_csv(frame, "%.1f") == "a,b,c\n1,-1.5,'-x\n,2.0,\n'=x,,-2\n"
-    assert frame["a"][2] == "=x"
-
-
-def ranked(folder: Path, records: list[dict[str, Any]], facts: dict[str, Any]) -> list[list[str]]:
-    """The rows of the headline table, with how many tables there are."""
-    summary = summary_of(load_run(write_run(folder, records, facts)))
-    return [[*row[:2], row[-1]] for row in summary.tables[0].rows] + [[str(len(summary.tables))]]
-
-
-@pytest.mark.parametrize("is_whole", [True, False])
-def test_a_model_with_samples_that_were_not_asked_has_no_rank(
-    tmp_path: Path, is_whole: bool
-) -> None:
-    levels = list(LEVELS)
-    records = [
-        record(model, scene, scores=[score(tp, 1, 1)], outcome=outcome)
-        for model, tp, scenes, outcome in (
-            ("worse", 1, levels[:1], "api_error"),
-            ("worse", 1, levels[1:], "ok"),
-            ("best", 4, levels if is_whole else levels[1:], "ok"),
-        )
-        for scene in scenes
-    ]
-    rows = ranked(tmp_path / "run", records, manifest(models=["worse", "best"], seeds=[0]))
-    first, second, n_tables = rows
-    assert (first[1], second[1]) == ("best", "worse")
-    n = len(levels)
-    if is_whole:
-        assert (first[0], second[0]) == ("1\N{EN DASH}2", "1\N{EN DASH}2")
-    else:
-        assert (first[0], second[0]) == ("", "1")
-        assert (first[2], second[2]) == (f"{n - 1}/{n}", f"{n}/{n}")
-    # The second is the coverage, of the model whose calls failed.
-    assert n_tables == ["2"]

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from phyblock.files import bundled
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
@@ -39,14 +38,6 @@ def test_a_prompt_beside_the_suite_is_used_and_said(asked: Workspace) -> None:
     own_prompt(asked).write_text(f"{{# mine #}}\n\nYou are a builder.\n{text}", encoding="utf-8")
     told = " ".join(asked.phyblock("validate", "suite.yaml").out.split())
     assert "full_planning.j2; the text outside of its blocks (line 3) is NOT sent" in told
-
-
-def test_a_copy_of_the_bundled_prompt_is_the_bundled_one(asked: Workspace) -> None:
-    asked.write_models("http://127.0.0.1:9", "alpha")
-    before = asked.run("--dry-run")
-    own_prompt(asked).write_bytes(bundled("prompts", "full_planning.j2").read_bytes())
-    assert asked.run("--dry-run") == before
-    assert "prompt of" not in before.out
 
 
 @pytest.mark.parametrize(
@@ -131,10 +122,3 @@ def test_an_entry_point_is_loaded_without_being_named(suite: Workspace) -> None:
     assert done.code == 2
     assert "plugin mine: cannot be imported: ZeroDivisionError" in done.err
     assert "mine.py:1" in done.err
-
-
-def test_a_module_that_is_not_there_is_named(suite: Workspace) -> None:
-    done = suite.phyblock("--plugin", "no_such", "models", fresh=True)
-    assert done.code == 2
-    assert "--plugin: cannot be imported: ModuleNotFoundError" in done.err
-    assert "Traceback" not in done.err

@@ -7,7 +7,6 @@ import pty
 import re
 import subprocess
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import click
@@ -17,8 +16,6 @@ from click.testing import CliRunner
 from phyblock.cli.main import phyblock
 from phyblock.errors import StoreError
 from phyblock.files import LIST
-from phyblock.results.tables import write_tables
-from phyblock.web.report import write_report
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.web.factory import LEVELS, manifest, record, score, write_run
@@ -111,13 +108,6 @@ def test_a_person_is_asked_before_money_is_spent(
     assert suite.out.exists() == (code == 0)
 
 
-def test_tables_may_be_read_by_whoever_may_read_the_records(suite: Workspace) -> None:
-    assert suite.run().code == 0
-    modes = {path.stat().st_mode for path in suite.out.rglob("*") if path.is_file()}
-    assert modes == {(suite.out / "records.jsonl").stat().st_mode}
-    assert not list(suite.out.rglob("*.part"))
-
-
 def test_nothing_is_spent_unasked_where_nobody_can_be_asked(suite: Workspace) -> None:
     with Running(OpenAIChat()) as running:
         suite.write_models(running.url, "alpha", price={"input": 1.0, "output": 1.0})
@@ -138,38 +128,6 @@ def test_nothing_is_spent_unasked_where_nobody_can_be_asked(suite: Workspace) ->
         running.server.faults = Faults()
         limited = suite.run("--models", "alpha", *limit, "--retry-failed")
         assert (limited.code, running.server.requests) == (0, 10), limited.err
-
-
-def test_a_price_is_asked_about_and_none_at_a_local_server_is_not(suite: Workspace) -> None:
-    free, dear = ({"input": n, "output": n} for n in (0.0, 1.0))
-    with Running(OpenAIChat()) as running:
-        base = f"{running.url}/v1"
-        entries = {
-            name: {"id": f"hosted_vllm/{name}", "api_base": base, "price": price}
-            for name, price in {"dear": dear, "free": free, "unknown": None}.items()
-        }
-        suite.write_yaml("models.yaml", entries)
-        refused = suite.run("--models", "free,dear,unknown")
-        assert (refused.code, running.server.requests) == (2, 0)
-        assert "found: dear\n" in refused.err
-        assert suite.run("--models", "free,unknown").code == 0
-
-
-def test_failed_calls_are_shown_with_what_the_provider_said(suite: Workspace) -> None:
-    with Running(OpenAIChat(Faults(mode="400"))) as running:
-        suite.write_models(running.url, "alpha")
-        done = suite.run("--models", "alpha,oracle")
-        assert done.code == 1
-        assert "5 x alpha: HTTP 400: Invalid value for messages" in done.out
-        assert "5 requests rejected for good" in done.out
-
-        running.server.faults = Faults()
-        same = suite.run("--models", "alpha,oracle")
-        assert (same.code, running.server.requests) == (1, 5)
-        mended = suite.run("--models", "alpha,oracle", "--retry-failed")
-        assert (mended.code, running.server.requests) == (0, 10)
-    assert "All 10 samples are done" in mended.out
-    assert "rejected" not in mended.out
 
 
 def test_the_folder_of_a_run_is_found_again_without_naming_it(suite: Workspace) -> None:
@@ -289,24 +247,6 @@ def test_what_is_in_the_way_is_named_and_stays(finished: Path, name: str) -> Non
     assert not (finished / "report").is_dir() or (finished / "report").is_symlink()
 
 
-def test_a_run_goes_on_only_where_its_report_can_be_written(suite: Workspace) -> None:
-    words = ("run", suite.root / "suite.yaml", "--out", suite.out)
-    call(*words, "--no-report")
-    put(suite.out / "tables" / "mine.md")
-    before = files(suite.root)
-    for prepare, said in IN_THE_WAY.values():
-        if "tables" not in said and "table1" not in said:
-            prepare(suite.out)
-            with pytest.raises(StoreError, match=said):
-                call(*words)
-            for path in (suite.out / "report", suite.out / "report.html"):
-                path.unlink(missing_ok=True)
-    left = files(suite.root)
-    assert {path: left[path] for path in before} == before
-    call(*words, "--no-report")
-    assert (suite.out / "tables" / "mine.md").read_text() == "mine"
-
-
 def test_a_run_writes_through_no_link(suite: Workspace) -> None:
     put(suite.root / "theirs")
     words = ("run", suite.root / "suite.yaml", "--out", suite.out)
@@ -315,18 +255,6 @@ def test_a_run_writes_through_no_link(suite: Workspace) -> None:
     with pytest.raises(StoreError, match=r"calls\.jsonl: is a link"):
         call(*words)
     assert (suite.root / "theirs").read_text() == "mine"
-
-
-def test_reports_that_are_written_at_once_all_come_to_their_end(finished: Path) -> None:
-    def write(_: int) -> Path:
-        return write_report(write_tables(finished))
-
-    with ThreadPoolExecutor(4) as pool:
-        pages = list(pool.map(write, range(5)))
-    assert set(pages) == {finished / "report.html"}
-    (build,) = (path for path in (finished / "report").iterdir())
-    assert {path.name for path in build.iterdir()} >= {"samples.js", "records-0.js"}
-    assert f"report/{build.name}" in pages[0].read_text(encoding="utf-8")
 
 
 WRITING: dict[str, tuple[tuple[str, ...], str, str]] = {
@@ -363,14 +291,6 @@ def test_a_verb_writes_over_its_own_files_and_no_others(tmp_path: Path, verb: st
     assert set(files(tmp_path / "theirs")) <= {name, LIST}
 
 
-def test_init_writes_through_no_link(tmp_path: Path) -> None:
-    (tmp_path / "new").mkdir()
-    (tmp_path / "new" / "models.yaml").symlink_to(tmp_path / "elsewhere.yaml")
-    with pytest.raises(StoreError, match=r"models\.yaml: is already there"):
-        call("init", tmp_path / "new")
-    assert not (tmp_path / "elsewhere.yaml").exists()
-
-
 def refused(workspace: Workspace, output: int, *words: str | bytes) -> tuple[int, str]:
     done = subprocess.run(
         [*COMMAND, *words],
@@ -391,13 +311,3 @@ def test_output_that_nobody_takes_is_no_traceback(suite: Workspace) -> None:
     os.close(reader)
     assert refused(suite, writer, "models") == (1, "")
     os.close(writer)
-
-
-def test_a_data_set_in_a_folder_that_is_not_utf_8_is_refused(suite: Workspace) -> None:
-    place = Path(os.fsdecode(bytes(suite.root) + b"/r\xffn"))
-    place.mkdir()
-    for name in ("data", "suite.yaml"):
-        (suite.root / name).rename(place / name)
-    code, said = refused(suite, subprocess.DEVNULL, "run", place / "suite.yaml")
-    assert code == 2
-    assert "Traceback" not in said

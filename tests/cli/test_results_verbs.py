@@ -43,31 +43,6 @@ def test_tables_print_all_or_one_in_any_form(folder: Path) -> None:
     assert not (folder / "tables").exists()
 
 
-def test_tables_beside_the_paper(folder: Path) -> None:
-    others = "The paper's tables are of the official scenes; this run is of others.\n"
-    assert "beside the paper" not in call("report", folder, "--print").output
-    assert call("report", folder, "--print", "--paper").output == others
-    run = folder / "run.yaml"
-    official = "suite:\n  dataset: {format: official, path: checkout}\n"
-    run.write_text(run.read_text().replace("suite:\n", official))
-    output = call("report", folder, "--print", "--paper").output
-    # The paper has this model in its table of seeds alone.
-    assert "beside the paper's Table 1" not in output
-    assert "beside the paper's Table 5" in output
-
-
-@pytest.mark.parametrize("seeds", [[0], [0, 1]])
-def test_a_run_without_full_planning_has_nothing_beside_tables_1_and_5(
-    tmp_path: Path, seeds: list[int]
-) -> None:
-    facts = manifest(models=[("alpha", "GPT-4.1")], seeds=seeds, items={"step_planning": 5})
-    official = {"format": "official", "path": "checkout"}
-    facts["suite"] |= {"tracks": ["step_planning"], "dataset": official}
-    folder = write_run(tmp_path / "run", [], facts)
-    output = call("report", folder, "--print", "--paper").output
-    assert output == "No model of the run has a row in the paper's tables.\n"
-
-
 def test_compare_says_the_verdict_and_what_flipped(folder: Path, tmp_path: Path) -> None:
     done = call("compare", folder, "--models", "alpha,beta", "--out", tmp_path / "out")
     # Five base scenes are too few for five comparisons.

@@ -85,28 +85,6 @@ def test_a_film_tells_the_outcome_of_each_step_and_the_end(played: Workspace) ->
         assert last.caption.startswith(f"{record.progress[-1]} of 3 blocks placed; ended: ")
 
 
-@pytest.mark.parametrize(
-    ("sample", "message"),
-    [("no-such", "holds no such sample"), ("oracle", "holds 8 such samples")],
-)
-def test_which_sample_is_meant_must_be_clear(played: Workspace, sample: str, message: str) -> None:
-    done = played.phyblock("show", "out", sample)
-    assert (done.code, len(done.errors)) == (2, 1)
-    assert message in done.errors[0]
-    assert done.errors[0].partition("allowed")[2].count("step_planning/") == 5
-
-
-def test_without_its_data_set_a_sample_is_shown_and_not_drawn(played: Workspace) -> None:
-    moved = (played.root / "data").rename(played.root / "elsewhere")
-    wanted = ("show", "out", "repeat/seesaw/s0")
-    assert played.phyblock(*wanted).code == 0
-    done = played.phyblock(*wanted, "--gif", "x.gif")
-    assert (done.code, "--data" in done.err) == (2, True)
-    assert played.phyblock(*wanted, "--gif", "x.gif", "--data", "elsewhere").code == 0
-    assert (played.root / "x.gif").stat().st_size > 1000
-    moved.rename(played.root / "data")
-
-
 def test_a_plan_is_shown_from_its_prompt_to_its_verdicts(workspace: Workspace) -> None:
     with Running(OpenAIChat()) as running:
         workspace.write_models(running.url, "alpha")
