@@ -232,6 +232,7 @@ def serve(orders: socket.socket) -> None:
     from phyblock.config.suite import suite_model
     from phyblock.models.litellm_client import _litellm
     from phyblock.records.files import known_records
+    from phyblock.results.text import latex_template
 
     for package in (phyblock.cli, phyblock.making.cli):
         for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
@@ -241,6 +242,7 @@ def serve(orders: socket.socket) -> None:
     _litellm()
     suite_model()
     known_records()
+    latex_template("table.tex.j2")
     gc.collect()
     gc.freeze()
     while True:

@@ -10,7 +10,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from operator import truediv
@@ -32,7 +31,7 @@ from phyblock.making.questions.text_probe import text_features
 from phyblock.scoring.pose import Piece, PoseFit, overlap_volume, placed
 from phyblock.sim.geometry import collision_pieces
 from phyblock.stable import plain_sum
-from phyblock.text import counted, csv_cell, one_line
+from phyblock.text import csv_cell, one_line
 from phyblock.tracks.pose_planning import FITS
 from phyblock.workers import WorkerDiedError, WorkerPool
 
@@ -67,15 +66,6 @@ def test_one_line_is_one_line_that_can_be_written(text: str) -> None:
     assert len(shown) == len(text)
     assert shown.isprintable()
     shown.encode()
-
-
-@pytest.mark.parametrize(
-    ("number", "said"),
-    [(0, "0 replies"), (1, "1 reply"), (2, "2 replies"), (1500, "1,500 replies")],
-)
-def test_one_thing_is_no_plural(number: int, said: str) -> None:
-    assert counted(number, "reply", "replies") == said
-    assert counted(number, "scene") == said.replace("replies", "scenes").replace("reply", "scene")
 
 
 @given(st.text())
@@ -165,16 +155,6 @@ def test_a_process_that_is_killed_fails_its_own_job_alone() -> None:
         done = [job.exception() or job.result() for job in jobs]
     assert isinstance(done.pop(3), WorkerDiedError)
     assert done == [0, 1, 2, 4, 5, 6, 7]
-
-
-def test_processes_that_are_killed_answer_nothing() -> None:
-    pool = WorkerPool(2)
-    job = pool.submit(time.sleep, 600)
-    assert pool.submit(abs, -1).result() == 1
-    pool.kill()
-    with pytest.raises(WorkerDiedError):
-        job.result()
-    pool.shutdown()
 
 
 UNGUARDED = """

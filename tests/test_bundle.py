@@ -6,11 +6,8 @@ import io
 import json
 import re
 import shutil
-import signal
 import stat
 import struct
-import subprocess
-import sys
 import warnings
 import zipfile
 from collections.abc import Callable, Mapping
@@ -132,23 +129,6 @@ def test_a_bundle_verifies_elsewhere_and_holds_nothing_of_this_machine(
         assert f"needs the {lacking}, which a bundle does not hold" in done.err
 
 
-def test_data_are_told_by_what_they_hold_whatever_their_names(
-    made: Workspace, tmp_path: Path
-) -> None:
-    """Scenes and questions in one folder are found, and so are questions beside others of their
-    name.
-    """
-    both, other = tmp_path / "both", tmp_path / "questions"
-    shutil.copytree(made.root / "data", both)
-    shutil.copytree(made.root / "questions", both, dirs_exist_ok=True)
-    write_questions(other, questions(per_subtask=3, subtasks=SUBTASKS))
-    bundle = made.out / "bundle.zip"
-    for data in ([both], [other, *folders(made)]):
-        with opened_bundle(bundle, data) as found:
-            assert found.records == 20
-    refused(bundle, [other, made.root / "data"], DataError, "needs the questions questions")
-
-
 def test_a_run_without_its_data_is_bundled_to_the_same_bytes(
     made: Workspace, tmp_path: Path
 ) -> None:
@@ -169,22 +149,6 @@ def test_samples_that_were_left_out_are_counted(made: Workspace, tmp_path: Path)
     done = made.phyblock("verify", "less.zip", "--data", "data", "--data", "questions")
     assert done.code == 0, done.err
     assert "19 of 20 expected samples: the run is not whole" in done.out
-
-
-def test_a_bundle_that_is_killed_leaves_nothing_behind(made: Workspace, tmp_path: Path) -> None:
-    """Killed once all is packed, before it is put in its place."""
-    code = (
-        "import os, signal, sys, phyblock.bundle as bundle\n"
-        "from pathlib import Path\n"
-        "bundle.write_named = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
-        "bundle.bundle_run(Path(sys.argv[1]), Path(sys.argv[2]))\n"
-    )
-    for name in ("scratch", "out"):
-        (tmp_path / name).mkdir()
-    env = made.env | {"TMPDIR": str(tmp_path / "scratch")}
-    command = [sys.executable, "-c", code, str(made.out), str(tmp_path / "out" / "b.zip")]
-    assert subprocess.run(command, env=env, check=False).returncode == -signal.SIGKILL
-    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
 def of_track(records: list[Raw], track: str, model: str = "random") -> Raw:

@@ -6,11 +6,7 @@ import contextlib
 import io
 import json
 import os
-import resource
-import signal
 import struct
-import subprocess
-import sys
 import zlib
 from pathlib import Path
 
@@ -53,30 +49,6 @@ def test_what_cannot_be_replaced_stays_and_nothing_is_left_beside_it(tmp_path: P
     with pytest.raises(OSError, match="folder"):
         atomic_write(tmp_path / "folder", b"data")
     assert list(tmp_path.iterdir()) == [tmp_path / "folder"]
-
-
-def test_a_full_disk_leaves_the_file_of_before(tmp_path: Path) -> None:
-    path = tmp_path / "file"
-    path.write_text("before")
-    code = (
-        "import sys; from pathlib import Path; from phyblock.files import atomic_write\n"
-        "try: atomic_write(Path(sys.argv[1]), bytes(100_000))\n"
-        "except OSError: sys.exit(7)"
-    )
-
-    def almost_full() -> None:
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
-
-    done = subprocess.run(
-        [sys.executable, "-B", "-c", code, str(path)],
-        preexec_fn=almost_full,
-        cwd=Path(__file__).parents[1],
-        env=os.environ,
-    )
-    assert done.returncode == 7
-    assert path.read_text() == "before"
-    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_what_the_disk_refuses_is_one_of_our_errors(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import json
 import math
@@ -236,12 +237,18 @@ def escape(text: str) -> str:
 
 def latex(template: str, **facts: Any) -> str:
     """Return a float of a template of this package that compiles by `\\input`; `tex` escapes."""
+    return latex_template(template).render(facts)
+
+
+@functools.cache
+def latex_template(name: str) -> jinja2.Template:
+    """Return a template of this package for LaTeX."""
     marks = {"block_start_string": "<%", "block_end_string": "%>"}
     marks |= {"variable_start_string": "<<", "variable_end_string": ">>"}
     environment = jinja2.Environment(**marks, trim_blocks=True, keep_trailing_newline=True)  # type: ignore[arg-type]
     environment.filters["tex"] = escape
-    text = Path(__file__).with_name(template).read_text(encoding="utf-8")
-    return environment.from_string(text).render(facts)
+    text = Path(__file__).with_name(name).read_text(encoding="utf-8")
+    return environment.from_string(text)
 
 
 def to_latex(table: TextTable, label: str) -> str:

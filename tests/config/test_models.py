@@ -25,9 +25,6 @@ from phyblock.models.keys import server_address
 from phyblock.registry import baseline_names
 from tests.config.tables import table, told
 from tests.fuzz.strategies import MODELS_FILES
-from tests.servers.chassis import Running
-from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import Workspace
 
 BAD = table("bad_models.yaml")
 
@@ -67,13 +64,6 @@ m:
     assert models["m"].api_base is None
     assert models["m"].price == Tariff(input=0, output=1.5)
     assert load(tmp_path, "# none yet\n") == {}
-
-
-def test_an_address_may_be_named_by_the_environment(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("HOSTED_VLLM_API_BASE", "http://localhost:8000/v1")
-    assert load(tmp_path, "m: hosted_vllm/x\n")["m"].addresses == ()
 
 
 def test_a_parameter_left_out_is_the_suites_and_null_is_not_sent(tmp_path: Path) -> None:
@@ -255,37 +245,3 @@ def test_a_host_is_shown_without_what_stands_around_it() -> None:
     assert host_of(f"https://me:{SECRET}@host:8443/v1?key={SECRET}#x") == "host:8443"
     assert host_of("http://[::1]:80/v1") == "[::1]:80"
     assert host_of("http://[::1/v1") == host_of("/v1") == "an unreadable address"
-
-
-@pytest.mark.parametrize("url", [SECRETIVE[0], "http://[::1/v1"])
-def test_a_bad_address_in_the_environment_ends_before_anything_is_written(
-    workspace: Workspace, url: str
-) -> None:
-    workspace.write_yaml("models.yaml", {"m": "hosted_vllm/m"})
-    workspace.write_suite(models=["m"])
-    before = workspace.files()
-    variable = {"HOSTED_VLLM_API_BASE": url}
-    for done in (
-        workspace.run(env=variable),
-        workspace.phyblock("validate", "suite.yaml", env=variable),
-    ):
-        assert done.code == 2
-        assert "variable HOSTED_VLLM_API_BASE" in done.err
-        assert SECRET not in done.out + done.err
-    assert workspace.files() == before
-
-
-def test_a_key_that_no_header_can_carry_is_named_before_anything_is_sent(
-    workspace: Workspace,
-) -> None:
-    with Running(OpenAIChat()) as running:
-        workspace.write_models(running.url, "m", api_key_env="MY_KEY")
-        workspace.write_suite(models=["m"], seeds=[0])
-        done = workspace.run(env={"MY_KEY": f"{SECRET}\nand-more"})
-        assert done.code == 2
-        assert "MY_KEY holds a line break" in done.err
-        assert SECRET not in done.err
-        assert running.server.requests == 0
-        done = workspace.run("--yes", env={"MY_KEY": f" {SECRET}\r\n"})
-    assert (done.code, done.err) == (0, "")
-    assert {seen.key for seen in running.server.seen} == {SECRET}

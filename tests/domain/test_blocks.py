@@ -28,7 +28,7 @@ from phyblock.domain.blocks import (
     orientation_class,
     quat_xyzw_to_matrix,
 )
-from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
+from phyblock.domain.scene import Block, Candidate, CandidateSet, Scene
 
 ANGLES = st.floats(-720, 720)
 EULERS = st.tuples(ANGLES, ANGLES, ANGLES)
@@ -90,14 +90,6 @@ def test_euler_angles_are_extrinsic_x_y_z(euler_deg: Euler) -> None:
     same_sign = np.sign(quat_xyzw @ expected.as_quat())
     np.testing.assert_allclose(same_sign * quat_xyzw, expected.as_quat(), atol=1e-9)
     np.testing.assert_allclose(quat_xyzw_to_matrix(quat_xyzw), expected.as_matrix(), atol=1e-9)
-
-
-def test_one_euler_angle_turns_about_its_own_axis() -> None:
-    for axis, euler_deg in enumerate([(90.0, 0.0, 0.0), (0.0, 90.0, 0.0), (0.0, 0.0, 90.0)]):
-        matrix = quat_xyzw_to_matrix(euler_deg_to_quat_xyzw(euler_deg))
-        unit = np.eye(3)
-        np.testing.assert_allclose(matrix @ unit[axis], unit[axis], atol=1e-12)
-        np.testing.assert_allclose(matrix @ unit[(axis + 1) % 3], unit[(axis + 2) % 3], atol=1e-12)
 
 
 @given(block_type=TYPES, one=GRID_EULERS, other=GRID_EULERS)
@@ -212,37 +204,8 @@ CANDIDATES = CandidateSet(
 )
 
 
-def test_the_graph_follows_orders_not_file_positions() -> None:
-    assert SCENE.graph.depends_on == (frozenset({1}), frozenset())
-    assert SCENE.graph.layers == (2, 1)
-
-
-def test_the_level_of_a_scene_is_the_highest_it_counts_in() -> None:
-    assert SCENE.level == 2
-    assert len(SCENE) == 2
-
-
-def test_candidates_are_numbered_from_1() -> None:
-    assert CANDIDATES[1] is CANDIDATES.candidates[0]
-    assert CANDIDATES[3] is CANDIDATES.candidates[2]
-    for index in (0, 4, -1):
-        with pytest.raises(IndexError, match=rf"candidate {index} is outside 1\.\.3"):
-            CANDIDATES[index]
-
-
 def test_a_candidate_is_found_by_its_look_up_to_symmetry() -> None:
     assert [CANDIDATES.index_of(block.look) for block in SCENE.blocks] == [3, 2]
     assert CANDIDATES.missing(SCENE) == ()
     assert CandidateSet(CANDIDATES.candidates[:2]).missing(SCENE) == (3,)
     assert CANDIDATES.index_of(Candidate("cube", "blue", (0, 0, 0)).look) is None
-
-
-def test_kind_is_setting_b_and_look_is_setting_a() -> None:
-    first, _, third = CANDIDATES.candidates
-    assert first.kind == third.kind == TOP.kind
-    assert first.look != third.look == TOP.look
-
-
-def test_a_plan_is_as_long_as_its_steps() -> None:
-    assert len(Plan()) == 0
-    assert len(Plan((1, 1, 2))) == 3

@@ -32,7 +32,6 @@ from tests.fuzz.laws import (
     kept_in,
     lost,
     run_watched,
-    take_tree,
 )
 from tests.fuzz.strategies import FAULTS, SEED, fuzzed
 from tests.models.batching import Disk, Killing, command, run_command
@@ -178,12 +177,6 @@ def test_faults_that_stop_a_model(
         assert run(workspace).code == 0
     holds([*asked_twice(server.ledger.entries), *lost(server.ledger, kept_in(workspace.out))])
     tallies.setdefault(f"faults that stop, {transport}", Counter()).update(server.ledger.faults)
-
-
-def test_nothing_of_the_workspace_is_left_out(workspace: Workspace) -> None:
-    """The look at a folder sees every file, also hidden ones."""
-    Path(workspace.root / ".hidden").write_text("x", encoding="utf-8")
-    assert {".hidden", "data/scenes.jsonl"} <= take_tree(workspace.root).keys()
 
 
 ASKED = 4

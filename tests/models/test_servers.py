@@ -281,28 +281,6 @@ def test_servers_that_die_in_the_middle_lose_nothing(route: str) -> None:
     assert len(gone) == 3
 
 
-def test_a_server_that_restarts_loses_nothing_over_a_real_wire() -> None:
-    server = OpenAIChat(Faults(latency_s=0.01))
-    policy = RetryPolicy(base_s=0.002, max_wait_s=0.01)
-
-    async def main() -> list[object]:
-        runner, port = await start(server, 0)
-        model = make_model(at(f"http://127.0.0.1:{port}", max_concurrency=8), policy=policy)
-        asking = asyncio.create_task(answers_of(model, *names(60)))
-        while server.ended["ok"] < 20:
-            await asyncio.sleep(0.005)
-        await runner.cleanup()
-        # Each sample would use up its eight attempts in this time.
-        await asyncio.sleep(0.2)
-        runner, _ = await start(server, port)
-        answers = await asking
-        await model.aclose()
-        await runner.cleanup()
-        return answers
-
-    assert [type(answer) for answer in run(main)] == [Reply] * 60
-
-
 def test_a_server_that_refuses_everything_is_left_out_and_the_last_one_stops_the_model() -> None:
     told: list[str] = []
     wrong, right = OpenAIChat(Faults(mode="404")), OpenAIChat()

@@ -3,7 +3,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from pathlib import Path
 from random import Random
 
 import pandas as pd
@@ -11,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.errors import StoreError
 from phyblock.results.load import load_run
 from phyblock.sim.engine import ENGINES
 from tests.web.factory import (
@@ -20,39 +18,8 @@ from tests.web.factory import (
     record,
     record_lists,
     run_of,
-    score,
     write_run,
 )
-
-
-def test_records_have_one_row_a_sample_and_scores_one_a_score(tmp_path: Path) -> None:
-    records = [
-        record("beta", "000", 0, [score(2, 1, 2), score(3, 0, 1, criterion="selection")]),
-        record("alpha", "001", 0, [score(4, 0, 0)], prompt_tokens=7, cost_usd=0.25),
-        record("alpha", "002", 0, outcome="api_error"),
-    ]
-    run = load_run(write_run(tmp_path / "run", records, manifest()))
-    assert run.records["sample"].tolist() == [
-        "full_planning/alpha/001/s0",
-        "full_planning/alpha/002/s0",
-        "full_planning/beta/000/s0",
-    ]
-    first = run.records.iloc[0]
-    assert first["levels"] == (2,)
-    assert first["prompt_tokens"] == 7
-    assert first["cost_usd"] == 0.25
-    failed = run.records.iloc[1]
-    assert (failed["error_kind"], failed["error_status"]) == ("retryable", 429)
-    assert pd.isna(failed["attempts"])
-    steps = run.counts["full_planning", "steps"]
-    ways = [steps.ways[n] for n in steps.way]
-    assert list(zip(steps.row, ways, steps.numbers[:, 0], strict=True)) == [
-        (0, ("A", "optimal", "aov"), 4),
-        (2, ("A", "optimal", "aov"), 2),
-        (2, ("A", "", "selection"), 3),
-    ]
-    assert run.path == tmp_path / "run"
-    assert run.manifest.scenes == 5
 
 
 @laws
@@ -87,34 +54,6 @@ def test_a_cut_last_line_is_passed_over_and_counted(
     run = load_run(folder)
     assert run.records["model"].tolist() == ["alpha"]
     assert run.is_cut
-
-
-@pytest.mark.parametrize(
-    ("line", "at", "field"),
-    [
-        ('{"sample": "x', ":14", ""),
-        ("\0\0\0", "", ""),
-        (json.dumps(record()) + "\r", "", ""),
-        ("[1, 2]", "", ""),
-        ("{}", "", "track"),
-        (json.dumps(record() | {"seed": "first"}), "", "seed"),
-        (json.dumps(record() | {"scores": [{"criterion": "aov"}]}), "", "scores[0].setting"),
-        (json.dumps(record() | {"scores": [7]}), "", "scores[0]"),
-        (json.dumps(record() | {"reply": "text"}), "", "reply"),
-        (json.dumps(record() | {"levels": 2}), "", "levels"),
-    ],
-)
-def test_a_corrupt_line_is_named(tmp_path: Path, line: str, at: str, field: str) -> None:
-    folder = write_run(tmp_path / "run", [], manifest())
-    good = json.dumps(record())
-    (folder / "records.jsonl").write_text(f"{good}\n{line}\n{good}\n", encoding="utf-8")
-    with pytest.raises(StoreError) as caught:
-        load_run(folder)
-    problem = caught.value.problems[0]
-    assert problem.where == f"{folder / 'records.jsonl'}:2{at}"
-    assert problem.message.startswith("is not a record")
-    assert problem.field == field
-    assert problem.hint
 
 
 def test_reading_runs_needs_no_simulator_and_no_network() -> None:

@@ -40,20 +40,6 @@ def test_each_published_model_has_15_cells() -> None:
     assert beside.notes[0] == "Largest absolute difference of 6 cells: 25.200."
 
 
-def test_setting_a_is_compared_whatever_the_headline() -> None:
-    scores = [score(1, 1, 3, matcher="paper"), score(4, 0, 0, matcher="paper", setting="B")]
-    records = [record("mine", "001", scores=scores)]
-    for settings, wanted in ((["B", "A"], 50), (["A", "B"], 50), (["B"], None)):
-        facts = manifest(models=[("mine", "GPT-4o")], seeds=[0], settings=settings)
-        table = published_frame(run_of(records, facts), 1).set_index(["cell", "metric"])
-        assert len(table) == 15
-        if wanted is None:
-            assert table["ours"].isna().all()
-            assert (table["n"] == 0).all()
-        else:
-            assert table.loc[("2", "precision"), "ours"] == wanted
-
-
 @pytest.mark.parametrize(
     ("levels", "has_overall"),
     [([1, 2], False), ([3], False), ([1, 3, 4], False), ([2, 3, 4], True), ([1, 2, 3, 4], True)],

@@ -102,43 +102,6 @@ def _two_arches(carrier: int) -> Case:
     return Case(Scene("s", (3,), blocks, ("s",)), candidates, Plan((1, 2, 1)))
 
 
-def test_the_greedy_choice_can_score_less_in_b_than_in_a() -> None:
-    ground, flat, turned = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 90.0)
-    blocks = (
-        Block(1, "arch", "red", ground, turned, (), 1),
-        Block(2, "arch", "red", ground, flat, (), 1),
-        Block(3, "cuboid3", "blue", ground, flat, (2,), 2),
-    )
-    candidates = _two_arches(carrier=2).candidates
-    case = Case(Scene("s", (3,), blocks, ("s",)), candidates, Plan((1, 2)))
-    assert [counted(case, setting, "paper").tp for setting in SETTINGS] == [2, 1]
-    assert [counted(case, setting, "optimal").tp for setting in SETTINGS] == [2, 2]
-
-
-def test_the_greedy_choice_can_lose_blocks_by_one_more_right_step() -> None:
-    ground, flat, turned = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 90.0)
-    blocks = (
-        Block(1, "arch", "red", ground, flat, (2,), 2),
-        Block(2, "cube", "red", ground, flat, (), 1),
-        Block(3, "arch", "red", ground, flat, (), 1),
-        Block(4, "cuboid3", "blue", ground, flat, (3,), 2),
-        Block(5, "cuboid3", "blue", ground, turned, (3,), 2),
-    )
-    candidates = CandidateSet(
-        (
-            Candidate("cube", "red", flat),
-            Candidate("arch", "red", flat),
-            Candidate("cuboid3", "blue", flat),
-            Candidate("cuboid3", "blue", turned),
-        )
-    )
-    scene = Scene("s", (3,), blocks, ("s",))
-    short = Case(scene, candidates, Plan((2, 3, 4)))
-    long = Case(scene, candidates, Plan((1, 2, 3, 4)))
-    assert [counted(case, "A", "paper").tp for case in (short, long)] == [3, 2]
-    assert [counted(case, "A", "optimal").tp for case in (short, long)] == [3, 4]
-
-
 COUNTS = st.builds(Counts, *[st.integers(0, 1000)] * 3)
 
 

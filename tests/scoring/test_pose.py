@@ -288,15 +288,3 @@ def _inside(points: np.ndarray, solid: tuple[Piece, ...]) -> np.ndarray:
         heights, spans = points @ piece.normals.T, piece.corners @ piece.normals.T
         found |= ((heights >= spans.min(axis=0)) & (heights <= spans.max(axis=0))).all(axis=1)
     return found
-
-
-def test_two_cubes_half_a_cube_apart_share_a_third() -> None:
-    block = Block(1, "cube", "red", (0.0, 0.0, 0.025), (0.0, 0.0, 0.0), (), 1)
-    candidates = CandidateSet((Candidate("cube", "red", (0.0, 0.0, 0.0)),))
-    scene = Scene("s", (2,), (block,), ("s",))
-    scorer = PoseScorer(scene, candidates, pieces)
-    absolute, aligned = scorer.score([Laid(1, (0.025, 0.0, 0.025), (0.0, 0.0, 0.0))])
-    assert absolute.fits[0] is not None
-    assert absolute.fits[0].iou == pytest.approx(1 / 3, abs=1e-4)
-    assert (absolute.right, aligned.right) == ((0, 0, 0, 1), (1, 1, 1, 1))
-    assert aligned.motion.shift_cm == pytest.approx((-2.5, 0.0))

@@ -202,21 +202,6 @@ def test_layers_wait_for_the_whole_layer_below() -> None:
     }
 
 
-def test_what_counts_as_placed_rightly() -> None:
-    """Setting A counts a turned block as wrong, where setting B let it be placed."""
-    scene = Scene("s", (2,), (cube(1, "red"), cube(2, "red", (1,), 90.0)), ("s",))
-    candidates = CandidateSet((Candidate("arch", "red", (0, 0, 0)),))
-    assembly = Assembly(scene, candidates, "B")
-    assert [assembly.move(1).outcome for _ in range(3)] == ["placed", "placed", "overflow"]
-    in_a, in_b = (placed_counts(scene, candidates, s, assembly.chosen) for s in SETTINGS)
-    assert (in_a.tp, in_a.fp, in_a.fn) == (1, 1, 1)
-    assert (in_b.tp, in_b.fp, in_b.fn) == (2, 0, 0)
-    tried = attempted_counts(in_a, 3)
-    assert (tried.tp, tried.fp, tried.fn) == (1, 2, 1)
-    fallen = placed_counts(scene, candidates, "B", assembly.chosen, (1,))
-    assert (fallen.tp, fallen.fp, fallen.fn) == (1, 1, 1)
-
-
 @settings(deadline=None)
 @given(cases(max_steps=14), any_setting)
 def test_every_placed_block_is_right_under_the_setting_that_let_it(

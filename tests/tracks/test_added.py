@@ -15,18 +15,16 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from phyblock import registry
 from phyblock.cli.main import phyblock
 from phyblock.data.base import AssemblyTask
-from phyblock.errors import SpecError, StoreError
+from phyblock.errors import SpecError
 from phyblock.records.record import Record
 from phyblock.results.compare import comparable, compare_models
-from phyblock.results.estimates import main_column, track_estimates
-from phyblock.results.export import export_run
-from phyblock.results.load import Run, load_run, track_measures
+from phyblock.results.estimates import main_column
+from phyblock.results.load import Run, load_run
 from phyblock.results.tables import write_tables
 from phyblock.run.rescore import rescore
 from phyblock.scoring.plan import mean_of, ratio_of
@@ -34,8 +32,6 @@ from phyblock.tracks.base import Judgement, SceneTrack, kind_of
 from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts, TrackReport
 from phyblock.web.board import SiteRun, Sources, all_values, board_of, entries_of, values_of
-from tests.vqa_set import write_questions
-from tests.web.factory import manifest, record, write_run
 from tests.workspace import Workspace
 
 
@@ -126,40 +122,6 @@ def first_is_placed(_: Any, record: Any) -> tuple[float, float]:
     return record.outcomes[:1] == ("placed",), 1
 
 
-def is_right(_: Any, record: Any) -> tuple[float, float]:
-    return record.answer.correct, 1
-
-
-@pytest.mark.parametrize(
-    ("track", "more", "counts"),
-    [
-        ("step_planning", {"steps": {"physics": "off"}, "levels": [3]}, first_is_placed),
-        ("vqa", {"vqa": {"path": "./questions", "subtasks": ["SH"], "circular": True}}, is_right),
-    ],
-)
-def test_scoring_again_counts_in_every_track(
-    here: Workspace, request: pytest.FixtureRequest, track: str, more: Any, counts: Any
-) -> None:
-    write_questions(here.root / "questions")
-    here.write_suite(tracks=[track], models=["oracle", "random"], **more)
-    folders = [here.root / name for name in ("out", "same", "new", "scored")]
-    old, same, new, scored = folders
-    assert not command("run", "suite.yaml", "--out", old, "--no-report")
-    shutil.copytree(old, same)
-    rescore(same)
-    counted = SampleCounts("sampled", ("part", "whole"), sample=counts)
-    registry.add_measure(track, Measure("part", "Part", counted, ratio_of, "a part"))
-    request.addfinalizer(lambda: registry.remove_measure(track, "part"))
-    assert not command("run", "suite.yaml", "--out", new, "--no-report")
-    shutil.copytree(old, scored)
-    rescore(scored)
-    before, unchanged, fresh, again = map(here.records, folders)
-    assert unchanged == before
-    counts_now = {line["sample"]: line["counts"] for line in fresh}
-    assert again == [{**line, "counts": counts_now[line["sample"]]} for line in before]
-    assert len({tuple(now["sampled"]) for now in counts_now.values()}) == 2
-
-
 def test_an_episode_that_would_have_asked_otherwise_is_no_longer_final(
     here: Workspace, request: pytest.FixtureRequest
 ) -> None:
@@ -203,34 +165,12 @@ def test_a_name_that_is_taken_is_refused(more: dict[str, Any]) -> None:
     assert kind not in registry.known_tracks().values()
 
 
-@pytest.mark.usefixtures("half")
-@pytest.mark.parametrize(
-    "other", [HALF, replace(HALF, name="other", counted=replace(SAMPLED, columns=("a", "b")))]
-)
-def test_two_measures_or_counts_of_one_name_are_refused(
-    other: Measure, request: pytest.FixtureRequest
-) -> None:
-    registry.add_measure("full_planning", other)
-    request.addfinalizer(lambda: registry.add_measure("full_planning", HALF))
-    request.addfinalizer(lambda: registry.remove_measure("full_planning", other.name))
-    with pytest.raises(ValueError, match="are called"):
-        track_measures("full_planning")
-
-
 @pytest.mark.parametrize("track", sorted(registry.known_tracks()))
 def test_a_track_counts_all_that_its_own_measures_need(track: str) -> None:
     """A measure in the report whose counts the kind does not name would never be counted."""
     kind = kind_of(track)
     needed = {one.counted for one in kind.report().measures if one.counted.sample is not None}
     assert needed == {one for one in kind.counted if one.sample is not None}
-
-
-@pytest.mark.usefixtures("half")
-def test_counts_of_another_measure_name_the_file(tmp_path: Path) -> None:
-    folder = write_run(tmp_path / "run", [record() | {"counts": {"sampled": [1]}}], manifest())
-    assert json.loads((folder / "records.jsonl").read_text())["counts"] == {"sampled": [1]}
-    with pytest.raises(StoreError, match=r"records.jsonl: counts.sampled: was counted in another"):
-        track_estimates(load_run(folder), "full_planning")
 
 
 def count_blocks(item: AssemblyTask, record: Record) -> tuple[float, float, float]:
@@ -286,25 +226,6 @@ def run(here: Workspace) -> Iterator[Run]:
     registry.unregister_track(Counting.name)
 
 
-def test_a_run_of_an_added_track_that_was_cut_goes_on(run: Run) -> None:
-    records = run.path / "records.jsonl"
-
-    def samples() -> list[str]:
-        return sorted(json.loads(line)["sample"] for line in records.read_text().splitlines())
-
-    whole, text = samples(), records.read_text()
-    records.write_text(text[: len(text) // 2])
-    assert not command("run", "suite.yaml", "--out", "out", "--no-report")
-    assert samples() == whole
-
-
-def test_samples_of_an_added_track_are_exported(run: Run) -> None:
-    (path,) = export_run(run, "csv")
-    rows = pd.read_csv(path)
-    assert len(rows) == 10
-    assert rows["count_blocks_exact"][rows["model"] == "oracle"].eq(1).all()
-
-
 def show(kind: type[Counting]) -> None:
     registry.unregister_track(Counting.name)
     registry.register_track(kind)
@@ -320,36 +241,6 @@ def test_the_leading_measure_leads_everywhere(run: Run) -> None:
         assert track["main"] == main_column(run, "counting").heading
         worth = values_of(run, "counting").samples["oracle"].values()
         assert set(worth) == {leading.best}
-
-
-@pytest.mark.parametrize(
-    ("better", "most", "best"),
-    [
-        *(("higher", 8, 8), ("higher", math.inf, math.nan), ("higher", None, math.nan)),
-        *(("lower", 8, 0), ("lower", math.inf, 0), ("lower", None, math.nan)),
-    ],
-)
-def test_a_sample_is_solved_where_it_has_the_best_value_that_there_is(
-    run: Run, better: Any, most: float | None, best: float
-) -> None:
-    """The oracle has it everywhere, guesses nowhere: they are off by one block or more."""
-    far = {"higher": lambda sums: 8 - ERROR.value(sums), "lower": ERROR.value}
-    measure = replace(ERROR, value=far[better], better=better, most=most)
-    show(led_by(measure, measure))
-    assert measure.best == pytest.approx(best, nan_ok=True)
-    has_best = not math.isnan(best)
-    flipped = compare_models(run).flipped
-    assert set(flipped["right"]) == ({"oracle"} if has_best else set())
-    sites = [SiteRun("run", run, Sources())]
-    board = board_of(sites, entries_of(sites), all_values(sites))
-    assert json.loads(json.dumps(board, allow_nan=False))["tracks"][0]["best"] == (
-        best if has_best else None
-    )
-    solved = {row["name"]: row["facts"]["counting"]["solved"] for row in board["rows"]}
-    asked = run.design.samples("counting")
-    assert solved == (
-        {"oracle": asked, "random": 0} if has_best else {"oracle": None, "random": None}
-    )
 
 
 @pytest.mark.usefixtures("run")

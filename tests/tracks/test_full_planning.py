@@ -64,19 +64,6 @@ def test_any_reply_is_judged_and_every_goal_block_accounted_for(track: Any, text
     assert all(1 <= step <= len(task.candidates) for step in plan)
 
 
-def test_facts_hold_what_is_shown_alone(track: Any) -> None:
-    for task in track.items:
-        assert track.facts(task, [SimpleNamespace(label="goal")]) == {
-            "pictures": ["goal"],
-            "n_candidates": len(task.candidates),
-            "candidate_scale": "common",
-            "is_blind": False,
-            "answer_format": "text",
-            "answer_schema": None,
-            "answer_example": None,
-        }
-
-
 def test_learned_plans_are_those_of_the_order_shown(tasks: tuple[AssemblyTask, ...]) -> None:
     track = track_of("full_planning", tasks, limit=2, candidates={"order": "shuffled"})
     for seed in (0, 7):
