@@ -19,10 +19,12 @@ import shutil
 import sys
 import tempfile
 from collections import defaultdict
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from tests.conftest import official_root
+from tests.fork_server import end_fork_server
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
@@ -79,11 +81,16 @@ def rows_digests(path: Path) -> dict[str, str]:
     return {model: _digest(sorted(lines)) for model, lines in by_model.items()}
 
 
-def run_numbers(name: str, root: Path, pictures: Path) -> dict[str, dict[str, str]]:
-    """Run a suite of `RUNS` below `root`; digests of its tables by file and model."""
+def run_numbers(
+    name: str, root: Path, pictures: Path, models: Sequence[str] = ()
+) -> dict[str, dict[str, str]]:
+    """Run a suite of `RUNS` below `root`; digests of its tables by file and model. With `models`,
+    these alone are run.
+    """
     official = official_root()
     place = "" if official is None else str(official / "PhyBlock")
     arguments = [text.format(official=place) for text in RUNS[name]]
+    arguments += ["--models", ",".join(models)] if models else []
     made = _workspace(root / name, pictures)
     done = made.phyblock("run", *arguments, "--out", made.out, "--yes", "--no-report", fresh=True)
     if done.code != 0:
@@ -102,7 +109,7 @@ def request_digests(name: str, root: Path, pictures: Path) -> dict[str, Any]:
     with Running(server) as running:
         made.write_models(running.url, "probe")
         arguments = ("--models-file", made.root / "models.yaml", "--out", made.out, "--yes")
-        done = made.phyblock("run", made.root / "suite.yaml", *arguments, "--no-report", fresh=True)
+        done = made.phyblock("run", made.root / "suite.yaml", *arguments, "--no-report")
     if done.code != 0:
         raise SystemExit(f"{name}: exit code {done.code}\n{done.out}{done.err}")
     bodies = sorted(json.dumps(seen.raw, sort_keys=True) for seen in server.seen)
@@ -161,6 +168,7 @@ def main() -> int:
             differences += found
             print(f"{name}: {f'{len(found)} differences' if found else 'equal'}", flush=True)
     finally:
+        end_fork_server()
         if options.keep is None:
             shutil.rmtree(root)
     print(*differences, sep="\n")

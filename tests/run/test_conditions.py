@@ -6,13 +6,10 @@ import hashlib
 import json
 from typing import Any
 
-import numpy as np
-import pytest
 import yaml
 
 from phyblock.data.base import AssemblyTask
 from phyblock.data.scenes import read_builtin
-from phyblock.scoring.plan import f1_of
 from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png
 from phyblock.tracks.items import presented, shown_order
 from tests.servers.chassis import Running, Seen
@@ -82,18 +79,10 @@ def test_a_model_that_looks_is_right_in_every_order(workspace: Workspace) -> Non
     )
     with Running(Sighted(answers)) as running:
         workspace.write_models(running.url, "alpha", "beta", transport="direct")
-        done = workspace.run(page=True)
+        done = workspace.run()
         assert (done.code, done.err) == (0, "")
-        whole = workspace.records()
-        path = workspace.out / "records.jsonl"
-        path.write_text("".join(path.read_text().splitlines(keepends=True)[:7]))
-        assert workspace.run().code == 0
         assert running.server.requests == 20
-    check_records(whole, tasks)
-    known = ("sample", "shown", "parse", "scores", "counts")
-    assert sorted([[line[k] for k in known] for line in whole], key=str) == sorted(
-        [[line[k] for k in known] for line in workspace.records()], key=str
-    )
+    check_records(workspace.records(), tasks)
     assert "[candidates shuffled]" in done.out
     assert set(overall_f1(workspace).values()) == {1.0}
     check_scored_again(workspace)
@@ -114,14 +103,12 @@ def check_records(records: list[Raw], tasks: dict[str, AssemblyTask]) -> None:
 
 
 def check_scored_again(workspace: Workspace) -> None:
-    """Stored replies are read in the numbers that were shown, by `score` and on the page."""
-    scored = workspace.scored()
-    assert [r["scores"] for r in workspace.records(scored)] == [
-        r["scores"] for r in workspace.records()
-    ]
-    sent = {i["sha256"][:24] for r in workspace.records() for i in r["prompt"]["images"]}
-    beside = {path.stem for path in (workspace.out / "report" / "pictures").glob("*.png")}
-    assert beside == sent
+    """Stored replies are read as they were asked for: in the numbers that were shown."""
+    first, again = (
+        [record["scores"] for record in workspace.records(folder)]
+        for folder in (workspace.out, workspace.scored())
+    )
+    assert first == again
 
 
 def test_blind_leaves_out_the_goal_and_leaves_the_candidates(workspace: Workspace) -> None:
@@ -221,7 +208,6 @@ VARY = {
 }
 WAYS, SCENES = 16, 3
 BRIEF = "{% block user %}Build it. End with lines: Step1: Move block with index N{% endblock %}"
-KNOWN = ("sample", "variant", "shown", "parse", "scores", "prompt")
 
 
 class Moody(OpenAIChat):
@@ -247,7 +233,9 @@ def asked(server: OpenAIChat) -> list[str]:
     return [seen.sample for seen in server.seen]
 
 
-def test_every_way_is_asked_once_and_what_is_kept_is_not_asked_again(workspace: Workspace) -> None:
+def test_every_way_is_asked_once_and_the_reference_is_what_a_plain_suite_asks(
+    workspace: Workspace,
+) -> None:
     with Running(Moody()) as running:
         server = running.server
         assert isinstance(server, OpenAIChat)
@@ -255,40 +243,19 @@ def test_every_way_is_asked_once_and_what_is_kept_is_not_asked_again(workspace: 
         dry = workspace.run("--dry-run")
         assert "16 conditions" in dry.out
         assert f"{WAYS * SCENES} calls" in dry.out
-        done = workspace.run(page=True)
+        done = workspace.run()
         assert (done.code, done.err) == (0, "")
         # A repeat is no question that the cache knows.
-        assert len(set(asked(server))) == server.requests == WAYS * SCENES
-        whole, lines = workspace.records(), (workspace.out / "records.jsonl").read_text()
-        check_repeats(whole, server)
-        check_variants_scored_again(workspace)
-        check_tables(workspace, whole)
-
-        # Some records are left, no calls and no cache: what has a record is not asked again.
-        kept = lines.splitlines(keepends=True)[: WAYS * SCENES // 2]
-        (workspace.out / "records.jsonl").write_text("".join(kept) + lines[:40])
-        (workspace.cache / "replies.sqlite").unlink()
-        (workspace.out / "calls.jsonl").unlink()
-        before, left = asked(server), {json.loads(line)["sample"] for line in kept}
-        assert workspace.run("--no-report").code == 0
-        again = asked(server)[len(before) :]
-        lacking = [r for r in whole if r["sample"] not in left and r["model"] == "alpha"]
-        assert len(set(again)) == len(again) == len(lacking)
-        assert sorted([[r.get(k) for k in KNOWN] for r in workspace.records()], key=str) == sorted(
-            [[r.get(k) for k in KNOWN] for r in whole], key=str
-        )
-
-        # The reference is what a suite asks that varies nothing, found in the cache.
-        for path in workspace.cache.glob("replies*"):
-            path.unlink()
-        workspace.out = workspace.root / "anew"
-        assert workspace.run("--no-report", "--models", "alpha").code == 0
+        assert len({seen.sample for seen in server.seen}) == server.requests == WAYS * SCENES
+        check_repeats(workspace.records(), server)
+        check_scored_again(workspace)
+        factors = [r["factor"] for r in workspace.rows("sensitivity") if r["model"] == "alpha"]
+        assert factors == [*VARY, "items"]
         workspace.out = workspace.root / "plain"
         prepare(workspace, running.url, images={"size_px": 128, "background": "checkerboard"})
-        requests = server.requests
         assert workspace.run("--models", "alpha").code == 0
         assert len(workspace.records()) == SCENES
-        assert server.requests == requests
+        assert server.requests == WAYS * SCENES
         assert all("variant" not in record for record in workspace.records())
 
 
@@ -307,39 +274,6 @@ def check_repeats(records: list[Raw], server: OpenAIChat) -> None:
         assert record["sample"] == f"full_planning/alpha/{record['scene']}/s0{end}"
         assert record["prompt"]["template"] == variant.get("prompt", "default")
         assert ("shown" in record) == ("candidate_order" in variant)
-
-
-def check_variants_scored_again(workspace: Workspace) -> None:
-    scored = workspace.scored()
-    first, again = ([r["scores"] for r in workspace.records(f)] for f in (workspace.out, scored))
-    assert first == again
-    asked = [r["prompt"] for r in workspace.records() if r["model"] == "alpha"]
-    sent = {image["sha256"][:24] for prompt in asked for image in prompt["images"]}
-    beside = {path.stem for path in (workspace.out / "report" / "pictures").glob("*.png")}
-    assert beside == sent
-
-
-def check_tables(workspace: Workspace, records: list[Raw]) -> None:
-    """Headlines pool over variants."""
-    (row,) = (r for r in workspace.rows("table1") if r["model"] == "alpha")
-    assert float(row["overall_f1"]) == pytest.approx(100 * pooled(records), abs=0.05)
-    factors = [r["factor"] for r in workspace.rows("sensitivity") if r["model"] == "alpha"]
-    assert factors == ["prompt", "background", "candidate_order", "repeats", "items"]
-    vary = yaml.safe_load((workspace.out / "run.yaml").read_text())["suite"]["vary"]
-    assert {factor: vary[factor] for factor in VARY} == VARY
-
-
-def pooled(records: list[Raw]) -> float:
-    """F1 of the headline over a model's samples."""
-    kept = [
-        score
-        for record in records
-        if record["model"] == "alpha"
-        for score in record["scores"]
-        if (score["criterion"], score["matcher"], score["setting"]) == ("aov", "optimal", "A")
-    ]
-    sums = [sum(score[name] for score in kept) for name in ("tp", "fp", "fn")]
-    return float(f1_of(np.array(sums, dtype=np.float64)))
 
 
 def test_questions_and_episodes_vary_what_they_know(workspace: Workspace) -> None:
