@@ -261,11 +261,15 @@ class Comparable:
     def flips(self, samples: Samples, pair: Sequence[int], names: tuple[str, str]) -> pd.DataFrame:
         """Return the samples that one of two sides alone got wholly right."""
         both, best = samples.has[list(pair)].all(axis=0), self.measure.best
-        counts = samples.counts[list(pair)][:, both]
-        a, b = self.measure.scale * np.nan_to_num(self.measure.value(counts))
-        table = samples.keys[both].assign(a=names[0], b=names[1], value_a=a, value_b=b)
-        table["right"] = np.where(a == best, *names)
-        return table.loc[(a == best) != (b == best), _FLIPPED].sort_values(["right", *_KEYS])
+        a, b = self.measure.scale * np.nan_to_num(
+            self.measure.value(samples.counts[list(pair)][:, both])
+        )
+        alone = (a == best) != (b == best)
+        a, b, keys = a[alone], b[alone], samples.keys.iloc[np.flatnonzero(both)[alone]]
+        table = keys.assign(a=names[0], b=names[1], value_a=a, value_b=b)
+        return table.assign(right=np.where(a == best, *names))[_FLIPPED].sort_values(
+            ["right", *_KEYS]
+        )
 
 
 def comparable(run: Run, track: str, measure: str = "") -> Comparable:
