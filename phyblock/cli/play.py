@@ -92,7 +92,7 @@ def play(
             print_again(console)
             return INTERRUPTED
         made = show_tables(folder, page=True)
-        server.show_files(report_files(folder))
+        server.files = report_files(folder)
         session.finish(Ending(folder, person.model, beside, plan.dataset.tasks))
         print_path(console, made)
         console.print("All is answered; the page shows how it went. Ctrl-C ends.", style="dim")

@@ -261,15 +261,14 @@ class Comparable:
     def flips(self, samples: Samples, pair: Sequence[int], names: tuple[str, str]) -> pd.DataFrame:
         """Return the samples that one of two sides alone got wholly right."""
         both, best = samples.has[list(pair)].all(axis=0), self.measure.best
-        a, b = self.measure.scale * np.nan_to_num(
-            self.measure.value(samples.counts[list(pair)][:, both])
-        )
+        counts = samples.counts[list(pair)][:, both]
+        a, b = self.measure.scale * np.nan_to_num(self.measure.value(counts))
         alone = (a == best) != (b == best)
-        a, b, keys = a[alone], b[alone], samples.keys.iloc[np.flatnonzero(both)[alone]]
+        a, b, keys = a[alone], b[alone], samples.keys[both][alone]
         table = keys.assign(a=names[0], b=names[1], value_a=a, value_b=b)
-        return table.assign(right=np.where(a == best, *names))[_FLIPPED].sort_values(
-            ["right", *_KEYS]
-        )
+        table["right"] = np.where(a == best, *names)
+        found: pd.DataFrame = table[_FLIPPED].sort_values(["right", *_KEYS])
+        return found
 
 
 def comparable(run: Run, track: str, measure: str = "") -> Comparable:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,6 @@ from phyblock.records.files import ManifestModel, read_stopped
 from phyblock.records.record import Record
 from phyblock.results.compare import Side, comparable, rank_ranges_of
 from phyblock.results.estimates import (
-    Floor,
     Value,
     headline_columns,
     headline_of,
@@ -36,7 +35,6 @@ from phyblock.results.text import number as rounded
 from phyblock.run.rescore import recorded_dataset
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of
-from phyblock.tracks.measures import Better
 from phyblock.types import WITHOUT_REPLY
 
 _LABELS = ("published", "size_b", "served_at")
@@ -75,6 +73,31 @@ def open_sources(run: Run, data: Path | None) -> Sources:
         return Sources(lacking=f"Nothing can be drawn without the data set ({said}); {how}.")
 
 
+@dataclass
+class Entry:
+    """A row: `runs` has the number of the run that asked each of its tracks. `name` is unique."""
+
+    model: ManifestModel
+    runs: dict[str, int] = field(default_factory=dict)
+    name: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class TrackValues:
+    """A track of a run: `values` by setting, model and heading; `samples` what each sample is worth
+    by the main measure, in its unit, by model and its scene, item, seed and variant, without those
+    that have no value; `facts` by model.
+
+    Settings are those of the run, or "" alone where the track knows none. Facts are of the table of
+    coverage, None where one is not known; of the samples, `solved` are worth all that one can be,
+    None where one may always be worth more; `errors` are shares of wrong steps [%].
+    """
+
+    values: Mapping[str, Mapping[tuple[str, str], Value]]
+    samples: Mapping[str, Mapping[tuple[str, str, int, str], float]]
+    facts: Mapping[str, Mapping[str, Any]]
+
+
 @dataclass(frozen=True, eq=False)
 class SiteRun:
     """A run that was opened: `where` is what the user calls it, `sources` are what can be drawn of
@@ -87,6 +110,11 @@ class SiteRun:
     sources: Sources
     unverified: tuple[str, ...] | None = None
 
+    @cached_property
+    def values(self) -> Mapping[str, TrackValues]:
+        """The values of each of its tracks."""
+        return {track: values_of(self.run, track) for track in self.tracks}
+
     @property
     def date(self) -> str:
         """The day on which it was begun, UTC."""
@@ -98,37 +126,6 @@ class SiteRun:
         return self.run.design.suite.tracks
 
 
-@dataclass
-class Entry:
-    """A row: `runs` has the number of the run that asked each of its tracks. `name` is unique."""
-
-    model: ManifestModel
-    runs: dict[str, int] = field(default_factory=dict)
-    name: str = ""
-
-
-Key = tuple[str, str, int, str]
-"""A sample of one model: scene, item, seed, variant."""
-
-
-@dataclass(frozen=True, eq=False)
-class TrackValues:
-    """A track of a run: `values` by setting, model and heading; `samples` what each sample is worth
-    by the main measure, in its unit, by model and `Key`, without those that have no value; `facts`
-    by model.
-
-    Settings are those of the run, or "" alone where the track knows none.
-    """
-
-    values: Mapping[str, Mapping[tuple[str, str], Value]]
-    samples: Mapping[str, Mapping[Key, float]]
-    facts: Mapping[str, Mapping[str, Any]]
-
-
-AllValues = Mapping[tuple[int, str], TrackValues]
-"""Values by number of the run, and track."""
-
-
 def entries_of(runs: Sequence[SiteRun]) -> tuple[Entry, ...]:
     """Return every model of every run.
 
@@ -136,40 +133,27 @@ def entries_of(runs: Sequence[SiteRun]) -> tuple[Entry, ...]:
     same parameters. Asked in the same track it is a row for each run, told apart by the date and
     the identity of the run.
     """
-    found: list[tuple[str, Entry]] = []
+    found: list[tuple[dict[str, Any], Entry]] = []
     for number, one in enumerate(runs):
         # A run stands in the same row as a folder and as a bundle.
         for model in portable_manifest(one.run.manifest).models:
             told = {name: value for name, value in model.fields().items() if name not in _LABELS}
-            identity = json.dumps(told, sort_keys=True, default=str)
-            same = (
-                entry
-                for known, entry in found
-                if known == identity and not set(one.tracks) & set(entry.runs)
-            )
-            entry = next(same, None)
-            if entry is None:
+            for known, entry in found:
+                if known == told and not set(one.tracks) & set(entry.runs):
+                    break
+            else:
                 entry = Entry(model)
-                found.append((identity, entry))
+                found.append((told, entry))
             entry.runs |= dict.fromkeys(one.tracks, number)
     entries = tuple(entry for _, entry in found)
-    used = Counter(entry.model.name for entry in entries)
+    names = [entry.model.name for entry in entries]
     for place, entry in enumerate(entries):
-        entry.name, one = entry.model.name, runs[min(entry.runs.values())]
-        if used[entry.name] > 1:
+        entry.name, one = names[place], runs[min(entry.runs.values())]
+        if names.count(entry.name) > 1:
             entry.name += f" ({one.date}, run {one.run.manifest.identity[:8]})"
         if entry.name in {other.name for other in entries[:place]}:
             entry.name += f" ({place + 1})"
     return entries
-
-
-def all_values(runs: Sequence[SiteRun]) -> AllValues:
-    """Return the values of every track of every run."""
-    return {
-        (number, track): values_of(one.run, track)
-        for number, one in enumerate(runs)
-        for track in one.tracks
-    }
 
 
 def values_of(run: Run, track: str) -> TrackValues:
@@ -185,60 +169,26 @@ def values_of(run: Run, track: str) -> TrackValues:
     for setting in design.suite.settings if shown["setting"].astype(bool).any() else ("",):
         suite = design.suite.model_copy(update={"settings": (setting,)} if setting else {})
         values[setting] = headline_of(run, track, replace(design, suite=suite))
-    return TrackValues(values, samples, _facts_of(run, track, samples, what.measure.best))
-
-
-def _facts_of(
-    run: Run, track: str, samples: Mapping[str, Mapping[Key, float]], best: float
-) -> dict[str, dict[str, Any]]:
-    """Return by model what its samples of a track took and came to; None where it is not known.
-
-    `solved` samples are worth all that a sample can be; None where a sample may always be worth
-    more. `errors` are shares of wrong steps [%]. Costs [US dollars] are at the prices of the
-    replies, cached ones included.
-    """
-    table = coverage_frame(run)
-    outcomes = table[table["track"] == track].set_index("model").to_dict("index")
-
-    def known(value: Any) -> Any:
-        if not isinstance(value, float):
-            return value
-        return None if math.isnan(value) else float(f"{value:.6g}")
-
     errors: dict[str, dict[str, float]] = {}
-    rows = headline_rows(track_estimates(run, track), run.design)
-    rows = rows[rows["cell"] == run.cells(track)[-1].name]
-    for row in rows[rows["value"].notna()].to_dict("records"):
-        name = str(row["measure"])
-        if name.startswith("wrong_"):
-            of_model = errors.setdefault(str(row["model"]), {})
-            of_model[name.removeprefix("wrong_")] = round(100 * float(row["value"]), 2)
-    found = {}
-    for model, row in outcomes.items():
-        solved, whole = None, None
-        if not math.isnan(best):
-            solved = sum(value == best for value in samples.get(str(model), {}).values())
-        if known(price := row["cost_per_100_usd"]) is not None and solved:
-            whole = price / 100 * int(row["replies"]) / solved
-        facts = {
-            "expected": int(row["expected"]),
-            "done": int(row["recorded"]),
-            "failed": int(row["recorded"] - row["ok"]),
-            "solved": solved,
-            "prompt_tokens": row["prompt_tokens"],
-            "completion_tokens": row["completion_tokens"],
-            "latency_s": row["latency_median_s"],
-            "usd_per_100": price,
-            "usd_per_solved": whole,
-            "errors": errors.get(str(model), {}),
+    rows = headline_rows(estimates, design)
+    rows = rows[(rows["cell"] == run.cells(track)[-1].name) & rows["value"].notna()]
+    rows = rows[rows["measure"].str.startswith("wrong_")]
+    for model, name, value in zip(rows["model"], rows["measure"], rows["value"], strict=True):
+        share = round(100 * float(value), 2)
+        errors.setdefault(model, {})[name.removeprefix("wrong_")] = share
+    table, best, facts = coverage_frame(run), what.measure.best, {}
+    for row in table[table["track"] == track].to_dict("records"):
+        model = str(row["model"])
+        solved = sum(value == best for value in samples.get(model, {}).values())
+        facts[model] = {
+            **{str(name): None if pd.isna(value) else value for name, value in row.items()},
+            "solved": None if math.isnan(best) else solved,
+            "errors": errors.get(model, {}),
         }
-        found[str(model)] = {name: known(value) for name, value in facts.items()}
-    return found
+    return TrackValues(values, samples, facts)
 
 
-def board_of(
-    runs: Sequence[SiteRun], entries: Sequence[Entry], values: AllValues
-) -> dict[str, Any]:
+def board_of(runs: Sequence[SiteRun], entries: Sequence[Entry]) -> dict[str, Any]:
     """Return the numbers that a page shows, as plain values.
 
     Raises SpecError for runs that cannot be compared.
@@ -246,119 +196,107 @@ def board_of(
     first: dict[str, int] = {}
     for number, one in enumerate(runs):
         first |= {track: number for track in one.tracks if track not in first}
-    numbers = {entry.name: _values(entry, values) for entry in entries}
+    # Value and interval by column.
+    numbers: dict[str, dict[str, list[float | None]]] = {
+        entry.name: {
+            _id(track, setting, heading): [
+                None if math.isnan(number) else round(number, 4)
+                for number in (value.value, value.lo, value.hi)
+            ]
+            for track, place in entry.runs.items()
+            for setting, of_setting in runs[place].values[track].values.items()
+            for (model, heading), value in of_setting.items()
+            if model == entry.model.name and not math.isnan(value.value)
+        }
+        for entry in entries
+    }
     ranges: dict[str, Mapping[str, tuple[int, int]]] = {}
     tracks: list[dict[str, Any]] = []
     columns: list[dict[str, Any]] = []
     for track, place in first.items():
-        run, of = runs[place].run, {one.name: one for one in track_measures(track)}
+        run = runs[place].run
         columns += [
             {
                 "id": _id(track, setting, column.heading),
                 "track": track,
                 "setting": setting,
                 "heading": column.heading,
-                "unit": of[column.measure].unit,
-                "better": of[column.measure].better,
+                "unit": measure.unit,
+                "better": measure.better,
                 "cell": column.cell,
             }
-            for setting in values[place, track].values
+            for setting in runs[place].values[track].values
             for column in headline_columns(run, track)
+            for measure in track_measures(track)
+            if measure.name == column.measure
         ]
         heading = main_column(run, track).heading
-        setting = next(iter(values[place, track].values))
+        setting = next(iter(runs[place].values[track].values))
         main = _id(track, setting, heading)
         ranked = [entry for entry in entries if main in numbers[entry.name]]
         models = [
-            values[e.runs[track], track].values[setting][e.model.name, heading]
+            runs[e.runs[track]].values[track].values[setting][e.model.name, heading]
             for e in ranked
             if not e.model.is_baseline
         ]
         sides = [Side(e.name, e.model.name, runs[e.runs[track]].run) for e in ranked]
         ranges[track] = rank_ranges_of(sides, track)
         tracks.append(_track(track, run, models))
-    lacking = {key: shortfalls(runs[key[0]].run, key[1]) for key in values}
+    lacking = [{track: shortfalls(one.run, track) for track in one.tracks} for one in runs]
     rows = []
     for entry in entries:
-        name, of_tracks = entry.model.name, [(n, track) for track, n in entry.runs.items()]
+        name, of_tracks = entry.model.name, entry.runs.items()
         rows.append(
             {
                 "name": entry.name,
-                "model": name,
                 "kind": entry.model.kind,
                 "size_b": entry.model.size_b,
-                "runs": dict(entry.runs),
+                "runs": entry.runs,
                 "values": numbers[entry.name],
                 "ranks": {t: list(r[entry.name]) for t, r in ranges.items() if entry.name in r},
-                "lacking": {k[1]: lacking[k][name] for k in of_tracks if name in lacking[k]},
-                "facts": {key[1]: values[key].facts[name] for key in of_tracks},
+                "lacking": {t: lacking[n][t][name] for t, n in of_tracks if name in lacking[n][t]},
+                "facts": {t: runs[n].values[t].facts[name] for t, n in of_tracks},
             }
         )
-    return {
-        "tracks": tracks,
-        "columns": columns,
-        "rows": rows,
-        "runs": [_run(one) for one in runs],
-    }
-
-
-def _track(track: str, run: Run, models: Sequence[Value]) -> dict[str, Any]:
-    """Return a track of a page; `models` are the values of those that are no baselines."""
-    kind, measure = kind_of(track), main_measure(run, track)
-    report, heading = kind.report(), main_column(run, track).heading
-    floor = strongest_floor(run, track)
-    names = (one.name for one in track_measures(track))
-    parts = report.part_names
-    return {
-        "name": track,
-        "title": kind.title,
-        "item": kind.item,
-        "main": heading,
-        "unit": measure.unit,
-        "better": measure.better,
-        "best": None if math.isnan(measure.best) else measure.best,
-        "notes": list(track_notes(run, track)),
-        "errors": [name.removeprefix("wrong_") for name in names if name.startswith("wrong_")],
-        "floor": floor and {"name": floor.name, "value": round(floor.value, 4)},
-        "physics": kind.lets_go(run.manifest.suite),
-        "finding": _finding(floor, measure.better, models),
-        "parts": dict(parts),
-        "groups": {
-            cell.name: {"title": cell.heading, "of": list(cell.of)}
-            for cell in run.cells(track)
-            if cell.of and all(name in parts for name in cell.of)
-        },
-    }
-
-
-def _finding(floor: Floor | None, better: Better, models: Sequence[Value]) -> str:
-    """Say how many models are above the strongest blind baseline; "" where there is none of
-    either.
-    """
-    if floor is None or not models:
-        return ""
-    above = sum(floor.is_below(value, better) for value in models)
-    rule = f"a rule that never sees the goal ({floor.name}, {rounded(floor.value)})"
-    if not above:
-        return f"No model is shown to beat {rule}."
-    return f"{above} of {counted(len(models), 'model')} beat{'s' * (above == 1)} {rule}."
+    return {"tracks": tracks, "columns": columns, "rows": rows, "runs": list(map(_run, runs))}
 
 
 def _id(track: str, setting: str, heading: str) -> str:
     return "/".join(filter(None, (track, setting, heading)))
 
 
-def _values(entry: Entry, values: AllValues) -> dict[str, list[float | None]]:
-    """Return value and interval by column."""
+def _track(track: str, run: Run, models: Sequence[Value]) -> dict[str, Any]:
+    """Return a track of a page; `models` are the values of those that are no baselines.
+
+    The finding says how many of them are above the strongest blind baseline.
+    """
+    kind, measure, finding = kind_of(track), main_measure(run, track), ""
+    floor, parts = strongest_floor(run, track), kind.report().part_names
+    names = (one.name for one in track_measures(track))
+    if floor is not None and models:
+        above = sum(floor.is_below(value, measure.better) for value in models)
+        said = f"{above} of {counted(len(models), 'model')} beat{'s' * (above == 1)}"
+        rule = f"a rule that never sees the goal ({floor.name}, {rounded(floor.value)})"
+        finding = f"{said if above else 'No model is shown to beat'} {rule}."
     return {
-        _id(track, setting, heading): [
-            None if math.isnan(number) else round(number, 4)
-            for number in (value.value, value.lo, value.hi)
-        ]
-        for track, number in entry.runs.items()
-        for setting, of_setting in values[number, track].values.items()
-        for (model, heading), value in of_setting.items()
-        if model == entry.model.name and not math.isnan(value.value)
+        "name": track,
+        "title": kind.title,
+        "item": kind.item,
+        "main": main_column(run, track).heading,
+        "unit": measure.unit,
+        "better": measure.better,
+        "best": None if math.isnan(measure.best) else measure.best,
+        "notes": track_notes(run, track),
+        "errors": [name.removeprefix("wrong_") for name in names if name.startswith("wrong_")],
+        "floor": floor and {"name": floor.name, "value": round(floor.value, 4)},
+        "physics": kind.lets_go(run.manifest.suite),
+        "finding": finding,
+        "parts": dict(parts),
+        "groups": {
+            cell.name: {"title": cell.heading, "of": cell.of}
+            for cell in run.cells(track)
+            if cell.of and all(name in parts for name in cell.of)
+        },
     }
 
 
@@ -382,13 +320,13 @@ def shortfalls(run: Run, track: str) -> Mapping[str, str]:
     """Return by model that lacks replies in a track how many it has, and why it has no more."""
     table, stopped = coverage_frame(run), read_stopped(run.path).models
     failed = run.records[run.records["error_kind"].notna() & (run.records["track"] == track)]
+    told = failed[["model", "error_kind", "error_status", "error_message"]]
     reasons: dict[str, Counter[str]] = {}
-    for row in failed[["model", "error_kind", "error_status", "error_message"]].to_dict("records"):
-        status = row["error_status"]
-        message = " ".join(str(row["error_message"] or row["error_kind"]).split())
-        if not pd.isna(status) and str(status) not in message:
-            message = f"HTTP {status}: {message}"
-        reasons.setdefault(str(row["model"]), Counter())[short(message)] += 1
+    for model, kind, status, message in zip(*(told[name] for name in told), strict=True):
+        text = str(message or kind)
+        if not pd.isna(status) and str(status) not in text:
+            text = f"HTTP {status}: {text}"
+        reasons.setdefault(model, Counter())[short(text)] += 1
     found = {}
     for row in table[table["track"] == track].to_dict("records"):
         model, answered = str(row["model"]), row["recorded"] - sum(row[n] for n in WITHOUT_REPLY)

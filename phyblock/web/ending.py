@@ -42,11 +42,14 @@ class Ending:
     ) -> None:
         self._runs = [load_run(path) for path in (folder, *beside)]
         self._run, self._person = self._runs[0], person
-        self._tasks = {task.scene.id: task for task in tasks}
+        of_scene = {task.scene.id: task for task in tasks}
         records = [one for one in read_records(folder) if one.model == person]
-        self._films = {
-            n: steps for n, one in enumerate(records) if (steps := self._film(one)) is not None
-        }
+        self._films: dict[int, tuple[AssemblyTask, FilmStep]] = {}
+        for n, record in enumerate(records):
+            film, task = kind_of(record.track).report().film, of_scene.get(record.scene)
+            if film is not None and task is not None:
+                *_, last = film(record, as_recorded(task, record))
+                self._films[n] = task, last
         self._notes: list[str] = []
         tracks = [self._track(name, records) for name in self._run.design.suite.tracks]
         self.shown: Mapping[str, Any] = {
@@ -68,14 +71,6 @@ class Ending:
         pair = self._pair(next(iter(self._films))) if self._films else None
         return card_png("Can you build this?", f"{said}\n{about}", pair)
 
-    def _film(self, record: Record) -> tuple[AssemblyTask, FilmStep] | None:
-        """Return the scene of a record with the last step of its build, where it has one."""
-        film, task = kind_of(record.track).report().film, self._tasks.get(record.scene)
-        if film is None or task is None:
-            return None
-        *_, last = film(record, as_recorded(task, record))
-        return task, last
-
     def _pair(self, number: int) -> Image.Image:
         """Return the goal on the left and what was built on the right."""
         task, last = self._films[number]
@@ -86,7 +81,9 @@ class Ending:
         return pair
 
     def _track(self, track: str, records: Sequence[Record]) -> dict[str, Any]:
-        """Return a track: its measure, the line that sums it up, all means, and a row an item."""
+        """Return a track: its measure, all means, and a row an item. Its `line` has the person, the
+        strongest rule that never sees the goal, and the best model.
+        """
         kind, measure = kind_of(track), comparable(self._run, track).measure
         own, others = self._values(track)
         rows = [
@@ -106,12 +103,18 @@ class Ending:
             if common := [found[row["key"]] for row in rows if row["key"] in found]:
                 means.append((name, fmean(common), len(common)))
         means.sort(key=lambda one: one[1], reverse=measure.better == "higher")
+        worth = {name: value for name, value, _ in means}
+        line = [("You", worth["You"])] if own else []
+        if (floor := strongest_floor(self._run, track)) is not None:
+            line.append((floor.name, worth.get(floor.name, floor.value)))
+        rules = {"You"}.union(*(one.design.baselines for one in self._runs))
+        line += [(f"best model {name}", worth[name]) for name in worth if name not in rules][:1]
         return {
             "title": kind.title,
             "item": kind.item,
             "measure": measure.heading,
             "unit": measure.unit,
-            "line": self._line(track, {name: value for name, value, _ in means}),
+            "line": line,
             "means": means,
             "rows": rows,
         }
@@ -132,16 +135,6 @@ class Ending:
                 means = values.groupby(level="item").mean()
                 found.setdefault(model, {str(item): float(mean) for item, mean in means.items()})
         return found.pop(self._person, {}), found
-
-    def _line(self, track: str, means: Mapping[str, float]) -> list[tuple[str, float]]:
-        """Return the person, the strongest rule that never sees the goal, and the best model."""
-        floor = strongest_floor(self._run, track)
-        rules = set().union(*(one.design.baselines for one in self._runs))
-        line = [(name, value) for name, value in means.items() if name == "You"]
-        if floor is not None:
-            line.append((floor.name, means.get(floor.name, floor.value)))
-        models = [name for name in means if name not in rules and name != "You"]
-        return line + [(f"best model {name}", means[name]) for name in models[:1]]
 
 
 def went(record: Record, matcher: str) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from phyblock.records.files import MANIFEST, RECORDS
 from phyblock.results.load import Run, load_run
 from phyblock.sim.pictures import Lookout, PictureStyle
 from phyblock.tracks.base import CARRYING, kind_of
-from phyblock.web.board import SiteRun, all_values, board_of, entries_of, open_sources
+from phyblock.web.board import SiteRun, board_of, entries_of, open_sources
 from phyblock.web.card import card_png
 from phyblock.web.pack import build_of, pack_samples, write_page
 
@@ -73,17 +73,30 @@ def write_site(
     with ExitStack() as kept:
         runs = open_runs(paths, data, kept)
         check_runs_alike(runs)
-        entries, values = entries_of(runs), all_values(runs)
-        board = board_of(runs, entries, values) | {"title": title, "about": _ABOUT}
+        entries = entries_of(runs)
+        board = board_of(runs, entries) | {"title": title, "about": _ABOUT}
         finding = board["tracks"][0]["finding"]
-        build = build_of(title, [_digests(one) for one in runs])
+        told = []
+        for one in runs:
+            # The manifest of a bundle names this machine's data.
+            manifest = digest_of_file(one.run.path / MANIFEST)
+            is_verified = one.unverified is not None
+            known = one.run.manifest.identity if is_verified else manifest
+            records = digest_of_file(one.run.path / RECORDS)
+            told.append([known, records, is_verified, bool(one.sources.lacking)])
+        build = build_of(title, told)
         facts = {"title": title, "description": f"{_ABOUT} {finding}".strip(), "board": board}
         facts["image"] = f"{_DATA}{build}/card.png"
         made = SiteWritten(out / INDEX, len(entries))
 
         def make(new: Path) -> dict[str, Any]:
-            index = pack_samples(new, build, runs, entries, values, failures=_FAILURES, is_cut=True)
-            (new / "card.png").write_bytes(_card(title, finding, runs, index))
+            index = pack_samples(new, build, runs, entries, failures=_FAILURES, is_cut=True)
+            goal = None
+            for row in index["telling"][:1]:
+                scene = index["scenes"][index["items"]["scene"][index["rows"]["item"][row]]]
+                task = next(one.sources.tasks[scene] for one in runs if scene in one.sources.tasks)
+                goal = Lookout(task.scene, PictureStyle(size_px=560)).image(task.scene.blocks)
+            (new / "card.png").write_bytes(card_png(title, finding, goal))
             made.size_bytes = sum(path.stat().st_size for path in new.iterdir())
             made.samples, made.lacking = len(index["rows"]["entry"]), index["lacking"]
             return facts
@@ -91,15 +104,6 @@ def write_site(
         write_page(folder, INDEX, _DATA, build, make)
     made.size_bytes += made.path.stat().st_size
     return made
-
-
-def _digests(one: SiteRun) -> list[Any]:
-    """Return what makes another page where it is another."""
-    is_verified = one.unverified is not None
-    # The manifest of a bundle names this machine's data.
-    manifest = one.run.manifest.identity if is_verified else digest_of_file(one.run.path / MANIFEST)
-    records = digest_of_file(one.run.path / RECORDS)
-    return [manifest, records, is_verified, bool(one.sources.lacking)]
 
 
 def _check_place(folder: OutFolder) -> None:
@@ -157,21 +161,22 @@ def check_runs_alike(runs: Sequence[SiteRun]) -> None:
     """
     problems: list[Problem] = []
     for number, one in enumerate(runs):
-        differences = (list(_differences(one, first)) for first in runs[:number])
-        problems += next(filter(None, differences), [])
+        for first in runs[:number]:
+            shared = [track for track in one.tracks if track in first.tracks]
+            told, wanted = (dict(_facts(side.run, shared)) for side in (one, first))
+            message = f"cannot stand in one table with {first.where}"
+            differences = [
+                Problem(one.where, message, name, str(value), str(other), hint)
+                for name, value in told.items()
+                # A recording was asked elsewhere, and a baseline is asked in no words.
+                if None not in (value, other := wanted.get(name)) and value != other
+                for hint in [_HINTS.get(name.rpartition(".")[2], "make a site of each")]
+            ]
+            problems += differences
+            if differences:
+                break
     if problems:
         raise SpecError(problems)
-
-
-def _differences(one: SiteRun, first: SiteRun) -> Iterator[Problem]:
-    shared = [track for track in one.tracks if track in first.tracks]
-    told, wanted = (dict(_facts(side.run, shared)) for side in (one, first))
-    message = f"cannot stand in one table with {first.where}"
-    for name, value in told.items():
-        # A recording was asked elsewhere, and a baseline is asked in no words.
-        if None not in (value, other := wanted.get(name)) and value != other:
-            hint = _HINTS.get(name.rpartition(".")[2], "make a site of each")
-            yield Problem(one.where, message, name, str(value), str(other), hint)
 
 
 def _facts(run: Run, shared: Sequence[str]) -> Iterator[tuple[str, Any]]:
@@ -209,14 +214,3 @@ def _facts(run: Run, shared: Sequence[str]) -> Iterator[tuple[str, Any]]:
         for name, values, without in held:
             for key in type(values).model_fields.keys() - without:
                 yield f"{name}.{key}", str(getattr(values, key))
-
-
-def _card(title: str, finding: str, runs: Sequence[SiteRun], index: Mapping[str, Any]) -> bytes:
-    """Return the picture of a site for links to it: its title and finding, and a goal."""
-    goal = None
-    for row in index["telling"][:1]:
-        scene = index["scenes"][index["items"]["scene"][index["rows"]["item"][row]]]
-        task = next(one.sources.tasks[scene] for one in runs if scene in one.sources.tasks)
-        style = PictureStyle(size_px=560)
-        goal = Lookout(task.scene, style).image(task.scene.blocks)
-    return card_png(title, finding, goal)

@@ -13,9 +13,10 @@ import json
 import os
 import re
 import zlib
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cached_property
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields as dataclass_fields
+from dataclasses import is_dataclass
+from functools import cached_property, partial
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
@@ -25,16 +26,13 @@ import jinja2
 
 from phyblock.data.base import AssemblyTask
 from phyblock.domain.blocks import BLOCK_TYPES
-from phyblock.domain.question import Question
-from phyblock.domain.scene import Block
 from phyblock.files import OutFolder, atomic_write, cache_dir, digest_of_file, writing
 from phyblock.records.files import PromptLines, RecordLines
 from phyblock.records.record import Record, SentPrompt
-from phyblock.results.load import Run
 from phyblock.sim.geometry import solid_mesh
 from phyblock.sim.pictures import COLOR_RGB
 from phyblock.stable import hex_digest
-from phyblock.web.board import AllValues, Entry, SiteRun, Sources
+from phyblock.web.board import Entry, SiteRun, Sources
 
 _LAYOUT = 7
 """Version of the scripts."""
@@ -55,6 +53,7 @@ _LEFT_OUT = frozenset(
     }
 )
 """Fields of records that the index has, that a page does not show, or shows in another form."""
+_OF_QUESTION = ("subtask", "text", "options", "answer_letters", "pictures", "evidence")
 _LONGEST = {"text": 6000, "reasoning": 2000}
 """Characters of a reply that a site shows; the bundle has all of it."""
 _TELLING_BLOCKS = 6
@@ -109,22 +108,20 @@ def _write_three(folder: Path) -> None:
     Its published build is of two modules, which a page that was opened from disk may not load; what
     they import and export becomes what functions take and return.
     """
-
-    def exported(match: re.Match[str]) -> str:
-        pairs = (name.rpartition(" as ") for name in match[1].split(","))
-        return ",".join(f"{shown}:{own or shown}" for own, _, shown in pairs)
-
     core, module = (asset(f"three/three.{name}.min.js").decode() for name in ("core", "module"))
-    core = re.sub(r"export\{([^}]*)\};?\s*$", lambda match: f"return{{{exported(match)}}}", core)
-    source = r'from"\./three\.core\.min\.js";?'
-    module = re.sub(rf"export\{{[^}}]*\}}{source}", "", module)
+    names, source = r"(\{[^}]*\})", r'from"\./three\.core\.min\.js";?'
+    exported = partial(re.sub, r"([\w$]+) as ([\w$]+)", r"\2:\1")
+    core = re.sub(rf"export{names};?\s*$", lambda found: f"return{exported(found[1])}", core)
+    module = re.sub(rf"export{names}{source}", "", module)
     module = re.sub(
-        rf"import\{{([^}}]*)\}}{source}",
-        lambda match: f"const{{{match[1].replace(' as ', ':')}}}=core;",
+        rf"import{names}{source}",
+        lambda found: f"const{found[1].replace(' as ', ':')}=core;",
         module,
     )
     module = re.sub(
-        r"export\{([^}]*)\};?\s*$", lambda match: f"return{{...core,{exported(match)}}}", module
+        rf"export{names};?\s*$",
+        lambda found: f"return{{...core,...{exported(found[1])}}}",
+        module,
     )
     script = f"window.THREE=(core=>{{{module}}})((()=>{{{core}}})());\n"
     (folder / "three.js").write_text(script, encoding="utf-8")
@@ -133,21 +130,6 @@ def _write_three(folder: Path) -> None:
 def build_of(*told: object) -> str:
     """Return a name for what a page shows: the same runs, written again, have the same files."""
     return hex_digest(json.dumps([_LAYOUT, version("phyblock"), *told]))[:12]
-
-
-def places_of(run: Run) -> list[int]:
-    """Return the place of the newest record of each sample in `records.jsonl` [bytes]: by track,
-    item, then model in the suite's order, and seed.
-    """
-    tracks = {name: n for n, name in enumerate(run.design.suite.tracks)}
-    models = {name: n for n, name in enumerate(run.design.model_names)}
-    columns = (run.records[name].tolist() for name in ("track", "item", "model", "seed", "start"))
-    found = [
-        (tracks[track], item, models.get(model, len(models)), model, seed, start)
-        for track, item, model, seed, start in zip(*columns, strict=True)
-        if track in tracks
-    ]
-    return [start for *_, start in sorted(found)]
 
 
 class _Numbers(dict[Any, int]):
@@ -163,7 +145,6 @@ def pack_samples(
     build: str,
     runs: Sequence[SiteRun],
     entries: Sequence[Entry],
-    values: AllValues,
     *,
     failures: int,
     sent: SentPictures | None = None,
@@ -189,20 +170,26 @@ def pack_samples(
         for track, number in entry.runs.items()
     }
     for number, one in enumerate(runs):
-        design, prompts = one.run.design, {}
+        design, rules, prompts = one.run.design, one.run.design.baselines, {}
         if sent:
             for _, line in PromptLines(one.run.path):
                 messages = [message.fields() for message in line.messages]
                 prompts[line.sha256] = packs["prompts"].add(messages)
-        rules = {model.name for model in one.run.manifest.models if model.is_baseline}
-        for record in RecordLines(one.run.path).at(places_of(one.run)):
+        order = {"track": design.suite.tracks, "model": design.model_names}
+        held = one.run.records[one.run.records["track"].isin(design.suite.tracks)]
+        held = held.assign(**{name: held[name].map(known.index) for name, known in order.items()})
+        held = held.sort_values(["track", "item", "model", "seed"], kind="stable")
+        for record in RecordLines(one.run.path).at(held["start"].tolist()):
             track, item = record.track, record.item
             if (track, item) not in numbered:
                 asked = opener(record) if (opener := one.sources.items.get(track)) else None
-                question = packs["questions"].add(_question(asked.question)) if asked else -1
+                question = -1
+                if asked:
+                    told = {name: _plain(getattr(asked.question, name)) for name in _OF_QUESTION}
+                    question = packs["questions"].add(told)
                 about = (tracks.of(track), item, scenes.of(record.scene), record.levels)
                 items.append((*about, record.part, question))
-            worth = values[number, track].samples.get(record.model, {})
+            worth = one.values[track].samples.get(record.model, {})
             score = worth.get((record.scene, item, record.seed, record.way.key))
             course = record.course(design.matcher)
             wrong = [why for _, why in course.steps] if course else []
@@ -218,8 +205,11 @@ def pack_samples(
                     sum(1 << errors.of(why) for why in set(filter(None, wrong))),
                 )
             )
-            if record.scene in one.sources.tasks and record.model not in rules:
-                found += _failure(record, wrong, len(rows) - 1)
+            first = next((n for n, why in enumerate(wrong) if why), 0)
+            # It goes well for some steps first.
+            if first >= 2 and record.scene in one.sources.tasks and record.model not in rules:
+                tells = min(first, 4) - abs(record.n_blocks - _TELLING_BLOCKS)
+                found.append(_Failure(str(wrong[first]), record.model, tells, len(rows) - 1))
             packs["records"].add(_entry(record, design.matcher, prompts, sent, is_cut))
     is_drawn = False
     for scene in scenes:
@@ -230,6 +220,12 @@ def pack_samples(
     for pack in packs.values():
         pack.close()
     starts_of = {kind: pack.starts for kind, pack in packs.items()}
+    shapes = {}
+    for name in BLOCK_TYPES:
+        mesh = solid_mesh(name)
+        # In the body frame [m].
+        corners = mesh.vertices_m.round(_DECIMALS).tolist()
+        shapes[name] = {"vertices": corners, "triangles": mesh.triangles.tolist()}
     index = {
         "tracks": list(tracks),
         "scenes": list(scenes),
@@ -239,9 +235,9 @@ def pack_samples(
         "items": _columns("track key scene levels part question", items),
         "rows": _columns("entry item seed way outcome score wrong", rows),
         "starts": {**starts_of, "scenes": starts_of["scenes"] if is_drawn else []},
-        "lacking": "" if is_drawn or not runs else runs[0].sources.lacking,
+        "lacking": "" if is_drawn else runs[0].sources.lacking,
         "telling": _telling(found, failures),
-        "kit": _kit(),
+        "kit": {"shapes": shapes, "colors": COLOR_RGB},
     }
     _write(folder, "samples", build, _to_json(index))
     _write_three(folder)
@@ -264,13 +260,9 @@ def _entry(
     def prompt(one: SentPrompt | None) -> dict[str, Any]:
         if one is None or sent is None:
             return {}
+        known = ("label", "width_px", "height_px")
         images = [
-            {
-                "label": image.label,
-                "width_px": image.width_px,
-                "height_px": image.height_px,
-                "file": sent.name(image.sha256),
-            }
+            {**{name: getattr(image, name) for name in known}, "file": sent.name(image.sha256)}
             for image in one.images
         ]
         number = prompts.get(one.messages)
@@ -305,103 +297,52 @@ def _entry(
 
 
 class _Failure(NamedTuple):
+    """The first wrong step of a sample, its model and row; it `tells` more the larger this is."""
+
     error: str
     model: str
     tells: float
     row: int
 
 
-def _failure(record: Record, wrong: Sequence[str | None], row: int) -> Iterator[_Failure]:
-    """Yield the first wrong step of a sample that tells something: it goes well for some steps
-    first, and tells more where its goal is neither tiny nor large.
-    """
-    first = next((n for n, why in enumerate(wrong) if why), 0)
-    if first >= 2:
-        tells = min(first, 4) - abs(record.n_blocks - _TELLING_BLOCKS)
-        yield _Failure(str(wrong[first]), record.model, tells, row)
-
-
 def _telling(found: list[_Failure], most: int) -> list[int]:
     """Return rows of samples that tell most: of every type of error, and of other models."""
-    errors: Counter[str] = Counter()
-    models: Counter[str] = Counter()
     chosen: list[_Failure] = []
 
     def order(one: _Failure) -> tuple[int, int, float, int]:
-        return errors[one.error], models[one.model], -one.tells, one.row
+        errors, models = ([other[n] for other in chosen] for n in (0, 1))
+        return errors.count(one.error), models.count(one.model), -one.tells, one.row
 
     while len(chosen) < min(most, len(found)):
-        best = min((one for one in found if one not in chosen), key=order)
-        errors[best.error] += 1
-        models[best.model] += 1
-        chosen.append(best)
+        chosen.append(min((one for one in found if one not in chosen), key=order))
     return [one.row for one in chosen]
 
 
-def _kit() -> dict[str, Any]:
-    """Return shapes (vertices [m] and triangles in the body frame) and colors of all blocks."""
-    shapes = {}
-    for name in BLOCK_TYPES:
-        mesh = solid_mesh(name)
-        corners = [_rounded(corner) for corner in mesh.vertices_m.tolist()]
-        shapes[name] = {"vertices": corners, "triangles": mesh.triangles.tolist()}
-    return {"shapes": shapes, "colors": COLOR_RGB}
+def _plain(value: Any) -> Any:
+    """Return dataclasses as pages take them: fields by names without units, numbers rounded."""
+    if is_dataclass(value):
+        named = ((re.sub("_(m|deg)$", "", one.name), one.name) for one in dataclass_fields(value))
+        return {name: _plain(getattr(value, field)) for name, field in named}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    return round(value, _DECIMALS) if isinstance(value, float) else value
 
 
 def _scene(task: AssemblyTask) -> dict[str, Any]:
     """Return a scene with its candidates, as pages take it.
 
     `depend` holds positions of blocks in the list, from 0; `candidate` is the number of the
-    candidate that stands for the block in setting A, null where there is none.
+    candidate that stands for the block in setting A, None where there is none.
     """
-    scene, candidates = task.scene, task.candidates
     blocks = [
         {
-            **_block(block),
-            "depend": sorted(scene.graph.depends_on[vertex]),
-            "candidate": candidates.index_of(block.look),
+            **_plain(block),
+            "depend": sorted(task.scene.graph.depends_on[vertex]),
+            "candidate": task.candidates.index_of(block.look),
         }
-        for vertex, block in enumerate(scene.blocks)
+        for vertex, block in enumerate(task.scene.blocks)
     ]
-    offered = [
-        {"type": one.type, "color": one.color, "euler": _rounded(one.euler_deg)}
-        for one in candidates.candidates
-    ]
-    return {"blocks": blocks, "candidates": offered}
-
-
-def _question(question: Question) -> dict[str, Any]:
-    """Return a question with the recipes of its pictures, as pages take it."""
-    pictures = [
-        {
-            "label": picture.label,
-            "view": list(picture.view_deg),
-            "blocks": [_block(block) for block in picture.blocks],
-            "framed": [_block(block) for block in picture.framed],
-            "marks": [
-                {"letter": mark.letter, "position": _rounded(mark.position_m)}
-                for mark in picture.marks
-            ],
-        }
-        for picture in question.pictures
-    ]
-    return {
-        "subtask": question.subtask,
-        "text": question.text,
-        "options": list(question.options),
-        "answer": question.answer_letters,
-        "pictures": pictures,
-        "evidence": dict(question.evidence),
-    }
-
-
-def _block(block: Block) -> dict[str, Any]:
-    pose = {"position": _rounded(block.position_m), "euler": _rounded(block.euler_deg)}
-    return {"type": block.type, "color": block.color, **pose}
-
-
-def _rounded(values: Iterable[float]) -> list[float]:
-    return [round(float(value), _DECIMALS) for value in values]
+    return {"blocks": blocks, "candidates": _plain(task.candidates.candidates)}
 
 
 class SentPictures:

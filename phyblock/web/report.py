@@ -15,7 +15,6 @@ from phyblock.tracks.base import kind_of
 from phyblock.types import WITHOUT_REPLY
 from phyblock.web.board import (
     SiteRun,
-    all_values,
     board_of,
     entries_of,
     open_sources,
@@ -75,14 +74,14 @@ def write_report(written: TablesWritten, data: Path | None = None) -> Path:
     build = build_of(one.sources.lacking, [digest_of_file(p) for p in paths if p.exists()])
 
     def make(new: Path) -> dict[str, Any]:
-        entries, values = entries_of([one]), all_values([one])
+        entries = entries_of([one])
         with ExitStack() as made:
             sent = None
             if (run.path / PROMPTS).exists():
                 folder = made.enter_context(out.making(PICTURES))
                 sent = SentPictures(folder, out.path / PICTURES, one.sources)
-            pack_samples(new, build, [one], entries, values, failures=_FAILURES, sent=sent)
-        board = {**board_of([one], entries, values), **_about(written)}
+            pack_samples(new, build, [one], entries, failures=_FAILURES, sent=sent)
+        board = {**board_of([one], entries), **_about(written)}
         return {"title": board["title"], "description": board["about"], "image": "", "board": board}
 
     out.claim([REPORT_FILE])

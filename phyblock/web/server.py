@@ -30,13 +30,17 @@ from phyblock.tracks.picking import Pick
 from phyblock.web.pack import asset
 from phyblock.web.session import NotNowError, PlaySession
 
-_FILES = ("style.css", "icon.svg", "dom.js", "picker.js", "play.js")
-_KINDS = {"css": "text/css", "js": "text/javascript", "html": "text/html", "svg": "image/svg+xml"}
+_PAGE = {
+    "": ("play.html", "text/html"),
+    "style.css": ("style.css", "text/css"),
+    "icon.svg": ("icon.svg", "image/svg+xml"),
+    **{name: (name, "text/javascript") for name in ("dom.js", "picker.js", "play.js")},
+}
+"""File and type of what the page is made of, by its name below the address."""
 HOST = "127.0.0.1"
 LARGEST_BODY_BYTES = 16 * 1024
 """Of a request; an answer is some hundred bytes long."""
 _WAIT_S = 15.0
-_TIMEOUT_S = 30.0
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -56,120 +60,40 @@ _STATE = re.compile(r"(?:after=(\d{1,9}))?")
 _PICTURE = re.compile(r"picture/(\d{1,9})/(\d{1,3})")
 
 
-def assets() -> dict[str, tuple[str, bytes]]:
-    """Return type and content of every file of the page by name; the page itself has none."""
-    found = {"": asset("play.html"), **{one: asset(one) for one in _FILES}}
-    return {
-        one: (_KINDS[(one or "play.html").rpartition(".")[2]], data) for one, data in found.items()
-    }
-
-
-class Server:
+class Server(ThreadingHTTPServer):
     """A server of one session until it is closed; a context manager.
 
     `address` is what a browser opens, with a token that nobody can guess; `one_time_address` leads
-    on to it when it is opened first, and never again. `finished` is set by the page when the person
-    is through. Raises SpecError for a port that is taken.
+    on to it when it is opened first, and never again. `files` are served too, by their names below
+    the address. `finished` is set by the page when the person is through. Raises SpecError for a
+    port that is taken.
     """
 
-    def __init__(self, session: PlaySession, port: int = 0) -> None:
-        self.finished = threading.Event()
-        self._session = session
-        self._token, self._code = secrets.token_urlsafe(24), secrets.token_urlsafe(24)
-        self._code_used = threading.Lock()
-        self._assets = assets()
-        self._files: Mapping[str, Path] = {}
-        handler = type("Handler", (_Handler,), {"server_of": self})
-        try:
-            self._http = _Listener((HOST, port), handler)
-        except OSError as error:
-            problem = Problem("--port", f"cannot be used: {reason_of(error)}", found=str(port))
-            raise SpecError(problem) from error
-        self.port = int(self._http.server_address[1])
-        self.hosts = (f"{HOST}:{self.port}", f"localhost:{self.port}")
-        self.address = f"http://{self.hosts[0]}/{self._token}/"
-        self.one_time_address = f"http://{self.hosts[0]}/{self._code}/"
-        self._thread = threading.Thread(target=self._http.serve_forever, daemon=True)
-
-    def __enter__(self) -> Server:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._http.shutdown()
-        self._http.server_close()
-
-    def show_files(self, files: Mapping[str, Path]) -> None:
-        """Serve these files too, by their names below the address."""
-        self._files = dict(files)
-
-    def below(self, path: str) -> str | None:
-        """Return the rest of a path that begins with the token; None for any other."""
-        token, slash, rest = path.removeprefix("/").partition("/")
-        is_ours = secrets.compare_digest(token.encode(), self._token.encode()) and slash
-        return rest if is_ours else None
-
-    def is_code(self, path: str) -> bool:
-        """True if this is the path of the one-time address."""
-        return secrets.compare_digest(path.encode(), f"/{self._code}/".encode())
-
-    def use_code(self) -> str | None:
-        """Return the path of the page; None for all but the first who asks."""
-        return f"/{self._token}/" if self._code_used.acquire(blocking=False) else None
-
-    def get(self, name: str, query: str) -> tuple[str, bytes, str] | None:
-        """Return type, content and policy of what stands under a name; None where nothing does."""
-        if name in self._assets:
-            return *self._assets[name], _POLICY
-        if name == "state" and (asked := _STATE.fullmatch(query)):
-            told = self._session.state(int(asked[1] or -1), _WAIT_S)
-            return "application/json", json.dumps(told).encode(), _POLICY
-        if asked := _PICTURE.fullmatch(name):
-            picture = self._session.picture(int(asked[1]), int(asked[2]))
-            return None if picture is None else ("image/png", picture.data, _POLICY)
-        if drawn := self._session.drawn(name):
-            return "image/png", drawn, _POLICY
-        if name in self._files:
-            kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
-            # These bring a policy of their own.
-            return kind, self._files[name].read_bytes(), "frame-ancestors 'none'"
-        return None
-
-    def post(self, name: str, body: Mapping[str, Any]) -> bool:
-        """Do what a page asks for; False for what there is not. Raises as the session does."""
-        actions: dict[str, Callable[[], None]] = {
-            "begin": self._session.begin,
-            "pause": self._session.pause,
-            "resume": self._session.resume,
-            "finish": self.finished.set,
-            "answer": lambda: self._answer(_Answer.model_validate(body)),
-        }
-        if name in actions:
-            actions[name]()
-        return name in actions
-
-    def _answer(self, answer: _Answer) -> None:
-        self._session.answer(answer.change, answer.given())
-
-
-class _Answer(BaseModel):
-    """An answer as the page sends it: picks, and the numbers of each where they have some."""
-
-    model_config = ConfigDict(strict=True)
-    change: int
-    picks: list[int]
-    numbers: list[list[int | float]] = []
-
-    def given(self) -> tuple[Pick, ...]:
-        """Return the picks; ValueError for numbers of other picks."""
-        numbers = self.numbers or [[] for _ in self.picks]
-        return tuple(Pick(pick, tuple(own)) for pick, own in zip(self.picks, numbers, strict=True))
-
-
-class _Listener(ThreadingHTTPServer):
     daemon_threads = True
     # The same command goes on at the same port at once; on Windows two could then share one.
     allow_reuse_address = os.name == "posix"
+
+    def __init__(self, session: PlaySession, port: int = 0) -> None:
+        self.session, self.finished = session, threading.Event()
+        self.files: Mapping[str, Path] = {}
+        self.page, self.once = (f"/{secrets.token_urlsafe(24)}/" for _ in range(2))
+        self.is_once_used = threading.Lock()
+        try:
+            super().__init__((HOST, port), _Handler)
+        except OSError as error:
+            problem = Problem("--port", f"cannot be used: {reason_of(error)}", found=str(port))
+            raise SpecError(problem) from error
+        self.hosts = (f"{HOST}:{self.server_port}", f"localhost:{self.server_port}")
+        self.address = f"http://{self.hosts[0]}{self.page}"
+        self.one_time_address = f"http://{self.hosts[0]}{self.once}"
+
+    def __enter__(self) -> Server:
+        threading.Thread(target=self.serve_forever, daemon=True).start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.shutdown()
+        self.server_close()
 
     def server_bind(self) -> None:
         """Bind without asking the network for the machine's name, which may take long."""
@@ -182,45 +106,77 @@ class _Listener(ThreadingHTTPServer):
             super().handle_error(request, client_address)
 
 
+class _Answer(BaseModel):
+    """An answer as the page sends it: picks, and the numbers of each where they have some."""
+
+    model_config = ConfigDict(strict=True)
+    change: int
+    picks: list[int]
+    numbers: list[list[int | float]] = []
+
+
 class _Handler(BaseHTTPRequestHandler):
-    server_of: Server
-    timeout = _TIMEOUT_S
+    server: Server
+    timeout = 30.0
     protocol_version = "HTTP/1.1"
     server_version = "phyblock"
     sys_version = ""
 
     def do_GET(self) -> None:
-        """Give a file of the page, the state, or a picture."""
-        if (asked := self._admitted(changes=False)) is not None:
-            found = self.server_of.get(*asked)
-            if found is None:
-                self._refuse(404)
-            else:
-                self._send(200, *found)
+        """Give a file of the page, the state, a picture, or a file that was named."""
+        if (asked := self._admitted(changes=False)) is None:
+            return
+        (name, query), session, files = asked, self.server.session, self.server.files
+        if name in _PAGE:
+            file, kind = _PAGE[name]
+            self._send(200, kind, asset(file))
+        elif name == "state" and (after := _STATE.fullmatch(query)):
+            told = session.state(int(after[1] or -1), _WAIT_S)
+            self._send(200, "application/json", json.dumps(told).encode())
+        elif (at := _PICTURE.fullmatch(name)) and (
+            shown := session.picture(*map(int, at.groups()))
+        ):
+            self._send(200, "image/png", shown.data)
+        elif drawn := session.drawn(name):
+            self._send(200, "image/png", drawn)
+        elif name in files:
+            kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
+            # These bring a policy of their own.
+            self._send(200, kind, files[name].read_bytes(), "frame-ancestors 'none'")
+        else:
+            self._refuse(404)
 
     def do_POST(self) -> None:
         """Take an answer, a pause, a beginning, an end."""
         if (asked := self._admitted(changes=True)) is None:
             return
-        length = self.headers.get("Content-Length", "")
+        length, session = self.headers.get("Content-Length", ""), self.server.session
+        actions: dict[str, Callable[[], None]] = {
+            **{"begin": session.begin, "pause": session.pause},
+            "finish": self.server.finished.set,
+        }
         if not length.isascii() or not length.isdigit():
             self._refuse(411)
-            return
-        if len(length) > 9 or int(length) > LARGEST_BODY_BYTES:
+        elif len(length) > 9 or int(length) > LARGEST_BODY_BYTES:
             self._refuse(413)
-            return
-        try:
-            body = load_json(self.rfile.read(int(length)))
-            is_known = self.server_of.post(asked[0], body if isinstance(body, dict) else {})
-        except NotNowError:
-            self._refuse(409)
-        except ValueError as error:
-            self._refuse(400, str(error).encode())
+        elif (name := asked[0]) != "answer" and name not in actions:
+            self._refuse(404)
         else:
-            if is_known:
-                self._send(200, "application/json", b"{}")
+            try:
+                body = load_json(self.rfile.read(int(length)))
+                if name in actions:
+                    actions[name]()
+                else:
+                    given = _Answer.model_validate(body)
+                    numbers = given.numbers or [[] for _ in given.picks]
+                    pairs = zip(given.picks, map(tuple, numbers), strict=True)
+                    session.answer(given.change, [Pick(*pair) for pair in pairs])
+            except NotNowError:
+                self._refuse(409)
+            except ValueError as error:
+                self._refuse(400, str(error).encode())
             else:
-                self._refuse(404)
+                self._send(200, "application/json", b"{}")
 
     def _admitted(self, *, changes: bool) -> tuple[str, str] | None:
         """Return the name that is asked for and its query; None where the request was refused."""
@@ -230,29 +186,31 @@ class _Handler(BaseHTTPRequestHandler):
             self._refuse(400)
             return None
         hosts, origin = self.headers.get_all("Host", []), self.headers.get("Origin")
-        origins = [f"http://{host}" for host in self.server_of.hosts]
-        name = self.server_of.below(split.path)
+        origins = [f"http://{host}" for host in self.server.hosts]
+        path, page, once = (
+            split.path.encode(),
+            *map(str.encode, (self.server.page, self.server.once)),
+        )
         if split.netloc:
             # A whole address is for proxies, and Pythons differ in which hosts they take.
             self._refuse(404)
-        elif len(hosts) != 1 or hosts[0] not in self.server_of.hosts:
+        elif len(hosts) != 1 or hosts[0] not in self.server.hosts:
             self._refuse(421)
         elif (origin is None and changes) or (origin is not None and origin not in origins):
             self._refuse(403)
-        elif not changes and self.server_of.is_code(split.path):
-            page = self.server_of.use_code()
-            if page is None:
-                self._refuse(410, _USED)
+        elif not changes and secrets.compare_digest(path, once):
+            if self.server.is_once_used.acquire(blocking=False):
+                self._send(303, "text/plain", b"", Location=self.server.page)
             else:
-                self._send(303, "text/plain", b"", Location=page)
-        elif name is None:
+                self._refuse(410, _USED)
+        elif not secrets.compare_digest(path[: len(page)], page):
             self._refuse(404)
         elif changes and self.headers.get("Content-Type") != "application/json":
             self._refuse(415)
         elif self.headers.get("Transfer-Encoding") is not None:
             self._refuse(411)
         else:
-            return name, split.query
+            return split.path[len(page) :], split.query
         return None
 
     def _refuse(self, status: int, why: bytes = b"") -> None:
@@ -273,10 +231,9 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
         self.wfile.write(content)
 
-    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+    def send_error(self, code: int, *_: object, **__: object) -> None:
         """Refuse what is no request at all as everything else, with nothing of it repeated."""
-        del message, explain
         self._refuse(code)
 
-    def log_message(self, format: str, *args: object) -> None:
+    def log_message(self, *_: object) -> None:
         """Say nothing: the terminal is the run's."""

@@ -56,11 +56,6 @@ class Person:
         """The name in records and tables."""
         return f"{HUMAN}{self.name}"
 
-    def planned(self) -> ModelConfig:
-        """Return the person in a plan; another prompt makes another run."""
-        params: dict[str, JsonValue] = {"exact": True} if self.is_exact else {}
-        return ModelConfig(name=self.model, extra_body=params, max_concurrency=1)
-
 
 def plan_session(suite: Suite, person: Person, limit: int | None) -> RunPlan:
     """Plan the run of one person: a suite asked once, with its first seed.
@@ -73,7 +68,10 @@ def plan_session(suite: Suite, person: Person, limit: int | None) -> RunPlan:
         found = ", ".join(suite.vary.factors)
         raise SpecError(Problem(suite.where("vary"), message, "vary", found, hint=hint))
     once = suite.model_copy(update={"seeds": suite.seeds[:1]})
-    return make_plan(once, {}, limit=limit, people=[person.planned()])
+    # Another prompt makes another run.
+    params: dict[str, JsonValue] = {"exact": True} if person.is_exact else {}
+    planned = ModelConfig(name=person.model, extra_body=params, max_concurrency=1)
+    return make_plan(once, {}, limit=limit, people=[planned])
 
 
 @dataclass(frozen=True)
@@ -87,8 +85,8 @@ class Given:
 class PersonModel:
     """A model that answers a request with the reply that a person's picks make at a page.
 
-    Before the first, the person may try the page on a scene of level 1 that the run leaves out;
-    nothing of it is kept.
+    Before the first plan that is asked for in one reply, the person may try the page on a scene of
+    level 1 that the run leaves out, where there is one; nothing of it is kept.
     """
 
     needs_messages = True
@@ -96,7 +94,11 @@ class PersonModel:
     def __init__(self, name: str, plan: RunPlan, session: PlaySession) -> None:
         self.name = name
         self._plan, self._session = plan, session
-        self._spare = _spare_scene(plan)
+        self._spare, track = None, plan.tracks[0]
+        if isinstance(track, SceneTrack) and not track.plays:
+            used = {task.scene.id for task in plan.dataset.tasks}
+            left = (task for task in track.dataset.tasks if task.scene.id not in used)
+            self._spare = next((task for task in left if 1 in task.scene.levels), None)
 
     async def ask(self, request: Request) -> Reply:
         """Return the reply, in the form that the prompt asks for; HaltedError after the end."""
@@ -132,18 +134,6 @@ class PersonModel:
 
     async def aclose(self) -> None:
         """Do nothing: nothing is held open."""
-
-
-def _spare_scene(plan: RunPlan) -> AssemblyTask | None:
-    """Return a scene of level 1 that no item of the plan shows; None where plans are not asked for
-    in one reply, or no such scene is left.
-    """
-    track = plan.tracks[0]
-    if track.plays or not isinstance(track, SceneTrack):
-        return None
-    used = {task.scene.id for task in plan.dataset.tasks}
-    spare = (task for task in track.dataset.tasks if task.scene.id not in used)
-    return next((task for task in spare if 1 in task.scene.levels), None)
 
 
 def pictures_of(request: Request) -> tuple[Image, ...]:
@@ -220,9 +210,8 @@ class PlaySession:
         self._changed = threading.Condition()
         self._number = 0
         self._phase: Phase = "waiting"
+        self._told: Mapping[str, Any] = {}
         self._asked: _Asked | None = None
-        self._name = ""
-        self._warm_up: Mapping[str, Any] = {}
         self._is_exact = False
         self._ending: Ending | None = None
 
@@ -285,14 +274,8 @@ class PlaySession:
         """Return what a page shows; wait for a change after number `after`, this long at most."""
         with self._changed:
             self._changed.wait_for(lambda: self._number != after, wait_s)
-            told: dict[str, Any] = {"change": self._number, "phase": self._phase}
-            if self._phase == "start":
-                told["about"] = {"name": self._name, "done": self.done, "of": self._of}
-            elif self._phase == "warmed":
-                told["went"] = self._warm_up
-            elif self._phase == "done" and self._ending is not None:
-                told["results"] = self._ending.shown
-            elif self._asked is not None and self._phase == "question":
+            told: dict[str, Any] = {"change": self._number, "phase": self._phase, **self._told}
+            if self._asked is not None and self._phase == "question":
                 asked, now_s = self._asked, self._clock()
                 # The clock starts when the question is first given out.
                 asked.since_s = now_s if asked.since_s is None else asked.since_s
@@ -317,19 +300,17 @@ class PlaySession:
     def welcome(self, name: str) -> None:
         """Say what comes, to a person of this name."""
         with self._changed:
-            self._name = name
-            self._go_to("start")
+            self._go_to("start", about={"name": name, "done": self.done, "of": self._of})
 
     def warmed(self, went: Mapping[str, Any]) -> None:
         """Show how the warm-up went."""
         with self._changed:
-            self._warm_up = went
-            self._go_to("warmed")
+            self._go_to("warmed", went=went)
 
     def begin(self) -> None:
-        """Show questions from now on."""
+        """Show questions from now on, after a welcome, a warm-up or a pause."""
         with self._changed:
-            if self._phase not in ("start", "warmed"):
+            if self._phase not in ("start", "warmed", "paused"):
                 raise NotNowError
             self._go_to("waiting" if self._asked is None else "question")
 
@@ -354,17 +335,11 @@ class PlaySession:
             asked.before_s, asked.since_s = asked.seen_s(self._clock()), None
             self._go_to("paused")
 
-    def resume(self) -> None:
-        """Show the question again."""
-        with self._changed:
-            self._expect("paused")
-            self._go_to("question")
-
     def finish(self, ending: Ending) -> None:
         """Show how it went: the session is over."""
         with self._changed:
             self._ending = ending
-            self._go_to("done")
+            self._go_to("done", results=ending.shown)
 
     def close(self) -> None:
         """Take nothing more; a question on show is given up."""
@@ -374,16 +349,13 @@ class PlaySession:
         if asked is not None:
             asked.answer.set_exception(HaltedError("the session was closed"))
 
-    def _expect(self, phase: Phase, change: int | None = None) -> None:
-        if self._phase != phase or change not in (None, self._number):
-            raise NotNowError
-
     def _on_show(self, change: int | None = None) -> _Asked:
-        self._expect("question", change)
+        if self._phase != "question" or change not in (None, self._number):
+            raise NotNowError
         assert self._asked is not None
         return self._asked
 
-    def _go_to(self, phase: Phase) -> None:
-        self._phase = phase
+    def _go_to(self, phase: Phase, **told: Any) -> None:
+        self._phase, self._told = phase, told
         self._number += 1
         self._changed.notify_all()

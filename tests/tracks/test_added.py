@@ -31,7 +31,7 @@ from phyblock.scoring.plan import mean_of, ratio_of
 from phyblock.tracks.base import Judgement, SceneTrack, kind_of
 from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts, TrackReport
-from phyblock.web.board import SiteRun, Sources, all_values, board_of, entries_of, values_of
+from phyblock.web.board import SiteRun, Sources, board_of, entries_of, values_of
 from tests.workspace import Workspace
 
 
@@ -237,7 +237,7 @@ def test_the_leading_measure_leads_everywhere(run: Run) -> None:
         assert comparable(run, "counting").measure == leading
         assert compare_models(run).name == leading.heading
         one = (SiteRun("run", run, Sources()),)
-        (track,) = board_of(one, entries_of(one), all_values(one))["tracks"]
+        (track,) = board_of(one, entries_of(one))["tracks"]
         assert track["main"] == main_column(run, "counting").heading
         worth = values_of(run, "counting").samples["oracle"].values()
         assert set(worth) == {leading.best}

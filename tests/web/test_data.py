@@ -23,7 +23,7 @@ from phyblock.results.estimates import headline_of
 from phyblock.results.load import load_run
 from phyblock.results.tables import write_tables
 from phyblock.web import pack
-from phyblock.web.board import SiteRun, Sources, all_values, board_of, entries_of
+from phyblock.web.board import SiteRun, Sources, board_of, entries_of
 from phyblock.web.leaderboard import check_runs_alike, write_site
 from phyblock.web.pack import Pack, pack_samples
 from phyblock.web.report import write_report
@@ -89,8 +89,8 @@ def test_the_newest_record_of_every_sample_is_there_once(
     ]
     write_run(folder, [*stale, *records], facts)
     run = [SiteRun("run", load_run(folder), Sources())]
-    entries_of_run, values = entries_of(run), all_values(run)
-    index = pack_samples(folder, "build", run, entries_of_run, values, failures=6)
+    entries_of_run = entries_of(run)
+    index = pack_samples(folder, "build", run, entries_of_run, failures=6)
     entries = entries_in(folder, index["starts"]["records"])
     by_name = {one["sample"]: one for one in records}
     rows = index["rows"]
@@ -163,7 +163,7 @@ def test_scenes_are_drawn_from_where_they_are_and_from_no_other_data(
 
 def test_boards_say_what_tables_say(made: Workspace) -> None:
     one = (SiteRun("run", load_run(made.out), Sources()),)
-    board = board_of(one, entries_of(one), all_values(one))
+    board = board_of(one, entries_of(one))
     tracks = {track["name"]: track for track in board["tracks"]}
     assert tracks["step_planning"]["main"] == "F1 of attempts"
     for column in board["columns"]:
@@ -230,7 +230,7 @@ def planned(
 
 def test_only_whole_models_have_ranks() -> None:
     def board(*runs: SiteRun) -> dict[str, dict[str, Any]]:
-        rows = board_of(runs, entries_of(runs), all_values(runs))["rows"]
+        rows = board_of(runs, entries_of(runs))["rows"]
         return {row["name"]: row for row in rows}
 
     def ranks_of(*runs: SiteRun) -> dict[str, Any]:

@@ -91,7 +91,7 @@ def test_the_clock_runs_from_the_first_look_and_stands_still_in_pauses() -> None
             (100.0, session.begin),
             (200.0, lambda: session.state(-1)),
             (203.0, session.pause),
-            (400.0, session.resume),
+            (400.0, session.begin),
         ):
             clock.now = now
             act()
@@ -225,11 +225,11 @@ def ask(
         usual["Content-Type"] = "application/json"
         usual["Content-Length"] = str(len(body or b""))
     given = {name.replace("_", "-"): value for name, value in headers.items()}
-    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)
+    connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=10)
     connection.putrequest(method, path.format(token=token(server)), skip_host=True)
     for name, value in {**usual, **given}.items():
         if value is not None:
-            connection.putheader(name, value.format(port=server.port))
+            connection.putheader(name, value.format(port=server.server_port))
     connection.endheaders(body)
     answer = connection.getresponse()
     found = Answer(answer.status, dict(answer.headers), answer.read())
@@ -238,12 +238,12 @@ def ask(
 
 
 def test_it_listens_on_the_loopback_address_alone(server: Server, session: PlaySession) -> None:
-    assert server.address.startswith(f"http://127.0.0.1:{server.port}/")
+    assert server.address.startswith(f"http://127.0.0.1:{server.server_port}/")
     # The whole of 127/8 is this machine: another address of it is not answered.
     with pytest.raises(ConnectionRefusedError):
-        socket.create_connection(("127.0.0.2", server.port), timeout=5)
+        socket.create_connection(("127.0.0.2", server.server_port), timeout=5)
     with pytest.raises(SpecError, match="--port: cannot be used"):
-        Server(session, server.port)
+        Server(session, server.server_port)
 
 
 def test_a_page_of_its_own_is_answered_and_may_load_nothing_from_elsewhere(server: Server) -> None:
@@ -349,18 +349,18 @@ def test_only_files_that_were_named_are_served_and_a_fault_of_ours_is_seen(
     names = ("report.html", "run.yaml", "gone.html")
     for name in names[:2]:
         (tmp_path / name).write_text("secret", encoding="utf-8")
-    server.show_files({name: tmp_path / name for name in names if name != "run.yaml"})
+    server.files = {name: tmp_path / name for name in names if name != "run.yaml"}
     assert ask(server, path="/{token}/report.html").status == 200
     assert ask(server, path="/{token}/run.yaml").status == 404
     with pytest.raises(http.client.RemoteDisconnected):
         ask(server, path="/{token}/gone.html")
     until_idle()
-    server.show_files({})
+    server.files = {}
     assert "FileNotFoundError" in capfd.readouterr().err
 
 
 def send(server: Server, content: bytes) -> socket.socket:
-    connection = socket.create_connection(("127.0.0.1", server.port), timeout=10)
+    connection = socket.create_connection(("127.0.0.1", server.server_port), timeout=10)
     connection.sendall(content)
     return connection
 

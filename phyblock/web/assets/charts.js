@@ -45,7 +45,7 @@ const Charts = (() => {
           lo === null ? null : el("i", { class: "interval", style: { left: at(lo), width: `calc(${at(hi)} - ${at(lo)})` } }),
           lines.map(([, value, kind]) => el("i", { class: `line ${kind}`, style: { left: at(value) } }))),
         el("td", { class: "number main" }, number(value), lo === null ? null : el("span", { class: "unseen" }, `, interval ${number(lo)} to ${number(hi)}`)),
-        hasSolved ? el("td", { class: "number" }, number(fact.solved, 0), el("span", { class: "muted" }, ` / ${number(fact.done, 0)}`)) : null,
+        hasSolved ? el("td", { class: "number" }, number(fact.solved, 0), el("span", { class: "muted" }, ` / ${number(fact.recorded, 0)}`)) : null,
         levels.length ? el("td", { class: "text" }, sparkline(row, levels, most)) : null);
     };
     return scrolled(`Bars of ${track.title}`, el("table", { class: "bars" },

@@ -64,7 +64,7 @@
     paused() {
       card(el("h1", {}, "Paused"),
         el("p", {}, "The clock stands still. All that you submitted is kept; you may also close this page and go on another day."),
-        button("Go on", () => post("resume")));
+        button("Go on", () => post("begin")));
     },
     closed() {
       card(el("h1", {}, "The session was closed"), el("p", {}, "All that you submitted is kept."));

@@ -116,7 +116,7 @@ const Results = (() => {
   // ---- how it was done
 
   function method({ runs, rows }) {
-    const samples = rows.flatMap((row) => Object.values(row.facts)).reduce((sum, fact) => sum + fact.done, 0);
+    const samples = rows.flatMap((row) => Object.values(row.facts)).reduce((sum, fact) => sum + fact.recorded, 0);
     const dates = [...new Set(runs.map((run) => run.date).filter(Boolean).sort())];
     const verified = runs.filter((run) => run.verified).length, suite = runs[0].suite || "full", isOfficial = runs[0].data === "official";
     const where = isOfficial ? " --set dataset.path=FOLDER   # a checkout of the official repository" : "";

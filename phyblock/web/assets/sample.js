@@ -135,7 +135,7 @@ const Sample = (() => {
 
   /** By how many places the letters of a sample are turned against those that are shown. */
   function turned(question, { answer }) {
-    return answer?.right ? LETTERS.indexOf(question.answer[0]) - LETTERS.indexOf(answer.right[0]) : 0;
+    return answer?.right ? LETTERS.indexOf(question.answer_letters[0]) - LETTERS.indexOf(answer.right[0]) : 0;
   }
 
   /** The letters that a sample gave, as the options are lettered here. */

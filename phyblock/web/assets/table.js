@@ -55,12 +55,15 @@ const Table = (() => {
     });
   }
 
-  /** Facts of a model's samples: name, heading, digits or dollars, and the sense in which less is better. */
+  /** What a solved sample cost; null where it is not known. */
+  const perSolved = ({ solved, replies, cost_per_100_usd: cost }) => (solved && cost !== null ? (cost * replies) / 100 / solved : null);
+
+  /** Facts of a model's samples: value, heading, digits or dollars, and the sense in which less is better. */
   const FACTS = [
-    ["solved", "Solved", (n) => number(n, 0)], ["usd_per_solved", "USD a solved {item}", dollars, "lower"],
-    ["usd_per_100", "USD for 100 replies", dollars, "lower"], ["prompt_tokens", "Tokens in", (n) => number(n, 0), "lower"],
-    ["completion_tokens", "Tokens out", (n) => number(n, 0), "lower"], ["latency_s", "Seconds", (n) => number(n, 2), "lower"],
-    ["done", "Samples done", (n) => number(n, 0)], ["failed", "Not read or failed", (n) => number(n, 0), "lower"],
+    [(fact) => fact.solved, "Solved", (n) => number(n, 0)], [perSolved, "USD a solved {item}", dollars, "lower"],
+    [(fact) => fact.cost_per_100_usd, "USD for 100 replies", dollars, "lower"], [(fact) => fact.prompt_tokens, "Tokens in, mean", (n) => number(n, 0), "lower"],
+    [(fact) => fact.completion_tokens, "Tokens out, mean", (n) => number(n, 0), "lower"], [(fact) => fact.latency_median_s, "Seconds, median", (n) => number(n, 2), "lower"],
+    [(fact) => fact.recorded, "Samples done", (n) => number(n, 0)], [(fact) => fact.recorded - fact.ok, "Not read or failed", (n) => number(n, 0), "lower"],
   ];
 
   /** All numbers of a track: values by setting, then what its samples took, then the run. */
@@ -75,8 +78,8 @@ const Table = (() => {
         return { text: number(value), below: lo === null ? "" : `${number(lo)} to ${number(hi)}`, href };
       },
     }));
-    const facts = FACTS.map(([name, heading, text, better = "higher"]) => {
-      const value = (row) => row.facts[track.name]?.[name] ?? null;
+    const facts = FACTS.map(([of, heading, text, better = "higher"]) => {
+      const value = (row) => (row.facts[track.name] ? of(row.facts[track.name]) : null);
       return { heading: heading.replace("{item}", track.item), over: "Samples and cost", better, value, cell: (row) => ({ text: text(value(row)) }) };
     }).filter(({ value }) => board.rows.some((row) => value(row) !== null));
     const columns = [...values, ...facts, ...ofRuns()];
@@ -115,10 +118,10 @@ const Table = (() => {
 
   /** The share of samples that were answered, why no more, and whether that leaves the row without a rank. */
   function lacking(row, track) {
-    const fact = row.facts[track.name], isCut = fact.done < fact.expected;
-    const counted = row.lacking[track.name] || (isCut ? `${number(fact.done, 0)} of ${number(fact.expected, 0)} samples` : "");
+    const fact = row.facts[track.name], isCut = fact.recorded < fact.expected;
+    const counted = row.lacking[track.name] || (isCut ? `${number(fact.recorded, 0)} of ${number(fact.expected, 0)} samples` : "");
     return isCut ? `${counted}; no rank` : counted;
   }
 
-  return { made, sorted, numbers, written, rank, lacking };
+  return { made, sorted, numbers, perSolved, written, rank, lacking };
 })();
