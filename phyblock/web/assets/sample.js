@@ -119,7 +119,7 @@ const Sample = (() => {
       shown.length ? el("div", { class: "pictures" }, shown.map((one) => pictureOf(question, one.label, sample))) : null,
       el("ol", { class: question.options.every(isPicture) ? "options pictured" : "options" },
         question.options.map((option, i) => optionOf(question, samples, option, LETTERS[i]))),
-      folded("Evidence: what the right answer was worked out from", evidence(question.evidence)));
+      folded("Evidence: what the right answer was computed from", evidence(question.evidence)));
   }
 
   /** A picture of the question: the one that was sent, where it is at hand, else drawn. */
@@ -145,7 +145,7 @@ const Sample = (() => {
   }
 
   function optionOf(question, samples, option, letter) {
-    const { answer } = question, isOrder = answer.length > 1, isRight = answer === letter;
+    const { answer_letters: answer } = question, isOrder = answer.length > 1, isRight = answer === letter;
     const marks = [isOrder ? `right place ${answer.indexOf(letter) + 1}` : isRight ? "✓ right" : null];
     for (const { record, name } of samples) {
       const letters = given(question, record), by = samples.length > 1 ? ` by ${name}` : "";
