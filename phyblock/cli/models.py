@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import click
 from PIL import Image as PillowImage
@@ -21,7 +21,7 @@ from phyblock.config.models import (
 )
 from phyblock.config.suite import Suite
 from phyblock.errors import ModelError, Problem, SpecError
-from phyblock.models.costs import ends_on, is_billed, tariff_of
+from phyblock.models.costs import is_billed, tariff_of
 from phyblock.models.keys import api_key_status
 from phyblock.models.litellm_client import be_quiet
 from phyblock.models.model import RetryPolicy, build_model
@@ -30,8 +30,6 @@ from phyblock.records.record import Reply
 from phyblock.registry import baseline_names
 from phyblock.run.plan import find_models_file, to_config
 from phyblock.text import counted, did_you_mean
-
-_TIERS = " .. "
 
 
 @click.group(invoke_without_command=True)
@@ -52,12 +50,8 @@ def models(ctx: click.Context, models_file: str | None) -> None:
         groups["in no group" if len(others) < len(known) else "models"] = others
     for title, names in groups.items():
         rows = [_row(name, _config(name, known)) for name in names]
-        headings = (title, "id", "key", "ends", "$/M in, out")
-        kept = [i for i in range(len(headings)) if i != 3 or any(row[3] for row in rows)]
-        cells = [[row[i] for i in kept] for row in rows]
-        print_rows(console, [headings[i] for i in kept], cells, numbers=1)
+        print_rows(console, (title, "id", "key", "$/M in, out"), rows, numbers=1)
     console.print(f"{counted(len(known), 'model')} in {shown_path(path)}")
-    console.print(f"Of prices a{_TIERS}b, b is that of the longest prompts.", style="dim")
 
 
 def _config(name: str, known: Mapping[str, ModelConfig]) -> ModelConfig:
@@ -66,9 +60,9 @@ def _config(name: str, known: Mapping[str, ModelConfig]) -> ModelConfig:
 
 
 def _row(name: str, config: ModelConfig) -> tuple[str, ...]:
-    """Return name, id, key, the day on which its provider ends it, and its prices."""
+    """Return name, id, state of the key, and the prices of short prompts."""
     if config.kind != "litellm":
-        return (name, str(config.recording or config.kind), "", "", "0, 0")
+        return (name, str(config.recording or config.kind), "", "0, 0")
     status = api_key_status(config)
     if status.fault:
         key = "cannot be sent"
@@ -76,16 +70,9 @@ def _row(name: str, config: ModelConfig) -> tuple[str, ...]:
         key = "set"
     else:
         key = f"needs {status.variables[0]}" if status.is_needed else "not needed"
-    tariff, ends = tariff_of(config), ends_on(config)
-    tiers = [] if tariff is None else [tariff, *tariff.tiers]
-    usd = f"{_usd(one.input for one in tiers)}, {_usd(one.output for one in tiers)}"
-    return (name, config.id, key, ends.isoformat() if ends else "", usd if tiers else "unknown")
-
-
-def _usd(dollars: Iterable[float]) -> str:
-    """Return the price of short prompts, and that of the longest if it differs."""
-    shown = [f"{usd:.3f}".rstrip("0").rstrip(".") for usd in dollars]
-    return _TIERS.join(dict.fromkeys((*shown[:1], *shown[-1:])))
+    tariff = tariff_of(config)
+    price = f"{tariff.input:.10g}, {tariff.output:.10g}" if tariff else "unknown"
+    return (name, config.id, key, price)
 
 
 @models.command()

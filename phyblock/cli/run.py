@@ -36,7 +36,6 @@ from phyblock.cli.progress import ProgressView
 from phyblock.cli.results import show_tables
 from phyblock.config.models import load_models
 from phyblock.files import OutFolder
-from phyblock.models.costs import price_source
 from phyblock.results.text import NO_VALUE, REPORT_FILE, TABLES, Column, TextTable, kept_summary
 from phyblock.run.estimate import Estimate, estimate, may_bill
 from phyblock.run.plan import (
@@ -167,7 +166,7 @@ def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressV
 
 
 def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> None:
-    """Print the calls, tokens and cost of each model, their sums, and the sources of prices."""
+    """Print the calls, tokens and cost of each model, and their sums."""
     items = [counted(len(track.items), kind_of(track.name).item) for track in plan.tracks]
     facts = [f"{', '.join(items)} of {plan.dataset.name}", counted(len(plan.suite.seeds), "seed")]
     if len(plan.variants) > 1:
@@ -178,6 +177,7 @@ def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) ->
         "samples": lambda row: f"{row.samples:,}",
         "done": lambda row: f"{row.done:,}",
         "cached": lambda row: f"{row.cached:,}",
+        "in batches": lambda row: f"{row.waiting:,}",
         "calls": lambda row: f"{row.calls:,}",
         "tokens in": lambda row: f"{row.prompt_tokens:,}",
         "tokens out": lambda row: f"{row.replies[0]:,.0f}",
@@ -185,44 +185,27 @@ def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) ->
         "at most": lambda row: _dollars(row.most_usd) if row.calls else NO_VALUE,
     }
     cells = {heading: [text(row) for row in asked] for heading, text in columns.items()}
-    cells = {heading: texts for heading, texts in cells.items() if set(texts) != {"0"}}
+    cells = {heading: texts for heading, texts in cells.items() if set(texts) - {"0"}}
     headings = (Column("model", is_text=True), *map(Column, cells))
     lines = tuple(zip((row.model.name for row in asked), *cells.values(), strict=True))
-    print_table(console, TextTable(f"{plan.suite.name}: {', '.join(facts)}", headings, lines))
-    if free := [row.model.name for row in rows if row.model.kind != "litellm"]:
-        console.print(f"Without a call: {', '.join(free)}.")
+    notes: tuple[str, ...] = ()
     left = [row for row in rows if row.calls]
+    if left:
+        notes = (
+            "Tokens are estimates: texts by their words, pictures by the provider's rule, replies "
+            "as long as the model's earlier ones, or of usual length if there are none. At most: "
+            "every reply is as long as its limit allows.",
+        )
+    print_table(
+        console, TextTable(f"{plan.suite.name}: {', '.join(facts)}", headings, lines, notes)
+    )
     known = [row for row in left if row.cost_usd is not None]
     prompts, replies = sum(r.prompt_usd for r in known), sum(r.replies[1] for r in known)
-    costs = []
-    if known or not left:
-        parts = f" (prompts {_dollars(prompts)}, replies {_dollars(replies)})" if known else ""
-        costs.append(f"about {_dollars(prompts + replies)}{parts}")
+    parts = f" (prompts {_dollars(prompts)}, replies {_dollars(replies)})" if known else ""
+    costs = [f"about {_dollars(prompts + replies)}{parts}"] if known or not left else []
     if unknown := len(left) - len(known):
         costs.append(f"unknown cost of {counted(unknown, 'model')} (give a price in models.yaml)")
     console.print(f"{counted(sum(row.calls for row in left), 'call')}, {' and '.join(costs)}.")
-    by_source: dict[str, list[str]] = {}
-    for row in left:
-        if row.tariff is not None:
-            by_source.setdefault(price_source(row.model), []).append(row.model.name)
-    if by_source:
-        sources = [f"{source} ({', '.join(names)})" for source, names in by_source.items()]
-        console.print(f"Prices: {'; '.join(sources)}.")
-    for row in rows:
-        if row.waiting:
-            console.print(
-                f"{counted(row.waiting, 'call')} of {row.model.name} are in batches already."
-            )
-    if batched := [row.model.name for row in left if row.model.batch]:
-        text = f"In batches: {', '.join(batched)}; answers come within a day, at the batch price."
-        console.print(text, style="dim")
-    if left:
-        text = (
-            "Tokens are estimates: texts by their words, pictures by the provider's rule, replies "
-            "as long as the model's earlier ones, or of usual length if there are none. At most: "
-            "every reply is as long as its limit allows."
-        )
-        console.print(text, style="dim")
 
 
 def _dollars(cost_usd: float | None) -> str:

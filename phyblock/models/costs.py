@@ -14,8 +14,6 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from datetime import date
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -74,11 +72,6 @@ def _halved(rate: _RateT) -> _RateT:
     """Return the rate with half its price for batches, unless it has one for them."""
     half = {name: None if usd is None else usd / 2 for name, usd in rate if name in _MAP_KEYS}
     return rate if rate.batch else rate.model_copy(update={"batch": Price.model_validate(half)})
-
-
-def price_source(config: ModelConfig) -> str:
-    """Return the source of a model's price."""
-    return "the models file" if config.price else f"litellm {version('litellm')} map"
 
 
 def price_at(tariff: Tariff, prompt_tokens: int = 0, *, batched: bool = False) -> Price:
@@ -147,14 +140,6 @@ def mapped_providers() -> frozenset[str]:
     """Return the providers of the map's models."""
     named = (str(entry.get("litellm_provider", "")) for entry in _map_entries().values())
     return frozenset(filter(None, named))
-
-
-def ends_on(config: ModelConfig) -> date | None:
-    """Return the day from which a model no longer answers; None where the map names none."""
-    try:
-        return date.fromisoformat(str(map_entry(config).get("deprecation_date")))
-    except ValueError:
-        return None
 
 
 def _mapped_tariff(config: ModelConfig) -> Tariff | None:

@@ -21,7 +21,7 @@ from phyblock.config.models import ModelConfig, group_names, load_models
 from phyblock.config.suite import Suite
 from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.models.client import Answer, HttpClient
-from phyblock.models.costs import ends_on, map_entry
+from phyblock.models.costs import map_entry
 from phyblock.models.keys import KEYLESS
 from phyblock.models.model import RetryPolicy
 from phyblock.models.request import Message
@@ -280,10 +280,11 @@ def faults(models: Mapping[str, ModelConfig]) -> Iterator[str]:
         asked = config(name, spec)
         if asked.provider in KEYLESS:
             continue
-        entry, end = map_entry(asked), ends_on(asked)
+        entry = map_entry(asked)
+        end = entry.get("deprecation_date")
         if not entry:
             yield f"{name} ({asked.id}) is unknown"
-        elif end is not None and end <= AS_OF:
+        elif end is not None and date.fromisoformat(str(end)) <= AS_OF:
             yield f"{name} ({asked.id}) is retired since {end}"
         elif not entry.get("supports_vision") or entry.get("mode") != "chat":
             yield f"{name} ({asked.id}) is shown no pictures, or does not chat"
