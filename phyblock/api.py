@@ -32,11 +32,12 @@ from phyblock.config.suite import Suite as ConfigSuite
 from phyblock.config.suite import load_suite as read_suite
 from phyblock.config.validation import problems_of
 from phyblock.data.base import AssemblyTask
+from phyblock.data.lookup import open_dataset
 from phyblock.errors import Problem, SpecError
-from phyblock.files import bundled, write_named
+from phyblock.files import write_named
 from phyblock.results.load import Run, load_run
 from phyblock.run.estimate import may_bill
-from phyblock.run.plan import find_models_file, find_suite, make_plan, open_dataset, prompt_dirs
+from phyblock.run.plan import find_models_file, find_suite, make_plan, prompt_dirs
 from phyblock.run.runner import RunEvent, RunResult, Session, Stopping, check_ready
 from phyblock.sim.pictures import PictureStyle, candidates_png, composite_png, goal_png, goal_style
 from phyblock.text import counted, did_you_mean
@@ -197,8 +198,7 @@ def load_suite(suite: Place, *overrides: str) -> Suite:
     Raises SpecError with all that is wrong, each with its file, line and field.
     """
     path = find_suite(str(suite))
-    data, prompts = bundled("benchmarks", "data"), prompt_dirs(path)
-    return Suite(read_suite(path, overrides, data_dir=data, prompt_dirs=prompts))
+    return Suite(read_suite(path, overrides, prompt_dirs=prompt_dirs(path)))
 
 
 @checked

@@ -19,7 +19,6 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
 from functools import partial
 from importlib.metadata import version
 from itertools import zip_longest
@@ -63,8 +62,6 @@ _LARGEST_BYTES = 128 * _MB
 _BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, RuntimeError)
 _SHOWN = ("prompt", "pictures")
 """Parts of a track's identity that say what models were shown."""
-_EARLIEST, _CLOCKS = datetime(2025, 1, 1, tzinfo=UTC), timedelta(days=1)
-"""Bounds of times in records: the earliest one, and how far clocks may differ."""
 _HINT = "ask for the bundle again, or make it again with phyblock bundle"
 _NEVER_VERIFIED = (
     "The bytes of pictures: what they are drawn from is compared.",
@@ -156,7 +153,7 @@ def opened_bundle(path: Path, data: Sequence[Path] = ()) -> Iterator[Verified]:
         prompts = _Prompts(folder, here, is_ours=made_by == version("phyblock"))
         counted = ("items", "scenes", "scenes_by_level")
         differ = [name for name in counted if getattr(here, name) != getattr(judged, name)]
-        differ += [*prompts.differ, *([] if _is_time(here.created) else ["created"])]
+        differ += prompts.differ
         if differ or not here.models:
             raise _differs(folder / MANIFEST, ", ".join(differ) or "models", made_by)
         count, seen = 0, set[str]()
@@ -168,8 +165,6 @@ def opened_bundle(path: Path, data: Sequence[Path] = ()) -> Iterator[Verified]:
                     raise _differs(where, "", made_by)
                 if not prompts.made(record):
                     raise _differs(where, "prompt", made_by)
-                if not _is_time(record.time):
-                    raise _differs(where, "time", made_by)
                 seen.add(record.sample)
         expected = design_of(here, str(path)).all_samples
         physics = ", ".join(kind.title for kind in simulating(here.suite))
@@ -183,14 +178,6 @@ def _differs(where: object, field: str, made_by: str) -> StoreError:
     return StoreError(
         Problem(str(where), message, field, hint=f"{_HINT}; it was made by phyblock {made_by}")
     )
-
-
-def _is_time(text: str) -> bool:
-    """True if a time can be that of a run; "" is none."""
-    try:
-        return not text or _EARLIEST < datetime.fromisoformat(text) < datetime.now(UTC) + _CLOCKS
-    except (TypeError, ValueError):
-        return False
 
 
 class _Prompts:

@@ -24,7 +24,7 @@ from pydantic import Field, InstanceOf, SkipValidation
 from phyblock.api import Scenes, SceneTask, checked, load_suite
 from phyblock.config.suite import Suite
 from phyblock.data.base import AssemblyTask, Dataset
-from phyblock.data.lookup import find_data_set
+from phyblock.data.lookup import find_data_set, open_dataset
 from phyblock.data.scenes import SCENES_FILE
 from phyblock.errors import Problem, SpecError
 from phyblock.making.checks import Finding, verify_scene
@@ -36,7 +36,6 @@ from phyblock.models.request import Request, wire_messages
 from phyblock.records.record import Record, Reply
 from phyblock.registry import added_measures, known_track, known_tracks
 from phyblock.run.judge import begun, judge_episode, judge_reply
-from phyblock.run.plan import open_dataset
 from phyblock.text import did_you_mean, well_formed
 from phyblock.tracks.base import Track, open_tracks
 from phyblock.tracks.items import Item

@@ -209,10 +209,8 @@ FORGED: dict[str, tuple[Change, str]] = {
     "template": (put("prompt.version", ZEROS, "vqa", "alpha"), ": prompt: "),
     "turn-prompt": (put("turns.0.prompt.messages", ZEROS, "step_planning", "alpha"), ": prompt: "),
     "label": (put("prompt.images.0.label", "answer", "vqa", "alpha"), ": prompt: "),
-    "time": (put("time", "9999-12-31T00:00:00+00:00", "full_planning"), ": time: "),
     "pictures": (put("tracks.full_planning.pictures", ZEROS), "tracks.full_planning.pictures"),
     "no-prompt": (put("tracks.full_planning.prompt", None), ": prompt: "),
-    "created": (put("created", "1999-12-31T00:00:00+00:00"), "created"),
     "no-plan": (put("suite.levels.0", [1]), re.escape("suite.levels")),
     "no-models": (_no_models, "models"),
 }

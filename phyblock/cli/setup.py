@@ -13,8 +13,8 @@ from phyblock.cli.options import UserPath, models_file_option, sets_option
 from phyblock.config.models import RECORDED, load_models
 from phyblock.config.suite import suite_model
 from phyblock.config.yaml import read_yaml
-from phyblock.data.official import read_official
-from phyblock.data.scenes import SCENES_FILE, read_builtin
+from phyblock.data.lookup import read_data_set
+from phyblock.data.scenes import SCENES_FILE
 from phyblock.errors import InputError, Problem, SpecError
 from phyblock.files import bundled, check_free, reply_cache_file, writing
 from phyblock.run.plan import (
@@ -102,9 +102,7 @@ def validate(files: tuple[Path, ...], sets: tuple[str, ...], models_file: str | 
 def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[str]:
     """Describe a file without problems, and add remarks."""
     if os.path.isdir(path) or path.name == SCENES_FILE:
-        folder = path.parent if path.name == SCENES_FILE else path
-        is_builtin = os.path.lexists(folder / SCENES_FILE)
-        dataset = read_builtin(folder) if is_builtin else read_official(folder)
+        dataset = read_data_set(str(path))
         levels = sorted({n for task in dataset.tasks for n in task.scene.levels})
         by_level = ", ".join(
             f"{sum(n in task.scene.levels for task in dataset.tasks)} of level {n}" for n in levels

@@ -39,6 +39,7 @@ from phyblock.config.validation import (
 )
 from phyblock.config.yaml import FieldPath, YamlSource, apply_overrides, dotted, expand, read_yaml
 from phyblock.errors import Problem, SpecError
+from phyblock.files import bundled
 from phyblock.registry import baseline_names, known_track, known_tracks
 from phyblock.text import did_you_mean
 from phyblock.types import (
@@ -477,18 +478,13 @@ def _composed(sections: tuple[tuple[str, type[BaseModel]], ...]) -> type[Suite]:
 
 
 def load_suite(
-    path: Path,
-    overrides: Sequence[str] = (),
-    *,
-    data_dir: Path,
-    prompt_dirs: Sequence[Path] = (),
+    path: Path, overrides: Sequence[str] = (), *, prompt_dirs: Sequence[Path] = ()
 ) -> Suite:
     """Read, override and validate a suite.
 
-    `overrides` are "key=value" texts; `data_dir` is the folder of the bundled data sets, where
-    bare names are looked up. A file in one of `prompt_dirs` that is called as a bundled prompt is
-    used in its place where the suite says `default`. Raises SpecError with all that is wrong, in
-    the order of the file.
+    `overrides` are "key=value" texts. A file in one of `prompt_dirs` that is called as a bundled
+    prompt is used in its place where the suite says `default`. Raises SpecError with all that is
+    wrong, in the order of the file.
     """
     source = read_yaml(path)
     problems = apply_overrides(source, overrides)
@@ -496,11 +492,11 @@ def load_suite(
         raise SpecError([*problems, Problem(str(path), "is empty", allowed="a suite")])
     # What varies has the values of the reference, wherever one value alone is asked for.
     suite = read_section(suite_model(), source, problems).at(Variant())
-    return suite.with_files(_files_of(suite, path, source, data_dir, prompt_dirs))
+    return suite.with_files(_files_of(suite, path, source, prompt_dirs))
 
 
 def _files_of(
-    suite: Suite, path: Path, source: YamlSource, data_dir: Path, prompt_dirs: Sequence[Path]
+    suite: Suite, path: Path, source: YamlSource, prompt_dirs: Sequence[Path]
 ) -> SuiteFiles:
     """Resolve the paths of a suite; SpecError for all that lead nowhere."""
     problems: list[Problem] = []
@@ -520,9 +516,9 @@ def _files_of(
     def data(text: str, at: FieldPath, may_be_bundled: bool) -> Path:
         if not (may_be_bundled and re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", text)):
             return existing(text, at, is_folder=True)
-        folder = data_dir.absolute() / text
+        folder = bundled("benchmarks", "data", text)
         if not os.path.isdir(folder):
-            names = sorted(known.name for known in data_dir.glob("*/"))
+            names = sorted(known.name for known in folder.parent.glob("*/"))
             message = "is not a bundled data set"
             allowed = f"a bundled data set ({', '.join(names)}), or the path of a folder"
             hint = did_you_mean(text, names) or f"for a folder beside the suite write ./{text}"
@@ -543,13 +539,13 @@ def _files_of(
         }
         own_prompt = str(functools.reduce(getattr, kind.prompt_field(), suite))
         for text, at in (prompts or {own_prompt: kind.prompt_field()}).items():
-            bundled = kind.template_for(suite.answer_format)
+            template = kind.template_for(suite.answer_format)
             if text not in PROMPT_WORDS:
                 templates[name, text] = existing(text, at)
-            elif text == "default" and bundled is not None:
-                near = (folder.absolute() / bundled.name for folder in prompt_dirs)
+            elif text == "default" and template is not None:
+                near = (folder.absolute() / template.name for folder in prompt_dirs)
                 custom = next((file for file in near if os.path.isfile(file)), None)
-                if custom and not filecmp.cmp(custom, str(bundled), shallow=False):
+                if custom and not filecmp.cmp(custom, str(template), shallow=False):
                     templates[name, text] = custom
     if problems:
         raise SpecError(source.in_order(problems))

@@ -1,5 +1,6 @@
 """Data sets by the name that a person gives: a folder, a file in it, or a set of phyblock's own."""
 
+import os
 from pathlib import Path
 
 from phyblock.data.base import Dataset
@@ -16,7 +17,7 @@ def find_data_set(name: str) -> Path:
     Raises DataError that lists the bundled sets when there is no such folder.
     """
     path = Path(name)
-    if (path / SCENES_FILE).is_file() or (path / "data").is_dir():
+    if os.path.lexists(path / SCENES_FILE) or (path / "data").is_dir():
         return path
     return _file_or_bundled(path, SCENES_FILE, "data set", ", an official checkout")
 
@@ -24,7 +25,12 @@ def find_data_set(name: str) -> Path:
 def read_data_set(name: str) -> Dataset:
     """Return the data set that `name` means; DataError with everything that is wrong in it."""
     folder = find_data_set(name)
-    return read_builtin(folder) if (folder / SCENES_FILE).is_file() else read_official(folder)
+    return open_dataset("builtin" if os.path.lexists(folder / SCENES_FILE) else "official", folder)
+
+
+def open_dataset(layout: str, folder: Path) -> Dataset:
+    """Return the data set in a folder, "builtin" or "official"; DataError where it is broken."""
+    return read_official(folder) if layout == "official" else read_builtin(folder)
 
 
 def find_questions(name: str) -> Path:
@@ -38,7 +44,7 @@ def find_questions(name: str) -> Path:
 
 def _file_or_bundled(path: Path, file: str, noun: str, more: str = "") -> Path:
     """Return the folder of a data file that is named itself, or of a bundled set."""
-    if path.name == file and path.is_file():
+    if path.name == file and os.path.lexists(path):
         return path.parent
     inside = bundled("benchmarks", "data", *path.parts)
     if len(path.parts) == 1 and (inside / file).is_file():

@@ -359,8 +359,8 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         if observe == "text":
             rules = {"setting": setting, "gating": gating, "max_steps": max_steps or "null"}
             said = [f"steps.{name}={value}" for name, value in rules.items()]
-            path, folder = bundled("benchmarks", "steps.yaml"), bundled("benchmarks", "data")
-            known, suite = Dataset("env", path, tasks), load_suite(path, said, data_dir=folder)
+            path = bundled("benchmarks", "steps.yaml")
+            known, suite = Dataset("env", path, tasks), load_suite(path, said)
             self._prompter = StepPlanning(suite, known, shop=LocalShop())
         self._begin(self._task)
         self.action_space = self._play.action_space

@@ -14,10 +14,10 @@ from phyblock.config.models import RECORDED, ModelConfig, resolve_models, with_m
 from phyblock.config.suite import Suite, Variant
 from phyblock.config.yaml import read_yaml
 from phyblock.data.base import Dataset
-from phyblock.data.official import match_published, read_official, recorded_models
-from phyblock.data.scenes import SCENES_FILE, read_builtin
-from phyblock.errors import DataError, Problem, SpecError
-from phyblock.files import bundled, bundled_sets
+from phyblock.data.lookup import open_dataset
+from phyblock.data.official import match_published, recorded_models
+from phyblock.errors import Problem, SpecError
+from phyblock.files import bundled
 from phyblock.models.keys import server_address
 from phyblock.models.model import takes_format
 from phyblock.models.request import Request
@@ -212,17 +212,6 @@ def _recorded_as(folder: Path) -> dict[str, str]:
         return made
     suite = suite_of(read_manifest(folder), str(folder / MANIFEST)).at(Variant())
     return {field: attrgetter(field)(suite) for field in made}
-
-
-def open_dataset(format_name: str, path: Path) -> Dataset:
-    """Read a data set; DataError when it is not there or broken."""
-    if format_name == "official":
-        return read_official(path)
-    if path.is_dir():
-        return read_builtin(path)
-    names = ", ".join(bundled_sets(SCENES_FILE))
-    allowed = f"a folder with {SCENES_FILE}, or a bundled data set: {names}"
-    raise DataError(Problem(str(path), "is no data set", "dataset.path", allowed=allowed))
 
 
 def _planned_models(

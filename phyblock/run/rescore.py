@@ -14,12 +14,12 @@ from typing import Any
 from phyblock.config.suite import Suite, SuiteFiles
 from phyblock.config.yaml import YamlSource
 from phyblock.data.base import Dataset
+from phyblock.data.lookup import open_dataset
 from phyblock.errors import DataError, Problem, StoreError
 from phyblock.records.files import MANIFEST, Manifest, read_manifest, run_records, suite_of
 from phyblock.records.record import AskedTurn, Record, StoredError
 from phyblock.run.judge import about_item, judge_reply, judged
 from phyblock.run.manifest import asked_counts, code_versions
-from phyblock.run.plan import open_dataset
 from phyblock.run.store import locked, write_run
 from phyblock.text import counted
 from phyblock.tracks.base import CARRYING, ENGINE, Track, kind_of, open_tracks

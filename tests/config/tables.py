@@ -25,7 +25,6 @@ def table(name: str) -> list[dict[str, Any]]:
 
 def told(folder: Path, kind: str, text: str, sets: Sequence[str] = ()) -> str:
     """All that is said of a bad file, which lies in the working directory, without the folder."""
-    (folder / "data" / "phyblock-400").mkdir(parents=True, exist_ok=True)
     (folder / "brief.j2").write_text("{% block user %}go{% endblock %}", encoding="utf-8")
     path = folder / f"{kind}.yaml"
     path.write_text(text, encoding="utf-8")
@@ -35,7 +34,7 @@ def told(folder: Path, kind: str, text: str, sets: Sequence[str] = ()) -> str:
         if kind == "models":
             load_models(path)
         else:
-            load_suite(path, sets, data_dir=folder / "data")
+            load_suite(path, sets)
     except SpecError as error:
         return str(error).replace(f"{folder}/", "") + "\n"
     finally:

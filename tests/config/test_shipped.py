@@ -50,10 +50,8 @@ def test_a_shipped_file_is_valid_by_the_schema_it_names(path: Path) -> None:
 
 @pytest.mark.parametrize("path", SUITES, ids=lambda path: path.stem)
 def test_a_shipped_suite_loads_and_its_models_are_known(path: Path, tmp_path: Path) -> None:
-    for name in ("phyblock-400", "phyblock-vqa"):
-        (tmp_path / name).mkdir()
     overrides = [f"dataset.path={tmp_path}"] if path.stem in OFFICIAL_ONLY else []
-    loaded = load_suite(path, overrides, data_dir=tmp_path)
+    loaded = load_suite(path, overrides)
     assert loaded.name == path.stem
     assert loaded.description
     if loaded.models != "recorded":
@@ -61,9 +59,9 @@ def test_a_shipped_suite_loads_and_its_models_are_known(path: Path, tmp_path: Pa
 
 
 @pytest.mark.parametrize("name", sorted(OFFICIAL_ONLY))
-def test_an_official_suite_without_data_says_how_to_set_it(name: str, tmp_path: Path) -> None:
+def test_an_official_suite_without_data_says_how_to_set_it(name: str) -> None:
     with pytest.raises(SpecError) as caught:
-        load_suite(ROOT / "benchmarks" / f"{name}.yaml", data_dir=tmp_path)
+        load_suite(ROOT / "benchmarks" / f"{name}.yaml")
     (problem,) = caught.value.problems
     assert problem.field == "dataset.path"
     assert "--set dataset.path=FOLDER" in problem.hint
@@ -79,11 +77,9 @@ def test_the_list_is_that_of_the_papers_tables(official_dir: Path) -> None:
         assert rows - {"Random"} <= named
 
 
-def test_full_holds_the_models_of_table_1(tmp_path: Path) -> None:
-    for name in ("phyblock-400", "phyblock-vqa"):
-        (tmp_path / name).mkdir()
+def test_full_holds_the_models_of_table_1() -> None:
     models = load_models(ROOT / "models.yaml")
-    suite = load_suite(ROOT / "benchmarks" / "full.yaml", data_dir=tmp_path)
+    suite = load_suite(ROOT / "benchmarks" / "full.yaml")
     rows = [models[name].published for name in suite.models if name in models]
     assert rows == [name.strip() for name in PUBLISHED.split(",")][:20]
     assert suite.seeds == (0, 1, 2, 3, 4)

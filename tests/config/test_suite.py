@@ -26,6 +26,7 @@ from phyblock.config.suite import (
 )
 from phyblock.config.yaml import dump_yaml
 from phyblock.errors import SpecError
+from phyblock.files import bundled
 from phyblock.types import BACKGROUNDS
 from tests.config.strategies import FIELDS, REQUIRED, SECTIONS, SUITES
 from tests.config.tables import table, told
@@ -58,7 +59,6 @@ def test_many_problems_are_reported_in_part(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("suites")
-    (folder / "data" / "phyblock-400").mkdir(parents=True)
     (folder / "official").mkdir()
     (folder / "brief.j2").write_text("{% block user %}go{% endblock %}", encoding="utf-8")
     return folder
@@ -67,7 +67,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def load(folder: Path, text: str, *overrides: str) -> Suite:
     path = folder / "s.yaml"
     path.write_text(text, encoding="utf-8")
-    return load_suite(path, overrides, data_dir=folder / "data")
+    return load_suite(path, overrides)
 
 
 @given(raw=SUITES)
@@ -144,11 +144,11 @@ def test_paths_start_at_the_file_or_for_overrides_at_the_working_directory(
     assert suite.files.dataset == folder / "official"
     assert suite.template("full_planning") == folder / "brief.j2"
     assert suite.where("dataset", "path") == f"{folder / 's.yaml'}:3:35"
-    monkeypatch.chdir(folder / "data")
+    monkeypatch.chdir(folder / "official")
     assert load(folder, HEAD, official, "dataset.path=../official").files.dataset == (
         folder / "official"
     )
-    assert load(folder, HEAD).files.dataset == folder / "data" / "phyblock-400"
+    assert load(folder, HEAD).files.dataset == bundled("benchmarks", "data", "phyblock-400")
     assert load(folder, HEAD, "seeds=[1]", "seeds=[2]", "levels=[1]").seeds == (2,)
 
 
@@ -211,5 +211,5 @@ def test_any_suite_is_read_or_refused(folder: Path, data: bytes, override: str |
     (folder / "law.yaml").write_bytes(data)
     with contextlib.suppress(SpecError):
         overrides = () if override is None else (override,)
-        suite = load_suite(folder / "law.yaml", overrides, data_dir=folder / "data")
+        suite = load_suite(folder / "law.yaml", overrides)
         assert json.dumps(suite.identity(), allow_nan=False)

@@ -17,7 +17,6 @@ from rich.console import Console
 from phyblock.cli.run import print_estimate
 from phyblock.config.models import ModelConfig, Tariff, load_models
 from phyblock.config.suite import load_suite
-from phyblock.files import bundled
 from phyblock.models.costs import Estimate as CallEstimate
 from phyblock.models.costs import text_tokens
 from phyblock.run.estimate import Estimate, estimate
@@ -178,7 +177,7 @@ def _environment(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def planned(workspace: Workspace) -> RunPlan:
-    loaded = load_suite(workspace.root / "suite.yaml", data_dir=bundled("benchmarks", "data"))
+    loaded = load_suite(workspace.root / "suite.yaml")
     return make_plan(loaded, load_models(workspace.root / "models.yaml"))
 
 

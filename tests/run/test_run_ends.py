@@ -199,7 +199,7 @@ class FirstAtOnce(OpenAIChat):
 def session(workspace: Workspace, watch: Callable[[RunEvent], None], model: str) -> Session:
     workspace.write_suite(models=[model], seeds=[0, 1, 2, 3], limits={"max_concurrency": AT_ONCE})
     known = load_models(workspace.root / "models.yaml") if model == "alpha" else {}
-    plan = make_plan(load_suite(workspace.root / "suite.yaml", data_dir=workspace.root), known)
+    plan = make_plan(load_suite(workspace.root / "suite.yaml"), known)
     return Session(plan, workspace.out, watch, use_cache=False)
 
 

@@ -112,7 +112,7 @@ def test_a_run_is_on_disk_with_its_name_before_anything_is_asked(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     workspace.write_suite(models=["oracle"])
-    plan = make_plan(load_suite(workspace.root / "suite.yaml", data_dir=workspace.root), {})
+    plan = make_plan(load_suite(workspace.root / "suite.yaml"), {})
     synced: list[tuple[str, set[str]]] = []
     fsync = os.fsync
 

@@ -28,7 +28,7 @@ def suite_of(**fields: Any) -> Suite:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "suite.yaml"
         path.write_text(yaml.safe_dump(whole), encoding="utf-8")
-        return load_suite(path, data_dir=DATA)
+        return load_suite(path)
 
 
 def track_of(

@@ -126,7 +126,7 @@ def test_an_answer_counts_once_and_only_for_what_lies_there() -> None:
 def played(suite: Path, picks: Sequence[int]) -> tuple[RunResult, list[str]]:
     """Sit down, pick these one after another, and close the sitting; what was shown."""
     person = Person("ada")
-    plan = plan_session(load_suite(suite, data_dir=suite.parent), person, None)
+    plan = plan_session(load_suite(suite), person, None)
     session = PlaySession(plan.samples_per_model)
     shown: list[str] = []
 
