@@ -14,6 +14,7 @@ import json
 import secrets
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any, Protocol
 
 from phyblock.config.models import ModelConfig
@@ -44,6 +45,21 @@ class Image:
     def sha256(self) -> str:
         """Hex digest of the encoded bytes."""
         return hex_digest(self.data)
+
+    @functools.cached_property
+    def data_uri(self) -> str:
+        """The picture as a `data:` URI, its type by the bytes themselves: providers refuse a label
+        that they do not bear out. Kept, as one picture is sent to several models.
+
+        Raises DataError when the picture is none of PNG, JPEG, GIF and WebP.
+        """
+        mime = next((name for magic, name in _MAGIC if self.data.startswith(magic)), "")
+        if self.data[:4] == b"RIFF" and self.data[8:12] == b"WEBP":
+            mime = "image/webp"
+        if not mime:
+            where, found = f"picture {self.label!r}", repr(self.data[:8])
+            raise DataError(Problem(where, "is no picture", "", found, "PNG, JPEG, GIF or WebP"))
+        return f"data:{mime};base64,{base64.b64encode(self.data).decode('ascii')}"
 
 
 @dataclass(frozen=True)
@@ -128,21 +144,6 @@ class HaltedError(PhyblockError):
     """The run was ended before this request was sent."""
 
 
-def data_uri(image: Image) -> str:
-    """Return the picture as a `data:` URI, its type by the bytes themselves: providers refuse a
-    label that they do not bear out.
-
-    Raises DataError when the picture is none of PNG, JPEG, GIF and WebP.
-    """
-    mime = next((name for magic, name in _MAGIC if image.data.startswith(magic)), "")
-    if image.data[:4] == b"RIFF" and image.data[8:12] == b"WEBP":
-        mime = "image/webp"
-    if not mime:
-        where, found = f"picture {image.label!r}", repr(image.data[:8])
-        raise DataError(Problem(where, "is no picture", "", found, "PNG, JPEG, GIF or WebP"))
-    return f"data:{mime};base64,{base64.b64encode(image.data).decode('ascii')}"
-
-
 def wire_params(config: ModelConfig, request: Request) -> dict[str, Any]:
     """Return what to send beside the messages: the request's sampling parameters, overridden by
     the model's, and the format of the answer where the model takes one; None is not sent.
@@ -160,7 +161,7 @@ def json_body(
     pictures: list[bytes] = []
 
     def placeholder(image: Image) -> str:
-        pictures.append(data_uri(image).encode())
+        pictures.append(image.data_uri.encode())
         return _MARK
 
     body = {**fields, "messages": wire_messages(messages, detail, placeholder)}
@@ -171,7 +172,7 @@ def json_body(
 def wire_messages(
     messages: tuple[Message, ...],
     detail: ImageDetail | None,
-    url_of: Callable[[Image], str] = data_uri,
+    url_of: Callable[[Image], str] = attrgetter("data_uri"),
 ) -> list[dict[str, Any]]:
     """Return chat messages, texts and pictures in the order given; a lone text is a plain string.
 

@@ -189,12 +189,14 @@ class Reply(Line):
         It is paid for: an absurd number in it is one that is not known, and characters that no
         file could hold become "?".
         """
-        fields = dict(self)
-        texts = {name: encodable(text) for name, text in fields.items() if isinstance(text, str)}
-        counts = {name: _within(count, -LARGEST_WHOLE) for name, count in self.usage}
-        money = {name: _within(fields[name], 0) for name in ("cost_usd", "billed_usd")}
-        usage = Usage.model_construct(**counts)
-        return self.model_construct(**{**fields, **texts, **money, "usage": usage})
+        held, usage = vars(self), self.usage
+        fields = {name: held[name] for name in Reply.model_fields}
+        fields |= {name: encodable(text) for name, text in fields.items() if isinstance(text, str)}
+        fields |= {name: _within(held[name], 0) for name in ("cost_usd", "billed_usd")}
+        counts = {
+            name: _within(getattr(usage, name), -LARGEST_WHOLE) for name in Usage.model_fields
+        }
+        return self.model_copy(update={**fields, "usage": usage.model_copy(update=counts)})
 
     @property
     def limit_usd(self) -> float:
