@@ -275,12 +275,13 @@ _NAP_S = 0.1
 def completed(
     session: Session,
     signals: Collection[signal.Signals] = (signal.SIGINT,),
-    tick: Callable[[], object] = lambda: None,
+    tick: Callable[[bool], object] = lambda _: None,
 ) -> RunResult:
     """Run a session to its end in a thread of its own, since a notebook's has a loop already.
 
     The first signal lets it send nothing more, the second gives up calls under way; what was
-    answered is on disk when this returns. `tick` is called several times a second.
+    answered is on disk when this returns. `tick` is called several times a second, with True while
+    calls are under way.
     """
     loop, stops = asyncio.new_event_loop(), 0
     whole: asyncio.Task[RunResult] | None = None
@@ -315,7 +316,7 @@ def completed(
             running = pool.submit(in_thread)
             try:
                 while not wait((running,), _NAP_S).done:
-                    tick()
+                    tick(session.under_way > 0)
             except BaseException:
                 # A program's handlers of other signals may raise what they like.
                 stop()

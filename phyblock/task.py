@@ -321,7 +321,8 @@ class Episode:
     def score(self) -> Score:
         """Return the score as far as it has come."""
         fields = self.task._begun(None)
-        record = judge_episode(self._episode, self.task.item, fields, self._replies)
+        track, item = self.task.track, self.task.item
+        record = judge_episode(track, item, fields, self._episode, self._replies)
         return self.task._scored(record)
 
 

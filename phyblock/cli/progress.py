@@ -151,7 +151,7 @@ class ProgressView:
         if not isinstance(event, SampleDone) or self._now() - self._shown_s >= _SHOWN_EVERY_S:
             self.tick()
 
-    def tick(self, *, asks: bool = False) -> None:
+    def tick(self, asks: bool = False) -> None:
         """Print what is due; called several times a second. `asks`: calls are under way."""
         self._shown_s = now_s = self._now()
         self._has_asked |= asks

@@ -134,7 +134,7 @@ def run(
     gc.freeze()
     with ProgressView(console) as view:
         session = Session(plan, folder, view, **asks)
-        result = completed(session, _SIGNALS, lambda: view.tick(asks=session.under_way > 0))
+        result = completed(session, _SIGNALS, view.tick)
     gc.freeze()
     made = show_tables(folder, page=not no_report, anew=False, keep=not result.left)
     code = _conclude(console, folder, result, view)

@@ -14,9 +14,9 @@ import operator
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, TypeVar
 
-from pydantic import Field, TypeAdapter, ValidationError, create_model
+from pydantic import Field, TypeAdapter, ValidationError
 
 from phyblock.config.suite import Suite, suite_model
 from phyblock.config.validation import Fault, checked, problems_of
@@ -377,9 +377,8 @@ class BatchLines(Lines[BatchLine]):
 
 
 def record_types() -> tuple[type[Record], ...]:
-    """Return the model of every track's records; plain for a track that adds nothing of its own."""
-    kinds = known_tracks().values()
-    return tuple(kind.record if kind.record is not None else _plain(kind.name) for kind in kinds)
+    """Return the model of every track's records."""
+    return tuple(kind.record_type() for kind in known_tracks().values())
 
 
 def known_records() -> TypeAdapter[Record]:
@@ -391,12 +390,6 @@ def known_records() -> TypeAdapter[Record]:
 def _adapter(types: tuple[type[Record], ...]) -> TypeAdapter[Record]:
     union: Any = functools.reduce(operator.or_, types)
     return TypeAdapter(Annotated[union, Field(discriminator="track")])
-
-
-@functools.cache
-def _plain(track: str) -> type[Record]:
-    tag: Any = Literal[track]
-    return create_model("Record", __base__=Record, track=(tag, ...))
 
 
 def run_records(

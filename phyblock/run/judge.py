@@ -14,7 +14,6 @@ from phyblock.errors import (
     SimulationError,
 )
 from phyblock.models.request import Request
-from phyblock.records.files import known_records
 from phyblock.records.record import (
     ErrorKind,
     Record,
@@ -25,7 +24,7 @@ from phyblock.records.record import (
     Usage,
 )
 from phyblock.stable import plain_sum
-from phyblock.tracks.base import Episode, Judgement, Track, count_sample
+from phyblock.tracks.base import Episode, Judgement, Track
 from phyblock.tracks.items import Item
 from phyblock.types import Outcome
 
@@ -71,28 +70,28 @@ def about_prompt(request: Request, template: str, digest: str) -> SentPrompt:
     return SentPrompt(template=template, version=version, messages=digest, images=images)
 
 
-def judged(fields: Mapping[str, Any], item: Item, judgement: Judgement) -> Record:
+def judged(track: Track, item: Item, fields: Mapping[str, Any], judgement: Judgement) -> Record:
     """Return the record with its outcome and what the track says and counts of it.
 
     `fields` are those of a record that was begun, or of one that was judged before.
     """
     outcome = _outcome(fields["reply"], fields["error"], judgement.is_read)
     told = {**fields, "outcome": outcome, **judgement.fields}
-    record = known_records().validate_python(told)
-    if counts := count_sample(item, record):
+    record = track.record_type().model_validate(told)
+    if counts := track.counts(item, record):
         record = record.model_copy(update={"counts": {**record.counts, **counts}})
     return record
 
 
 def judge_episode(
-    episode: Episode, item: Item, fields: Mapping[str, Any], replies: Sequence[Reply]
+    track: Track, item: Item, fields: Mapping[str, Any], episode: Episode, replies: Sequence[Reply]
 ) -> Record:
     """Return the record of an episode as far as it has come with these replies."""
     judgement = episode.judgement()
     if replies:
         first = judgement.fields["turns"][0]["prompt"]
         fields = {**fields, "reply": pooled(replies).storable(), "prompt": first}
-    return judged(fields, item, judgement)
+    return judged(track, item, fields, judgement)
 
 
 async def judge_reply(
@@ -109,13 +108,13 @@ async def judge_reply(
     reply = fields["reply"]
     text = None if reply is None else reply.text
     try:
-        return judged(fields, item, await track.judge_apart(item, text, earlier))
+        return judged(track, item, fields, await track.judge_apart(item, text, earlier))
     except SimulationError as error:
         if text is None:
             raise
         lacking = StoredError(kind="unjudged", message=str(error))
         nothing = await track.judge_apart(item, None, None)
-        return judged({**fields, "error": lacking}, item, nothing)
+        return judged(track, item, {**fields, "error": lacking}, nothing)
 
 
 def _outcome(reply: Reply | None, error: StoredError | None, readable: bool) -> Outcome:

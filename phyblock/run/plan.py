@@ -52,15 +52,11 @@ class Sample:
 
     def asking(self, request: Request) -> Request:
         """Return the request as it is sent: a repeat has another seed, and so is sent once more."""
-        seed, repeat = request.seed, self.variant.repeat
-        if repeat != 1:
+        seed = request.seed
+        if self.variant.levels and (repeat := self.variant.repeat) != 1:
             digest = drawn_bytes("repeat", request.seed, repeat)
             seed = int.from_bytes(digest[:8], "big") % _SEEDS
         return replace(request, seed=seed, sample=self.id, track=self.track.name)
-
-    def shown(self) -> Sample:
-        """Return the sample with its item as its seed shows it."""
-        return replace(self, item=self.track.shown(self.item, self.seed))
 
 
 @dataclass(frozen=True)

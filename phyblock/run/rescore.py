@@ -203,7 +203,7 @@ async def _judged_again(
     pairs = zip(asked, judgement.fields["turns"], strict=False)
     same = sum(1 for _ in takewhile(lambda pair: _led_on(*pair), pairs))
     if same == len(asked) and not (goes_on and record.error is None):
-        return judged(given, item, judgement)
+        return judged(track, item, given, judgement)
     if strict:
         message = "does not go as it did: another version of phyblock made it"
         hint = "use the version of phyblock that made the run"

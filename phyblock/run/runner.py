@@ -38,6 +38,7 @@ from phyblock.run.judge import about_prompt, begun, judge_episode, judge_reply
 from phyblock.run.plan import RunPlan, Sample, provider_problem
 from phyblock.run.store import RunStore, Summary
 from phyblock.text import counted
+from phyblock.tracks.items import Item
 
 if TYPE_CHECKING:
     from phyblock.models.batch import BatchFiles
@@ -363,42 +364,43 @@ class Session:
 
     async def _one(self, sample: Sample, config: ModelConfig) -> None:
         """Ask one sample, judge what came, and wait until its record is on disk."""
-        sample, model = sample.shown(), self._models[sample.model]
+        item = sample.track.shown(sample.item, sample.seed)
         if sample.track.plays:
-            record = await self._play(sample, model, config)
+            record = await self._play(sample, item, config)
         else:
-            record = await self._ask(sample, model, config)
+            record = await self._ask(sample, item, config)
         await self._store.records.put(record)
         self.result.add(record)
         self.watch(SampleDone(record))
 
-    async def _ask(self, sample: Sample, model: Model, config: ModelConfig) -> Record:
-        track, shows = sample.track, model.needs_messages
-        made = track.request(sample.item, sample.seed, config.params, with_messages=shows)
+    async def _ask(self, sample: Sample, item: Item, config: ModelConfig) -> Record:
+        track, model = sample.track, self._models[sample.model]
+        shows = model.needs_messages
+        made = track.request(item, sample.seed, config.params, with_messages=shows)
         request = sample.asking(await self._until_stopped(made))
         answer = await self._answer(model, request)
-        fields = self._fields(sample, answer, request, config)
-        record, is_cancelled = await to_its_end(judge_reply(track, sample.item, fields))
+        fields = self._fields(sample, item, answer, request, config)
+        record, is_cancelled = await to_its_end(judge_reply(track, item, fields))
         task = asyncio.current_task()
         if is_cancelled and task is not None:
             # It ends at its next wait, which is that for its record.
             task.cancel()
         return record
 
-    async def _play(self, sample: Sample, model: Model, config: ModelConfig) -> Record:
-        track, item = sample.track, sample.item
+    async def _play(self, sample: Sample, item: Item, config: ModelConfig) -> Record:
+        track, model = sample.track, self._models[sample.model]
         episode = track.start(item, sample.seed, config.params, with_messages=model.needs_messages)
         replies: list[Reply] = []
-        fields = self._fields(sample, None, None, config)
+        fields = self._fields(sample, item, None, None, config)
         while (wanted := await self._until_stopped(episode.request())) is not None:
             request = sample.asking(wanted)
             answer = await self._answer(model, request)
-            fields = self._fields(sample, answer, request, config)
+            fields = self._fields(sample, item, answer, request, config)
             if not isinstance(answer, Reply):
                 break
             replies.append(answer.storable())
             episode.take(replies[-1], fields["prompt"])
-        return judge_episode(episode, item, fields, replies)
+        return judge_episode(track, item, fields, episode, replies)
 
     async def _answer(self, model: Model, request: Request) -> Reply | ModelError | None:
         """Return the reply, or the error that is this sample's alone."""
@@ -412,14 +414,15 @@ class Session:
     def _fields(
         self,
         sample: Sample,
+        item: Item,
         answer: Reply | ModelError | None,
         request: Request | None,
         config: ModelConfig,
     ) -> dict[str, Any]:
         """Return the fields of a record before it is judged."""
-        track, item = sample.track, sample.item
+        track = sample.track
         fields = begun(sample.id, track.name, sample.model, item, sample.seed, answer)
-        fields |= {"run": self.plan.manifest.run, **track.about(item)}
+        fields |= {"run": self._store.run, **track.about(item)}
         if sample.variant.levels:
             fields["variant"] = dict(sample.variant.levels)
         if request is not None and request.messages:

@@ -252,7 +252,8 @@ class RunStore:
     """A run folder opened for writing, and the journal of the run's calls; one process at a time.
 
     `records` and `batches` are synced line by line. `progress` is how far the run was when the
-    folder was opened; a reply in it that no record holds is not asked for again.
+    folder was opened; a reply in it that no record holds is not asked for again. `run` is the
+    digest by which records show that they are of this run.
     """
 
     def __init__(self, folder: Path, manifest: Manifest, samples: Collection[str]) -> None:
@@ -263,7 +264,7 @@ class RunStore:
         """
         self.progress = Progress()
         self._folder = folder
-        self._run = manifest.run
+        self.run = manifest.run
         self._prompts_known: set[str] = set()
         self._open = ExitStack()
         try:
@@ -304,7 +305,7 @@ class RunStore:
         """Write a call that is about to be sent; StoreError where the disk refuses."""
         number = self.progress.calls
         self.progress.calls += 1
-        names = {"call": number, "model": model, "sample": sample, "key": key, "run": self._run}
+        names = {"call": number, "model": model, "sample": sample, "key": key, "run": self.run}
         call = Call.model_validate({**names, "most_usd": most_usd})
         await self.calls.put(call)
         return call

@@ -14,9 +14,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Literal, Protocol
 
-from pydantic import BaseModel
+from pydantic import BaseModel, create_model
 
 from phyblock.config.suite import Suite
 from phyblock.config.validation import PictureControls
@@ -28,7 +28,7 @@ from phyblock.records.record import Record, Reply, SentPrompt
 from phyblock.registry import added_measures, known_track, known_tracks
 from phyblock.sim.engine import REFERENCE_ENGINE, engine_version, physics_engine
 from phyblock.stable import hex_digest
-from phyblock.tracks.items import Item, ShownTask, presented, select_tasks
+from phyblock.tracks.items import ShownTask, presented, select_tasks
 from phyblock.tracks.measures import SampleCounts, TrackReport, read_report
 from phyblock.tracks.picking import Picking
 from phyblock.tracks.pictures import Drawing, Workshop, scene_drawings
@@ -128,6 +128,13 @@ class Track(ABC):
         return read_report(cls.name, cls.counted, **cls.results)
 
     @classmethod
+    @functools.cache
+    def record_type(cls) -> type[Record]:
+        """Return the model of its records."""
+        tag: Any = Literal[cls.name]
+        return cls.record or create_model("Record", __base__=Record, track=(tag, ...))
+
+    @classmethod
     def prompt_field(cls) -> tuple[str, ...]:
         """Return the path of keys to its prompt in a suite."""
         is_own = cls.options is not None and "prompt" in cls.options.model_fields
@@ -194,6 +201,21 @@ class Track(ABC):
     def judge(self, item: Any, text: str | None) -> Judgement:
         """Read and score a reply; None, where there is no reply, is scored as nothing said."""
         raise NotImplementedError
+
+    def counts(self, item: Any, record: Record) -> dict[str, tuple[float, ...]]:
+        """Return the counts of a sample that measures need besides its scores, by name.
+
+        They are empty where a measure does not count it.
+        """
+        return {
+            counted.name: tuple(map(float, sample(item, record) or ()))
+            for counted, sample in self._sample_counts
+        }
+
+    @functools.cached_property
+    def _sample_counts(self) -> list[tuple[SampleCounts, Callable[..., Sequence[float] | None]]]:
+        added = (measure.counted for measure in added_measures(self.name))
+        return [(one, one.sample) for one in (*self.counted, *added) if one.sample is not None]
 
     async def judge_apart(self, item: Any, text: str | None, _earlier: Record | None) -> Judgement:
         """Return what `judge` does; where that takes long, beside the calls of others.
@@ -329,19 +351,6 @@ def simulating(suite: Mapping[str, Any]) -> tuple[type[Track], ...]:
     """Return the tracks of a suite, as a manifest holds it, that use a physics engine."""
     asked = [kind for name, kind in kinds().items() if name in (suite.get("tracks") or ())]
     return tuple(kind for kind in asked if kind.lets_go(suite))
-
-
-def count_sample(item: Item, record: Record) -> dict[str, tuple[float, ...]]:
-    """Return the counts of a sample that the measures of its track need, by name of the counts.
-
-    They are empty where a measure does not count it.
-    """
-    added: list[SampleCounts] = [measure.counted for measure in added_measures(record.track)]
-    return {
-        counted.name: tuple(map(float, counted.sample(item, record) or ()))
-        for counted in (*kind_of(record.track).counted, *added)
-        if counted.sample is not None
-    }
 
 
 def open_tracks(
