@@ -61,7 +61,6 @@ PictureSource = Literal["render", "dataset"]
 PictureLayout = Literal["composite", "separate"]
 CandidateOrder = Literal["file", "shuffled"]
 """Order in which candidates are numbered and shown."""
-CandidateScale = Literal["common", "fit"]
 
 View = Literal["oblique", "front", "side", "top"]
 """View of a scene: from a corner, along an axis, or from above."""

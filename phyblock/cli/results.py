@@ -149,7 +149,6 @@ def compare(
         compare_models,
         compare_runs,
         compare_view,
-        flipped_lines,
         ranks_view,
         write_comparison,
     )
@@ -162,10 +161,7 @@ def compare(
         comparison = compare_runs(first, load_run(other), models, track, measure)
     console = make_console()
     print_table(console, compare_view(comparison))
-    if comparison.table[["a", "b"]].drop_duplicates().shape[0] == 1:
-        for line in flipped_lines(comparison):
-            console.print(line)
-    elif len(comparison.ranks):
+    if len(comparison.table[["a", "b"]].drop_duplicates()) > 1 and len(comparison.ranks):
         print_table(console, ranks_view(comparison))
     if out is not None:
         write_comparison(comparison, out)

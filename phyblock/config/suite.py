@@ -45,7 +45,6 @@ from phyblock.text import did_you_mean
 from phyblock.types import (
     AnswerFormat,
     CandidateOrder,
-    CandidateScale,
     Criterion,
     DataFormat,
     Matcher,
@@ -108,9 +107,6 @@ class ImagesSpec(Section):
         "candidates",
     )
     """Order in which separate pictures are sent."""
-    candidate_scale: CandidateScale = "common"
-    """common: all rendered candidates of a grid are drawn at one scale. fit: each fills its cell.
-    The prompt says which."""
     size_px: Annotated[int, Field(strict=True, ge=128, le=2048)] = 512
     """Edge of a rendered picture [pixels]."""
     view: View = "oblique"

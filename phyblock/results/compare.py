@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -16,12 +16,10 @@ from phyblock.config.suite import REPEAT, Variant, VarySpec
 from phyblock.errors import Problem, SpecError
 from phyblock.files import OutFolder
 from phyblock.results.estimates import (
+    Headline,
     base_scenes,
     cell_value,
     counted_rows,
-    headline_columns,
-    main_measure,
-    main_values,
     pooled_in,
     track_notes,
 )
@@ -63,7 +61,6 @@ from phyblock.tracks.measures import SCORED_BY, Cell, Measure, in_unit
 
 _LEVEL = 1 - CONFIDENCE
 _KEYS = ["scene", "item", "seed", "variant"]
-_FLIPPED = ["a", "b", *_KEYS, "right", "value_a", "value_b"]
 
 
 def check_alike(run: Run, first: Run, cells: Sequence[str], track: str, measure: Measure) -> None:
@@ -85,7 +82,7 @@ def check_alike(run: Run, first: Run, cells: Sequence[str], track: str, measure:
     varied, other_varied = ({n: one.names(n) for n in one.factors} for one in (vary, other_vary))
     need("vary", varied, other_varied)
     held = first.counts.get((track, measure.counted.name))
-    scored = [set(names) - {""} for names in zip(*held.ways, strict=True)] if held else [set()] * 3
+    scored = [held is not None and (held[name] != "").any() for name in SCORED_BY]
     criteria = {cell.criterion for cell in first.cells(track) if cell.name in cells} - {""}
     rules: list[tuple[str, Sequence[str], set[str]]] = [
         ("settings", suite.settings, {first.design.setting}),
@@ -258,18 +255,6 @@ class Comparable:
             **{"n_scenes": len(scenes), "n_clusters": clusters.size},
         }
 
-    def flips(self, samples: Samples, pair: Sequence[int], names: tuple[str, str]) -> pd.DataFrame:
-        """Return the samples that one of two sides alone got wholly right."""
-        both, best = samples.has[list(pair)].all(axis=0), self.measure.best
-        counts = samples.counts[list(pair)][:, both]
-        a, b = self.measure.scale * np.nan_to_num(self.measure.value(counts))
-        alone = (a == best) != (b == best)
-        a, b, keys = a[alone], b[alone], samples.keys[both][alone]
-        table = keys.assign(a=names[0], b=names[1], value_a=a, value_b=b)
-        table["right"] = np.where(a == best, *names)
-        found: pd.DataFrame = table[_FLIPPED].sort_values(["right", *_KEYS])
-        return found
-
 
 def comparable(run: Run, track: str, measure: str = "") -> Comparable:
     """Return a measure of a track of a run, the main one where none is named, to compare by.
@@ -280,8 +265,9 @@ def comparable(run: Run, track: str, measure: str = "") -> Comparable:
     if measure and measure not in known:
         message, allowed = "has no such measure", ", ".join(known)
         raise SpecError(Problem(f"track {track}", message, "--measure", measure, allowed))
-    chosen = known[measure] if measure else main_measure(run, track)
-    columns, cells = headline_columns(run, track), chosen.counted.cells or run.cells(track)
+    headline = Headline(run, track)
+    chosen = known[measure] if measure else headline.measure
+    columns, cells = headline.columns, chosen.counted.cells or run.cells(track)
     criteria = [s.criterion for s in columns if s.measure == chosen.name and s.criterion]
     # A part of a mean that is pooled itself is too small to be compared alone.
     names = [
@@ -306,15 +292,11 @@ class Comparison:
     and detectable_holm (the same at the first step of Holm's correction) [in `unit`; NaN where that
     is more than values can differ by], better, worse and same (samples on which a has the better,
     worse, same value), n_samples, n_scenes, n_clusters. `ranks` has one row for each model that has
-    a rank where all pairs were compared as a whole: model, value, best and worst rank that it may
-    have. `flipped` has one row a pair and sample that one side alone got wholly right: a, b, scene,
-    item (scene or question), seed, variant (what differs from the reference of the run), right
-    (that side's label), value_a, value_b; by a measure without a best value it has none. `name` is
-    what the values are called, `unit` theirs, `how` says what they are.
+    a rank where all pairs of a run were compared: model, value, best and worst rank that it may
+    have. `name` is what the values are called, `unit` theirs, `how` says what they are.
     """
 
     table: pd.DataFrame
-    flipped: pd.DataFrame
     ranks: pd.DataFrame
     name: str
     unit: str
@@ -336,7 +318,7 @@ def compare_models(
         raise SpecError(Problem(str(run.path), "needs two models to compare", allowed=allowed))
     what = comparable(run, _shared_track([run], track), measure)
     parts = what.parts if len(sides) == 2 else what.parts[-1:]
-    return compare(list(combinations(sides, 2)), parts, what)
+    return compare(list(combinations(sides, 2)), parts, what, _with_rank(sides, what.track))
 
 
 def compare_runs(
@@ -381,10 +363,14 @@ def _shared_track(runs: Sequence[Run], wanted: str) -> str:
 
 
 def compare(
-    pairs: Sequence[tuple[Side, Side]], parts: Sequence[Part], what: Comparable
+    pairs: Sequence[tuple[Side, Side]],
+    parts: Sequence[Part],
+    what: Comparable,
+    ranked: Sequence[Side] = (),
 ) -> Comparison:
     """Compare the sides of each pair in each part of a track on the samples that both have.
 
+    Sides that are `ranked`, of which every pair is among them, have ranks by the last part.
     Setting, matcher, criteria and what becomes of missing replies are those of the first run.
     Raises SpecError when a run was not scored so, asked other questions, or has other blocks in a
     scene of the same name.
@@ -395,20 +381,17 @@ def compare(
     for run in runs[1:]:
         check_alike(run, runs[0], [part.cell for part in parts], what.track, what.measure)
     parents = {scene: found for run in runs for scene, found in base_scenes(run).items()}
-    rows, flips = [], [pd.DataFrame(columns=_FLIPPED)]
+    rows = []
     for part in parts:
         samples = what.samples(sides, part, pairs[0][0].run.design)
         for a, b in pairs:
-            pair, names = (place[a.label], place[b.label]), (a.label, b.label)
             about = {"a": a.label, "b": b.label, "part": part.name}
+            pair = [place[a.label], place[b.label]]
             rows.append({**about, **what.contrast(samples, pair, part, parents)})
-            if part == parts[-1]:
-                flips.append(what.flips(samples, pair, names))
     table, measure = with_verdicts(pd.DataFrame(rows), what.measure), what.measure
-    flipped = pd.concat([flip for flip in flips if len(flip)] or flips[:1], ignore_index=True)
     how = " ".join([what.how, *_asked(runs, what.track)])
-    ranked = _ranks(table, measure, {side.label for side in _with_rank(sides, what.track)})
-    return Comparison(table, flipped, ranked, measure.heading, measure.unit, how)
+    ranks = _ranks(table, measure, ranked)
+    return Comparison(table, ranks, measure.heading, measure.unit, how)
 
 
 def _asked(runs: Sequence[Run], track: str) -> Iterator[str]:
@@ -460,7 +443,8 @@ def rank_ranges_of(sides: Sequence[Side], track: str) -> dict[str, tuple[int, in
     if len(ranked) < 2:
         return {side.label: (1, 1) for side in ranked}
     what = comparable(ranked[0].run, track)
-    rows = compare(list(combinations(ranked, 2)), what.parts[-1:], what).ranks.to_dict("records")
+    found = compare(list(combinations(ranked, 2)), what.parts[-1:], what, ranked)
+    rows = found.ranks.to_dict("records")
     return {str(row["model"]): (int(row["best"]), int(row["worst"])) for row in rows}
 
 
@@ -470,23 +454,21 @@ def _with_rank(sides: Sequence[Side], track: str) -> list[Side]:
     for run in {id(side.run): side.run for side in sides}.values():
         recorded = run.records.loc[run.records["track"] == track, "model"].value_counts()
         whole = recorded.index[recorded == run.design.samples(track)]
-        able[id(run)] = main_values(run, track).keys() & {*whole} - run.design.baselines
+        able[id(run)] = Headline(run, track).ranked.keys() & {*whole} - run.design.baselines
     return [side for side in sides if side.model in able[id(side.run)]]
 
 
-def _ranks(table: pd.DataFrame, measure: Measure, ranked: Set[str]) -> pd.DataFrame:
-    """Return the ranks that `ranked` models may have, the best first: model, value, best, worst.
+def _ranks(table: pd.DataFrame, measure: Measure, ranked: Sequence[Side]) -> pd.DataFrame:
+    """Return the ranks that models may have by the last part of a table, the best first.
 
-    Out of a table that compares every pair of its models as a whole; empty for any other. Tests
-    are corrected for the pairs of ranked models; a pair without a test is not told apart.
+    Tests are corrected for the pairs of ranked models; a pair without a test is not told apart.
     """
-    whole = table[table["part"] == table["part"].iloc[-1]] if len(table) else table
-    every = list(dict.fromkeys([*whole["a"], *whole["b"]]))
-    columns = ["model", "value", "best", "worst"]
-    if len(whole) != len(every) * (len(every) - 1) // 2:
+    names, columns = [side.label for side in ranked], ["model", "value", "best", "worst"]
+    if not names:
         return pd.DataFrame(columns=columns)
-    names, known = [name for name in every if name in ranked], dict[str, float]()
-    pairs = whole[whole["a"].isin(ranked) & whole["b"].isin(ranked)]
+    whole = table[table["part"] == table["part"].iloc[-1]]
+    pairs = whole[whole["a"].isin(names) & whole["b"].isin(names)]
+    known = dict[str, float]()
     # A single ranked model has its value from a pair with another side.
     for row in (pairs if len(pairs) else whole).to_dict("records"):
         known |= {row["a"]: row["value_a"], row["b"]: row["value_b"]}
@@ -495,11 +477,11 @@ def _ranks(table: pd.DataFrame, measure: Measure, ranked: Set[str]) -> pd.DataFr
         a, b = names.index(row["a"]), names.index(row["b"])
         a_is_better = (row["difference"] > 0) == (measure.better == "higher")
         is_better[(a, b) if a_is_better else (b, a)] = p < _LEVEL
-    ranges = rank_ranges(is_better)
-    rows = [(name, known[name], *ranges[place]) for place, name in enumerate(names)]
-    is_ascending = measure.better == "lower"
+    rows = [
+        (name, known[name], *of) for name, of in zip(names, rank_ranges(is_better), strict=True)
+    ]
     return pd.DataFrame(rows, columns=columns).sort_values(
-        "value", ascending=is_ascending, ignore_index=True, kind="stable"
+        "value", ascending=measure.better == "lower", ignore_index=True, kind="stable"
     )
 
 
@@ -571,28 +553,12 @@ def p_text(p: float) -> str:
     return "< 0.001" if p < 0.001 else number(p, 3)
 
 
-def flipped_lines(found: Comparison) -> Iterator[str]:
-    """Yield, for each side of each pair, the samples that it alone got wholly right."""
-    several = found.flipped["seed"].nunique() > 1
-    for (a, b), flips in found.flipped.groupby(["a", "b"], sort=False):
-        for side, other in ((a, b), (b, a)):
-            names = []
-            for row in flips[flips["right"] == side].to_dict("records"):
-                seed = f"seed {row['seed']}" if several else ""
-                told = ", ".join(filter(None, (seed, row["variant"])))
-                names.append(f"{row['item']} ({told})" if told else str(row["item"]))
-            if names:
-                listed = f"{len(names)}: {', '.join(names)}"
-                yield f"{side} is right where {other} is not, {listed}"
-
-
 def write_comparison(found: Comparison, folder: Path) -> tuple[Path, ...]:
-    """Write comparison (.csv, .md, .tex), flipped.csv and ranks.csv into `folder`.
+    """Write comparison (.csv, .md, .tex) and ranks.csv into `folder`.
 
     Raises StoreError where they cannot be written.
     """
     files = compare_view(found).files("comparison", "comparison")
-    files |= {"flipped.csv": to_csv(found.flipped, "%.2f")}
     files |= {"ranks.csv": to_csv(found.ranks, "%.6f")}
     return OutFolder(folder).write(files)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import jinja2
@@ -70,20 +71,18 @@ def counted_rows(
         records = records[~records.groupby(group)["out"].transform("any").astype(bool)]
     held, width = run.counts.get((track, counted.name)), len(counted.columns)
     if held is None:
-        records, ways, numbers = records.iloc[:0], [], np.zeros((0, width))
-    elif held.widths != {width}:
+        held = pd.DataFrame(columns=["row", *SCORED_BY, *range(width)]).astype({"row": "intp"})
+    held = held[held["row"].isin(records.index)]
+    numbers = held.iloc[:, 1 + len(SCORED_BY) :].to_numpy(np.float64)
+    if len(held) and (set(widths := (~np.isnan(numbers)).sum(axis=1)) != {width}):
         message, hint = "was counted in another way", "phyblock score counts anew"
-        found = f"{', '.join(map(str, sorted(held.widths - {width})))} numbers"
+        found = f"{', '.join(map(str, sorted({*widths.tolist()} - {width})))} numbers"
         where, allowed = str(run.path / RECORDS), ", ".join(counted.columns)
         raise StoreError(Problem(where, message, f"counts.{counted.name}", found, allowed, hint))
-    else:
-        used = np.isin(held.row, records.index)
-        records, numbers = records.loc[held.row[used]], held.numbers[used]
-        ways = [held.ways[n] for n in held.way[used].tolist()]
+    records = records.loc[held["row"]]
     about = records[[*_ABOUT, "group", "levels", "part"]].reset_index(drop=True)
     about["replied"] = ~records["outcome"].isin(WITHOUT_REPLY).to_numpy()
-    for n, name in enumerate(SCORED_BY):
-        about[name] = pd.Series([way[n] for way in ways], dtype="object")
+    about[[*SCORED_BY]] = held[[*SCORED_BY]].to_numpy(object)
     if counted.parts is not None:
         whole, groups = counted.parts(design.suite), about.groupby(group, sort=True)
         _, first = np.unique(code := groups.ngroup().to_numpy(), return_index=True)
@@ -289,30 +288,6 @@ class HeadlineColumn:
     main: bool = False
 
 
-def headline_columns(run: Run, track: str) -> tuple[HeadlineColumn, ...]:
-    """Return the columns of a track's headline: its own, else its first measure in every cell."""
-    report, cells = kind_of(track).report(), run.cells(track)
-    first = LayoutColumn({report.measures[0].name: "{cell}"}, cells="each")
-    return tuple(
-        HeadlineColumn(name, cell.name, heading.format(cell=cell.heading), one.criterion, one.main)
-        for one in report.headline or (first,)
-        for cell in one.places(cells)
-        for name, heading in one.headings.items()
-    )
-
-
-def main_column(run: Run, track: str) -> HeadlineColumn:
-    """Return the column that models are ranked by: the one that says so, else the last."""
-    columns = headline_columns(run, track)
-    return next((column for column in columns if column.main), columns[-1])
-
-
-def main_measure(run: Run, track: str) -> Measure:
-    """Return the measure of that column: the one that is drawn, compared and ranked by."""
-    name = main_column(run, track).measure
-    return next(measure for measure in track_measures(track) if measure.name == name)
-
-
 @dataclass(frozen=True)
 class Value:
     """An estimate as tables show it, in the unit of its measure (percent for shares).
@@ -323,46 +298,6 @@ class Value:
     value: float
     lo: float
     hi: float
-
-
-def headline_rows(estimates: pd.DataFrame, design: Design) -> pd.DataFrame:
-    """Return the rows of a frame of estimates in the headline setting and matcher."""
-    return estimates[
-        estimates["setting"].isin(["", design.setting])
-        & estimates["matcher"].isin(["", design.matcher])
-    ]
-
-
-def headline_of(run: Run, track: str, design: Design | None = None) -> dict[tuple[str, str], Value]:
-    """Return the values of a track's headline by model and heading, in the headline setting of
-    the run or of another `design`.
-    """
-    scale = {measure.name: measure.scale for measure in track_measures(track)}
-    rows = headline_rows(track_estimates(run, track), design or run.design)
-    fields = ("measure", CELL, "criterion", "model", "value", "lo", "hi")
-    listed = list(zip(*(rows[name].tolist() for name in fields), strict=True))
-    values = {}
-    for column in headline_columns(run, track):
-        for measure, cell, criterion, model, *numbers in listed:
-            is_here = (measure, cell) == (column.measure, column.cell)
-            if is_here and column.criterion in ("", criterion):
-                shown = (scale[measure] * float(number) for number in numbers)
-                values[str(model), column.heading] = Value(*shown)
-    return values
-
-
-def main_values(run: Run, track: str, *, ranked: bool = False) -> dict[str, Value]:
-    """Return the main value of each model that has one; with `ranked`, the best first."""
-    main = main_column(run, track).heading
-    values = {
-        model: value
-        for (model, heading), value in headline_of(run, track).items()
-        if heading == main and not math.isnan(value.value)
-    }
-    if not ranked:
-        return values
-    sign = -1 if main_measure(run, track).better == "higher" else 1
-    return dict(sorted(values.items(), key=lambda item: (sign * item[1].value, item[0])))
 
 
 @dataclass(frozen=True)
@@ -377,20 +312,93 @@ class Floor:
         return value.lo > self.value if better == "higher" else value.hi < self.value
 
 
-def strongest_floor(run: Run, track: str) -> Floor | None:
-    """Return the strongest blind baseline, or uniform guessing, in the main column of a track."""
-    measure, values = main_measure(run, track), main_values(run, track)
-    blind = run.design.baselines & set(kind_of(track).report().floors)
-    cells = {cell.name: cell for cell in run.cells(track)}
-    known = [Floor(model, value.value) for model, value in values.items() if model in blind]
+def headline_rows(estimates: pd.DataFrame, design: Design) -> pd.DataFrame:
+    """Return the rows of a frame of estimates in the headline setting and matcher."""
+    return estimates[
+        estimates["setting"].isin(["", design.setting])
+        & estimates["matcher"].isin(["", design.matcher])
+    ]
 
-    def guessing(chance: Callable[[Suite, str], float], cell: Cell) -> float:
-        if not cell.of:
-            return chance(run.design.suite, cell.name)
-        return plain_sum(guessing(chance, cells[name]) for name in cell.of) / len(cell.of)
 
-    if measure.chance is not None and len(track_estimates(run, track)):
-        worth = guessing(measure.chance, cells[main_column(run, track).cell])
-        known.append(Floor("chance", measure.scale * worth))
-    best = max if measure.better == "higher" else min
-    return best(known, key=lambda floor: floor.value) if known else None
+@dataclass(frozen=True, eq=False)
+class Headline:
+    """The headline of a track of a run: what the terminal, tables, figures and pages show first.
+
+    In the headline setting of the run, or of another `design`.
+    """
+
+    run: Run
+    track: str
+    design: Design | None = None
+
+    @cached_property
+    def columns(self) -> tuple[HeadlineColumn, ...]:
+        """The columns that the track declares, else its first measure in every cell."""
+        report, cells = kind_of(self.track).report(), self.run.cells(self.track)
+        first = LayoutColumn({report.measures[0].name: "{cell}"}, cells="each")
+        return tuple(
+            HeadlineColumn(name, cell.name, heading.format(cell=cell.heading), one.criterion,
+                           one.main)
+            for one in report.headline or (first,)
+            for cell in one.places(cells)
+            for name, heading in one.headings.items()
+        )  # fmt: skip
+
+    @property
+    def main(self) -> HeadlineColumn:
+        """The column that models are ranked by: the one that says so, else the last."""
+        return next((column for column in self.columns if column.main), self.columns[-1])
+
+    @property
+    def parts(self) -> list[HeadlineColumn]:
+        """The columns that have its measure in other cells, as by level."""
+        main = self.main
+        return [c for c in self.columns if c.measure == main.measure and c.cell != main.cell]
+
+    @property
+    def measure(self) -> Measure:
+        """The measure of the main column: the one that is drawn, compared and ranked by."""
+        return next(one for one in track_measures(self.track) if one.name == self.main.measure)
+
+    @cached_property
+    def values(self) -> dict[tuple[str, str], Value]:
+        """Its values by model and heading."""
+        scale = {measure.name: measure.scale for measure in track_measures(self.track)}
+        rows = headline_rows(track_estimates(self.run, self.track), self.design or self.run.design)
+        fields = ("measure", CELL, "criterion", "model", "value", "lo", "hi")
+        listed = list(zip(*(rows[name].tolist() for name in fields), strict=True))
+        values = {}
+        for column in self.columns:
+            for measure, cell, criterion, model, *numbers in listed:
+                is_here = (measure, cell) == (column.measure, column.cell)
+                if is_here and column.criterion in ("", criterion):
+                    shown = (scale[measure] * float(number) for number in numbers)
+                    values[str(model), column.heading] = Value(*shown)
+        return values
+
+    @cached_property
+    def ranked(self) -> dict[str, Value]:
+        """The main value of each model that has one, the best first."""
+        main, sign = self.main.heading, -1 if self.measure.better == "higher" else 1
+        values = [(model, value) for (model, heading), value in self.values.items()
+                  if heading == main and not math.isnan(value.value)]  # fmt: skip
+        return dict(sorted(values, key=lambda item: (sign * item[1].value, item[0])))
+
+    @cached_property
+    def floor(self) -> Floor | None:
+        """The strongest blind baseline, or uniform guessing, in the main column."""
+        run, measure = self.run, self.measure
+        blind = run.design.baselines & set(kind_of(self.track).report().floors)
+        known = [Floor(model, one.value) for model, one in self.ranked.items() if model in blind]
+        cells = {cell.name: cell for cell in run.cells(self.track)}
+
+        def guessing(chance: Callable[[Suite, str], float], cell: Cell) -> float:
+            if not cell.of:
+                return chance(run.design.suite, cell.name)
+            return plain_sum(guessing(chance, cells[name]) for name in cell.of) / len(cell.of)
+
+        if measure.chance is not None and len(track_estimates(run, self.track)):
+            worth = guessing(measure.chance, cells[self.main.cell])
+            known.append(Floor("chance", measure.scale * worth))
+        best = max if measure.better == "higher" else min
+        return best(known, key=lambda floor: floor.value) if known else None

@@ -14,6 +14,7 @@ from phyblock.records.files import RecordLines, read_prompts, record_types
 from phyblock.records.record import PictureMark, PromptMessage, Record
 from phyblock.results.load import TOKENS, Run, track_measures
 from phyblock.results.text import to_csv
+from phyblock.tracks.measures import SCORED_BY
 
 _TYPES = {
     **dict.fromkeys(("sample", "track", "model", "scene"), "string"),
@@ -58,7 +59,7 @@ def export_frame(run: Run) -> pd.DataFrame:
                 if key not in frame:
                     frame[key] = pd.Series(pd.NA, frame.index, dtype="Float64")
                 if held is not None:
-                    frame.loc[frame.index[held.row], key] = held.numbers[:, n]
+                    frame.loc[held["row"], key] = held.iloc[:, 1 + len(SCORED_BY) + n].to_numpy()
     return frame
 
 

@@ -24,13 +24,7 @@ from phyblock.results.compare import (
     sensitivity_frame,
     sizes_text,
 )
-from phyblock.results.estimates import (
-    headline_columns,
-    headline_of,
-    main_column,
-    main_measure,
-    main_values,
-)
+from phyblock.results.estimates import Headline
 from phyblock.results.load import Run
 from phyblock.results.tables import coverage_frame, filled
 from phyblock.results.text import between, latex, level_name, number
@@ -153,7 +147,7 @@ def forest(run: Run, *, track: str) -> Figure | None:
     part of the track. Wide figures say the numbers beside. Of the same samples, as `phyblock
     compare` has them; None for fewer than two models that answered.
     """
-    models = list(main_values(run, track, ranked=True))
+    models = list(Headline(run, track).ranked)
     if len(models) < 2:
         return None
     found = compare_models(run, models, track)
@@ -199,13 +193,9 @@ def forest(run: Run, *, track: str) -> Figure | None:
 
 def levels(run: Run, *, track: str) -> Figure | None:
     """A line a model over the cells of the headline; None for fewer than two cells."""
-    main, measure = main_column(run, track), main_measure(run, track)
-    columns = [
-        column
-        for column in headline_columns(run, track)
-        if column.measure == main.measure and column.cell != main.cell
-    ]
-    models, values = list(main_values(run, track, ranked=True)), headline_of(run, track)
+    headline = Headline(run, track)
+    columns, measure, values = headline.parts, headline.measure, headline.values
+    models = list(headline.ranked)
     if len(columns) < 2 or not models:
         return None
     figure, (ax,) = _axes(3.2)
@@ -241,7 +231,7 @@ def shares(run: Run, *, track: str, table: str) -> Figure | None:
         names = list(layout.rows)
         frame = frame.pivot(index="model", columns="part", values=whole)
     frame = frame[[name for name in names if name in frame]].dropna(how="all").fillna(0.0)
-    models = [model for model in main_values(run, track, ranked=True) if model in frame.index]
+    models = [model for model in Headline(run, track).ranked if model in frame.index]
     if not models or not frame.to_numpy().any():
         return None
     frame, headings = frame.loc[models], {one.name: one.heading for one in report.measures}
@@ -269,7 +259,8 @@ def cost(run: Run, *, track: str) -> Figure | None:
     from matplotlib.patheffects import withStroke
     from matplotlib.ticker import NullFormatter
 
-    ranked, measure = main_values(run, track, ranked=True), main_measure(run, track)
+    headline = Headline(run, track)
+    ranked, measure = headline.ranked, headline.measure
     table = coverage_frame(run)
     prices = table[table["track"] == track].set_index("model")["cost_per_100_usd"].to_dict()
     models = [model for model in ranked if prices.get(model, 0.0) > 0]
@@ -324,7 +315,7 @@ def sensitivity(run: Run, *, track: str) -> Figure | None:
         ax.set_xlabel("SD")
     _named_rows(axes[0], models)
     axes[0].set_xlim(left=0)
-    what = f"Standard deviation of {main_measure(run, track).heading_in_unit}"
+    what = f"Standard deviation of {Headline(run, track).measure.heading_in_unit}"
     how = f"{what}; lines: 95 % intervals, {sizes_text(table)}"
     return _finished(figure, run, f"{kind_of(track).title}: effect of the presentation", how)
 

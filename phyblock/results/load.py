@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from array import array
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from phyblock.config.suite import Suite
 from phyblock.errors import Problem, SpecError
@@ -24,9 +21,8 @@ from phyblock.records.files import (
 )
 from phyblock.records.record import Record
 from phyblock.registry import added_measures
-from phyblock.scoring.plan import Floats
 from phyblock.tracks.base import kind_of
-from phyblock.tracks.measures import Cell, Measure, SampleCounts, Way
+from phyblock.tracks.measures import SCORED_BY, Cell, Measure, SampleCounts
 from phyblock.types import WITHOUT_REPLY
 
 if TYPE_CHECKING:
@@ -72,105 +68,57 @@ def track_measures(track: str) -> tuple[Measure, ...]:
     return measures
 
 
-@dataclass(frozen=True, eq=False)
-class Counted:
-    """Counts of a name in a track: one row a sample and way of scoring it.
-
-    `row` is that of its record in `Run.records`, `way` its place in `ways`; `widths` are the
-    lengths of `numbers` that records hold, one where all were counted by the same measure.
-    """
-
-    row: NDArray[np.intp]
-    way: NDArray[np.intp]
-    ways: Sequence[Way]
-    numbers: Floats
-    widths: frozenset[int]
-
-
-class _Column:
-    """Counts of a name while records are read."""
-
-    def __init__(self) -> None:
-        self.owners, self.ways, self.numbers = array("i"), array("h"), array("d")
-        self.known: dict[Way, int] = {}
-        self.widths: set[int] = set()
-
-    def add(self, owner: int, way: Way, numbers: Sequence[float]) -> None:
-        """Take in the numbers of a record."""
-        self.owners.append(owner)
-        self.ways.append(self.known.setdefault(way, len(self.known)))
-        self.numbers.extend(numbers)
-        self.widths.add(len(numbers))
-
-    def placed(self, rows: NDArray[np.intp]) -> Counted:
-        """Return the counts by row; records that a newer one replaced have row -1."""
-        row, way = rows[np.asarray(self.owners)], np.asarray(self.ways, dtype=np.intp)
-        numbers = np.asarray(self.numbers)
-        if len(self.widths) == 1:
-            order = np.argsort(row, kind="stable")
-            order = order[row[order] >= 0]
-            row, way, numbers = row[order], way[order], numbers.reshape(len(row), -1)[order]
-        return Counted(row, way, tuple(self.known), numbers, frozenset(self.widths))
-
-
 def frames_of(
     records: Iterable[tuple[Record, int]], design: Design
-) -> tuple[pd.DataFrame, dict[tuple[str, str], Counted]]:
+) -> tuple[pd.DataFrame, dict[tuple[str, str], pd.DataFrame]]:
     """Return `Run.records` and `Run.counts` of records and where they begin [bytes].
 
     The newest record of a sample stands for it. Order and types do not depend on the file.
     """
     import pandas as pd
 
-    values: list[tuple[Any, ...]] = []
-    counts: dict[tuple[str, str], _Column] = {}
+    found: list[tuple[Any, ...]] = []
+    numbers: dict[tuple[str, str], list[tuple[Any, ...]]] = {}
     taken: dict[str, list[SampleCounts]] = {}
     for owner, (record, start) in enumerate(records):
-        values.append(_values(record, start))
+        found.append(_row(record, start))
         track = record.track
         if track not in taken:
             known = dict.fromkeys(measure.counted for measure in track_measures(track))
             taken[track] = [counted for counted in known if counted.sample is None]
         for counted in taken[track]:
-            for way, numbers in counted.of(record):
-                counts.setdefault((track, counted.name), _Column()).add(owner, way, numbers)
-        for name, numbers in record.counts.items():
-            if numbers:
-                counts.setdefault((track, name), _Column()).add(owner, ("", "", ""), numbers)
-    columns = zip(_TYPES.items(), zip(*values, strict=True) if values else [()] * len(_TYPES),
-                  strict=True)  # fmt: skip
-    frame = pd.DataFrame({name: pd.Series(column, dtype=kind) for (name, kind), column in columns})
-    rows = np.full(len(frame), -1, dtype=np.intp)
+            rows = numbers.setdefault((track, counted.name), [])
+            rows += [(owner, *way, *of_way) for way, of_way in counted.of(record)]
+        for name, kept in record.counts.items():
+            if kept:
+                numbers.setdefault((track, name), []).append((owner, "", "", "", *kept))
+    frame = pd.DataFrame(found, columns=list(_TYPES)).astype(_TYPES)
     place = {name: n for n, name in enumerate(design.model_names)}
     frame = frame.drop_duplicates("sample", keep="last")
     frame["place"] = [place.get(name, len(place)) for name in frame["model"]]
     frame = frame.sort_values(["track", "place", "model", "scene", "seed", "sample"])
-    rows[frame.index] = np.arange(len(frame))
-    frame = frame.drop(columns="place").reset_index(drop=True)
-    return frame, {key: column.placed(rows) for key, column in counts.items()}
+    # Records that a newer one replaced have no row.
+    row_of = pd.Series(range(len(frame)), index=frame.index)
+    counts = {}
+    for key, rows in ((key, rows) for key, rows in numbers.items() if rows):
+        held = pd.DataFrame(rows).rename(columns=dict(enumerate(("row", *SCORED_BY))))
+        held["row"] = held["row"].map(row_of)
+        held = held.dropna(subset="row").astype({"row": "intp"})
+        counts[key] = held.sort_values("row", kind="stable", ignore_index=True)
+    return frame.drop(columns="place").reset_index(drop=True), counts
 
 
-def _attributes(names: Collection[str]) -> Callable[[object], tuple[Any, ...]]:
-    """Return what reads attributes of a thing; each is None of no thing."""
-    read, none = attrgetter(*names), (None,) * len(names)
-    return lambda thing: none if thing is None else read(thing)
-
-
-_of_record, _of_reply, _of_error = map(_attributes, (_OF_RECORD, _OF_REPLY, _OF_ERROR))
-_of_usage = _attributes(TOKENS)
-
-
-def _values(record: Record, start: int) -> tuple[Any, ...]:
+def _row(record: Record, start: int) -> tuple[Any, ...]:
     """Return a row of `Run.records`, in the order of `_TYPES`."""
-    reply, parse = record.reply, record.parse
+    reply, error, parse = record.reply, record.error, record.parse
     rule = parse.get("rule") if isinstance(parse, dict) else getattr(parse, "rule", None)
     return (
-        *_of_record(record),
+        *(getattr(record, name) for name in _OF_RECORD),
         record.way.key,
-        *_of_reply(reply),
-        *_of_usage(reply and reply.usage),
+        *(getattr(reply, name, None) for name in _OF_REPLY),
+        *(getattr(reply and reply.usage, name, None) for name in TOKENS),
         reply and record.paid_usd,
-        *_of_error(record.error),
+        *(getattr(error, name, None) for name in _OF_ERROR),
         None if rule is None else str(rule),
         start,
     )
@@ -244,15 +192,16 @@ class Run:
 
     `records` has one row a sample: track, model, scene, levels, parents, n_blocks, seed, outcome,
     tokens, cost_usd, latency_s and so on, and the error. `counts` are those of its measures, by
-    track and name. `is_cut` says that the last line was cut off by a kill and therefore ignored.
-    `made` keeps frames that are made once.
+    track and name: the row in `records`, the columns of `SCORED_BY`, and the numbers. `is_cut` says
+    that the last line was cut off by a kill and therefore ignored. `made` keeps frames that are
+    made once.
     """
 
     path: Path
     manifest: Manifest = field(repr=False)
     design: Design = field(repr=False)
     records: pd.DataFrame = field(repr=False)
-    counts: Mapping[tuple[str, str], Counted] = field(repr=False)
+    counts: Mapping[tuple[str, str], pd.DataFrame] = field(repr=False)
     is_cut: bool = False
     made: dict[str, pd.DataFrame] = field(default_factory=dict, repr=False, init=False)
 
@@ -273,11 +222,11 @@ class Run:
         """
         import pandas as pd
 
-        from phyblock.results.estimates import main_values
+        from phyblock.results.estimates import Headline
 
         table = pd.DataFrame(index=pd.Index(self.design.model_names, name="model"))
         for track in self.design.suite.tracks:
-            short, values = kind_of(track).report().short or track, main_values(self, track)
+            short, values = kind_of(track).report().short or track, Headline(self, track).ranked
             for end, name in {"value": short, "lo": f"{short}_lo", "hi": f"{short}_hi"}.items():
                 table[name] = [getattr(values.get(model), end, np.nan) for model in table.index]
         return table

@@ -15,16 +15,10 @@ from phyblock.files import OutFolder
 from phyblock.registry import added_measures
 from phyblock.results.compare import Side, rank_ranges_of, rank_text, sensitivity_table
 from phyblock.results.estimates import (
-    HeadlineColumn,
+    Headline,
     Value,
     all_estimates,
-    headline_columns,
-    headline_of,
     headline_rows,
-    main_column,
-    main_measure,
-    main_values,
-    strongest_floor,
     track_estimates,
     track_notes,
 )
@@ -61,7 +55,7 @@ def _layouts(run: Run, track: str) -> Mapping[str, Layout]:
     columns = [
         LayoutColumn({one.measure: one.heading}, cell=one.cell, criterion=one.criterion,
                      show="both", key="{cell}_{measure}")
-        for one in headline_columns(run, track)
+        for one in Headline(run, track).columns
     ]  # fmt: skip
     own = kind.report().tables or {track: Layout(kind.title, columns)}
     if not added:
@@ -376,17 +370,15 @@ def headline_table(run: Run, track: str, coverage: pd.DataFrame) -> TextTable:
     A rank is a range, as in `compare` and on the page. Baselines have none, nor have models with
     samples that were not asked.
     """
-    kind, main = kind_of(track), main_column(run, track)
-    others = [one for one in headline_columns(run, track) if one != main]
-    by_cell = [one for one in others if one.measure == main.measure and one.cell != main.cell]
-    columns: list[HeadlineColumn] = [main, *(by_cell or others)]
+    kind, headline = kind_of(track), Headline(run, track)
+    others = headline.parts or [one for one in headline.columns if one != headline.main]
+    columns, known = [headline.main, *others], headline.values
     units = {one.name: one.unit for one in track_measures(track)}
     unit = " (%)" if {units[column.measure] for column in columns} == {"%"} else ""
-    known, ranked = headline_of(run, track), main_values(run, track, ranked=True)
     mine = coverage[coverage["track"] == track].set_index("model").to_dict("index")
     ranks = rank_ranges_of([Side(name, name, run) for name in run.design.model_names], track)
     rows = []
-    for model in dict.fromkeys((*ranked, *run.design.model_names)):
+    for model in dict.fromkeys((*headline.ranked, *run.design.model_names)):
         found = [known.get((model, column.heading), _NONE) for column in columns]
         rank = rank_text(*ranks[model]) if model in ranks else ""
         row: dict[str, Any] = {"rank": rank, "model": model}
@@ -404,13 +396,13 @@ def headline_table(run: Run, track: str, coverage: pd.DataFrame) -> TextTable:
 
 def blind_sentence(run: Run, track: str) -> str:
     """Say how many models are above the strongest blind baseline; "" where there is none."""
-    floor = strongest_floor(run, track)
-    if floor is None:
+    headline = Headline(run, track)
+    if (floor := headline.floor) is None:
         return ""
-    named, better = f"{floor.name} ({number(floor.value)})", main_measure(run, track).better
+    named, better = f"{floor.name} ({number(floor.value)})", headline.measure.better
     above = [
         floor.is_below(value, better)
-        for model, value in main_values(run, track).items()
+        for model, value in headline.ranked.items()
         if model not in run.design.baselines
     ]
     verb = "is" if len(above) == 1 else "are"

@@ -13,7 +13,7 @@ import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar, get_args
+from typing import TypeVar
 
 import numpy as np
 import PIL
@@ -29,7 +29,7 @@ from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import dot, drawn_mesh, rounded, turned
 from phyblock.sim.raster import RASTER_VERSION, Light, Prop, Raster, Rgb, draw
 from phyblock.stable import hex_digest
-from phyblock.types import BACKGROUNDS, Background, CandidateScale, View
+from phyblock.types import BACKGROUNDS, Background, View
 
 RENDER_VERSION = 2
 """Raised whenever the same input gives other pixels, so that stored pictures are made again."""
@@ -181,16 +181,14 @@ _LEAST_CUBE = 0.08
 class PictureStyle:
     """Side length [pixels], background, and direction of the camera.
 
-    Azimuth 0 looks from +x and 90 from +y; elevation 90 looks straight down [degrees]. Candidates
-    share one scale in their grid (`common`), or each fills its cell (`fit`). Raises ValueError for
-    what is not allowed.
+    Azimuth 0 looks from +x and 90 from +y; elevation 90 looks straight down [degrees]. Raises
+    ValueError for what is not allowed.
     """
 
     size_px: int = 512
     background: Background = "checkerboard"
     azimuth_deg: float = VIEWS["oblique"][0]
     elevation_deg: float = VIEWS["oblique"][1]
-    candidate_scale: CandidateScale = "common"
 
     def __post_init__(self) -> None:
         ranges = {"size_px": (SMALLEST_PX, LARGEST_PX), "elevation_deg": (1, 90)}
@@ -198,11 +196,9 @@ class PictureStyle:
             number = getattr(self, name)
             if not (least <= number <= most and math.isfinite(number)):
                 raise ValueError(f"{name} is {number!r}, allowed {least}..{most}")
-        names = {"background": BACKGROUNDS, "candidate_scale": get_args(CandidateScale)}
-        for name, allowed in names.items():
-            if getattr(self, name) not in allowed:
-                found = getattr(self, name)
-                raise ValueError(f"{name} is {found!r}, allowed {', '.join(allowed)}")
+        if self.background not in BACKGROUNDS:
+            allowed = ", ".join(BACKGROUNDS)
+            raise ValueError(f"background is {self.background!r}, allowed {allowed}")
 
     @classmethod
     def from_view(
@@ -266,7 +262,7 @@ def goal_key(scene: Scene, style: PictureStyle) -> str:
 def candidates_key(candidates: CandidateSet, style: PictureStyle) -> str:
     """SHA-256 [hex] of all that the candidate grid depends on."""
     content = [(c.type, c.color, c.euler_deg) for c in candidates.candidates]
-    return picture_key("candidates", style, [style.candidate_scale, *content])
+    return picture_key("candidates", style, ["common", *content])
 
 
 def picture_key(kind: str, style: PictureStyle, content: Iterable[object]) -> str:
@@ -334,7 +330,7 @@ def candidates_grid(
     """Candidates in a 4 by 4 grid, numbered from 1, as drawn, and their common distance [m]."""
     size_px, cell_px = style.size_px, math.ceil(style.size_px / GRID_COLUMNS)
     blocks = [on_the_floor(c.type, c.color, c.euler_deg) for c in candidates.candidates]
-    distance_m = common_distance_m(blocks, style) if style.candidate_scale == "common" else None
+    distance_m = common_distance_m(blocks, style)
     cube = on_the_floor("cube", "red", (0.0, 0.0, 0.0))
     empty = picture([], candidate_camera(cube, style), style.background, cell_px)
     grid = Image.new("RGB", (size_px, size_px))

@@ -229,4 +229,4 @@ def kit_sheet(candidates: CandidateSet, style: PictureStyle) -> Image.Image:
 def kit_key(candidates: CandidateSet, style: PictureStyle) -> str:
     """SHA-256 [hex] of all that the sheet depends on."""
     content = [astuple(candidate) for candidate in candidates.candidates]
-    return picture_key("kit", style, [KIT_VERSION, style.candidate_scale, *content])
+    return picture_key("kit", style, [KIT_VERSION, "common", *content])

@@ -190,9 +190,13 @@ class Track(ABC):
     def facts(self, item: Any, pictures: Sequence[Image]) -> dict[str, object]:
         """Return what templates may use; nothing in it gives an answer away."""
 
-    def form(self, _item: Any) -> AnswerForm[Any] | None:
+    def json_form(self, item: Any) -> AnswerForm[Any]:
+        """Return the form of an answer as JSON, where it has a prompt that asks for it."""
+        raise NotImplementedError
+
+    def form(self, item: Any) -> AnswerForm[Any] | None:
         """Return the form in which an answer is asked for; None where that is text."""
-        return None
+        return None if self.suite.answer_format == "text" else self.json_form(item)
 
     def subject_of(self, item: Any) -> object:
         """Return what baselines and people answer about."""
@@ -337,7 +341,7 @@ class SceneTrack(Track):
         return {
             "pictures": [picture.label for picture in pictures],
             "n_candidates": len(item.candidates),
-            "candidate_scale": None if images.source == "dataset" else images.candidate_scale,
+            "candidate_scale": None if images.source == "dataset" else "common",
             "is_blind": self.is_blind,
             **form_facts(self.form(item)),
         }

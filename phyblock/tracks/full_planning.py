@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
@@ -82,7 +83,9 @@ def score_fields(score: Score) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class PlanSubject:
-    """A whole plan is asked for; `guess` gives one that was learned without the goal."""
+    """The scene that baselines and people answer about; `guess` gives a plan that was learned
+    without the goal.
+    """
 
     scene: Scene
     candidates: CandidateSet
@@ -98,18 +101,6 @@ _RANDOM_STEPS = 4
 """As in the paper's Random row."""
 
 
-def _random_plan(subject: PlanSubject, rng: np.random.Generator) -> str:
-    return plan_text(int(n) for n in rng.integers(1, len(subject.candidates) + 1, _RANDOM_STEPS))
-
-
-def _all_candidates(subject: PlanSubject, _: np.random.Generator) -> str:
-    return plan_text(range(1, len(subject.candidates) + 1))
-
-
-def _goal_blind(subject: PlanSubject, _: np.random.Generator) -> str:
-    return plan_text(subject.guess().steps)
-
-
 def _in_valid_order(choose: Callable[[PlanSubject, Block, np.random.Generator], int | None]) -> Any:
     """Return the rule that takes a random valid order, and of each block the candidate that is
     chosen, else the right one.
@@ -122,11 +113,6 @@ def _in_valid_order(choose: Callable[[PlanSubject, Block, np.random.Generator], 
         )
 
     return rule
-
-
-def _first_pose(subject: PlanSubject, block: Block, _: np.random.Generator) -> int | None:
-    """Return the candidate of the block's kind that is listed first."""
-    return subject.candidates.first_of(block.kind)
 
 
 def _turned(subject: PlanSubject, block: Block, rng: np.random.Generator) -> int | None:
@@ -147,10 +133,14 @@ def needed_candidate(subject: Any, block: Block) -> int:
 
 
 PLAN_RULES: Mapping[str, Callable[..., str]] = {
-    "random": _random_plan,
-    "all-candidates": _all_candidates,
-    "goal-blind": _goal_blind,
-    "first-pose": _in_valid_order(_first_pose),
+    "random": lambda subject, rng: plan_text(
+        rng.integers(1, len(subject.candidates) + 1, _RANDOM_STEPS).tolist()
+    ),
+    "all-candidates": lambda subject, _: plan_text(range(1, len(subject.candidates) + 1)),
+    "goal-blind": lambda subject, _: plan_text(subject.guess().steps),
+    "first-pose": _in_valid_order(
+        lambda subject, block, _: subject.candidates.first_of(block.kind)
+    ),
     "oracle": _in_valid_order(lambda *_: None),
     "oracle-no-orientation": _in_valid_order(_turned),
 }
@@ -190,12 +180,11 @@ def pose_choices(
             yield right[0], chosen[kind]
 
 
-def pose_counts(item: Any, record: Any) -> tuple[int, int, int, int]:
+def pose_counts(item: Any, record: Any) -> tuple[int, ...]:
     """Return the numbers of `POSE_COUNTS` of a plan or an episode."""
-    choices = list(pose_choices(item.scene, item.candidates, record.parse.plan))
-    first = [is_right for is_first, is_right in choices if is_first]
-    later = [is_right for is_first, is_right in choices if not is_first]
-    return sum(first), len(first), sum(later), len(later)
+    choices = Counter(pose_choices(item.scene, item.candidates, record.parse.plan))
+    of = {first: choices[first, True] for first in (True, False)}
+    return of[True], of[True] + choices[True, False], of[False], of[False] + choices[False, False]
 
 
 POSE_COUNTS = SampleCounts(
@@ -297,9 +286,9 @@ class FullPlanning(SceneTrack):
             raise SpecError(Problem(where, message, "prompt", "official", hint=hint))
         return OfficialPrompt(official_prompt(self.suite.files.dataset))
 
-    def form(self, item: AssemblyTask) -> AnswerForm[list[int]] | None:
-        """Return the form in which a plan is asked for; None where that is text."""
-        return None if self.suite.answer_format == "text" else plan_form(len(item.candidates))
+    def json_form(self, item: AssemblyTask) -> AnswerForm[list[int]]:
+        """Return the form of a plan as JSON."""
+        return plan_form(len(item.candidates))
 
     def subject_of(self, item: AssemblyTask) -> PlanSubject:
         """Return what baselines answer about."""
@@ -316,13 +305,10 @@ class FullPlanning(SceneTrack):
         scores = self._scorers[key].score(parsed.plan, suite.scoring.matchers, level1)
         parse = {
             "parser": suite.parser,
-            "rule": parsed.rule,
+            "version": 1 if suite.parser == "official" else READER_VERSION,
             "plan": parsed.plan.steps,
             "file_plan": file_plan(item, parsed.plan.steps),
-            "dropped": parsed.dropped,
-            "version": 1 if suite.parser == "official" else READER_VERSION,
-            "problem": parsed.problem,
-            "truncated": parsed.truncated,
+            **{n: getattr(parsed, n) for n in ("rule", "dropped", "problem", "truncated")},
         }
         fields = {"parse": parse, "scores": [score_fields(score) for score in scores]}
         return Judgement(parsed.rule is not None, fields)

@@ -8,7 +8,7 @@ import os
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -204,8 +204,7 @@ class LocalShop(Workshop):
 def picture_style(images: ImagesSpec) -> PictureStyle:
     """Return the style in which a suite wants pictures drawn."""
     ground = images.background or BACKGROUNDS[0]
-    seen = PictureStyle.from_view(images.view, images.size_px, ground)
-    return replace(seen, candidate_scale=images.candidate_scale)
+    return PictureStyle.from_view(images.view, images.size_px, ground)
 
 
 def scene_drawings(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, ...]:

@@ -7,7 +7,7 @@ import math
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from functools import partial
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -50,7 +50,7 @@ from phyblock.sim.pictures import goal_style
 from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
 from phyblock.stable import plain_sum
 from phyblock.tracks.base import CARRYING, ENGINE, Judgement, SceneTrack
-from phyblock.tracks.full_planning import PlanParse, needed_candidate, score_fields
+from phyblock.tracks.full_planning import PlanParse, PlanSubject, needed_candidate, score_fields
 from phyblock.tracks.items import ShownTask, file_plan
 from phyblock.tracks.measures import SampleCounts, level_cells
 from phyblock.tracks.picking import NumberField, Pick, Picking, candidate_choices
@@ -383,14 +383,6 @@ def buildable_order(scene: Scene, wanted: Sequence[int]) -> list[int]:
     return order
 
 
-@dataclass(frozen=True)
-class PoseSubject:
-    """A plan with poses is asked for."""
-
-    scene: Scene
-    candidates: CandidateSet
-
-
 def written(steps: Iterable[PoseStep]) -> str:
     """Steps in the form that the prompt asks for."""
     return "\n".join(
@@ -404,7 +396,7 @@ def _number(value: float) -> str:
 
 
 def _built(
-    subject: PoseSubject,
+    subject: PlanSubject,
     rng: np.random.Generator,
     move: Callable[[Block, Center], Center] = lambda _, center: center,
 ) -> str:
@@ -423,10 +415,10 @@ def _built(
     )
 
 
-def _noisy(sigma_cm: float) -> Callable[[PoseSubject, np.random.Generator], str]:
+def _noisy(sigma_cm: float) -> Callable[[PlanSubject, np.random.Generator], str]:
     """The oracle, every coordinate off by a Gaussian of so many centimeters."""
 
-    def rule(subject: PoseSubject, rng: np.random.Generator) -> str:
+    def rule(subject: PlanSubject, rng: np.random.Generator) -> str:
         noise = np.random.default_rng(rng.integers(2**32))
 
         def moved(_: Block, center: Center) -> Center:
@@ -438,12 +430,12 @@ def _noisy(sigma_cm: float) -> Callable[[PoseSubject, np.random.Generator], str]
     return rule
 
 
-def _flat(subject: PoseSubject, rng: np.random.Generator) -> str:
+def _flat(subject: PlanSubject, rng: np.random.Generator) -> str:
     """Right sideways, all on the floor."""
     return _built(subject, rng, lambda block, center: (*center[:2], box_height_cm(block) / 2))
 
 
-def _stack(subject: PoseSubject, rng: np.random.Generator) -> str:
+def _stack(subject: PlanSubject, rng: np.random.Generator) -> str:
     """All at the origin, one on another."""
     top = 0.0
 
@@ -456,7 +448,7 @@ def _stack(subject: PoseSubject, rng: np.random.Generator) -> str:
     return _built(subject, rng, stacked)
 
 
-def _random(subject: PoseSubject, rng: np.random.Generator) -> str:
+def _random(subject: PlanSubject, rng: np.random.Generator) -> str:
     """Any blocks anywhere, which sees nothing of the goal."""
     steps = []
     for _ in range(_RANDOM_STEPS):
@@ -480,7 +472,7 @@ POSE_RULES: Mapping[str, Callable[..., str]] = {
 }
 
 
-def pick_poses(subject: PoseSubject) -> Picking:
+def pick_poses(subject: PlanSubject) -> Picking:
     """Return the choices of a person: any candidates, each as often as needed, with its place."""
 
     def step(pick: Pick) -> PoseStep:
@@ -499,54 +491,57 @@ def pick_poses(subject: PoseSubject) -> Picking:
     )
 
 
-def _right(record: PoseRecord) -> tuple[float, ...] | None:
-    if (pose := record.pose) is None:
-        return None
-    right = (count for frame in POSE_FRAMES for count in pose.right[frame])
-    score = record.scores[0]
+def _counted(
+    name: str,
+    columns: tuple[str, ...],
+    count: Callable[[PoseRecord, PoseOutcome], Sequence[float]],
+    **more: Any,
+) -> SampleCounts:
+    """Return what counts records whose plan was carried out."""
+
+    def of(record: PoseRecord) -> Sequence[float] | None:
+        return None if record.pose is None else count(record, record.pose)
+
+    return SampleCounts(name, columns, record=of, **more)
+
+
+def _right(record: PoseRecord, pose: PoseOutcome) -> tuple[float, ...]:
+    right, score = (n for frame in POSE_FRAMES for n in pose.right[frame]), record.scores[0]
     return (*right, score.tp + score.fp, score.tp + score.fn)
 
 
-def _fits(record: PoseRecord) -> tuple[float, ...] | None:
-    if (pose := record.pose) is None:
-        return None
+def _fits(_: PoseRecord, pose: PoseOutcome) -> tuple[float, ...]:
     fits = [step for step in pose.steps if step.vertex is not None]
-    parts = ("position_cm", "turn_deg", "iou")
-    return (*(plain_sum(getattr(fit, part) for fit in fits) for part in parts), len(fits))
+    return (*(plain_sum(getattr(fit, part) for fit in fits) for part in _FITS), len(fits))
 
 
-def _ends(record: PoseRecord) -> tuple[float, ...] | None:
-    if (pose := record.pose) is None:
-        return None
-    ends, blocks = Counter(step.end for step in pose.steps), record.n_blocks
-    whole = (pose.reached, blocks, pose.iou, pose.completed, 1)
-    return (*(ends[name] for name in STEP_ENDS), len(pose.steps), *whole)
+def _ends(record: PoseRecord, pose: PoseOutcome) -> tuple[float, ...]:
+    ends = Counter(name for step in pose.steps for name in (step.end, step.error))
+    whole = (pose.reached, record.n_blocks, pose.iou, pose.completed, 1)
+    return (*(ends[name] for name in (*STEP_ENDS, *POSE_ERRORS)), len(pose.steps), *whole)
 
 
-def _errors(record: PoseRecord) -> tuple[float, ...] | None:
-    if (pose := record.pose) is None:
-        return None
-    errors = Counter(step.error for step in pose.steps)
-    return (*(errors[name] for name in POSE_ERRORS), len(pose.steps))
+def _plan(setting: Setting) -> SampleCounts:
+    """Return what counts the plan without its poses, by the headline matcher."""
 
+    def of(record: PoseRecord) -> tuple[float, ...] | None:
+        score = next((one for one in record.scores if one.setting == setting), None)
+        return None if score is None else (score.tp, score.fp, score.fn)
 
-def _plan(record: PoseRecord, setting: Setting = "A") -> tuple[float, ...] | None:
-    """Count the plan without its poses, by the headline matcher."""
-    score = next((one for one in record.scores if one.setting == setting), None)
-    return None if score is None else (score.tp, score.fp, score.fn)
+    return SampleCounts(f"plan_{setting.lower()}", ("tp", "fp", "fn"), record=of)
 
 
 _ALIKE = tuple(f"tracks.pose_planning.{key}" for key in (CARRYING, ENGINE))
-ENDS = (*STEP_ENDS, "steps", "reached", "blocks", "iou", "completed", "plans")
-FITS = SampleCounts("fits", ("position_cm", "turn_deg", "iou", "n"), record=_fits)
+_FITS = ("position_cm", "turn_deg", "iou")
+_WHOLE_COUNTS = ("steps", "reached", "blocks", "iou", "completed", "plans")
 _RIGHT = tuple(f"{frame}_{cm:g}" for frame in POSE_FRAMES for cm in TOLERANCES_CM)
+FITS = _counted("fits", (*_FITS, "n"), _fits)
 COUNTS = (
-    SampleCounts("poses", (*_RIGHT, "steps", "blocks"), record=_right),
+    _counted("poses", (*_RIGHT, "steps", "blocks"), _right),
     FITS,
-    SampleCounts("carried", ENDS, record=_ends, alike=_ALIKE),
-    SampleCounts("pose_errors", (*POSE_ERRORS, "steps"), record=_errors, alike=_ALIKE),
-    SampleCounts("plan_a", ("tp", "fp", "fn"), record=_plan),
-    SampleCounts("plan_b", ("tp", "fp", "fn"), record=partial(_plan, setting="B")),
+    _counted("carried", (*STEP_ENDS, *POSE_ERRORS, *_WHOLE_COUNTS), _ends, alike=_ALIKE),
+    _plan("A"),
+    _plan("B"),
 )
 
 
@@ -570,8 +565,7 @@ class PosePlanning(SceneTrack):
 
     def draw(self, item: AssemblyTask) -> tuple[Drawing, ...]:
         """Return the goal, where it is shown, from every view, and the sheet from the first."""
-        # The prompt says that the sheet has one scale, whatever other pictures of candidates have.
-        style = replace(picture_style(self.suite.images), candidate_scale="common")
+        style = picture_style(self.suite.images)
         seen = {
             view: replace(style, azimuth_deg=VIEWS[view][0], elevation_deg=VIEWS[view][1])
             for view in self.spec.views
@@ -590,15 +584,13 @@ class PosePlanning(SceneTrack):
         """Return what decides its results, with the version of how plans are carried out."""
         return {**super().identity(), CARRYING: CARRY_VERSION}
 
-    def form(self, item: AssemblyTask) -> AnswerForm[Any] | None:
-        """Return the form in which a plan is asked for; None where that is text."""
-        if self.suite.answer_format == "text":
-            return None
+    def json_form(self, item: AssemblyTask) -> AnswerForm[Any]:
+        """Return the form of a plan as JSON."""
         return pose_form(len(item.candidates))
 
-    def subject_of(self, item: AssemblyTask) -> PoseSubject:
+    def subject_of(self, item: AssemblyTask) -> PlanSubject:
         """Return what baselines answer about."""
-        return PoseSubject(item.scene, item.candidates)
+        return PlanSubject(item.scene, item.candidates)
 
     def judge(self, item: AssemblyTask, text: str | None) -> Judgement:
         """Read, score and carry out a reply; None, where there is none, is an empty plan."""

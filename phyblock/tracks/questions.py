@@ -422,10 +422,8 @@ class Vqa(Track):
             **super().identity(),
         }
 
-    def form(self, item: AskedQuestion) -> AnswerForm[str] | None:
-        """Return the form in which an answer is asked for; None where that is text."""
-        if self.suite.answer_format == "text":
-            return None
+    def json_form(self, item: AskedQuestion) -> AnswerForm[str]:
+        """Return the form of an answer as JSON."""
         return choice_form(item.question.options, item.question.subtask == "OR")
 
     def facts(self, item: AskedQuestion, pictures: Sequence[Image]) -> dict[str, object]:

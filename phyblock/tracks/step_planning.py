@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import accumulate, takewhile
 from typing import Any, ClassVar, Literal, get_args
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from phyblock.config.validation import Count, Flag, PictureControls, TemplateName
 from phyblock.data.base import AssemblyTask
-from phyblock.domain.scene import Block, CandidateSet, Plan, Scene
+from phyblock.domain.scene import Block
 from phyblock.files import bundled
 from phyblock.models.request import Image, Message, Request
 from phyblock.parsing.move import MoveProblem, ParsedMove, move_form, parse_move
@@ -28,7 +28,7 @@ from phyblock.sim.pictures import goal_style
 from phyblock.sim.question_pictures import question_key, question_png, state_picture
 from phyblock.text import counted
 from phyblock.tracks.base import ENGINE, Judgement, SceneTrack
-from phyblock.tracks.full_planning import POSE_COUNTS, PlanParse
+from phyblock.tracks.full_planning import POSE_COUNTS, PlanParse, PlanSubject
 from phyblock.tracks.goal_blind import blind_guesses
 from phyblock.tracks.items import file_plan
 from phyblock.tracks.measures import SampleCounts
@@ -155,22 +155,18 @@ class EpisodeRecord(Record):
 
 
 @dataclass(frozen=True)
-class StepSubject:
+class StepSubject(PlanSubject):
     """The next step is asked for.
 
     `valid` are the candidates that would be placed now, in ascending order; empty when the goal
     is complete. `exact` are those of them that are also turned as the goal is. `last_failed` is
     the candidate whose move failed last, if the last move did; `step` is how many steps were taken.
-    `guess` gives a plan that was learned without the goal.
     """
 
-    scene: Scene
-    candidates: CandidateSet
-    valid: tuple[int, ...]
-    exact: tuple[int, ...]
+    valid: tuple[int, ...] = ()
+    exact: tuple[int, ...] = ()
     last_failed: int | None = None
     step: int = 0
-    guess: Callable[[], Plan] = field(default=Plan, compare=False)
 
 
 def _random_step(subject: StepSubject, rng: np.random.Generator) -> str:
@@ -204,11 +200,6 @@ def _turned(subject: StepSubject, index: int, rng: np.random.Generator) -> int |
     return wrong[int(rng.integers(len(wrong)))] if wrong else None
 
 
-def _first_pose(subject: StepSubject, index: int, _: np.random.Generator) -> int | None:
-    """Return the candidate of the same kind that is listed first."""
-    return subject.candidates.first_of(subject.candidates[index].kind)
-
-
 def _repeated_step(subject: StepSubject, rng: np.random.Generator) -> str:
     """Any move at random until one fails, then that one for ever."""
     failed = subject.last_failed
@@ -237,7 +228,9 @@ STEP_RULES: Mapping[str, Callable[..., str]] = {
     "repeat": _repeated_step,
     "all-candidates": _in_turn(lambda subject: range(1, len(subject.candidates) + 1)),
     "goal-blind": _in_turn(lambda subject: subject.guess().steps),
-    "first-pose": _right_move(_first_pose),
+    "first-pose": _right_move(
+        lambda subject, index, _: subject.candidates.first_of(subject.candidates[index].kind)
+    ),
 }
 
 
@@ -389,10 +382,8 @@ class StepPlanning(SceneTrack):
         engine = {} if self.spec.physics == "off" else {"engine": described_engine()}
         return {"max_steps": self.spec.most_steps(len(item.scene)), **engine, **super().about(item)}
 
-    def form(self, item: AssemblyTask) -> AnswerForm[ParsedMove] | None:
-        """Return the form in which an operation is asked for; None where that is text."""
-        if self.suite.answer_format == "text":
-            return None
+    def json_form(self, item: AssemblyTask) -> AnswerForm[ParsedMove]:
+        """Return the form of an operation as JSON."""
         return move_form(len(item.candidates), reasons=self.spec.cot)
 
     def start(
@@ -517,11 +508,11 @@ class StepEpisode:
         subject = StepSubject(
             task.scene,
             task.candidates,
+            functools.partial(track.guess, task),
             assembly.right_moves(),
             assembly.exact_moves(),
             self._failed[-1].move if self._failed else None,
             len(self._past),
-            functools.partial(track.guess, task),
         )
         return track.asked(task, len(self._past), self._seed, self._params, messages, subject)
 

@@ -19,13 +19,9 @@ from phyblock.records.files import ManifestModel, read_stopped
 from phyblock.records.record import Record
 from phyblock.results.compare import Side, comparable, rank_ranges_of
 from phyblock.results.estimates import (
+    Headline,
     Value,
-    headline_columns,
-    headline_of,
     headline_rows,
-    main_column,
-    main_measure,
-    strongest_floor,
     track_estimates,
     track_notes,
 )
@@ -163,12 +159,12 @@ def values_of(run: Run, track: str) -> TrackValues:
         model: dict(zip(values.index, values.tolist(), strict=True))
         for model, values in what.values(run, what.parts[-1], design)
     }
-    columns = headline_columns(run, track)
+    columns = Headline(run, track).columns
     shown = estimates[estimates["measure"].isin([column.measure for column in columns])]
     values: dict[str, Mapping[tuple[str, str], Value]] = {}
     for setting in design.suite.settings if shown["setting"].astype(bool).any() else ("",):
         suite = design.suite.model_copy(update={"settings": (setting,)} if setting else {})
-        values[setting] = headline_of(run, track, replace(design, suite=suite))
+        values[setting] = Headline(run, track, replace(design, suite=suite)).values
     errors: dict[str, dict[str, float]] = {}
     rows = headline_rows(estimates, design)
     rows = rows[(rows["cell"] == run.cells(track)[-1].name) & rows["value"].notna()]
@@ -215,6 +211,7 @@ def board_of(runs: Sequence[SiteRun], entries: Sequence[Entry]) -> dict[str, Any
     columns: list[dict[str, Any]] = []
     for track, place in first.items():
         run = runs[place].run
+        headline = Headline(run, track)
         columns += [
             {
                 "id": _id(track, setting, column.heading),
@@ -226,11 +223,11 @@ def board_of(runs: Sequence[SiteRun], entries: Sequence[Entry]) -> dict[str, Any
                 "cell": column.cell,
             }
             for setting in runs[place].values[track].values
-            for column in headline_columns(run, track)
+            for column in headline.columns
             for measure in track_measures(track)
             if measure.name == column.measure
         ]
-        heading = main_column(run, track).heading
+        heading = headline.main.heading
         setting = next(iter(runs[place].values[track].values))
         main = _id(track, setting, heading)
         ranked = [entry for entry in entries if main in numbers[entry.name]]
@@ -270,8 +267,8 @@ def _track(track: str, run: Run, models: Sequence[Value]) -> dict[str, Any]:
 
     The finding says how many of them are above the strongest blind baseline.
     """
-    kind, measure, finding = kind_of(track), main_measure(run, track), ""
-    floor, parts = strongest_floor(run, track), kind.report().part_names
+    kind, headline, finding = kind_of(track), Headline(run, track), ""
+    measure, floor, parts = headline.measure, headline.floor, kind.report().part_names
     names = (one.name for one in track_measures(track))
     if floor is not None and models:
         above = sum(floor.is_below(value, measure.better) for value in models)
@@ -282,7 +279,7 @@ def _track(track: str, run: Run, models: Sequence[Value]) -> dict[str, Any]:
         "name": track,
         "title": kind.title,
         "item": kind.item,
-        "main": main_column(run, track).heading,
+        "main": headline.main.heading,
         "unit": measure.unit,
         "better": measure.better,
         "best": None if math.isnan(measure.best) else measure.best,

@@ -15,7 +15,7 @@ from phyblock.errors import SpecError
 from phyblock.records.files import read_records
 from phyblock.records.record import Record
 from phyblock.results.compare import check_alike, comparable
-from phyblock.results.estimates import strongest_floor
+from phyblock.results.estimates import Headline
 from phyblock.results.load import load_run
 from phyblock.results.text import number
 from phyblock.sim.film import FilmStep
@@ -105,7 +105,7 @@ class Ending:
         means.sort(key=lambda one: one[1], reverse=measure.better == "higher")
         worth = {name: value for name, value, _ in means}
         line = [("You", worth["You"])] if own else []
-        if (floor := strongest_floor(self._run, track)) is not None:
+        if (floor := Headline(self._run, track).floor) is not None:
             line.append((floor.name, worth.get(floor.name, floor.value)))
         rules = {"You"}.union(*(one.design.baselines for one in self._runs))
         line += [(f"best model {name}", worth[name]) for name in worth if name not in rules][:1]

@@ -259,7 +259,7 @@ def test_a_run_writes_through_no_link(suite: Workspace) -> None:
 
 WRITING: dict[str, tuple[tuple[str, ...], str, str]] = {
     "export": (("export", "{run}", "--to", "csv"), "records.csv", "phyblock did not make"),
-    "compare": (("compare", "{run}"), "flipped.csv", "phyblock did not make"),
+    "compare": (("compare", "{run}"), "ranks.csv", "phyblock did not make"),
     "figures": (("figures", "{run}", "--only", "errors"), "errors.pdf", "phyblock did not make"),
     "scenes": (("scenes", "generate", "--jobs", "1"), "SHA256SUMS", "already there"),
     "questions": (("questions", "generate", "--jobs", "1"), "SHA256SUMS", "already there"),

@@ -43,11 +43,10 @@ def test_tables_print_all_or_one_in_any_form(folder: Path) -> None:
     assert not (folder / "tables").exists()
 
 
-def test_compare_says_the_verdict_and_what_flipped(folder: Path, tmp_path: Path) -> None:
+def test_compare_says_the_verdict(folder: Path, tmp_path: Path) -> None:
     done = call("compare", folder, "--models", "alpha,beta", "--out", tmp_path / "out")
     # Five base scenes are too few for five comparisons.
     assert "cannot tell" in done.output
-    assert "alpha is right where beta is not, 10: 000 (seed 0)" in done.output
     assert (tmp_path / "out" / "comparison.tex").exists()
     assert call("compare", folder, "--track", "full_planning").output.startswith("Models compared")
     with pytest.raises(SpecError, match="no such track to compare"):

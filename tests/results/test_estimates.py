@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.domain.question import CATEGORIES, LETTERS, SUBTASKS
-from phyblock.results.estimates import all_estimates, strongest_floor
+from phyblock.results.estimates import Headline, all_estimates
 from phyblock.results.load import Run
 from phyblock.scoring.plan import Counts, micro
 from tests.web.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
@@ -192,7 +192,7 @@ def test_circular_needs_every_rotation_of_a_seed() -> None:
     run = questions(records, seeds=(0, 1), circular=True)
     assert value(run, "accuracy", "SH") == 0.5
     assert value(run, "each_rotation", "SH") == 14 / 16
-    floor = strongest_floor(run, "vqa")
+    floor = Headline(run, "vqa").floor
     assert floor is not None
     assert floor.name == "chance"
     lacking = questions(records[1:], seeds=(0, 1), circular=True)

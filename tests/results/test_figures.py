@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from phyblock.results.estimates import headline_of
+from phyblock.results.estimates import Headline
 from phyblock.results.figures import (
     COLUMN_IN,
     Look,
@@ -47,7 +47,7 @@ def run() -> Run:
 
 
 def test_lines_over_levels_and_cost_show_the_headline(run: Run) -> None:
-    values = headline_of(run, TRACK)
+    values = Headline(run, TRACK).values
     drawn = levels(run, track=TRACK)
     assert drawn is not None
     for line in drawn.axes[0].lines:

@@ -23,7 +23,7 @@ from phyblock.data.base import AssemblyTask
 from phyblock.errors import SpecError
 from phyblock.records.record import Record
 from phyblock.results.compare import comparable, compare_models
-from phyblock.results.estimates import main_column
+from phyblock.results.estimates import Headline
 from phyblock.results.load import Run, load_run
 from phyblock.results.tables import write_tables
 from phyblock.run.rescore import rescore
@@ -238,7 +238,7 @@ def test_the_leading_measure_leads_everywhere(run: Run) -> None:
         assert compare_models(run).name == leading.heading
         one = (SiteRun("run", run, Sources()),)
         (track,) = board_of(one, entries_of(one))["tracks"]
-        assert track["main"] == main_column(run, "counting").heading
+        assert track["main"] == Headline(run, "counting").main.heading
         worth = values_of(run, "counting").samples["oracle"].values()
         assert set(worth) == {leading.best}
 

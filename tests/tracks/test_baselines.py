@@ -25,7 +25,7 @@ from phyblock.tracks.baselines import FOLDS, Folds, Guesses, majority_rule
 from phyblock.tracks.full_planning import PlanSubject, pick_plan
 from phyblock.tracks.goal_blind import KEYS, chances, goal_blind_plans, related, units
 from phyblock.tracks.picking import Choice, Pick, Picking
-from phyblock.tracks.pose_planning import PoseSubject, pick_poses
+from phyblock.tracks.pose_planning import pick_poses
 from phyblock.tracks.questions import ChoiceSubject, pick_answer
 from phyblock.tracks.step_planning import StepSubject, pick_step
 from phyblock.types import Setting
@@ -229,7 +229,7 @@ def test_a_plan_is_read_as_it_was_picked(picks: list[int]) -> None:
 
 @pytest.mark.parametrize("pick", range(N + 1))
 def test_a_step_is_read_as_it_was_picked(pick: int) -> None:
-    picking = pick_step(StepSubject(TASK.scene, TASK.candidates, (), ()))
+    picking = pick_step(StepSubject(TASK.scene, TASK.candidates))
     reply, wanted = picking.reply([Pick(pick)]), pick + 1 if pick < N else "Done"
     parsed = parse_move(reply)
     assert ("Done" if parsed.is_done else parsed.move) == wanted
@@ -258,7 +258,7 @@ CENTIMETERS = st.integers(-100_000, 100_000).map(lambda n: n / 100)
     )
 )
 def test_places_are_read_as_they_were_given(steps: list[tuple[int, tuple[float, ...]]]) -> None:
-    picking = pick_poses(PoseSubject(TASK.scene, TASK.candidates))
+    picking = pick_poses(PlanSubject(TASK.scene, TASK.candidates))
     reply = picking.reply([Pick(pick, place) for pick, place in steps])
     read = parse_poses(reply, N).steps
     assert [(step.candidate - 1, step.center_cm) for step in read] == steps
@@ -278,7 +278,7 @@ def test_places_are_read_as_they_were_given(steps: list[tuple[int, tuple[float, 
     ],
 )
 def test_numbers_that_are_lacking_or_not_allowed_are_refused(numbers: tuple[float, ...]) -> None:
-    picking = pick_poses(PoseSubject(TASK.scene, TASK.candidates))
+    picking = pick_poses(PlanSubject(TASK.scene, TASK.candidates))
     with pytest.raises(ValueError, match=r"y within ±1000 cm with at most 2 decimals"):
         picking.reply([Pick(0, numbers)])
 

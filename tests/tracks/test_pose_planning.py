@@ -30,12 +30,12 @@ from phyblock.sim.dynamics import execute
 from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import center_cm, origin_m, put
 from phyblock.tracks import pose_planning as pose_track
+from phyblock.tracks.full_planning import PlanSubject
 from phyblock.tracks.pose_planning import (
     POSE_RULES,
     PosePlanning,
     PoseRecord,
     PoseSpec,
-    PoseSubject,
     StepOutcome,
     written,
 )
@@ -162,7 +162,7 @@ def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(
 ) -> None:
     item = built_in[0]
     track = poses()
-    subject = PoseSubject(item.scene, item.candidates)
+    subject = PlanSubject(item.scene, item.candidates)
     text = POSE_RULES[baseline](subject, np.random.default_rng(1))
     found = track.judge(item, text)
     steps = parse_poses(text, len(item.candidates)).steps

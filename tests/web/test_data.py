@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from phyblock.errors import DataError, SpecError, StoreError
 from phyblock.records.files import known_records
 from phyblock.records.record import Record
-from phyblock.results.estimates import headline_of
+from phyblock.results.estimates import Headline
 from phyblock.results.load import load_run
 from phyblock.results.tables import write_tables
 from phyblock.web import pack
@@ -169,7 +169,7 @@ def test_boards_say_what_tables_say(made: Workspace) -> None:
     for column in board["columns"]:
         if column["setting"] not in ("", "A"):
             continue
-        values = headline_of(one[0].run, column["track"])
+        values = Headline(one[0].run, column["track"]).values
         for row in board["rows"]:
             value, shown = (
                 values.get((row["name"], column["heading"])),
