@@ -46,11 +46,9 @@ class Problem:
         where, field = _plain(self.where), _plain(self.field)
         head = f"{where}: {field}: " if field else f"{where}: "
         lines = [head + _plain(self.message)]
-        lines += [f"    {name}: {_plain(text)}" for name, text in self._details() if text]
+        details = (("found", self.found), ("allowed", self.allowed), ("hint", self.hint))
+        lines += [f"    {name}: {_plain(text)}" for name, text in details if text]
         return "\n".join(lines)
-
-    def _details(self) -> tuple[tuple[str, str], ...]:
-        return (("found", self.found), ("allowed", self.allowed), ("hint", self.hint))
 
 
 def reason_of(error: BaseException) -> str:

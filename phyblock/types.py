@@ -39,7 +39,6 @@ GATINGS: tuple[Gating, ...] = get_args(Gating)
 Physics = Literal["off", "settle", "strict"]
 """Simulation of every new state, and the effect of a collapse."""
 
-"""The source of a block's orientation: its candidate as it is shown, or the step."""
 StepEnd = Literal["stands", "falls", "knocks_over", "overlaps", "under_floor", "no_block"]
 """Ending of a step that is carried out. `stands`: the block is where it was put, and so are the
 others. `falls`: it is not. `knocks_over`: others are not where they were. `overlaps`,

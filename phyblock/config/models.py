@@ -51,9 +51,6 @@ DIRECT_PROVIDERS = ("openai", "hosted_vllm", "lm_studio")
 """Provider prefixes that mean the plain OpenAI protocol: litellm has nothing to translate."""
 OWN_SERVER = "a server of one's own"
 """Stands for an address where it decides nothing but that it is no provider's."""
-LARGEST_REPLY_BYTES = 32 * 1024 * 1024
-"""Default limit of a reply's body [bytes]: a hundred times what the longest thoughts take."""
-
 ADDRESS_ALLOWED = "http://... or https://..., without user, password, query and fragment"
 
 _SELF_HOSTED = (
@@ -220,7 +217,6 @@ class ModelConfig(Section):
     )
 
     name: SkipJsonSchema[str] = Field(default="", exclude=True)
-    most_body_bytes: SkipJsonSchema[int] = Field(default=LARGEST_REPLY_BYTES, exclude=True)
     id: _Id = ""
     """litellm id with its provider: openai/gpt-4o-2024-08-06."""
     addresses: Annotated[
@@ -410,9 +406,8 @@ class ModelConfig(Section):
 
 
 def _entry(value: object) -> object:
-    if isinstance(value, Mapping):
-        for key in value.keys() & {"name", "most_body_bytes"}:
-            raise fault(Fault("is not a known key", found="", at=(key,), key=True))
+    if isinstance(value, Mapping) and "name" in value:
+        raise fault(Fault("is not a known key", found="", at=("name",), key=True))
     return {"id": value} if isinstance(value, str) else value
 
 

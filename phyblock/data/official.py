@@ -14,6 +14,7 @@ are matched to the rows of the paper's Tables 1 and 2.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -154,8 +155,8 @@ def official_prompt(root: Path) -> str:
     marks that stood for the pictures are taken off. Where recordings differ, the prompt of most
     models is taken. Raises DataError when no recording carries one, or when there is no most.
     """
-    models_by_text: dict[str, list[str]] = {}
-    for name, folder in recorded_models(root).items():
+    texts: Counter[str] = Counter()
+    for folder in recorded_models(root).values():
         path = min(folder.glob("*.json"))
         try:
             raw = load_json(read_data(path))
@@ -163,18 +164,15 @@ def official_prompt(root: Path) -> str:
             raise DataError(Problem(str(path), f"is not JSON: {error}")) from error
         instruction = raw.get("instruction") if isinstance(raw, dict) else None
         if isinstance(instruction, str):
-            models_by_text.setdefault(_PICTURE_MARKS.sub("", instruction), []).append(name)
-    where = str(root / _OUTPUTS)
-    if not models_by_text:
-        message = "no recording carries the official prompt"
-        allowed = "recordings with a field 'instruction', such as those of the InternVL models"
-        raise DataError(Problem(where, message, "instruction", allowed=allowed))
-    ranked = sorted(models_by_text, key=lambda text: -len(models_by_text[text]))
-    if len(ranked) > 1 and len(models_by_text[ranked[0]]) == len(models_by_text[ranked[1]]):
-        names = "; ".join(", ".join(models) for models in models_by_text.values())
+            texts[_PICTURE_MARKS.sub("", instruction)] += 1
+    first, second = [*texts.most_common(2), ("", 0), ("", 0)][:2]
+    if first[1] > second[1]:
+        return first[0]
+    message = "no recording carries the official prompt"
+    if texts:
         message = "the recordings carry different prompts, none more often than the others"
-        raise DataError(Problem(where, message, "instruction", names))
-    return ranked[0]
+    allowed = "recordings with a field 'instruction', such as those of the InternVL models"
+    raise DataError(Problem(str(root / _OUTPUTS), message, "instruction", allowed=allowed))
 
 
 class _Question(Line, extra="ignore"):

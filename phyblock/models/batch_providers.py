@@ -75,9 +75,8 @@ class BatchProvider(ABC):
         self._url = url
         self._first_page = first_page
         self._secrets = secrets_of(config)
-        limits = {"timeout_s": _TRANSFER_S, "most_body_bytes": _LARGEST_RESULTS_BYTES}
-        self._looks = HttpClient(config.model_copy(update={"timeout_s": _LOOK_S}))
-        self._transfers = HttpClient(config.model_copy(update=limits))
+        self._looks = HttpClient(_LOOK_S)
+        self._transfers = HttpClient(_TRANSFER_S, _LARGEST_RESULTS_BYTES)
 
     @abstractmethod
     def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:

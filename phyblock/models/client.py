@@ -86,7 +86,7 @@ class Client(ABC):
     def __init__(self, config: ModelConfig, http: HttpClient | None = None) -> None:
         """`http` sends in the place of a connection of its own."""
         self.config = config
-        self.http = http or HttpClient(config)
+        self.http = http or HttpClient(config.timeout_s)
         self._secrets = secrets_of(config)
 
     async def complete(self, request: Request) -> Reply:
@@ -126,6 +126,10 @@ def shown(text: str, secrets: tuple[str, ...]) -> str:
     return " ".join(hidden(text, secrets).split())[:_LONGEST_MESSAGE]
 
 
+LARGEST_REPLY_BYTES = 32 * 1024 * 1024
+"""Default limit of a reply's body [bytes]: a hundred times what the longest thoughts take."""
+
+
 @dataclass(frozen=True)
 class Answer:
     """The answer of a server; `fault` says what is wrong with its body, or "" for nothing."""
@@ -144,9 +148,9 @@ class Answer:
 class HttpClient:
     """Sends requests for one model, over one session that is opened by the first."""
 
-    def __init__(self, config: ModelConfig) -> None:
-        self._timeout_s = config.timeout_s
-        self._most_bytes = config.most_body_bytes
+    def __init__(self, timeout_s: float, most_bytes: int | None = None) -> None:
+        self._timeout_s = timeout_s
+        self._most_bytes = most_bytes or LARGEST_REPLY_BYTES
         self._session: aiohttp.ClientSession | None = None
         self._proxies: dict[tuple[str, str], str | None] = {}
 

@@ -55,8 +55,7 @@ ROUTES = {
 def with_fields(config: ModelConfig, **fields: Any) -> ModelConfig:
     """The model with other values in fields of its entry."""
     given = config.model_dump(by_alias=True, exclude_unset=True)
-    hidden = {"name": config.name, "most_body_bytes": config.most_body_bytes}
-    return ModelConfig.model_validate({**given, **hidden, **fields})
+    return ModelConfig.model_validate({**given, "name": config.name, **fields})
 
 
 PNG = b"\x89PNG\r\n\x1a\n"

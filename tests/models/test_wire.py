@@ -27,6 +27,7 @@ from phyblock.errors import (
     UnavailableError,
     UnreachableError,
 )
+from phyblock.models import client
 from phyblock.models.client import shown
 from phyblock.models.model import ModelEvent, RetryPolicy
 from phyblock.models.request import Image, Message, Model, Request, json_body, wire_messages
@@ -412,8 +413,10 @@ def answers_to(route: Route, server: LocalServer, url: str, faults: list[str]) -
         return reply
 
     def new(timeout_s: float) -> Model:
-        fields = {"seed": "never", "timeout_s": timeout_s, "most_body_bytes": 2**20}
-        return make_model(route.config(url, **fields), policy=ONCE)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(client, "LARGEST_REPLY_BYTES", 2**20)
+            asked = route.config(url, seed="never", timeout_s=timeout_s)
+            return make_model(asked, policy=ONCE)
 
     async def all_of_them() -> Answers:
         found: Answers = {}
