@@ -283,7 +283,6 @@ class Suite(Section):
     tracks: UniqueSome[Annotated[str, OneOf(known_tracks)]] = ("full_planning",)
     """The tracks to run."""
     dataset: DatasetSpec = DatasetSpec()
-    """The scenes of a run."""
     levels: UniqueSome[Level] = (1, 2, 3, 4)
     """Difficulty levels."""
     limit: Count | None = None
@@ -305,18 +304,13 @@ class Suite(Section):
     """text: lines of text. json_schema: one JSON object, whose schema the prompt states; it is also
     sent as response_format where the provider takes one."""
     images: ImagesSpec = ImagesSpec()
-    """The pictures that a model is shown."""
     candidates: CandidatesSpec = CandidatesSpec()
-    """The presentation of candidates."""
     parser: PlanParser = "steps"
     """steps: reads the step list and records the rule that matched. official: the official
     expression over the whole reply."""
     scoring: ScoringSpec = ScoringSpec()
-    """The rules of scoring."""
     sampling: SamplingSpec = SamplingSpec()
-    """Sampling parameters for models that set none."""
     limits: LimitsSpec = LimitsSpec()
-    """Bounds of a run; they change how fast results come, not what they are."""
     vary: VarySpec = VarySpec()
     """Conditions of presentation that are varied, to measure how much each of them changes a
     model's score."""
