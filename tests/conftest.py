@@ -24,7 +24,8 @@ OFFICIAL_MISSING = (
 )
 
 # No test asserts on time: what a machine takes for an example says what else it was doing.
-settings.register_profile("phyblock", deadline=None)
+EXAMPLES = int(os.environ.get("PHYBLOCK_EXAMPLES", "50"))
+settings.register_profile("phyblock", deadline=None, max_examples=EXAMPLES)
 settings.load_profile("phyblock")
 
 os.environ.update(ONE_THREAD)

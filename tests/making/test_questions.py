@@ -37,13 +37,13 @@ SCENES = {task.scene.id: task.scene for task in DATA.tasks}
 SOME = list(SCENES.values())[3::40]
 STATIC: tuple[Subtask, ...] = ("SH", "CO", "SI", "NU", "RP", "AP", "RD", "RR", "OC", "LC", "TC")
 ASKED: dict[Subtask, tuple[int, tuple[str, ...]]] = {
-    "VP": (3, ("l3-061-house", "l4-051-combined", "l4-073-combined")),
+    "VP": (2, ("l3-061-house", "l4-051-combined", "l4-073-combined")),
     "CF": (5, ("l1-001-animal", "l1-025-bridge", "l2-001-animal", "l2-021-slide")),
-    "PD": (3, ("l1-002-bridge", "l1-007-slide", "l1-010-tree", "l2-005-house")),
+    "PD": (2, ("l1-002-bridge", "l1-007-slide", "l1-010-tree", "l2-005-house")),
     "OR": (2, ("l3-023-stair", "l3-028-arcade", "l3-029-bridge")),
 }
 """Scenes that are quick to ask about."""
-COUNT = 6
+COUNT = 3
 HANGS_M = 0.004
 
 

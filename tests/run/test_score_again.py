@@ -123,29 +123,31 @@ def test_it_is_refused_until_it_is_scored_and_then_ends_as_if_today_had_begun_it
 
 
 @pytest.mark.usefixtures("begun")
-@pytest.mark.parametrize("writes", [1, 2])
 def test_killed_before_either_file_is_replaced_it_is_scored_again(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, writes: int
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    shutil.copytree(workspace.out, workspace.root / "whole")
+    for name in ("whole", "1", "2"):
+        shutil.copytree(workspace.out, workspace.root / name)
     assert call("score", "whole") == 0
-    before = (workspace.out / "records.jsonl").read_bytes()
-    left, write = writes, store.atomic_write
+    for writes in (1, 2):
+        folder = workspace.root / str(writes)
+        before = (folder / "records.jsonl").read_bytes()
+        left, write = writes, store.atomic_write
 
-    def dying(*args: Any, **options: Any) -> None:
-        nonlocal left
-        left -= 1
-        if not left:
-            raise KeyboardInterrupt
-        write(*args, **options)
+        def dying(*args: Any, **options: Any) -> None:
+            nonlocal left
+            left -= 1
+            if not left:
+                raise KeyboardInterrupt
+            write(*args, **options)  # noqa: B023
 
-    with monkeypatch.context() as dies:
-        dies.setattr(store, "atomic_write", dying)
-        with pytest.raises(KeyboardInterrupt):
-            rescore.rescore(workspace.out)
-    assert ((workspace.out / "records.jsonl").read_bytes() == before) == (writes == 1)
-    with pytest.raises(StoreError, match="by another version"):
-        run("out")
-    assert call("score", "out") == 0
-    assert newest(workspace, "out") == newest(workspace, "whole")
-    assert run("out") == 0
+        with monkeypatch.context() as dies:
+            dies.setattr(store, "atomic_write", dying)
+            with pytest.raises(KeyboardInterrupt):
+                rescore.rescore(folder)
+        assert ((folder / "records.jsonl").read_bytes() == before) == (writes == 1)
+        with pytest.raises(StoreError, match="by another version"):
+            run(folder.name)
+        assert call("score", folder.name) == 0
+        assert newest(workspace, folder.name) == newest(workspace, "whole")
+        assert run(folder.name) == 0
