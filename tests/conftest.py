@@ -45,6 +45,13 @@ def pytest_collection() -> Generator[None, object, object]:
         gc.enable()
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Pages come first, or two processes would make the runs that they show: a process that has
+    nothing left to do takes the last tests of the other.
+    """
+    items.sort(key=lambda item: "web" not in item.path.parts)
+
+
 def official_root() -> Path | None:
     """The folder that holds `PhyBlock/` and `expected/`, or None; the checkout itself will do."""
     named = os.environ.get("PHYBLOCK_OFFICIAL")

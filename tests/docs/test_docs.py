@@ -1,0 +1,156 @@
+"""What the documentation says is done: tutorials from an empty folder, plugins, models."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import os
+import re
+import subprocess
+import sys
+import zlib
+from pathlib import Path
+
+import pytest
+
+from tests.servers.chassis import Running
+from tests.servers.openai_chat import OpenAIChat
+from tests.workspace import Workspace
+
+DOCS = Path(__file__).parents[2] / "docs"
+ADDRESS = "http://localhost:8000"
+"""The server that pages name."""
+_FENCE = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.M | re.S)
+
+
+def follow(text: str, workspace: Workspace, url: str = ADDRESS) -> str:
+    """Do what a text says; return what its commands printed.
+
+    Blocks with a title are files, added to those that are there; `sh` blocks are commands. Others,
+    such as `console`, need what a test does not have.
+    """
+    command = workspace.root / "bin" / "phyblock"
+    command.parent.mkdir()
+    command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m phyblock "$@"\n')
+    command.chmod(0o755)
+    folder = workspace.root / "reader"
+    folder.mkdir()
+    env = {**workspace.env, "PATH": f"{command.parent}{os.pathsep}{workspace.env['PATH']}"}
+    printed = ""
+    for language, file, block in _FENCE.findall(text):
+        step = block.replace(ADDRESS, url)
+        if file:
+            with (folder / file).open("a", encoding="utf-8") as written:
+                written.write(step)
+        elif language == "sh":
+            done = subprocess.run(
+                ["bash", "-euc", f"{step}\npwd >{workspace.root}/where"],
+                cwd=folder,
+                env=env,
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                timeout=300,
+            )
+            assert done.returncode == 0, f"{step}\n{done.stdout}\n{done.stderr}"
+            folder = Path((workspace.root / "where").read_text().strip())
+            printed += done.stdout
+    return printed
+
+
+LEFT = {
+    "first-model.md": ("my-bench/results/first/report.html",),
+    "first-scenes.md": ("mine-set/scenes.jsonl", "pictures", "results/mine-poses/tables"),
+    "paper-tables.md": ("results/comparison", "results/paper/paper", "rocket.gif"),
+}
+"""What is there after each tutorial; blocks of agent.md are run with the environment's tests."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", LEFT)
+def test_a_reader_comes_to_the_end(page: str, workspace: Workspace) -> None:
+    with Running(OpenAIChat()) as server:
+        text = (DOCS / "tutorials" / page).read_text(encoding="utf-8")
+        printed = follow(text, workspace, server.url)
+    for name in LEFT[page]:
+        assert (workspace.root / "reader" / name).exists(), name
+    if page == "first-model.md":
+        table = printed[printed.index("Assembly planning") :]
+        assert re.search(r"^\W*my-model\b.*\d", table, re.M)
+        assert "All 24 samples are done" in printed
+
+
+def test_every_tutorial_is_followed() -> None:
+    assert {page.name for page in (DOCS / "tutorials").glob("*.md")} == {*LEFT, "agent.md"}
+
+
+@pytest.mark.parametrize(
+    "page", ["../README.md", "index.md", "models.md", "tutorials/first-model.md"]
+)
+def test_a_model_that_a_page_adds_is_not_there_yet(page: str) -> None:
+    models = (DOCS.parent / "models.yaml").read_text(encoding="utf-8")
+    added = re.findall(r"^(\S+:) openai/", (DOCS / page).read_text(encoding="utf-8"), re.M)
+    assert added
+    assert not [name for name in added if re.search(f"^{re.escape(name)}", models, re.M)]
+
+
+MOST_LINES = 150
+SECTIONS = dict(
+    re.findall(
+        r"^## (.+?)\n(.*?)(?=^## |\Z)",
+        (DOCS / "extending.md").read_text(encoding="utf-8"),
+        re.MULTILINE | re.DOTALL,
+    )
+)
+SHOWN: dict[str, tuple[str, str, dict[str, float | None], str, str]] = {
+    "A block shape": ("towers", "f1", {"oracle": 1.0, "random": None}, "table1.md", "hexagon"),
+    "A background": ("grounds", "f1", {"random": None}, "sensitivity.md", "sand"),
+    "A question kind": ("ground", "accuracy", {"oracle": 1.0}, "table2.md", "GR"),
+    "A measure": (
+        "needless",
+        "needless",
+        {"oracle": 0.0, "all-candidates": None},
+        "full_planning_measures.md",
+        "Needless steps",
+    ),
+    "A track": ("counting", "exact", {"oracle": 1.0, "random": None}, "counting.md", "Counting"),
+}
+"""By section: the folder of its run, a measure with values, a table, and a text of the page."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("section", SECTIONS)
+def test_a_plugin_is_in_tables_and_on_the_page(section: str, workspace: Workspace) -> None:
+    text = SECTIONS[section]
+    assert max(code.count("\n") for code in re.findall(r"```python(.*?)```", text, re.S)) <= (
+        MOST_LINES
+    )
+    follow(text, workspace)
+    folder, measure, values, table, word = SHOWN[section]
+    run = workspace.root / "reader" / "results" / folder
+    with (run / "tables" / "estimates.csv").open(newline="", encoding="utf-8") as file:
+        rows = [
+            row
+            for row in csv.DictReader(file)
+            if row["measure"] == measure and row["cell"] == "overall"
+        ]
+    for model, value in values.items():
+        (found, *_) = [row for row in rows if row["model"] == model]
+        assert found["lo"] <= found["value"] <= found["hi"]
+        assert value is None or float(found["value"]) == value
+    shown = (run / "tables" / table).read_text(encoding="utf-8")
+    assert all(model in shown for model in values)
+    assert word in shown or section in ("A block shape", "A background")
+    assert word in page_of(run)
+
+
+def page_of(run: Path) -> str:
+    """Return the report with the data that it loads, unpacked."""
+    scripts = "".join(file.read_text(encoding="utf-8") for file in (run / "report").rglob("*.js"))
+    packed = re.findall(r"^phyblockTake\('[^']*','[^']*','([^']*)'\)$", scripts, re.M)
+    data = [zlib.decompress(base64.b64decode(text)).decode() for text in packed]
+    return "".join([(run / "report.html").read_text(encoding="utf-8"), *data])
+
+
+def test_every_kind_of_addition_has_a_plugin() -> None:
+    assert [*SECTIONS] == [*SHOWN]
