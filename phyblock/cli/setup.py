@@ -116,7 +116,18 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[s
         hint = f"`phyblock scenes complete {shown_path(path)}` makes a data set of them"
         raise SpecError(Problem(str(path), message, allowed=allowed, hint=hint))
     if isinstance(data, dict) and data.keys() & suite_model().model_fields.keys():
-        return _check_suite(path, sets, models_file)
+        from phyblock.api import load_suite
+
+        suite = load_suite(path, *sets).loaded
+        named = find_models_file(models_file, path)
+        known = load_models(named)
+        asked = () if suite.models == RECORDED else suite.models
+        if problems := list(model_problems(named, known, asked)):
+            raise SpecError(problems)
+        plan = make_plan(suite, known)
+        models = counted(len(plan.models), "model")
+        samples = f"{counted(plan.samples_per_model, 'sample')} a model"
+        return [f"suite {suite.name}, {models}, {samples}", *asking_remarks(suite, plan)]
     known = load_models(path)
     if problems := list(model_problems(path, known, known)):
         raise SpecError(problems)
@@ -124,19 +135,6 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[s
         allowed = "a suite, or a models file with name: provider/model lines"
         raise SpecError(Problem(str(path), "names nothing", allowed=allowed))
     return [f"models file, {counted(len(known), 'model')}"]
-
-
-def _check_suite(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[str]:
-    from phyblock.api import load_suite
-
-    suite = load_suite(path, *sets).loaded
-    named = find_models_file(models_file, path)
-    known = load_models(named)
-    if suite.models != RECORDED and (problems := list(model_problems(named, known, suite.models))):
-        raise SpecError(problems)
-    plan = make_plan(suite, known)
-    models, samples = counted(len(plan.models), "model"), counted(plan.samples_per_model, "sample")
-    return [f"suite {plan.suite.name}, {models}, {samples} a model", *asking_remarks(suite, plan)]
 
 
 @click.group()

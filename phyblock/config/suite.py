@@ -460,10 +460,7 @@ def suite_model() -> type[Suite]:
 
 @functools.cache
 def _composed(sections: tuple[tuple[str, type[BaseModel]], ...]) -> type[Suite]:
-    fields: dict[str, Any] = {
-        key: (model, Field(default_factory=model, description=model.__doc__))
-        for key, model in sections
-    }
+    fields: dict[str, Any] = {key: (model, model()) for key, model in sections}
     return create_model("Suite", __base__=Suite, __doc__=Suite.__doc__, **fields)
 
 

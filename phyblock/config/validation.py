@@ -200,10 +200,8 @@ TemplateName = Literal["default"] | Template
 class PictureControls(Section):
     """Controls of a track's section that find out what answers owe to the picture."""
 
-    blind: Flag = Field(
-        default=False,
-        description="Leave out the picture of the goal; for questions, all pictures.",
-    )
+    blind: Flag = False
+    """Leave out the picture of the goal; for questions, all pictures."""
 
 
 def read_section(model: type[ModelT], source: YamlSource, more: Sequence[Problem] = ()) -> ModelT:
