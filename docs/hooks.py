@@ -87,7 +87,9 @@ def _text(path: str) -> str:
 def _table(fields: dict[str, Schema]) -> str:
     lines = ["| field | type | default | meaning |", "|---|---|---|---|"]
     for name, field in fields.items():
-        default = "" if "default" not in field else f"`{json.dumps(field['default'])}`"
+        # The defaults of a section stand in its own table.
+        is_plain = "default" in field and "$ref" not in field
+        default = f"`{json.dumps(field['default'])}`" if is_plain else ""
         text = " ".join(field.get("description", "").split()).replace("|", "\\|")
         lines.append(f"| `{name}` | {_kind(field)} | {default} | {text} |")
     return "\n".join(lines)
