@@ -17,7 +17,7 @@ from pathlib import Path
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import Problem, StoreError, reason_of
-from phyblock.models.request import Image, Message, Request, wire_params
+from phyblock.models.request import Image, Request, wire_params
 from phyblock.records.record import Reply
 from phyblock.stable import hex_digest
 
@@ -41,17 +41,18 @@ def reply_key(config: ModelConfig, request: Request) -> str:
     content = {
         "schema": SCHEMA,
         "model": {**config.identity(), "params": wire_params(config, request)},
-        "messages": [_message(message) for message in request.messages],
+        "messages": [
+            [
+                message.role,
+                [{"image": p.sha256} if isinstance(p, Image) else p for p in message.parts],
+            ]
+            for message in request.messages
+        ],
         "seed": request.seed,
         "prompt_version": request.prompt_version,
     }
     canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hex_digest(canonical)
-
-
-def _message(message: Message) -> list[object]:
-    parts = [{"image": p.sha256} if isinstance(p, Image) else p for p in message.parts]
-    return [message.role, parts]
 
 
 class ReplyCache:

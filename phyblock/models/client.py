@@ -374,9 +374,11 @@ def read_raw_reply(raw: object, where: str) -> Reply:
     responses (as the REST API and as its Python client write them), and a text under `predict`,
     `text` or `response`. Raises DataError for any other.
     """
-    for read in (read_chat_completion, _anthropic, _gemini, _text_alone):
+    for read in (read_chat_completion, _anthropic, _gemini):
         if (reply := read(raw)) is not None:
             return reply
+    if isinstance(text := _get(raw, "predict", "text", "response"), str):
+        return _reply(text)
     found = f"keys {', '.join(map(str, raw))}" if isinstance(raw, Mapping) else type(raw).__name__
     allowed = "a chat completion, an Anthropic message, a Gemini response, predict, text, response"
     raise DataError(Problem(where, "is no recorded reply of a known shape", "", found, allowed))
@@ -447,12 +449,6 @@ def _gemini(raw: object) -> Reply | None:
     text, thoughts = _parts(_get(candidate, "content.parts"))
     model = _get(raw, "modelVersion", "model_version")
     return _reply(text, thoughts, "refusal" if blocked else finish, usage, model)
-
-
-def _text_alone(raw: object) -> Reply | None:
-    """Read a dump with the reply under one name."""
-    text = _get(raw, "predict", "text", "response")
-    return _reply(text) if isinstance(text, str) else None
 
 
 def _reply(

@@ -247,7 +247,9 @@ class ModelBudget:
                 spent = f"{self._spent_usd:.4f} spent, the next call can cost {usd:.4f}"
                 raise UnavailableError(f"its max_cost_usd {self._max_usd:g} is reached: {spent}")
             is_slow = self.is_limited and len(self._under_way) > self._settled
-            if self._fits(usd) and (together or not is_slow):
+            fits = self._spent_usd + self._held_usd + usd <= self._max_usd
+            fits = fits and run.spent_usd + run.held_usd + usd <= run.max_usd
+            if fits and (together or not is_slow):
                 number = self.hold(usd)
                 if not together:
                     self._under_way.add(number)
@@ -257,11 +259,6 @@ class ModelBudget:
                 raise BudgetReachedError(f"max_cost_usd {run.max_usd:g} is reached: {spent}")
             run.changed.clear()
             await run.changed.wait()
-
-    def _fits(self, usd: float) -> bool:
-        """True if a further cost would stay within the limits."""
-        is_own = self._spent_usd + self._held_usd + usd <= self._max_usd
-        return is_own and self._run.spent_usd + self._run.held_usd + usd <= self._run.max_usd
 
     def hold(self, usd: float) -> int:
         """Make a reservation, whether it fits or not; return its number."""
@@ -424,44 +421,37 @@ class PictureRule:
 
     def tokens(self, width: float, height: float) -> int:
         """Return the tokens of a picture of so many pixels."""
+
+        def squares() -> int:
+            return math.ceil(width / self.side) * math.ceil(height / self.side)
+
         scale = min(1.0, self.longest / max(width, height), self.shortest / min(width, height))
         if self.fit == "area":
             scale = min(scale, math.sqrt(self.most * self.side**2 / (width * height)))
         width, height = width * scale, height * scale
         if self.fit == "pixels":
-            width, height = self._in_pixels(max(1, round(width)), max(1, round(height)))
-        return math.ceil(self.plus + self.each * min(self.most, self._squares(width, height)))
-
-    def _squares(self, width: float, height: float) -> int:
-        return math.ceil(width / self.side) * math.ceil(height / self.side)
-
-    def _in_pixels(self, width: int, height: int) -> tuple[int, int]:
-        """Return the size at which no more than `most` squares cover it, along one side exactly."""
-        if self._squares(width, height) <= self.most:
-            return width, height
-        scale = math.sqrt(self.side**2 * self.most / (width * height))
-        squares = (side * scale / self.side for side in (width, height))
-        scale *= min(math.floor(along) / along or 1.0 for along in squares)
-        return max(1, math.floor(width * scale)), max(1, math.floor(height * scale))
+            width, height = max(1, round(width)), max(1, round(height))
+            if squares() > self.most:
+                # No more than `most` squares cover it then, along one side exactly.
+                scale = math.sqrt(self.side**2 * self.most / (width * height))
+                each = (side * scale / self.side for side in (width, height))
+                scale *= min(math.floor(along) / along or 1.0 for along in each)
+                width, height = (max(1, math.floor(side * scale)) for side in (width, height))
+        return math.ceil(self.plus + self.each * min(self.most, squares()))
 
 
 @functools.cache
 def _picture_rules() -> list[tuple[re.Pattern[str], dict[str, PictureRule]]]:
     """Read pictures.yaml: rules by detail, "" the usual one, each with the names that it is for."""
-
-    def rule(told: Any) -> PictureRule:
-        return PictureRule(**told) if isinstance(told, dict) else PictureRule(plus=told)
-
-    return [
-        (
-            re.compile(rf"(^|\.){entry['model']}"),
-            {
-                name: rule(told)
-                for name, told in {"": entry["usual"], **entry.get("details", {})}.items()
-            },
-        )
-        for entry in read_own_yaml(Path(__file__).with_name("pictures.yaml"))
-    ]
+    rules = []
+    for entry in read_own_yaml(Path(__file__).with_name("pictures.yaml")):
+        told = {"": entry["usual"], **entry.get("details", {})}.items()
+        by_detail = {
+            name: PictureRule(**rule) if isinstance(rule, dict) else PictureRule(plus=rule)
+            for name, rule in told
+        }
+        rules.append((re.compile(rf"(^|\.){entry['model']}"), by_detail))
+    return rules
 
 
 def picture_tokens(model_id: str, image: Image, detail: ImageDetail | None = None) -> int:

@@ -471,7 +471,7 @@ class ChatModel:
         """Send with the call's greatest cost reserved in the budget."""
         held = None
         if self.budget.tariff is not None:
-            held = await self.budget.reserve(lambda: self._most_usd(call) or 0.0)
+            held = await self.budget.reserve(lambda: self.budget.most_usd(call.expected) or 0.0)
         exchange = asyncio.ensure_future(self._exchange(call, server, held))
         try:
             return await asyncio.shield(exchange)
@@ -490,7 +490,7 @@ class ChatModel:
         spent_usd: float | None = 0.0
         try:
             if self.journal is not None:
-                sample, most_usd = call.request.sample, self._most_usd(call)
+                sample, most_usd = call.request.sample, self.budget.most_usd(call.expected)
                 written = await self.journal.sent(self.name, sample, call.key, most_usd)
                 if call.is_cancelled:
                     raise asyncio.CancelledError
@@ -522,9 +522,6 @@ class ChatModel:
             if self.journal is not None and written is not None:
                 await self.journal.ended(written, spent_usd, reply)
         return reply
-
-    def _most_usd(self, call: _Call) -> float | None:
-        return self.budget.most_usd(call.expected)
 
     def _cost_usd(self, reply: Reply) -> float | None:
         return cost_usd(self.budget.tariff, reply)
@@ -590,7 +587,11 @@ def build_model(
         assert batches is not None, "batches are kept in a run"
         return BatchModel(client=lambda http: client(config, http), files=batches, **shared)
     each = [
-        Server(_origin(address) or config.provider, client(config.at(address)))
+        Server(
+            # Scheme, host and port: the rest of an address may hold a secret.
+            "/".join(address.split("/")[:3]).lower() if address else config.provider,
+            client(config.at(address)),
+        )
         for address in config.addresses or (None,)
     ]
     servers = Servers(each, policy, tell)
@@ -603,8 +604,3 @@ def build_model(
         clock=policy.clock,
     )
     return ChatModel(servers=servers, limits=limits, journal=journal, **shared)
-
-
-def _origin(address: str | None) -> str:
-    """Return scheme, host and port of an address."""
-    return "/".join((address or "").split("/")[:3]).lower()

@@ -58,7 +58,17 @@ def open_replay(config: ModelConfig) -> LocalModel:
         where, found = f"model {config.name}", str(folder)
         raise DataError(Problem(where, "recordings not found", "replay", found, "a folder"))
     if (folder / RECORDS).is_file():
-        return LocalModel(config.name, partial(_recorded, _read_records(folder, config.name)))
+        known = _read_records(folder, config.name)
+
+        def recorded(request: Request) -> Reply | None:
+            record = known.get((request.track, request.key, request.seed))
+            error = None if record is None else record.error
+            if error is not None and error.kind in ("sample", "refused"):
+                cls = RefusedError if error.kind == "refused" else SampleError
+                raise cls(error.message, status=error.status)
+            return None if record is None else record.reply
+
+        return LocalModel(config.name, recorded)
     if not any(folder.glob("*.json")):
         allowed = f"a file a scene such as 000.json, or {RECORDS}"
         raise DataError(Problem(str(folder), "holds no recorded replies", allowed=allowed))
@@ -116,13 +126,3 @@ def _read_records(folder: Path, model: str) -> _Records:
     where = str(folder / RECORDS)
     message = "has no records of this model"
     raise DataError(Problem(where, message, "model", model, ", ".join(found)))
-
-
-def _recorded(known: _Records, request: Request) -> Reply | None:
-    """Return the reply recorded for a request, or None; raise the error that was recorded."""
-    record = known.get((request.track, request.key, request.seed))
-    error = None if record is None else record.error
-    if error is not None and error.kind in ("sample", "refused"):
-        cls = RefusedError if error.kind == "refused" else SampleError
-        raise cls(error.message, status=error.status)
-    return None if record is None else record.reply
