@@ -71,6 +71,11 @@ def make_manifest(
         with contextlib.suppress(PackageNotFoundError):
             libraries[name] = version(name)
     engine = {"engine": described_engine()} if simulating(suite.model_dump()) else {}
+    questions: dict[str, Any] = {}
+    for name, root in suite.files.folders.items():
+        form = getattr(suite, kind_of(name).section).format
+        about = {"format": form, "root": str(root), "version": read_version(root)}
+        questions = questions or {"questions": about}
     fields = {
         "identity": identity,
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -92,20 +97,11 @@ def make_manifest(
             "root": str(dataset.root),
         },
         **engine,
-        **_questions(suite),
+        **questions,
         **asked_counts(suite, dataset, variants[Variant()]),
         "versions": {"python": platform.python_version(), **libraries, **code_versions()},
     }
     return Manifest.model_validate(fields)
-
-
-def _questions(suite: Suite) -> dict[str, Any]:
-    """Return the set of questions of a run, for a track that brings data of its own."""
-    for name, root in suite.files.folders.items():
-        own = getattr(suite, kind_of(name).section)
-        about = {"format": own.format, "root": str(root), "version": read_version(root)}
-        return {"questions": about}
-    return {}
 
 
 def asked_counts(suite: Suite, dataset: Dataset, tracks: Iterable[Track]) -> dict[str, Any]:

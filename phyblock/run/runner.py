@@ -204,12 +204,13 @@ class Session:
         """
         plan, result = self.plan, self.result
         stack.callback(plan.close)
-        store = RunStore(self.folder, plan.manifest, plan.sample_ids())
-        self._store = stack.enter_context(store)
-        queues: dict[str, deque[Sample]] = {model.name: deque() for model in plan.models}
-        earlier: dict[str, list[Summary]] = {name: [] for name in queues}
+        samples = {model.name: list(plan.samples(model.name)) for model in plan.models}
+        ids = frozenset(sample.id for each in samples.values() for sample in each)
+        self._store = store = stack.enter_context(RunStore(self.folder, plan.manifest, ids))
+        queues: dict[str, deque[Sample]] = {name: deque() for name in samples}
+        earlier: dict[str, list[Summary]] = {name: [] for name in samples}
         for name, queue in queues.items():
-            for sample in plan.samples(name):
+            for sample in samples[name]:
                 known = store.progress.samples.get(sample.id)
                 if known and (known.is_answered if self.retry_failed else known.is_final):
                     earlier[name].append(known)

@@ -107,7 +107,10 @@ class Workshop:
         Raises DataError for a file that is no picture, StoreError when the cache folder cannot be
         written, SimulationError when a worker was killed.
         """
-        return tuple(await asyncio.gather(*map(self._image, drawings)))
+        kept = [image for one in drawings if (image := self._kept(one)) is not None]
+        if len(kept) < len(drawings):
+            return tuple(await asyncio.gather(*map(self._image, drawings)))
+        return tuple(kept)
 
     def outlines(self, drawings: Sequence[Drawing]) -> tuple[Image, ...]:
         """Return pictures as far as they are at hand, of others empty ones of their sizes.
