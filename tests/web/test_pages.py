@@ -253,7 +253,7 @@ def test_a_stage_opens_at_the_first_wrong_step_and_moves_but_for_those_who_want_
     expect(page.locator("canvas.stage")).to_have_attribute("data-drawn", "0")
     said = page.locator(".said")
     assert "The goal has no green cylinder." in said.inner_text()
-    assert "Glowing: what was tried, on the floor, the first open place." in said.inner_text()
+    assert "Pink: what was tried, on the floor, the first open place." in said.inner_text()
     assert said.locator(".quote").inner_text() == "1. Move block with index 9."
     # What is drawn while a block drops is another picture than the one it ends in.
     page.clock.pause_at(page.evaluate("Date.now() / 1000 + 60"))

@@ -5,6 +5,7 @@
 const Results = (() => {
   const LOOP_MS = 900;
   const REST_MS = 2600;
+  const NOTE = "Intervals: jackknife over base scenes. Ranks are ranges: paired tests of every pair of models, corrected for their number (Holm). Baselines have no rank, nor have models that were not asked about every sample.";
   const { number } = Words;
   let clock = null;
 
@@ -42,7 +43,7 @@ const Results = (() => {
       isSaid ? null : findings(track),
       Charts.bars(track),
       el("details", { class: "more" }, el("summary", {}, "All numbers: intervals, settings, tokens and cost"), Table.numbers(track)),
-      el("ul", { class: "notes" }, [...track.notes, "Thin bars are 95 % intervals: jackknife over base scenes; a dark bar lies beyond the line with all of its interval. Ranks are ranges: paired tests of every pair of models, corrected for their number (Holm). Baselines have no rank, nor have models that were not asked about every sample.",
+      el("ul", { class: "notes" }, [...track.notes, track === Data.board.tracks[0] && NOTE,
         track.physics && "What fell is taken from the records; physics is not run again."].filter(Boolean).map((note) => el("li", {}, note))),
       Charts.slope(track), Charts.losses(track));
   }
@@ -66,7 +67,7 @@ const Results = (() => {
   /** Once the page stands, show the failures that tell most, and the first of them as a loop. */
   async function show(failures, hero) {
     const index = await Data.open();
-    const cards = (await Promise.all(index.telling.map(failure))).filter(Boolean);
+    const cards = (await Promise.all(index.telling.map((row) => failure(row)))).filter(Boolean);
     if (!cards.length || !failures.isConnected) return hero?.remove();
     failures.append(...cards.map(({ item }) => item));
     failures.parentElement.hidden = false;
@@ -75,7 +76,7 @@ const Results = (() => {
   }
 
   /** A sample at its first wrong step, beside its goal; null where nothing can be drawn. */
-  async function failure(row) {
+  async function failure(row, title = "") {
     const sample = Data.sample(row), record = await Data.entry("records", row);
     const scene = Steps.asShown(await Data.scene(sample.sceneNumber), record);
     if (!scene) return null;
@@ -86,7 +87,7 @@ const Results = (() => {
     const figure = (title, drawing) => el("figure", {}, Stage.picture(title, drawing), el("figcaption", {}, title));
     const item = el("li", {}, el("a", { href: App.address("samples", { s: sample.id }) },
       el("span", { class: "pair" }, figure("Goal", [scene.blocks]), figure(`Step ${at + 1}`, [state.blocks, { ...state, ghosts: [] }])),
-      el("strong", {}, Words.named(step.why)), ` ${sample.name}: ${step.text}`));
+      el("strong", {}, Words.named(step.why)), ` ${title || sample.name}: ${step.text}`));
     return { item, scene, run, name: sample.name };
   }
 
@@ -131,5 +132,5 @@ const Results = (() => {
       el("p", {}, "Ma, Wen, Lin, Xu, Liang, Lin et al.: PhyBlock: A Progressive Benchmark for Physical Understanding and Planning via 3D Block Assembly. NeurIPS 2025, Datasets and Benchmarks Track."))];
   }
 
-  return { view };
+  return { view, failure };
 })();

@@ -269,7 +269,7 @@ const Sample = (() => {
       el("figcaption", { class: "muted" }, `${label}${size}, as sent`));
   }
 
-  return { parts, settingsOf,
+  return { parts, settingsOf, candidates,
     get player() {
       return player;
     } };

@@ -132,7 +132,7 @@ const Steps = (() => {
     const lift = Solid.onTheFloor(candidate).position[2] - Solid.onTheFloor(goal).position[2];
     const why = step.before.has(v) ? ", a place that is taken" : ofKind.length ? "" : ", the first open place";
     return { tried: { ...candidate, position: [x, y, z + lift] },
-      where: `Glowing: what was tried, ${placeOf(scene, v)}${why}.` };
+      where: `Pink: what was tried, ${placeOf(scene, v)}${why}.` };
   }
 
   /** The number of the candidate that a block is, or one of its kind; "" for none. */

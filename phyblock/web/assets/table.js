@@ -55,12 +55,9 @@ const Table = (() => {
     });
   }
 
-  /** What a solved sample cost; null where it is not known. */
-  const perSolved = ({ solved, replies, cost_per_100_usd: cost }) => (solved && cost !== null ? (cost * replies) / 100 / solved : null);
-
   /** Facts of a model's samples: value, heading, digits or dollars, and the sense in which less is better. */
   const FACTS = [
-    [(fact) => fact.solved, "Solved", (n) => number(n, 0)], [perSolved, "USD a solved {item}", dollars, "lower"],
+    [(fact) => fact.solved, "Solved", (n) => number(n, 0)],
     [(fact) => fact.cost_per_100_usd, "USD for 100 replies", dollars, "lower"], [(fact) => fact.prompt_tokens, "Tokens in, mean", (n) => number(n, 0), "lower"],
     [(fact) => fact.completion_tokens, "Tokens out, mean", (n) => number(n, 0), "lower"], [(fact) => fact.latency_median_s, "Seconds, median", (n) => number(n, 2), "lower"],
     [(fact) => fact.recorded, "Samples done", (n) => number(n, 0)], [(fact) => fact.recorded - fact.ok, "Not read or failed", (n) => number(n, 0), "lower"],
@@ -80,7 +77,7 @@ const Table = (() => {
     }));
     const facts = FACTS.map(([of, heading, text, better = "higher"]) => {
       const value = (row) => (row.facts[track.name] ? of(row.facts[track.name]) : null);
-      return { heading: heading.replace("{item}", track.item), over: "Samples and cost", better, value, cell: (row) => ({ text: text(value(row)) }) };
+      return { heading, over: "Samples and cost", better, value, cell: (row) => ({ text: text(value(row)) }) };
     }).filter(({ value }) => board.rows.some((row) => value(row) !== null));
     const columns = [...values, ...facts, ...ofRuns()];
     return made({ caption: `All numbers of ${track.title}`, columns, rows: board.rows.filter((row) => row.facts[track.name]), name: named,
@@ -123,5 +120,5 @@ const Table = (() => {
     return isCut ? `${counted}; no rank` : counted;
   }
 
-  return { made, sorted, numbers, perSolved, written, rank, lacking };
+  return { made, sorted, numbers, written, rank, lacking };
 })();

@@ -23,11 +23,11 @@ const Views = (() => {
           ["Independently re-scored", !Data.isSite ? null : run.verified ? "yes, from a bundle" : "no: taken from a run folder"],
           ["Not verified", run.unverified.join(" ")], ["Seeds", run.seeds], ["Asked how", run.asked.join(", ")]]),
       ]),
-      ...board.tracks.filter((track) => row.facts[track.name]).map((track) => ofTrack(row, place, track)),
+      ...await Promise.all(board.tracks.filter((track) => row.facts[track.name]).map((track) => ofTrack(row, place, track))),
     ];
   }
 
-  function ofTrack(row, place, track) {
+  async function ofTrack(row, place, track) {
     const columns = Data.board.columns.filter((column) => column.track === track.name);
     const headings = [...new Set(columns.map(({ heading }) => heading))];
     const settings = [...new Set(columns.map(({ setting }) => setting))];
@@ -42,34 +42,25 @@ const Views = (() => {
         ["Samples", Table.lacking(row, track) || number(fact.recorded, 0)], ["Solved", fact.solved],
         ["Not read or failed", number(fact.recorded - fact.ok, 0)], ["Tokens in, mean", fact.prompt_tokens && number(fact.prompt_tokens, 0)],
         ["Tokens out, mean", fact.completion_tokens && number(fact.completion_tokens, 0)], ["100 replies", fact.cost_per_100_usd && `$${Words.dollars(fact.cost_per_100_usd)}`],
-        [`A solved ${track.item}`, Table.perSolved(fact) && `$${Words.dollars(Table.perSolved(fact))}`],
       ]),
       Table.made({ caption: `${track.title}, values`, head: "Setting", name: (setting) => setting || "All", rows: settings,
         columns: headings.map((heading) => ({ heading, isMain: heading === track.main, cell: cell(heading) })) }),
-      profile(row, track), telling(row, place, track), neighbours(row, track),
+      Charts.losses(track, [row]), await telling(row, place, track), neighbours(row, track),
       el("p", {}, link("samples", { track: track.name, model: row.name, order: "worst" }, "All its samples, the worst first")));
   }
 
-  /** The types of its wrong steps, as bars. */
-  function profile(row, track) {
-    const errors = Object.entries(row.facts[track.name].errors).sort((a, b) => b[1] - a[1]);
-    if (!errors.length) return null;
-    return [el("h3", {}, "Its wrong steps"), el("div", { class: "profile" }, errors.flatMap(([name, share]) =>
-      [el("span", {}, Words.named(name)), Charts.score(share, { best: 100 }, `${number(share)} %`)]))];
-  }
-
-  /** Six samples that it failed where the others did better. */
-  function telling(row, place, track) {
+  /** Six samples that it failed where the others did better, each at its first wrong step. */
+  async function telling(row, place, track) {
     const sign = track.better === "lower" ? -1 : 1;
     const gaps = Data.index.rowsOfEntry[place].map(Data.sample).filter((one) => one.track === track && isBuilt(one)).map((sample) => {
       const others = Data.index.rowsOfItem[sample.item].map(Data.sample)
         .filter((one) => one.entry !== row && Data.isModel(one.entry) && one.score !== null).map(({ score }) => score);
       return { sample, gap: others.length ? sign * (mean(others) - sample.score) : 0 };
     }).filter(({ sample, gap }) => gap > 0 && sample.score > 0)
-      .sort((a, b) => b.gap - a.gap || a.sample.key.localeCompare(b.sample.key)).slice(0, 6);
-    if (!gaps.length) return null;
-    return [el("h3", {}, "Where it falls furthest behind the others"), el("ul", { class: "wall" }, gaps.map(({ sample, gap }) =>
-      tile(sample, sample.key, ` ${number(gap)} behind the mean`)))];
+      .sort((a, b) => b.gap - a.gap || a.sample.key.localeCompare(b.sample.key)).slice(0, 12);
+    const cards = await Promise.all(gaps.map(({ sample, gap }) => Results.failure(sample.row, `${sample.key}, ${number(gap)} behind the mean`)));
+    const items = cards.filter(Boolean).slice(0, 6).map(({ item }) => item);
+    return items.length ? [el("h3", {}, "Where it falls furthest behind the others"), el("ul", { class: "cards" }, items)] : null;
   }
 
   /** On how many items it beats the models beside it in the ranking, and loses to them. */
@@ -88,10 +79,11 @@ const Views = (() => {
   }
 
   /** A sample as a small picture of what it built, with its score. */
-  function tile(sample, name, more = "") {
+  function tile(sample) {
+    const { name } = sample;
     return el("li", {}, link("samples", { track: sample.track.name, s: sample.id },
       isBuilt(sample) ? Stage.picture(`Built by ${sample.name} in ${sample.key}`, () => builtBy(sample)) : null,
-      el("strong", {}, name), el("span", { class: "muted" }, more, sample.score === null ? ` ${Words.named(sample.outcome)}` : ""),
+      el("strong", {}, name), sample.score === null ? el("span", { class: "muted" }, ` ${Words.named(sample.outcome)}`) : null,
       sample.score === null ? null : Charts.score(sample.score, sample.track)));
   }
 
@@ -151,10 +143,9 @@ const Views = (() => {
     const drawn = await Data.scene(place), items = index.items.scene.flatMap((one, item) => (one === place ? [item] : []));
     return [
       el("h1", {}, `Scene ${words.get("s")}`),
-      el("div", { class: "scene-head" },
-        drawn ? el("figure", {}, Stage.picture(`The goal, ${Words.count(drawn.blocks.length, "block")}`, [drawn.blocks]))
-          : el("p", { class: "notice" }, index.lacking || "The scene is not at hand."),
-        listOf([["Blocks", drawn?.blocks.length], ["Level", index.items.levels[items[0]].join(" and ")], ["Candidates", drawn?.candidates.length]])),
+      listOf([["Blocks", drawn?.blocks.length], ["Level", index.items.levels[items[0]].join(" and ")]]),
+      drawn ? el("div", { class: "scene-head" }, el("figure", {}, Stage.picture(`The goal, ${Words.count(drawn.blocks.length, "block")}`, [drawn.blocks])), Sample.candidates(drawn))
+        : el("p", { class: "notice" }, index.lacking || "The scene is not at hand."),
       ...Data.board.tracks.map((track) => {
         const mine = items.filter((item) => index.tracks[index.items.track[item]] === track.name);
         return mine.length ? el("section", { "aria-label": track.title }, el("h2", {}, track.title), mine.map((item) => wall(track, item, words.get("s")))) : null;
@@ -167,7 +158,7 @@ const Views = (() => {
     const samples = Data.index.rowsOfItem[item].map(Data.sample)
       .sort((a, b) => Data.worse(b.score, a.score, track) || a.name.localeCompare(b.name));
     const key = Data.index.items.key[item];
-    return [key === scene ? null : el("h3", {}, key), el("ul", { class: "wall" }, samples.map((sample) => tile(sample, sample.name)))];
+    return [key === scene ? null : el("h3", {}, key), el("ul", { class: "wall" }, samples.map(tile))];
   }
 
   const unknown = (noun, name) => [el("h1", {}, `There is no such ${noun}`),
