@@ -45,7 +45,8 @@ from phyblock.sim.camera import VIEWS
 from phyblock.sim.contact import voxel_iou
 from phyblock.sim.dynamics import ExecutionLimits, execute, groups
 from phyblock.sim.engine import Pose, described_engine
-from phyblock.sim.geometry import box_height_cm, center_cm, collision_pieces, put
+from phyblock.sim.film import FilmStep, Tone
+from phyblock.sim.geometry import box_height_cm, center_cm, collision_pieces, origin_m, put
 from phyblock.sim.pictures import goal_style
 from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
 from phyblock.stable import plain_sum
@@ -545,6 +546,29 @@ COUNTS = (
 )
 
 
+def _film(record: PoseRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
+    """Yield the empty ground, the world after every step, and how many goal blocks were reached."""
+    yield FilmStep(f"{record.model}, {record.scene}", "plain", None, ())
+    if record.pose is None or record.parse is None:
+        yield FilmStep("no step is known", "bad", None, ())
+        return
+    world: dict[int, Block] = {}
+    for n, (given, step) in enumerate(zip(record.parse.steps, record.pose.steps, strict=True), 1):
+        block = task and put(PoseStep(given.block, given.center_cm), task.candidates)
+        if block and step.end in ("stands", "falls", "knocks_over"):
+            world[n] = block
+        for rest in step.rests if task else ():
+            kind, euler_deg = world[rest.step].type, rest.euler_deg
+            place_m = origin_m(kind, euler_deg, rest.center_cm)
+            world[rest.step] = replace(world[rest.step], position_m=place_m, euler_deg=euler_deg)
+        tone: Tone = "bad" if step.error else "good"
+        caption = f"{n}. block {given.block}: {(step.error or step.end).replace('_', ' ')}"
+        yield FilmStep(caption, tone, given.block, tuple(world.values()))
+    tone = "good" if record.pose.completed else "bad"
+    told = f"{record.pose.reached} of {record.n_blocks} blocks reached"
+    yield FilmStep(told, tone, None, tuple(world.values()))
+
+
 class PosePlanning(SceneTrack):
     """Asks for a whole plan with the place of every block, and carries it out."""
 
@@ -557,7 +581,7 @@ class PosePlanning(SceneTrack):
     by_hand = staticmethod(pick_poses)
     record = PoseRecord
     counted = COUNTS
-    results: ClassVar = {"cells": level_cells}
+    results: ClassVar = {"cells": level_cells, "film": _film}
     varies = ("prompt", "background", "candidate_order", "repeats")
     simulates = True
     draws = True

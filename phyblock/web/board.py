@@ -112,11 +112,6 @@ class SiteRun:
         return {track: values_of(self.run, track) for track in self.tracks}
 
     @property
-    def date(self) -> str:
-        """The day on which it was begun, UTC."""
-        return self.run.manifest.created[:10]
-
-    @property
     def tracks(self) -> tuple[str, ...]:
         """The tracks of its suite."""
         return self.run.design.suite.tracks
@@ -143,12 +138,10 @@ def entries_of(runs: Sequence[SiteRun]) -> tuple[Entry, ...]:
             entry.runs |= dict.fromkeys(one.tracks, number)
     entries = tuple(entry for _, entry in found)
     names = [entry.model.name for entry in entries]
-    for place, entry in enumerate(entries):
-        entry.name, one = names[place], runs[min(entry.runs.values())]
+    for entry in entries:
+        entry.name, begun = entry.model.name, runs[min(entry.runs.values())].run.manifest
         if names.count(entry.name) > 1:
-            entry.name += f" ({one.date}, run {one.run.manifest.identity[:8]})"
-        if entry.name in {other.name for other in entries[:place]}:
-            entry.name += f" ({place + 1})"
+            entry.name += f" ({begun.created[:10]}, run {begun.identity[:8]})"
     return entries
 
 
@@ -303,7 +296,7 @@ def _run(one: SiteRun) -> dict[str, Any]:
     return {
         "suite": run.design.suite.name,
         "id": manifest.identity[:12],
-        "date": one.date,
+        "date": manifest.created[:10],  # UTC
         "verified": one.unverified is not None,
         "unverified": one.unverified or (),
         "seeds": len(run.design.suite.seeds),
@@ -328,8 +321,8 @@ def shortfalls(run: Run, track: str) -> Mapping[str, str]:
     for row in table[table["track"] == track].to_dict("records"):
         model, answered = str(row["model"]), row["recorded"] - sum(row[n] for n in WITHOUT_REPLY)
         if answered < row["expected"]:
-            why = [short(stopped[model])] if model in stopped else []
-            why = why or [reason for reason, _ in reasons.get(model, Counter()).most_common(1)]
+            often = [reason for reason, _ in reasons.get(model, Counter()).most_common(1)]
+            why = [short(stopped[model])] if model in stopped else often
             found[model] = ": ".join([f"{answered:,} of {row['expected']:,} answered", *why])
     return found
 

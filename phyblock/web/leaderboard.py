@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,8 +28,10 @@ _DATA = "data/"
 _PARTIAL = re.compile(r"\.[0-9a-f]{32}\.part")
 _MAY_DIFFER = ("pictures",)
 """Parts of a track's identity: digests of pictures, which change with their size."""
-_CONTROLS = frozenset({"blind", "prompt", "path"})
-"""Parts of a track's section of the suite that are shown with the run, or known by their digest."""
+_CONTROLS = frozenset({"blind", "prompt", "path", "size_px"})
+"""Fields of pictures and of a track's section of the suite that may differ, are shown with the run,
+or are known by their digest.
+"""
 _HINTS = {
     "sha256": "give all runs the same levels and --limit, or make a site of each",
     CARRYING: "run the older one again, as phyblock score leaves what was carried out as it was, "
@@ -163,7 +165,7 @@ def check_runs_alike(runs: Sequence[SiteRun]) -> None:
     for number, one in enumerate(runs):
         for first in runs[:number]:
             shared = [track for track in one.tracks if track in first.tracks]
-            told, wanted = (dict(_facts(side.run, shared)) for side in (one, first))
+            told, wanted = (_facts(side.run, shared) for side in (one, first))
             message = f"cannot stand in one table with {first.where}"
             differences = [
                 Problem(one.where, message, name, str(value), str(other), hint)
@@ -179,38 +181,37 @@ def check_runs_alike(runs: Sequence[SiteRun]) -> None:
         raise SpecError(problems)
 
 
-def _facts(run: Run, shared: Sequence[str]) -> Iterator[tuple[str, Any]]:
-    """Yield what has to agree, by name; None where it is not said."""
-    manifest, suite = run.manifest, run.design.suite
-    if (data := manifest.dataset) is not None:
-        yield "dataset.name", data.name
-        yield "dataset.version", data.version
-    if not shared:
-        return
-    if data is not None:
-        yield "dataset.sha256", data.sha256[:12]
-    if (asked := manifest.questions) is not None:
-        yield "questions.version", asked.version
-    yield "scoring.matchers", suite.scoring.matchers[0]
-    yield "scoring.level1", suite.scoring.level1
-    yield "scoring.missing", suite.scoring.missing
-    yield "settings", ", ".join(suite.settings)
-    yield "answer_format", suite.answer_format
-    yield "vary", ", ".join(suite.vary.factors) or "nothing"
+def _facts(run: Run, shared: Sequence[str]) -> dict[str, Any]:
+    """Return what has to agree, by name; None where it is not said."""
+    manifest, suite, data = run.manifest, run.design.suite, run.manifest.dataset
+    found: dict[str, Any] = {
+        "dataset.name": data and data.name,
+        "dataset.version": data and data.version,
+    }
+    if shared:
+        found |= {
+            "dataset.sha256": data and data.sha256[:12],
+            "questions.version": manifest.questions and manifest.questions.version,
+            "scoring.matchers": suite.scoring.matchers[0],
+            **{f"scoring.{name}": getattr(suite.scoring, name) for name in ("level1", "missing")},
+            "settings": ", ".join(suite.settings),
+            "answer_format": suite.answer_format,
+            "vary": ", ".join(suite.vary.factors) or "nothing",
+        }
     for track in shared:
-        identity = manifest.tracks.get(track, {})
+        identity, kind = manifest.tracks.get(track, {}), kind_of(track)
         for key, value in identity.items():
             if isinstance(value, Mapping) and {"name", "version"} <= value.keys():
                 # A prompt by its name and digest.
                 value = f"{value['name']} ({str(value['version'])[:12]})"
             if key not in _MAY_DIFFER:
-                yield f"tracks.{track}.{key}", value
-        held: list[tuple[str, BaseModel, frozenset[str]]] = []
+                found[f"tracks.{track}.{key}"] = value
+        held: dict[str, BaseModel] = {}
         if identity.get("pictures") is not None:
-            held.append(("images", run.design.suite.images, frozenset({"size_px"})))
-        kind = kind_of(track)
+            held["images"] = suite.images
         if kind.options is not None:
-            held.append((kind.section, run.design.suite.section(kind.options), _CONTROLS))
-        for name, values, without in held:
-            for key in type(values).model_fields.keys() - without:
-                yield f"{name}.{key}", str(getattr(values, key))
+            held[kind.section] = suite.section(kind.options)
+        for name, values in held.items():
+            for key in type(values).model_fields.keys() - _CONTROLS:
+                found[f"{name}.{key}"] = str(getattr(values, key))
+    return found

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import itertools
 import json
 import os
 import re
 import zlib
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields as dataclass_fields
 from dataclasses import is_dataclass
@@ -132,14 +134,6 @@ def build_of(*told: object) -> str:
     return hex_digest(json.dumps([_LAYOUT, version("phyblock"), *told]))[:12]
 
 
-class _Numbers(dict[Any, int]):
-    """Distinct values, numbered from 0 in the order in which they come."""
-
-    def of(self, value: Any) -> int:
-        """Return the number of a value, the next one where it is new."""
-        return self.setdefault(value, len(self))
-
-
 def pack_samples(
     folder: Path,
     build: str,
@@ -160,7 +154,10 @@ def pack_samples(
     packs = {
         kind: Pack(folder, kind, build) for kind in ("records", "scenes", "questions", "prompts")
     }
-    tracks, scenes, numbered, outcomes, ways, errors = (_Numbers() for _ in range(6))
+    # Distinct values, numbered from 0 in the order in which they come.
+    tracks, scenes, numbered, outcomes, ways, errors = (
+        defaultdict[Any, int](itertools.count().__next__) for _ in range(6)
+    )
     items: list[tuple[Any, ...]] = []
     rows: list[tuple[Any, ...]] = []
     found: list[_Failure] = []
@@ -187,7 +184,7 @@ def pack_samples(
                 if asked:
                     told = {name: _plain(getattr(asked.question, name)) for name in _OF_QUESTION}
                     question = packs["questions"].add(told)
-                about = (tracks.of(track), item, scenes.of(record.scene), record.levels)
+                about = (tracks[track], item, scenes[record.scene], record.levels)
                 items.append((*about, record.part, question))
             worth = one.values[track].samples.get(record.model, {})
             score = worth.get((record.scene, item, record.seed, record.way.key))
@@ -196,13 +193,13 @@ def pack_samples(
             rows.append(
                 (
                     owner[number, track, record.model],
-                    numbered.of((track, item)),
+                    numbered[track, item],
                     record.seed,
-                    ways.of(record.way.key),
-                    outcomes.of(record.outcome),
+                    ways[record.way.key],
+                    outcomes[record.outcome],
                     None if score is None else round(score, 1),
                     # A bit for each type of wrong step.
-                    sum(1 << errors.of(why) for why in set(filter(None, wrong))),
+                    sum(1 << errors[why] for why in set(filter(None, wrong))),
                 )
             )
             first = next((n for n, why in enumerate(wrong) if why), 0)
@@ -401,22 +398,12 @@ def write_page(
     that is still open says that it was written again.
     """
     own = f"{below}{build}/"
-    with out.alone(), writing(out.path / name):
-        with out.making(own) as new:
-            facts = make(new)
-        (path,) = out.write({name: _filled(**facts, folder=own.rstrip("/"), build=build)})
-        kept = (own, *lasting)
-        out.remove(one for one in out.names(below) if not one.startswith(kept))
-    return path
-
-
-def _filled(**facts: Any) -> str:
-    """Return the HTML of a page; every text in it is escaped, and only our own scripts may run."""
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    script = "\n".join(asset(name).decode() for name in _SCRIPTS)
-    style = asset("style.css").decode()
+    script = "\n".join(asset(one).decode() for one in _SCRIPTS)
+    style, icon = asset("style.css").decode(), base64.b64encode(asset("icon.svg")).decode()
+    # Only our own scripts may run, and every text is escaped.
     digests = (
         base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
         for text in (script, style)
@@ -425,6 +412,12 @@ def _filled(**facts: Any) -> str:
         "default-src 'none'; script-src 'sha256-{}' 'self'; style-src 'sha256-{}'; "
         "img-src 'self' data:; base-uri 'none'; form-action 'none'"
     ).format(*digests)
-    icon = base64.b64encode(asset("icon.svg")).decode()
-    page = environment.from_string(asset("page.html.j2").decode())
-    return page.render(**facts, script=script, style=style, policy=policy, icon=icon)
+    about = {"script": script, "style": style, "policy": policy, "icon": icon, "build": build}
+    template = environment.from_string(asset("page.html.j2").decode())
+    with out.alone(), writing(out.path / name):
+        with out.making(own) as new:
+            facts = make(new)
+        (path,) = out.write({name: template.render(**facts, **about, folder=own.rstrip("/"))})
+        kept = (own, *lasting)
+        out.remove(one for one in out.names(below) if not one.startswith(kept))
+    return path

@@ -17,12 +17,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.errors import DataError, SpecError, StoreError
+from phyblock.files import OutFolder
 from phyblock.records.files import known_records
 from phyblock.records.record import Record
 from phyblock.results.estimates import Headline
 from phyblock.results.load import load_run
 from phyblock.results.tables import write_tables
-from phyblock.web import pack
 from phyblock.web.board import SiteRun, Sources, board_of, entries_of
 from phyblock.web.leaderboard import check_runs_alike, write_site
 from phyblock.web.pack import Pack, pack_samples
@@ -337,7 +337,7 @@ def test_a_build_that_was_stopped_never_looks_whole_and_what_is_not_ours_stays(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(pack, "_filled", stopped)
+        patched.setattr(OutFolder, "write", stopped)
         for place in (tmp_path / "new", out):
             with pytest.raises(KeyboardInterrupt):
                 write_site([runs.root / "later"], place, title="Two")

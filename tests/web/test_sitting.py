@@ -231,9 +231,12 @@ def end_on_a_phone(page: Page, run: Path) -> None:
     assert "You 0.0" in page.locator(".finding").first.inner_text()
     page.get_by_text("All means").first.tap()
     assert "oracle\t100.0" in page.locator("table").first.inner_text()
-    built = page.get_by_alt_text("what you built").first
-    built.scroll_into_view_if_needed()
-    assert built.evaluate("image => image.decode().then(() => image.naturalWidth)") == 648
+    built = page.get_by_alt_text("what you built")
+    # Of three plans and three plans with poses.
+    assert built.count() == 6
+    for picture in (built.first, built.last):
+        picture.scroll_into_view_if_needed()
+        assert picture.evaluate("image => image.decode().then(() => image.naturalWidth)") == 648
     with page.expect_download() as download:
         page.get_by_role("link", name="Save a picture").tap()
     assert Path(download.value.path()).read_bytes().startswith(b"\x89PNG")
