@@ -203,20 +203,6 @@ def test_a_bad_picture_is_refused(data: bytes, told: str, tmp_path: Path) -> Non
     assert problem.allowed
 
 
-def test_what_is_no_file_or_too_large(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(DataError, match="is not a regular file"):
-        read_picture(tmp_path / "pipe")
-    with pytest.raises(DataError, match="Is a directory"):
-        read_picture(tmp_path)
-    with pytest.raises(DataError, match="No such file"):
-        read_picture(tmp_path / "none.png")
-    with (tmp_path / "big.png").open("wb") as file:
-        file.truncate(40 * 2**20)
-    with pytest.raises(DataError, match="is larger than 32 MB"):
-        read_picture(tmp_path / "big.png")
-
-
 @settings(deadline=None)
 @given(PICTURES)
 def test_any_bytes_are_a_picture_or_a_data_error(data: bytes) -> None:

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from typing import Any
-
 import pytest
-import yaml
 
 from phyblock.config.models import ModelConfig
 from phyblock.models import litellm_client
@@ -55,23 +51,3 @@ def test_missing_recordings_and_unknown_providers_are_found(workspace: Workspace
 def test_a_model_at_hand_needs_no_litellm(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(litellm_client, "_litellm", lambda: pytest.fail("it was imported"))
     assert model.partition("/")[0] in known_providers(ModelConfig(name="m", id=model))
-
-
-@pytest.mark.parametrize("keys", [{}, {"levels": [2], "candidates": []}], ids=["plain", "derived"])
-@pytest.mark.parametrize("form", ["yaml", "json"])
-def test_scenes_that_are_no_data_set_yet_are_told_from_models(
-    workspace: Workspace, keys: dict[str, Any], form: str
-) -> None:
-    blocks = [{"type": "cube", "color": "red", "position": [0, 0, 0.025], "euler": [0, 0, 0]}]
-    scene = {"id": "mine", "blocks": blocks, **keys}
-    if form == "yaml":
-        text = yaml.safe_dump(scene).replace("blocks:", "blocks:  # from below")
-        (workspace.root / "mine.yaml").write_text(text, encoding="utf-8")
-    else:
-        (workspace.root / "mine.json").write_text(json.dumps(scene), encoding="utf-8")
-    done = workspace.phyblock("validate", f"mine.{form}")
-    assert (done.code, len(done.errors)) == (2, 1)
-    assert f"mine.{form}: holds scenes" in done.err
-    assert f"phyblock scenes complete mine.{form}" in done.err
-    workspace.write_yaml("odd.yaml", {"blocks": {"position": "x"}})
-    assert "holds scenes" not in workspace.phyblock("validate", "odd.yaml").err

@@ -229,13 +229,6 @@ def test_texts_pictures_and_orders_are_read(tmp_path: Path, scenes: Dataset) -> 
     assert found["or-001"].question.pictures == ()
 
 
-def test_letters_and_texts_are_answers(tmp_path: Path, scenes: Dataset) -> None:
-    answers = ("a", "(B)", "C.", "yellow")
-    write(tmp_path, "CO.json", [{**COLOR, "answer": answer} for answer in answers])
-    found = read_official_questions(tmp_path, scenes).tasks
-    assert "".join(task.question.answer_letters for task in found) == "ABCD"
-
-
 FAULTS = [
     ({"answer": "E"}, "answer: is none of the options"),
     ({"answer": "purple"}, "answer: is none of the options"),

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +18,6 @@ from scipy.spatial.transform import Rotation
 from phyblock.data.official import read_official
 from phyblock.domain.blocks import (
     BLOCK_TYPES,
-    COLORS,
-    KIT_PALETTE,
     SHAPES,
     BlockType,
     Euler,
@@ -179,17 +176,6 @@ def test_sizes_volumes_and_centers_of_mass(block_type: BlockType) -> None:
     assert shape.mass_kg == pytest.approx(1040 * shape.volume_m3)
     center_z_m = CENTERS_Z_M.get(block_type, 0)
     assert shape.center_of_mass_m == pytest.approx((0, 0, center_z_m), abs=1e-5)
-
-
-def test_a_shape_without_a_color_of_the_kit_is_refused() -> None:
-    with pytest.raises(ValueError, match="needs a color of the kit"):
-        replace(SHAPES["cube"], kit_colors=())
-
-
-def test_the_kit_uses_every_type_and_color() -> None:
-    assert {block_type for block_type, _ in KIT_PALETTE} == set(BLOCK_TYPES) == set(SHAPES)
-    assert {color for _, color in KIT_PALETTE} == set(COLORS)
-    assert len(set(KIT_PALETTE)) == len(KIT_PALETTE) == 12
 
 
 BASE = Block(7, "cuboid2", "green", (0, 0, 0.0125), (0, 0, 0), (), 1)

@@ -21,7 +21,6 @@ from phyblock.results.tables import (
     coverage_frame,
     make_tables,
     summary_of,
-    table_files,
     write_tables,
 )
 from phyblock.results.text import NO_VALUE, Column, TextTable, number, to_latex, to_markdown
@@ -141,20 +140,6 @@ def records_of(model: str) -> Records:
     return [
         record(model, scene, seed, scores) for scene in ("000", "002", "003") for seed in (0, 1)
     ]
-
-
-def test_a_run_writes_estimates_the_tables_of_its_tracks_and_cost(tmp_path: Path) -> None:
-    facts = manifest(models=[("alpha", "GPT-4o")], level1="membership")
-    facts["suite"]["dataset"] = {"format": "official", "path": "there"}
-    written = write_tables(write_run(tmp_path / "run", records_of("alpha"), facts))
-    names = {"table1", "errors", "losses", "published", "coverage", "cost"}
-    assert set(written.tables) == names
-    assert {file.name for file in written.folder.iterdir()} == {
-        "estimates.csv",
-        *(f"{name}.{form}" for name in names for form in ("csv", "md", "tex")),
-    }
-    assert {f"tables/{file.name}" for file in written.files} <= set(table_files())
-    assert set(make_tables(written.run, ["errors"])) == {"errors"}
 
 
 @settings(laws, max_examples=3)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from typing import Any
 
 import yaml
@@ -182,22 +181,6 @@ def test_blind_baselines_are_scored_beside_models_without_being_named(
     workspace.out = workspace.root / "alone"
     assert workspace.run().code == 0
     assert {record["model"] for record in workspace.records()} == {"random"}
-
-
-def test_a_recording_of_another_order_is_refused(workspace: Workspace) -> None:
-    workspace.write_suite(models=["oracle"], candidates={"order": "shuffled"}, levels=[4])
-    assert workspace.run().code == 0
-    workspace.write_yaml("models.yaml", {"again": {"replay": str(workspace.out)}})
-    again = ("run", "suite.yaml", "--out", workspace.root / "again", "--no-report")
-    workspace.write_suite(models=["again"], levels=[4])
-    done = workspace.phyblock(*again)
-    assert done.code == 2
-    assert "is a recording that was made with candidates.order: shuffled" in done.err
-    workspace.write_suite(models=["again"], candidates={"order": "shuffled"}, levels=[4])
-    assert workspace.phyblock(*again).code == 0
-    (line,) = workspace.records(workspace.root / "again")
-    (first,) = workspace.records()
-    assert json.dumps(line["scores"]) == json.dumps(first["scores"])
 
 
 VARY = {

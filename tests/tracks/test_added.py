@@ -26,7 +26,6 @@ from phyblock.results.compare import comparable, compare_models
 from phyblock.results.estimates import Headline
 from phyblock.results.load import Run, load_run
 from phyblock.results.tables import write_tables
-from phyblock.run.rescore import rescore
 from phyblock.scoring.plan import mean_of, ratio_of
 from phyblock.tracks.base import Judgement, SceneTrack, kind_of
 from phyblock.tracks.full_planning import FullPlanning
@@ -116,31 +115,6 @@ def test_scoring_again_fills_in_what_older_records_lack(
         assert json.dumps({**line, "counts": again["counts"]}, sort_keys=True) == json.dumps(
             again, sort_keys=True
         )
-
-
-def first_is_placed(_: Any, record: Any) -> tuple[float, float]:
-    return record.outcomes[:1] == ("placed",), 1
-
-
-def test_an_episode_that_would_have_asked_otherwise_is_no_longer_final(
-    here: Workspace, request: pytest.FixtureRequest
-) -> None:
-    here.write_suite(tracks=["step_planning"], steps={"physics": "off"}, levels=[3])
-    assert not command("run", "suite.yaml", "--out", here.out, "--no-report")
-    counted = SampleCounts("first_steps", ("placed", "n"), sample=first_is_placed)
-    registry.add_measure("step_planning", Measure("first", "First", counted, ratio_of))
-    request.addfinalizer(lambda: registry.remove_measure("step_planning", "first"))
-    path = here.out / "records.jsonl"
-    lines = here.records()
-    lines[0]["turns"][0]["reply"]["text"] = "Done"
-    path.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
-    told: list[str] = []
-    rescore(here.out, tell=told.append)
-    first, *others = here.records()
-    assert [text.partition(" this")[0] for text in told] == ["Step planning: in 1 episode"]
-    assert (first["outcome"], first["error"]["kind"]) == ("api_error", "retryable")
-    assert first["turns"] == lines[0]["turns"]
-    assert not any(line["error"] for line in others)
 
 
 SAMPLED = SampleCounts("sampled", ("part", "whole"), sample=lambda _, __: (1, 2))
