@@ -31,7 +31,6 @@ from phyblock.making.checks import Finding, verify_scene
 from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.production import Production, builtin_forms, shares, split_tasks
 from phyblock.making.scenes.sketch import PALETTES, Palette
-from phyblock.making.workers import open_workers
 from phyblock.models.request import Request, wire_messages
 from phyblock.records.record import Record, Reply
 from phyblock.registry import added_measures, known_track, known_tracks
@@ -41,6 +40,7 @@ from phyblock.tracks.base import Track, open_tracks
 from phyblock.tracks.items import Item
 from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts
 from phyblock.tracks.pictures import LocalShop
+from phyblock.workers import open_workers
 
 Split = Literal["test", "train", "dev"]
 _SUITES = {"step_planning": "steps", "vqa": "vqa", "pose_planning": "pose"}

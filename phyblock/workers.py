@@ -1,13 +1,14 @@
-"""Worker processes that ignore Ctrl-C, end with the process that started them, and do not import
-its main module.
+"""Workers: this process, several, a Ray cluster, or programs that share a folder of results.
 
-`multiprocessing` would import the main module in each process: a program that calls phyblock
-without a guard would run again there. A worker is `python -c` in a session of its own, and takes
-its jobs from a pipe.
+Worker processes ignore Ctrl-C, end with the process that started them, and do not import its main
+module. `multiprocessing` would import it in each process: a program that calls phyblock without a
+guard would run again there. A worker is `python -c` in a session of its own, and takes its jobs
+from a pipe.
 """
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import os
 import pickle
@@ -15,16 +16,30 @@ import queue
 import subprocess
 import sys
 import threading
+import time
 import traceback
-from collections.abc import Callable
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from functools import partial
+from itertools import islice
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any, TypeVar
 
+from phyblock.errors import InputError, PhyblockError, Problem, StoreError
+from phyblock.files import atomic_write, make_folder, read_text, writing
 from phyblock.registry import PLUGINS
 
 T = TypeVar("T")
+R = TypeVar("R")
+_RAY_RETRIES = 5
+_BATCH = 16
+_WAITING = 4
+"""So many times the batches under way may wait for an earlier one."""
+_BEAT_S, _GONE_S, _LOOK_S = 2.0, 30.0, 0.1
+"""A shard says so often that it is at work; it is not, when it did not for so long."""
 
 
 class WorkerDiedError(RuntimeError):
@@ -122,3 +137,228 @@ def _serve(number: int, plugins: list[str]) -> None:
         except Exception as error:
             answer = pickle.dumps((error, traceback.format_exc()))
         connection.send_bytes(answer)
+
+
+@dataclass
+class Workers:
+    """Runs pure functions over tasks in batches of `size`: here, in processes, or on a cluster.
+
+    `submit` starts a job, `first` waits for jobs that are done, `result` gives what one gave, and
+    `cancel` ends one. At most `ahead` batches are under way, and few more wait for an earlier one.
+    With `shards`, batches are kept in files, and other programs do their part of them.
+    """
+
+    submit: Callable[..., Any]
+    first: Callable[[list[Any]], Iterable[Any]]
+    result: Callable[[Any], Any]
+    cancel: Callable[[Any], object]
+    ahead: int = 1
+    size: int = 1
+    shards: Shards | None = None
+    is_here: bool = False
+    _calls: int = 0
+
+    def map(self, function: Callable[[T], R], tasks: Iterable[T]) -> Iterator[R]:
+        """Yield the answers in the order of the tasks."""
+        call, self._calls = self._calls, self._calls + 1
+        return self._mapped(call, function, iter(tasks))
+
+    def _mapped(self, call: int, function: Callable[[T], R], tasks: Iterator[T]) -> Iterator[R]:
+        shards, number, following = self.shards, 0, 0
+        most = _WAITING * self.ahead * (shards.count if shards else 1)
+        running: dict[Any, int] = {}
+        others: dict[int, list[T]] = {}
+        done: dict[int, list[R]] = {}
+
+        def start(number: int, batch: list[T]) -> None:
+            running[self.submit(function, batch, PLUGINS)] = number
+
+        try:
+            while True:
+                while len(running) < self.ahead and len(running) + len(others) + len(done) < most:
+                    if not (batch := list(islice(tasks, self.size))):
+                        break
+                    if shards is not None and not shards.is_mine(call, number):
+                        others[number] = batch
+                    elif shards is not None and shards.has(call, number):
+                        done[number] = shards.read(call, number)
+                    else:
+                        start(number, batch)
+                    number += 1
+                if following in done:
+                    yield from done.pop(following)
+                    following += 1
+                elif shards is not None and following in others and shards.has(call, following):
+                    del others[following]
+                    done[following] = shards.read(call, following)
+                elif running:
+                    for job in self.first(list(running)):
+                        at = running.pop(job)
+                        done[at] = self.result(job)
+                        if shards is not None:
+                            shards.keep(call, at, done[at])
+                elif shards is not None and following in others:
+                    if shards.is_left(call, following):
+                        start(following, others.pop(following))
+                    else:
+                        time.sleep(_LOOK_S)
+                else:
+                    return
+        finally:
+            for job in running:
+                self.cancel(job)
+
+
+class Shards:
+    """Batches of one work in a folder that several programs share, each as one of its shards.
+
+    A shard computes every so many-th batch and reads the others'. It computes itself those of a
+    shard that is not at work. So shards end whether they run at once or one after another, and go
+    on where they were cut short.
+    """
+
+    def __init__(self, folder: Path, number: int, count: int, work: str) -> None:
+        """Begin, or go on; `work` says what is done, and has to be the same in all shards.
+
+        Raises StoreError for the folder of other work.
+        """
+        self.number, self.count, self._folder = number, count, folder
+        make_folder(folder)
+        path = folder / "work.txt"
+        with writing(folder):
+            if not path.exists():
+                atomic_write(path, work)
+        if (begun := read_text(path)) != work:
+            hint = "remove the folder, or give the same arguments"
+            raise StoreError(Problem(str(path), "is about other work", "", begun, work, hint))
+        self._stop = threading.Event()
+        self._beating = threading.Thread(target=self._beat, daemon=True)
+
+    def __enter__(self) -> Shards:
+        self._mark(self.number).touch()
+        self._beating.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._beating.join()
+        self._mark(self.number).unlink(missing_ok=True)
+
+    @property
+    def writes(self) -> bool:
+        """True for the shard that writes what all made: the first."""
+        return self.number == 1
+
+    def is_mine(self, call: int, number: int) -> bool:
+        """True if a batch is this shard's."""
+        return self._owner(call, number) == self.number
+
+    def has(self, call: int, number: int) -> bool:
+        """True if a batch is done."""
+        return self._file(call, number).exists()
+
+    def is_left(self, call: int, number: int) -> bool:
+        """True if a batch is another shard's that is not at work."""
+        try:
+            seen_s = self._mark(self._owner(call, number)).stat().st_mtime
+        except FileNotFoundError:
+            return True
+        # By the clock of the folder, which may be another machine's.
+        return self._mark(self.number).stat().st_mtime - seen_s > _GONE_S
+
+    def read(self, call: int, number: int) -> Any:
+        """Return the answers of a batch that is done."""
+        return pickle.loads(self._file(call, number).read_bytes())
+
+    def keep(self, call: int, number: int, answers: object) -> None:
+        """Keep the answers of a batch."""
+        with writing(self._folder):
+            atomic_write(self._file(call, number), pickle.dumps(answers))
+
+    def _owner(self, call: int, number: int) -> int:
+        return (call + number) % self.count + 1
+
+    def _file(self, call: int, number: int) -> Path:
+        return self._folder / f"{call:04d}-{number:06d}.pickle"
+
+    def _mark(self, number: int) -> Path:
+        return self._folder / f"shard-{number}"
+
+    def _beat(self) -> None:
+        while not self._stop.wait(_BEAT_S):
+            with contextlib.suppress(OSError):
+                self._mark(self.number).touch()
+
+
+def _each(function: Callable[[T], R], batch: list[T], plugins: list[str]) -> list[R]:
+    for plugin in plugins:
+        importlib.import_module(plugin)
+    return [function(task) for task in batch]
+
+
+@contextlib.contextmanager
+def open_workers(
+    jobs: int = 1,
+    ray_address: str | None = None,
+    shards: Shards | None = None,
+    size: int = 1,
+) -> Iterator[Workers]:
+    """Open workers for the time of a with statement: `jobs` processes, or this one alone.
+
+    With `ray_address` they are those of a Ray cluster (HOST:PORT or `auto`), or `jobs` of one on
+    this machine (`local`). Batches on a cluster, and those that `shards` share, hold 16 tasks or
+    more. Raises InputError when Ray is not installed or not reachable.
+    """
+    size = max(size, _BATCH if ray_address or shards else 1)
+    shared: Any = {"size": size, "shards": shards}
+    with shards or contextlib.nullcontext():
+        if ray_address is not None:
+            ray = _started(jobs, ray_address)
+            try:
+                # A batch whose worker dies is done again, which changes nothing: it is pure.
+                remote = ray.remote(max_retries=_RAY_RETRIES)(_each).remote
+                ahead = 2 * max(1, int(ray.cluster_resources().get("CPU", 1)))
+                first = partial(_first_of_ray, ray)
+                yield Workers(remote, first, ray.get, ray.cancel, ahead, **shared)
+            finally:
+                ray.shutdown()
+        elif jobs == 1:
+            here = (
+                partial(partial, _each),
+                lambda running: running[:1],
+                lambda job: job(),
+                lambda _: None,
+            )
+            yield Workers(*here, is_here=True, **shared)
+        else:
+            with WorkerPool(jobs) as pool:
+                try:
+                    done = partial(wait, return_when=FIRST_COMPLETED)
+                    threads = (lambda running: done(running).done, Future.result, Future.cancel)
+                    yield Workers(partial(pool.submit, _each), *threads, ahead=4 * jobs, **shared)
+                except WorkerDiedError as error:
+                    raise PhyblockError("a worker process was killed") from error
+                except KeyboardInterrupt:
+                    # Of what is under way nothing is wanted, and a worker hears no Ctrl-C.
+                    pool.kill()
+                    raise
+
+
+def _first_of_ray(ray: Any, running: list[Any]) -> list[Any]:
+    done: list[Any] = ray.wait(running)[0]
+    return done
+
+
+def _started(jobs: int, address: str) -> Any:
+    """Ray, connected to a cluster."""
+    try:
+        ray = importlib.import_module("ray")
+        options = {"num_cpus": jobs} if address == "local" else {"address": address}
+        ray.init(log_to_driver=False, **options)
+    except ModuleNotFoundError as error:
+        hint = "pip install 'phyblock[ray]'"
+        raise InputError(Problem("--ray", "Ray is not installed", hint=hint)) from error
+    except (ConnectionError, ValueError, RuntimeError) as error:
+        allowed = "local, auto, or the HOST:PORT of a running cluster"
+        raise InputError(Problem("--ray", "no such cluster", "", address, allowed)) from error
+    return ray

@@ -10,8 +10,9 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterable
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from operator import truediv
 from pathlib import Path
 from types import SimpleNamespace
@@ -25,7 +26,7 @@ from hypothesis import strategies as st
 from phyblock.data.questions import read_questions
 from phyblock.data.scenes import read_builtin
 from phyblock.domain.blocks import euler_deg_to_matrix
-from phyblock.errors import DataError, ModelError, Problem
+from phyblock.errors import DataError, ModelError, Problem, StoreError
 from phyblock.files import bundled
 from phyblock.making.questions.text_probe import text_features
 from phyblock.scoring.pose import Piece, PoseFit, overlap_volume, placed
@@ -33,7 +34,7 @@ from phyblock.sim.geometry import collision_pieces
 from phyblock.stable import plain_sum
 from phyblock.text import csv_cell, one_line
 from phyblock.tracks.pose_planning import FITS
-from phyblock.workers import WorkerDiedError, WorkerPool
+from phyblock.workers import Shards, WorkerDiedError, WorkerPool, open_workers
 
 STARTS = tuple("=+-@\t\r\n")
 risky = st.text(alphabet="'=+-@\t\r\n1.a") | st.text()
@@ -185,3 +186,47 @@ def test_a_program_without_a_guard_runs_once_and_takes_its_workers_with_it(tmp_p
         program.kill()
         # The worker holds the pipe open: it ends when the worker has.
         assert program.stdout.read() == ""
+
+
+def late(number: int) -> int:
+    """Return the square of a number; every third one is slow."""
+    time.sleep(0.02 * (number % 3 == 0))
+    return number * number
+
+
+SQUARES = [number * number for number in range(150)]
+
+
+@pytest.mark.parametrize(("jobs", "size"), [(1, 1), (2, 1), (2, 16)])
+def test_answers_come_in_the_order_of_tasks(jobs: int, size: int) -> None:
+    with open_workers(jobs, size=size) as workers:
+        assert list(workers.map(late, iter(range(150)))) == SQUARES
+        assert list(workers.map(late, [])) == []
+        some = workers.map(late, range(10**9))
+        assert [next(some) for _ in range(20)] == SQUARES[:20]
+
+
+@pytest.mark.parametrize("at_once", [True, False])
+def test_shards_end_alike_at_once_or_one_after_another_and_go_on(
+    tmp_path: Path, at_once: bool
+) -> None:
+    done: list[int] = []
+
+    def counted_square(number: int) -> int:
+        done.append(number)
+        return late(number)
+
+    def shard(number: int) -> list[list[int]]:
+        with open_workers(shards=Shards(tmp_path / "all.shards", number, 4, "squares")) as workers:
+            return [list(workers.map(counted_square, range(n))) for n in (150, 1, 40)]
+
+    with ThreadPoolExecutor(4 if at_once else 1) as threads:
+        found = list(threads.map(shard, (3, 1, 4, 2)))
+    assert found == [[SQUARES, SQUARES[:1], SQUARES[:40]]] * 4
+    assert at_once or len(done) == 191
+    done.clear()
+    (tmp_path / "all.shards" / "0000-000003.pickle").unlink()
+    assert shard(2) == found[0]
+    assert done == list(range(48, 64))
+    with pytest.raises(StoreError, match="is about other work"):
+        Shards(tmp_path / "all.shards", 1, 4, "cubes")

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import importlib
 import os
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from phyblock.text import did_you_mean
 from phyblock.types import QUOTE_HINT
+
+if TYPE_CHECKING:
+    from phyblock.workers import Shards
 
 INTERRUPTED = 130
 """The exit code after Ctrl-C."""
@@ -72,6 +76,81 @@ class Names(click.ParamType[Any]):
         if not all(names):
             self.fail(f"{value!r} holds an empty name: {QUOTE_HINT}", param, ctx)
         return names
+
+
+class ShardType(click.ParamType[tuple[int, int]]):
+    """A shard and the number of all, as in 3/64."""
+
+    name = "shard"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        """Return the two numbers."""
+        found = re.fullmatch(r"([1-9]\d{0,4})/([1-9]\d{0,4})", value)
+        if found is None or int(found[1]) > int(found[2]):
+            self.fail(f"{value!r} is no shard: 3/64 is the third of 64", param, ctx)
+        return int(found[1]), int(found[2])
+
+
+def jobs_option(default: int | None = None) -> Callable[..., Any]:
+    """Return the option `--jobs`, by default all processors."""
+    return click.option(
+        *("--jobs", "-j"),
+        type=click.IntRange(1, 256),
+        default=default or os.cpu_count() or 1,
+        show_default=True if default else "all processors",
+        metavar="N",
+        help="Processes.",
+    )
+
+
+_CLUSTER_OPTIONS = (
+    click.option(
+        *("--ray", "ray_address"),
+        metavar="ADDRESS",
+        help="Work on this Ray cluster; local: on one of N workers here.",
+    ),
+    click.option(
+        "--shard",
+        type=ShardType(),
+        metavar="I/N",
+        help="Be shard I of N programs that share the work through OUT.shards.",
+    ),
+)
+
+
+def worker_options(jobs: int | None = None) -> Callable[[Any], Any]:
+    """Return a decorator that adds the options of a verb that works in parallel."""
+
+    def add(command: Any) -> Any:
+        for option in reversed((jobs_option(jobs), *_CLUSTER_OPTIONS)):
+            command = option(command)
+        return command
+
+    return add
+
+
+def shards_folder(out: Path) -> Path:
+    """Return the folder that the shards of what goes to `out` share."""
+    return out.with_name(f"{out.name}.shards")
+
+
+def open_shards(shard: tuple[int, int] | None, out: Path, work: str) -> Shards | None:
+    """Return the shard that was asked for, if any; StoreError in a folder of other work."""
+    from phyblock.workers import Shards
+
+    return None if shard is None else Shards(shards_folder(out), *shard, work)
+
+
+def left_to_first(shards: Shards | None, out: Path) -> bool:
+    """True, with a word of it, if another shard writes what was made."""
+    from phyblock.cli.console import shown_path
+
+    if shards is None or shards.writes:
+        return False
+    click.echo(f"shard {shards.number}/{shards.count} is done; the first writes {shown_path(out)}")
+    return True
 
 
 def models_option(help_text: str) -> Callable[..., Any]:

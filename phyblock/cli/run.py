@@ -24,20 +24,25 @@ from phyblock.cli.options import (
     INTERRUPTED,
     NAME_OR_PATH,
     data_option,
+    left_to_first,
     limit_option,
     models_file_option,
     models_option,
+    open_shards,
     run_argument,
     run_out_option,
     sets_option,
+    worker_options,
     yes_option,
 )
 from phyblock.cli.progress import ProgressView
 from phyblock.cli.results import show_tables
 from phyblock.config.models import load_models
 from phyblock.files import OutFolder
+from phyblock.records.files import read_manifest
 from phyblock.results.text import NO_VALUE, REPORT_FILE, TABLES, Column, TextTable, kept_summary
 from phyblock.run.estimate import Estimate, estimate, may_bill
+from phyblock.run.manifest import code_versions
 from phyblock.run.plan import (
     RunPlan,
     asking_remarks,
@@ -49,6 +54,7 @@ from phyblock.run.runner import RunResult, Session, check_ready
 from phyblock.run.store import held_run
 from phyblock.text import counted, one_line
 from phyblock.tracks.base import kind_of
+from phyblock.workers import open_workers
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _LINE_EVERY_S = 2.0
@@ -217,7 +223,14 @@ def _dollars(cost_usd: float | None) -> str:
 @click.command()
 @run_argument
 @data_option
-def score(run: Path, data: Path | None) -> None:
+@worker_options(1)
+def score(
+    run: Path,
+    data: Path | None,
+    jobs: int,
+    ray_address: str | None,
+    shard: tuple[int, int] | None,
+) -> None:
     """Read and score the stored replies of the folder RUN again, and count every measure again.
     Calls no model.
 
@@ -233,5 +246,10 @@ def score(run: Path, data: Path | None) -> None:
             shown_s = time.monotonic()
             console.print(f"scored {done:,} samples")
 
-    rescore(run, data, console.print, progress)
+    work = f"score {read_manifest(run).identity}: {code_versions()}\n"
+    shards = open_shards(shard, run, work)
+    with open_workers(jobs, ray_address, shards, size=64) as workers:
+        rescore(run, data, console.print, progress, workers)
+    if left_to_first(shards, run):
+        return
     print_path(make_console(), show_tables(run, data=data))

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import functools
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -25,6 +28,7 @@ from phyblock.text import counted
 from phyblock.tracks.base import CARRYING, ENGINE, Track, kind_of, open_tracks
 from phyblock.tracks.items import Item, select_tasks
 from phyblock.tracks.pictures import Workshop
+from phyblock.workers import Workers
 
 _CHANGED = "is not the data set that the run was made on, or it was changed since"
 _MOVED = "name the folder where it is now with --data"
@@ -37,28 +41,40 @@ def rescore(
     data: Path | None = None,
     tell: Callable[[str], object] = lambda _: None,
     watch: Callable[[int], object] = lambda _: None,
+    workers: Workers | None = None,
 ) -> None:
     """Judge every stored reply of a run again and replace its records in one step.
 
     `data` is where the data set is now, if it has moved. An episode in which today's code would ask
     something else stays as it was and is no longer final: `tell` is called with how many there are,
-    `watch` with the number of records that are done. Raises StoreError for a folder that is no run
-    or cannot be written, DataError when the data are not what the run was made on.
+    `watch` with the number of records that are done. `workers` do it, where they are given; of
+    their shards the first alone writes. Raises StoreError for a folder that is no run or cannot be
+    written, DataError when the data are not what the run was made on.
     """
     manifest = read_manifest(folder)
     suite = suite_of(manifest, str(folder / MANIFEST))
-    tracks = _by_condition(folder, manifest, suite, recorded_dataset(folder, manifest, data))
+    judge = _Judge(folder, manifest, suite, recorded_dataset(folder, manifest, data), strict=False)
     versions = {**manifest.versions, **code_versions()}
     diverged: Counter[str] = Counter()
 
     def records() -> Iterator[Record]:
-        for done, (record, again) in enumerate(_judged(folder, manifest, tracks, strict=False)):
+        share = map if workers is None else workers.map
+        work: Callable[[tuple[str, Record]], tuple[Record, Record]] = judge
+        if workers is not None and not workers.is_here:
+            work = partial(_judge_there, folder.resolve(), None if data is None else data.resolve())
+        lines = run_records(folder, manifest, whole=True)
+        for done, (record, again) in enumerate(share(work, lines)):
             watch(done)
             diverged[record.track] += again.error is not None and record.error is None
             yield again
 
-    with locked(folder):
-        write_run(folder, manifest.model_copy(update={"versions": versions}), records())
+    with contextlib.closing(judge):
+        if workers is not None and workers.shards is not None and not workers.shards.writes:
+            for _ in records():
+                pass
+            return
+        with locked(folder):
+            write_run(folder, manifest.model_copy(update={"versions": versions}), records())
     for name, count in (+diverged).items():
         tell(
             f"{kind_of(name).title}: in {counted(count, 'episode')} this version would have asked "
@@ -76,10 +92,15 @@ def judged_anew(folder: Path) -> tuple[Manifest, Iterator[Record]]:
     manifest = read_manifest(folder)
     suite = suite_of(manifest, str(folder / MANIFEST))
     dataset = recorded_dataset(folder, manifest)
-    tracks = _by_condition(folder, manifest, suite, dataset)
-    changes = asked_counts(suite, _asked_about(manifest, dataset), tracks[""].values())
-    records = (again for _, again in _judged(folder, manifest, tracks, strict=True))
-    return manifest.model_copy(update=changes), records
+    judge = _Judge(folder, manifest, suite, dataset, strict=True)
+    changes = asked_counts(suite, _asked_about(manifest, dataset), judge.tracks[""].values())
+
+    def records() -> Iterator[Record]:
+        with contextlib.closing(judge):
+            for line in run_records(folder, manifest):
+                yield judge(line)[1]
+
+    return manifest.model_copy(update=changes), records()
 
 
 def recorded_dataset(folder: Path, manifest: Manifest, data: Path | None = None) -> Dataset:
@@ -134,50 +155,64 @@ def reopen_tracks(
     return tracks
 
 
-def _by_condition(
-    folder: Path, manifest: Manifest, suite: Suite, dataset: Dataset
-) -> dict[str, dict[str, Track]]:
-    """The tracks of a run by the key of the condition in which they asked, and by name."""
-    conditions = dict.fromkeys(variant.shown for variant in suite.vary.variants)
-    return {
-        one.key: {
-            track.name: track for track in reopen_tracks(folder, manifest, suite.at(one), dataset)
-        }
-        for one in conditions
-    }
-
-
-def _judged(
-    folder: Path,
-    manifest: Manifest,
-    tracks: Mapping[str, Mapping[str, Track]],
-    *,
-    strict: bool,
-) -> Iterator[tuple[Record, Record]]:
-    """Every record of the run in `folder`, as it is stored and judged again.
+class _Judge:
+    """Judges records of the run in `folder` again, on tracks that are opened once.
 
     With `strict`, an episode that would go otherwise is a StoreError.
     """
-    items = {(name, item.key): item for name, track in tracks[""].items() for item in track.items}
-    # The thread of a notebook has a loop already.
-    with ThreadPoolExecutor(1) as thread:
-        loop = asyncio.new_event_loop()
-        try:
-            for where, record in run_records(folder, manifest, whole=not strict):
-                track = tracks.get(record.way.shown.key, {}).get(record.track)
-                item = items.get((record.track, record.item))
-                if track is None or item is None:
-                    message = "names an item or a condition that the run does not have"
-                    hint = "restore the file from a copy"
-                    raise StoreError(Problem(where, message, "sample", record.sample, hint=hint))
-                shown = track.shown(item, record.seed)
-                work = _judged_again(track, shown, record, where, strict=strict)
-                yield record, thread.submit(loop.run_until_complete, work).result()
-        finally:
-            for of_condition in tracks.values():
-                for track in of_condition.values():
-                    track.close()
-            loop.close()
+
+    def __init__(
+        self, folder: Path, manifest: Manifest, suite: Suite, dataset: Dataset, *, strict: bool
+    ) -> None:
+        conditions = dict.fromkeys(variant.shown for variant in suite.vary.variants)
+        self.tracks = {
+            one.key: {
+                track.name: track
+                for track in reopen_tracks(folder, manifest, suite.at(one), dataset)
+            }
+            for one in conditions
+        }
+        self._items = {
+            (name, item.key): item for name, one in self.tracks[""].items() for item in one.items
+        }
+        self._strict = strict
+        # The thread of a notebook has a loop already.
+        self._thread, self._loop = ThreadPoolExecutor(1), asyncio.new_event_loop()
+
+    def __call__(self, line: tuple[str, Record]) -> tuple[Record, Record]:
+        """Return the record of a line as it is stored and judged again."""
+        where, record = line
+        track = self.tracks.get(record.way.shown.key, {}).get(record.track)
+        item = self._items.get((record.track, record.item))
+        if track is None or item is None:
+            message = "names an item or a condition that the run does not have"
+            hint = "restore the file from a copy"
+            raise StoreError(Problem(where, message, "sample", record.sample, hint=hint))
+        shown = track.shown(item, record.seed)
+        work = _judged_again(track, shown, record, where, strict=self._strict)
+        return record, self._thread.submit(self._loop.run_until_complete, work).result()
+
+    def close(self) -> None:
+        """Close the tracks."""
+        self._thread.shutdown()
+        for of_condition in self.tracks.values():
+            for track in of_condition.values():
+                track.close()
+        self._loop.close()
+
+
+@functools.lru_cache(maxsize=1)
+def _judge_of(folder: Path, data: Path | None) -> _Judge:
+    """The judge of a worker, as long as it lives."""
+    manifest = read_manifest(folder)
+    suite = suite_of(manifest, str(folder / MANIFEST))
+    return _Judge(folder, manifest, suite, recorded_dataset(folder, manifest, data), strict=False)
+
+
+def _judge_there(
+    folder: Path, data: Path | None, line: tuple[str, Record]
+) -> tuple[Record, Record]:
+    return _judge_of(folder, data)(line)
 
 
 async def _judged_again(

@@ -28,10 +28,10 @@ from phyblock.making.checks import (
 from phyblock.making.files import SCENE_FILES, SUMS_FILE, check_sums, sums_text
 from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.sketch import make_scene, transformed
-from phyblock.making.workers import open_workers
 from phyblock.sim.contact import GROUND
 from phyblock.sim.dynamics import Trial
 from phyblock.sim.engine import Physics
+from phyblock.workers import open_workers
 from tests.designs import built, designed_scene, designed_scenes
 from tests.sim.test_geometry import FLOATING, OVERLAPPING
 

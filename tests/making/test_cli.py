@@ -22,8 +22,8 @@ from phyblock.cli.main import phyblock
 from phyblock.errors import DataError, InputError, StoreError
 from phyblock.files import LIST, bundled
 from phyblock.making.scenes.production import Production, Share
-from phyblock.making.workers import open_workers
 from phyblock.sim.engine import other_engine
+from phyblock.workers import open_workers
 from tests.workspace import SCENES, tower
 
 ALONE = ("--jobs", 1)
@@ -66,6 +66,26 @@ def test_what_is_made_is_verified_and_a_changed_scene_is_named(
     assert "scenes.jsonl: differs from its checksum" in done.output
     assert f"failed: {spoiled['id']}" in done.output
     assert "floats 10.00 mm above its support" in done.output
+
+
+def test_processes_and_shards_make_the_same_files(folder: Path, tmp_path: Path) -> None:
+    words = ("generate", "--count", 3, "--levels", 2, "--seed", 9)
+    for number in (2, 1, 3):
+        shard = ("--shard", f"{number}/3", *ALONE, "--out", tmp_path / "few")
+        done = scenes(*words, *shard)
+        assert ("is done; the first writes" in done.stdout) == (number != 1)
+    scenes(*words, "--jobs", 2, "--out", tmp_path / "two" / "few")
+    for made in (tmp_path / "few", tmp_path / "two" / "few"):
+        for path in folder.iterdir():
+            assert (made / path.name).read_bytes() == path.read_bytes()
+    with pytest.raises(StoreError, match="is about other work"):
+        scenes("generate", "--count", 4, *shard)
+    words = ("render", folder, "--out")
+    scenes(*words, tmp_path / "drawn", *ALONE)
+    scenes(*words, tmp_path / "shards", "--shard", "2/2", *ALONE)
+    scenes(*words, tmp_path / "shards", "--shard", "1/2", "--jobs", 2)
+    for path in (tmp_path / "drawn").iterdir():
+        assert (tmp_path / "shards" / path.name).read_bytes() == path.read_bytes()
 
 
 def test_a_set_holds_nothing_of_those_that_it_excludes(folder: Path, tmp_path: Path) -> None:
@@ -132,6 +152,8 @@ def test_a_season_is_made_again_from_what_was_revealed_and_from_nothing_else(
         (("scenes", "--levels", "1,1"), "give all, or some of 1,2,3,4"),
         (("scenes", "--count", "0"), "0 is not in the range"),
         (("scenes", "--palette", "wood"), "'wood' is not one of"),
+        (("scenes", "--shard", "5/4"), "is no shard: 3/64 is the third of 64"),
+        (("questions", "--shard", "0/4"), "is no shard"),
         *((("questions", "--subtasks", bad), "some of SH,CO,SI") for bad in ("XX", "CO,CO", "")),
     ],
 )

@@ -23,10 +23,10 @@ from phyblock.making.questions.base import WORDINGS, fill_template
 from phyblock.making.questions.dynamics import OUTCOME_TEXTS
 from phyblock.making.questions.production import make_questions, problem_of
 from phyblock.making.questions.sight import LEAST_PIXELS
-from phyblock.making.workers import open_workers
 from phyblock.sim.contact import find_gaps
 from phyblock.sim.engine import other_engine
 from phyblock.sim.question_pictures import is_inside, least_difference, seen
+from phyblock.workers import open_workers
 from tests.vqa_set import questions as asked_questions
 from tests.vqa_set import write_questions as write_asked
 from tests.workspace import Workspace

@@ -27,9 +27,9 @@ from phyblock.making.scenes.production import (
     split_tasks,
 )
 from phyblock.making.scenes.sketch import PALETTES, POSES, Draft, colorless, transformed
-from phyblock.making.workers import open_workers
 from phyblock.sim.contact import bounds_m, find_gaps, find_overlaps, support_graph
 from phyblock.sim.pictures import drawn_m, hidden_blocks
+from phyblock.workers import open_workers
 from tests.designs import designed_scenes
 
 grid = st.integers(-3, 3)

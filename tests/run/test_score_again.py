@@ -151,3 +151,16 @@ def test_killed_before_either_file_is_replaced_it_is_scored_again(
         assert call("score", folder.name) == 0
         assert newest(workspace, folder.name) == newest(workspace, "whole")
         assert run(folder.name) == 0
+
+
+@pytest.mark.usefixtures("begun")
+def test_processes_and_shards_score_alike(workspace: Workspace) -> None:
+    for name in ("alone", "two", "shards"):
+        shutil.copytree(workspace.out, workspace.root / name)
+    assert call("score", "alone") == 0
+    assert call("score", "two", "--jobs", "2") == 0
+    for shard in ("2/3", "1/3", "3/3"):
+        assert call("score", "shards", "--shard", shard) == 0
+    folders = ("alone", "two", "shards")
+    alone, *others = ((workspace.root / one / "records.jsonl").read_bytes() for one in folders)
+    assert others == [alone, alone]

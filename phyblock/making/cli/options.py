@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from phyblock.cli.console import make_console
-from phyblock.cli.options import UserPath
+from phyblock.cli.options import UserPath, open_shards, shards_folder, worker_options
 from phyblock.errors import Problem
-from phyblock.making.workers import open_workers
-from phyblock.sim.engine import other_engine
+from phyblock.making.files import check_out
+from phyblock.making.season import code_digest
+from phyblock.sim.engine import described_engine, other_engine
 from phyblock.text import counted
+from phyblock.workers import Shards, open_workers
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -40,22 +42,9 @@ class Several(click.ParamType[tuple[str, ...]]):
         return words
 
 
-jobs_option = click.option(
-    *("--jobs", "-j"),
-    type=click.IntRange(1, 256),
-    default=os.cpu_count() or 1,
-    show_default="all processors",
-    metavar="N",
-    help="Processes.",
-)
 _OPTIONS = (
     click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="S"),
-    jobs_option,
-    click.option(
-        *("--ray", "ray_address"),
-        metavar="ADDRESS",
-        help="Work on this Ray cluster; local: on one of N workers here.",
-    ),
+    worker_options(),
     click.option(
         "--out", "-o", type=UserPath(), required=True, metavar="DIR", help="Folder to write."
     ),
@@ -63,10 +52,22 @@ _OPTIONS = (
 
 
 def making_options(command: Command) -> Command:
-    """Add the options of a verb that makes a set: seed, jobs, ray_address, out."""
+    """Add the options of a verb that makes a set: seed, jobs, ray_address, shard, out."""
     for option in reversed(_OPTIONS):
         command = option(command)
     return command
+
+
+def begin_set(
+    shard: tuple[int, int] | None, out: Path, names: Sequence[str], work: str
+) -> Shards | None:
+    """Return the shard, if any, that makes a set; StoreError where `out` has one.
+
+    Shards that go on may find the set, which the first one wrote.
+    """
+    if shard is None or not shards_folder(out).exists():
+        check_out(out, names)
+    return open_shards(shard, out, f"{work}\n{described_engine()}\n{code_digest()}\n")
 
 
 def tracked(items: Iterable[T], total: int, doing: str, noun: str = "scenes") -> Iterator[T]:

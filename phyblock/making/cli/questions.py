@@ -12,7 +12,12 @@ import click
 from PIL import Image
 
 from phyblock.cli.console import make_console, print_rows, shown_path
-from phyblock.cli.options import NAME_OR_PATH, UserPath
+from phyblock.cli.options import (
+    NAME_OR_PATH,
+    UserPath,
+    jobs_option,
+    left_to_first,
+)
 from phyblock.data.base import VERSION_FILE, QuestionSet, read_version
 from phyblock.data.lookup import find_questions, read_data_set
 from phyblock.data.questions import read_questions
@@ -21,8 +26,8 @@ from phyblock.errors import DataError, Problem
 from phyblock.files import write_named
 from phyblock.making.cli.options import (
     Several,
+    begin_set,
     conclude,
-    jobs_option,
     making_options,
     mapped,
     print_engine,
@@ -31,17 +36,16 @@ from phyblock.making.cli.options import (
 from phyblock.making.files import (
     QUESTION_FILES,
     QUESTION_SET_VERSION,
-    check_out,
     check_sums,
     question_card,
     write_questions,
 )
 from phyblock.making.questions.audit import Probe, audit_questions
 from phyblock.making.questions.production import PER_SUBTASK, make_questions, problem_of
-from phyblock.making.workers import open_workers
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_png
 from phyblock.text import counted, did_you_mean
+from phyblock.workers import open_workers
 
 _QUESTIONS = "phyblock-vqa"
 _GAP_PX = 8
@@ -78,6 +82,7 @@ def generate(
     seed: int,
     jobs: int,
     ray_address: str | None,
+    shard: tuple[int, int] | None,
     out: Path,
 ) -> None:
     """Make questions, each with an answer that is derived, and their data card.
@@ -85,17 +90,19 @@ def generate(
     The same scenes, subtasks, numbers and seed give the same files with the same physics engine,
     on any Python, any number of processes or a cluster.
     """
-    check_out(out, QUESTION_FILES)
-    wanted = dict.fromkeys(subtasks, per_subtask or PER_SUBTASK)
-    read = read_data_set(data)
-    originals = {task.scene.id: task.scene for task in read.tasks}
-    with open_workers(jobs, ray_address) as workers:
-        made = make_questions(list(originals.values()), wanted, seed, workers, tracked)
     command = f"phyblock questions generate --data {data} --seed {seed} --out {out.name}"
     if len(subtasks) < len(SUBTASKS):
         command += f" --subtasks {','.join(subtasks)}"
     if per_subtask is not None:
         command += f" --per-subtask {per_subtask}"
+    wanted = dict.fromkeys(subtasks, per_subtask or PER_SUBTASK)
+    read = read_data_set(data)
+    shards = begin_set(shard, out, QUESTION_FILES, f"{command}\n{read.sha256}")
+    originals = {task.scene.id: task.scene for task in read.tasks}
+    with open_workers(jobs, ray_address, shards) as workers:
+        made = make_questions(list(originals.values()), wanted, seed, workers, tracked)
+    if left_to_first(shards, out):
+        return
     write_questions(out, made, originals, question_card(out.name, read.name, made, command))
     outcome = f"{counted(len(made), 'question')} in {counted(len(subtasks), 'subtask')}"
     each_s = sum(os.times()[:4]) / len(made)
@@ -106,7 +113,7 @@ def generate(
 @questions.command("verify")
 @_argument
 @_data_option
-@jobs_option
+@jobs_option()
 def verify(questions: str, data: str, jobs: int) -> None:
     """Derive every answer of PATH again, from scene, pictures and simulator.
 

@@ -16,7 +16,14 @@ from click.core import ParameterSource
 from pydantic import TypeAdapter
 
 from phyblock.cli.console import make_console, print_rows, shown_path
-from phyblock.cli.options import NAME_OR_PATH, UserPath
+from phyblock.cli.options import (
+    NAME_OR_PATH,
+    UserPath,
+    jobs_option,
+    left_to_first,
+    open_shards,
+    worker_options,
+)
 from phyblock.data.base import AssemblyTask, Dataset, read_data
 from phyblock.data.lookup import find_data_set, read_data_set
 from phyblock.data.scenes import SCENES_FILE, read_builtin
@@ -44,8 +51,8 @@ from phyblock.making.checks import (
 )
 from phyblock.making.cli.options import (
     Several,
+    begin_set,
     conclude,
-    jobs_option,
     making_options,
     mapped,
     print_engine,
@@ -64,12 +71,12 @@ from phyblock.making.scenes.completing import Completed, ReadScene, complete, pa
 from phyblock.making.scenes.production import Production, builtin_forms, shares
 from phyblock.making.scenes.sketch import PALETTES, Palette, colorless
 from phyblock.making.season import Commitment, code_digest, season_seed
-from phyblock.making.workers import open_workers
 from phyblock.records.record import decode
 from phyblock.sim.camera import VIEWS
 from phyblock.sim.engine import described_engine
 from phyblock.sim.film import assembly_gif
 from phyblock.sim.pictures import (
+    RENDER_VERSION,
     PictureStyle,
     candidates_png,
     composite_png,
@@ -79,6 +86,7 @@ from phyblock.sim.pictures import (
 from phyblock.stable import hex_digest
 from phyblock.text import counted, did_you_mean, some_of
 from phyblock.types import BACKGROUNDS
+from phyblock.workers import open_workers
 
 
 @click.group("scenes")
@@ -112,6 +120,7 @@ def generate(
     seed: int,
     jobs: int,
     ray_address: str | None,
+    shard: tuple[int, int] | None,
     out: Path,
 ) -> None:
     """Make N scenes with candidate sets, each checked by physics, and their data card.
@@ -120,22 +129,25 @@ def generate(
     mirroring and shifting. The same N, seed, levels and palette give the same files with the same
     physics engine, on any Python, any number of processes or a cluster.
     """
-    check_out(out, SCENE_FILES)
+    chosen = ",".join(sorted(levels))
+    command = f"phyblock scenes generate --count {count} --seed {seed} --levels {chosen}"
+    command += f" --palette {palette}"
+    command += "".join(f" --exclude {shlex.quote(name)}" for name in exclude)
+    command += f" --out {out.name}"
     kind = cast(Palette, palette)
     others = (task.scene for name in exclude for task in read_data_set(name).tasks)
     excluded = builtin_forms().union(colorless(scene.blocks) for scene in others)
-    with open_workers(jobs, ray_address) as workers:
+    work = f"{command}\n{hex_digest(b''.join(sorted(excluded)))}"
+    shards = begin_set(shard, out, SCENE_FILES, work)
+    with open_workers(jobs, ray_address, shards) as workers:
         production = Production(seed, kind, workers, excluded)
         produced = production.scenes(shares(count, list(map(int, levels))))
         tasks = [
             (scene, make_candidates(scene, palette=PALETTES[kind]))
             for scene in tracked(produced, count, "Making")
         ]
-    chosen = ",".join(sorted(levels))
-    command = f"phyblock scenes generate --count {count} --seed {seed} --levels {chosen}"
-    command += f" --palette {palette}"
-    command += "".join(f" --exclude {shlex.quote(name)}" for name in exclude)
-    command += f" --out {out.name}"
+    if left_to_first(shards, out):
+        return
     write_scenes(out, tasks, scene_card(out.name, tasks, command, kind, production.rejected))
     click.echo(f"{counted(count, 'scene')}, all checks passed: {shown_path(out)}")
     known = "the built-in set or an excluded one" if exclude else "the built-in set"
@@ -240,7 +252,7 @@ def compare(first: str, second: str) -> None:
 
 @scenes.command("complete")
 @click.argument("data", metavar="FILE_OR_FOLDER", type=UserPath())
-@jobs_option
+@jobs_option()
 @click.option("--out", "-o", type=UserPath(), help="Folder to write.  [default: NAME-set here]")
 def complete_set(data: Path, jobs: int, out: Path | None) -> None:
     """Make a data set from scenes that give type, color, position and euler of their blocks.
@@ -283,7 +295,7 @@ def _completed(read: ReadScene) -> Completed | tuple[Problem, ...]:
 
 @scenes.command("verify")
 @click.argument("data", metavar="[PATH]", default="phyblock-400", type=NAME_OR_PATH)
-@jobs_option
+@jobs_option()
 def verify(data: str, jobs: int) -> None:
     """Check every scene of PATH against geometry and physics, down to the last number.
 
@@ -322,7 +334,7 @@ _WORST = 15
 @scenes.command("audit")
 @click.argument("data", metavar="PATH", type=NAME_OR_PATH)
 @click.option("--csv", "table", type=UserPath(), metavar="FILE", help="All findings as CSV.")
-@jobs_option
+@jobs_option()
 def audit(data: str, table: Path | None, jobs: int) -> None:
     """Audit the data set PATH: a folder with scenes.jsonl, an official checkout, or a bundled set.
 
@@ -460,6 +472,7 @@ def _angles(euler_deg: tuple[float, float, float]) -> str:
 )
 @click.option("--composite", is_flag=True, help="Goal and candidates side by side, too.")
 @click.option("--gif", is_flag=True, help="The assembly as an animated GIF, too.")
+@worker_options()
 def render(
     data: str,
     scenes: tuple[str, ...],
@@ -468,6 +481,9 @@ def render(
     background: str,
     composite: bool,
     gif: bool,
+    jobs: int,
+    ray_address: str | None,
+    shard: tuple[int, int] | None,
 ) -> None:
     """Draw the scenes SCENE... of the data set PATH, or all of them, at 512 by 512 pixels.
 
@@ -489,9 +505,21 @@ def render(
                     drawings[f"{stem}.gif"] = partial(assembly_gif, task.scene, style)
     folder = OutFolder(out)
     folder.check(drawings)
-    for name, draw in drawings.items():
-        folder.write({name: draw()})
+    work = f"scenes render: {read.sha256} {hex_digest(repr([RENDER_VERSION, *drawings]))}\n"
+    shards = open_shards(shard, out, work)
+    with open_workers(jobs, ray_address, shards) as workers:
+        drawn = workers.map(_drawn, drawings.values())
+        drawn = tracked(drawn, len(drawings), "Drawing", "pictures")
+        for name, picture in zip(drawings, drawn, strict=True):
+            if shards is None or shards.writes:
+                folder.write({name: picture})
+    if left_to_first(shards, out):
+        return
     click.echo(f"{counted(len(drawings), 'file')} in {shown_path(out)}")
+
+
+def _drawn(drawing: Callable[[], bytes]) -> bytes:
+    return drawing()
 
 
 def _composite(task: AssemblyTask, style: PictureStyle) -> bytes:

@@ -34,9 +34,9 @@ from phyblock.making.questions.relations import (
 )
 from phyblock.making.questions.text_probe import text_features
 from phyblock.making.questions.views import OrderingMaker, ViewpointMaker
-from phyblock.making.workers import Workers
 from phyblock.sim.question_pictures import filled
 from phyblock.types import BACKGROUNDS, Background
+from phyblock.workers import Workers
 
 MAKERS: dict[Subtask, Maker] = {
     maker.subtask: maker

@@ -36,9 +36,9 @@ from phyblock.making.scenes.sketch import (
     make_scene,
     transformed,
 )
-from phyblock.making.workers import Workers
 from phyblock.sim.contact import find_gaps
 from phyblock.stable import drawn_bytes
+from phyblock.workers import Workers
 
 Group = Literal["1", "1+2", "2", "3", "4"]
 GROUP_LEVELS: dict[Group, tuple[int, ...]] = {
