@@ -101,7 +101,7 @@ class Client(ABC):
             error.args = (said,)
             raise
         texts = {
-            name: hidden(well_formed(text), self._secrets, guess=False)
+            name: hidden(text, self._secrets, guess=False)
             for name in ("text", "reasoning", "provider_model")
             if (text := getattr(reply, name))
         }

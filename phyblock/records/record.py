@@ -19,6 +19,7 @@ from phyblock.config.yaml import FieldPath, YamlSource
 from phyblock.errors import DataError, InputError, Problem, StoreError
 from phyblock.files import load_json
 from phyblock.stable import plain_sum
+from phyblock.text import well_formed
 from phyblock.types import AskedAs, Finish, Outcome, Role
 
 LARGEST_WHOLE = 2**53
@@ -84,14 +85,14 @@ def decode(
     """Return JSON text as what `adapter` reads, without changing the type of anything.
 
     Raises DataError with everything that is wrong with it; `kind` is the model of what is read.
-    Lone surrogates, which no output could hold, become "?".
+    Lone surrogates, which no output could hold, become U+FFFD.
     """
     try:
         return adapter.validate_json(data, strict=True)
     except ValidationError:
         pass  # Most lines are valid: only one that is not is decoded again, to find the reason.
     try:
-        value = _well_formed(load_json(data.decode("utf-8")))
+        value = _storable(load_json(data.decode("utf-8")))
     except json.JSONDecodeError as error:
         place = f"{error.lineno}:{error.colno}" if b"\n" in data.rstrip() else f"{error.colno}"
         raise DataError(Problem(f"{where}:{place}", f"is not JSON: {error.msg}")) from error
@@ -111,19 +112,14 @@ def not_a(noun: str, error: InputError, hint: str) -> StoreError:
     )
 
 
-def encodable(text: str) -> str:
-    """Return text that UTF-8 can hold: lone surrogates, as of a broken reply, become "?"."""
-    return text if text.isascii() else text.encode("utf-8", "replace").decode("utf-8")
-
-
-def _well_formed(value: Any) -> Any:
+def _storable(value: Any) -> Any:
     """Return a decoded value with texts that UTF-8 can hold."""
     if isinstance(value, str):
-        return encodable(value)
+        return well_formed(value)
     if isinstance(value, list):
-        return [_well_formed(below) for below in value]
+        return [_storable(below) for below in value]
     if isinstance(value, dict):
-        return {encodable(name): _well_formed(below) for name, below in value.items()}
+        return {well_formed(name): _storable(below) for name, below in value.items()}
     return value
 
 
@@ -187,11 +183,13 @@ class Reply(Line):
         """Return the reply with all its fields, as it is written.
 
         It is paid for: an absurd number in it is one that is not known, and characters that no
-        file could hold become "?".
+        file could hold become U+FFFD.
         """
         held, usage = vars(self), self.usage
         fields = {name: held[name] for name in Reply.model_fields}
-        fields |= {name: encodable(text) for name, text in fields.items() if isinstance(text, str)}
+        fields |= {
+            name: well_formed(text) for name, text in fields.items() if isinstance(text, str)
+        }
         fields |= {name: _within(held[name], 0) for name in ("cost_usd", "billed_usd")}
         counts = {
             name: _within(getattr(usage, name), -LARGEST_WHOLE) for name in Usage.model_fields

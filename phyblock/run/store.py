@@ -51,12 +51,11 @@ from phyblock.records.record import (
     Record,
     Reply,
     Stopped,
-    encodable,
 )
 from phyblock.run.manifest import code_versions, differences
 from phyblock.scoring.plan import Counts
 from phyblock.stable import hex_digest
-from phyblock.text import counted
+from phyblock.text import counted, well_formed
 
 LineT = TypeVar("LineT", bound=Line)
 
@@ -478,7 +477,7 @@ def prompt_fields(messages: Sequence[Message]) -> dict[str, Any]:
         {
             "role": message.role,
             "parts": [
-                {"image": part.label} if isinstance(part, Image) else encodable(part)
+                {"image": part.label} if isinstance(part, Image) else well_formed(part)
                 for part in message.parts
             ],
         }
