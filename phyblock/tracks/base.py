@@ -22,7 +22,7 @@ from phyblock.config.suite import Suite
 from phyblock.config.validation import PictureControls
 from phyblock.data.base import AssemblyTask, Dataset
 from phyblock.errors import Problem, SpecError
-from phyblock.models.request import Image, Request
+from phyblock.models.request import Image, Message, Request
 from phyblock.parsing.text import AnswerForm
 from phyblock.records.record import Record, Reply, SentPrompt
 from phyblock.registry import added_measures, known_track, known_tracks
@@ -112,6 +112,7 @@ class Track(ABC):
         """
         self.suite, self.dataset, self.limit, self.shop = suite, dataset, limit, shop
         self.spec: Any = None if self.options is None else suite.section(self.options)
+        self.is_blind = isinstance(self.spec, PictureControls) and self.spec.blind
         self.drawn_seeds = suite.seeds[:1]
         self.prompt = None if shop is None else self.open_prompt()
         self._drawings: dict[str, tuple[Drawing, ...]] = {}
@@ -186,9 +187,10 @@ class Track(ABC):
             self._drawings[name] = self.draw(item)
         return self._drawings[name]
 
-    @abstractmethod
     def facts(self, item: Any, pictures: Sequence[Image]) -> dict[str, object]:
         """Return what templates may use; nothing in it gives an answer away."""
+        labels = [picture.label for picture in pictures]
+        return {"pictures": labels, "is_blind": self.is_blind, **form_facts(self.form(item))}
 
     def json_form(self, item: Any) -> AnswerForm[Any]:
         """Return the form of an answer as JSON, where it has a prompt that asks for it."""
@@ -261,8 +263,9 @@ class Track(ABC):
     ) -> Request:
         """Return the request of one sample; without messages for models that need none."""
         if not with_messages or self.shop is None:
-            return Request(item.key, seed, (), params, "", self.subject_of(item))
-        return self._request(item, seed, params, await self.shop.images(self.drawings(item)))
+            return self.asked(item, seed, params)
+        pictures = await self.shop.images(self.drawings(item))
+        return self.asked(item, seed, params, self.messages(item, pictures))
 
     def outlines(self, item: Any) -> Iterator[Request]:
         """Yield the requests of an item as far as they are known before any is answered.
@@ -270,26 +273,29 @@ class Track(ABC):
         With seed 0 and no parameters, made without rendering: a picture that is not at hand is
         empty, and so is one that cannot be known.
         """
-        if self.shop is None:
-            yield Request(item.key, 0, (), {}, "", self.subject_of(item))
-            return
-        yield self._request(item, 0, {}, self.shop.outlines(self.drawings(item)))
+        pictures = () if self.shop is None else self.shop.outlines(self.drawings(item))
+        yield self.asked(item, 0, {}, () if self.shop is None else self.messages(item, pictures))
 
-    def _request(
-        self, item: Any, seed: int, params: Mapping[str, object], pictures: Sequence[Image]
-    ) -> Request:
-        """Return the request about an item with these pictures."""
+    def messages(self, item: Any, pictures: Sequence[Image]) -> tuple[Message, ...]:
+        """Return the messages about an item with these pictures."""
         assert self.prompt is not None
-        form = self.form(item)
-        return Request(
-            item.key,
-            seed,
-            self.prompt.messages(pictures, self.facts(item, pictures)),
-            params,
-            self.prompt.version,
-            self.subject_of(item),
-            None if form is None else form.response_format,
-        )
+        return self.prompt.messages(pictures, self.facts(item, pictures))
+
+    def asked(
+        self,
+        item: Any,
+        seed: int,
+        params: Mapping[str, object],
+        messages: tuple[Message, ...] = (),
+        subject: object = None,
+        turn: int = 0,
+    ) -> Request:
+        """Return the request with these messages; of an episode that of a turn, from 1."""
+        key, form = f"{item.key}/{turn}" if turn else item.key, self.form(item)
+        version = self.prompt.version if messages and self.prompt is not None else ""
+        about = subject or self.subject_of(item)
+        wanted = None if form is None else form.response_format
+        return Request(key, seed, messages, params, version, about, wanted)
 
     async def work_out(self, work: Callable[[], Any]) -> Any:
         """Return what `work`, a `partial`, gives in another process; without a shop in a thread."""
@@ -313,7 +319,6 @@ class SceneTrack(Track):
         """Select scenes evenly over levels."""
         suite = self.suite
         self.items = select_tasks(self.dataset.tasks, suite.levels, self.limit)
-        self.is_blind = isinstance(self.spec, PictureControls) and self.spec.blind
         if self.is_blind or suite.candidates.order != "file":
             self.drawn_seeds = suite.seeds
         if self.draws and self.shop is not None and suite.images.source == "dataset":
@@ -339,11 +344,9 @@ class SceneTrack(Track):
         """Return what templates may use; nothing in it gives an answer away."""
         images = self.suite.images
         return {
-            "pictures": [picture.label for picture in pictures],
+            **super().facts(item, pictures),
             "n_candidates": len(item.candidates),
             "candidate_scale": None if images.source == "dataset" else "common",
-            "is_blind": self.is_blind,
-            **form_facts(self.form(item)),
         }
 
 

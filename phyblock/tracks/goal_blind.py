@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.data.base import AssemblyTask
-from phyblock.domain.scene import Candidate, CandidateSet, Kind, Plan, Scene
+from phyblock.domain.scene import Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring.plan import Goal, most_placed
 from phyblock.tracks.items import ShownTask, presented
 from phyblock.types import CandidateOrder, Setting
@@ -54,16 +54,12 @@ KEYS: tuple[Key, ...] = (
 
 def units(candidates: CandidateSet, setting: Setting) -> list[Unit]:
     """Return the units of a candidate set under a setting, by their numbers."""
-    numbers: dict[Kind, list[int]] = defaultdict(list)
-    for number, one in enumerate(candidates.candidates, 1):
-        numbers[one.kind].append(number)
-    made = []
-    for number, one in enumerate(candidates.candidates, 1):
-        same = numbers[one.kind]
+    listed, made = list(enumerate(candidates.candidates, 1)), []
+    for number, one in listed:
+        same = tuple(n for n, other in listed if other.kind == one.kind)
         rank = same.index(number)
         if setting == "A" or rank == 0:
-            named = (number,) if setting == "A" else tuple(same)
-            made.append(Unit(named, one, len(same), rank))
+            made.append(Unit((number,) if setting == "A" else same, one, len(same), rank))
     return made
 
 

@@ -12,7 +12,6 @@ from functools import partial
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
 
 from phyblock.config.validation import Fault, PictureControls, TemplateName, UniqueSome, checked
 from phyblock.data.base import AssemblyTask
@@ -65,7 +64,11 @@ end differently.
 KIT_LABEL = "blocks"
 """The label of the sheet of candidates."""
 Center = tuple[float, float, float]
-_LIMITS = ExecutionLimits()
+_REACHED = {"reached_cm": 1.0, "reached_deg": 10.0}
+_LIMITS = {**asdict(ExecutionLimits()), **_REACHED}
+"""Tolerances of execution, as records hold them: a goal block is reached if a block of its kind
+ends up at most `reached_cm` from it, turned by at most `reached_deg`.
+"""
 _DIGITS = 4
 _RANDOM_STEPS = 4
 _RANDOM_REACH_CM = 15.0
@@ -81,41 +84,14 @@ def _oblique_first(views: tuple[View, ...]) -> Iterator[Fault]:
         yield Fault("must begin with oblique", f"[{', '.join(order)}]")
 
 
-Tolerance = Annotated[float, Field(strict=True, gt=0, le=10, allow_inf_nan=False)]
-Angle = Annotated[float, Field(strict=True, gt=0, le=90, allow_inf_nan=False)]
-
-
 class PoseSpec(PictureControls):
-    """The pose_planning track: the form of requests, and the tolerances of execution."""
+    """The pose_planning track: the form of requests."""
 
     views: Annotated[UniqueSome[View], checked(_oblique_first)] = ("oblique", "top")
     """Views of the goal, one picture each: oblique first, then any of front, side and top.
     Candidates are shown in the first view."""
-    overlap_cm: Tolerance = _LIMITS.overlap_cm
-    """Farthest that a block that overlaps others is moved out of them; one that would need more is
-    refused [cm]."""
-    stand_cm: Tolerance = _LIMITS.stand_cm
-    """A block that moves farther than this when it is released has fallen, or was knocked over
-    [cm]."""
-    stand_deg: Angle = _LIMITS.stand_deg
-    """The same for its rotation [degrees]."""
-    reached_cm: Tolerance = 1.0
-    """A goal block is reached if a block of its kind ends up at most this far from it [cm]."""
-    reached_deg: Angle = 10.0
-    """The same for its rotation [degrees]."""
     prompt: TemplateName = "default"
     """default, or the path of a .j2 template."""
-
-    @property
-    def limits(self) -> ExecutionLimits:
-        """The tolerances by which plans are carried out."""
-        return ExecutionLimits(self.overlap_cm, self.stand_cm, self.stand_deg)
-
-    @property
-    def tolerances(self) -> dict[str, float]:
-        """All tolerances by which what is carried out is judged, as records hold them."""
-        names = ("overlap_cm", "stand_cm", "stand_deg", "reached_cm", "reached_deg")
-        return {name: getattr(self, name) for name in names}
 
 
 class GivenStep(Line):
@@ -199,7 +175,7 @@ class PoseOutcome(Line):
     completed: bool
     """True if the whole goal was reached and no other block is left."""
     limits: dict[str, Amount]
-    """The tolerances of the suite's section `pose` with which the plan was carried out."""
+    """The tolerances with which the plan was carried out [cm, degrees]."""
     engine: str
     """The physics engine, with its version."""
 
@@ -256,14 +232,13 @@ _WHOLE = ("reached", "iou", "completed", "engine")
 def judge_poses(
     item: AssemblyTask,
     text: str | None,
-    spec: PoseSpec,
     settings: tuple[Setting, ...],
     matchers: tuple[Matcher, ...],
     earlier: PoseRecord | None = None,
 ) -> Judgement:
     """Read, score and carry out a reply; None, where there is no reply, is an empty plan.
 
-    A plan that an `earlier` record holds, executed with the same tolerances, ended as it did.
+    A plan that an `earlier` record holds, executed with these tolerances, ended as it did.
     """
     parsed, n = ParsedPoses((), None), len(item.candidates)
     if text is not None:
@@ -278,7 +253,7 @@ def judge_poses(
         if block is not None
     )
     poses = scorer.score(list(laid))
-    ended, whole = _ended_before(earlier, given, spec) or _carried(item.scene, blocks, spec)
+    ended, whole = _ended_before(earlier, given) or _carried(item.scene, blocks)
     found = iter(poses[0].fits)
     fits = [None if block is None else next(found) for block in blocks]
     numbers, ends = [step.candidate for step in given], [step["end"] for step in ended]
@@ -306,7 +281,7 @@ def judge_poses(
             {**({"vertex": None} if fit is None else asdict(fit)), **end, "error": error}
             for fit, end, error in zip(fits, ended, errors, strict=True)
         ],
-        "limits": spec.tolerances,
+        "limits": _LIMITS,
         **whole,
     }
     fields = {"parse": parse, "scores": [score_fields(score) for score in scores], "pose": pose}
@@ -317,28 +292,24 @@ Ended = tuple[tuple[Mapping[str, Any], ...], Mapping[str, Any]]
 """Endings of the steps of a plan that was carried out, and the world in the end, as in records."""
 
 
-def _ended_before(
-    record: PoseRecord | None, given: Sequence[PoseStep], spec: PoseSpec
-) -> Ended | None:
-    """Return the result that a record holds of the same steps by the same tolerances, or None."""
+def _ended_before(record: PoseRecord | None, given: Sequence[PoseStep]) -> Ended | None:
+    """Return the result that a record holds of the same steps by these tolerances, or None."""
     if record is None or record.pose is None or record.parse is None:
         return None
     pose = record.pose
     known = [PoseStep(s.block, s.center_cm) for s in record.parse.steps]
-    if known != list(given) or len(pose.steps) != len(known):
-        return None
-    if dict(pose.limits) != spec.tolerances:
+    if known != list(given) or len(pose.steps) != len(known) or pose.limits != _LIMITS:
         return None
     steps = tuple({n: v for n, v in step.fields().items() if n in _END} for step in pose.steps)
     return steps, {name: getattr(pose, name) for name in _WHOLE}
 
 
-def _carried(scene: Scene, blocks: Sequence[Block | None], spec: PoseSpec) -> Ended:
+def _carried(scene: Scene, blocks: Sequence[Block | None]) -> Ended:
     # An engine has no more than one plan at a time, whichever thread asks.
     with _ONE_AT_A_TIME:
-        done = execute(blocks, spec.limits)
+        done = execute(blocks)
     goal, rests = scene.blocks, rests_of(blocks, done.worlds)
-    reached = blocks_reached(goal, done.blocks, spec.reached_cm, spec.reached_deg)
+    reached = blocks_reached(goal, done.blocks, *_REACHED.values())
     steps = tuple(
         {**asdict(step), "rests": [rest.fields() for rest in moved]}
         for step, moved in zip(done.steps, rests, strict=True)
@@ -386,14 +357,11 @@ def buildable_order(scene: Scene, wanted: Sequence[int]) -> list[int]:
 
 def written(steps: Iterable[PoseStep]) -> str:
     """Steps in the form that the prompt asks for."""
-    return "\n".join(
-        f"Step{n}: block {step.candidate} at ({', '.join(map(_number, step.center_cm))})"
-        for n, step in enumerate(steps, 1)
-    )
-
-
-def _number(value: float) -> str:
-    return f"{round(value, 4) + 0.0:g}"
+    lines = []
+    for n, step in enumerate(steps, 1):
+        center = ", ".join(f"{round(value, 4) + 0.0:g}" for value in step.center_cm)
+        lines.append(f"Step{n}: block {step.candidate} at ({center})")
+    return "\n".join(lines)
 
 
 def _built(
@@ -431,11 +399,6 @@ def _noisy(sigma_cm: float) -> Callable[[PlanSubject, np.random.Generator], str]
     return rule
 
 
-def _flat(subject: PlanSubject, rng: np.random.Generator) -> str:
-    """Right sideways, all on the floor."""
-    return _built(subject, rng, lambda block, center: (*center[:2], box_height_cm(block) / 2))
-
-
 def _stack(subject: PlanSubject, rng: np.random.Generator) -> str:
     """All at the origin, one on another."""
     top = 0.0
@@ -468,7 +431,9 @@ POSE_RULES: Mapping[str, Callable[..., str]] = {
     "oracle-noise-1mm": _noisy(0.1),
     "oracle-noise-3mm": _noisy(0.3),
     "oracle-noise-1cm": _noisy(1.0),
-    "oracle-2d": _flat,
+    "oracle-2d": lambda subject, rng: _built(
+        subject, rng, lambda block, center: (*center[:2], box_height_cm(block) / 2)
+    ),
     "stack": _stack,
 }
 
@@ -619,7 +584,7 @@ class PosePlanning(SceneTrack):
     def judge(self, item: AssemblyTask, text: str | None) -> Judgement:
         """Read, score and carry out a reply; None, where there is none, is an empty plan."""
         suite = self.suite
-        return judge_poses(item, text, self.spec, suite.settings, suite.scoring.matchers)
+        return judge_poses(item, text, suite.settings, suite.scoring.matchers)
 
     async def judge_apart(
         self, item: AssemblyTask, text: str | None, earlier: Record | None
@@ -629,7 +594,7 @@ class PosePlanning(SceneTrack):
         A plan that an earlier record holds is not carried out again.
         """
         known = earlier if isinstance(earlier, PoseRecord) else None
-        rules = (self.spec, self.suite.settings, self.suite.scoring.matchers, known)
+        rules = (self.suite.settings, self.suite.scoring.matchers, known)
         found: Judgement = await self.work_out(partial(judge_poses, item, text, *rules))
         return found
 

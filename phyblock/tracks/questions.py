@@ -58,7 +58,6 @@ from phyblock.tracks.items import spread, stratified
 from phyblock.tracks.measures import OVERALL, WHOLE, Cell, SampleCounts
 from phyblock.tracks.picking import Choice, Picking
 from phyblock.tracks.pictures import Drawing, picture_style
-from phyblock.tracks.prompts import form_facts
 from phyblock.types import Background, DataFormat
 
 BUILTIN_QUESTIONS = "phyblock-vqa"
@@ -403,7 +402,7 @@ class Vqa(Track):
 
     def draw(self, item: AskedQuestion) -> tuple[Drawing, ...]:
         """Return the pictures of a question as a suite wants them."""
-        if self.spec.blind:
+        if self.is_blind:
             return ()
         images = self.suite.images
         return question_drawings(item, picture_style(images), images.background)
@@ -411,7 +410,7 @@ class Vqa(Track):
     def about(self, item: AskedQuestion) -> dict[str, Any]:
         """Return the question and how it is shown."""
         asked = {name: getattr(item.question, name) for name in ("id", "subtask", "category")}
-        return {"question": {**asked, "rotation": item.rotation, "blind": self.spec.blind}}
+        return {"question": {**asked, "rotation": item.rotation, "blind": self.is_blind}}
 
     def identity(self) -> dict[str, Any]:
         """Return digests of all questions, of those asked, the prompt and the pictures."""
@@ -430,6 +429,7 @@ class Vqa(Track):
         """Return the variables of templates; nothing in it gives the answer away."""
         question = item.question
         return {
+            **super().facts(item, pictures),
             "question": question.text,
             "options": [
                 {"letter": letter, "text": option, "is_picture": is_picture_option(option)}
@@ -437,9 +437,6 @@ class Vqa(Track):
             ],
             "letters": list(LETTERS[: len(question.options)]),
             "is_ordering": question.subtask == "OR",
-            "pictures": [picture.label for picture in pictures],
-            "is_blind": self.spec.blind,
-            **form_facts(self.form(item)),
         }
 
     def subject_of(self, item: AskedQuestion) -> ChoiceSubject:

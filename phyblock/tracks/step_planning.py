@@ -410,25 +410,10 @@ class StepPlanning(SceneTrack):
                 (current,) = self.shop.outlines((self.draw_state(item, ()),))
                 current = replace(current, data=b"") if step else current
                 messages = self.messages(item, (*fixed, current), [_LIKELY] * step)
-            yield self.asked(item, step, 0, {}, messages)
-
-    def asked(
-        self,
-        item: AssemblyTask,
-        step: int,
-        seed: int,
-        params: Mapping[str, object],
-        messages: tuple[Message, ...],
-        subject: StepSubject | None = None,
-    ) -> Request:
-        """Return the request of the step after so many."""
-        version = self.prompt.version if messages and self.prompt is not None else ""
-        form, key = self.form(item), f"{item.key}/{step + 1}"
-        wanted = None if form is None else form.response_format
-        return Request(key, seed, messages, params, version, subject, wanted)
+            yield self.asked(item, 0, {}, messages, turn=step + 1)
 
     def messages(
-        self, item: AssemblyTask, pictures: Sequence[Image], past: Sequence[PastStep]
+        self, item: AssemblyTask, pictures: Sequence[Image], past: Sequence[PastStep] = ()
     ) -> tuple[Message, ...]:
         """Return the messages of the step after `past`, which they tell as a text."""
         assert isinstance(self.prompt, TemplatePrompt)
@@ -514,7 +499,8 @@ class StepEpisode:
             self._failed[-1].move if self._failed else None,
             len(self._past),
         )
-        return track.asked(task, len(self._past), self._seed, self._params, messages, subject)
+        turn = len(self._past) + 1
+        return track.asked(task, self._seed, self._params, messages, subject, turn)
 
     def take(self, reply: Reply, prompt: SentPrompt | None = None) -> None:
         """Take the step that the reply to the last request names."""

@@ -35,7 +35,6 @@ from phyblock.tracks.pose_planning import (
     POSE_RULES,
     PosePlanning,
     PoseRecord,
-    PoseSpec,
     StepOutcome,
     written,
 )
@@ -167,7 +166,7 @@ def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(
     found = track.judge(item, text)
     steps = parse_poses(text, len(item.candidates)).steps
     blocks = [put(step, item.candidates) for step in steps]
-    worlds = execute(blocks, PoseSpec().limits).worlds
+    worlds = execute(blocks).worlds
     record = judged(begun("s", track.name, "m", item, 0, None), item, found)
     assert isinstance(record, PoseRecord)
     assert record.pose is not None
