@@ -133,11 +133,11 @@ def test_a_reply_is_read_scored_and_carried_out(
     assert found.is_read == bool(ends)
     # Its record is written, read again and judged again, and says the same.
     fields = begun("s", track.name, "m", task, 0, None)
-    record = judged({**fields, **track.about(task)}, task, found)
+    record = judged(track, task, {**fields, **track.about(task)}, found)
     assert known_records().validate_json(record.as_json()) == record
     assert isinstance(record, PoseRecord)
     again = asyncio.run(track.judge_apart(task, text, record))
-    assert judged({**fields, **track.about(task)}, task, again) == record
+    assert judged(track, task, {**fields, **track.about(task)}, again) == record
 
 
 def worlds_of(put: Sequence[Block | None], steps: Sequence[StepOutcome]) -> list[tuple[Block, ...]]:
