@@ -167,7 +167,7 @@ def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(
     steps = parse_poses(text, len(item.candidates)).steps
     blocks = [put(step, item.candidates) for step in steps]
     worlds = execute(blocks).worlds
-    record = judged(begun("s", track.name, "m", item, 0, None), item, found)
+    record = judged(track, item, begun("s", track.name, "m", item, 0, None), found)
     assert isinstance(record, PoseRecord)
     assert record.pose is not None
     for world, again in zip(worlds, worlds_of(blocks, record.pose.steps), strict=True):
