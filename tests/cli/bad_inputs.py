@@ -99,6 +99,8 @@ OPTIONS: tuple[Bad, ...] = (
     Bad("set-spaced", options("--set", "seeds", "=", "0"), ("quote values with spaces",)),
     Bad("set-half", options("--set", "seeds=[0,"), ("--set seeds=[0,", "quote values with spaces")),
     Bad("models-spaced", options("--models", "alpha,", "random"), ("quote values with spaces",)),
+    Bad("field", options("--seeds", "0,1"), ("are set with --set 'seeds=[...]'",)),
+    Bad("field-word", options("--answer-format", "x"), ("with --set answer_format=VALUE",)),
     Bad("models-empty", options("--models", "oracle,,random"), ("holds an empty name",)),
     Bad(
         "plugin",

@@ -75,11 +75,3 @@ def is_option(verb: str, *words: str) -> bool:
     inner = command.get_command(context, words[0]) if isinstance(command, click.Group) else None
     known = {name for one in (command, inner) if one for param in one.params for name in param.opts}
     return words[-1] in known | {"--help"}
-
-
-def test_a_field_of_suites_that_is_taken_for_an_option_is_shown_how_to_set() -> None:
-    for option, form in (("--seeds", "'seeds=[...]'"), ("--answer-format", "answer_format=VALUE")):
-        command = [sys.executable, "-m", "phyblock", "run", "quick", option, "0,1"]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        assert done.returncode == 2
-        assert f"fields of the suite are set with --set {form}\n" in done.stderr
