@@ -125,9 +125,6 @@ class Simulation(Protocol):
     def velocity(self, number: int) -> Velocity:
         """Return the velocity of a block now."""
 
-    def set_velocity(self, number: int, velocity: Velocity) -> None:
-        """Make a block move like this from now on, as far as contacts and gravity let it."""
-
 
 class PhysicsEngine(Protocol):
     """A way to simulate; any number of its simulations may be open at once."""
@@ -245,11 +242,6 @@ class World:
     def step(self, duration_s: float) -> None:
         """Simulate for `duration_s` [s], rounded to whole time steps."""
         self._simulation.step(round(duration_s / self.physics.time_step_s))
-
-    def drive(self, order: int, velocity_m_s: tuple[float, float]) -> None:
-        """Give a block this velocity in x and y; how it rises and turns is left as it is."""
-        linear, angular = self._simulation.velocity(order)
-        self._simulation.set_velocity(order, Velocity((*velocity_m_s, linear[2]), angular))
 
     def fastest_m_s(self) -> float:
         """Upper bound of the speed of the fastest corner [m/s]; 0 in an empty world."""

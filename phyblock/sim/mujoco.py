@@ -111,11 +111,6 @@ class _Simulation:
         linear = body.motion[:3] + np.cross(spin, body.center_m)
         return Velocity(_vector(linear), _vector(spin))
 
-    def set_velocity(self, number: int, velocity: Velocity) -> None:
-        body, spin = self._bodies[number], np.array(velocity.angular_rad_s)
-        body.motion[:3] = velocity.linear_m_s - np.cross(spin, body.center_m)
-        body.motion[3:] = body.rotation.T @ spin
-
     def _interrupt(self) -> None:
         """Let go of the data, as other blocks are to come or go."""
         for body in self._bodies.values():

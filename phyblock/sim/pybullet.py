@@ -118,10 +118,6 @@ class _Simulation:
         body, _ = self._bodies[number]
         return Velocity(*self._bullet.getBaseVelocity(body, physicsClientId=self._client))
 
-    def set_velocity(self, number: int, velocity: Velocity) -> None:
-        body, _ = self._bodies[number]
-        self._bullet.resetBaseVelocity(body, *velocity, physicsClientId=self._client)
-
     def _set_friction(self, body: int) -> None:
         self._bullet.changeDynamics(
             body,

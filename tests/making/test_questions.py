@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-import re
+import itertools
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from phyblock.data.base import QuestionSet
@@ -19,12 +20,12 @@ from phyblock.errors import DataError, StoreError
 from phyblock.files import bundled
 from phyblock.making.files import question_card, write_questions
 from phyblock.making.questions.audit import SubtaskAudit, audit_questions, duplicates_of
-from phyblock.making.questions.base import WORDINGS, fill_template
 from phyblock.making.questions.dynamics import OUTCOME_TEXTS
 from phyblock.making.questions.production import make_questions, problem_of
-from phyblock.making.questions.sight import LEAST_PIXELS
+from phyblock.making.questions.sight import LEAST_PIXELS, palette
 from phyblock.sim.contact import find_gaps
 from phyblock.sim.engine import other_engine
+from phyblock.sim.pictures import COLOR_RGB
 from phyblock.sim.question_pictures import is_inside, least_difference, seen
 from phyblock.workers import open_workers
 from tests.vqa_set import questions as asked_questions
@@ -112,7 +113,7 @@ def test_pictures_of_options_are_whole_and_told_apart(pictured: list[Question]) 
         if options:
             assert len(options) == len(LETTERS)
             assert least_difference([seen(option) for option in options]) >= LEAST_PIXELS
-        if kind in ("cf-color", "pd-push", "pd-next", "pd-fall"):
+        if kind in ("cf-color", "pd-next"):
             assert not any(find_gaps(picture.blocks, HANGS_M) for picture in question.pictures)
         if kind == "cf-count":
             assert sorted(question.options) == sorted(OUTCOME_TEXTS)
@@ -181,9 +182,8 @@ def built_in() -> QuestionSet:
 
 def test_the_built_in_set_is_whole_and_even(built_in: QuestionSet) -> None:
     asked = [task.question for task in built_in.tasks]
-    few = dict.fromkeys(("OR", "AD"), 50)
-    assert Counter(question.subtask for question in asked) == dict.fromkeys(SUBTASKS, 150) | few
-    assert len(asked) == 2200
+    assert Counter(q.subtask for q in asked) == dict.fromkeys(SUBTASKS, 150) | {"AD": 50}
+    assert len(asked) == 2300
     assert not duplicates_of(asked)
     for subtask in SUBTASKS:
         answers = [question.answer for question in asked if question.subtask == subtask]
@@ -201,66 +201,47 @@ def test_the_built_in_set_is_whole_and_even(built_in: QuestionSet) -> None:
         assert question_card(FOLDER.name, "phyblock-400", asked, made_by) == shipped
 
 
-OLD_WORDS = {
-    **{"topmost": "highest", "flattest": "shortest", "farthest left": "farthest to the left"},
-    **{"farthest right": "farthest to the right", "its right side": "the right"},
-    **{"its left side": "the left", "largest": "the most space", "smallest": "the least space"},
-    "a quarter turn about an upright axis": "a quarter turn about a vertical axis",
-    "a quarter turn about a level axis along its length": "a quarter turn about its own long axis",
-    "a quarter turn about a level axis across its length": (
-        "a quarter turn about a horizontal axis across its length"
-    ),
-    "No other block moves or falls.": "no other block",
-    "Exactly one other block moves or falls.": "exactly one other block",
-    "Exactly two other blocks move or fall.": "exactly two other blocks",
-    "Three or more other blocks move or fall.": "three or more other blocks",
-}
-"""Words of the built-in set, which an earlier version made, and those of today."""
-
-
-def in_words_of_today(question: Question) -> Question:
-    def today(text: str) -> str:
-        for old, new in OLD_WORDS.items():
-            text = new if text == old else re.sub(rf"\b{old}(?= )", new, text)
-        return re.sub(r" cm, and (\S+) cm in height", r" cm, \1 cm high", text).replace(
-            " cm by ", " by "
-        )
-
-    wording = question.wording.rsplit("-", 1)[0]
-    slots = {name: today(str(text)) for name, text in question.evidence["slots"].items()}
-    options = tuple(map(today, question.options))
-    text = fill_template(WORDINGS[wording], slots)
-    evidence = {**question.evidence, "slots": slots}
-    return replace(question, wording=wording, text=text, options=options, evidence=evidence)
-
-
-GONE = ("oc-pair", "oc-other")
-"""Kinds that are not asked any more."""
-
-
-def test_no_answer_of_the_built_in_set_is_found_wrong(built_in: QuestionSet) -> None:
-    """Its words and rules are older: some questions are not fair any more, but each answer that
-    can be derived is the same.
-    """
-    kept = [t.question for t in built_in.tasks if not t.question.wording.startswith(GONE)]
-    problems = [problem_of(in_words_of_today(question)) for question in kept[7::50]]
-    assert not [one for one in problems if one and "the answer is" in one]
-    assert problems.count(None) > 0.9 * len(problems)
-    first = next(t.question for t in built_in.tasks if t.question.subtask == "AD")
-    scene, block = in_words_of_today(first).pictures
-    bare = replace(
-        in_words_of_today(first), pictures=(replace(scene, marks=scene.marks[1:]), block)
-    )
+def test_answers_of_the_built_in_set_are_derived_again(built_in: QuestionSet) -> None:
+    asked = [task.question for task in built_in.tasks]
+    assert [problem for q in asked[7::70] if (problem := problem_of(q))] == []
+    first = next(question for question in asked if question.subtask == "AD")
+    scene, block = first.pictures
+    bare = replace(first, pictures=(replace(scene, marks=scene.marks[1:]), block))
     assert problem_of(bare) == "no place A is marked on a block"
 
 
 @pytest.mark.slow
-def test_no_answer_of_the_whole_built_in_set_is_found_wrong(built_in: QuestionSet) -> None:
-    kept = [t.question for t in built_in.tasks if not t.question.wording.startswith(GONE)]
-    problems = {q.id: problem_of(in_words_of_today(q)) for q in kept}
-    assert not [one for one in problems.values() if one and "the answer is" in one]
-    spoiled = [wrong_answer(in_words_of_today(question)) for question in kept[3::44]]
-    assert all(problem_of(question) is not None for question in spoiled)
+def test_every_answer_of_the_built_in_set_is_derived_again(built_in: QuestionSet) -> None:
+    asked = [task.question for task in built_in.tasks]
+    assert {q.id: problem for q in asked if (problem := problem_of(q))} == {}
+    assert all(problem_of(wrong_answer(question)) is not None for question in asked[3::44])
+
+
+def lab(rgb: tuple[int, int, int], seen_as: np.ndarray) -> np.ndarray:
+    """CIELAB (D65) of a color as it is seen, by a matrix of linear sRGB."""
+    linear = np.clip(seen_as @ ((np.array(rgb) / 255 + 0.055) / 1.055) ** 2.4, 0, 1)
+    x, y, z = np.cbrt(TO_XYZ @ linear / (0.9505, 1.0, 1.0888))
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
+
+
+TO_XYZ = np.array([(0.4125, 0.3576, 0.1804), (0.2127, 0.7152, 0.0722), (0.0193, 0.1192, 0.9503)])
+SEEN_AS = {
+    "all": np.eye(3),
+    "no red": np.array([(0.1124, 0.8876, 0), (0.1124, 0.8876, 0), (0.0040, -0.0040, 1)]),
+    "no green": np.array([(0.2928, 0.7072, 0), (0.2928, 0.7072, 0), (-0.0223, 0.0223, 1)]),
+}
+"""Red and green blindness in linear sRGB (Vienot, Brettel and Mollon 1999)."""
+
+
+@pytest.mark.parametrize("seen_as", SEEN_AS.values(), ids=SEEN_AS)
+def test_colors_of_a_question_are_told_apart_by_everybody(seen_as: np.ndarray) -> None:
+    drawn = {frozenset(palette(np.random.default_rng(seed))) for seed in range(20)}
+    assert len(drawn) == 2
+    for colors in drawn:
+        assert len(colors) == 3
+        for one, other in itertools.combinations(sorted(colors), 2):
+            apart = np.linalg.norm(lab(COLOR_RGB[one], seen_as) - lab(COLOR_RGB[other], seen_as))
+            assert apart >= 20
 
 
 # The audit

@@ -18,7 +18,7 @@ from phyblock.cli.options import (
     jobs_option,
     left_to_first,
 )
-from phyblock.data.base import VERSION_FILE, QuestionSet, read_version
+from phyblock.data.base import QuestionSet
 from phyblock.data.lookup import find_questions, read_data_set
 from phyblock.data.questions import read_questions
 from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Question, Subtask
@@ -35,13 +35,12 @@ from phyblock.making.cli.options import (
 )
 from phyblock.making.files import (
     QUESTION_FILES,
-    QUESTION_SET_VERSION,
     check_sums,
     question_card,
     write_questions,
 )
 from phyblock.making.questions.audit import Probe, audit_questions
-from phyblock.making.questions.production import PER_SUBTASK, make_questions, problem_of
+from phyblock.making.questions.production import MAKERS, make_questions, problem_of
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_png
 from phyblock.text import counted, did_you_mean
@@ -72,7 +71,7 @@ def questions() -> None:
     "--per-subtask",
     type=click.IntRange(1),
     metavar="N",
-    help="Questions of each subtask; by default 150.",
+    help="Questions of each subtask; by default 150, of affordance 50.",
 )
 @making_options
 def generate(
@@ -95,7 +94,7 @@ def generate(
         command += f" --subtasks {','.join(subtasks)}"
     if per_subtask is not None:
         command += f" --per-subtask {per_subtask}"
-    wanted = dict.fromkeys(subtasks, per_subtask or PER_SUBTASK)
+    wanted = {subtask: per_subtask or MAKERS[subtask].count for subtask in subtasks}
     read = read_data_set(data)
     shards = begin_set(shard, out, QUESTION_FILES, f"{command}\n{read.sha256}")
     originals = {task.scene.id: task.scene for task in read.tasks}
@@ -118,17 +117,11 @@ def verify(questions: str, data: str, jobs: int) -> None:
     """Derive every answer of PATH again, from scene, pictures and simulator.
 
     PATH is a folder with questions.jsonl or a bundled set, by default the built-in phyblock-vqa.
-    Exits with 1 when an answer differs, or a question is not fair. Of a set that an earlier
-    version made, only the checksums are checked.
+    Exits with 1 when an answer differs, a question is not fair, or a file has changed.
     """
     read = _read(questions, data)
-    version = read_version(read.root)
     # Questions about one scene follow one another, so that pictures are shared.
     asked = sorted((task.question for task in read.tasks), key=lambda question: question.scene.id)
-    if (read.root / VERSION_FILE).is_file() and version < QUESTION_SET_VERSION:
-        asked = []
-        known = f"this one derives those of version {QUESTION_SET_VERSION}"
-        click.echo(f"Version {version} of the makers derived the answers; {known}.")
     problems = mapped(problem_of, asked, jobs, "Verifying", "questions")
     counts = Counter(question.subtask for question in asked)
     failed = Counter(q.subtask for q, p in zip(asked, problems, strict=True) if p)

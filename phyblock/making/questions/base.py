@@ -50,8 +50,9 @@ class Draft:
 
     `scene` is the scene as shown; `options` has the right one first, or for ordering all four in
     the right order. `slots` fill the template of the `wording`. `facts` are further evidence, which
-    JSON can hold. Selection takes an even share of each `kind`. `looks` are measures of options
-    that are no texts, a row each, by which a reader might guess: drafts are dropped until these
+    JSON can hold. Selection takes an even share of each `kind`, by
+    default the wording. `looks` are measures of the
+    pictures, a row for each option, by which a reader might guess: drafts are dropped until these
     tell nothing. Of the same base scenes there is one question of a wording, slots and `about`.
     """
 
@@ -66,6 +67,11 @@ class Draft:
     about: Hashable = None
 
     @property
+    def group(self) -> str:
+        """Its kind, or its wording."""
+        return self.kind or self.wording
+
+    @property
     def text(self) -> str:
         """The wording with its slots filled."""
         return fill_template(WORDINGS[self.wording], self.slots)
@@ -75,6 +81,8 @@ class Maker(ABC):
     """Makes the questions of one subtask and can derive an answer again."""
 
     subtask: Subtask
+    count: int = 150
+    """Questions that are made where no other number is asked for."""
     spare: float = 1.5
     """Scenes are asked until there are so many times the drafts that are wanted."""
     doubtful: float = 1.05

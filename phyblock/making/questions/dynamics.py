@@ -1,14 +1,12 @@
-"""CF, PD, AD: what moves when a block goes, comes, or is pushed.
+"""CF, PD, AD: what moves when a block goes or comes.
 
 Questions are proposed by statics alone; simulations confirm those that are selected.
 
-CF: the block that goes is marked in the picture, so that no word of the question hints at the
-answer. It supports others, all of the scene; or, as a kind of its own, it is a weight that holds
-what it rests on.
+CF: the block that goes supports others of the scene. It is marked in the picture, so that no word
+of the question hints at the answer.
 
-PD: four pictures show the same blocks laid on an unfinished structure, of which one stays, or one
-falls: what is right in one kind of question is wrong in the other. Or a block is pushed to the
-right or left as seen, and all pictures show what pushes of it or its neighbors lead to.
+PD: four pictures show the same blocks laid on an unfinished structure, of which one stays. By how
+far its weights lean to one side it is as often any of the four in order.
 
 AD: all places are on flat faces, and no more central where the block stays than elsewhere. Where it
 stays it comes down on the face that is marked. Elsewhere a plank tips under it, as far as such
@@ -19,7 +17,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -51,11 +49,10 @@ from phyblock.making.questions.structures import (
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.camera import view_axes
-from phyblock.sim.contact import bounds_m, boxes_near, support_graph
+from phyblock.sim.contact import bounds_m, support_graph
 from phyblock.sim.dynamics import groups
-from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import drawn_mesh
-from phyblock.sim.outcomes import OUTCOME_SETTINGS, Outcome, Push, after, after_removal, has_moved
+from phyblock.sim.outcomes import Outcome, after_removal
 from phyblock.sim.pictures import Shot, drawn_m
 from phyblock.sim.question_pictures import (
     BLOCK_LABEL,
@@ -75,7 +72,7 @@ from phyblock.sim.question_pictures import (
 # CF
 
 TAKEN = "X"
-"""The letter of the block that is taken away or pushed."""
+"""The letter of the block that is taken away."""
 Ints = NDArray[np.int64]
 Lot = frozenset[int]
 """Orders of blocks that move."""
@@ -83,41 +80,31 @@ OUTCOME_TEXTS: tuple[str, ...] = tuple(base.WORDS["outcomes_of_removal"])
 """Outcomes of a removal, by the number of other blocks that do not stay; all are offered."""
 _ALL_SEEN = 0.12
 _VIEWS_TRIED, _REMOVALS_TRIED = 3, 4
-_WEIGHTS_ASKED = 0.25
-"""Of so many scenes the block that goes is a weight put on top."""
 _MOST_LOTS, _MOST_TOGETHER = 40, 3
 _COLORS = tuple(itertools.permutations(sight.PLAIN_COLORS))
 """The colors of what moves, of what stays, and of the block that is taken away."""
 
 
 class CounterfactualMaker(Maker):
-    """Kinds: `cf-count` (texts) and `cf-color` (what moves, by colors), where a support of the
-    scene goes; `cf-weight` (texts), where a weight put on it goes. The former are asked as often
-    where what rests on the block is what moves as where it is not.
-    """
+    """Kinds: `cf-count` (texts) and `cf-color` (what moves, by colors)."""
 
     subtask: Subtask = "CF"
-    spare, doubtful = 6.0, 1.2
+    spare, doubtful = 4.0, 1.2
     drafts_a_scene = 3
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-        """Ask about removals from the scene, or from a part of it with an annex."""
-        is_weight = rng.random() < _WEIGHTS_ASKED
-        blocks = (with_annex(scene, rng) if is_weight else scene.blocks) or ()
-        below = _below(blocks)
-        carrying = frozenset[int]().union(*below.values())
-        asked = [o for o in below if (o > len(scene)) is is_weight and (o in carrying) != is_weight]
+        """Ask about removals of blocks that others rest on."""
+        carrying = frozenset[int]().union(*_below(scene.blocks).values())
+        asked = [block.order for block in scene.blocks if block.order in carrying]
         for order in shuffled(rng, asked)[:_REMOVALS_TRIED]:
-            shown = _pictured(blocks, order, rng)
-            moved = falling(group_of(blocks, order), order) if shown else None
-            if shown is None or moved is None or not sight.are_seen(shown, moved, sight.COUNTED):
-                continue
-            if is_weight:
-                yield _count(scene, shown, order, moved, rng, "cf-weight", "cf-weight")
-                return
-            kind = "plain" if moved == resting_on(blocks, order) else "odd"
-            yield _count(scene, shown, order, moved, rng, "cf-count", f"cf-count-{kind}")
-            yield from _color(scene, shown, order, moved, rng, f"cf-color-{kind}")
+            shown = _pictured(scene.blocks, order, rng)
+            moved = falling(group_of(scene.blocks, order), order) if shown else None
+            if shown and moved is not None and sight.are_seen(shown, moved, sight.COUNTED):
+                right, *others = base.right_first(_outcome_text(len(moved)), OUTCOME_TEXTS)
+                options = (right, *shuffled(rng, others))
+                facts = {"removed": order, "moved": sorted(moved)}
+                yield Draft(scene, "cf-count", options, (shown,), facts=facts, about=order)
+                yield from _color(scene, shown, order, moved, rng)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Simulate the removal again."""
@@ -126,9 +113,10 @@ class CounterfactualMaker(Maker):
         outcome = sure_removal(shown.blocks, order)
         if outcome is None:
             raise UnfairError(f"it is not sure what follows without block {order}")
-        sight.require_seen(
-            shown, sight.NAMED, [block for block in shown.blocks if block.order == order]
-        )
+        gone = [block for block in shown.blocks if block.order == order]
+        if not any(order in block.depend for block in shown.blocks):
+            raise UnfairError(f"block {order} supports no other")
+        sight.require_seen(shown, sight.NAMED, gone)
         if question.wording != "cf-color":
             right = _outcome_text(len(outcome.moved))
             return base.only_index([option == right for option in question.options])
@@ -181,38 +169,8 @@ def _pictured(
     return None
 
 
-def _count(
-    scene: Scene,
-    shown: QuestionPicture,
-    order: int,
-    moved: Lot,
-    rng: np.random.Generator,
-    stem: str,
-    kind: str,
-) -> Draft:
-    """Ask how many blocks move."""
-    right, *others = base.right_first(_outcome_text(len(moved)), OUTCOME_TEXTS)
-    options = (right, *shuffled(rng, others))
-    tops_m = {block.order: float(bounds_m(block)[1, 2]) for block in shown.blocks}
-    bins = (int(3.99 * tops_m[order] / max(tops_m.values())), min(len(shown.blocks) // 4, 3))
-    looks = np.zeros((len(options), len(options), len(bins), 4))
-    for row, option in enumerate(options):
-        looks[row, OUTCOME_TEXTS.index(option), range(len(bins)), bins] = 1.0
-    facts, rows = {"removed": order, "moved": sorted(moved)}, looks.reshape(len(options), -1)
-    return Draft(
-        *(scene, stem, options, (shown,), {}, facts, kind),
-        looks=tuple(map(tuple, rows.tolist())),
-        about=order,
-    )
-
-
 def _color(
-    scene: Scene,
-    shown: QuestionPicture,
-    order: int,
-    moved: Lot,
-    rng: np.random.Generator,
-    kind: str,
+    scene: Scene, shown: QuestionPicture, order: int, moved: Lot, rng: np.random.Generator
 ) -> Iterator[Draft]:
     """Ask which blocks move, by pictures that color them."""
     plain = replace(shown, marks=())
@@ -231,8 +189,7 @@ def _color(
     if options and sight.are_told_apart(options):
         slots: dict[str, str] = dict(zip(("color", "other", "taken"), colors, strict=True))
         facts = {"removed": order, "moved": sorted(moved)}
-        looks = tuple(map(tuple, measures[four].tolist()))
-        yield Draft(scene, "cf-color", options, (shown,), slots, facts, kind, looks, order)
+        yield Draft(scene, "cf-color", options, (shown,), slots, facts, about=order)
 
 
 def _other_lots(
@@ -301,74 +258,53 @@ def sure_removal(blocks: tuple[Block, ...], order: int) -> Outcome | None:
 # PD
 
 
+_STAGES_TRIED, _MOST_WAYS = 6, 8
+_LEAST_DIFFERENCE = 2 * sight.LEAST_PIXELS
+_ELEVATIONS_DEG = (20, 38)
+
+
 class PredictiveMaker(Maker):
-    """Kinds: `pd-next` and `pd-fall` (next steps), `pd-push` (the settled scene after a push)."""
+    """Kind: `pd-next`, the next step after which all stays."""
 
     subtask: Subtask = "PD"
-    spare, doubtful = 3.0, 1.7
-    drafts_a_scene = 4
+    spare, doubtful = 2.2, 1.2
+    drafts_a_scene = 2
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-        """Ask for a next step or about a push, as drawn, where one is fair."""
-        yield from (_pushes if rng.random() < _PUSHES_ASKED else _next_steps)(scene, rng)
+        """Propose stages of building and ways to go on, of which one stays."""
+        for _ in range(_STAGES_TRIED):
+            stage, staying, falling = arrangements(scene, rng, _MOST_WAYS)
+            if not staying or len(falling) < len(LETTERS) - 1:
+                continue
+            ways = [*staying, *falling]
+            view = base.drawn_view(rng, _ELEVATIONS_DEG)
+            plain = QuestionPicture("scene", stage, view, framed=_framed([b for b, _ in ways]))
+            pictures = [replace(plain, blocks=blocks) for blocks, _ in ways]
+            shots = [seen(one) for one in pictures]
+            unlike = np.array([[float(differing_pixels(a, b)) for b in shots] for a in shots])
+            laid = [20 * looks for _, looks in ways]
+            measures = np.hstack([laid, [[*_looks_of(plain, shot)] for shot in shots]])
+            four = base.four_alike(measures, unlike, _LEAST_DIFFERENCE, rng, rights=len(staying))
+            options = [pictures[i] for i in four]
+            framed = _framed([one.blocks for one in options])
+            if options and all(
+                sight.are_seen(one, sight.orders_of(one.blocks), _ALL_SEEN) for one in options
+            ):
+                shown, *options = (replace(one, framed=framed) for one in (plain, *options))
+                facts = {"placed": sight.orders_of(stage)}
+                yield Draft(scene, "pd-next", tuple(options), (shown,), facts=facts)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Decide by statics and simulation."""
-        slots = base.slots_of(question)
+        base.slots_of(question)
         shown, options = sight.picture_of(question, "scene"), sight.option_pictures(question)
-        if question.wording != "pd-push":
-            stays = [_can_follow(shown, one) for one in options]
-            return base.only_index([one is (question.wording == "pd-next") for one in stays])
-        push = _meant_push(shown, sight.marked_order(shown, TAKEN), slots["direction"])
-        outcome = _sure_push(shown.blocks, push)
-        if outcome is None:
-            raise UnfairError("it is not sure what follows the push")
-        expected = _story(shown.blocks, replace(shown, blocks=outcome.settled), push)
-        return base.only_index([_story(shown.blocks, one, push) == expected for one in options])
+        return base.only_index([_can_follow(shown, one) for one in options])
 
 
 def _framed(every: Sequence[Sequence[Block]]) -> tuple[Block, ...]:
     """Return the blocks of all pictures that are compared, to frame a camera on."""
     poses = {(block.type, block.position_m, block.euler_deg): block for s in every for block in s}
     return tuple(replace(block, order=i) for i, block in enumerate(poses.values(), 1))
-
-
-# Next steps
-
-_PUSHES_ASKED, _STAGES_TRIED, _MOST_WAYS = 0.45, 6, 8
-_LEAST_DIFFERENCE = 2 * sight.LEAST_PIXELS
-_ELEVATIONS_DEG = (20, 38)
-
-
-def _next_steps(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-    """Propose a stage of building and ways to go on, of which one stays, and of which one falls."""
-    drafts: list[Draft] = []
-    for _ in range(_STAGES_TRIED):
-        stage, staying, falling = arrangements(scene, rng, _MOST_WAYS)
-        if min(len(staying), len(falling)) < len(LETTERS) - 1:
-            continue
-        for stem, some, others in (("pd-next", staying, falling), ("pd-fall", falling, staying)):
-            every = [blocks for blocks, _ in (*some, *others)]
-            view = base.drawn_view(rng, _ELEVATIONS_DEG)
-            plain = QuestionPicture("scene", stage, view, framed=_framed(every))
-            pictures = [replace(plain, blocks=blocks) for blocks in every]
-            shots = [seen(one) for one in pictures]
-            unlike = np.array([[float(differing_pixels(a, b)) for b in shots] for a in shots])
-            laid = [20 * looks for _, looks in (*some, *others)]
-            measures = np.hstack([laid, [[*_looks_of(plain, shot)] for shot in shots]])
-            four = base.four_alike(measures, unlike, _LEAST_DIFFERENCE, rng, rights=len(some))
-            options = [pictures[i] for i in four]
-            if options and all(
-                sight.are_seen(one, sight.orders_of(one.blocks), _ALL_SEEN) for one in options
-            ):
-                framed = _framed([one.blocks for one in options])
-                shown, *options = (replace(one, framed=framed) for one in (plain, *options))
-                facts = {"placed": sight.orders_of(stage)}
-                kept = tuple(map(tuple, measures[four].tolist()))
-                drafts.append(Draft(scene, stem, tuple(options), (shown,), {}, facts, looks=kept))
-        if drafts:
-            break
-    yield from drafts
 
 
 def _looks_of(plain: QuestionPicture, shot: Shot) -> Iterator[float]:
@@ -400,157 +336,16 @@ def _can_follow(shown: QuestionPicture, option: QuestionPicture) -> bool:
     return stays
 
 
-# Pushes
-
-_PUSHES_TRIED, _OF_A_SCENE = 10, 3
-_FRONTS_DEG = (0.0, 90.0, 180.0, 270.0)
-_ELEVATIONS_DEG_PUSHES = (20, 32)
-_DIRECTIONS: Mapping[str, int] = base.WORDS["directions"]
-_LEAST_SHOWN_PUSHES = 60
-_TOUCH_M, _ALONG_M, _REACH_M = 0.002, 0.01, 0.12
-_LEVEL_M, _DOWN_M = 0.004, 0.008
-
-
-def _pushes(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-    """Propose pushes of neighbors, seen from the front, back or a side, and what each leads to."""
-    block = pick(rng, scene.blocks)
-    view = (pick(rng, _FRONTS_DEG), base.drawn_view(rng, _ELEVATIONS_DEG_PUSHES)[1])
-    plain = QuestionPicture("scene", scene.blocks, view)
-    told = _told_apart(plain, block.order, rng)
-    plain = replace(plain, framed=_framed([scene.blocks, *(blocks for *_, blocks in told)]))
-    shot = seen(plain)
-    is_shown = min(shown_pixels(plain, shot).values()) >= _LEAST_SHOWN_PUSHES
-    if len(told) < len(LETTERS) or not is_shown:
-        return
-    pictures = [replace(plain, blocks=blocks) for *_, blocks in told]
-    shots = [seen(one) for one in pictures]
-    unlike = np.array([[float(differing_pixels(a, b)) for b in shots] for a in shots])
-    for number in rng.permutation(len(told))[:_OF_A_SCENE].tolist():
-        order, direction, _ = told[number]
-        mark = block_mark(plain, shot, order, TAKEN)
-        if mark is None:
-            continue
-        here = mark_pixel(plain, mark.position_m)
-        measures = np.array([_looks_of_push(plain, s, here, direction) for s in shots])
-        turn = [number, *(i for i in range(len(told)) if i != number)]
-        four = base.four_alike(measures[turn], unlike[np.ix_(turn, turn)], sight.LEAST_PIXELS, rng)
-        framed = _framed([scene.blocks, *(pictures[turn[i]].blocks for i in four)])
-        options = tuple(replace(pictures[turn[i]], framed=framed) for i in four)
-        if four and sight.are_told_apart([replace(plain, framed=framed), *options]):
-            shown = (replace(plain, marks=(mark,), framed=framed),)
-            slots = {"direction": direction}
-            looks = tuple(map(tuple, measures[turn][four].tolist()))
-            yield Draft(
-                scene, "pd-push", options, shown, slots, {"pushed": order}, "", looks, order
-            )
-
-
-def _looks_of_push(
-    plain: QuestionPicture, shot: Shot, here: tuple[int, int], direction: str
-) -> list[float]:
-    """Return measures of an outcome, from the mark and the way of the push: area, place, way."""
-    size, sign = len(shot.block) / 10, _DIRECTIONS[direction]
-    start = seen(plain)
-    changed = changed_pixels(start, shot)
-    rows, columns = np.nonzero(changed)
-    x, y, wide, high = _spread(rows, columns)
-    way = [float(np.mean(np.nonzero(one.block >= 0), axis=1)[1]) for one in (start, shot)]
-    far = float(np.hypot(rows - here[0], columns - here[1]).min(initial=size))
-    return [
-        len(rows) / size**2,
-        *((x - here[1]) * sign / size, (y - here[0]) / size, wide / size, high / size),
-        float(np.hypot(x - here[1], y - here[0])) / size,
-        far / size,
-        (way[1] - way[0]) * sign,
-    ]
-
-
-def _told_apart(
-    plain: QuestionPicture, order: int, rng: np.random.Generator
-) -> list[tuple[int, str, tuple[Block, ...]]]:
-    """Return pushes of a block or what it touches, and what comes of each: a story of its own."""
-    boxes = {block.order: bounds_m(block) for block in plain.blocks}
-    touching = [one for one, box in boxes.items() if boxes_near(box, boxes[order], _TOUCH_M)]
-    pushes = shuffled(rng, [*itertools.product(touching, _DIRECTIONS)])[:_PUSHES_TRIED]
-    near = next(
-        group
-        for group in groups(plain.blocks, _REACH_M)
-        if any(block.order == order for block in group)
-    )
-    found: list[tuple[int, str, tuple[Block, ...]]] = []
-    stories: set[object] = set()
-    axis = _meant_push(plain, order, next(iter(_DIRECTIONS)))
-    for number, (one, direction) in enumerate(pushes):
-        if len(found) + len(pushes) - number < len(LETTERS):
-            break
-        outcome = after(near, _meant_push(plain, one, direction), OUTCOME_SETTINGS[:1])
-        if not outcome.is_clear or one not in outcome.moved:
-            continue
-        settled = {block.order: block for block in outcome.settled}
-        blocks = tuple(settled.get(block.order, block) for block in plain.blocks)
-        try:
-            story = _story(plain.blocks, replace(plain, blocks=blocks), axis)
-        except UnfairError:
-            continue
-        if story not in stories:
-            stories.add(story)
-            found.append((one, direction, blocks))
-    return found
-
-
-def _meant_push(picture: QuestionPicture, order: int, direction: str) -> Push:
-    """Return the push that is meant by a direction in a picture."""
-    right = view_axes(*picture.view_deg)[0] * _DIRECTIONS[direction]
-    x, y = (round(float(part), 6) + 0.0 for part in right[:2])
-    return Push(order, (x, y))
-
-
-@functools.lru_cache(maxsize=16)
-def _sure_push(blocks: tuple[Block, ...], push: Push) -> Outcome | None:
-    """Return the sure outcome of a push; None where settings, or statics if none fell, doubt it."""
-    outcome = after(blocks, push)
-    if not outcome.is_clear or push.order not in outcome.moved:
-        return None
-    height = {block.order: block.position_m[2] for block in blocks}
-    if any(height[b.order] - b.position_m[2] > _TOUCH_M for b in outcome.settled):
-        return outcome
-    return outcome if is_sure(group_of(outcome.settled, push.order), ()) else None
-
-
-def _story(blocks: Sequence[Block], picture: QuestionPicture, push: Push) -> tuple[object, ...]:
-    """Return orders of blocks gone, moved, come down, and gone the way pushed.
-
-    UnfairError where that cannot be told.
-    """
-    goal, label = {block.order: block for block in blocks}, picture.label
-    moved, down, along = [], [], []
-    for block in picture.blocks:
-        before = goal.get(block.order)
-        if before is None or before.kind != block.kind:
-            raise UnfairError(f"picture {label} shows a block that the scene has not")
-        has = has_moved(Pose.goal(before), Pose.goal(block))
-        if has is None:
-            raise UnfairError(f"picture {label} shows block {block.order} hardly moved")
-        x, y, z = (b - a for a, b in zip(before.position_m, block.position_m, strict=True))
-        if has and _LEVEL_M < abs(z) < _DOWN_M:
-            raise UnfairError(f"picture {label} shows a block hardly lower than before")
-        moved += [block.order] if has else []
-        down += [block.order] if has and -z >= _DOWN_M else []
-        along += [block.order] if x * push.direction[0] + y * push.direction[1] > _ALONG_M else []
-    gone = set(goal) - {block.order for block in picture.blocks}
-    return tuple(map(frozenset, (gone, moved, down, along)))
-
-
 # AD
 
 Place = tuple[float, float, float]
 """A point of the world [m]."""
 _PLACE_RING_M = 0.005
 """The verdict on a place holds all round it, this far off [m]."""
-_ANNEXED, _STRUCTURES_TRIED, _PROPOSED = 0.6, 3, 6
+_ANNEXED, _STRUCTURES_TRIED, _PROPOSED, _MOST_BLOCKS = 0.8, 4, 6, 7
 _STEP_PX, _APART_PX, _FLAT_RISE = 5, 18.0, 0.99
 _OFF_CENTER_M, _MOST_OF_A_FACE = 0.001, 0.8
-_PLACES_TRIED, _GIVEN_UP, _SORT = 60, 20, 8
+_PLACES_TRIED, _GIVEN_UP, _SORT = 30, 12, 6
 _SAME_HEIGHT_M, _CLEARLY_HIGHER_M = 0.001, 0.01
 
 
@@ -558,11 +353,13 @@ class AffordanceMaker(Maker):
     """Kind: `ad-place`."""
 
     subtask: Subtask = "AD"
-    spare, doubtful = 1.6, 1.1
+    count = 50
+    spare, doubtful = 2.0, 1.1
+    drafts_a_scene = 3
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Propose a block in a pose drawn, one place where it stays, and three where not."""
-        for _ in range(_STRUCTURES_TRIED):
+        for _ in range(_STRUCTURES_TRIED if len(scene) <= _MOST_BLOCKS else 0):
             blocks = (with_annex(scene, rng) if rng.random() < _ANNEXED else None) or scene.blocks
             plain = QuestionPicture("scene", blocks, base.drawn_view(rng))
             if not sight.are_seen(plain, sight.orders_of(blocks), _ALL_SEEN):
@@ -584,11 +381,10 @@ class AffordanceMaker(Maker):
                 if four and None not in (stays_round(one, blocks, _PLACE_RING_M) for one in puts):
                     shown = (plain, QuestionPicture(BLOCK_LABEL, (block,), plain.view_deg))
                     marks = tuple(Mark("A", both[i].position_m) for i in four)
-                    looks = tuple(map(tuple, measures[four].tolist()))
                     facts = {"block": block.type, "euler": list(block.euler_deg)}
                     slots = {"size": _size(block)}
-                    yield Draft(scene, "ad-place", marks, shown, slots, facts, "", looks)
-                    return
+                    yield Draft(scene, "ad-place", marks, shown, slots, facts)
+                    break
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Decide by statics and simulation of the block at every place, and statics all round."""

@@ -25,7 +25,14 @@ from phyblock.domain.scene import Block, Scene
 from phyblock.errors import DataError, PhyblockError, Problem
 from phyblock.making.questions.base import Draft, Floats, Maker, pick, shuffled
 from phyblock.making.questions.dynamics import AffordanceMaker, CounterfactualMaker, PredictiveMaker
-from phyblock.making.questions.properties import PropertyMaker, SizeMaker, TallyMaker
+from phyblock.making.questions.measures import measures_of
+from phyblock.making.questions.properties import (
+    ColorMaker,
+    NumberMaker,
+    ShapeMaker,
+    SizeMaker,
+    TallyMaker,
+)
 from phyblock.making.questions.relations import (
     DependencyMaker,
     DistanceMaker,
@@ -41,15 +48,13 @@ from phyblock.workers import Workers
 MAKERS: dict[Subtask, Maker] = {
     maker.subtask: maker
     for maker in (
-        *(PropertyMaker("SH"), PropertyMaker("CO"), SizeMaker(), TallyMaker("NU")),
+        *(ShapeMaker(), ColorMaker(), SizeMaker(), NumberMaker()),
         *(PositionMaker(), DistanceMaker(), DependencyMaker(), RotationMaker()),
         *(TallyMaker("OC"), TallyMaker("LC"), TallyMaker("TC"), ViewpointMaker()),
         *(CounterfactualMaker(), PredictiveMaker(), OrderingMaker(), AffordanceMaker()),
     )
 }
 """The makers of questions, by subtask; plugins add theirs."""
-PER_SUBTASK = 150
-"""Questions of each subtask, where no other number is asked for."""
 _LEAST_FILLED = 0.05
 """The least share of a picture that its blocks fill."""
 _DIGITS = 6
@@ -98,8 +103,16 @@ def scene_drafts(task: tuple[Subtask, int, Scene]) -> list[Draft]:
     """Return the drafts of a subtask, by a seed, about a scene; they depend on nothing else."""
     subtask, seed, scene = task
     maker = MAKERS[subtask]
-    drafts = maker.drafts(scene, _rng(seed, subtask, scene.id))
-    return list(islice(drafts, maker.drafts_a_scene))
+    drafts = islice(maker.drafts(scene, _rng(seed, subtask, scene.id)), maker.drafts_a_scene)
+    return [replace(one, looks=_looks(subtask, one)) for one in drafts]
+
+
+def _looks(subtask: Subtask, draft: Draft) -> tuple[tuple[float, ...], ...]:
+    """Return measures of a draft's pictures, by which the one right option might stand out."""
+    if subtask == "OR":
+        return ()
+    measures = measures_of(as_question("", subtask, draft, _PLACES, BACKGROUNDS[0]))
+    return tuple(map(tuple, measures.tolist()))
 
 
 def _rng(seed: int, *parts: str) -> np.random.Generator:
@@ -248,9 +261,9 @@ def _spread(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list
     turns: dict[str, list[tuple[int, int]]] = defaultdict(list)
     of_scene: Counter[tuple[str, str]] = Counter()
     for i in rng.permutation(len(pool)).tolist():
-        about = (pool[i].kind, pool[i].scene.id)
+        about = (pool[i].group, pool[i].scene.id)
         of_scene[about] += 1
-        turns[pool[i].kind].append((of_scene[about], i))
+        turns[pool[i].group].append((of_scene[about], i))
     most = -(-_SPREAD * count // max(len(turns), 1))
     ranked = (sorted(group, key=lambda entry: entry[0])[:most] for group in turns.values())
     return [pool[i] for group in ranked for _, i in group]
@@ -258,9 +271,9 @@ def _spread(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list
 
 def _even(draft: Draft) -> Iterator[tuple[Hashable, Hashable, float]]:
     """Yield groups, the draft's member of each, and weights: members should be as frequent."""
-    yield "kind", draft.kind, 6.0
+    yield "kind", draft.group, 6.0
     if texts := _texts(draft):
-        yield ("options", draft.kind), frozenset(texts), 0.2
+        yield ("options", draft.group), frozenset(texts), 0.2
     else:
         yield "scene", draft.scene.id, 3.0
         yield "level", draft.scene.level, 0.3
@@ -350,16 +363,11 @@ def _chances(scores: Floats) -> Floats:
 def _features(one: Draft) -> Iterator[Mapping[str, float]]:
     """Yield what a reader sees of each option, as it is and for its kind, beside the others."""
     if one.looks:
-        # How far each measure is from the mean of the options, in standard deviations.
-        values = np.array(one.looks)
-        spread = values.std(axis=0)
-        for steps in (values - values.mean(axis=0)) / np.where(spread > 0, spread, 1.0):
-            yield {f"{one.kind}: {i}": step for i, step in enumerate(steps)} | {
-                f"{one.kind}: off {i}": abs(step) for i, step in enumerate(steps)
-            }
+        for row in one.looks:
+            yield {f"{one.group}: {i}": x for i, x in enumerate(row)}
         return
     options = _texts(one)
     together = " / ".join(sorted(options))
     for option, features in zip(options, text_features(one.text, options), strict=True):
-        own = {f"{one.kind}: {name}": value for name, value in features.items()}
-        yield {"": 1.0, **features, **own, f"{one.kind}: {option} of {together}": 1.0}
+        own = {f"{one.group}: {name}": value for name, value in features.items()}
+        yield {"": 1.0, **features, **own, f"{one.group}: {option} of {together}": 1.0}

@@ -1,16 +1,16 @@
 """SH, CO, SI: shape, color and size of a block. NU, OC, LC, TC: how many blocks, layers or shapes.
 
-Scenes are recolored from the full palette, so that neither color nor shape tells the other. For
-sizes, blocks are named by colors of their own, because a shape's name would tell its size. What is
-counted is what the picture tells.
+Scenes are recolored, so that neither color nor shape tells the other. For sizes, blocks are named
+by color and side, because a shape's name would tell its size. What is counted is what the picture
+tells.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,16 +23,21 @@ from phyblock.sim.contact import GROUND, bounds_m, support_graph
 
 _LYING_M = 0.03
 """A half cylinder that lies on its flat face is lower than this."""
+_PAIRS_TRIED = 8
 
 
-class PropertyMaker(StaticMaker):
-    """SH: the shape of a block named by anything but a shape; CO: likewise its color."""
+_UNSAID: Mapping[str, Sequence[sight.Feature]] = {
+    "SH": ("color", "side", "layer", "support"),
+    "CO": ("type", "side", "layer", "support"),
+    "SI": ("color", "side"),
+}
+"""What names of blocks may speak of, by subtask."""
 
-    def __init__(self, subtask: Literal["SH", "CO"]) -> None:
-        self.subtask: Subtask = subtask
-        self._is_shape = subtask == "SH"
-        other: sight.Feature = "color" if self._is_shape else "type"
-        self._features: tuple[sight.Feature, ...] = (other, "side", "layer", "support")
+
+class ShapeMaker(StaticMaker):
+    """SH: the shape of a block named by anything but a shape."""
+
+    subtask: Subtask = "SH"
 
     def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
         """Ask about each block that can be named, in colors drawn anew."""
@@ -40,17 +45,15 @@ class PropertyMaker(StaticMaker):
             shown = sight.recolored(scene, rng)
             picture = sight.goal_picture(shown, view)
             block = next(b for b in shown.blocks if b.order == order)
-            if name := sight.drawn_name(rng, block, picture, self._features):
-                about = next((word for word in ("most", "layer", "resting") if word in name), "")
-                stem = self.subtask.lower()
-                yield Asked(stem, shown, picture, {"block": name}, kind=f"{stem} {about}")
+            if name := sight.drawn_name(rng, block, picture, _UNSAID["SH"]):
+                word, slots = sight.shape_word(block.type), {"block": name}
+                others = base.shuffled(rng, [one for one in sight.SHAPE_WORDS if one != word])
+                yield Asked("sh", shown, picture, slots, [word, *others[:3]], f"sh {_said(name)}")
 
     def right(self, asked: Asked) -> str:
-        """Return the shape or color of the block that the text names."""
+        """Return the shape of the block that the text names."""
         block = sight.resolve_one(asked.slots["block"], asked.picture)
-        sight.require_seen(asked.picture, sight.STUDIED if self._is_shape else sight.NAMED, [block])
-        if not self._is_shape:
-            return block.color
+        sight.require_seen(asked.picture, sight.STUDIED, [block])
         if not sight.shows_profile(block, asked.picture.view_deg):
             raise UnfairError("is seen from a side that does not tell its shape")
         is_standing = block.type == "semi_cylinder" and sight.height_m(block) > _LYING_M
@@ -58,10 +61,47 @@ class PropertyMaker(StaticMaker):
             raise UnfairError("a half cylinder that stands and carries looks like a cylinder")
         return sight.shape_word(block.type)
 
+
+def _said(name: str) -> str:
+    """Return what a name says besides color and shape."""
+    return next((word for word in ("most", "layer", "resting") if word in name), "")
+
+
+class ColorMaker(StaticMaker):
+    """CO: the colors of two blocks that are named by anything but a color.
+
+    There are no four colors that everybody tells apart, but there are six pairs of three colors.
+    """
+
+    subtask: Subtask = "CO"
+
+    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
+        """Ask about pairs of blocks that can be named, one of them at most as the outermost."""
+        for _ in range(_PAIRS_TRIED):
+            shown = sight.recolored(scene, rng)
+            picture = sight.goal_picture(shown, view)
+            two = base.shuffled(rng, sight.seen_blocks(picture, sight.NAMED))[:2]
+            named = [sight.drawn_name(rng, block, picture, _UNSAID["CO"]) for block in two]
+            said = {_said(name or "") for name in named}
+            if len(two) == 2 and None not in named and said != {"most"}:
+                slots = {"block": str(named[0]), "other": str(named[1])}
+                kind = next((one for one in ("most", "layer", "resting") if one in said), "")
+                yield Asked("co", shown, picture, slots, kind=f"co {kind}")
+
+    def right(self, asked: Asked) -> str:
+        """Return the colors of the blocks that the text names."""
+        blocks = [
+            sight.resolve_one(asked.slots[name], asked.picture) for name in ("block", "other")
+        ]
+        sight.require_seen(asked.picture, sight.NAMED, blocks)
+        return " and ".join(block.color for block in blocks)
+
     def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
-        """Return the right shape or color and three others."""
-        words: Sequence[str] = list(sight.SHAPE_WORDS) if asked.stem == "sh" else sight.NAMED_COLORS
-        return [right, *base.shuffled(rng, [word for word in words if word != right])[:3]]
+        """Return four of the six orders of two colors in the picture, the right one among them."""
+        colors = sorted({block.color for block in asked.picture.blocks})
+        pairs = [" and ".join(two) for two in itertools.permutations(colors, 2)]
+        others = base.shuffled(rng, [pair for pair in pairs if pair != right])
+        return [right, *others[:3]] if len(pairs) == 6 and right in pairs else ()
 
 
 def _length_m(block: Block) -> float:
@@ -92,21 +132,27 @@ class SizeMaker(StaticMaker):
     subtask: Subtask = "SI"
 
     def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
-        """Compare four blocks, where there are no others, and two, in turns."""
+        """Compare four blocks, and two, in turns."""
         studied = sight.seen_blocks(sight.goal_picture(scene, view), sight.STUDIED)
-        for number in range(2 * _TRIES):
-            chosen = base.shuffled(rng, studied)[: 2 if number % 2 else 4]
-            if len(chosen) not in (2, len(scene)):
-                continue
-            shown = sight.with_own_colors(scene, sight.orders_of(chosen), rng)
-            colors = {block.order: block.color for block in shown.blocks}
-            named = [f"{colors[block.order]} block" for block in chosen]
+        for number in range(2 * _TRIES if len(studied) > 1 else 0):
+            is_choice = number % 2 == 0
+            chosen = sight.orders_of(base.shuffled(rng, studied)[: 4 if is_choice else 2])
+            shown = (
+                sight.recolored(scene, rng)
+                if is_choice
+                else sight.with_own_colors(scene, chosen, rng)
+            )
             picture = sight.goal_picture(shown, view)
-            if len(chosen) == 4:
+            blocks = [next(b for b in shown.blocks if b.order == order) for order in chosen]
+            named = [sight.drawn_name(rng, block, picture, _UNSAID["SI"]) for block in blocks]
+            if any(name is None or "highest" in name for name in named):
+                continue
+            if not is_choice:
+                slots = {"block": str(named[0]), "other": str(named[1])}
+                yield Asked("si-times", shown, picture, slots)
+            elif len(named) == 4:
                 how, options = pick(rng, list(_COMPARISONS)), [f"the {name}" for name in named]
                 yield Asked(_COMPARISONS[how][0], shown, picture, {"comparison": how}, options, how)
-            elif len(chosen) == 2:
-                yield Asked("si-times", shown, picture, {"block": named[0], "other": named[1]})
 
     def right(self, asked: Asked) -> str:
         """Compare the blocks that the text or the options name."""
@@ -242,12 +288,6 @@ def _layer_numbers(picture: QuestionPicture) -> list[Slots]:
     return [{"layer": str(n + 1)} for n in range(max(block.layer for block in picture.blocks))]
 
 
-def _sorts(picture: QuestionPicture) -> list[Slots]:
-    colors = _colors(picture)
-    words = [f"{color} {noun}" for color in colors for noun in ("blocks", *_TYPES_OF)]
-    return [{"what": word} for word in (*words, *_TYPES_OF)]
-
-
 @dataclass(frozen=True)
 class Tally:
     """One way of counting.
@@ -264,7 +304,6 @@ class Tally:
 
 
 TALLIES: Mapping[str, Tally] = {
-    "nu": Tally(_fitting, range(1, 13), _sorts, is_recolored=True),
     "oc-all": Tally(lambda p, _: len(_all(p)), range(2, 25)),
     "oc-hidden": Tally(lambda p, _: sure_blocks(p), range(2, 25)),
     "oc-ground": Tally(lambda p, _: len(_on_ground(_all(p))), range(1, 13)),
@@ -298,12 +337,10 @@ TALLIES: Mapping[str, Tally] = {
     ),
 }
 """By stem of the wordings."""
-_SLOTS_TRIED = {"nu": 12}
-"""Texts of a stem that are tried for a picture; one of the others."""
 
 
 class TallyMaker(StaticMaker):
-    """NU, OC, LC or TC: the ways of counting whose stems begin with the subtask."""
+    """OC, LC or TC: the ways of counting whose stems begin with the subtask."""
 
     def __init__(self, subtask: Subtask) -> None:
         self.subtask = subtask
@@ -317,13 +354,8 @@ class TallyMaker(StaticMaker):
             picture, kind = sight.goal_picture(shown, view), ""
             if stem == "oc-hidden":
                 kind = f"{stem}-{sum(x < sight.COUNTED for x in sight.shares(picture).values())}"
-            texts = base.shuffled(rng, TALLIES[stem].slots(picture))
-            for slots in texts[: _SLOTS_TRIED.get(stem, 1)]:
-                if stem == "nu":
-                    first, _, rest = slots["what"].partition(" ")
-                    kind = "both" if first in COLORS else "shape"
-                    kind = "color" if rest == "blocks" else kind
-                yield Asked(stem, shown, picture, slots, kind=kind)
+            if texts := TALLIES[stem].slots(picture):
+                yield Asked(stem, shown, picture, pick(rng, texts), kind=kind)
 
     def right(self, asked: Asked) -> str:
         """Count again."""
@@ -334,3 +366,46 @@ class TallyMaker(StaticMaker):
     def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
         """Return four numbers that follow one another."""
         return base.window(rng, TALLIES[asked.stem].values, int(right))
+
+
+_COUNTS, _TEXTS_TRIED = range(1, 11), 8
+
+
+class NumberMaker(StaticMaker):
+    """NU: how many blocks are of a color, a shape, or both.
+
+    Where color counts, four numbers are drawn, one of them, and so many blocks are colored.
+    """
+
+    subtask: Subtask = "NU"
+
+    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
+        """Ask for a color, a shape, or both, in colors drawn anew."""
+        for _ in range(_TEXTS_TRIED):
+            color, *others = sight.palette(rng)
+            kind = pick(rng, ("color", "shape", "both"))
+            noun = "blocks" if kind == "color" else pick(rng, list(_TYPES_OF))
+            types = _TYPES_OF.get(noun, BLOCK_TYPES)
+            mine = sight.orders_of([block for block in scene.blocks if block.type in types])
+            fours = [_COUNTS[i : i + 4] for i in range(min(len(mine), len(_COUNTS)) - 3)]
+            if kind == "shape":
+                shown, what = sight.recolored(scene, rng), noun
+                options = base.window(rng, _COUNTS, len(mine))
+            elif fours:
+                four = pick(rng, fours)
+                ours = dict.fromkeys(base.shuffled(rng, mine)[: pick(rng, four)], color)
+                other = {order: pick(rng, others) for order in mine}
+                drawn = {b.order: pick(rng, (color, *others)) for b in scene.blocks} | other | ours
+                shown = replace(
+                    scene, blocks=tuple(replace(b, color=drawn[b.order]) for b in scene.blocks)
+                )
+                what, options = f"{color} {noun}", list(map(str, four))
+            else:
+                continue
+            if options:
+                picture = sight.goal_picture(shown, view)
+                yield Asked("nu", shown, picture, {"what": what}, options, kind)
+
+    def right(self, asked: Asked) -> str:
+        """Count again."""
+        return str(_fitting(asked.picture, asked.slots))

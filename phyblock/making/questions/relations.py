@@ -162,9 +162,7 @@ def _upright(one: Block, other: Block, view: View) -> int:
 _SIDE_M, _EXACT_CM, _LONGER = 0.001, 0.1, 1.3
 _SCALES: Sequence[BlockType] = ("cube", "cylinder", "arch")
 """Types whose size the prompt says; one of them is to be seen."""
-_STEP_CM, _LONGEST_CM, _PLACE_STEP_CM = 2.5, 50.0, 5.0
-_APART = (1.2, 2.0)
-"""Values that are options together: each at least and at most so many times the one before."""
+_STEP_CM = 2.5
 
 
 def grid_cm(length_m: float) -> float:
@@ -183,35 +181,20 @@ def _apart(one: Block, other: Block, blocks: Sequence[Block]) -> float:
     return float(max(x, y))
 
 
-def _gap(one: Block, other: Block, blocks: Sequence[Block]) -> float:
-    """Return the clear way between two boxes that face each other, with nothing between them."""
-    if any(not SHAPES[block.type].is_box or block.euler_deg[2] % 90 for block in (one, other)):
-        raise UnfairError("the blocks do not face each other with flat sides")
-    _require_joined(one, other, blocks)
-    low = np.minimum(bounds_m(one)[1], bounds_m(other)[1])
-    high = np.maximum(bounds_m(one)[0], bounds_m(other)[0])
-    is_open = high - low > _SIDE_M
-    shared = low - high >= 0.5 * np.diff(bounds_m(one), axis=0)[0]
-    if is_open[2] or is_open.sum() != 1 or not (shared | is_open).all():
-        raise UnfairError("the blocks do not face each other")
-    start, end = np.minimum(low, high) + _SIDE_M, np.maximum(low, high) - _SIDE_M
-    for block in blocks:
-        its_low, its_high = bounds_m(block)
-        if block not in (one, other) and np.all(its_low < end) and np.all(its_high > start):
-            raise UnfairError("another block stands in the gap")
-    return float((high - low)[is_open][0])
-
-
 LENGTHS: Mapping[str, Callable[[Block, Block, Sequence[Block]], float]] = {
     "ap-top": lambda one, *_: _top_m(one),
     "ap-bottom": lambda one, *_: float(bounds_m(one)[0, 2]),
     "ap-apart": _apart,
     "ap-rise": lambda one, other, _: abs(_top_m(one) - _top_m(other)),
-    "ap-gap": _gap,
 }
 """By kind, of a block, another, and all blocks; UnfairError for what cannot be determined."""
 _HEIGHTS = ("ap-top", "ap-bottom")
-"""Asked of one block; together they are one kind of five."""
+"""Asked of one block; together they are one kind of three."""
+_LADDERS_CM = (
+    *((2.5, 5, 7.5, 10), (5, 7.5, 10, 12.5), (7.5, 10, 12.5, 15), (10, 12.5, 15, 20)),
+    *((12.5, 15, 20, 25), (15, 20, 25, 30)),
+)
+"""Lengths that are options together: few fours, so that of each any length is as often right."""
 
 
 def _require_joined(one: Block, other: Block, blocks: Sequence[Block]) -> None:
@@ -239,7 +222,7 @@ def length_axis(block: Block) -> int:
 
 
 class DistanceMaker(StaticMaker):
-    """AP: heights, distances and places in centimeters, on the blocks' grid.
+    """AP: heights and distances in centimeters, on the blocks' grid.
 
     A block whose size the prompt says is in the picture as the scale.
     """
@@ -249,7 +232,7 @@ class DistanceMaker(StaticMaker):
     def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
         """Ask for heights of blocks and distances of pairs."""
         for shown, picture, named in _named(scene, view, rng, 2):
-            for stem in (*LENGTHS, "ap-place"):
+            for stem in LENGTHS:
                 for one, other in _pairs(list(named.values()), rng):
                     slots = {"block": one}
                     if stem in _HEIGHTS:
@@ -265,45 +248,13 @@ class DistanceMaker(StaticMaker):
         sight.require_supports_seen(picture, blocks)
         if not any(one.type in _SCALES for one in sight.seen_blocks(picture, sight.NAMED)):
             raise UnfairError("no block that gives the scale can be seen")
-        if asked.stem == "ap-place":
-            one, other = blocks
-            _require_joined(one, other, picture.blocks)
-            axis, step = length_axis(other), np.abs(sight.center_m(one) - sight.center_m(other))
-            return _place(grid_cm(float(step[axis])), grid_cm(float(step[1 - axis])))
-        try:
-            values = sorted(float(option.removesuffix(" cm")) for option in asked.options)
-        except ValueError as error:
-            raise UnfairError("some option is no length in centimeters") from error
-        if any(high < _APART[0] * low for low, high in itertools.pairwise(values)):
-            raise UnfairError("two values are less than 20 % apart")
         return f"{grid_cm(LENGTHS[asked.stem](blocks[0], blocks[-1], asked.picture.blocks)):g} cm"
 
     def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
-        """Return four lengths that may stand together, or four places in a square."""
-        if asked.stem != "ap-place":
-            fitting = [four for four in _ladders() if right in four]
-            return pick(rng, fitting) if fitting else ()
-        words = right.split()
-        low = [float(word) - _PLACE_STEP_CM * int(rng.integers(2)) for word in (words[0], words[4])]
-        steps = (0, _PLACE_STEP_CM)
-        return (
-            [_place(low[0] + x, low[1] + y) for x in steps for y in steps] if min(low) >= 0 else ()
-        )
-
-
-def _place(along_cm: float, across_cm: float) -> str:
-    return f"{along_cm:g} cm along and {across_cm:g} cm across"
-
-
-@functools.cache
-def _ladders() -> Sequence[Sequence[str]]:
-    """Return all sets of four lengths on the grid that may stand together, rising."""
-    grid = [_STEP_CM * n for n in range(1, round(_LONGEST_CM / _STEP_CM) + 1)]
-    return [
-        [f"{length:g} cm" for length in four]
-        for four in itertools.combinations(grid, 4)
-        if all(_APART[0] * a <= b <= _APART[1] * a for a, b in itertools.pairwise(four))
-    ]
+        """Return four lengths that may stand together."""
+        fours = [[f"{length:g} cm" for length in four] for four in _LADDERS_CM]
+        fitting = [four for four in fours if right in four and asked.stem in LENGTHS]
+        return pick(rng, fitting) if fitting else ()
 
 
 # RD

@@ -45,8 +45,15 @@ _SAME_M, _SAME_DEG = 0.002, 2.0
 
 PLAIN_COLORS: tuple[Color, ...] = ("red", "yellow", "blue")
 """Colors that everybody tells apart, for marks of what is meant."""
-NAMED_COLORS: tuple[Color, ...] = (*PLAIN_COLORS, "orange")
-"""Without green: to some it looks like orange, to others like yellow."""
+
+
+def palette(rng: np.random.Generator) -> list[Color]:
+    """Return three colors, in an order drawn, that everybody tells apart: at least 20 lie between
+    any two in CIELAB, also for people who are blind to red or green.
+
+    Of red, orange and green there is one at most, and green is too near to yellow.
+    """
+    return shuffled(rng, (pick(rng, ("red", "orange")), *PLAIN_COLORS[1:]))
 
 
 def orders_of(blocks: Sequence[Block]) -> list[int]:
@@ -55,20 +62,19 @@ def orders_of(blocks: Sequence[Block]) -> list[int]:
 
 
 def recolored(scene: Scene, rng: np.random.Generator) -> Scene:
-    """Return the scene with a color drawn for every block, so that color tells no shape."""
-    drawn = zip(scene.blocks, rng.integers(len(NAMED_COLORS), size=len(scene)), strict=True)
-    blocks = (replace(block, color=NAMED_COLORS[i]) for block, i in drawn)
-    return replace(scene, blocks=tuple(blocks))
+    """Return the scene with one of three colors drawn for every block, so that color tells no
+    shape.
+    """
+    colors = palette(rng)
+    drawn = zip(scene.blocks, rng.integers(len(colors), size=len(scene)), strict=True)
+    return replace(scene, blocks=tuple(replace(block, color=colors[i]) for block, i in drawn))
 
 
 def with_own_colors(scene: Scene, orders: Sequence[int], rng: np.random.Generator) -> Scene:
-    """Return the scene with a color of its own for each of up to four blocks."""
-    colors = shuffled(rng, NAMED_COLORS)
-    own, left = dict(zip(orders, colors, strict=False)), colors[len(orders) :]
-    blocks = (
-        replace(block, color=own.get(block.order) or left[int(rng.integers(len(left)))])
-        for block in scene.blocks
-    )
+    """Return the scene with a color for each of two blocks, and a third for all others."""
+    first, second, rest = palette(rng)
+    own = dict(zip(orders, (first, second), strict=True))
+    blocks = (replace(block, color=own.get(block.order, rest)) for block in scene.blocks)
     return replace(scene, blocks=tuple(blocks))
 
 

@@ -81,16 +81,16 @@ def arrangements(
     for _ in range(_PLANS_TRIED):
         off, *steps = rng.integers(1 - half, half, size=len(loose)).tolist()
         offs_m = _UNIT_M * np.array([off, *(off + step for step in steps)])
-        lean_m = abs(float(np.average(offs_m, weights=masses)))
-        stays = lean_m <= reach_m - MARGIN_M
-        if (not stays and lean_m <= reach_m + MARGIN_M) or len(found[stays]) == most:
+        lean_m = float(np.average(offs_m, weights=masses))
+        stays = abs(lean_m) <= reach_m - MARGIN_M
+        if (not stays and abs(lean_m) <= reach_m + MARGIN_M) or len(found[stays]) == most:
             continue
         blocks = base
         for block, off_m in zip(loose, offs_m.tolist(), strict=True):
             x, y = (float(middle[i]) + (off_m if i == along else 0.0) for i in (0, 1))
             blocks = (*blocks, lowered(block, blocks[len(base) :][:1] or [top], x, y))
         if not find_overlaps(blocks) and not find_gaps(blocks):
-            looks = [*offs_m, *np.abs(offs_m), *(offs_m[1:] - offs_m[0]), np.ptp(offs_m)]
+            looks = [*offs_m, *np.abs(offs_m), *(offs_m[1:] - offs_m[0]), np.ptp(offs_m), lean_m]
             found[stays].append((blocks, np.array(looks)))
     return base, found[True], found[False]
 

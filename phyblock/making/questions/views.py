@@ -25,7 +25,7 @@ from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import turned_form
 from phyblock.making.questions import base, sight
 from phyblock.making.questions.base import Draft, Floats, Maker, UnfairError, View, pick
-from phyblock.sim.question_pictures import is_inside, least_difference, seen, shown_pixels
+from phyblock.sim.question_pictures import is_inside, seen, shown_pixels
 
 # VP
 
@@ -34,7 +34,7 @@ _FRONTS_DEG = (0.0, 90.0, 180.0, 270.0)
 _FRONT_ELEVATION_DEG = 22.0
 _SIDES: dict[str, float] = base.WORDS["sides_seen"]
 _LEAST_TURN_DEG, _FAMILIES_TRIED = 60, 40
-_LEAST_SHARE = 0.1
+_LEAST_SHARE = 0.12
 """In so much of what shows of the blocks any two options differ: less is easily overlooked."""
 _LEVEL_M = 0.01
 
@@ -43,6 +43,7 @@ class ViewpointMaker(Maker):
     """Kinds: `vp-match`, a structure from anywhere; `vp-side`, what is seen from a side named."""
 
     subtask: Subtask = "VP"
+    spare = 2.0
     drafts_a_scene = 2
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
@@ -80,23 +81,30 @@ def _colorings(
     scene: Scene, rng: np.random.Generator, stem: str, first: View, second: View, side: str
 ) -> Iterator[Draft]:
     """Propose four colorings from the second view, one of which the first picture shows."""
+    pixels = [_pixels(scene.blocks, view) for view in (first, second)]
     for _ in range(_FAMILIES_TRIED):
         scene = sight.recolored(scene, rng)
         four = [scene.blocks, *(_exchanged(scene.blocks, rng) for _ in LETTERS[1:])]
-        if (
-            len({turned_form(blocks) for blocks in four}) < len(four)
-            or _hits(four, first, second) != 1
-        ):
+        if _hits(four, *pixels) != 1 or min(_unlike(four, one) for one in pixels) < _LEAST_SHARE:
             continue
         shown, options = ([QuestionPicture("scene", b, v) for b in four] for v in (first, second))
-        area = int((seen(options[0]).block >= 0).sum())
-        least = min(least_difference([*map(seen, pictures)]) for pictures in (shown, options))
-        if least >= _LEAST_SHARE * area and all(map(is_inside, (shown[0], options[0]))):
+        is_new = len({turned_form(blocks) for blocks in four}) == len(four)
+        if is_new and all(map(is_inside, (shown[0], options[0]))):
             right = int(rng.integers(len(four)))
             dealt = [options[right], *options[:right], *options[right + 1 :]]
             slots = {"side_words": side} if side else {}
             yield Draft(scene, stem, tuple(dealt), (shown[right],), slots)
             return
+
+
+def _unlike(four: Sequence[Sequence[Block]], pixels: dict[int, int]) -> float:
+    """Return the least share of what shows of the blocks in which two colorings differ."""
+    pairs = itertools.combinations(four, 2)
+    differing = (
+        sum(pixels[a.order] for a, b in zip(one, other, strict=True) if a.color != b.color)
+        for one, other in pairs
+    )
+    return min(differing) / sum(pixels.values())
 
 
 def _exchanged(blocks: Sequence[Block], rng: np.random.Generator) -> tuple[Block, ...]:
@@ -109,10 +117,10 @@ def _exchanged(blocks: Sequence[Block], rng: np.random.Generator) -> tuple[Block
     return tuple(replace(block, color=colors[block.order]) for block in blocks)
 
 
-def _hits(four: Sequence[Sequence[Block]], first: View, second: View) -> float:
+def _hits(four: Sequence[Sequence[Block]], first: dict[int, int], second: dict[int, int]) -> float:
     """Return how many colorings the nearest histogram of colors finds; ties count in part."""
-    pixels = [_pixels(four[0], view) for view in (first, second)]
-    shown, options = (np.array([_histogram(blocks, one) for blocks in four]) for one in pixels)
+    views = (first, second)
+    shown, options = (np.array([_histogram(blocks, one) for blocks in four]) for one in views)
     far = np.abs(shown[:, None, :] - options[None, :, :]).sum(axis=2)
     nearest = far <= far.min(axis=1, keepdims=True) + 1e-9
     return round(float((np.diag(nearest) / nearest.sum(axis=1)).sum()), 6)
@@ -144,17 +152,24 @@ class OrderingMaker(Maker):
     """Kinds: `or-build` and `or-apart`."""
 
     subtask: Subtask = "OR"
+    drafts_a_scene = 2
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-        """Propose one question, of either kind, about a structure of which every block shows."""
+        """Propose questions, of either kind, from views of a structure that show every block."""
         views = [
             base.drawn_view(rng) for _ in range(_VIEWS_TRIED if len(scene) >= _LEAST_BLOCKS else 0)
         ]
         pictures = [QuestionPicture("scene", scene.blocks, v, framed=scene.blocks) for v in views]
         orders = sight.orders_of(scene.blocks)
-        plain = next((one for one in pictures if sight.are_seen(one, orders, sight.COUNTED)), None)
-        for _ in range(_CUTS_TRIED if plain else 0):
-            assert plain is not None
+        for plain in pictures:
+            if sight.are_seen(plain, orders, sight.COUNTED):
+                yield from self._about(scene, plain, rng)
+
+    def _about(
+        self, scene: Scene, plain: QuestionPicture, rng: np.random.Generator
+    ) -> Iterator[Draft]:
+        """Propose one question about a structure as it is seen."""
+        for _ in range(_CUTS_TRIED):
             stages = _cut(scene, rng)
             if _only_order(scene, stages) is None or _is_sorted_by_eye(plain, stages):
                 continue
