@@ -89,7 +89,7 @@ class CounterfactualMaker(Maker):
     """Kinds: `cf-count` (texts) and `cf-color` (what moves, by colors)."""
 
     subtask: Subtask = "CF"
-    spare, doubtful = 4.0, 1.2
+    spare, doubtful = 4.0, 1.35
     drafts_a_scene = 3
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
@@ -258,7 +258,7 @@ def sure_removal(blocks: tuple[Block, ...], order: int) -> Outcome | None:
 # PD
 
 
-_STAGES_TRIED, _MOST_WAYS = 6, 8
+_STAGES_TRIED, _MOST_WAYS, _ONE_STAYS = 6, 8, [True, False, False, False]
 _LEAST_DIFFERENCE = 2 * sight.LEAST_PIXELS
 _ELEVATIONS_DEG = (20, 38)
 
@@ -267,7 +267,7 @@ class PredictiveMaker(Maker):
     """Kind: `pd-next`, the next step after which all stays."""
 
     subtask: Subtask = "PD"
-    spare, doubtful = 2.2, 1.2
+    spare, doubtful = 2.2, 1.35
     drafts_a_scene = 2
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
@@ -287,8 +287,10 @@ class PredictiveMaker(Maker):
             four = base.four_alike(measures, unlike, _LEAST_DIFFERENCE, rng, rights=len(staying))
             options = [pictures[i] for i in four]
             framed = _framed([one.blocks for one in options])
-            if options and all(
-                sight.are_seen(one, sight.orders_of(one.blocks), _ALL_SEEN) for one in options
+            if (
+                options
+                and all(sight.are_seen(p, sight.orders_of(p.blocks), _ALL_SEEN) for p in options)
+                and [surely_stays(p.blocks, p.blocks[-1].order) for p in options] == _ONE_STAYS
             ):
                 shown, *options = (replace(one, framed=framed) for one in (plain, *options))
                 facts = {"placed": sight.orders_of(stage)}
