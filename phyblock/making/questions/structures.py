@@ -8,14 +8,15 @@ off its middle as likely as not, with weights on it: a balance, or a cantilever 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from phyblock.domain.blocks import COLORS, SHAPES, BlockType, Euler
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.base import Floats, pick
+from phyblock.making.questions.base import pick
 from phyblock.sim.balance import MARGIN_M, is_balanced, surely_falls, surely_stands
 from phyblock.sim.contact import bounds_m, drop_height_m, find_gaps, find_overlaps
 from phyblock.sim.dynamics import groups
@@ -34,8 +35,8 @@ _WEIGHTS: tuple[tuple[BlockType, Euler], ...] = (
 _LIFT_M, _DIRECTIONS = 0.6, 8
 
 
-Way = tuple[tuple[Block, ...], Floats]
-"""Blocks, and measures of how some were laid by which these might stand out."""
+Ways = Mapping[tuple[bool, int], Sequence[tuple[Block, ...]]]
+"""Blocks, by whether all stays, and by the side to which the plank is off the middle, -1 or 1."""
 
 
 def with_annex(scene: Scene, rng: np.random.Generator) -> tuple[Block, ...] | None:
@@ -45,28 +46,30 @@ def with_annex(scene: Scene, rng: np.random.Generator) -> tuple[Block, ...] | No
     orders above its own.
     """
     for _ in range(_TRIED):
-        for blocks, _ in arrangements(scene, rng, 1)[1]:
+        ways = arrangements(scene, rng, 1)[1]
+        for blocks in ways.get((True, 0), ()):
             if is_balanced(blocks):
                 return blocks
     return None
 
 
 def arrangements(
-    scene: Scene, rng: np.random.Generator, most: int
-) -> tuple[tuple[Block, ...], list[Way], list[Way]]:
+    scene: Scene, rng: np.random.Generator, most: int, *, is_even: bool = False
+) -> tuple[tuple[Block, ...], Ways]:
     """Return a structure nearly done, and ways of laying a plank with two weights on one of its
-    tops: at most so many that stay, and that fall.
+    tops: at most so many of each sort.
 
-    All ways are of the same blocks along the same line; a lever decides, with a margin.
+    All ways are of the same blocks along the same line; a lever decides, with a margin. Where they
+    shall be even, the plank is off the middle as far in each; else its side is not told (0).
     """
     order = scene.graph.random_order(rng)
     kept = len(order) - int(rng.integers(min(_MOST_LEFT_OUT, max(len(order) - 2, 0)) + 1))
     base = tuple(scene.blocks[vertex] for vertex in sorted(order[:kept]))
     carrying = {order for block in base for order in block.depend}
     tops = [block for block in base if block.order not in carrying and _is_flat(block)]
-    found: dict[bool, list[Way]] = {True: [], False: []}
+    found: dict[tuple[bool, int], list[tuple[Block, ...]]] = defaultdict(list)
     if not tops:
-        return base, [], []
+        return base, found
     top, along, first = pick(rng, tops), int(rng.integers(2)), max(b.order for b in scene.blocks)
     low, high = bounds_m(top)
     middle, reach_m = (low + high) / 2, float(high[along] - low[along]) / 2
@@ -78,21 +81,25 @@ def arrangements(
         for i, (block_type, (roll, pitch, yaw)) in enumerate(kinds, 1)
         for turned in [(roll, pitch, (yaw + 90.0 * along) % 180.0)]
     ]
+    over = 0
     for _ in range(_PLANS_TRIED):
         off, *steps = rng.integers(1 - half, half, size=len(loose)).tolist()
+        if is_even:
+            over = over or abs(off)
+            off = over if off > 0 else -over
         offs_m = _UNIT_M * np.array([off, *(off + step for step in steps)])
-        lean_m = float(np.average(offs_m, weights=masses))
-        stays = abs(lean_m) <= reach_m - MARGIN_M
-        if (not stays and abs(lean_m) <= reach_m + MARGIN_M) or len(found[stays]) == most:
+        lean_m = abs(float(np.average(offs_m, weights=masses)))
+        stays = lean_m <= reach_m - MARGIN_M
+        sort = (stays, int(np.sign(off)) if is_even else 0)
+        if (not stays and lean_m <= reach_m + MARGIN_M) or len(found[sort]) == most:
             continue
         blocks = base
         for block, off_m in zip(loose, offs_m.tolist(), strict=True):
             x, y = (float(middle[i]) + (off_m if i == along else 0.0) for i in (0, 1))
             blocks = (*blocks, lowered(block, blocks[len(base) :][:1] or [top], x, y))
         if not find_overlaps(blocks) and not find_gaps(blocks):
-            looks = [*offs_m, *np.abs(offs_m), *(offs_m[1:] - offs_m[0]), np.ptp(offs_m), lean_m]
-            found[stays].append((blocks, np.array(looks)))
-    return base, found[True], found[False]
+            found[sort].append(blocks)
+    return base, found
 
 
 def _is_flat(block: Block) -> bool:
