@@ -40,7 +40,7 @@ STATIC: tuple[Subtask, ...] = ("SH", "CO", "SI", "NU", "RP", "AP", "RD", "RR", "
 ASKED: dict[Subtask, tuple[int, tuple[str, ...]]] = {
     "VP": (2, ("l3-061-house", "l4-051-combined", "l4-073-combined")),
     "CF": (5, ("l1-001-animal", "l1-025-bridge", "l2-001-animal", "l2-021-slide")),
-    "PD": (2, ("l1-011-animal", "l1-025-bridge", "l2-003-car", "l2-034-table", "l2-041-recolored")),
+    "PD": (2, ("l2-010-stair", "l2-028-gate", "l3-011-stair")),
     "OR": (2, ("l3-023-stair", "l3-028-arcade", "l3-029-bridge")),
 }
 """Scenes that are quick to ask about."""
