@@ -180,7 +180,7 @@ class Suite:
         """
         suite = self.loaded
         dataset = open_dataset(suite.dataset.format, self.loaded.files.dataset)
-        tasks = select_tasks(dataset.tasks, suite.levels, suite.limit)
+        tasks = select_tasks(dataset.tasks, suite, suite.limit)
         return Scenes({t.key: SceneTask(t.scene, t.candidates, t.composite) for t in tasks})
 
     def __repr__(self) -> str:

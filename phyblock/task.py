@@ -482,7 +482,7 @@ def _given(data: Any) -> Dataset:
 def generate(
     count: Annotated[int, Field(ge=1)],
     *,
-    levels: Sequence[Annotated[int, Field(ge=1, le=4)]] = _LEVELS,
+    levels: Sequence[Annotated[int, Field(ge=1, le=5)]] = _LEVELS,
     seed: Annotated[int, Field(ge=0)] = 0,
     palette: Palette = "kit",
 ) -> Scenes:

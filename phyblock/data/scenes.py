@@ -30,10 +30,10 @@ from phyblock.domain.scene import (
 from phyblock.records.record import Line, decode
 
 SCENES_FILE = "scenes.jsonl"
-MAX_BLOCKS = 22
+MAX_BLOCKS = 40
 NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
 NAME_ALLOWED = "up to 100 letters, digits, '.', '_' or '-', a letter or digit first"
-_LEVELS = ((1,), (2,), (3,), (4,), (1, 2))
+_LEVELS = ((1,), (2,), (3,), (4,), (5,), (1, 2))
 Vector = tuple[float, float, float]
 
 
@@ -207,7 +207,7 @@ class StoredScene(Line, extra="ignore"):
     id: Name
     """Unique in the file; up to 100 letters, digits, `.`, `_`, `-`, a letter or digit first."""
     levels: Levels
-    """The levels that the scene counts in: `[1]`, `[2]`, `[3]`, `[4]` or `[1, 2]`."""
+    """The levels that the scene counts in: `[1]`, `[2]`, `[3]`, `[4]`, `[5]` or `[1, 2]`."""
     parents: Annotated[tuple[Name, ...], Field(min_length=1, max_length=100)]
     """The base scenes that it was made from, one at least; a base scene names itself. Statistics
     cluster by them."""

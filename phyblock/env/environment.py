@@ -67,7 +67,7 @@ _KEPT_PICTURES = 64
 """Pictures of one scene that are kept; 50 MB at 512 pixels."""
 _MOST_CHARACTERS = 1 << 20
 _SMALLEST_PX = 16
-_LEVELS = (1, 2, 3, 4)
+_LEVELS = (1, 2, 3, 4, 5)
 _CM = 100.0
 _NEAR = (1.0, 10.0)
 """Distance and turn within which a block has reached its place [cm, degrees]."""

@@ -82,6 +82,7 @@ LEVEL_LIMITS: dict[int, Limits] = {
     2: Limits(2, 5, 3),
     3: Limits(6, 12, 8),
     4: Limits(13, 22, 8),
+    5: Limits(23, 40, 20),
 }
 
 

@@ -152,7 +152,7 @@ def make_plan(
     for track in (track for opened in variants.values() for track in opened if asks):
         # PromptError where a prompt cannot be rendered for the first item, before anything is.
         next(iter(track.outlines(track.items[0])), None) if track.items else None
-    selected = replace(dataset, tasks=select_tasks(dataset.tasks, suite.levels, limit))
+    selected = replace(dataset, tasks=select_tasks(dataset.tasks, suite, limit))
     manifest = make_manifest(suite, models, selected, variants, limit)
     return RunPlan(suite, models, selected, variants, manifest)
 

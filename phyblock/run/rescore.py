@@ -124,7 +124,7 @@ def recorded_dataset(folder: Path, manifest: Manifest, data: Path | None = None)
 
 def _asked_about(manifest: Manifest, dataset: Dataset) -> Dataset:
     """Return the part of a data set that a run asks about."""
-    tasks = select_tasks(dataset.tasks, suite_of(manifest, MANIFEST).levels, manifest.limit)
+    tasks = select_tasks(dataset.tasks, suite_of(manifest, MANIFEST), manifest.limit)
     return replace(dataset, tasks=tasks)
 
 

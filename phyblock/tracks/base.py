@@ -318,7 +318,7 @@ class SceneTrack(Track):
     def open(self) -> None:
         """Select scenes evenly over levels."""
         suite = self.suite
-        self.items = select_tasks(self.dataset.tasks, suite.levels, self.limit)
+        self.items = select_tasks(self.dataset.tasks, suite, self.limit)
         if self.is_blind or suite.candidates.order != "file":
             self.drawn_seeds = suite.seeds
         if self.draws and self.shop is not None and suite.images.source == "dataset":

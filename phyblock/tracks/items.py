@@ -13,11 +13,13 @@ from fractions import Fraction
 from functools import partial
 from typing import Protocol, TypeVar
 
+from phyblock.config.suite import Suite
 from phyblock.data.base import AssemblyTask
 from phyblock.domain.scene import CandidateSet, Scene
 from phyblock.errors import DataError, Problem
 from phyblock.records.record import Record
 from phyblock.stable import drawn_bytes
+from phyblock.tracks.difficulty import is_within
 from phyblock.types import CandidateOrder
 
 
@@ -37,13 +39,14 @@ ItemT = TypeVar("ItemT", bound=Item)
 
 
 def select_tasks(
-    tasks: Sequence[AssemblyTask], levels: Sequence[int], limit: int | None
+    tasks: Sequence[AssemblyTask], suite: Suite, limit: int | None
 ) -> tuple[AssemblyTask, ...]:
-    """Return the tasks counted in any of `levels`, at most `limit` of them, in their order.
+    """Return the tasks of a suite's levels and difficulty, at most `limit`, in their order.
 
     They are evenly spread, and a higher limit keeps all that a lower one keeps.
     """
-    chosen = [task for task in tasks if set(task.scene.levels) & set(levels)]
+    levels, difficulty = set(suite.levels), suite.dataset.difficulty
+    chosen = [one for one in tasks if levels & set(one.scene.levels) and is_within(one, difficulty)]
     kept = set(_fair_order([task.scene.level for task in chosen])[:limit])
     return tuple(task for position, task in enumerate(chosen) if position in kept)
 

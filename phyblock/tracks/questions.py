@@ -54,7 +54,7 @@ from phyblock.sim.question_pictures import (
 from phyblock.stable import hex_digest
 from phyblock.tracks.base import Judgement, Track
 from phyblock.tracks.baselines import Guesses, majority_rule
-from phyblock.tracks.items import spread, stratified
+from phyblock.tracks.items import select_tasks, spread, stratified
 from phyblock.tracks.measures import OVERALL, WHOLE, Cell, SampleCounts
 from phyblock.tracks.picking import Choice, Picking
 from phyblock.tracks.pictures import Drawing, picture_style
@@ -385,13 +385,15 @@ class Vqa(Track):
         self.questions = known = open_questions(
             spec.format, suite.files.folders[self.name], self.dataset
         )
-        tasks = select_questions(
-            known.tasks, spec.subtasks, suite.levels, spec.per_subtask, self.limit
-        )
+        asked = known.tasks
+        if suite.dataset.difficulty.ranges:
+            fitting = {one.key for one in select_tasks(self.dataset.tasks, suite, None)}
+            asked = tuple(one for one in known.tasks if one.scene.id in fitting)
+        tasks = select_questions(asked, spec.subtasks, suite.levels, spec.per_subtask, self.limit)
         if not tasks:
             where = suite.where("vqa", "subtasks")
             found = ", ".join(sorted({task.question.subtask for task in known.tasks}))
-            message = "no question is of these subtasks and levels"
+            message = "no question is of these subtasks, levels and difficulty"
             raise SpecError(Problem(where, message, "vqa.subtasks", found=f"questions of {found}"))
         self.items = tuple(
             AskedQuestion(task, rotation, is_one_of_many=spec.circular)

@@ -75,7 +75,7 @@ SUITES: tuple[Bad, ...] = (
     ),
     Bad("empty", suite_text(""), ("suite.yaml: is empty",)),
     Bad("tab", suite_text("name: trial\n\tmodels: [random]\n"), ("suite.yaml:2:1",)),
-    Bad("level", suite_line("levels: [1, 5]"), ("suite.yaml:4:13: levels[1]", "1, 2, 3, 4")),
+    Bad("level", suite_line("levels: [1, 6]"), ("suite.yaml:4:13: levels[1]", "1, 2, 3, 4, 5")),
     Bad("model", suite_line("models: [alpah]"), ("suite.yaml:3:10: models[0]", "mean alpha?")),
     Bad("no-list", suite_line("models: random"), ("suite.yaml:3:9: models", "[random]")),
     Bad("range", suite_line("levels: 1-4"), ("suite.yaml:4:9: levels", "[1, 2, 3, 4]")),

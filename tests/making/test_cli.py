@@ -148,7 +148,7 @@ def test_a_season_is_made_again_from_what_was_revealed_and_from_nothing_else(
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("scenes", "--levels", "5"), "give all, or some of 1,2,3,4"),
+        (("scenes", "--levels", "5"), "give all, or some of 1,2,3,4,5+"),
         (("scenes", "--levels", "1,1"), "give all, or some of 1,2,3,4"),
         (("scenes", "--count", "0"), "0 is not in the range"),
         (("scenes", "--palette", "wood"), "'wood' is not one of"),

@@ -15,6 +15,7 @@ from phyblock.domain.blocks import BLOCK_TYPES, KIT_PALETTE, SHAPES
 from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, canonical_form
 from phyblock.making.checks import FORM, PHYSICS, SceneFacts, check_set, findings_of
+from phyblock.making.scenes import designs
 from phyblock.making.scenes.designs import BUILDINGS, COMPOSITIONS, CREATURES, beside
 from phyblock.making.scenes.production import (
     GROUP_LEVELS,
@@ -26,8 +27,10 @@ from phyblock.making.scenes.production import (
     shares,
     split_tasks,
 )
-from phyblock.making.scenes.sketch import PALETTES, POSES, Draft, colorless, transformed
+from phyblock.making.scenes.sketch import PALETTES, POSES, Draft, colorless, scene_of, transformed
+from phyblock.sim.balance import is_balanced, surely_falls, surely_stands
 from phyblock.sim.contact import bounds_m, find_gaps, find_overlaps, support_graph
+from phyblock.sim.dynamics import groups
 from phyblock.sim.pictures import drawn_m, hidden_blocks
 from phyblock.workers import open_workers
 from tests.designs import designed_scenes
@@ -176,6 +179,29 @@ def test_no_two_scenes_are_the_same_and_variations_name_base_scenes(scenes: list
 @pytest.mark.slow
 def test_two_processes_give_the_same_scenes(scenes: list[Scene]) -> None:
     assert made(jobs=2) == scenes
+
+
+def test_great_scenes_are_within_their_level_and_stand() -> None:
+    drawn = [one for one in (draw(Request(3, "kit", "5", number)) for number in range(3)) if one]
+    assert drawn
+    for scene in drawn:
+        assert scene.levels == (5,)
+        assert 23 <= len(scene) <= 40
+        assert all(map(is_balanced, groups(scene.blocks)))
+    assert {share.group for share in shares(100, (4, 5))} == {"4", "5"}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_crane_holds_only_where_its_weight_is_there_first(seed: int) -> None:
+    draft = Draft(np.random.default_rng(seed))
+    designs._crane(draft)
+    beam = next(one.order for one in draft.blocks if one.type == "cuboid3")
+    weight, load = beam, beam + 1
+    assert surely_stands(draft.blocks)
+    assert surely_falls([one for one in draft.blocks if one.order != weight + 1])
+    order = list(range(len(draft.blocks)))
+    order[weight], order[load] = load, weight
+    assert scene_of("crane", (5,), draft.blocks).graph.is_valid(order)
 
 
 def test_splits_share_no_scene_with_one_another_or_with_the_built_in_set() -> None:

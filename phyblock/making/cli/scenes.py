@@ -85,6 +85,7 @@ from phyblock.sim.pictures import (
 )
 from phyblock.stable import hex_digest
 from phyblock.text import counted, did_you_mean, some_of
+from phyblock.tracks.difficulty import MEASURES
 from phyblock.types import BACKGROUNDS
 from phyblock.workers import open_workers
 
@@ -94,9 +95,12 @@ def scenes() -> None:
     """Make data sets of scenes, check them against physics, and look at them."""
 
 
+_LEVELS = ("1", "2", "3", "4", "5+")
+
+
 @scenes.command("generate")
 @click.option("--count", type=click.IntRange(1), default=400, show_default=True, metavar="N")
-@click.option("--levels", type=Several("1234"), default="1,2,3,4", show_default=True)
+@click.option("--levels", type=Several(_LEVELS), default="1,2,3,4", show_default=True)
 @click.option(
     "--palette",
     type=click.Choice(["kit", "full"]),
@@ -141,7 +145,7 @@ def generate(
     shards = begin_set(shard, out, SCENE_FILES, work)
     with open_workers(jobs, ray_address, shards) as workers:
         production = Production(seed, kind, workers, excluded)
-        produced = production.scenes(shares(count, list(map(int, levels))))
+        produced = production.scenes(shares(count, [int(level[0]) for level in levels]))
         tasks = [
             (scene, make_candidates(scene, palette=PALETTES[kind]))
             for scene in tracked(produced, count, "Making")
@@ -418,6 +422,8 @@ def show(data: str, scene: str) -> None:
     size = f"{counted(len(shown), 'block')} · {counted(max(shown.graph.layers), 'layer')}"
     heading = f"scene {shown.id} · level {levels} · {size} · made from {parents}"
     console.print(heading, soft_wrap=True)
+    numbers = (f"{name} {measure(task):.3g}" for name, measure in MEASURES.items())
+    console.print(f"difficulty: {' · '.join(numbers)}", soft_wrap=True)
     seen = visible_shares(shown, PictureStyle())
     blocks = [
         (

@@ -441,6 +441,29 @@ CREATURES: dict[str, Theme] = {
     "table": _table,
     "tree": _tree,
 }
+
+
+def _crane(d: Draft) -> None:
+    """A beam whose load tips it where the weight at its other end is not there first."""
+    column(d, d.pick((1, 2, 2, 3)))
+    d.build("cuboid3:flat-y 0.5")
+    weight = d.pick(("cube", "cylinder"))
+    d.build(f"{weight} -1.5")
+    d.build(f"{weight} 2.5 +1")
+    d.build("top 2.5" if d.maybe() else "")
+
+
+def _keep(d: Draft) -> None:
+    """Storeys on storeys, and a turret: as deep a dependency as rests on two piers."""
+    widths = d.pick(((8, 8, 6, 4), (8, 6, 6, 4), (8, 8, 6, 6, 4), (6, 6, 4, 4, 4)))
+    for number, width in enumerate(widths):
+        storey(d, width, number)
+    column(d, d.pick((1, 2)))
+    d.build("top")
+
+
+_TALL: dict[str, Theme] = {"crane": _crane, "keep": _keep}
+"""Parts of great structures alone."""
 _ACROSS = Symmetry(2, mirrored=True)
 """The mirror image across the plane y = 0."""
 
@@ -468,7 +491,7 @@ def beside(parts: Sequence[Sequence[Block]], gap_units: float, axis: int = 1) ->
 def _part(d: Draft, *names: str) -> list[Block]:
     """The blocks of a part drawn apart, in the colors of the whole."""
     apart = d.fresh()
-    d.pick([{**BUILDINGS, **CREATURES}[name] for name in names])(apart)
+    d.pick([{**BUILDINGS, **CREATURES, **_TALL}[name] for name in names])(apart)
     return apart.blocks
 
 
@@ -505,3 +528,29 @@ COMPOSITIONS: dict[str, Theme] = {
     "street": _street,
     "train": _train,
 }
+
+
+def _castle(d: Draft) -> None:
+    """Towers, wings and a middle, mirrored."""
+    side = _part(d, "tower", "keep", "crane")
+    wing = _part(d, "wall", "arcade", "house", "bridge")
+    middle = _part(d, "gate", "house", "keep", "pyramid")
+    mirrored = [transformed(part, _ACROSS) for part in (wing, side)]
+    d.blocks += beside([side, wing, middle, *mirrored], d.pick((0.0, 1.0)))
+
+
+def _site(d: Draft) -> None:
+    """A building between two cranes, and another beside them."""
+    crane, middle = _part(d, "crane"), _part(d, "keep", "house", "pyramid", "arcade")
+    last = _part(d, "tower", "gate", "stair", "wall")
+    d.blocks += beside([crane, middle, transformed(crane, _ACROSS), last], d.pick((1.0, 2.0)))
+
+
+def _town(d: Draft) -> None:
+    """Buildings in a row."""
+    names = ("arcade", "bridge", "gate", "house", "keep", "pyramid", "stair", "wall")
+    row = [_part(d, *names) for _ in range(d.pick((3, 3, 4)))]
+    d.blocks += beside(row, d.pick((1.0, 2.0)))
+
+
+GREAT: dict[str, Theme] = {"castle": _castle, "site": _site, "town": _town}

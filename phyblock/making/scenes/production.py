@@ -26,7 +26,7 @@ from phyblock.errors import DataError, Problem
 from phyblock.files import bundled
 from phyblock.making.checks import LEVEL_LIMITS, is_acceptable
 from phyblock.making.scenes.candidates import make_candidates
-from phyblock.making.scenes.designs import BUILDINGS, COMPOSITIONS, CREATURES, beside
+from phyblock.making.scenes.designs import BUILDINGS, COMPOSITIONS, CREATURES, GREAT, beside
 from phyblock.making.scenes.sketch import (
     PALETTES,
     Draft,
@@ -40,17 +40,18 @@ from phyblock.sim.contact import find_gaps
 from phyblock.stable import drawn_bytes
 from phyblock.workers import Workers
 
-Group = Literal["1", "1+2", "2", "3", "4"]
+Group = Literal["1", "1+2", "2", "3", "4", "5"]
 GROUP_LEVELS: dict[Group, tuple[int, ...]] = {
     "1": (1,),
     "1+2": (1, 2),
     "2": (2,),
     "3": (3,),
     "4": (4,),
+    "5": (5,),
 }
 """Levels that a scene of each group counts in."""
 
-_ALL: dict[str, Theme] = {**BUILDINGS, **CREATURES, **COMPOSITIONS}
+_ALL: dict[str, Theme] = {**BUILDINGS, **CREATURES, **COMPOSITIONS, **GREAT}
 _LARGE = ("arcade", "balance", "court", "figure", "fountain", "henge", "wall")
 _SMALL = sorted(name for name in (*BUILDINGS, *CREATURES) if name not in _LARGE)
 _THEMES: dict[Group, tuple[str, ...]] = {
@@ -59,8 +60,9 @@ _THEMES: dict[Group, tuple[str, ...]] = {
     "2": (*_SMALL, "figure", "henge"),
     "3": tuple(sorted((*BUILDINGS, *CREATURES))),
     "4": (*sorted(COMPOSITIONS), "house", "framed", "street", "court", "avenue", "pyramid"),
+    "5": tuple(GREAT),
 }
-_LEAST: dict[Group, int] = {"1": 2, "1+2": 3, "2": 4, "3": 6, "4": 13}
+_LEAST: dict[Group, int] = {"1": 2, "1+2": 3, "2": 4, "3": 6, "4": 13, "5": 23}
 _TRIES = 25
 _MAX_LOOKS = 14
 
@@ -155,14 +157,16 @@ _SHARES: dict[Group, tuple[int, int]] = {
     "2": (36, 71),
     "3": (68, 70),
     "4": (20, 99),
+    "5": (60, 40),
 }
-"""Base scenes and variations in each group, of 400."""
+"""Base scenes and variations in each group, of 400 of levels 1 to 4."""
 _SOURCES: dict[Group, tuple[tuple[int, tuple[Group, ...]], ...]] = {
     "1": ((1, ("1",)),),
     "1+2": ((1, ("1+2", "1")),),
     "2": ((1, ("2",)), (1, ("1", "1+2", "2")), (2, ("1", "1+2"))),
     "3": ((1, ("3",)), (2, ("1", "1+2", "2")), (2, ("1", "1+2", "2", "3"))),
     "4": ((2, ("3",)), (2, ("3",)), (2, ("3",)), (2, ("3",)), (1, ("4",))),
+    "5": ((1, ("5",)), (2, ("4",)), (2, ("3", "4"))),
 }
 """Sources of variations: the number of parents, and their groups."""
 _PATIENCE = 150

@@ -1,0 +1,68 @@
+"""Difficulty of scenes as measured numbers, by which a suite may choose."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from phyblock.config.suite import DifficultySpec
+from phyblock.data.base import AssemblyTask
+from phyblock.domain.scene import AOVGraph, Oriented, Plan
+from phyblock.scoring.plan import Goal, match_plan
+
+
+def log_orders(graph: AOVGraph) -> float:
+    """Return the decimal logarithm of how many orders of placing there are, at the least.
+
+    It is n! over the numbers of blocks that need each, or that each needs, itself among them:
+    exact where no block rests on two others, or no two on one.
+    """
+    needed = [0] * len(graph)
+    for vertex in sorted(range(len(graph)), key=graph.layers.__getitem__):
+        needed[vertex] = 1 << vertex
+        for other in graph.depends_on[vertex]:
+            needed[vertex] |= needed[other]
+    below = [mask.bit_count() for mask in needed]
+    above = [sum(mask >> vertex & 1 for mask in needed) for vertex in range(len(graph))]
+    most = max(-math.log10(math.prod(sizes)) for sizes in (below, above))
+    return math.log10(math.factorial(len(graph))) + most
+
+
+def blind_f1(task: AssemblyTask) -> float:
+    """Return the F1 in setting A of the plan that names every candidate once, in its order."""
+    plan = Plan(tuple(range(1, len(task.candidates) + 1)))
+    goal = Goal(task.scene, task.candidates, "A")
+    return match_plan(goal, plan, "optimal").counts.f1 or 0.0
+
+
+def distractor_distance(task: AssemblyTask) -> float:
+    """Return in how many of type, color and orientation the nearest distractor differs from a look
+    that is needed, on average over these; 3 where there is no distractor.
+    """
+    needed = {block.look: block for block in task.scene.blocks}
+    others = [one for one in task.candidates.candidates if one.look not in needed]
+
+    def apart(one: Oriented, other: Oriented) -> int:
+        is_turned = one.look[2] != other.look[2] or one.type != other.type
+        return (one.type != other.type) + (one.color != other.color) + is_turned
+
+    nearest = [min((apart(one, other) for other in others), default=3) for one in needed.values()]
+    return sum(nearest) / len(nearest)
+
+
+MEASURES: Mapping[str, Callable[[AssemblyTask], float]] = MappingProxyType(
+    {
+        "blocks": lambda task: len(task.scene),
+        "depth": lambda task: max(task.scene.graph.layers),
+        "orders": lambda task: log_orders(task.scene.graph),
+        "blind": blind_f1,
+        "distractor": distractor_distance,
+    }
+)
+"""The numbers of a scene, by the names of `DifficultySpec`."""
+
+
+def is_within(task: AssemblyTask, spec: DifficultySpec) -> bool:
+    """True if all numbers of a scene are within the ranges that a suite asks for."""
+    return all(low <= MEASURES[name](task) <= high for name, (low, high) in spec.ranges.items())
