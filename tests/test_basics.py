@@ -230,3 +230,13 @@ def test_shards_end_alike_at_once_or_one_after_another_and_go_on(
     assert done == list(range(48, 64))
     with pytest.raises(StoreError, match="is about other work"):
         Shards(tmp_path / "all.shards", 1, 4, "cubes")
+
+
+def test_processes_that_are_killed_answer_nothing() -> None:
+    pool = WorkerPool(2)
+    job = pool.submit(time.sleep, 600)
+    assert pool.submit(abs, -1).result() == 1
+    pool.kill()
+    with pytest.raises(WorkerDiedError):
+        job.result()
+    pool.shutdown()

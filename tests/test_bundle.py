@@ -6,8 +6,11 @@ import io
 import json
 import re
 import shutil
+import signal
 import stat
 import struct
+import subprocess
+import sys
 import warnings
 import zipfile
 from collections.abc import Callable, Mapping
@@ -365,3 +368,19 @@ def test_of_what_one_machine_knows_the_ends_of_paths_stay(before: str, after: st
     named = portable(known_records().validate_python(record(provider_model=before)))
     assert named.reply is not None
     assert named.reply.provider_model == after
+
+
+def test_a_bundle_that_is_killed_leaves_nothing_behind(made: Workspace, tmp_path: Path) -> None:
+    """Killed once all is packed, before it is put in its place."""
+    code = (
+        "import os, signal, sys, phyblock.bundle as bundle\n"
+        "from pathlib import Path\n"
+        "bundle.write_named = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "bundle.bundle_run(Path(sys.argv[1]), Path(sys.argv[2]))\n"
+    )
+    for name in ("scratch", "out"):
+        (tmp_path / name).mkdir()
+    env = made.env | {"TMPDIR": str(tmp_path / "scratch")}
+    command = [sys.executable, "-c", code, str(made.out), str(tmp_path / "out" / "b.zip")]
+    assert subprocess.run(command, env=env, check=False).returncode == -signal.SIGKILL
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]

@@ -6,7 +6,11 @@ import contextlib
 import io
 import json
 import os
+import resource
+import signal
 import struct
+import subprocess
+import sys
 import zlib
 from pathlib import Path
 
@@ -328,3 +332,27 @@ def test_files_that_are_made_together_come_together_or_not_at_all(tmp_path: Path
         make(out, "mine")
     assert contents(out.path) == {"deep/x/y": "ours", "mine": "theirs"}
     assert sorted(path.name for path in out.path.iterdir()) == [LIST, "deep", "mine"]
+
+
+def test_a_full_disk_leaves_the_file_of_before(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_text("before")
+    code = (
+        "import sys; from pathlib import Path; from phyblock.files import atomic_write\n"
+        "try: atomic_write(Path(sys.argv[1]), bytes(100_000))\n"
+        "except OSError: sys.exit(7)"
+    )
+
+    def almost_full() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
+
+    done = subprocess.run(
+        [sys.executable, "-B", "-c", code, str(path)],
+        preexec_fn=almost_full,
+        cwd=Path(__file__).parents[1],
+        env=os.environ,
+    )
+    assert done.returncode == 7
+    assert path.read_text() == "before"
+    assert list(tmp_path.iterdir()) == [path]

@@ -7,6 +7,7 @@ import pty
 import re
 import subprocess
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import click
@@ -16,6 +17,8 @@ from click.testing import CliRunner
 from phyblock.cli.main import phyblock
 from phyblock.errors import StoreError
 from phyblock.files import LIST
+from phyblock.results.tables import write_tables
+from phyblock.web.report import write_report
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.web.factory import LEVELS, manifest, record, score, write_run
@@ -308,3 +311,56 @@ def test_output_that_nobody_takes_is_no_traceback(suite: Workspace) -> None:
     os.close(reader)
     assert refused(suite, writer, "models") == (1, "")
     os.close(writer)
+
+
+def test_reports_that_are_written_at_once_all_come_to_their_end(finished: Path) -> None:
+    def write(_: int) -> Path:
+        return write_report(write_tables(finished))
+
+    with ThreadPoolExecutor(4) as pool:
+        pages = list(pool.map(write, range(5)))
+    assert set(pages) == {finished / "report.html"}
+    (build,) = (path for path in (finished / "report").iterdir())
+    assert {path.name for path in build.iterdir()} >= {"samples.js", "records-0.js"}
+    assert f"report/{build.name}" in pages[0].read_text(encoding="utf-8")
+
+
+def test_init_writes_through_no_link(tmp_path: Path) -> None:
+    (tmp_path / "new").mkdir()
+    (tmp_path / "new" / "models.yaml").symlink_to(tmp_path / "elsewhere.yaml")
+    with pytest.raises(StoreError, match=r"models\.yaml: is already there"):
+        call("init", tmp_path / "new")
+    assert not (tmp_path / "elsewhere.yaml").exists()
+
+
+def test_a_price_is_asked_about_and_none_at_a_local_server_is_not(suite: Workspace) -> None:
+    free, dear = ({"input": n, "output": n} for n in (0.0, 1.0))
+    with Running(OpenAIChat()) as running:
+        base = f"{running.url}/v1"
+        entries = {
+            name: {"id": f"hosted_vllm/{name}", "api_base": base, "price": price}
+            for name, price in {"dear": dear, "free": free, "unknown": None}.items()
+        }
+        suite.write_yaml("models.yaml", entries)
+        refused = suite.run("--models", "free,dear,unknown")
+        assert (refused.code, running.server.requests) == (2, 0)
+        assert "found: dear\n" in refused.err
+        assert suite.run("--models", "free,unknown").code == 0
+
+
+def test_a_run_goes_on_only_where_its_report_can_be_written(suite: Workspace) -> None:
+    words = ("run", suite.root / "suite.yaml", "--out", suite.out)
+    call(*words, "--no-report")
+    put(suite.out / "tables" / "mine.md")
+    before = files(suite.root)
+    for prepare, said in IN_THE_WAY.values():
+        if "tables" not in said and "table1" not in said:
+            prepare(suite.out)
+            with pytest.raises(StoreError, match=said):
+                call(*words)
+            for path in (suite.out / "report", suite.out / "report.html"):
+                path.unlink(missing_ok=True)
+    left = files(suite.root)
+    assert {path: left[path] for path in before} == before
+    call(*words, "--no-report")
+    assert (suite.out / "tables" / "mine.md").read_text() == "mine"

@@ -9,6 +9,8 @@ import json
 import os
 import re
 import signal
+import subprocess
+import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -323,3 +325,43 @@ def test_a_killed_worker_loses_and_doubles_nothing(tmp_path: Path) -> None:
 def test_no_ray_and_no_cluster_are_told() -> None:
     with pytest.raises(InputError, match="--ray"), open_workers(2, "127.0.0.1:1"):
         pass
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
+def test_workers_end_with_the_process_that_started_them(
+    sent: signal.Signals, tmp_path: Path
+) -> None:
+    for name, text in (("work.py", WORK), ("tasks.py", TASKS)):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    words = [sys.executable, str(tmp_path / "work.py")]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "start_new_session": True}
+    with subprocess.Popen(words, **pipes) as process:
+        assert int(process.stdout.readline()) != int(process.stdout.readline())
+        # Ctrl-C reaches the whole group, a kill one process alone.
+        (os.killpg if sent == signal.SIGINT else os.kill)(process.pid, sent)
+        # The workers hold the pipe open: it ends when they have.
+        _, errors = process.communicate(timeout=30)
+    assert process.returncode == (130 if sent == signal.SIGINT else -signal.SIGKILL)
+    assert b"Traceback" not in errors
+
+
+TASKS = """
+import time, os
+
+def stay(n):
+    os.write(1, f"{os.getpid()}\\n".encode())
+    time.sleep(60)
+"""
+
+
+WORK = """
+import sys
+from phyblock.workers import open_workers
+from tasks import stay
+
+try:
+    with open_workers(2) as workers:
+        list(workers.map(stay, range(2)))
+except KeyboardInterrupt:
+    sys.exit(130)
+"""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import sqlite3
 import subprocess
 import sys
@@ -221,3 +223,17 @@ def test_what_two_samples_ask_at_the_same_time_is_asked_once(tmp_path: Path) -> 
         answers = ask(make_model(config, cache=cache), *[make_request()] * 5)
     assert server.requests == 1
     assert [answer.cached for answer in answers if isinstance(answer, Reply)].count(True) == 4
+
+
+def test_what_was_kept_survives_a_kill(tmp_path: Path) -> None:
+    path = tmp_path / "c.sqlite"
+    process = writer(path, "a", 10**6)
+    assert process.stdout is not None
+    for _ in range(50):
+        last = int(process.stdout.readline())
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    process.stdout.close()
+    with ReplyCache(path) as cache:
+        assert all(cache.get(f"a-{n}") for n in range(last + 1))
+        assert cache.put("after", "openai/m", REPLY)

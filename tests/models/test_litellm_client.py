@@ -23,6 +23,7 @@ from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.models.client import Answer, HttpClient
 from phyblock.models.costs import map_entry
 from phyblock.models.keys import KEYLESS
+from phyblock.models.litellm_client import LitellmClient
 from phyblock.models.model import RetryPolicy
 from phyblock.models.request import Message
 from phyblock.records.record import Reply
@@ -330,3 +331,20 @@ def test_each_is_asked_with_what_it_takes() -> None:
                 assert not {"temperature", "top_p"} & shipped.params.keys(), name
                 # litellm sends Gemini the temperature that it has anyway.
                 assert seen.params.get("temperature", 1.0) == 1.0, name
+
+
+def test_of_a_large_error_litellm_sees_the_beginning_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It looks for keys in all that it sees, again and again."""
+    sizes: list[int] = []
+    after = LitellmClient._after
+
+    def noted(self: LitellmClient, error: Exception, *others: Any) -> Reply:
+        sizes.append(len(str(error)))
+        return after(self, error, *others)
+
+    monkeypatch.setattr(LitellmClient, "_after", noted)
+    with Running(AnyPath(500, b'{"error": "' + b"x" * 10**6 + b'"}')) as running:
+        answer = answer_of("hosted_vllm/m", api_base=f"{running.url}/v1")
+    assert isinstance(answer, RetryableError)
+    assert answer.status == 500
+    assert 0 < max(sizes) < 10**5

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -121,3 +122,27 @@ def test_records_that_were_copied_in_are_not_counted(
     (problem,) = caught.value.problems
     assert (problem.where, problem.field) == (f"{path}:6", "run")
     assert path.read_bytes() == before
+
+
+def test_a_run_does_not_go_on_with_records_that_were_copied_in(
+    runs: Workspace, tmp_path: Path
+) -> None:
+    whole = runs.out
+    runs.out = Path(shutil.copytree(whole, tmp_path / "run"))
+    try:
+        assert runs.run().code == 0
+        path = runs.out / "records.jsonl"
+        shutil.copy(runs.root / "other" / "records.jsonl", path)
+        before = path.read_bytes()
+        done = runs.run()
+        assert done.code == 2
+        assert "records.jsonl:1: run: is of another run" in done.err
+        assert path.read_bytes() == before
+        lines = [json.loads(line) for line in (whole / "records.jsonl").read_bytes().splitlines()]
+        lines[2] |= {"key": "t9", "scene": "t9", "sample": "full_planning/random/t9/s0"}
+        path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+        done = runs.run()
+        assert done.code == 2
+        assert "records.jsonl:3: sample: is of another run" in done.err
+    finally:
+        runs.out = whole

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from phyblock.data.official import match_published
-from phyblock.results.paper import published_frame
+from phyblock.results.paper import beside_paper, published_frame
 from tests.results.test_estimates import answered, episode
 from tests.web.factory import manifest, record, run_of, score
 
@@ -78,3 +78,31 @@ def test_the_published_numbers_come_out_of_the_official_counts(official_dir: Pat
     assert len(table) == 15 * len(with_row) >= 15 * 7
     assert table["difference"].abs().max() <= 0.065
     assert (table["difference"].abs() > 0.06).sum() <= 1
+
+
+def test_each_published_model_has_15_cells() -> None:
+    facts = manifest(models=[("mine", "GPT-4o"), "other"], seeds=[0])
+    scores = [score(1, 1, 3), score(1, 3, 1, matcher="paper")]
+    run = run_of([record("mine", "001", scores=scores)], facts)
+    table = published_frame(run, 1)
+    assert table[["model", "published_name"]].drop_duplicates().values.tolist() == [
+        ["mine", "GPT-4o"]
+    ]
+    assert sorted(table["cell"].unique()) == LEVELS
+    assert len(table) == 15
+    assert table["published"].notna().all()
+    by_cell = table.set_index(["cell", "metric"])
+    cell = by_cell.loc[("2", "precision")]
+    assert (cell["published"], cell["ours"]) == (50.2, 25)
+    assert cell["difference"] == pytest.approx(-25.2)
+    assert by_cell.loc["3", "ours"].isna().all()
+    assert by_cell.loc["3", "n"].tolist() == [0, 0, 0]
+    assert beside_paper(run, 1) is None  # of other scenes than the paper's
+    facts["suite"]["dataset"] = {"format": "official", "path": "checkout"}
+    beside = beside_paper(run_of([record("mine", "001", scores=scores)], facts), 1)
+    assert beside is not None
+    assert len(beside.rows) == 3
+    assert beside.notes[0] == "Largest absolute difference of 6 cells: 25.200."
+
+
+LEVELS = ["1", "2", "3", "4", "overall"]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
+import os
 import re
 import signal
 import threading
@@ -104,3 +107,54 @@ def test_a_run_that_waits_is_stopped_and_goes_on_by_the_same_command(workspace: 
         assert done.code == 0
         assert "All 10 samples are done" in done.out
         assert counted_once(server, 10)
+
+
+def test_kills_of_the_process_lose_nothing_and_ask_nothing_twice(workspace: Workspace) -> None:
+    """When a batch is made and nobody heard, then when its answers are on their way."""
+    with Running(OpenAIBatches()) as running:
+        server = running.server
+        assert isinstance(server, OpenAIBatches)
+        prepare(workspace, running.url)
+        for number, name in ((3, "create"), (5, "results")):
+            assert killed_at(workspace, server, number)
+            assert server.calls[-1] == name
+            assert not workspace.records()
+        finished(workspace, server, 10)
+
+
+def finished(workspace: Workspace, server: BatchServer, samples: int) -> None:
+    done = workspace.run("--yes")
+    assert (done.code, done.err) == (0, "")
+    records = workspace.records()
+    assert len(records) == samples
+    assert {record["outcome"] for record in records} == {"ok"}
+    assert counted_once(server, samples)
+    ids = [json.loads(line) for line in batches_of(workspace).splitlines()]
+    assert {line["batch"] for line in ids} >= {made.token for made in server.made if made.token}
+
+
+def killed_at(workspace: Workspace, server: BatchServer, number: int) -> bool:
+    """Kill a run at a moment of its server; True if it was reached."""
+    reached = threading.Event()
+    first = threading.Event()
+    pids: list[int] = []
+    count = iter(range(10**6))
+
+    def moment(_: int, __: str) -> None:
+        if next(count) == number:
+            first.wait(30)
+            reached.set()
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pids[0], signal.SIGKILL)
+
+    server.moment = moment
+    with workspace.start("--yes") as process:
+        pids.append(process.pid)
+        first.set()
+        process.communicate()
+    server.moment = lambda *_: None
+    return reached.is_set()
+
+
+def batches_of(workspace: Workspace) -> str:
+    return (workspace.out / "batches.jsonl").read_text(encoding="utf-8")

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import re
+import signal
 import sqlite3
+import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -234,3 +238,33 @@ def test_a_disk_that_takes_neither_replies_nor_records_ends_the_run_after_few_ca
         assert (again.code, again.err) == (0, "")
         assert running.server.requests <= asked + SAMPLES - kept
         assert len({record["sample"] for record in workspace.records()}) == SAMPLES
+
+
+def test_ctrl_c_ends_a_run_whose_cache_is_locked(workspace: Workspace) -> None:
+    with Running(OpenAIChat()) as running, locked(workspace):
+        prepare(workspace, running.url, AT_ONCE)
+        with workspace.start() as process:
+            while not catches(process.pid, signal.SIGTERM):
+                time.sleep(0.01)
+            time.sleep(1.0)
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (130, "")
+    assert "(interrupted)" in out
+
+
+@pytest.mark.slow
+def test_a_run_with_a_locked_cache_ends_as_without_one(workspace: Workspace) -> None:
+    with Running(OpenAIChat()) as running, locked(workspace):
+        prepare(workspace, running.url, AT_ONCE)
+        done = workspace.run()
+        assert (done.code, done.err) == (0, "")
+        assert done.out.count("database is locked") == 1
+        assert running.server.requests == SAMPLES
+
+
+def catches(pid: int, number: signal.Signals) -> bool:
+    """True if a process has its own handler of a signal, as one that asks models has of SIGTERM."""
+    status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
+    (mask,) = re.findall(r"^SigCgt:\s*(\w+)", status, re.MULTILINE)
+    return bool(int(mask, 16) >> (number - 1) & 1)

@@ -14,6 +14,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import psutil
@@ -23,14 +24,16 @@ from aiohttp import web
 from phyblock.api import run_suite
 from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
+from phyblock.errors import SimulationError
 from phyblock.records.files import STOPPED
 from phyblock.records.record import Line, Record
 from phyblock.run.plan import make_plan
 from phyblock.run.rescore import rescore
-from phyblock.run.runner import RunEvent, SampleDone, Session, Stopping
+from phyblock.run.runner import RunEvent, SampleDone, Session, Stopping, to_its_end
 from phyblock.run.store import AppendFile
 from phyblock.sim import dynamics
 from phyblock.tracks.full_planning import FullPlanning
+from phyblock.tracks.pictures import Workshop
 from phyblock.tracks.pose_planning import PosePlanning
 from tests.fork_server import Forked
 from tests.run.killing import killed
@@ -361,3 +364,76 @@ def words_of(process: psutil.Process) -> list[str]:
     with contextlib.suppress(psutil.NoSuchProcess):
         return process.cmdline()
     return []
+
+
+def test_calls_that_wait_for_their_turn_are_not_sent_any_more(workspace: Workspace) -> None:
+    with Running(OpenAIChat(holds=True)) as running:
+        server = running.server
+        prepare(workspace, running.url, "alpha", "beta")
+        code, _, _ = interrupted(workspace.start(), server, signal.SIGINT)
+    assert code == 130
+    assert server.requests == AT_ONCE
+    assert len(workspace.records()) == AT_ONCE
+
+
+def test_a_wait_before_another_attempt_is_given_up(workspace: Workspace) -> None:
+    with Running(OpenAIChat(Faults(rate_limited=1.0, retry_after="100"))) as running:
+        server = running.server
+        prepare(workspace, running.url, "alpha")
+        process = workspace.start()
+        wait_for(lambda: server.requests == AT_ONCE and not server.at_once)
+        process.send_signal(signal.SIGINT)
+        code, out, err = ended(process)
+    assert (code, err) == (130, "")
+    assert f"0 of {SAMPLES} samples are done" in out
+    assert not workspace.records()
+    assert server.requests == AT_ONCE
+
+
+def test_a_wait_for_a_server_that_cannot_be_reached_is_given_up(workspace: Workspace) -> None:
+    prepare(workspace, "http://127.0.0.1:9", "alpha")
+    process = workspace.start()
+    assert process.stdout is not None
+    while "http://127.0.0.1:9 cannot be reached" not in process.stdout.readline():
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    code, out, err = ended(process)
+    assert (code, err) == (130, "")
+    assert f"0 of {SAMPLES} samples are done (interrupted)" in out
+    assert not workspace.records()
+
+
+def test_work_of_a_worker_that_was_killed_is_done_again_once(tmp_path: Path) -> None:
+    async def work() -> None:
+        assert await shop.work_out(partial(killed, tmp_path, 1)) == "done"
+        with pytest.raises(SimulationError, match="killed twice"):
+            await shop.work_out(partial(killed, tmp_path, 3))
+
+    shop = Workshop(1)
+    try:
+        asyncio.run(work())
+    finally:
+        shop.close()
+
+
+def test_what_must_be_done_is_done_though_nobody_waits() -> None:
+    done = []
+
+    async def work() -> str:
+        await asyncio.sleep(0.05)
+        done.append("work")
+        return "record"
+
+    async def wait() -> tuple[str, bool]:
+        return await to_its_end(work())
+
+    async def cancelled() -> tuple[str, bool]:
+        waiting = asyncio.create_task(wait())
+        for _ in range(3):
+            await asyncio.sleep(0.01)
+            waiting.cancel()
+        return await waiting
+
+    assert asyncio.run(cancelled()) == ("record", True)
+    assert done == ["work"]
+    assert asyncio.run(wait()) == ("record", False)

@@ -6,6 +6,7 @@ import errno
 import hashlib
 import json
 import os
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,7 @@ from phyblock.records.files import (
 from phyblock.records.record import Call, Reply
 from phyblock.run.plan import make_plan
 from phyblock.run.store import AppendFile, Progress, RunStore
-from tests.servers.chassis import Running
+from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace
 
@@ -207,3 +208,22 @@ def test_tables_and_page_are_made_again_where_the_run_or_what_was_made_is_anothe
     records.write_bytes(records.read_bytes() + records.read_bytes().splitlines(True)[-1])
     assert is_made(page=True)
     assert len(ends) == 1
+
+
+def test_a_run_whose_records_are_taken_away_asks_no_more_and_says_so(workspace: Workspace) -> None:
+    with Running(OpenAIChat(Faults(latency_s=0.02))) as running:
+        server = running.server
+        workspace.write_models(running.url, "alpha", max_concurrency=2)
+        workspace.write_suite(models=["alpha"], seeds=list(range(20)))
+        with workspace.start("--yes") as process:
+            while process.poll() is None and server.requests < 10:
+                time.sleep(0.002)
+            (workspace.out / "records.jsonl").unlink()
+            _, errors = process.communicate()
+        assert process.returncode == 2
+        assert "records.jsonl: was removed, replaced or changed" in errors
+        assert server.requests < 100
+        asked = server.requests
+        assert workspace.run("--yes").code == 0
+        assert server.requests == 100 < asked + 100
+    assert len(workspace.records()) == 100

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 import shutil
 import time
@@ -268,3 +269,33 @@ def test_answers_to_two_versions_of_questions_are_not_mixed() -> None:
     runs = [run_of([], manifest(tracks={"vqa": {"questions": digest}})) for digest in "ab"]
     with pytest.raises(SpecError, match=r"tracks.vqa.questions: cannot be .*\n.*found: b"):
         check_alike(runs[1], runs[0], [], "vqa", Headline(runs[0], "vqa").measure)
+
+
+def test_a_record_is_one_line_of_json_whatever_the_reply_holds(workspace: Workspace) -> None:
+    class Strange(OpenAIChat):
+        def reply(self, seen: object, ending: str) -> Raw:
+            body = super().reply(seen, ending)  # type: ignore[arg-type]
+            text = "Step1: Move block with index 1\n\u2028\x85\r\0\ud800 ￿ 😀"
+            body["choices"][0]["message"]["content"] = text
+            return body
+
+    with Running(Strange()) as running:
+        workspace.write_models(running.url, "alpha")
+        workspace.write_suite(models=["alpha"])
+        done = workspace.run()
+        assert (done.code, done.err) == (0, "")
+        again = workspace.run()
+        assert (again.code, again.out) == (0, done.out)
+        assert running.server.requests == 5
+    lines = (workspace.out / "records.jsonl").read_bytes().split(b"\n")[:-1]
+    assert len(lines) == 5
+    assert all("😀" in json.loads(line)["reply"]["text"] for line in lines)
+
+
+def test_scores_can_be_made_where_the_data_set_has_moved(copy: Workspace) -> None:
+    shutil.move(copy.root / "data", copy.root / "moved")
+    manifest = copy.out / "run.yaml"
+    lost = manifest.read_text(encoding="utf-8").replace("root: ", "root: /nowhere")
+    manifest.write_text(lost, encoding="utf-8")
+    assert copy.phyblock("score", "out").code == 2
+    assert copy.phyblock("score", "out", "--data", "moved").code == 0

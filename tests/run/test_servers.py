@@ -165,3 +165,30 @@ def test_keys_and_pictures_stay_off_the_disk(workspace: Workspace, transport: st
         assert b"5ecret" not in content, name
         assert PNG_HEAD not in content, name
         assert b"IHDR" not in content, name
+
+
+def test_a_check_asks_every_server(workspace: Workspace) -> None:
+    with Running(OpenAIChat()) as server:
+        bases = [f"{server.url}/v1", "http://127.0.0.1:9/v1"]
+        workspace.write_yaml("models.yaml", {"m": {"id": "hosted_vllm/m", "api_base": bases}})
+        models_file = workspace.root / "models.yaml"
+        checked = workspace.phyblock("models", "--models-file", models_file, "check", "m")
+    assert checked.code == 1
+    assert f"m at 127.0.0.1:{server.port} answers: " in checked.out
+    assert "m at 127.0.0.1:9 failed the check: " in checked.out
+
+
+def test_one_model_at_two_addresses_is_named_before_anything_is_asked(workspace: Workspace) -> None:
+    entries = {
+        name: {"id": "hosted_vllm/m", "api_base": f"http://127.0.0.1:{port}/v1"}
+        for name, port in (("alpha", 9), ("beta", 10))
+    }
+    workspace.write_yaml("models.yaml", entries)
+    workspace.write_suite(models=["alpha", "beta"], seeds=[0])
+    refused = workspace.run()
+    assert refused.code == 2
+    assert "model beta: api_base: is alpha at another address" in refused.err
+    assert not workspace.out.exists()
+    entries["beta"]["revision"] = "step 2000"
+    workspace.write_yaml("models.yaml", entries)
+    assert workspace.run("--dry-run").code == 0

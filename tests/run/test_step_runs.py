@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -146,3 +147,24 @@ def test_runs_in_two_engines_are_scored_anywhere_and_never_compared(
     runs = [load_run(out) for out in (usual, other)]
     with pytest.raises(SpecError, match="physics: cannot be compared"):
         compare_runs(*runs, ())
+
+
+@pytest.mark.parametrize(("mode", "outcome"), [("length", "truncated"), ("filtered", "refusal")])
+def test_an_episode_of_which_no_reply_is_whole_is_no_parse_failure(
+    workspace: Workspace, mode: str, outcome: str
+) -> None:
+    with Running(StepAgent(Faults(mode=mode))) as running:
+        prepare(workspace, running.url)
+        assert workspace.run(*FEW).code == 0
+    assert {record["outcome"] for record in workspace.records()} == {outcome}
+
+
+def test_a_goal_that_is_not_drawn_is_no_match_for_states_that_are(
+    workspace: Workspace, official_checkout: Path
+) -> None:
+    official = {"format": "official", "path": str(official_checkout)}
+    prepare(workspace, "http://nowhere", dataset=official, images={"source": "dataset"})
+    done = workspace.run("--dry-run")
+    assert (done.code, len(done.errors)) == (2, 1)
+    assert "step_planning draws its own pictures" in done.errors[0]
+    assert "images.source=render" in done.errors[0]

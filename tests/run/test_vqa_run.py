@@ -5,9 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
+import pytest
 from PIL import Image as PillowImage
 
 from phyblock.data.questions import read_questions
@@ -18,8 +20,8 @@ from phyblock.sim.question_pictures import question_png
 from tests.fork_server import Done
 from tests.servers.chassis import Running, Seen
 from tests.servers.openai_chat import OpenAIChat
-from tests.vqa_set import vqa_suite, write_questions
-from tests.workspace import Workspace
+from tests.vqa_set import questions, vqa_suite, write_questions
+from tests.workspace import Raw, Workspace
 
 FEW = ["SH", "VP", "OR", "AD"]
 
@@ -146,3 +148,40 @@ def test_pictures_of_official_files_are_sent_byte_for_byte(workspace: Workspace)
     assert set(sent) == turned
     right = {record["answer"]["right"] for record in workspace.records()}
     assert right == set(LETTERS)
+
+
+def test_circular_and_blind_a_question_counts_once_and_only_if_all_rotations_are_right(
+    workspace: Workspace,
+) -> None:
+    server = Answering(a_cube)
+    done = run_with(
+        workspace, server, circular=True, blind=True, subtasks=["SH", "CO"], per_subtask=3
+    )
+    assert (done.code, done.err) == (0, "")
+    assert server.requests == 24
+    made = {one["id"]: one for one in questions()}
+    records = workspace.records()
+    assert Counter(record["question"]["rotation"] for record in records) == dict.fromkeys(
+        range(4), 6
+    )
+    is_cube = {
+        name: made[name]["options"][LETTERS.index(made[name]["answer"])] == "cube"
+        for name in {record["question"]["id"] for record in records}
+    }
+    assert all(
+        record["answer"]["correct"] == is_cube[record["question"]["id"]] for record in records
+    )
+    cells = accuracies(workspace, "accuracy")
+    for subtask in ("SH", "CO"):
+        right = [held for name, held in is_cube.items() if name.startswith(subtask.lower())]
+        assert float(cells[subtask]["value"]) == pytest.approx(sum(right) / 3, abs=1e-6)
+        assert cells[subtask]["n"] == "3"
+    assert "circular" in done.out
+    assert "[circular, blind]" in workspace.tables()["table2.tex"].decode().replace(
+        "{", ""
+    ).replace("}", "")
+
+
+def accuracies(workspace: Workspace, measure: str) -> dict[str, Raw]:
+    rows = workspace.rows("estimates")
+    return {row["cell"]: row for row in rows if row["measure"] == measure}

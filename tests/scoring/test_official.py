@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import math
+import random
 from collections.abc import Iterator
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -18,7 +20,7 @@ from phyblock.domain.scene import Plan
 from phyblock.parsing.plan import parse_plan
 from phyblock.results.paper import published_table
 from phyblock.scoring.plan import AssemblyScorer, Goal, chance, match_plan
-from phyblock.types import SETTINGS
+from phyblock.types import MATCHERS, SETTINGS, PlanParser
 from tests.official_replies import reply_texts
 
 Row = tuple[str, str, str, str]
@@ -133,3 +135,30 @@ def test_chance_of_an_order_is_one_in_all_permutations() -> None:
     assert chance("SH") == 0.25
     assert chance("OR") == pytest.approx(1 / math.factorial(4))
     assert chance("VP", 2) == 0.5
+
+
+@pytest.mark.parametrize("share", [0.2, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("parser", get_args(PlanParser))
+def test_optimal_is_never_below_paper_on_recorded_replies(
+    official_checkout: Path, tasks: dict[str, AssemblyTask], parser: PlanParser, share: float
+) -> None:
+    goals = {
+        (name, setting): Goal(task.scene, task.candidates, setting)
+        for name, task in tasks.items()
+        for setting in SETTINGS
+    }
+    replies = reply_texts(official_checkout)
+    plans: set[tuple[str, Plan]] = {
+        (scene, parse_plan(text, len(tasks[scene].candidates), parser).plan)
+        for (_, scene), text in replies.items()
+        if random.Random(text).random() < share
+    }
+    assert len(plans) > 1000 * share
+    for scene, plan in plans:
+        tp = {}
+        for setting in SETTINGS:
+            goal = goals[scene, setting]
+            for matcher in MATCHERS:
+                tp[setting, matcher] = match_plan(goal, plan, matcher).counts.tp
+            assert tp[setting, "optimal"] >= tp[setting, "paper"], (scene, plan)
+        assert tp["B", "optimal"] >= tp["A", "optimal"], (scene, plan)

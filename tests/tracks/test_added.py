@@ -24,13 +24,15 @@ from phyblock.errors import SpecError
 from phyblock.records.record import Record
 from phyblock.results.compare import comparable, compare_models
 from phyblock.results.estimates import Headline
-from phyblock.results.load import Run, load_run
+from phyblock.results.load import Run, load_run, track_measures
 from phyblock.results.tables import write_tables
+from phyblock.run.rescore import rescore
 from phyblock.scoring.plan import mean_of, ratio_of
 from phyblock.tracks.base import Judgement, SceneTrack, kind_of
 from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts, TrackReport
 from phyblock.web.board import SiteRun, Sources, board_of, entries_of, values_of
+from tests.vqa_set import write_questions
 from tests.workspace import Workspace
 
 
@@ -223,3 +225,76 @@ def test_what_a_track_has_not_is_refused() -> None:
         command("run", "suite.yaml", "--set", "answer_format=json_schema", "--out", "json")
     with pytest.raises(SpecError, match="is a person, who cannot answer in counting"):
         command("play", "suite.yaml", "--name", "ada")
+
+
+def first_is_placed(_: Any, record: Any) -> tuple[float, float]:
+    return record.outcomes[:1] == ("placed",), 1
+
+
+def is_right(_: Any, record: Any) -> tuple[float, float]:
+    return record.answer.correct, 1
+
+
+def test_an_episode_that_would_have_asked_otherwise_is_no_longer_final(
+    here: Workspace, request: pytest.FixtureRequest
+) -> None:
+    here.write_suite(tracks=["step_planning"], steps={"physics": "off"}, levels=[3])
+    assert not command("run", "suite.yaml", "--out", here.out, "--no-report")
+    counted = SampleCounts("first_steps", ("placed", "n"), sample=first_is_placed)
+    registry.add_measure("step_planning", Measure("first", "First", counted, ratio_of))
+    request.addfinalizer(lambda: registry.remove_measure("step_planning", "first"))
+    path = here.out / "records.jsonl"
+    lines = here.records()
+    lines[0]["turns"][0]["reply"]["text"] = "Done"
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
+    told: list[str] = []
+    rescore(here.out, tell=told.append)
+    first, *others = here.records()
+    assert [text.partition(" this")[0] for text in told] == ["Step planning: in 1 episode"]
+    assert (first["outcome"], first["error"]["kind"]) == ("api_error", "retryable")
+    assert first["turns"] == lines[0]["turns"]
+    assert not any(line["error"] for line in others)
+
+
+@pytest.mark.parametrize(
+    ("track", "more", "counts"),
+    [
+        ("step_planning", {"steps": {"physics": "off"}, "levels": [3]}, first_is_placed),
+        ("vqa", {"vqa": {"path": "./questions", "subtasks": ["SH"], "circular": True}}, is_right),
+    ],
+)
+def test_scoring_again_counts_in_every_track(
+    here: Workspace, request: pytest.FixtureRequest, track: str, more: Any, counts: Any
+) -> None:
+    write_questions(here.root / "questions")
+    here.write_suite(tracks=[track], models=["oracle", "random"], **more)
+    folders = [here.root / name for name in ("out", "same", "new", "scored")]
+    old, same, new, scored = folders
+    assert not command("run", "suite.yaml", "--out", old, "--no-report")
+    for copy in (same, scored):
+        shutil.copytree(old, copy)
+    rescore(same)
+    counted = SampleCounts("sampled", ("part", "whole"), sample=counts)
+    registry.add_measure(track, Measure("part", "Part", counted, ratio_of, "a part"))
+    request.addfinalizer(lambda: registry.remove_measure(track, "part"))
+    assert not command("run", "suite.yaml", "--out", new, "--no-report")
+    rescore(scored)
+    before, unchanged, fresh, again = map(here.records, folders)
+    assert unchanged == before
+    counts_now = {line["sample"]: line["counts"] for line in fresh}
+    assert again == [{**line, "counts": counts_now[line["sample"]]} for line in before]
+    assert len({tuple(now["sampled"]) for now in counts_now.values()}) == 2
+
+
+@pytest.mark.usefixtures("half")
+@pytest.mark.parametrize(
+    "other", [HALF, replace(HALF, name="other", counted=replace(SAMPLED, columns=("a", "b")))]
+)
+def test_two_measures_or_counts_of_one_name_are_refused(
+    other: Measure, request: pytest.FixtureRequest
+) -> None:
+    registry.add_measure("full_planning", other)
+    request.addfinalizer(lambda: registry.add_measure("full_planning", HALF))
+    request.addfinalizer(lambda: registry.remove_measure("full_planning", other.name))
+    with pytest.raises(ValueError, match="are called"):
+        track_measures("full_planning")

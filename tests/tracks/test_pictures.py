@@ -15,7 +15,7 @@ from PIL import Image as PillowImage
 from phyblock.config.suite import ImagesSpec
 from phyblock.data.base import AssemblyTask
 from phyblock.data.official import read_official
-from phyblock.errors import DataError
+from phyblock.errors import DataError, StoreError
 from phyblock.models.request import Image
 from phyblock.sim.pictures import candidates_png
 from phyblock.tracks.items import presented
@@ -168,3 +168,13 @@ def test_what_is_no_picture_in_the_cache_is_drawn_anew(
     (tmp_path / key[:2] / f"{key}.png").write_bytes(png_header(*size))
     (outline,) = Workshop(1, tmp_path).outlines(scene_drawings(tasks[0], COMPOSITE))
     assert outline.data == b""
+
+
+def test_a_cache_that_cannot_be_written_is_said_so(
+    tasks: tuple[AssemblyTask, ...], tmp_path: Path
+) -> None:
+    taken = tmp_path / "taken"
+    taken.write_text("mine", encoding="utf-8")
+    with pytest.raises(StoreError, match="PHYBLOCK_CACHE"):
+        draw(taken, COMPOSITE, tasks[:1])
+    assert taken.read_text(encoding="utf-8") == "mine"
