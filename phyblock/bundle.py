@@ -11,7 +11,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import re
 import shutil
 import tempfile
 import zipfile
@@ -46,6 +45,7 @@ from phyblock.records.files import (
 from phyblock.records.record import Record, SentPrompt
 from phyblock.results.load import design_of
 from phyblock.run.judge import about_prompt
+from phyblock.run.manifest import portable_manifest, without_paths
 from phyblock.run.rescore import judged_anew, recorded_dataset, reopen_tracks
 from phyblock.run.store import manifest_text, prompt_fields, record_lines
 from phyblock.tracks.base import Track, kind_of, simulating
@@ -67,12 +67,6 @@ _NEVER_VERIFIED = (
     "The bytes of pictures: what they are drawn from is compared.",
     "That the models gave these replies, when, how fast and at what cost: no bundle can show it.",
 )
-_SENT = frozenset({"params", "sampling"})
-"""Keys of values that are sent to a model unchanged, where `/no_think` is a word and no path."""
-_PATH = re.compile(
-    r"^([\w.-]+/(?=/|~/|[A-Za-z]:[\\/]))?(?:~/|/.*/|[A-Za-z]:[\\/])(?:.*[\\/])?([^\\/\n]+)[\\/]*$"
-)
-"""A path from the root or the home folder, after a provider where it names a model."""
 
 
 @dataclass(frozen=True)
@@ -275,29 +269,6 @@ def _localized(folder: Path, manifest: Manifest, data: Sequence[Path]) -> Manife
     return manifest
 
 
-def portable_manifest(manifest: Manifest) -> Manifest:
-    """Return the manifest with the last part of every path, and without addresses of servers.
-
-    What is sent to models stays as it is, and so does the identity, made of what the run was.
-    """
-    fields = _without_paths(manifest.fields())
-    for model in fields.get("models", ()):
-        model.pop("served_at", None)
-    for part in ("dataset", "questions"):
-        held = getattr(manifest, part)
-        if held is not None and held.root:
-            fields[part]["root"] = Path(held.root).resolve().name
-    return Manifest.model_validate(fields)
-
-
-def _without_paths(value: Any) -> Any:
-    if isinstance(value, str):
-        return _PATH.sub(r"\1\2", value)
-    if isinstance(value, Mapping):
-        return {key: one if key in _SENT else _without_paths(one) for key, one in value.items()}
-    return [*map(_without_paths, value)] if isinstance(value, list | tuple) else value
-
-
 def portable(record: Record) -> Record:
     """Return a record without messages of servers and without local paths of models."""
     fields = record.fields()
@@ -305,7 +276,7 @@ def portable(record: Record) -> Record:
         fields["error"]["message"] = ""
     for reply in (fields.get("reply"), *(turn.get("reply") for turn in fields.get("turns", ()))):
         if reply is not None and "provider_model" in reply:
-            reply["provider_model"] = _without_paths(reply["provider_model"])
+            reply["provider_model"] = without_paths(reply["provider_model"])
     return type(record).model_validate(fields)
 
 

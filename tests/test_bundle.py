@@ -29,11 +29,11 @@ from phyblock.bundle import (
     bundle_run,
     opened_bundle,
     portable,
-    portable_manifest,
     unpack,
 )
 from phyblock.errors import DataError, StoreError
 from phyblock.records.files import MANIFEST, RECORDS, Manifest, known_records
+from phyblock.run.manifest import portable_manifest
 from phyblock.stable import hex_digest
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat

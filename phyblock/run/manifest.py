@@ -6,9 +6,11 @@ import contextlib
 import hashlib
 import json
 import platform
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any
 
 from phyblock.config.models import HUMAN, ModelConfig
@@ -30,6 +32,12 @@ _NOT_IDENTITY = {
 }
 """Parts of a manifest that may change while the run stays the same, or that others repeat."""
 _LONGEST_SHOWN = 60
+_SENT = frozenset({"params", "sampling"})
+"""Keys of values that are sent to a model unchanged, where `/no_think` is a word and no path."""
+_PATH = re.compile(
+    r"^([\w.-]+/(?=/|~/|[A-Za-z]:[\\/]))?(?:~/|/.*/|[A-Za-z]:[\\/])(?:.*[\\/])?([^\\/\n]+)[\\/]*$"
+)
+"""A path from the root or the home folder, after a provider where it names a model."""
 
 
 def make_manifest(
@@ -170,3 +178,27 @@ def _parts(manifest: Manifest) -> dict[str, dict[str, Any]]:
         }
         for part, about in parts.items()
     }
+
+
+def portable_manifest(manifest: Manifest) -> Manifest:
+    """Return the manifest with the last part of every path, and without addresses of servers.
+
+    What is sent to models stays as it is, and so does the identity, made of what the run was.
+    """
+    fields = without_paths(manifest.fields())
+    for model in fields.get("models", ()):
+        model.pop("served_at", None)
+    for part in ("dataset", "questions"):
+        held = getattr(manifest, part)
+        if held is not None and held.root:
+            fields[part]["root"] = Path(held.root).resolve().name
+    return Manifest.model_validate(fields)
+
+
+def without_paths(value: Any) -> Any:
+    """Return a value with the last part of every path in it, but for what is sent to models."""
+    if isinstance(value, str):
+        return _PATH.sub(r"\1\2", value)
+    if isinstance(value, Mapping):
+        return {key: one if key in _SENT else without_paths(one) for key, one in value.items()}
+    return [*map(without_paths, value)] if isinstance(value, list | tuple) else value

@@ -176,8 +176,7 @@ class _Judge:
             (name, item.key): item for name, one in self.tracks[""].items() for item in one.items
         }
         self._strict = strict
-        # The thread of a notebook has a loop already.
-        self._thread, self._loop = ThreadPoolExecutor(1), asyncio.new_event_loop()
+        self._thread = ThreadPoolExecutor(1)  # The thread of a notebook has a loop already.
 
     def __call__(self, line: tuple[str, Record]) -> tuple[Record, Record]:
         """Return the record of a line as it is stored and judged again."""
@@ -190,7 +189,7 @@ class _Judge:
             raise StoreError(Problem(where, message, "sample", record.sample, hint=hint))
         shown = track.shown(item, record.seed)
         work = _judged_again(track, shown, record, where, strict=self._strict)
-        return record, self._thread.submit(self._loop.run_until_complete, work).result()
+        return record, self._thread.submit(asyncio.run, work).result()
 
     def close(self) -> None:
         """Close the tracks."""
@@ -198,7 +197,6 @@ class _Judge:
         for of_condition in self.tracks.values():
             for track in of_condition.values():
                 track.close()
-        self._loop.close()
 
 
 @functools.lru_cache(maxsize=1)

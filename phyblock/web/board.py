@@ -12,7 +12,6 @@ from typing import Any
 
 import pandas as pd
 
-from phyblock.bundle import portable_manifest
 from phyblock.data.base import AssemblyTask
 from phyblock.errors import DataError
 from phyblock.records.files import ManifestModel, read_stopped
@@ -28,6 +27,7 @@ from phyblock.results.estimates import (
 from phyblock.results.load import Run, track_measures
 from phyblock.results.tables import coverage_frame
 from phyblock.results.text import number as rounded
+from phyblock.run.manifest import portable_manifest
 from phyblock.run.rescore import recorded_dataset
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of

@@ -158,7 +158,7 @@ BROKEN = [
     ("models", []),
     ("models", "oracle"),
     ("models", ["a", "a"]),
-    ("levels", [5]),
+    ("levels", [6]),
     ("levels", [True]),
     ("settings", "A"),
     ("seeds", [-1]),

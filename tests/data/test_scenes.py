@@ -93,7 +93,7 @@ BROKEN_VALUES: dict[str, tuple[str, object, str]] = {
     "id is empty": ("id", "", "id"),
     "id is a path": ("id", "../s1", "id"),
     "id has two lines": ("id", "a\nb", "id"),
-    "level 5": ("levels", [5], "levels"),
+    "level 6": ("levels", [6], "levels"),
     "levels 1 and 3": ("levels", [1, 3], "levels"),
     "level is true": ("levels", [True], "levels[0]"),
     "no levels": ("levels", [], "levels"),
