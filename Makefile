@@ -34,7 +34,7 @@ test: $(TESTS)
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 test-all: $(TESTS)
-	PHYBLOCK_EXAMPLES=200 $(BIN)/python -m pytest -n 2 --dist worksteal -m ''
+	PHYBLOCK_EXAMPLES=200 PHYBLOCK_FUZZ_KILLS=$(KILLS) $(BIN)/python -m pytest -n 2 --dist worksteal -m ''
 
 test-pythons: $(RUNS)
 	.ci/pythons

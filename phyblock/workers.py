@@ -285,6 +285,7 @@ class Shards:
         return self._folder / f"shard-{number}"
 
     def _beat(self) -> None:
+        # A shard that cannot say so is taken for gone: others make its batches too, the same.
         while not self._stop.wait(_BEAT_S):
             with contextlib.suppress(OSError):
                 self._mark(self.number).touch()

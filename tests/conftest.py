@@ -24,7 +24,7 @@ OFFICIAL_MISSING = (
 )
 
 # No test asserts on time: what a machine takes for an example says what else it was doing.
-EXAMPLES = int(os.environ.get("PHYBLOCK_EXAMPLES", "50"))
+EXAMPLES = int(os.environ.get("PHYBLOCK_EXAMPLES", "100"))
 settings.register_profile("phyblock", deadline=None, max_examples=EXAMPLES)
 settings.load_profile("phyblock")
 

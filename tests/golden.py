@@ -19,7 +19,6 @@ import shutil
 import sys
 import tempfile
 from collections import defaultdict
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -81,16 +80,11 @@ def rows_digests(path: Path) -> dict[str, str]:
     return {model: _digest(sorted(lines)) for model, lines in by_model.items()}
 
 
-def run_numbers(
-    name: str, root: Path, pictures: Path, models: Sequence[str] = ()
-) -> dict[str, dict[str, str]]:
-    """Run a suite of `RUNS` below `root`; digests of its tables by file and model. With `models`,
-    these alone are run.
-    """
+def run_numbers(name: str, root: Path, pictures: Path) -> dict[str, dict[str, str]]:
+    """Run a suite of `RUNS` below `root`; digests of its tables by file and model."""
     official = official_root()
     place = "" if official is None else str(official / "PhyBlock")
     arguments = [text.format(official=place) for text in RUNS[name]]
-    arguments += ["--models", ",".join(models)] if models else []
     made = _workspace(root / name, pictures)
     done = made.phyblock("run", *arguments, "--out", made.out, "--yes", "--no-report", fresh=True)
     if done.code != 0:

@@ -13,29 +13,12 @@ from tests.conftest import OFFICIAL_MISSING, official_root
 GOLDEN = json.loads(golden.GOLDEN.read_text(encoding="utf-8"))
 
 
-QUICK = {"pose": ("oracle-noise-3mm", "stack")}
-"""Models that stand for all of a run that takes long: blocks of theirs fall and stand."""
-
-
-@pytest.mark.parametrize(
-    ("name", "models"),
-    [
-        *((name, QUICK.get(name, ())) for name in golden.RUNS),
-        *(pytest.param(name, (), marks=pytest.mark.slow) for name in QUICK),
-    ],
-)
-def test_numbers_are_what_they_were(
-    name: str, models: tuple[str, ...], tmp_path: Path, pictures_dir: Path
-) -> None:
+@pytest.mark.parametrize("name", golden.RUNS)
+def test_numbers_are_what_they_were(name: str, tmp_path: Path, pictures_dir: Path) -> None:
     if name == "paper-table1" and official_root() is None:
         pytest.skip(OFFICIAL_MISSING)
-    now = golden.run_numbers(name, tmp_path, pictures_dir, models)
-    known = {
-        file: {key: row for key, row in rows.items() if not models or key.split()[0] in models}
-        for file, rows in GOLDEN[name].items()
-    }
-    assert all(known.values())
-    assert golden.compare(known, now, name) == []
+    now = golden.run_numbers(name, tmp_path, pictures_dir)
+    assert golden.compare(GOLDEN[name], now, name) == []
 
 
 @pytest.mark.parametrize("name", golden.SUITES)

@@ -63,7 +63,7 @@ def test_known_counts_match_row_for_row(
     assert len(expected) >= 6250
 
 
-ORDERS = 50
+ORDERS = 200
 BUNDLED = sorted((Path(__file__).parents[2] / "benchmarks" / "data").glob("*/scenes.jsonl"))
 EVERY = pytest.mark.parametrize("every", [5, pytest.param(1, marks=pytest.mark.slow)])
 """Each fifth scene, of all levels; all scenes when there is time."""

@@ -50,10 +50,10 @@ class Draft:
 
     `scene` is the scene as shown; `options` has the right one first, or for ordering all four in
     the right order. `slots` fill the template of the `wording`. `facts` are further evidence, which
-    JSON can hold. Selection takes an even share of each `kind`, by
-    default the wording. `looks` are measures of the
-    pictures, a row for each option, by which a reader might guess: drafts are dropped until these
-    tell nothing. Of the same base scenes there is one question of a wording, slots and `about`.
+    JSON can hold. Selection takes an even share of each `kind`, by default the wording. `looks` are
+    measures of the pictures, a row for each option, by which a reader might guess: drafts are
+    dropped until these tell nothing. Of the same base scenes there is one question of a wording,
+    slots and `about`.
     """
 
     scene: Scene
