@@ -1,10 +1,10 @@
 """phyblock: PhyBlock, 3D block assembly for vision-language models, as tasks, scenes and runs.
 
 `tasks(track)` gives what a track asks, and the score of a reply. `generate(n)` makes scenes,
-`verify(scene)` checks one, `render(scene)` draws one. `load_suite(name)` reads a suite and its
-scenes, `run_suite(suite)` runs it. `load_run(path)` opens a run folder: `.records` is a DataFrame,
-a row a sample, `.estimates` every value with its interval, `.tables` maps names to DataFrames,
-`.summary()` and `.compare(other)` say what came out.
+`verify(scene)` checks one, `render(scene)` draws one. `load_suite(name)` reads a suite,
+`run_suite(suite)` runs it. `load_run(path)` opens a run folder: `.records` is a DataFrame, a row a
+sample, `.estimates` every value with its interval, `.tables` maps names to DataFrames, `.summary()`
+and `.compare(other)` say what came out.
 """
 
 from __future__ import annotations
@@ -14,18 +14,29 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from phyblock.api import Picture, Run, SceneTask, Suite, load_run, load_suite, render, run_suite
+    from phyblock.api import (
+        Episode,
+        Score,
+        Task,
+        Tasks,
+        Turn,
+        generate,
+        load_suite,
+        render,
+        run_suite,
+        tasks,
+        verify,
+    )
+    from phyblock.config.suite import Suite
     from phyblock.errors import PhyblockError
-    from phyblock.task import Episode, Score, Task, Tasks, Turn, generate, tasks, verify
+    from phyblock.results.load import Run, load_run
 
     __version__: str
 
 __all__ = [
     "Episode",
     "PhyblockError",
-    "Picture",
     "Run",
-    "SceneTask",
     "Score",
     "Suite",
     "Task",
@@ -42,12 +53,10 @@ __all__ = [
 ]
 _HOMES = {
     "PhyblockError": "errors",
-    **dict.fromkeys(("Picture", "Run", "SceneTask", "Suite"), "api"),
-    **dict.fromkeys(("load_run", "load_suite", "render", "run_suite"), "api"),
-    **dict.fromkeys(("Episode", "Score", "Task", "Tasks", "Turn"), "task"),
-    **dict.fromkeys(("generate", "tasks", "verify"), "task"),
+    "Suite": "config.suite",
+    **dict.fromkeys(("Run", "load_run"), "results.load"),
 }
-"""The module of each name."""
+"""The modules of names that are not in `api`."""
 if find_spec("verifiers"):
     # It finds a taskset and its environment among the names that a package exports.
     __all__ += ["VerifiersEnv", "VerifiersTaskset"]
@@ -60,9 +69,9 @@ def __getattr__(name: str) -> object:
         from importlib.metadata import version
 
         return version("phyblock")
-    if name not in _HOMES:
+    if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"phyblock.{_HOMES[name]}"), name)
+    return getattr(import_module(f"phyblock.{_HOMES.get(name, 'api')}"), name)
 
 
 def __dir__() -> list[str]:

@@ -1,22 +1,29 @@
-"""Public names of `phyblock`, for programs and notebooks; nothing is spent without consent."""
+"""Public names of `phyblock`: tasks and their scores, scenes, suites and runs.
+
+A task asks and judges through the functions that runs use, so its scores are those of a run to the
+last bit. Pictures are drawn in the calling process and kept in the cache on disk. Tasks may be used
+from several threads; each process opens its own. Nothing is spent without consent.
+"""
 
 from __future__ import annotations
 
-import asyncio
 import functools
 import inspect
+import io
+import json
+import math
 import re
-import signal
 import sys
-import threading
 import warnings
-from collections.abc import Callable, Collection, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
-from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from collections import Counter
+from collections.abc import Callable, Coroutine, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal, ParamSpec, TypeVar
+from typing import Annotated, Any, Literal, NamedTuple, ParamSpec, TypeVar, overload
 
+import numpy as np
+from PIL import Image
 from pydantic import (
     BaseModel,
     ConfigDict,
@@ -28,38 +35,43 @@ from pydantic import (
 )
 
 from phyblock.config.models import load_models
-from phyblock.config.suite import Suite as ConfigSuite
-from phyblock.config.suite import load_suite as read_suite
+from phyblock.config.suite import Suite
 from phyblock.config.validation import problems_of
-from phyblock.data.base import AssemblyTask
-from phyblock.data.lookup import open_dataset
+from phyblock.data.base import AssemblyTask, Dataset
+from phyblock.data.lookup import find_data_set, open_dataset
+from phyblock.data.scenes import SCENES_FILE
 from phyblock.errors import Problem, SpecError
-from phyblock.files import write_named
+from phyblock.making.checks import Finding, verify_scene
+from phyblock.making.scenes.candidates import make_candidates
+from phyblock.making.scenes.production import Production, builtin_forms, shares, split_tasks
+from phyblock.making.scenes.sketch import PALETTES, Palette
+from phyblock.models.request import Request, wire_messages
+from phyblock.records.record import Record, Reply
+from phyblock.registry import added_measures, known_track, known_tracks
 from phyblock.results.load import Run, load_run
+from phyblock.run.drive import completed, remarks_on
 from phyblock.run.estimate import may_bill
-from phyblock.run.plan import find_models_file, find_suite, make_plan, prompt_dirs
-from phyblock.run.runner import RunEvent, RunResult, Session, Stopping, check_ready
+from phyblock.run.judge import begun, judge_episode, judge_reply
+from phyblock.run.plan import find_models_file, make_plan, read_suite
+from phyblock.run.runner import RunEvent, Session, Stopping, check_ready
 from phyblock.sim.pictures import PictureStyle, candidates_png, composite_png, goal_png, goal_style
-from phyblock.text import counted, did_you_mean
-from phyblock.tracks.items import select_tasks
+from phyblock.text import counted, did_you_mean, well_formed
+from phyblock.tracks.base import Track, open_tracks
+from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts
+from phyblock.tracks.pictures import LocalShop
 from phyblock.types import Background, View
-
-__all__ = [
-    "Picture",
-    "Run",
-    "SceneTask",
-    "Scenes",
-    "Suite",
-    "load_run",
-    "load_suite",
-    "render",
-    "run_suite",
-]
+from phyblock.workers import open_workers
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 _Text = Annotated[str, Field(min_length=1)]
 Place = _Text | Path
+Split = Literal["test", "train", "dev"]
+_SUITES = {"step_planning": "steps", "vqa": "vqa", "pose_planning": "pose"}
+"""Bundled suites that say how a track asks; others ask as `full` does."""
+_LEVELS = (1, 2, 3, 4)
+_MOST_REPEATS = 50
+"""Scenes in a row that a set holds already, after which a split has no others."""
 
 
 def checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
@@ -85,22 +97,457 @@ def checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
     return checked
 
 
+def _result(work: Coroutine[Any, Any, _T]) -> _T:
+    """Return the result of a coroutine that never waits, as those of tracks with a local shop."""
+    try:
+        work.send(None)
+    except StopIteration as end:
+        result: _T = end.value
+        return result
+    work.close()
+    raise RuntimeError("the coroutine waits for an event loop")
+
+
 @dataclass(frozen=True, repr=False)
-class Picture:
-    """A picture as PNG; a notebook shows it."""
+class Score:
+    """The worth of a reply: its record as a run would keep it, read by one setting and matcher."""
 
-    png: bytes
-
-    def save(self, path: str | Path) -> Path:
-        """Write the PNG, replacing a file that is there; StoreError if that fails."""
-        write_named(Path(path), self.png)
-        return Path(path)
-
-    def _repr_png_(self) -> bytes:
-        return self.png
+    record: Record
+    setting: str
+    matcher: str
 
     def __repr__(self) -> str:
-        return f"<picture: PNG, {len(self.png):,} bytes>"
+        return f"<score: {self.measure} {self.value:.3f}, {self.problem or self.outcome}>"
+
+    @property
+    def measure(self) -> str:
+        """The name of the track's headline measure."""
+        return [*_headline(self.record.track).headings][-1]
+
+    @property
+    def value(self) -> float:
+        """The headline measure, in [0, 1]: F1 of a plan, in setting C of one with poses, of all
+        attempts of an episode; 1 or 0 for an answer. 0 where it is not defined.
+        """
+        return self._value(self.measure) or 0.0
+
+    @property
+    def f1(self) -> float | None:
+        """The headline F1; None where that is no F1."""
+        return self.value if self.measure.startswith("f1") else None
+
+    @property
+    def success(self) -> bool:
+        """True if all is right."""
+        name = known_track(self.record.track).report().success or self.measure
+        return self._value(name) == 1.0
+
+    @property
+    def outcome(self) -> str:
+        """The outcome of the reply, as in records."""
+        return self.record.outcome
+
+    @property
+    def problem(self) -> str | None:
+        """The reason why nothing could be read or carried out."""
+        if self.record.error is not None:
+            return self.record.error.message
+        missing = "there is no reply" if self.outcome == "missing" else None
+        return missing or getattr(self.record.parse, "problem", None)
+
+    @property
+    def counts(self) -> dict[str, float]:
+        """The counts that `value` is made of, by name."""
+        counted = self._measures[self.measure].counted
+        return dict(zip(counted.columns, self._numbers(counted) or (), strict=False))
+
+    @property
+    def errors(self) -> dict[str, int]:
+        """The wrong steps by type of error."""
+        course = self.record.course(self.matcher)
+        return dict(Counter(why for _, why in course.steps if why is not None)) if course else {}
+
+    @property
+    def measures(self) -> dict[str, float]:
+        """All measures of the track that have a value, by name."""
+        values = {name: self._value(name) for name in self._measures}
+        return {name: value for name, value in values.items() if value is not None}
+
+    def as_json(self) -> dict[str, Any]:
+        """Return its numbers and words, for the logs of other tools."""
+        names = ("value", "measure", "success", "outcome", "problem", "counts", "errors")
+        return {name: getattr(self, name) for name in names}
+
+    @property
+    def _measures(self) -> dict[str, Measure]:
+        report = known_track(self.record.track).report()
+        return {one.name: one for one in (*report.measures, *added_measures(self.record.track))}
+
+    def _value(self, name: str) -> float | None:
+        measure = self._measures[name]
+        if (numbers := self._numbers(measure.counted)) is None:
+            return None
+        value = float(measure.value(np.asarray(numbers, dtype=np.float64)))
+        return None if math.isnan(value) else value
+
+    def _numbers(self, counted: SampleCounts) -> Sequence[float] | None:
+        if counted.sample is not None:
+            return self.record.counts.get(counted.name) or None
+        criterion = _headline(self.record.track).criterion or "aov"
+        ways = [("", "", ""), *((self.setting, by, criterion) for by in (self.matcher, ""))]
+        return next((numbers for way, numbers in counted.of(self.record) if way in ways), None)
+
+
+def _headline(track: str) -> LayoutColumn:
+    """Return the column that models are ranked by."""
+    headline = known_track(track).report().headline
+    return next((column for column in headline if column.main), headline[-1])
+
+
+@dataclass(frozen=True, repr=False)
+class Task:
+    """One item of a track, as a seed shows it."""
+
+    track: Track
+    item: Any
+    """The scene with its candidates, or the question."""
+    seed: int = 0
+
+    @property
+    def key(self) -> str:
+        """Its name in the track: the scene, or the question."""
+        return str(self.item.key)
+
+    @property
+    def id(self) -> str:
+        """Its name among the tasks of all tracks."""
+        return f"{self.track.name}/{self.key}"
+
+    @property
+    def level(self) -> int:
+        """The lowest level that its scene counts in."""
+        return int(self.item.scene.level)
+
+    @property
+    def part(self) -> str:
+        """The part of the track that it is filed under: the level, or the subtask of a question."""
+        question = self.track.about(self.item).get("question")
+        return question["subtask"] if question else f"level {self.level}"
+
+    @property
+    def base_scene(self) -> str:
+        """The first scene that its scene was made from, by which errors cluster."""
+        return str((self.item.scene.parents or (self.item.scene.id,))[0])
+
+    @property
+    def plays(self) -> bool:
+        """True if it is an episode of several turns."""
+        return self.track.plays
+
+    def request(self) -> Request:
+        """Return the request as a run makes it; of an episode its first."""
+        if self.plays:
+            request: Request = _result(self._start(shows=True).request())
+            return request
+        return _result(self.track.request(self.item, self.seed, {}, with_messages=True))
+
+    def messages(self) -> list[dict[str, Any]]:
+        """Return the messages in OpenAI's form, with pictures as data URLs."""
+        return wire_messages(self.request().messages, None)
+
+    @property
+    def pictures(self) -> dict[str, Image.Image]:
+        """The pictures by their labels, in the order sent."""
+        return {one.label: Image.open(io.BytesIO(one.data)) for one in self.request().images}
+
+    @property
+    def answer_schema(self) -> Mapping[str, Any] | None:
+        """The JSON schema of an answer; None where it is asked for as text."""
+        form = self.track.form(self.item)
+        return None if form is None else form.schema
+
+    def score(self, reply: str | Sequence[str] | None) -> Score:
+        """Return the score of a reply, of an episode's replies in order, or of none.
+
+        Raises SpecError for anything else.
+        """
+        if self.plays and (reply is None or isinstance(reply, Sequence)):
+            episode = Episode(self, shows=False)
+            for one in [reply] if isinstance(reply, str) else reply or ():
+                if episode.step(one).done:
+                    break
+            return episode.score()
+        if not (reply is None or isinstance(reply, str)):
+            allowed = "a text, None" + (", a list of texts" if self.plays else "")
+            raise SpecError(Problem(self.id, "cannot be scored", "reply", repr(reply), allowed))
+        record = _result(judge_reply(self.track, self.item, self._begun(reply)))
+        return self._scored(record)
+
+    def episode(self) -> Episode:
+        """Return a new episode; SpecError where the track asks once."""
+        return Episode(self)
+
+    def _begun(self, reply: str | None) -> dict[str, Any]:
+        answer = None if reply is None else Reply(text=well_formed(reply))
+        sample = f"{self.track.name}/reply/{self.key}/s{self.seed}"
+        fields = begun(sample, self.track.name, "reply", self.item, self.seed, answer)
+        return {**fields, **self.track.about(self.item)}
+
+    def _scored(self, record: Record) -> Score:
+        suite = self.track.suite
+        return Score(record, suite.settings[0], suite.scoring.matchers[0])
+
+    def _start(self, *, shows: bool) -> Any:
+        return self.track.start(self.item, self.seed, {}, with_messages=shows)
+
+    def __deepcopy__(self, _: object) -> Task:
+        return self
+
+    def __repr__(self) -> str:
+        return f"<task {self.id}: level {self.level}>"
+
+
+class Turn(NamedTuple):
+    """A step of an episode: the next messages, what it added to the score, and how it went."""
+
+    messages: list[dict[str, Any]]
+    reward: float
+    done: bool
+    outcome: str
+
+
+class Episode:
+    """A task of several turns, played by replies. One thread plays it.
+
+    Rewards are differences of `Score.value`, so that they sum to that of the whole episode.
+    `request` is the one that waits for a reply, None at the end.
+    """
+
+    def __init__(self, task: Task, *, shows: bool = True) -> None:
+        """Begin; without `shows`, no pictures are drawn and messages are empty.
+
+        Raises SpecError for a task that is asked once.
+        """
+        if not task.plays:
+            raise SpecError(Problem(task.id, "is asked once and has no episode"))
+        self.task, self._shows = task, shows
+        self.reset()
+
+    def reset(self) -> list[dict[str, Any]]:
+        """Begin again; return the first messages."""
+        self._episode = self.task._start(shows=self._shows)
+        self._replies: list[Reply] = []
+        self._value = 0.0
+        self.request: Request | None = _result(self._episode.request())
+        return self.messages
+
+    @property
+    def messages(self) -> list[dict[str, Any]]:
+        """The messages of the turn that waits for a reply; none at the end."""
+        return [] if self.request is None else wire_messages(self.request.messages, None)
+
+    @property
+    def done(self) -> bool:
+        """True if it has ended."""
+        return self.request is None
+
+    def step(self, reply: str) -> Turn:
+        """Take a step with a reply; SpecError where the episode has ended, or for no text."""
+        if self.request is None:
+            raise SpecError(Problem(self.task.id, "has ended", hint="call reset() before step()"))
+        if not isinstance(reply, str):
+            raise SpecError(Problem(self.task.id, "takes texts", "reply", repr(reply)))
+        self._replies.append(Reply(text=well_formed(reply)).storable())
+        self._episode.take(self._replies[-1])
+        self.request = _result(self._episode.request())
+        score, before = self.score(), self._value
+        self._value = score.value
+        outcomes = getattr(score.record, "outcomes", None) or (score.outcome,)
+        return Turn(self.messages, self._value - before, self.done, str(outcomes[-1]))
+
+    def score(self) -> Score:
+        """Return the score as far as it has come."""
+        fields = self.task._begun(None)
+        track, item = self.task.track, self.task.item
+        record = judge_episode(track, item, fields, self._episode, self._replies)
+        return self.task._scored(record)
+
+
+@dataclass(frozen=True, repr=False)
+class Tasks:
+    """The tasks of a track in one split: a finite set, by place or key, or a stream without end.
+
+    A stream begins again with each iteration, and makes a task by its place; each has a track of
+    its own, so that nothing is kept of those that are done.
+    """
+
+    suite: Suite
+    name: str
+    source: Callable[..., Iterator[AssemblyTask]] | None
+    found: Mapping[str, Task]
+    first: int = 0
+
+    @property
+    def is_endless(self) -> bool:
+        """True if it is a stream."""
+        return self.source is not None
+
+    def __iter__(self) -> Iterator[Task]:
+        yield from self._streamed(0) if self.is_endless else self.found.values()
+
+    def _streamed(self, place: int) -> Iterator[Task]:
+        assert self.source is not None, "a stream has a source"
+        shop = LocalShop()
+        for scene in self.source(first=self.first + place):
+            yield from _opened(self.suite, Dataset(self.name, Path(self.name), (scene,)), shop)
+
+    def __len__(self) -> int:
+        if self.is_endless:
+            raise TypeError(f"{self!r} has no length: give a limit")
+        return len(self.found)
+
+    @overload
+    def __getitem__(self, key: int | str) -> Task: ...
+    @overload
+    def __getitem__(self, key: slice) -> Tasks: ...
+    def __getitem__(self, key: int | str | slice) -> Task | Tasks:
+        """Return a task by its place or its key, or a finite set's tasks by a slice.
+
+        Raises SpecError for what is not there, IndexError for a place behind the last.
+        """
+        if isinstance(key, slice) and not self.is_endless:
+            return replace(self, found=dict(list(self.found.items())[key]))
+        if isinstance(key, int) and not self.is_endless:
+            return list(self.found.values())[key]
+        if isinstance(key, int) and key >= 0:
+            return next(self._streamed(key))
+        if not isinstance(key, str) or key not in self.found:
+            hint = did_you_mean(str(key), list(self.found))
+            hint = "a stream has tasks by place: 0, 1, ..." if self.is_endless else hint
+            raise SpecError(Problem(repr(self), "has no such task", "", str(key), hint=hint))
+        return self.found[key]
+
+    def __repr__(self) -> str:
+        size = "endless" if self.is_endless else len(self.found)
+        return f"<tasks of {self.suite.tracks[0]}, {self.name}: {size}>"
+
+
+def _opened(
+    suite: Suite, dataset: Dataset, shop: LocalShop, limit: int | None = None
+) -> Iterator[Task]:
+    (track,) = open_tracks(suite, dataset, limit, shop)
+    seed = suite.seeds[0]
+    return (Task(track, track.shown(item, seed), seed) for item in track.items)
+
+
+@checked
+def tasks(
+    track: str,
+    *overrides: str,
+    split: Split = "test",
+    levels: Sequence[Annotated[int, Field(ge=1)]] | None = None,
+    seed: Annotated[int, Field(ge=0)] = 0,
+    data: SkipValidation[str | Path | Dataset | Iterable[AssemblyTask] | None] = None,
+    limit: Annotated[int, Field(ge=1)] | None = None,
+    first: Annotated[int, Field(ge=0)] = 0,
+) -> Tasks:
+    """Return the tasks of a track: `full_planning`, `step_planning`, `pose_planning` or `vqa`.
+
+    The split `test` is the built-in set, or `data`: a data set's name or folder, or scenes. `train`
+    and `dev` are made from the seed and share no structure with the test set or with one another;
+    they have no end and begin at place `first`, unless a `limit` makes them a finite set of so many
+    scenes. `overrides` are `KEY=VALUE` texts for the track's bundled suite, as for `--set`. Of the
+    test set, `limit` keeps so many, spread over levels or subtasks. Raises SpecError, DataError or
+    PromptError with what is wrong.
+    """
+    if track not in known_tracks():
+        allowed, hint = ", ".join(known_tracks()), did_you_mean(track, known_tracks())
+        raise SpecError(Problem("tasks", "is no track", "track", track, allowed, hint))
+    if split != "test" and (data is not None or track == "vqa"):
+        message = "takes no data" if data is not None else "has no questions"
+        hint = 'make a set with phyblock questions generate; give split="test", vqa.path=FOLDER'
+        raise SpecError(Problem("tasks", message, "split", split, hint="" if data else hint))
+    said = [f"tracks=[{track}]", f"seeds=[{seed}]"]
+    said += [] if levels is None else [f"levels={list(levels)}"]
+    if isinstance(data, str | Path):
+        folder = find_data_set(str(data)).absolute()
+        form = "builtin" if (folder / SCENES_FILE).is_file() else "official"
+        said += [f"dataset.format={form}", f"dataset.path={json.dumps(str(folder))}"]
+    suite = load_suite(_SUITES.get(track, "full"), *said, *overrides)
+    if suite.tracks != (track,):
+        message = "does not go with the track that is asked for"
+        raise SpecError(Problem("tasks", message, "tracks", ", ".join(suite.tracks), track))
+    limit = suite.limit if limit is None else limit
+    if first and (split == "test" or limit is not None):
+        message = "is the place where a stream begins; this is a finite set"
+        raise SpecError(Problem("tasks", message, "first", str(first), hint="use a slice"))
+    dataset = None
+    if split != "test":
+        stream = partial(split_tasks, split, seed, levels=suite.levels)
+        if limit is None:
+            return Tasks(suite, split, stream, {}, first)
+        dataset = Dataset(split, Path(split), _distinct(stream(), limit))
+    elif data is not None and not isinstance(data, str | Path):
+        dataset = _given(data)
+    dataset = dataset or open_dataset(suite.dataset.format, suite.files.dataset)
+    found = _opened(suite, dataset, LocalShop(), limit)
+    return Tasks(suite, dataset.name, None, {task.key: task for task in found})
+
+
+def _distinct(scenes: Iterator[AssemblyTask], limit: int) -> tuple[AssemblyTask, ...]:
+    """Return the first scenes, each once; SpecError where no others come."""
+    found: dict[str, AssemblyTask] = {}
+    repeats = 0
+    while len(found) < limit:
+        scene = next(scenes)
+        repeats = repeats + 1 if scene.key in found else 0
+        found.setdefault(scene.key, scene)
+        if repeats == _MOST_REPEATS:
+            message = f"the rules seem to give {len(found)} scenes in these levels, and no more"
+            raise SpecError(Problem("tasks", message, "limit", str(limit)))
+    return tuple(found.values())
+
+
+def _given(data: Any) -> Dataset:
+    """Return a caller's scenes as a data set; SpecError for other things, and for repeats."""
+    allowed = "the name or folder of a data set, a Dataset, or scenes"
+    if not isinstance(data, Dataset | Iterable):
+        raise SpecError(Problem("tasks", "is no data", "data", repr(data), allowed))
+    dataset = data if isinstance(data, Dataset) else Dataset("data", Path("data"), tuple(data))
+    known: set[str] = set()
+    for place, one in enumerate(dataset.tasks):
+        field = f"data[{place}]"
+        if not isinstance(one, AssemblyTask):
+            raise SpecError(Problem("tasks", "is no scene", field, repr(one), allowed))
+        if one.key in known:
+            raise SpecError(Problem("tasks", "comes a second time", field, one.key))
+        known.add(one.key)
+    return dataset
+
+
+@checked
+def generate(
+    count: Annotated[int, Field(ge=1)],
+    *,
+    levels: Sequence[Annotated[int, Field(ge=1, le=5)]] = _LEVELS,
+    seed: Annotated[int, Field(ge=0)] = 0,
+    palette: Palette = "kit",
+) -> dict[str, AssemblyTask]:
+    """Make scenes with their candidates, those of `phyblock scenes generate`, by id; each stands,
+    and none has the structure of a built-in one. DataError where the rules give no more.
+    """
+    kinds = PALETTES[palette]
+    with open_workers() as workers:
+        made = Production(seed, palette, workers, builtin_forms()).scenes(shares(count, levels))
+        return {
+            scene.id: AssemblyTask(scene, make_candidates(scene, palette=kinds)) for scene in made
+        }
+
+
+@checked
+def verify(scene: InstanceOf[AssemblyTask]) -> tuple[Finding, ...]:
+    """Return all that is wrong with a scene and its candidates, by geometry and physics."""
+    return verify_scene((scene.scene, scene.candidates))
 
 
 @checked
@@ -111,7 +558,7 @@ def render(
     view: View = "oblique",
     background: SkipValidation[Background] = "checkerboard",
     size_px: int = 512,
-) -> Picture:
+) -> Image.Image:
     """Draw a scene as models see it: goal and numbered candidates, or one of the two.
 
     `size_px` is the side of each square [pixels]. Raises SpecError for an unknown view, background
@@ -122,72 +569,12 @@ def render(
     except ValueError as error:
         raise SpecError(Problem("render", str(error))) from error
     style = style if show == "candidates" else goal_style(scene.scene, style)
-    if show == "goal":
-        return Picture(goal_png(scene.scene, style))
-    candidates = candidates_png(scene.candidates, style)
-    if show == "candidates":
-        return Picture(candidates)
-    return Picture(composite_png(goal_png(scene.scene, style), candidates))
-
-
-@dataclass(frozen=True, repr=False)
-class SceneTask(AssemblyTask):
-    """A goal (`scene`) with its numbered `candidates`; a notebook shows both as a picture."""
-
-    def __repr__(self) -> str:
-        n_blocks = counted(len(self.scene.blocks), "block")
-        n_candidates = counted(len(self.candidates), "candidate")
-        return f"<scene {self.key}: level {self.scene.level}, {n_blocks}, {n_candidates}>"
-
-    def _repr_png_(self) -> bytes:
-        return render(self).png
-
-
-class Scenes(dict[str, SceneTask]):
-    """Scenes by id, in the order of the data set."""
-
-    def __missing__(self, key: str) -> SceneTask:
-        hint = did_you_mean(str(key), list(self))
-        raise SpecError(Problem("suite.scenes", "has no such scene", "", str(key), hint=hint))
-
-    def __repr__(self) -> str:
-        first = ", ".join(list(self)[:3])
-        return f"<{counted(len(self), 'scene')}: {first}{', ...' if len(self) > 3 else ''}>"
-
-
-@dataclass(frozen=True, repr=False)
-class Suite:
-    """A suite as it was read: what `run_suite` takes."""
-
-    loaded: ConfigSuite = field(compare=False)
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-        return self.loaded.name
-
-    @property
-    def models(self) -> tuple[str, ...]:
-        """The models that it names; groups, and the word `recorded`, stand for themselves."""
-        named = self.loaded.models
-        return (named,) if isinstance(named, str) else tuple(named)
-
-    @functools.cached_property
-    def scenes(self) -> Scenes:
-        """The scenes of its levels, as many as its limit keeps.
-
-        Raises DataError where the data set cannot be read.
-        """
-        suite = self.loaded
-        dataset = open_dataset(suite.dataset.format, self.loaded.files.dataset)
-        tasks = select_tasks(dataset.tasks, suite, suite.limit)
-        return Scenes({t.key: SceneTask(t.scene, t.candidates, t.composite) for t in tasks})
-
-    def __repr__(self) -> str:
-        suite = self.loaded
-        levels, seeds = ", ".join(map(str, suite.levels)), counted(len(suite.seeds), "seed")
-        asked = f"{', '.join(suite.tracks)}; levels {levels}; {seeds}"
-        return f"<suite {self.name}: {asked}; models {', '.join(self.models)}>"
+    parts = []
+    if show != "candidates":
+        parts.append(goal_png(scene.scene, style))
+    if show != "goal":
+        parts.append(candidates_png(scene.candidates, style))
+    return Image.open(io.BytesIO(composite_png(*parts) if show == "both" else parts[0]))
 
 
 @checked
@@ -197,13 +584,12 @@ def load_suite(suite: Place, *overrides: str) -> Suite:
 
     Raises SpecError with all that is wrong, each with its file, line and field.
     """
-    path = find_suite(str(suite))
-    return Suite(read_suite(path, overrides, prompt_dirs=prompt_dirs(path)))
+    return read_suite(str(suite), overrides)
 
 
 @checked
 def run_suite(
-    suite: Suite | str | Path,
+    suite: InstanceOf[Suite] | str | Path,
     *,
     models: Annotated[Sequence[str], Field(min_length=1)] | None = None,
     limit: Annotated[int, Field(ge=1)] | None = None,
@@ -224,7 +610,7 @@ def run_suite(
     run sends nothing more, waits for calls under way (not after a second interrupt), and raises
     KeyboardInterrupt once what was answered is on disk.
     """
-    loaded = (suite if isinstance(suite, Suite) else load_suite(suite)).loaded
+    loaded = suite if isinstance(suite, Suite) else load_suite(suite)
     named = None if models_file is None else str(models_file)
     known = load_models(find_models_file(named, loaded.files.path))
     plan = make_plan(loaded, known, only=models or (), limit=limit)
@@ -238,11 +624,11 @@ def run_suite(
         where, message = f"suite {plan.suite.name}", "would cost money, and nobody agreed"
         raise SpecError(Problem(where, message, found=found, hint=hint))
 
-    def tell(event: RunEvent) -> None:
+    def report(event: RunEvent) -> None:
         if isinstance(event, Stopping):
             print(event.text, file=sys.stderr, flush=True)
 
-    result = completed(Session(plan, folder, tell, **asks))
+    result = completed(Session(plan, folder, report, **asks))
     if result.stop is not None and result.stop.cause == "interrupted":
         raise KeyboardInterrupt
     remarks = remarks_on(result, folder)
@@ -253,75 +639,3 @@ def run_suite(
     for remark in remarks:
         warnings.warn(remark, stacklevel=3)
     return load_run(folder)
-
-
-def remarks_on(result: RunResult, folder: Path | str) -> list[str]:
-    """Return a sentence on each model that was stopped, and on samples that need a person."""
-    remarks = [f"{model} was stopped: {reason}" for model, reason in result.stopped.items()]
-    if result.failed:
-        rejected = f"{counted(result.failed, 'request')} rejected for good"
-        how = "when the cause is fixed, ask again with --retry-failed, retry_failed=True"
-        remarks.append(f"{rejected}: {how}")
-    if result.unjudged:
-        unjudged = f"{counted(result.unjudged, 'answer')} could not be judged"
-        remarks.append(f"{unjudged}: phyblock score {folder} tries again, without a call")
-    return remarks
-
-
-_NAP_S = 0.1
-"""Longest delay until a signal that the system gives to another thread is noticed [s]."""
-
-
-def completed(
-    session: Session,
-    signals: Collection[signal.Signals] = (signal.SIGINT,),
-    tick: Callable[[bool], object] = lambda _: None,
-) -> RunResult:
-    """Run a session to its end in a thread of its own, since a notebook's has a loop already.
-
-    The first signal lets it send nothing more, the second gives up calls under way; what was
-    answered is on disk when this returns. `tick` is called several times a second, with True while
-    calls are under way.
-    """
-    loop, stops = asyncio.new_event_loop(), 0
-    whole: asyncio.Task[RunResult] | None = None
-
-    async def run() -> RunResult:
-        nonlocal whole
-        whole = asyncio.current_task()
-        try:
-            return await session.run()
-        except asyncio.CancelledError:
-            return session.result
-
-    def in_thread() -> RunResult:
-        with asyncio.Runner(loop_factory=lambda: loop) as runner:
-            return runner.run(run())
-
-    def stop(*_: object) -> None:
-        nonlocal stops
-        stops += 1
-        # Once, as what is answered must be written; a loop that is closed has nothing to stop.
-        give_up = whole.cancel if stops == 2 and whole is not None else session.interrupt
-        with suppress(RuntimeError):
-            loop.call_soon_threadsafe(give_up)
-
-    is_main = threading.current_thread() is threading.main_thread()
-    before = {name: signal.getsignal(name) for name in signals if is_main}
-    heard = {name: was for name, was in before.items() if was not in (None, signal.SIG_IGN)}
-    for name in heard:
-        signal.signal(name, stop)
-    try:
-        with ThreadPoolExecutor(1) as pool:
-            running = pool.submit(in_thread)
-            try:
-                while not wait((running,), _NAP_S).done:
-                    tick(session.under_way > 0)
-            except BaseException:
-                # A program's handlers of other signals may raise what they like.
-                stop()
-                raise
-        return running.result()
-    finally:
-        for name, was in heard.items():
-            signal.signal(name, was)

@@ -11,13 +11,14 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 import phyblock
 from phyblock.errors import SpecError
 from phyblock.sim.engine import ENGINES
 from tests.workspace import Workspace
 
-NAMES = ["Episode", "PhyblockError", "Picture", "Run", "SceneTask", "Score", "Suite", "Task"]
+NAMES = ["Episode", "PhyblockError", "Run", "Score", "Suite", "Task"]
 NAMES += ["Tasks", "Turn", "__version__", "generate", "load_run", "load_suite", "render"]
 NAMES += ["run_suite", "tasks", "verify"]
 GUIDE = Path(__file__).parents[1] / "docs" / "python.md"
@@ -62,11 +63,9 @@ def test_the_guide_runs_and_every_object_shows_itself(
     for block in blocks:
         exec(compile(block, str(GUIDE), "exec"), names)
     assert "levels[0]" in capsys.readouterr().out
-    assert (tmp_path / "front.png").read_bytes() == names["picture"].png
+    assert Image.open(tmp_path / "front.png").tobytes() == names["picture"].tobytes()
     assert names["picture"]._repr_png_().startswith(PNG)
-    scene, run = names["scene"], names["run"]
-    assert scene._repr_png_().startswith(PNG)
-    assert f"<scene {scene.key}: level 1" in repr(scene)
+    run = names["run"]
     assert "quick" in repr(names["suite"])
     assert "random" in run._repr_html_()
     assert set(run.estimates["model"]) == {"random", "goal-blind"}
@@ -74,12 +73,12 @@ def test_the_guide_runs_and_every_object_shows_itself(
 
 def test_what_is_wrong_is_named() -> None:
     suite = phyblock.load_suite("quick", "limit=2")
-    scene = next(iter(suite.scenes.values()))
+    scene = phyblock.tasks("full_planning", limit=1)[0].item
     wrong: dict[str, typing.Callable[[], object]] = {
         "there is no such suite": lambda: phyblock.load_suite("quik"),
         "load_suite: suite: is too short": lambda: phyblock.load_suite(""),
         "--set limit=0": lambda: phyblock.load_suite("quick", "limit=0"),
-        "has no such scene": lambda: suite.scenes["l9"],
+        "has no such task": lambda: phyblock.tasks("full_planning", limit=1)["l9"],
         "render: show": lambda: phyblock.render(scene, show="all"),  # type: ignore[arg-type]
         "background is 'sea'": lambda: phyblock.render(scene, background="sea"),  # type: ignore[arg-type]
         "size_px is 5": lambda: phyblock.render(scene, size_px=5),

@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 import phyblock
+from phyblock.api import _distinct
 from phyblock.errors import SpecError
 from phyblock.records.files import read_manifest, run_records
 from phyblock.records.record import Record
-from phyblock.task import _distinct
 from phyblock.tracks.pictures import Workshop
 
 TRACKS = {"full_planning": "quick", "step_planning": "steps", "pose_planning": "pose", "vqa": "vqa"}
@@ -108,7 +108,7 @@ def test_streams_hold_no_scene_of_the_test_set_and_begin_anywhere() -> None:
     assert not {one.key for one in first} & {one.key for one in phyblock.tasks("full_planning")}
     dev = phyblock.tasks("pose_planning", split="dev", levels=[1], seed=5, limit=1)
     assert len(dev) == 1
-    assert not phyblock.verify(dev[0].item)  # type: ignore[arg-type]
+    assert not phyblock.verify(dev[0].item)
     assert first[0].score(None).outcome == "missing"
     with pytest.raises(TypeError, match="give a limit"):
         len(stream)

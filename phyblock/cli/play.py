@@ -21,7 +21,7 @@ from phyblock.cli.options import (
 )
 from phyblock.cli.results import show_tables
 from phyblock.files import OutFolder
-from phyblock.run.plan import bundled_suites
+from phyblock.run.plan import bundled_suites, read_suite
 from phyblock.run.store import held_run
 from phyblock.web.ending import Ending
 from phyblock.web.report import files_of, report_files
@@ -66,10 +66,10 @@ def play(
     Answers are records of the model human:NAME in a run folder. Give the same command again to
     continue where it stopped.
     """
-    from phyblock.api import load_run, load_suite
+    from phyblock.results.load import load_run
 
     person = Person(name, exact)
-    plan = plan_session(load_suite(Path(suite), *sets).loaded, person, limit)
+    plan = plan_session(read_suite(suite, sets), person, limit)
     folder = out or plan.folder_in(Path("results"))
     if held_run(folder, plan.manifest) is not None:
         OutFolder(folder).check(files_of(page=True))

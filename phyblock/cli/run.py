@@ -41,6 +41,7 @@ from phyblock.config.models import load_models
 from phyblock.files import OutFolder
 from phyblock.records.files import read_manifest
 from phyblock.results.text import NO_VALUE, REPORT_FILE, TABLES, Column, TextTable, kept_summary
+from phyblock.run.drive import completed, remarks_on
 from phyblock.run.estimate import Estimate, estimate, may_bill
 from phyblock.run.manifest import code_versions
 from phyblock.run.plan import (
@@ -49,6 +50,7 @@ from phyblock.run.plan import (
     bundled_suites,
     find_models_file,
     make_plan,
+    read_suite,
 )
 from phyblock.run.runner import RunResult, Session, check_ready
 from phyblock.run.store import held_run
@@ -95,10 +97,8 @@ def run(
     Keeps every record as it comes. Give the same command again to continue where it stopped; no
     call is repeated.
     """
-    from phyblock.api import completed, load_suite
-
     console = make_console()
-    loaded = load_suite(Path(suite), *sets).loaded
+    loaded = read_suite(suite, sets)
     known = load_models(find_models_file(models_file, loaded.files.path))
     plan = make_plan(loaded, known, only=models, limit=limit)
     folder = out or plan.folder_in(Path("results"))
@@ -150,8 +150,6 @@ def run(
 
 def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressView) -> int:
     """Print how a run ended, its cost and how to continue; return the exit code."""
-    from phyblock.api import remarks_on
-
     for remark in remarks_on(result, shown_path(folder)):
         console.print(one_line(remark), style="red")
     done = f"All {result.samples:,} samples are done"

@@ -24,6 +24,7 @@ from phyblock.run.plan import (
     find_suite,
     make_plan,
     model_problems,
+    read_suite,
 )
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of
@@ -116,9 +117,7 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[s
         hint = f"`phyblock scenes complete {shown_path(path)}` makes a data set of them"
         raise SpecError(Problem(str(path), message, allowed=allowed, hint=hint))
     if isinstance(data, dict) and data.keys() & suite_model().model_fields.keys():
-        from phyblock.api import load_suite
-
-        suite = load_suite(path, *sets).loaded
+        suite = read_suite(str(path), sets)
         named = find_models_file(models_file, path)
         known = load_models(named)
         asked = () if suite.models == RECORDED else suite.models

@@ -12,10 +12,10 @@ from typing import Any
 
 from PIL import Image
 
+from phyblock.api import Task, Tasks, tasks
 from phyblock.domain.question import LETTERS, is_picture_option
 from phyblock.files import OutFolder, writing
 from phyblock.integrations.huggingface import question_tasks
-from phyblock.task import Task, Tasks, tasks
 
 TSV_FILES = MCQ_FILE, ORDERING_FILE = "PhyBlock_MCQ.tsv", "PhyBlock_Ordering.tsv"
 _COLUMNS = ("index", "question", *LETTERS, "answer", "category", "l2-category", "scene")

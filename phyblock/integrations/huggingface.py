@@ -10,12 +10,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from phyblock.api import Task, tasks
 from phyblock.data.scenes import StoredScene
 from phyblock.files import OutFolder, needs, writing
 from phyblock.results.export import export_run
 from phyblock.results.load import Run
 from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png, goal_style
-from phyblock.task import Task, tasks
 
 FILES = "data.parquet", "README.md"
 _CARD = """---

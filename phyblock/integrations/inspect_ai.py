@@ -27,7 +27,7 @@ from inspect_ai.scorer import (
 )
 from inspect_ai.solver import Generate, Solver, TaskState, solver
 
-from phyblock.task import Split, Tasks, tasks
+from phyblock.api import Split, Tasks, tasks
 
 _ROLES = {
     "system": model.ChatMessageSystem,

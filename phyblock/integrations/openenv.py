@@ -21,8 +21,8 @@ from openenv.core.env_server.http_server import create_app
 from openenv.core.env_server.interfaces import Environment
 from openenv.core.env_server.types import Action, Observation, State
 
+from phyblock.api import Episode, Task, Tasks, tasks
 from phyblock.errors import Problem, SpecError
-from phyblock.task import Episode, Task, Tasks, tasks
 
 _MOST_SESSIONS = 64
 

@@ -12,7 +12,7 @@ from typing import Any
 from datasets import Dataset, Features, List, Value
 from datasets import Image as Picture
 
-from phyblock.task import Tasks
+from phyblock.api import Tasks
 
 _PART = {"type": Value("string"), "text": Value("string")}
 _FEATURES = {

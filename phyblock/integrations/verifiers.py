@@ -14,7 +14,7 @@ import verifiers.v1 as vf
 from pydantic import Field
 from verifiers.v1.types import content_text
 
-from phyblock.task import Score, Split, Task, Tasks, tasks
+from phyblock.api import Score, Split, Task, Tasks, tasks
 
 __all__ = ["VerifiersEnv", "VerifiersTaskset"]
 

@@ -11,7 +11,7 @@ from operator import attrgetter
 from pathlib import Path
 
 from phyblock.config.models import RECORDED, ModelConfig, resolve_models, with_members
-from phyblock.config.suite import Suite, Variant
+from phyblock.config.suite import Suite, Variant, load_suite
 from phyblock.config.yaml import read_yaml
 from phyblock.data.base import Dataset
 from phyblock.data.lookup import open_dataset
@@ -326,6 +326,12 @@ def find_suite(name: str) -> Path:
     hint = "name the suite that uses it" if is_prompt else did_you_mean(path.stem, suites)
     allowed = "a suite file, or a bundled suite: " + ", ".join(suites)
     raise SpecError(Problem(name or "suite", message, allowed=allowed, hint=hint))
+
+
+def read_suite(name: str, overrides: Sequence[str] = ()) -> Suite:
+    """Return the suite that `name` means, with custom prompts near it; raises as `load_suite`."""
+    path = find_suite(name)
+    return load_suite(path, overrides, prompt_dirs=prompt_dirs(path))
 
 
 def find_models_file(named: str | None, suite: Path | None) -> Path:
