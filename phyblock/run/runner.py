@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 from collections import deque
 from collections.abc import Callable, Coroutine, Mapping, Sequence
 from contextlib import AsyncExitStack
@@ -98,6 +99,7 @@ Watcher = Callable[[RunEvent], None]
 
 
 _Result = TypeVar("_Result")
+_LOCAL_AT_ONCE = max(8, os.cpu_count() or 1)
 
 
 @dataclass
@@ -288,8 +290,10 @@ class Session:
         workers: list[asyncio.Task[None]] = []
         for planned in self.plan.models:
             queue = queues[planned.name]
+            # What answers at once is asked a few at a time: it would keep calls waiting.
+            most = planned.max_concurrency if planned.kind == "litellm" else _LOCAL_AT_ONCE
             # What goes out in a batch is asked at once.
-            count = len(queue) if planned.batch else min(planned.max_concurrency, len(queue))
+            count = len(queue) if planned.batch else min(most, len(queue))
             workers += [asyncio.create_task(self._work(planned, queue)) for _ in range(count)]
         try:
             # One worker's error must not end the others: they wait for what is paid for.
