@@ -1,14 +1,15 @@
-"""Tables, paths and the question before money is spent, the same in all verbs."""
+"""Options, tables, paths and the question before money is spent, the same in all verbs."""
 
 from __future__ import annotations
 
 import os
+import re
 import shlex
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from rich import box
@@ -20,7 +21,13 @@ from rich.text import Text
 from phyblock.errors import Problem, SpecError
 from phyblock.results.text import Column, TextTable
 from phyblock.text import one_line, plain_lines
+from phyblock.types import QUOTE_HINT
 
+if TYPE_CHECKING:
+    from phyblock.workers import Shards
+
+INTERRUPTED = 130
+"""The exit code after Ctrl-C."""
 _PIPE_WIDTH = 160
 _TEXT_WIDTH = 24
 """Characters after which a cell of text may go on in a new line."""
@@ -137,3 +144,135 @@ def may_spend(
     if has_limit is not None:
         hint += ", or set a limit: --set limits.max_cost_usd=5"
     raise SpecError(Problem("models", message, found=", ".join(models), hint=hint))
+
+
+class UserPath(click.Path):
+    """A path with `~` for the home folder; an empty one, as from an unset variable, is refused."""
+
+    def __init__(self, *, path_type: type[Any] = Path, **options: Any) -> None:
+        super().__init__(path_type=path_type, **options)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path that `value` means."""
+        if not os.fspath(value):
+            self.fail("it is empty: is a variable not set?", param, ctx)
+        return super().convert(os.path.expanduser(value), param, ctx)
+
+
+def _names(_: click.Context, __: click.Parameter, value: str | None) -> tuple[str, ...]:
+    """Return names that are separated by single commas."""
+    names = () if value is None else tuple(name.strip() for name in value.split(","))
+    if not all(names):
+        raise click.BadParameter(f"{value!r} holds an empty name: {QUOTE_HINT}")
+    return names
+
+
+def _shard(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, int] | None:
+    """Return a shard and the number of all, which 3/64 stands for."""
+    if value is None:
+        return None
+    found = re.fullmatch(r"([1-9]\d{0,4})/([1-9]\d{0,4})", value)
+    if found is None or int(found[1]) > int(found[2]):
+        raise click.BadParameter(f"{value!r} is no shard: 3/64 is the third of 64")
+    return int(found[1]), int(found[2])
+
+
+def jobs_option(default: int | None = None) -> Callable[..., Any]:
+    """Return the option `--jobs`, by default all processors."""
+    return click.option(
+        *("--jobs", "-j"),
+        type=click.IntRange(1, 256),
+        default=default or os.cpu_count() or 1,
+        show_default=True if default else "all processors",
+        metavar="N",
+        help="Processes.",
+    )
+
+
+_CLUSTER_OPTIONS = (
+    click.option(
+        *("--ray", "ray_address"),
+        metavar="ADDRESS",
+        help="Work on this Ray cluster; local: on one of N workers here.",
+    ),
+    click.option(
+        "--shard",
+        callback=_shard,
+        metavar="I/N",
+        help="Be shard I of N programs that share the work through OUT.shards.",
+    ),
+)
+
+
+def worker_options(jobs: int | None = None) -> Callable[[Any], Any]:
+    """Return a decorator that adds the options of a verb that works in parallel."""
+
+    def add(command: Any) -> Any:
+        for option in reversed((jobs_option(jobs), *_CLUSTER_OPTIONS)):
+            command = option(command)
+        return command
+
+    return add
+
+
+def shards_folder(out: Path) -> Path:
+    """Return the folder that the shards of what goes to `out` share."""
+    return out.with_name(f"{out.name}.shards")
+
+
+def open_shards(shard: tuple[int, int] | None, out: Path, work: str) -> Shards | None:
+    """Return the shard that was asked for, if any; StoreError in a folder of other work."""
+    from phyblock.workers import Shards
+
+    return None if shard is None else Shards(shards_folder(out), *shard, work)
+
+
+def left_to_first(shards: Shards | None, out: Path) -> bool:
+    """True, with a word of it, if another shard writes what was made."""
+    if shards is None or shards.writes:
+        return False
+    click.echo(f"shard {shards.number}/{shards.count} is done; the first writes {shown_path(out)}")
+    return True
+
+
+def models_option(help_text: str) -> Callable[..., Any]:
+    """Return the option `--models`."""
+    return click.option("--models", callback=_names, metavar="A,B", help=help_text)
+
+
+NAME_OR_PATH = UserPath(path_type=str)
+"""The name of something bundled, or a path, as text."""
+
+run_argument = click.argument("run", type=UserPath())
+models_file_option = click.option(
+    "--models-file",
+    type=NAME_OR_PATH,
+    metavar="FILE",
+    help="Models file instead of models.yaml.",
+)
+data_option = click.option(
+    "--data",
+    type=UserPath(exists=True, file_okay=False),
+    metavar="DIR",
+    help="The data set, where it has moved.",
+)
+data_folders_option = click.option(
+    "--data",
+    type=UserPath(),
+    metavar="DIR",
+    multiple=True,
+    help="A folder of data that the run needs; may be given again.",
+)
+run_out_option = click.option(
+    "--out",
+    type=UserPath(),
+    metavar="DIR",
+    help="Folder of the run. [default: results/SUITE-DIGEST]",
+)
+sets_option = click.option(
+    "--set", "sets", multiple=True, metavar="KEY=VALUE", help="Override a value of the suite."
+)
+limit_option = click.option(
+    "--limit", type=click.IntRange(min=1), metavar="N", help="N scenes, spread over levels."
+)
+yes_option = click.option("--yes", is_flag=True, help="Spend money without asking.")

@@ -11,26 +11,25 @@ from importlib.metadata import entry_points
 
 import click
 
-from phyblock.cli.options import Sections, Verbs
 from phyblock.errors import InputError, PhyblockError, Problem, SpecError, StoreError, reason_of
 from phyblock.registry import PLUGINS
-from phyblock.text import counted, plain_lines
+from phyblock.text import counted, did_you_mean, plain_lines
 from phyblock.types import QUOTE_HINT
 
 _CLI, _MAKING, _MORE = "phyblock.cli", "phyblock.making.cli", "phyblock.integrations"
-_SECTIONS: Sections = {
+_SECTIONS = {
     "Run": {
         "init": (f"{_CLI}.setup:init", "Lay out a folder: a suite, models.yaml, prompts."),
         "validate": (f"{_CLI}.setup:validate", "Check suites, models files and data sets."),
-        "models": (f"{_CLI}.models:models", "List models with prices and keys; check one."),
+        "models": (f"{_CLI}.setup:models", "List models with prices and keys; check one."),
         "run": (f"{_CLI}.run:run", "Run a suite, or continue where it stopped."),
-        "play": (f"{_CLI}.play:play", "Answer a suite yourself, in a browser."),
+        "play": (f"{_CLI}.run:play", "Answer a suite yourself, in a browser."),
         "score": (f"{_CLI}.run:score", "Score stored replies again; calls no model."),
         "cache": (f"{_CLI}.setup:cache", "Show or clear the reply cache."),
     },
     "Look": {
         "report": (f"{_CLI}.results:report", "Write tables and page again, or print the tables."),
-        "show": (f"{_CLI}.show:show", "Show a sample: prompt, reply, verdict of each step."),
+        "show": (f"{_CLI}.results:show", "Show a sample: prompt, reply, verdict of each step."),
         "compare": (f"{_CLI}.results:compare", "Compare models on the same samples."),
         "figures": (f"{_CLI}.results:figures", "Draw figures for a paper, as PDF and SVG."),
     },
@@ -45,6 +44,8 @@ _SECTIONS: Sections = {
         "questions": (f"{_MAKING}.questions:questions", "Make, check and show questions."),
     },
 }
+"""Verbs by the heading that help lists them under: where each is (`module:name`), and its help."""
+_VERBS = {name: verb for verbs in _SECTIONS.values() for name, verb in verbs.items()}
 _ENTRY_POINTS = "phyblock.plugins"
 
 
@@ -69,9 +70,29 @@ def _load_plugins(_: click.Context, __: click.Parameter, modules: tuple[str, ...
         PLUGINS.append(module)
 
 
+class _Verbs(click.Group):
+    """The verbs, whose names and help texts are known without importing any of them."""
+
+    def list_commands(self, _: click.Context) -> list[str]:
+        return list(_VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
+        if cmd_name not in _VERBS:
+            hint = did_you_mean(cmd_name, _VERBS) or f"Commands: {', '.join(_VERBS)}"
+            raise click.UsageError(f"No such command {cmd_name!r}. {hint.capitalize()}", ctx)
+        module, _, name = _VERBS[cmd_name][0].partition(":")
+        command: click.Command = getattr(importlib.import_module(module), name)
+        return command
+
+    def format_commands(self, _: click.Context, formatter: click.HelpFormatter) -> None:
+        width = max(map(len, _VERBS))
+        for heading, verbs in _SECTIONS.items():
+            with formatter.section(heading):
+                formatter.write_dl([(f"{name:{width}}", verb[1]) for name, verb in verbs.items()])
+
+
 @click.group(
-    cls=Verbs,
-    sections=_SECTIONS,
+    cls=_Verbs,
     context_settings={
         "help_option_names": ["-h", "--help"],
         "max_content_width": 80,

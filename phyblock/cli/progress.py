@@ -51,8 +51,8 @@ class Tally:
     unpriced: int = 0
     cached: int = 0
     retries: int = 0
-    retries_told: int = 0
-    retries_told_s: float = -math.inf
+    logged: int = 0
+    logged_s: float = -math.inf
     last_retry: str = ""
     failures: Counter[str] = field(default_factory=Counter)
 
@@ -183,9 +183,9 @@ class ProgressView:
     def _log_retries(self, now_s: float) -> None:
         """Log repeated calls: the first at once, then at most a line a model every ten seconds."""
         for model, tally in list(self._tallies.items()):
-            more = tally.retries - tally.retries_told
-            if more and now_s - tally.retries_told_s >= _LINE_EVERY_S:
-                tally.retries_told, tally.retries_told_s = tally.retries, now_s
+            more = tally.retries - tally.logged
+            if more and now_s - tally.logged_s >= _LINE_EVERY_S:
+                tally.logged, tally.logged_s = tally.retries, now_s
                 again = counted(more, "call")
                 self._print(f"{model}: {again} sent again; last: {tally.last_retry}")
 

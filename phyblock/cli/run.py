@@ -1,7 +1,9 @@
-"""`phyblock run` and `phyblock score`: call models, and score stored replies again."""
+"""`phyblock run`, `play` and `score`: ask models or a person, score stored replies again."""
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import gc
 import signal
 import time
@@ -13,25 +15,24 @@ import click
 from rich.console import Console
 
 from phyblock.cli.console import (
-    make_console,
-    may_spend,
-    print_again,
-    print_path,
-    print_table,
-    shown_path,
-)
-from phyblock.cli.options import (
     INTERRUPTED,
     NAME_OR_PATH,
+    UserPath,
     data_option,
     left_to_first,
     limit_option,
+    make_console,
+    may_spend,
     models_file_option,
     models_option,
     open_shards,
+    print_again,
+    print_path,
+    print_table,
     run_argument,
     run_out_option,
     sets_option,
+    shown_path,
     worker_options,
     yes_option,
 )
@@ -142,7 +143,7 @@ def run(
         session = Session(plan, folder, view, **asks)
         result = completed(session, _SIGNALS, view.tick)
     gc.freeze()
-    made = show_tables(folder, page=not no_report, anew=False, keep=not result.left)
+    made = show_tables(folder, page=not no_report, kept=True, keep=not result.left)
     code = _conclude(console, folder, result, view)
     print_path(console, made)
     return code
@@ -156,9 +157,8 @@ def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressV
     if result.left:
         reason = f" ({result.stop.reason})" if result.stop else ""
         done = f"{result.settled:,} of {result.samples:,} samples are done{reason}"
-    cached = (
-        f" {view.cached:,} came from the reply cache (--no-cache asks anew)." if view.cached else ""
-    )
+    from_cache = f" {view.cached:,} came from the reply cache (--no-cache asks again)."
+    cached = from_cache if view.cached else ""
     unanswered = f"; {result.unanswered}" if result.unanswered else ""
     console.print(f"{done}. Cost so far: {view.cost_text}{unanswered}.{cached}")
     cause = result.stop.cause if result.stop else None
@@ -216,6 +216,85 @@ def _dollars(cost_usd: float | None) -> str:
     if cost_usd is None:
         return "unknown"
     return f"${cost_usd:,.4f}" if 0 < cost_usd < 0.01 else f"${cost_usd:,.2f}"
+
+
+@click.command(epilog=f"Bundled suites: {', '.join(bundled_suites())}.")
+@click.argument("suite", type=NAME_OR_PATH)
+@click.option(
+    "--name",
+    required=True,
+    metavar="NAME",
+    help="Who answers, as human:NAME in all tables: letters, digits, - and _; better no real name.",
+)
+@sets_option
+@limit_option
+@click.option(
+    "--beside",
+    type=UserPath(),
+    multiple=True,
+    metavar="RUN",
+    help="Show after the end how the models of this run folder did.",
+)
+@run_out_option
+@click.option("--port", type=click.IntRange(0, 65535), default=0, show_default="any free one")
+@click.option("--exact", is_flag=True, help="Show the models' prompt unfolded, as for a study.")
+@click.option("--no-browser", is_flag=True, help="Print the address and open nothing.")
+def play(
+    suite: str,
+    name: str,
+    sets: tuple[str, ...],
+    limit: int | None,
+    beside: tuple[Path, ...],
+    out: Path | None,
+    port: int,
+    exact: bool,
+    no_browser: bool,
+) -> int:
+    """Answer SUITE yourself, in a browser: the pictures that models get, and clicks for answers.
+
+    Answers are records of the model human:NAME in a run folder. Give the same command again to
+    continue where it stopped.
+    """
+    import webbrowser
+    from threading import Thread
+
+    from phyblock.results.load import load_run
+    from phyblock.web.ending import Ending
+    from phyblock.web.report import files_of, report_files
+    from phyblock.web.server import Server
+    from phyblock.web.session import Person, PlaySession, plan_session
+
+    person = Person(name, exact)
+    plan = plan_session(read_suite(suite, sets), person, limit)
+    folder = out or plan.folder_in(Path("results"))
+    if held_run(folder, plan.manifest) is not None:
+        OutFolder(folder).check(files_of(page=True))
+    for other in beside:
+        load_run(other)
+    console = make_console()
+
+    def begun() -> None:
+        print_path(console, f"Open {server.address}")
+        console.print("Ctrl-C ends the session; the same command continues it.", style="dim")
+        if not no_browser:
+            # A browser for terminals would not come back before it is closed.
+            Thread(target=webbrowser.open, args=(server.one_time_address,), daemon=True).start()
+
+    session = PlaySession(plan.samples_per_model)
+    with Server(session, port) as server:
+        result = asyncio.run(session.run(plan, person, folder, begun))
+        if result.left:
+            console.print(f"{session.done:,} of {plan.samples_per_model:,} tasks are answered.")
+            print_again(console)
+            return INTERRUPTED
+        made = show_tables(folder, page=True)
+        server.files = report_files(folder)
+        session.finish(Ending(folder, person.model, beside, plan.dataset.tasks))
+        print_path(console, made)
+        console.print("All is answered; the page shows how it went. Ctrl-C ends.", style="dim")
+        with contextlib.suppress(KeyboardInterrupt):
+            server.finished.wait()
+    return 0
 
 
 @click.command()

@@ -1,22 +1,44 @@
-"""`phyblock init`, `validate` and `cache`: a working folder, its files, the paid replies."""
+"""`phyblock init`, `validate`, `models` and `cache`: a working folder, its files, paid replies."""
 
 from __future__ import annotations
 
+import asyncio
+import io
 import os
 import shlex
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import click
 
-from phyblock.cli.console import make_console, print_path, print_rows, shown_path
-from phyblock.cli.options import UserPath, models_file_option, sets_option
-from phyblock.config.models import RECORDED, load_models
-from phyblock.config.suite import suite_model
+from phyblock.cli.console import (
+    UserPath,
+    make_console,
+    may_spend,
+    models_file_option,
+    print_path,
+    print_rows,
+    sets_option,
+    shown_path,
+    yes_option,
+)
+from phyblock.config.models import (
+    GROUP,
+    RECORDED,
+    ModelConfig,
+    group_names,
+    host_of,
+    load_models,
+    with_members,
+)
+from phyblock.config.suite import Suite, suite_model
 from phyblock.config.yaml import read_yaml
 from phyblock.data.lookup import read_data_set
 from phyblock.data.scenes import SCENES_FILE
-from phyblock.errors import InputError, Problem, SpecError
+from phyblock.errors import InputError, ModelError, Problem, SpecError
 from phyblock.files import bundled, check_free, reply_cache_file, writing
+from phyblock.models.cache import ReplyCache
+from phyblock.registry import baseline_names
 from phyblock.run.plan import (
     asking_remarks,
     bundled_suites,
@@ -25,8 +47,9 @@ from phyblock.run.plan import (
     make_plan,
     model_problems,
     read_suite,
+    to_config,
 )
-from phyblock.text import counted
+from phyblock.text import counted, did_you_mean
 from phyblock.tracks.base import kind_of
 
 _FILES = (
@@ -136,6 +159,113 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[s
     return [f"models file, {counted(len(known), 'model')}"]
 
 
+@click.group(invoke_without_command=True)
+@models_file_option
+@click.pass_context
+def models(ctx: click.Context, models_file: str | None) -> None:
+    """List the models that suites may name, by groups; `check NAME` makes one tiny call."""
+    from phyblock.models.costs import tariff_of
+    from phyblock.models.keys import api_key_status
+
+    path = find_models_file(models_file, None)
+    known = ctx.obj = load_models(path)
+    if ctx.invoked_subcommand is not None:
+        return
+    console = make_console()
+    groups: dict[str, Sequence[str]] = {"built in": baseline_names()}
+    groups |= {
+        f"{GROUP}{one}": with_members([f"{GROUP}{one}"], known) for one in group_names(known)
+    }
+    if others := [name for name, config in known.items() if not config.groups]:
+        groups["in no group" if len(others) < len(known) else "models"] = others
+    for title, names in groups.items():
+        rows: list[tuple[str, ...]] = []
+        for name, config in ((name, _config(name, known)) for name in names):
+            if config.kind != "litellm":
+                rows.append((name, str(config.recording or config.kind), "", "0, 0"))
+                continue
+            status, tariff = api_key_status(config), tariff_of(config)
+            key = f"needs {status.variables[0]}" if status.is_needed else "not needed"
+            key = "cannot be sent" if status.fault else "set" if status.is_set else key
+            price = f"{tariff.input:.10g}, {tariff.output:.10g}" if tariff else "unknown"
+            rows.append((name, config.id, key, price))
+        print_rows(console, (title, "id", "key", "$/M in, out"), rows, numbers=1)
+    console.print(f"{counted(len(known), 'model')} in {shown_path(path)}")
+
+
+def _config(name: str, known: Mapping[str, ModelConfig]) -> ModelConfig:
+    model = known.get(name, ModelConfig(name=name))
+    return to_config(name, model, Suite(name="models", models=(name,)))
+
+
+@models.command()
+@click.argument("name")
+@yes_option
+@click.pass_obj
+def check(known: Mapping[str, ModelConfig], name: str, yes: bool) -> int:
+    """Make one tiny call to each server of the model NAME, and print the answer."""
+    from phyblock.models.costs import is_billed
+    from phyblock.models.litellm_client import be_quiet
+
+    names = [*baseline_names(), *known]
+    if name not in names:
+        hint = did_you_mean(name, names) or "list them: phyblock models"
+        raise SpecError(Problem("models check", "is not in the models file", "", name, hint=hint))
+    console = make_console()
+    config = _config(name, known)
+    if config.kind != "litellm":
+        console.print(f"{name} is a {config.kind}: it makes no calls.")
+        return 0
+    addresses = config.addresses or (None,)
+    calls = counted(len(addresses), "call")
+    billed = [name] if is_billed(config) and not yes else []
+    if not may_spend(billed, lambda: console.print(f"{name} may bill {calls} of some 100 tokens.")):
+        console.print("Nothing was asked.")
+        return 1
+    be_quiet()
+    code = 0
+    for address in addresses:
+        server = f"{name} at {host_of(address)}" if address and len(addresses) > 1 else name
+        try:
+            answer = asyncio.run(_ask_tiny(config.at(address)))
+        except ModelError as error:
+            console.print(f"{server} failed the check: {error}", style="red")
+            code = 1
+        else:
+            console.print(f"{server} answers: {answer}")
+    return code
+
+
+async def _ask_tiny(config: ModelConfig) -> str:
+    """Show the model a small red square and ask for its color; one attempt, nothing cached.
+
+    Raises the ModelError that the call met, SpecError or DataError when the model cannot be built.
+    """
+    from PIL import Image as PillowImage
+
+    from phyblock.models.model import RetryPolicy, build_model
+    from phyblock.models.request import Image, Message, Request
+
+    side_px, buffer = 64, io.BytesIO()
+    PillowImage.new("RGB", (side_px, side_px), (216, 49, 49)).save(buffer, "PNG")
+    picture = Image(buffer.getvalue(), "check", side_px, side_px)
+    question = "What color is this picture? Answer with one word."
+    request = Request("check", 0, (Message("user", (picture, question)),), {}, "", None)
+    alone = config.model_copy(update={"seed": "never", "batch": False})
+    model = build_model(alone, cache=None, policy=RetryPolicy(attempts=1, retry_for_s=0.0))
+    try:
+        reply = await model.ask(request)
+    finally:
+        await model.aclose()
+    if reply is None or not reply.text.strip():
+        ended = f" (it ended by: {reply.finish})" if reply else ""
+        raise ModelError(f"the reply is empty{ended}")
+    usage = reply.usage
+    tokens = f"{usage.prompt_tokens or '?'} + {usage.completion_tokens or '?'} tokens"
+    cost = "cost unknown" if reply.cost_usd is None else f"${reply.cost_usd:.6f}"
+    return f"{reply.text.strip()[:80]!r} in {reply.latency_s:.1f} s, {tokens}, {cost}"
+
+
 @click.group()
 def cache() -> None:
     """Show or clear the reply cache, which all runs of this user share."""
@@ -144,8 +274,6 @@ def cache() -> None:
 @cache.command()
 def stats() -> None:
     """Show the number of cached replies of each model, and the size of the file."""
-    from phyblock.models.cache import ReplyCache
-
     console = make_console()
     with ReplyCache(reply_cache_file()) as opened:
         counts, size = opened.counts(), f"{opened.size_bytes / 1e6:,.1f} MB"
@@ -162,8 +290,6 @@ def stats() -> None:
 @click.option("--yes", is_flag=True, help="Do not ask.")
 def clear(model: str | None, yes: bool) -> None:
     """Delete cached replies; repeated calls will be billed."""
-    from phyblock.models.cache import ReplyCache
-
     which = f"replies of {model}" if model else "all replies"
     if not yes:
         click.confirm(f"Delete {which}? Repeated calls will be billed.", abort=True)

@@ -199,7 +199,7 @@ class Variant:
     """One choice of levels of the factors that a suite varies, as far as it differs from the
     reference of its run.
 
-    Another run may have another reference: only where two suites vary alike do names agree.
+    Another run may have another reference: names agree only where two suites vary the same.
     """
 
     levels: tuple[tuple[str, str], ...] = ()
@@ -216,7 +216,7 @@ class Variant:
 
     @property
     def shown(self) -> Variant:
-        """The part of it that changes what is sent, alike for all repeats."""
+        """The part of it that changes what is sent, the same for all repeats."""
         return Variant(tuple(pair for pair in self.levels if pair[0] != REPEAT))
 
 

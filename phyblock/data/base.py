@@ -22,6 +22,7 @@ from phyblock.domain.scene import CandidateSet, Scene
 from phyblock.errors import DataError, Problem, reason_of
 from phyblock.files import LARGEST_PICTURE_BYTES, read_bytes
 from phyblock.stable import hex_digest
+from phyblock.text import did_you_mean, some_of
 
 VERSION_FILE = "VERSION"
 UNNUMBERED = 1
@@ -60,6 +61,18 @@ class Dataset:
     def sha256(self) -> str:
         """Hex digest of the scenes and candidate sets, whatever the format they came in."""
         return _digest([[task.scene, task.candidates] for task in self.tasks])
+
+    @functools.cached_property
+    def _by_scene(self) -> dict[str, AssemblyTask]:
+        return {task.key: task for task in self.tasks}
+
+    def task(self, scene: str) -> AssemblyTask:
+        """Return the task of a scene; DataError where there is none."""
+        if scene in self._by_scene:
+            return self._by_scene[scene]
+        allowed, hint = some_of(list(self._by_scene)), did_you_mean(scene, self._by_scene)
+        message = "holds no such scene"
+        raise DataError(Problem(str(self.root), message, "scene", scene, allowed, hint))
 
 
 @dataclass(frozen=True)

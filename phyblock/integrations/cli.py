@@ -9,8 +9,7 @@ from typing import cast
 import click
 from click.core import ParameterSource
 
-from phyblock.cli.console import make_console, print_path
-from phyblock.cli.options import NAME_OR_PATH, UserPath
+from phyblock.cli.console import NAME_OR_PATH, UserPath, make_console, print_path
 
 _OF_RUN, _OF_SCENES, _OF_QUESTIONS = ("csv", "parquet", "hf"), ("hf",), ("hf", "vlmevalkit")
 _HELP = "Of a run: csv, parquet, hf; of scenes: hf; of questions: hf, vlmevalkit; else lmms-eval."

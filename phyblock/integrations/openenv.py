@@ -76,7 +76,7 @@ class PhyBlockEnvironment(Environment[PhyBlockAction, PhyBlockObservation, State
     ) -> PhyBlockObservation:
         """Begin a task: that of a key, of the seed's place, else the next in turn.
 
-        In a finite set, places are counted round; in a stream, that of a place is made anew.
+        In a finite set, places are counted round; in a stream, that of a place is made again.
         """
         if key is not None:
             self._task = self._known[key]
@@ -97,16 +97,16 @@ class PhyBlockEnvironment(Environment[PhyBlockAction, PhyBlockObservation, State
         if self._task is None:
             raise RuntimeError("reset() begins a task")
         self._state.step_count += 1
-        told: dict[str, Any] = {"key": self._task.key}
+        seen: dict[str, Any] = {"key": self._task.key}
         if self._episode is not None:
             turn, score = self._episode.step(action.text), self._episode.score()
-            told |= {"messages": turn.messages, "reward": turn.reward, "done": turn.done}
+            seen |= {"messages": turn.messages, "reward": turn.reward, "done": turn.done}
         else:
             score = self._task.score(action.text)
-            told |= {"reward": score.value, "done": True}
-        if told["done"]:
-            self._task, told["score"] = None, score.as_json()
-        return PhyBlockObservation(**told)
+            seen |= {"reward": score.value, "done": True}
+        if seen["done"]:
+            self._task, seen["score"] = None, score.as_json()
+        return PhyBlockObservation(**seen)
 
     @property
     def state(self) -> State:

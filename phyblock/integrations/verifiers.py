@@ -49,7 +49,7 @@ class VerifiersTask(vf.Task[VerifiersData, vf.State, vf.TaskConfig]):
     asked: Task | None = None
 
     def found(self) -> Task:
-        """Return the task of phyblock; of a trace that was stored, made anew."""
+        """Return the task of phyblock; of a trace that was stored, made again."""
         if self.asked is None:
             self.asked = self.data.source.read()[self.data.place]
         return self.asked

@@ -9,8 +9,7 @@ from typing import Any, TypeVar
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from phyblock.cli.console import make_console
-from phyblock.cli.options import UserPath, open_shards, shards_folder, worker_options
+from phyblock.cli.console import UserPath, make_console, open_shards, shards_folder, worker_options
 from phyblock.errors import Problem
 from phyblock.making.files import check_out
 from phyblock.making.season import code_digest

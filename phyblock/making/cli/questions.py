@@ -11,12 +11,14 @@ from pathlib import Path
 import click
 from PIL import Image
 
-from phyblock.cli.console import make_console, print_rows, shown_path
-from phyblock.cli.options import (
+from phyblock.cli.console import (
     NAME_OR_PATH,
     UserPath,
     jobs_option,
     left_to_first,
+    make_console,
+    print_rows,
+    shown_path,
 )
 from phyblock.data.base import QuestionSet
 from phyblock.data.lookup import find_questions, read_data_set
@@ -133,8 +135,8 @@ def verify(questions: str, data: str, jobs: int) -> None:
     ]
     rows.append(("", "checksums", str(files - len(changed)), str(files)))
     print_rows(make_console(), ("subtask", "", "derived again", "of"), rows, numbers=2)
-    told = [f"{q.id}: {p}" for q, p in zip(asked, problems, strict=True) if p]
-    conclude(questions, (*sorted(told), *changed))
+    failures = [f"{q.id}: {p}" for q, p in zip(asked, problems, strict=True) if p]
+    conclude(questions, (*sorted(failures), *changed))
 
 
 @questions.command("show")

@@ -15,16 +15,18 @@ import click
 from click.core import ParameterSource
 from pydantic import TypeAdapter
 
-from phyblock.cli.console import make_console, print_rows, shown_path
-from phyblock.cli.options import (
+from phyblock.cli.console import (
     NAME_OR_PATH,
     UserPath,
     jobs_option,
     left_to_first,
+    make_console,
     open_shards,
+    print_rows,
+    shown_path,
     worker_options,
 )
-from phyblock.data.base import AssemblyTask, Dataset, read_data
+from phyblock.data.base import AssemblyTask, read_data
 from phyblock.data.lookup import find_data_set, read_data_set
 from phyblock.data.scenes import SCENES_FILE, read_builtin
 from phyblock.domain.scene import Scene
@@ -84,7 +86,7 @@ from phyblock.sim.pictures import (
     visible_shares,
 )
 from phyblock.stable import hex_digest
-from phyblock.text import counted, did_you_mean, some_of
+from phyblock.text import counted
 from phyblock.tracks.difficulty import MEASURES
 from phyblock.types import BACKGROUNDS
 from phyblock.workers import open_workers
@@ -415,7 +417,7 @@ def show(data: str, scene: str) -> None:
     "on" names the blocks below, "pick" the candidate that stands for the block, "seen" the share
     of it that no other hides in the default goal picture.
     """
-    (task,) = _find_scenes(read_data_set(data), (scene,))
+    task = read_data_set(data).task(scene)
     shown, offered = task.scene, task.candidates
     console = make_console()
     levels, parents = " and ".join(map(str, shown.levels)), ", ".join(shown.parents)
@@ -445,20 +447,6 @@ def show(data: str, scene: str) -> None:
     ]
     columns = ("candidate", "type", "color", "euler deg", "needed")
     print_rows(console, columns, candidates, numbers=1)
-
-
-def _find_scenes(data: Dataset, names: Sequence[str]) -> tuple[AssemblyTask, ...]:
-    """The named scenes, in the order named; raises DataError with all that are not there."""
-    tasks = {task.scene.id: task for task in data.tasks}
-    if missing := [name for name in names if name not in tasks]:
-        raise DataError(
-            Problem(
-                *(str(data.root), "holds no such scene", "", name, some_of(list(tasks))),
-                hint=did_you_mean(name, tasks),
-            )
-            for name in missing
-        )
-    return tuple(tasks[name] for name in names)
 
 
 def _angles(euler_deg: tuple[float, float, float]) -> str:
@@ -499,7 +487,7 @@ def render(
     views = [name for name in VIEWS if view in (name, "all")]
     floors = [name for name in BACKGROUNDS if background in (name, "all")]
     drawings: dict[str, Callable[[], bytes]] = {}
-    for task in _find_scenes(read, scenes) if scenes else read.tasks:
+    for task in map(read.task, scenes) if scenes else read.tasks:
         for seen in views:
             for floor in floors:
                 style = PictureStyle(512, floor, *VIEWS[seen])
