@@ -143,15 +143,11 @@ def _serve(number: int, plugins: list[str]) -> None:
 class Workers:
     """Runs pure functions over tasks in batches of `size`: here, in processes, or on a cluster.
 
-    `submit` starts a job, `first` waits for jobs that are done, `result` gives what one gave, and
-    `cancel` ends one. At most `ahead` batches are under way, and few more wait for an earlier one.
-    With `shards`, batches are kept in files, and other programs do their part of them.
+    `submit` starts a job. At most `ahead` are under way, and few more wait for an earlier one. With
+    `shards`, batches are kept in files, and other programs do their part of them.
     """
 
-    submit: Callable[..., Any]
-    first: Callable[[list[Any]], Iterable[Any]]
-    result: Callable[[Any], Any]
-    cancel: Callable[[Any], object]
+    submit: Callable[..., Future[Any]]
     ahead: int = 1
     size: int = 1
     shards: Shards | None = None
@@ -166,7 +162,7 @@ class Workers:
     def _mapped(self, call: int, function: Callable[[T], R], tasks: Iterator[T]) -> Iterator[R]:
         shards, number, following = self.shards, 0, 0
         most = _WAITING * self.ahead * (shards.count if shards else 1)
-        running: dict[Any, int] = {}
+        running: dict[Future[list[R]], int] = {}
         others: dict[int, list[T]] = {}
         done: dict[int, list[R]] = {}
 
@@ -175,6 +171,9 @@ class Workers:
 
         try:
             while True:
+                while following in done:
+                    yield from done.pop(following)
+                    following += 1
                 while len(running) < self.ahead and len(running) + len(others) + len(done) < most:
                     if not (batch := list(islice(tasks, self.size))):
                         break
@@ -186,15 +185,14 @@ class Workers:
                         start(number, batch)
                     number += 1
                 if following in done:
-                    yield from done.pop(following)
-                    following += 1
-                elif shards is not None and following in others and shards.has(call, following):
+                    continue
+                if shards is not None and following in others and shards.has(call, following):
                     del others[following]
                     done[following] = shards.read(call, following)
                 elif running:
-                    for job in self.first(list(running)):
+                    for job in wait(running, return_when=FIRST_COMPLETED).done:
                         at = running.pop(job)
-                        done[at] = self.result(job)
+                        done[at] = job.result()
                         if shards is not None:
                             shards.keep(call, at, done[at])
                 elif shards is not None and following in others:
@@ -206,7 +204,7 @@ class Workers:
                     return
         finally:
             for job in running:
-                self.cancel(job)
+                job.cancel()
 
 
 class Shards:
@@ -297,6 +295,12 @@ def _each(function: Callable[[T], R], batch: list[T], plugins: list[str]) -> lis
     return [function(task) for task in batch]
 
 
+def _done_here(*job: Any) -> Future[Any]:
+    future: Future[Any] = Future()
+    future.set_result(_each(*job))
+    return future
+
+
 @contextlib.contextmanager
 def open_workers(
     jobs: int = 1,
@@ -311,32 +315,22 @@ def open_workers(
     more. Raises InputError when Ray is not installed or not reachable.
     """
     size = max(size, _BATCH if ray_address or shards else 1)
-    shared: Any = {"size": size, "shards": shards}
     with shards or contextlib.nullcontext():
         if ray_address is not None:
-            ray = _started(jobs, ray_address)
+            ray = _connected_ray(jobs, ray_address)
             try:
                 # A batch whose worker dies is done again, which changes nothing: it is pure.
                 remote = ray.remote(max_retries=_RAY_RETRIES)(_each).remote
                 ahead = 2 * max(1, int(ray.cluster_resources().get("CPU", 1)))
-                first = partial(_first_of_ray, ray)
-                yield Workers(remote, first, ray.get, ray.cancel, ahead, **shared)
+                yield Workers(lambda *job: remote(*job).future(), ahead, size, shards)
             finally:
                 ray.shutdown()
         elif jobs == 1:
-            here = (
-                partial(partial, _each),
-                lambda running: running[:1],
-                lambda job: job(),
-                lambda _: None,
-            )
-            yield Workers(*here, is_here=True, **shared)
+            yield Workers(_done_here, 1, size, shards, is_here=True)
         else:
             with WorkerPool(jobs) as pool:
                 try:
-                    done = partial(wait, return_when=FIRST_COMPLETED)
-                    threads = (lambda running: done(running).done, Future.result, Future.cancel)
-                    yield Workers(partial(pool.submit, _each), *threads, ahead=4 * jobs, **shared)
+                    yield Workers(partial(pool.submit, _each), 4 * jobs, size, shards)
                 except WorkerDiedError as error:
                     raise PhyblockError("a worker process was killed") from error
                 except KeyboardInterrupt:
@@ -345,13 +339,7 @@ def open_workers(
                     raise
 
 
-def _first_of_ray(ray: Any, running: list[Any]) -> list[Any]:
-    done: list[Any] = ray.wait(running)[0]
-    return done
-
-
-def _started(jobs: int, address: str) -> Any:
-    """Ray, connected to a cluster."""
+def _connected_ray(jobs: int, address: str) -> Any:
     try:
         ray = importlib.import_module("ray")
         options = {"num_cpus": jobs} if address == "local" else {"address": address}
