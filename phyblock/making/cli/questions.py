@@ -23,7 +23,7 @@ from phyblock.cli.console import (
 from phyblock.data.base import QuestionSet
 from phyblock.data.lookup import find_questions, read_data_set
 from phyblock.data.questions import read_questions
-from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Question, Subtask
+from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Subtask
 from phyblock.errors import DataError, Problem
 from phyblock.files import write_named
 from phyblock.making.cli.options import (
@@ -168,23 +168,20 @@ def show(question: str, questions: str, data: str, out: Path | None) -> None:
     ):
         console.print(line, soft_wrap=True)
     if out is not None:
-        write_named(out, _side_by_side(shown, PictureStyle()))
+        style = PictureStyle()
+        images = [Image.open(io.BytesIO(question_png(one, style))) for one in shown.pictures]
+        step = style.size_px + _GAP_PX
+        sheet = Image.new("RGB", (len(images) * step - _GAP_PX, style.size_px), "white")
+        for i, image in enumerate(images):
+            sheet.paste(image, (i * step, 0))
+        file = io.BytesIO()
+        sheet.save(file, "PNG")
+        write_named(out, file.getvalue())
         console.print(f"pictures: {shown_path(out)}", soft_wrap=True)
 
 
 def _read(questions: str, data: str) -> QuestionSet:
     return read_questions(find_questions(questions), read_data_set(data))
-
-
-def _side_by_side(question: Question, style: PictureStyle) -> bytes:
-    images = [Image.open(io.BytesIO(question_png(one, style))) for one in question.pictures]
-    step = style.size_px + _GAP_PX
-    sheet = Image.new("RGB", (len(images) * step - _GAP_PX, style.size_px), "white")
-    for i, image in enumerate(images):
-        sheet.paste(image, (i * step, 0))
-    file = io.BytesIO()
-    sheet.save(file, "PNG")
-    return file.getvalue()
 
 
 @questions.command("audit")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 import shlex
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -359,53 +359,46 @@ def audit(data: str, table: Path | None, jobs: int) -> None:
     twins = [one for one in check_set(scenes) if one.check == "duplicate"]
     every = [*twins, *chain.from_iterable(findings)]
     console = make_console()
+
+    def badness(scene: Scene) -> tuple[bool, bool, float, int]:
+        # What falls, then the largest overlap or gap, then the number of findings.
+        some = found[scene.id]
+        checks = {finding.check for finding in some}
+        fit = [f.value_mm or 0.0 for f in some if f.check in ("overlap", "floating")]
+        return "unstable" in checks, "unstable step" in checks, max(fit, default=0.0), len(some)
+
+    rows: list[tuple[str, ...]] = []
     guilty = [scene for scene in scenes if found[scene.id]]
-    if worst := sorted(guilty, key=lambda scene: _badness(found[scene.id]), reverse=True)[:_WORST]:
-        rows = [_worst_row(scene, found[scene.id]) for scene in worst]
+    for scene in sorted(guilty, key=badness, reverse=True)[:_WORST]:
+        first = found[scene.id][0]
+        named = [f"{b.order} {b.color} {b.type}" for b in scene.blocks if b.order in first.blocks]
+        facts = (first.check, first.message, ", ".join(named))
+        rows.append((scene.id, str(scene.level), *facts, str(len(found[scene.id]))))
+    if rows:
         headings = ("scene", "level", "check", "first finding", "blocks", "findings")
         print_rows(console, headings, rows, numbers=1)
     counts = _counts(every, (*AUDITED, "duplicate"))
     rows = [(check, str(failed), str(number)) for check, failed, number in counts]
     print_rows(console, ("check", "scenes", "findings"), rows, numbers=2)
-    for line in _totals(scenes, found, {check: n for check, _, n in counts}):
-        console.print(line, soft_wrap=True)
-    if table is not None:
-        write_named(table, findings_csv(every, {scene.id: scene.level for scene in scenes}))
-        console.print(f"all findings in {shown_path(table)}")
-
-
-def _badness(findings: Sequence[Finding]) -> tuple[bool, bool, float, int]:
-    """Sort key: what falls, then the largest overlap or gap [mm], then the number of findings."""
-    checks = {finding.check for finding in findings}
-    fit = [f.value_mm or 0.0 for f in findings if f.check in ("overlap", "floating")]
-    return "unstable" in checks, "unstable step" in checks, max(fit, default=0.0), len(findings)
-
-
-def _worst_row(scene: Scene, findings: Sequence[Finding]) -> tuple[str, ...]:
-    first = findings[0]
-    named = [f"{b.order} {b.color} {b.type}" for b in scene.blocks if b.order in first.blocks]
-    facts = (first.check, first.message, ", ".join(named))
-    return scene.id, str(scene.level), *facts, str(len(findings))
-
-
-def _totals(
-    scenes: Sequence[Scene], found: Mapping[str, Sequence[Finding]], count: Mapping[str, int]
-) -> tuple[str, ...]:
-    """Sentences about scenes that stand, and dependencies against contacts."""
 
     def without(*checks: str) -> int:
         return sum(not any(f.check in checks for f in found[scene.id]) for scene in scenes)
 
+    count = {check: number for check, _, number in counts}
     declared = sum(len(below) for scene in scenes for below in declared_supports(scene).values())
     shared = declared - count["dependency without contact"]
     contacts = shared + count["undeclared dependency"]
-    return (
+    for line in (
         f"{counted(len(scenes), 'scene')} read; {without(*AUDITED)} with no finding",
         f"{without('unstable')} stand when finished, "
         f"{without('unstable', 'unstable step')} at every step as well",
         f"{shared} of {declared} ({shared / declared:.3f}) declared dependencies are contacts",
         f"{shared} of {contacts} ({shared / max(contacts, 1):.3f}) contacts are declared",
-    )
+    ):
+        console.print(line, soft_wrap=True)
+    if table is not None:
+        write_named(table, findings_csv(every, {scene.id: scene.level for scene in scenes}))
+        console.print(f"all findings in {shown_path(table)}")
 
 
 @scenes.command("show")
