@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import gymnasium
 
-from phyblock.env.environment import DONE, PhyBlockEnv, read_tasks
+from phyblock.env.environment import DONE, PhyBlockEnv
 
-__all__ = ["DONE", "ENV_ID", "PhyBlockEnv", "read_tasks"]
+__all__ = ["DONE", "ENV_ID", "PhyBlockEnv"]
 
 ENV_ID = "PhyBlock-v0"
 

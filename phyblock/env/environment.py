@@ -30,7 +30,6 @@ from phyblock.data.base import AssemblyTask, Dataset
 from phyblock.data.lookup import read_data_set
 from phyblock.domain.blocks import BLOCK_TYPES, COLORS
 from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, PoseStep
-from phyblock.errors import DataError, Problem
 from phyblock.files import bundled
 from phyblock.models.request import Image as SentImage
 from phyblock.scoring.pose import blocks_reached
@@ -46,7 +45,6 @@ from phyblock.sim.pictures import (
     goal_style,
 )
 from phyblock.sim.ruled import RuledFloor, kit_sheet
-from phyblock.text import some_of
 from phyblock.tracks.pictures import LocalShop
 from phyblock.tracks.step_planning import PastStep, StepOutcome, StepPlanning
 from phyblock.types import GATINGS, SETTINGS, Background, Gating, Physics, Setting
@@ -71,13 +69,6 @@ _LEVELS = (1, 2, 3, 4, 5)
 _CM = 100.0
 _NEAR = (1.0, 10.0)
 """Distance and turn within which a block has reached its place [cm, degrees]."""
-
-
-def read_tasks(data: str | Path) -> tuple[AssemblyTask, ...]:
-    """The scenes of a data set: a folder with scenes.jsonl, an official checkout, a bundled name;
-    DataError for none, or with everything that is wrong in it.
-    """
-    return read_data_set(str(data)).tasks
 
 
 def _rows(blocks: Sequence[Block] | Sequence[Candidate], most: int) -> NDArray[np.float32]:
@@ -175,10 +166,8 @@ class _PosePlay:
 
     def __init__(self, style: PictureStyle, *, is_strict: bool) -> None:
         self._style, self._is_strict = style, is_strict
-        number, center = (
-            spaces.Discrete(MAX_CANDIDATES + 1),
-            spaces.Box(-1.0, 1.0, (3,), np.float64),
-        )
+        center = spaces.Box(-1.0, 1.0, (3,), np.float64)
+        number = spaces.Discrete(MAX_CANDIDATES + 1)
         self.action_space = spaces.Dict({"block": number, "center_m": center})
         self._stack = contextlib.ExitStack()
         self._task: AssemblyTask | None = None
@@ -301,9 +290,9 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         max_failures: int | None = None,
         render_mode: str | None = None,
     ) -> None:
-        """Play `data`, a data set (see `read_tasks`) or tasks: scenes of `levels` (None: of all),
-        or one `scene`. With `action="pose"` a block is put where the action says,
-        turned as its candidate is; `setting` and `gating` are of `action="block"` alone.
+        """Play `data`, a data set (a folder, an official checkout, a bundled name) or tasks: scenes
+        of `levels` (None: of all), or one `scene`. With `action="pose"` a block is put where the
+        action says, turned as its candidate is; `setting` and `gating` are of `action="block"`.
 
         Raises DataError for a data set or scene that is not there, ValueError for an option that
         is not among those allowed, a limit below 1, or no tasks at all.
@@ -314,9 +303,10 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
             ("physics", physics, get_args(Physics)),
             ("observe", observe, get_args(Observe)),
             ("action", action, get_args(Action)),
+            ("render_mode", render_mode, ("rgb_array", None)),
         ):
             if value not in allowed:
-                raise ValueError(f"{name} is {value!r}; allowed: {', '.join(allowed)}")
+                raise ValueError(f"{name} is {value!r}; allowed: {', '.join(map(str, allowed))}")
         if action == "pose" and (setting != "A" or gating != "aov"):
             raise ValueError("setting and gating are of action='block'; leave them out")
         if action == "pose" and observe == "text":
@@ -326,11 +316,9 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         for name, most in (("max_steps", max_steps), ("max_failures", max_failures)):
             if most is not None and most < 1:
                 raise ValueError(f"{name} is {most}; allowed: 1 or more, or None")
-        if render_mode not in (None, "rgb_array"):
-            raise ValueError(f"render_mode is {render_mode!r}; allowed: rgb_array, or None")
         if not _SMALLEST_PX <= size_px <= LARGEST_PX:
             raise ValueError(f"size_px is {size_px}, allowed {_SMALLEST_PX}..{LARGEST_PX}")
-        tasks = read_tasks(data) if isinstance(data, str | Path) else tuple(data)
+        tasks = read_data_set(str(data)).tasks if isinstance(data, str | Path) else tuple(data)
         if levels is not None:
             if not isinstance(levels, Collection) or not set(levels) <= set(_LEVELS):
                 raise ValueError(f"levels is {levels!r}; allowed: several of {_LEVELS}, or None")
@@ -338,13 +326,13 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         if not tasks:
             of = "" if levels is None else f" of levels {sorted(levels)}"
             raise ValueError(f"data holds no tasks{of}")
-        self._tasks = {task.scene.id: task for task in tasks}
-        self._scene = None if scene is None else self._find(scene).scene.id
+        self._data = Dataset("data", Path("data"), tasks)
+        self._scene = None if scene is None else self._data.task(scene).key
         self._observe = observe
         # Below the smallest that is drawn, whole pixels are put together.
         self._shrink = max(1, -(-SMALLEST_PX // size_px))
         style = PictureStyle(size_px * self._shrink, background)
-        self._task = next(iter(self._tasks.values()))
+        self._task = tasks[0]
         self._play: _BlockPlay | _PosePlay = (
             _PosePlay(style, is_strict=physics == "strict")
             if action == "pose"
@@ -359,9 +347,8 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         if observe == "text":
             rules = {"setting": setting, "gating": gating, "max_steps": max_steps or "null"}
             said = [f"steps.{name}={value}" for name, value in rules.items()]
-            path = bundled("benchmarks", "steps.yaml")
-            known, suite = Dataset("env", path, tasks), load_suite(path, said)
-            self._prompter = StepPlanning(suite, known, shop=LocalShop())
+            suite = load_suite(bundled("benchmarks", "steps.yaml"), said)
+            self._prompter = StepPlanning(suite, self._data, shop=LocalShop())
         self._begin(self._task)
         self.action_space = self._play.action_space
         parts: dict[str, spaces.Space[Any]] = {
@@ -393,8 +380,8 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         super().reset(seed=seed)
         name = (options or {}).get("scene", self._scene)
         if name is None:
-            name = list(self._tasks)[int(self.np_random.integers(len(self._tasks)))]
-        self._begin(self._find(name))
+            name = self._data.tasks[int(self.np_random.integers(len(self._data.tasks)))].key
+        self._begin(self._data.task(str(name)))
         return self._observation(), self._info()
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -449,18 +436,20 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
             self._task = task
             self._pictures.clear()
 
-    def _find(self, scene: object) -> AssemblyTask:
-        if scene in self._tasks:
-            return self._tasks[str(scene)]
-        message, allowed = "the environment has no such scene", some_of(list(self._tasks))
-        raise DataError(Problem("PhyBlockEnv", message, "scene", str(scene), allowed))
-
     def _observation(self) -> Observation:
         play, goal = self._play, self._task.scene.blocks
         if self._observe != "state":
             shown = zip(_PICTURES, (goal, None, play.blocks), strict=True)
             seen: Observation = {name: self._picture(blocks).copy() for name, blocks in shown}
-            return seen if self._prompter is None else {**seen, "text": self._text(self._prompter)}
+            if self._prompter is not None:
+                # Where a picture is sent, its name stands.
+                pictures = [SentImage(b"", name, 0, 0) for name in _PICTURES]
+                messages = self._prompter.messages(self._task, pictures, self._past)
+                parts = (part for message in messages for part in message.parts)
+                seen["text"] = "\n\n".join(
+                    part if isinstance(part, str) else f"[picture: {part.label}]" for part in parts
+                )
+            return seen
         if len(goal) > MOST_BLOCKS:
             raise ValueError(f"a goal of {len(goal)} blocks; at most {MOST_BLOCKS} fit in a state")
         placed = np.bincount(play.chosen, minlength=MAX_CANDIDATES + 1)[1:]
@@ -475,16 +464,6 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
             # Of more than there are rows, those that came last.
             state["world"] = _rows(play.blocks[-MOST_BLOCKS:], MOST_BLOCKS)
         return state
-
-    def _text(self, track: StepPlanning) -> str:
-        """The prompt of the next step, with `[picture: goal]` where the goal is, and so on."""
-        pictures = [SentImage(b"", name, 0, 0) for name in _PICTURES]
-        messages = track.messages(self._task, pictures, self._past)
-        return "\n\n".join(
-            part if isinstance(part, str) else f"[picture: {part.label}]"
-            for message in messages
-            for part in message.parts
-        )
 
     def _picture(self, blocks: tuple[Block, ...] | None) -> NDArray[np.uint8]:
         """A picture of blocks, or of the candidates; those unused for longest make room."""

@@ -16,9 +16,10 @@ from PIL import Image
 
 import phyblock
 import phyblock.env
+from phyblock.data.lookup import read_data_set
 from phyblock.domain.blocks import BLOCK_TYPES, COLORS
 from phyblock.domain.scene import CandidateSet, PoseStep
-from phyblock.env import DONE, PhyBlockEnv, read_tasks
+from phyblock.env import DONE, PhyBlockEnv
 from phyblock.scoring.pose import blocks_reached
 from phyblock.sim.dynamics import execute
 from phyblock.sim.geometry import put
@@ -26,7 +27,7 @@ from phyblock.types import SETTINGS, Setting
 from tests.tracks.opened import seesaw
 
 ROOT = Path(__file__).parents[2]
-SOME = read_tasks("phyblock-400")[::20]
+SOME = read_data_set("phyblock-400").tasks[::20]
 
 
 def rollout(env: PhyBlockEnv, seed: int, steps: int = 30) -> list[Any]:
@@ -193,7 +194,7 @@ def test_what_physics_does_with_what_cannot_stand(
         ({"setting": "C"}, "setting is 'C'; allowed: A, B"),
         ({"physics": "strct"}, "allowed: off, settle, strict"),
         ({"size_px": 15}, "size_px is 15, allowed 16..2048"),
-        ({"render_mode": "human"}, "render_mode is 'human'; allowed: rgb_array, or None"),
+        ({"render_mode": "human"}, "render_mode is 'human'; allowed: rgb_array, None"),
         ({"max_steps": 0}, "max_steps is 0"),
         ({"data": ()}, "no tasks"),
         ({"action": "pose", "physics": "off"}, "allowed: settle, strict"),
