@@ -515,14 +515,6 @@ def load_suite(
         raise SpecError([*problems, Problem(str(path), "is empty", allowed="a suite")])
     # What varies has the values of the reference, wherever one value alone is asked for.
     suite = read_section(suite_model(), source, problems).at(Variant())
-    return suite.with_files(_files_of(suite, path, source, prompt_dirs))
-
-
-def _files_of(
-    suite: Suite, path: Path, source: YamlSource, prompt_dirs: Sequence[Path]
-) -> SuiteFiles:
-    """Resolve the paths of a suite; SpecError for all that lead nowhere."""
-    problems: list[Problem] = []
 
     def existing(text: str, at: FieldPath, *, is_folder: bool = False) -> Path:
         base = Path.cwd() if source.is_overridden(at) else path.parent
@@ -572,4 +564,4 @@ def _files_of(
                     templates[name, text] = custom
     if problems:
         raise SpecError(source.in_order(problems))
-    return SuiteFiles(path, dataset, source, folders, templates)
+    return suite.with_files(SuiteFiles(path, dataset, source, folders, templates))
