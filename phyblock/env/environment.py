@@ -347,6 +347,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         if observe == "text":
             rules = {"setting": setting, "gating": gating, "max_steps": max_steps or "null"}
             said = [f"steps.{name}={value}" for name, value in rules.items()]
+            said.append("candidates.order=file")
             suite = load_suite(bundled("benchmarks", "steps.yaml"), said)
             self._prompter = StepPlanning(suite, self._data, shop=LocalShop())
         self._begin(self._task)

@@ -84,12 +84,12 @@ def score_fields(score: Score) -> dict[str, Any]:
 @dataclass(frozen=True)
 class PlanSubject:
     """The scene that baselines and people answer about; `guess` gives a plan that was learned
-    without the goal.
+    without the goal, or with the areas of its colors alone where that `sees_colors`.
     """
 
     scene: Scene
     candidates: CandidateSet
-    guess: Callable[[], Plan] = field(default=Plan, compare=False)
+    guess: Callable[..., Plan] = field(default=Plan, compare=False)
 
 
 def plan_text(steps: Iterable[int]) -> str:
@@ -138,6 +138,7 @@ PLAN_RULES: Mapping[str, Callable[..., str]] = {
     ),
     "all-candidates": lambda subject, _: plan_text(range(1, len(subject.candidates) + 1)),
     "goal-blind": lambda subject, _: plan_text(subject.guess().steps),
+    "color-areas": lambda subject, _: plan_text(subject.guess(sees_colors=True).steps),
     "first-pose": _in_valid_order(
         lambda subject, block, _: subject.candidates.first_of(block.kind)
     ),
@@ -266,7 +267,7 @@ class FullPlanning(SceneTrack):
         """Select scenes; DataError where the data set is to bring their pictures and lacks some."""
         super().open()
         suite, dataset = self.suite, self.dataset
-        self._guess = blind_guesses(suite.candidates.order, dataset.tasks, suite.settings[0])
+        self._guess = blind_guesses(suite, dataset.tasks, suite.settings[0])
         self._scorers: dict[object, AssemblyScorer] = {}
         lacking = [task.key for task in self.items if task.composite is None]
         if self.shop is not None and suite.images.source == "dataset" and lacking:

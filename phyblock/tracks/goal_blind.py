@@ -1,12 +1,14 @@
 """Plans made without seeing the goal: by how often blocks like each candidate are needed.
 
+They may also go by how much of each color the picture of the goal shows, and by nothing else in it.
 A scene is never answered by what is known of a scene that shares a base scene with it.
 """
 
 from __future__ import annotations
 
 import functools
-from collections import defaultdict
+import math
+from collections import Counter, defaultdict
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -16,11 +18,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from phyblock.config.suite import Suite
 from phyblock.data.base import AssemblyTask
 from phyblock.domain.scene import Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring.plan import Goal, most_placed
+from phyblock.sim.pictures import PictureStyle, goal_camera, segments
 from phyblock.tracks.items import ShownTask, presented
-from phyblock.types import CandidateOrder, Setting
+from phyblock.types import CandidateOrder, Setting, View
 
 Floats = NDArray[np.float64]
 _MOST_COPIES = 6
@@ -28,6 +32,11 @@ _MOST_COPIES = 6
 _PRIOR = 4.0
 """So many units of the overall frequency are mixed into every row of a table."""
 _THRESHOLDS = (0.0, 0.1, 0.14, 0.18, 0.23, 0.3, 0.4)
+_SIDE_PX = 128
+"""Side of the pictures in which colors are measured [pixels]."""
+Areas = Mapping[str, float]
+"""Share of each color in what a picture shows of blocks; colors that it does not show are absent.
+"""
 
 
 @dataclass(frozen=True)
@@ -35,13 +44,15 @@ class Unit:
     """One thing under a setting: a candidate in A, all candidates of a kind in B.
 
     `numbers` are those of its candidates, `candidate` is the first of them. `poses` is how many
-    candidates its kind has, `rank` its place among them from 0.
+    candidates its kind has, `rank` its place among them from 0. `area` is the share of its color in
+    the picture of the goal, where that is known.
     """
 
     numbers: tuple[int, ...]
     candidate: Candidate
     poses: int
     rank: int
+    area: float = 0.0
 
 
 Key = Callable[[Unit], Hashable]
@@ -50,16 +61,22 @@ KEYS: tuple[Key, ...] = (
     lambda unit: (unit.candidate.type, unit.poses, unit.rank),
 )
 """Rows of the table of frequencies: looks; types by the poses offered and the place among them."""
+AREA_KEYS: tuple[Key, ...] = (
+    lambda unit: math.ceil(10 * unit.area),
+    lambda unit: (math.ceil(10 * unit.area), unit.candidate.type),
+)
+"""Rows where areas are known: tenths of the color, 0 for none; the same by type."""
 
 
-def units(candidates: CandidateSet, setting: Setting) -> list[Unit]:
+def units(candidates: CandidateSet, setting: Setting, areas: Areas | None = None) -> list[Unit]:
     """Return the units of a candidate set under a setting, by their numbers."""
     listed, made = list(enumerate(candidates.candidates, 1)), []
     for number, one in listed:
         same = tuple(n for n, other in listed if other.kind == one.kind)
         rank = same.index(number)
         if setting == "A" or rank == 0:
-            made.append(Unit((number,) if setting == "A" else same, one, len(same), rank))
+            numbers, area = (number,) if setting == "A" else same, (areas or {}).get(one.color, 0.0)
+            made.append(Unit(numbers, one, len(same), rank, area))
     return made
 
 
@@ -79,17 +96,20 @@ def goal_blind_plans(
     setting: Setting,
     keys: Sequence[Key] = KEYS,
     repeats: bool = True,
+    areas: Mapping[str, Areas] | None = None,
 ) -> dict[str, Plan]:
     """Return for each scene a plan that was learned from the scenes unrelated to it.
 
     Every key, threshold and order is a way to make plans; of each scene the way is taken that
-    scores best on the unrelated ones. Without `repeats` no candidate is named twice.
+    scores best on the unrelated ones. Without `repeats` no candidate is named twice. `areas` are
+    those of the colors of each goal, by scene.
     """
     if not scenes:
         return {}
     kin = related(scenes)
     goals = [Goal(scene, candidates[scene.id], setting) for scene in scenes]
-    offered = [units(candidates[scene.id], setting) for scene in scenes]
+    seen = areas or {}
+    offered = [units(candidates[one.id], setting, seen.get(one.id)) for one in scenes]
     heights = _heights(scenes, offered, goals, kin)
     likely = zip(*(chances(offered, goals, kin, key) for key in keys), strict=True)
     plans_of = map(partial(_plans, repeats=repeats), offered, likely, heights)
@@ -201,28 +221,44 @@ def _plans(
     return plans
 
 
+@functools.lru_cache(maxsize=4096)
+def color_areas(scene: Scene, view: View) -> Areas:
+    """Return the share of each color in what the picture of a goal shows of its blocks."""
+    camera = goal_camera(scene, PictureStyle.from_view(view, _SIDE_PX))
+    seen = segments(scene.blocks, camera, _SIDE_PX)
+    shown = [scene.blocks[vertex].color for vertex in seen[seen >= 0].tolist()]
+    return {color: n / len(shown) for color, n in Counter(shown).items()}
+
+
 def blind_guesses(
-    order: CandidateOrder, pool: Sequence[AssemblyTask], setting: Setting
-) -> Callable[[AssemblyTask], Plan]:
+    suite: Suite, pool: Sequence[AssemblyTask], setting: Setting
+) -> Callable[..., Plan]:
     """Return what gives the plan for a task of a pool, in the numbers that are shown.
 
-    A place in the list tells something only where the order is the file's, so plans are learned
-    anew for every order. A goal is not learned from, whichever is shown.
+    Where it is asked for one that `sees_colors`, their areas in the picture of the goal have a part
+    in it. A place in the list tells something only where the order is the file's, so plans are
+    learned anew for every order. A goal is not learned from, whichever is shown.
     """
-    of_seed = functools.cache(lambda seed: _learned(tuple(pool), order, seed, setting))
+    order, view = suite.candidates.order, suite.images.view
 
-    def plan(task: AssemblyTask) -> Plan:
+    def plan(task: AssemblyTask, *, sees_colors: bool = False) -> Plan:
         seed = task.seed if isinstance(task, ShownTask) and order == "shuffled" else 0
-        learned: dict[str, Plan] = of_seed(seed)
-        return learned[task.key]
+        return _learned(tuple(pool), order, seed, setting, view if sees_colors else None)[task.key]
 
     return plan
 
 
 @functools.lru_cache(maxsize=32)
 def _learned(
-    pool: tuple[AssemblyTask, ...], order: CandidateOrder, seed: int, setting: Setting
+    pool: tuple[AssemblyTask, ...],
+    order: CandidateOrder,
+    seed: int,
+    setting: Setting,
+    view: View | None,
 ) -> dict[str, Plan]:
     shown = [presented(one, seed, order) for one in pool]
-    candidates = {one.key: one.candidates for one in shown}
-    return goal_blind_plans([one.scene for one in shown], candidates, setting)
+    scenes, candidates = [one.scene for one in shown], {one.key: one.candidates for one in shown}
+    if view is None:
+        return goal_blind_plans(scenes, candidates, setting)
+    areas = {scene.id: color_areas(scene, view) for scene in scenes}
+    return goal_blind_plans(scenes, candidates, setting, AREA_KEYS, areas=areas)

@@ -228,6 +228,7 @@ STEP_RULES: Mapping[str, Callable[..., str]] = {
     "repeat": _repeated_step,
     "all-candidates": _in_turn(lambda subject: range(1, len(subject.candidates) + 1)),
     "goal-blind": _in_turn(lambda subject: subject.guess().steps),
+    "color-areas": _in_turn(lambda subject: subject.guess(sees_colors=True).steps),
     "first-pose": _right_move(
         lambda subject, index, _: subject.candidates.first_of(subject.candidates[index].kind)
     ),
@@ -371,8 +372,7 @@ class StepPlanning(SceneTrack):
         """Select scenes."""
         super().open()
         self.accepts = self.spec.setting or self.suite.settings[0]
-        order, tasks = self.suite.candidates.order, self.dataset.tasks
-        self.guess = blind_guesses(order, tasks, self.accepts)
+        self.guess = blind_guesses(self.suite, self.dataset.tasks, self.accepts)
         self._fallen: dict[tuple[Block, ...], tuple[int, ...]] = {}
 
     def about(self, item: AssemblyTask) -> dict[str, Any]:

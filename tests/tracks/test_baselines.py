@@ -23,7 +23,15 @@ from phyblock.scoring.plan import Goal, match_plan, micro
 from phyblock.sim.pictures import joined_size_px
 from phyblock.tracks.baselines import FOLDS, Folds, Guesses, majority_rule
 from phyblock.tracks.full_planning import PlanSubject, pick_plan
-from phyblock.tracks.goal_blind import KEYS, chances, goal_blind_plans, related, units
+from phyblock.tracks.goal_blind import (
+    AREA_KEYS,
+    KEYS,
+    chances,
+    color_areas,
+    goal_blind_plans,
+    related,
+    units,
+)
 from phyblock.tracks.picking import Choice, Pick, Picking
 from phyblock.tracks.pose_planning import pick_poses
 from phyblock.tracks.questions import ChoiceSubject, pick_answer
@@ -188,9 +196,10 @@ def test_no_goal_has_a_part_in_what_is_learned_for_its_own_base_scene(
     others = tuple(data.draw(st.lists(st.sampled_from(own), min_size=1, max_size=5)))
     changed = [*scenes[:at], scene(scenes[at].id, others, scenes[at].parents), *scenes[at + 1 :]]
     kin = related(scenes)
-    offered = [units(sets[one.id], setting) for one in scenes]
+    areas = {color: data.draw(st.sampled_from([0.0, 0.15, 0.5])) for color in COLORS}
+    offered = [units(sets[one.id], setting, areas) for one in scenes]
     goals = [[Goal(one, sets[one.id], setting) for one in known] for known in (scenes, changed)]
-    for key in KEYS:
+    for key in (*KEYS, *AREA_KEYS):
         before, after = (chances(offered, known, kin, key) for known in goals)
         for place in kin[at]:
             np.testing.assert_array_equal(before[place], after[place])
@@ -211,6 +220,23 @@ def test_a_planted_tell_is_found(setting: Setting) -> None:
     assert f1(scenes, sets, learned, setting) > 0.8
     assert f1(scenes, sets, every, setting) < 0.5
     assert f1(scenes, sets, evenly, setting) < 0.5
+
+
+@pytest.mark.parametrize("setting", ["A", "B"])
+def test_areas_of_colors_tell_which_colors_are_needed(setting: Setting) -> None:
+    """The needed ones are all of a color that is drawn for each scene."""
+    rng = np.random.default_rng(5)
+    scenes, sets = [], {}
+    for number in range(40):
+        offered = [KIT[int(i)] for i in rng.permutation(len(KIT))[:8]]
+        color = offered[int(rng.integers(8))].color
+        scenes.append(scene(f"s{number}", tuple(one for one in offered if one.color == color)))
+        sets[f"s{number}"] = CandidateSet(tuple(offered))
+    areas = {one.id: color_areas(one, "oblique") for one in scenes}
+    assert all(areas[one.id] == {one.blocks[0].color: 1.0} for one in scenes)
+    seen = goal_blind_plans(scenes, sets, setting, AREA_KEYS, areas=areas)
+    assert f1(scenes, sets, seen, setting) > 0.9
+    assert f1(scenes, sets, goal_blind_plans(scenes, sets, setting), setting) < 0.6
 
 
 TASK = BUILT_IN.tasks[0]
