@@ -66,7 +66,7 @@ def test_a_task_asks_as_a_run_does(track: str) -> None:
 
 
 def test_the_rewards_of_an_episode_sum_to_its_score() -> None:
-    task = phyblock.tasks("step_planning", limit=2)[0]
+    task = phyblock.tasks("step_planning", "candidates.order=file", limit=2)[0]
     replies = ["Next plan: Move(1)", "I do not know.", *["Next plan: Move(2)"] * 40]
     episode, total, said = task.episode(), 0.0, 0
     while not episode.done:
