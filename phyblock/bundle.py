@@ -15,16 +15,15 @@ import shutil
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any
 
-from phyblock.errors import DataError, InputError, Problem, SpecError, StoreError, reason_of
+from phyblock.errors import DataError, Problem, SpecError, StoreError, reason_of
 from phyblock.files import (
     OutFolder,
     bundled,
@@ -42,14 +41,12 @@ from phyblock.records.files import (
     read_records,
     suite_of,
 )
-from phyblock.records.record import Record, SentPrompt
+from phyblock.records.record import Record
 from phyblock.results.load import design_of
-from phyblock.run.judge import about_prompt
 from phyblock.run.manifest import portable_manifest, without_paths
-from phyblock.run.rescore import judged_anew, recorded_dataset, reopen_tracks
-from phyblock.run.store import manifest_text, prompt_fields, record_lines
-from phyblock.tracks.base import Track, kind_of, simulating
-from phyblock.tracks.items import Item
+from phyblock.run.rescore import judged_again, recorded_dataset, reopen_tracks
+from phyblock.run.store import manifest_text, record_lines
+from phyblock.tracks.base import simulating
 
 BUNDLE_FILE = "bundle.zip"
 """Its name in the run's folder, unless another place is named."""
@@ -60,11 +57,9 @@ MEMBERS = {MANIFEST: 2 * _MB, RECORDS: 512 * _MB, ABOUT: _MB}
 """Members in their order, with their largest sizes [bytes]."""
 _LARGEST_BYTES = 128 * _MB
 _BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, RuntimeError)
-_SHOWN = ("prompt", "pictures")
-"""Parts of a track's identity that say what models were shown."""
 _HINT = "ask for the bundle again, or make it again with phyblock bundle"
 _NEVER_VERIFIED = (
-    "The bytes of pictures: what they are drawn from is compared.",
+    "What was sent: a bundle holds the digests of prompts and pictures, not what they are of.",
     "That the models gave these replies, when, how fast and at what cost: no bundle can show it.",
 )
 
@@ -129,8 +124,7 @@ def add(archive: zipfile.ZipFile, name: str, lines: Iterable[str]) -> str:
 
 @contextmanager
 def opened_bundle(path: Path, data: Sequence[Path] = ()) -> Iterator[Verified]:
-    """Unpack a bundle, score its replies and render its prompts again, and compare its records with
-    what comes out.
+    """Unpack a bundle, score its replies again, and compare its records with what comes out.
 
     `data` are folders in which its data may be, beside the sets that come with phyblock. Raises
     StoreError for what is no bundle, was changed, or comes out otherwise than it says, and
@@ -143,11 +137,9 @@ def opened_bundle(path: Path, data: Sequence[Path] = ()) -> Iterator[Verified]:
         manifest = read_manifest(folder)
         here = _localized(folder, manifest, data)
         (folder / MANIFEST).write_text(manifest_text(here), encoding="utf-8")
-        judged, again = judged_anew(folder)
-        prompts = _Prompts(folder, here, is_ours=made_by == version("phyblock"))
+        judged, again = judged_again(folder)
         counted = ("items", "scenes", "scenes_by_level")
         differ = [name for name in counted if getattr(here, name) != getattr(judged, name)]
-        differ += prompts.differ
         if differ or not here.models:
             raise _differs(folder / MANIFEST, ", ".join(differ) or "models", made_by)
         count, seen = 0, set[str]()
@@ -157,14 +149,11 @@ def opened_bundle(path: Path, data: Sequence[Path] = ()) -> Iterator[Verified]:
                 now = "" if record is None else next(record_lines([record]))
                 if record is None or was != now.encode() or record.sample in seen:
                     raise _differs(where, "", made_by)
-                if not prompts.made(record):
-                    raise _differs(where, "prompt", made_by)
                 seen.add(record.sample)
         expected = design_of(here, str(path)).all_samples
         physics = ", ".join(kind.title for kind in simulating(here.suite))
         fell = [f"{physics}: what fell, which is taken from the records."] if physics else []
-        unverified = (*dict.fromkeys(prompts.unverified), *fell, *_NEVER_VERIFIED)
-        yield Verified(made_by, here, folder, count, expected, unverified)
+        yield Verified(made_by, here, folder, count, expected, (*fell, *_NEVER_VERIFIED))
 
 
 def _differs(where: object, field: str, made_by: str) -> StoreError:
@@ -172,72 +161,6 @@ def _differs(where: object, field: str, made_by: str) -> StoreError:
     return StoreError(
         Problem(str(where), message, field, hint=f"{_HINT}; it was made by phyblock {made_by}")
     )
-
-
-class _Prompts:
-    """The prompts of a run, rendered again from its data and the bundled templates.
-
-    `differ` names what the manifest says of prompts and pictures that is not so. What cannot be
-    told stands in `unverified`: templates of the run's author, the prompts of later turns, and the
-    bytes of pictures, whose recipes alone are compared with the data.
-    """
-
-    def __init__(self, folder: Path, manifest: Manifest, *, is_ours: bool) -> None:
-        self.differ: list[str] = []
-        self.unverified: list[str] = []
-        self._tracks: dict[tuple[str, str], tuple[Track, dict[str, Item]] | None] = {}
-        """By condition and name, with items by key; None where the prompts are not known here."""
-        self._known: dict[tuple[object, ...], tuple[object, ...]] = {}
-        suite = suite_of(manifest, str(folder / MANIFEST))
-        dataset = recorded_dataset(folder, manifest)
-        for variant in dict.fromkeys(one.shown for one in suite.vary.variants):
-            for name, was in manifest.variants.get(variant.key, manifest.tracks).items():
-                if name not in suite.tracks or was.get("prompt") is None:
-                    continue
-                one = suite.at(variant).model_copy(update={"tracks": (name,)})
-                track, now, title = None, dict[str, Any](), kind_of(name).title
-                with suppress(InputError):
-                    (track,) = reopen_tracks(folder, manifest, one, dataset, with_prompts=True)
-                    now = track.identity()
-                changed = [key for key in _SHOWN if was.get(key) != now.get(key)]
-                is_bundled = is_ours and _name_of(was["prompt"]) == _name_of(now.get("prompt"))
-                if track is None or (changed and not is_bundled):
-                    self._tracks[variant.key, name] = None
-                    self.unverified.append(f"{title}: the prompts, whose template is not at hand.")
-                    continue
-                self.differ += [f"tracks.{name}.{key}" for key in changed]
-                items = {item.key: item for item in track.items}
-                self._tracks[variant.key, name] = (track, items)
-                if track.plays:
-                    self.unverified.append(f"{title}: the prompts after the first of an episode.")
-
-    def made(self, record: Record) -> bool:
-        """True if the prompt of a record is its item's, as far as can be checked."""
-        turns, at = record.asked_turns, (record.way.shown.key, record.track)
-        prompt = turns[0].prompt if turns else record.prompt
-        if prompt is None or at not in self._tracks:
-            return prompt is None
-        if (known := self._tracks[at]) is None:
-            return True
-        track, items = known
-        key = (*at, record.item, record.seed)
-        if key not in self._known:
-            shown = track.shown(items[record.item], record.seed)
-            request = next(iter(track.outlines(shown)))
-            digest = prompt_fields(request.messages)["sha256"]
-            self._known[key] = _sent(about_prompt(request, track.prompt_name, digest))
-        return self._known[key] == _sent(prompt)
-
-
-def _name_of(prompt: object) -> object:
-    """Return the name of a prompt in a manifest."""
-    return prompt.get("name") if isinstance(prompt, Mapping) else prompt
-
-
-def _sent(prompt: SentPrompt) -> tuple[object, ...]:
-    """Return the fields of a prompt that do not depend on the bytes of its pictures."""
-    labels = tuple(image.label for image in prompt.images)
-    return prompt.template, prompt.version, prompt.messages, labels
 
 
 def _localized(folder: Path, manifest: Manifest, data: Sequence[Path]) -> Manifest:

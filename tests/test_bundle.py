@@ -125,7 +125,7 @@ def test_a_bundle_verifies_elsewhere_and_holds_nothing_of_this_machine(
     done = elsewhere.phyblock("verify", "b.zip", "--data", "data", "--data", "questions")
     assert done.code == 0, done.err
     assert "20 of 20 expected samples." in done.out
-    assert "the prompts after the first of an episode" in done.out
+    assert "What was sent" in done.out
     for data, lacking in ((["--data", "data"], "questions questions"), ([], "data set data")):
         done = elsewhere.phyblock("verify", "b.zip", *data)
         assert (done.code, "Traceback" in done.err) == (2, False)
@@ -208,12 +208,6 @@ FORGED: dict[str, tuple[Change, str]] = {
     "level": (put("levels", [4], "full_planning"), RECORDS),
     "parents": (put("parents", ["t1", "t2"], "full_planning"), RECORDS),
     "plan": (put("parse.plan", [1], "full_planning"), RECORDS),
-    "prompt": (put("prompt.messages", ZEROS, "full_planning", "alpha"), ": prompt: "),
-    "template": (put("prompt.version", ZEROS, "vqa", "alpha"), ": prompt: "),
-    "turn-prompt": (put("turns.0.prompt.messages", ZEROS, "step_planning", "alpha"), ": prompt: "),
-    "label": (put("prompt.images.0.label", "answer", "vqa", "alpha"), ": prompt: "),
-    "pictures": (put("tracks.full_planning.pictures", ZEROS), "tracks.full_planning.pictures"),
-    "no-prompt": (put("tracks.full_planning.prompt", None), ": prompt: "),
     "no-plan": (put("suite.levels.0", [1]), re.escape("suite.levels")),
     "no-models": (_no_models, "models"),
 }
@@ -233,14 +227,6 @@ def test_what_is_not_changed_is_made_here_to_the_byte(made: Workspace, tmp_path:
     path = forged(made, tmp_path / "forged", lambda *_: None)
     with opened_bundle(path, folders(made)) as found:
         assert (found.folder / RECORDS).read_bytes() == was[RECORDS]
-
-
-def test_prompts_of_an_author_s_own_template_are_said_to_be_unverified(
-    made: Workspace, tmp_path: Path
-) -> None:
-    own = put("tracks.vqa.prompt", {"name": "mine", "version": ZEROS})
-    with opened_bundle(forged(made, tmp_path / "forged", own), folders(made)) as found:
-        assert "VQA: the prompts, whose template is not at hand." in found.unverified
 
 
 def test_data_are_never_looked_for_where_a_bundle_says(made: Workspace, tmp_path: Path) -> None:

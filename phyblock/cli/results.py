@@ -359,9 +359,9 @@ def bundle(run: Path, out: Path | None) -> None:
 @click.argument("file", type=UserPath())
 @data_folders_option
 def verify(file: Path, data: tuple[Path, ...]) -> None:
-    """Score the replies in the bundle FILE again, render its prompts, and report whether its
-    records come out as the same bytes, what was not verified, and whether samples are missing.
-    Exits with 2 if the records differ.
+    """Score the replies in the bundle FILE again, and report whether its records come out as the
+    same bytes, what was not verified, and whether samples are missing. Exits with 2 if the records
+    differ.
 
     Calls no model. A bundle holds no data: sets that come with phyblock are found; name others
     with --data.

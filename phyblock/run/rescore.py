@@ -27,7 +27,6 @@ from phyblock.run.store import locked, write_run
 from phyblock.text import counted
 from phyblock.tracks.base import CARRYING, ENGINE, Track, kind_of, open_tracks
 from phyblock.tracks.items import Item, select_tasks
-from phyblock.tracks.pictures import Workshop
 from phyblock.workers import Workers
 
 _CHANGED = "is not the data set that the run was made on, or it was changed since"
@@ -82,7 +81,7 @@ def rescore(
         )
 
 
-def judged_anew(folder: Path) -> tuple[Manifest, Iterator[Record]]:
+def judged_again(folder: Path) -> tuple[Manifest, Iterator[Record]]:
     """Return the manifest of a run and the record of each line, made of its replies and its data.
 
     What records say of their items is taken from the data, as is how much was to be asked. Physics
@@ -129,12 +128,11 @@ def _asked_about(manifest: Manifest, dataset: Dataset) -> Dataset:
 
 
 def reopen_tracks(
-    folder: Path, manifest: Manifest, suite: Suite, dataset: Dataset, *, with_prompts: bool = False
+    folder: Path, manifest: Manifest, suite: Suite, dataset: Dataset
 ) -> tuple[Track, ...]:
-    """Return the tracks of the run in `folder`, which ask exactly what was asked then.
+    """Return the tracks of the run in `folder`, without prompts, on the run's `dataset`.
 
-    `dataset` is the run's. With prompts, those of the bundled templates. Raises DataError for other
-    data of a track than those that the run was made on.
+    Raises DataError for other data of a track than those that the run was made on.
     """
     path = folder / MANIFEST
     folders: dict[str, Path] = {}
@@ -142,8 +140,7 @@ def reopen_tracks(
         own = (name for name in suite.tracks if kind_of(name).has_own_data())
         folders = dict.fromkeys(own, Path(manifest.questions.root))
     suite = suite.with_files(SuiteFiles(path, dataset.root, YamlSource(str(path)), folders))
-    shop = Workshop() if with_prompts else None
-    tracks = open_tracks(suite, dataset, manifest.limit, shop)
+    tracks = open_tracks(suite, dataset, manifest.limit)
     for track in tracks:
         stored = manifest.tracks.get(track.name, {})
         for key, value in track.identity().items():
@@ -188,7 +185,7 @@ class _Judge:
             hint = "restore the file from a copy"
             raise StoreError(Problem(where, message, "sample", record.sample, hint=hint))
         shown = track.shown(item, record.seed)
-        work = _judged_again(track, shown, record, where, strict=self._strict)
+        work = _again(track, shown, record, where, strict=self._strict)
         return record, self._thread.submit(asyncio.run, work).result()
 
     def close(self) -> None:
@@ -213,9 +210,7 @@ def _judge_there(
     return _judge_of(folder, data)(line)
 
 
-async def _judged_again(
-    track: Track, item: Item, record: Record, where: str, *, strict: bool
-) -> Record:
+async def _again(track: Track, item: Item, record: Record, where: str, *, strict: bool) -> Record:
     given = {**record.as_given(), **about_item(item), **track.about(item)}
     if "engine" in record.model_fields_set:
         # Nothing is let go again: what fell stands in the record, and so does what let it fall.
