@@ -64,7 +64,7 @@ const Words = (() => {
   const reasons = {
     shape_not_in_gt: (block) => `the goal has no ${block}`,
     overflow: (block) => `every ${block} of the goal is already placed`,
-    incorrect_orientation: (block, turned) => `the goal has no ${block} turned this way${turned && `; turned as it needs: ${turned}`}`,
+    incorrect_orientation: (block, turned) => `the goal has no ${block} in this orientation${turned && `; in the right one: ${turned}`}`,
     dependency_not_met: (block, turned, below) => `too early: ${below || "what it rests on"} must come first`,
   };
   /**

@@ -113,7 +113,7 @@ const Steps = (() => {
       said.note = expected && `Possible here (outlined): ${expected}.`;
       Object.assign(said, tried(scene, said));
     } else if (step.vertex !== null) said.text = `Placed ${placeOf(scene, step.vertex)}.`;
-    if (step.turn?.swapped?.length) said.text += " Blocks that look alike changed places for it.";
+    if (step.turn?.swapped?.length) said.text += " Blocks that look the same changed places for it.";
     if (step.turn?.fallen?.length) said.text += ` Let go, these blocks fall: ${step.turn.fallen.join(", ")}.`;
     return said;
   }

@@ -73,7 +73,7 @@ const Views = (() => {
     const lines = [all[at - 1], all[at + 1]].filter(Boolean).map((other) => {
       const gaps = [...scores(other)].filter(([key]) => mine.has(key)).map(([key, score]) => Math.sign(sign * (mine.get(key) - score)));
       const count = (way) => gaps.filter((gap) => gap === way).length;
-      return el("li", {}, `${Words.count(count(1), track.item)} better than `, link("model", { m: other.name }, other.name), `, ${count(-1)} worse, ${count(0)} alike`);
+      return el("li", {}, `${Words.count(count(1), track.item)} better than `, link("model", { m: other.name }, other.name), `, ${count(-1)} worse, ${count(0)} equal`);
     });
     return lines.length ? [el("h3", {}, "Beside its neighbors"), el("ul", {}, lines)] : null;
   }
