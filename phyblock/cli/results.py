@@ -162,8 +162,7 @@ def show(run: Path, sample: str, gif: Path | None, size: int, data: Path | None)
     from phyblock.files import write_named
     from phyblock.records.files import read_manifest
     from phyblock.run.rescore import recorded_dataset
-    from phyblock.tracks.base import kind_of
-    from phyblock.tracks.items import as_recorded
+    from phyblock.tracks.base import as_recorded, kind_of
 
     record = _find(run, sample)
     film = kind_of(record.track).report().film

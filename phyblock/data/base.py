@@ -37,11 +37,18 @@ _T = TypeVar("_T")
 class AssemblyTask:
     """A goal structure with its candidate set; `composite` is the data set's own picture of
     both, where it has one.
+
+    One that is shown in another form than the file's has an `order`: the number in the file of each
+    candidate as it is shown, which `seed` drew. Its `candidates` are in that order, and the goal is
+    not shown where it `is_blind`.
     """
 
     scene: Scene
     candidates: CandidateSet
     composite: Path | None = None
+    order: tuple[int, ...] = ()
+    is_blind: bool = False
+    seed: int = 0
 
     @property
     def key(self) -> str:

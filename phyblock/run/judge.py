@@ -24,8 +24,7 @@ from phyblock.records.record import (
     Usage,
 )
 from phyblock.stable import plain_sum
-from phyblock.tracks.base import Episode, Judgement, Track
-from phyblock.tracks.items import Item
+from phyblock.tracks.base import Episode, Item, Judgement, Track
 from phyblock.types import Outcome
 
 _N = TypeVar("_N", int, float)

@@ -26,8 +26,15 @@ from phyblock.registry import track_baselines
 from phyblock.run.manifest import make_manifest
 from phyblock.stable import drawn_bytes
 from phyblock.text import did_you_mean
-from phyblock.tracks.base import Track, kind_of, open_tracks, template_prompt
-from phyblock.tracks.items import Item, interleaved, select_tasks
+from phyblock.tracks.base import (
+    Item,
+    Track,
+    interleaved,
+    kind_of,
+    open_tracks,
+    select_tasks,
+    template_prompt,
+)
 from phyblock.tracks.pictures import Workshop
 
 _SEEDS = 2**31

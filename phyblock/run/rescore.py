@@ -25,8 +25,7 @@ from phyblock.run.judge import about_item, judge_reply, judged
 from phyblock.run.manifest import asked_counts, code_versions
 from phyblock.run.store import locked, write_run
 from phyblock.text import counted
-from phyblock.tracks.base import CARRYING, ENGINE, Track, kind_of, open_tracks
-from phyblock.tracks.items import Item, select_tasks
+from phyblock.tracks.base import CARRYING, ENGINE, Item, Track, kind_of, open_tracks, select_tasks
 from phyblock.workers import Workers
 
 _CHANGED = "is not the data set that the run was made on, or it was changed since"

@@ -39,7 +39,7 @@ from phyblock.run.judge import about_prompt, begun, judge_episode, judge_reply
 from phyblock.run.plan import RunPlan, Sample, provider_problem
 from phyblock.run.store import RunStore, Summary
 from phyblock.text import counted
-from phyblock.tracks.items import Item
+from phyblock.tracks.base import Item
 
 if TYPE_CHECKING:
     from phyblock.models.batch import BatchFiles

@@ -13,27 +13,28 @@ import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Protocol
+from typing import Any, ClassVar, Literal, Protocol, TypeVar
 
 from pydantic import BaseModel, create_model
 
 from phyblock.config.suite import Suite
 from phyblock.config.validation import PictureControls
 from phyblock.data.base import AssemblyTask, Dataset
-from phyblock.errors import Problem, SpecError
+from phyblock.domain.scene import CandidateSet, Scene
+from phyblock.errors import DataError, Problem, SpecError
 from phyblock.models.request import Image, Message, Request
 from phyblock.parsing.text import AnswerForm
 from phyblock.records.record import Record, Reply, SentPrompt
 from phyblock.registry import added_measures, known_track, known_tracks
 from phyblock.sim.engine import REFERENCE_ENGINE, engine_version, physics_engine
-from phyblock.stable import hex_digest
-from phyblock.tracks.items import ShownTask, presented, select_tasks
+from phyblock.stable import drawn_bytes, hex_digest
 from phyblock.tracks.measures import SampleCounts, TrackReport, read_report
 from phyblock.tracks.picking import Picking
 from phyblock.tracks.pictures import Drawing, Workshop, scene_drawings
 from phyblock.tracks.prompts import Prompt, TemplatePrompt, form_facts
-from phyblock.types import AnswerFormat
+from phyblock.types import AnswerFormat, CandidateOrder
 
 ENGINE = "physics"
 """Key in a track's identity of the physics engine that decides its results, where that is not the
@@ -41,6 +42,21 @@ engine of reference. Its results stand in the records.
 """
 CARRYING = "carrying"
 """The same of the version of how plans are carried out and what stands is measured."""
+
+
+class Item(Protocol):
+    """The subject of a sample: a scene with its candidates, or a question."""
+
+    @property
+    def key(self) -> str:
+        """Its name inside the track."""
+
+    @property
+    def scene(self) -> Scene:
+        """The scene it is about, by whose parents statistics cluster."""
+
+
+ItemT = TypeVar("ItemT", bound=Item)
 
 
 @dataclass(frozen=True)
@@ -115,7 +131,7 @@ class Track(ABC):
         self.is_blind = isinstance(self.spec, PictureControls) and self.spec.blind
         self.drawn_seeds = suite.seeds[:1]
         self.prompt = None if shop is None else self.open_prompt()
-        self._drawings: dict[str, tuple[Drawing, ...]] = {}
+        self._drawings: dict[tuple[object, ...], tuple[Drawing, ...]] = {}
         self.open()
 
     @abstractmethod
@@ -182,7 +198,7 @@ class Track(ABC):
 
     def drawings(self, item: Any) -> tuple[Drawing, ...]:
         """Return what `draw` does, computed once for each form in which an item is shown."""
-        name = getattr(item, "shown_as", item.key)
+        name = item.key, getattr(item, "order", ())
         if name not in self._drawings:
             self._drawings[name] = self.draw(item)
         return self._drawings[name]
@@ -336,7 +352,7 @@ class SceneTrack(Track):
 
     def about(self, item: AssemblyTask) -> dict[str, Any]:
         """Return how the scene is shown, where not as the file has it."""
-        if not isinstance(item, ShownTask):
+        if not item.order:
             return {}
         return {"shown": {"order": list(item.order), "blind": item.is_blind}}
 
@@ -348,6 +364,112 @@ class SceneTrack(Track):
             "n_candidates": len(item.candidates),
             "candidate_scale": None if images.source == "dataset" else "common",
         }
+
+
+def select_tasks(
+    tasks: Sequence[AssemblyTask], suite: Suite, limit: int | None
+) -> tuple[AssemblyTask, ...]:
+    """Return the tasks of a suite's levels and difficulty, at most `limit`, in their order.
+
+    They are evenly spread, and a higher limit keeps all that a lower one keeps.
+    """
+    levels, difficulty = set(suite.levels), suite.dataset.difficulty
+    chosen = [task for task in tasks if levels & set(task.scene.levels)]
+    if difficulty.ranges:
+        from phyblock.tracks.difficulty import is_within  # Few suites ask for it.
+
+        chosen = [task for task in chosen if is_within(task, difficulty)]
+    kept = set(_fair_order([task.scene.level for task in chosen])[:limit])
+    return tuple(task for position, task in enumerate(chosen) if position in kept)
+
+
+def interleaved(items: Sequence[ItemT]) -> list[ItemT]:
+    """Return items in an order in which any first few are a fair sample of levels and scenes."""
+    return [items[position] for position in _fair_order([item.scene.level for item in items])]
+
+
+def stratified(sizes: Sequence[int], limit: int) -> list[int]:
+    """Return `limit` places shared among groups of the given sizes, as `_fair_order` shares."""
+    groups = [group for group, size in enumerate(sizes) for _ in range(size)]
+    chosen = [groups[position] for position in _fair_order(groups)[:limit]]
+    return [chosen.count(group) for group in range(len(sizes))]
+
+
+def spread(size: int) -> list[int]:
+    """Return the positions 0 to `size` - 1, of which any first few are evenly spread.
+
+    They are taken at 0, 1/2, 1/4, 3/4, 1/8, ... of the size: the sequence of van der Corput (1935).
+    """
+    digits = max(1, (size - 1).bit_length())
+    parts = (int(f"{i:0{digits}b}"[::-1], 2) for i in range(2**digits))
+    return list(dict.fromkeys(part * size // 2**digits for part in parts))
+
+
+def _fair_order(strata: Sequence[int]) -> list[int]:
+    """Return all positions: strata in turn by their sizes, positions of each evenly spread.
+
+    Every stratum gets one place before any gets two; then each place goes to the stratum that has
+    least for its size (Webster's method, which is monotone in the number of places).
+    """
+    members: dict[int, list[int]] = {}
+    for position, stratum in enumerate(strata):
+        members.setdefault(stratum, []).append(position)
+    places = sorted(
+        (rank > 0, Fraction(2 * rank + 1, len(of_stratum)), stratum, of_stratum[place])
+        for stratum, of_stratum in members.items()
+        for rank, place in enumerate(spread(len(of_stratum)))
+    )
+    return [position for *_, position in places]
+
+
+def presented(
+    task: AssemblyTask, seed: int, order: CandidateOrder, *, is_blind: bool = False
+) -> AssemblyTask:
+    """Return the task as a seed shows it; itself where that is as the file has it."""
+    if order == "shuffled":
+        return in_order(task, shown_order(task, seed), seed, is_blind=is_blind)
+    numbers = range(1, len(task.candidates) + 1)
+    return in_order(task, numbers, is_blind=True) if is_blind else task
+
+
+def shown_order(task: AssemblyTask, seed: int) -> tuple[int, ...]:
+    """Return the candidates' numbers in the file, in the order that a seed draws for the scene.
+
+    It is sorted by digests, so that it is the same on every machine and with every library.
+    """
+    numbers = range(1, len(task.candidates) + 1)
+    place = functools.partial(drawn_bytes, "candidate order", seed, task.scene.id)
+    return tuple(sorted(numbers, key=place))
+
+
+def in_order(
+    task: AssemblyTask, numbers: Sequence[int], seed: int = 0, *, is_blind: bool = False
+) -> AssemblyTask:
+    """Return the task with the candidates of these numbers in the file, in this order.
+
+    Raises DataError for a number that no candidate has, and for one that is there twice.
+    """
+    n = len(task.candidates)
+    if len(set(numbers)) < len(numbers) or not set(numbers) <= set(range(1, n + 1)):
+        where, message = f"scene {task.key}", "is no order of its candidates"
+        found, allowed = ", ".join(map(str, numbers)), f"the numbers 1 to {n}, each once"
+        raise DataError(Problem(where, message, "shown.order", found, allowed))
+    shown = CandidateSet(tuple(task.candidates[number] for number in numbers))
+    return AssemblyTask(task.scene, shown, task.composite, tuple(numbers), is_blind, seed)
+
+
+def as_recorded(task: AssemblyTask, record: Record) -> AssemblyTask:
+    """Return the task with the candidates that a record says were shown, in their order."""
+    return task if record.shown is None else in_order(task, record.shown.order)
+
+
+def file_plan(task: AssemblyTask, steps: Sequence[int]) -> tuple[int, ...] | None:
+    """Return steps in the numbers of the file, None where those are the ones shown.
+
+    A number that no candidate has stays as it is: no candidate has it in the file either.
+    """
+    order = task.order
+    return tuple(order[n - 1] if 1 <= n <= len(order) else n for n in steps) if order else None
 
 
 kinds, kind_of = known_tracks, known_track

@@ -22,9 +22,8 @@ from phyblock.records.record import Line, Record
 from phyblock.records.record import Score as ScoreLine
 from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES, AssemblyScorer, Counts, Score
 from phyblock.sim.film import FilmStep, Tone
-from phyblock.tracks.base import Judgement, SceneTrack
+from phyblock.tracks.base import Judgement, SceneTrack, file_plan
 from phyblock.tracks.goal_blind import blind_guesses
-from phyblock.tracks.items import file_plan
 from phyblock.tracks.measures import SampleCounts, level_cells
 from phyblock.tracks.picking import Picking, candidate_choices
 from phyblock.tracks.prompts import OfficialPrompt, Prompt

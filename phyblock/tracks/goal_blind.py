@@ -23,7 +23,7 @@ from phyblock.data.base import AssemblyTask
 from phyblock.domain.scene import Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring.plan import Goal, most_placed
 from phyblock.sim.pictures import PictureStyle, goal_camera, segments
-from phyblock.tracks.items import ShownTask, presented
+from phyblock.tracks.base import presented
 from phyblock.types import CandidateOrder, Setting, View
 
 Floats = NDArray[np.float64]
@@ -242,8 +242,9 @@ def blind_guesses(
     order, view = suite.candidates.order, suite.images.view
 
     def plan(task: AssemblyTask, *, sees_colors: bool = False) -> Plan:
-        seed = task.seed if isinstance(task, ShownTask) and order == "shuffled" else 0
-        return _learned(tuple(pool), order, seed, setting, view if sees_colors else None)[task.key]
+        return _learned(tuple(pool), order, task.seed, setting, view if sees_colors else None)[
+            task.key
+        ]
 
     return plan
 

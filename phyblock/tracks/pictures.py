@@ -39,7 +39,6 @@ from phyblock.sim.pictures import (
     to_png,
 )
 from phyblock.stable import hex_digest
-from phyblock.tracks.items import ShownTask
 from phyblock.types import BACKGROUNDS
 
 _Result = TypeVar("_Result")
@@ -216,7 +215,7 @@ def scene_drawings(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, ...
     They are drawn, or cut out of the data set's own composites. A goal that is not shown has no
     part in the size of what is. DataError where the data set is to bring a picture and has none.
     """
-    is_blind, style = isinstance(task, ShownTask) and task.is_blind, picture_style(images)
+    is_blind, style = task.is_blind, picture_style(images)
     is_drawn = images.source == "render"
     if is_drawn:
         style = style if is_blind else goal_style(task.scene, style)

@@ -49,9 +49,8 @@ from phyblock.sim.geometry import box_height_cm, center_cm, collision_pieces, or
 from phyblock.sim.pictures import goal_style
 from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
 from phyblock.stable import plain_sum
-from phyblock.tracks.base import CARRYING, ENGINE, Judgement, SceneTrack
+from phyblock.tracks.base import CARRYING, ENGINE, Judgement, SceneTrack, file_plan
 from phyblock.tracks.full_planning import PlanParse, PlanSubject, needed_candidate, score_fields
-from phyblock.tracks.items import ShownTask, file_plan
 from phyblock.tracks.measures import SampleCounts, level_cells
 from phyblock.tracks.picking import NumberField, Pick, Picking, candidate_choices
 from phyblock.tracks.pictures import Drawing, picture_style
@@ -560,7 +559,7 @@ class PosePlanning(SceneTrack):
             for view in self.spec.views
         }
         drawings = []
-        if not (isinstance(item, ShownTask) and item.is_blind):
+        if not item.is_blind:
             for name, view_style in seen.items():
                 style = written_style(goal_style(item.scene, view_style))
                 key, make = ruled_key(item.scene, style), partial(ruled_png, item.scene, style)

@@ -52,9 +52,8 @@ from phyblock.sim.question_pictures import (
     question_png,
 )
 from phyblock.stable import hex_digest
-from phyblock.tracks.base import Judgement, Track
+from phyblock.tracks.base import Judgement, Track, select_tasks, spread, stratified
 from phyblock.tracks.baselines import Guesses, majority_rule
-from phyblock.tracks.items import select_tasks, spread, stratified
 from phyblock.tracks.measures import OVERALL, WHOLE, Cell, SampleCounts
 from phyblock.tracks.picking import Choice, Picking
 from phyblock.tracks.pictures import Drawing, picture_style

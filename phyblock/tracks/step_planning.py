@@ -27,10 +27,9 @@ from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.pictures import goal_style
 from phyblock.sim.question_pictures import question_key, question_png, state_picture
 from phyblock.text import counted
-from phyblock.tracks.base import ENGINE, Judgement, SceneTrack
+from phyblock.tracks.base import ENGINE, Judgement, SceneTrack, file_plan
 from phyblock.tracks.full_planning import POSE_COUNTS, PlanParse, PlanSubject
 from phyblock.tracks.goal_blind import blind_guesses
-from phyblock.tracks.items import file_plan
 from phyblock.tracks.measures import SampleCounts
 from phyblock.tracks.picking import Choice, Picking, candidate_choices
 from phyblock.tracks.pictures import Drawing, picture_style

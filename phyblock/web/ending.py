@@ -21,8 +21,7 @@ from phyblock.results.text import number
 from phyblock.sim.film import FilmStep
 from phyblock.sim.pictures import Lookout, PictureStyle, to_png
 from phyblock.text import counted, one_line
-from phyblock.tracks.base import kind_of
-from phyblock.tracks.items import as_recorded
+from phyblock.tracks.base import as_recorded, kind_of
 from phyblock.web.card import card_png
 
 CARD = "card.png"

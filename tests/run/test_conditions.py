@@ -10,7 +10,7 @@ import yaml
 from phyblock.data.base import AssemblyTask
 from phyblock.data.scenes import read_builtin
 from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png
-from phyblock.tracks.items import presented, shown_order
+from phyblock.tracks.base import presented, shown_order
 from tests.servers.chassis import Running, Seen
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Raw, Workspace

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from phyblock.data.base import AssemblyTask
 from phyblock.errors import DataError
 from phyblock.records.record import Reply
-from phyblock.tracks.items import (
+from phyblock.tracks.base import (
     file_plan,
     in_order,
     presented,

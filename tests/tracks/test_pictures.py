@@ -18,7 +18,7 @@ from phyblock.data.official import read_official
 from phyblock.errors import DataError, StoreError
 from phyblock.models.request import Image
 from phyblock.sim.pictures import candidates_png
-from phyblock.tracks.items import presented
+from phyblock.tracks.base import presented
 from phyblock.tracks.pictures import Workshop, picture_style, scene_drawings
 from tests.fuzz.strategies import png_header
 
