@@ -493,22 +493,21 @@ def _kept_after(goal: Goal, equal: int, kept: int, closed: int) -> Iterator[tupl
             yield kept | bit, closed | goal.below[vertex]
 
 
-@dataclass(frozen=True)
-class Score:
-    """Counts of one plan under one criterion and setting.
+@dataclass(frozen=True, kw_only=True)
+class Score(Counts):
+    """Counts of one plan under one criterion and setting, in the fields of records.
 
-    `matcher`, `errors` (wrong steps by type), `vertices` (the goal vertex each step placed),
-    `step_errors`, `blocks` (goal blocks by outcome) and `kept` (steps that the nearest valid order
+    `matcher`, `errors` (wrong steps by type), `placed` (the goal vertex of each step), `why` (the
+    error of each), `blocks` (goal blocks by outcome) and `kept` (steps that the nearest valid order
     keeps) belong to criterion `aov` and are None for the Level-1 criteria.
     """
 
     criterion: Criterion
     setting: Setting
-    counts: Counts
     matcher: Matcher | None = None
     errors: dict[ErrorType, int] | None = None
-    vertices: tuple[int | None, ...] | None = None
-    step_errors: tuple[ErrorType | None, ...] | None = None
+    placed: tuple[int | None, ...] | None = None
+    why: tuple[ErrorType | None, ...] | None = None
     blocks: dict[BlockOutcome, int] | None = None
     kept: int | None = None
 
@@ -540,26 +539,17 @@ class AssemblyScorer:
         scores: list[Score] = []
         for setting, goal in self._goals.items():
             matches = [match_plan(goal, plan, matcher) for matcher in matchers]
-            if matches:
-                placed = [match.counts.tp for match in matches]
-                kept = steps_kept(goal, plan, max(placed))
-                outcomes = block_outcomes(goal, plan, placed)
-                for matcher, match, blocks in zip(matchers, matches, outcomes, strict=True):
-                    why = step_errors(goal, plan, match)
-                    errors = count_errors(why)
-                    scores.append(
-                        Score(
-                            "aov",
-                            setting,
-                            match.counts,
-                            matcher,
-                            errors,
-                            match.vertices,
-                            why,
-                            blocks,
-                            kept,
-                        )
-                    )
+            placed = [match.counts.tp for match in matches]
+            kept = steps_kept(goal, plan, max(placed))
+            outcomes = block_outcomes(goal, plan, placed)
+            for matcher, match, blocks in zip(matchers, matches, outcomes, strict=True):
+                why = step_errors(goal, plan, match)
+                scores.append(
+                    Score(**vars(match.counts), criterion="aov", setting=setting, matcher=matcher,
+                          errors=count_errors(why), placed=match.vertices, why=why, blocks=blocks,
+                          kept=kept)
+                )  # fmt: skip
             if level1 is not None and 1 in self._scene.levels:
-                scores.append(Score(level1, setting, level1_counts(goal, plan, level1)))
+                counts = vars(level1_counts(goal, plan, level1))
+                scores.append(Score(**counts, criterion=level1, setting=setting))
         return tuple(scores)

@@ -305,11 +305,6 @@ def overlap_volume(one: Sequence[Piece], other: Sequence[Piece]) -> float:
     return plain_sum(_shared(first, second) for first in one for second in other)
 
 
-def volume(pieces: Sequence[Piece]) -> float:
-    """Volume of a solid that convex pieces fill."""
-    return plain_sum(_volume(_faces(piece)) for piece in pieces)
-
-
 def _shared(one: Piece, other: Piece) -> float:
     apart = np.maximum(
         one.corners.min(axis=0) - other.corners.max(axis=0),

@@ -18,9 +18,8 @@ from phyblock.errors import DataError, Problem, SpecError
 from phyblock.files import bundled
 from phyblock.parsing.plan import ParsedPlan, parse_plan, plan_form
 from phyblock.parsing.text import READER_VERSION, AnswerForm
-from phyblock.records.record import Line, Record
-from phyblock.records.record import Score as ScoreLine
-from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES, AssemblyScorer, Counts, Score
+from phyblock.records.record import Line, Record, Score
+from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES, AssemblyScorer, Counts
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.tracks.base import Judgement, SceneTrack, file_plan
 from phyblock.tracks.goal_blind import blind_guesses
@@ -61,23 +60,6 @@ class PlanRecord(Record):
     """`full_planning`."""
     parse: PlanParse | None = None
     """The plan that was read."""
-
-
-def score_fields(score: Score) -> dict[str, Any]:
-    """Return a score as records hold it."""
-    return {
-        "criterion": score.criterion,
-        "matcher": score.matcher,
-        "setting": score.setting,
-        "tp": score.counts.tp,
-        "fp": score.counts.fp,
-        "fn": score.counts.fn,
-        "errors": score.errors,
-        "placed": None if score.vertices is None else list(score.vertices),
-        "why": None if score.step_errors is None else list(score.step_errors),
-        "blocks": score.blocks,
-        "kept": score.kept,
-    }
 
 
 @dataclass(frozen=True)
@@ -192,7 +174,7 @@ POSE_COUNTS = SampleCounts(
 )
 
 
-def _steps(score: ScoreLine) -> tuple[float, ...]:
+def _steps(score: Score) -> tuple[float, ...]:
     """Count steps; under `membership` they count over again, so no plan has a value of its own."""
     alone = score.criterion != "membership"
     f1 = Counts(score.tp, score.fp, score.fn).f1 or 0.0
@@ -200,12 +182,12 @@ def _steps(score: ScoreLine) -> tuple[float, ...]:
     return score.tp, score.fp, score.fn, whole, alone * f1, alone
 
 
-def _wrong_steps(score: ScoreLine) -> list[int] | None:
+def _wrong_steps(score: Score) -> list[int] | None:
     errors = score.errors or {}
     return [errors.get(name, 0) for name in ERROR_TYPES] if score.criterion == "aov" else None
 
 
-def _blocks(score: ScoreLine) -> tuple[float, ...] | None:
+def _blocks(score: Score) -> tuple[float, ...] | None:
     """Count plans whose order counts."""
     if score.criterion != "aov" or score.kept is None:
         return None
@@ -310,7 +292,7 @@ class FullPlanning(SceneTrack):
             "file_plan": file_plan(item, parsed.plan.steps),
             **{n: getattr(parsed, n) for n in ("rule", "dropped", "problem", "truncated")},
         }
-        fields = {"parse": parse, "scores": [score_fields(score) for score in scores]}
+        fields = {"parse": parse, "scores": list(map(vars, scores))}
         return Judgement(parsed.rule is not None, fields)
 
 

@@ -50,7 +50,7 @@ from phyblock.sim.pictures import goal_style
 from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
 from phyblock.stable import plain_sum
 from phyblock.tracks.base import CARRYING, ENGINE, Judgement, SceneTrack, file_plan
-from phyblock.tracks.full_planning import PlanParse, PlanSubject, needed_candidate, score_fields
+from phyblock.tracks.full_planning import PlanParse, PlanSubject, needed_candidate
 from phyblock.tracks.measures import SampleCounts, level_cells
 from phyblock.tracks.picking import NumberField, Pick, Picking, candidate_choices
 from phyblock.tracks.pictures import Drawing, picture_style
@@ -283,7 +283,7 @@ def judge_poses(
         "limits": _LIMITS,
         **whole,
     }
-    fields = {"parse": parse, "scores": [score_fields(score) for score in scores], "pose": pose}
+    fields = {"parse": parse, "scores": list(map(vars, scores)), "pose": pose}
     return Judgement(parsed.rule is not None, fields)
 
 
@@ -456,31 +456,23 @@ def pick_poses(subject: PlanSubject) -> Picking:
     )
 
 
-def _counted(
-    name: str,
-    columns: tuple[str, ...],
-    count: Callable[[PoseRecord, PoseOutcome], Sequence[float]],
-    **more: Any,
-) -> SampleCounts:
-    """Return what counts records whose plan was carried out."""
-
-    def of(record: PoseRecord) -> Sequence[float] | None:
-        return None if record.pose is None else count(record, record.pose)
-
-    return SampleCounts(name, columns, record=of, **more)
-
-
-def _right(record: PoseRecord, pose: PoseOutcome) -> tuple[float, ...]:
+def _right(record: PoseRecord) -> tuple[float, ...] | None:
+    if (pose := record.pose) is None:
+        return None
     right, score = (n for frame in POSE_FRAMES for n in pose.right[frame]), record.scores[0]
     return (*right, score.tp + score.fp, score.tp + score.fn)
 
 
-def _fits(_: PoseRecord, pose: PoseOutcome) -> tuple[float, ...]:
+def _fits(record: PoseRecord) -> tuple[float, ...] | None:
+    if (pose := record.pose) is None:
+        return None
     fits = [step for step in pose.steps if step.vertex is not None]
     return (*(plain_sum(getattr(fit, part) for fit in fits) for part in _FITS), len(fits))
 
 
-def _ends(record: PoseRecord, pose: PoseOutcome) -> tuple[float, ...]:
+def _ends(record: PoseRecord) -> tuple[float, ...] | None:
+    if (pose := record.pose) is None:
+        return None
     ends = Counter(name for step in pose.steps for name in (step.end, step.error))
     whole = (pose.reached, record.n_blocks, pose.iou, pose.completed, 1)
     return (*(ends[name] for name in (*STEP_ENDS, *POSE_ERRORS)), len(pose.steps), *whole)
@@ -500,11 +492,11 @@ _ALIKE = tuple(f"tracks.pose_planning.{key}" for key in (CARRYING, ENGINE))
 _FITS = ("position_cm", "turn_deg", "iou")
 _WHOLE_COUNTS = ("steps", "reached", "blocks", "iou", "completed", "plans")
 _RIGHT = tuple(f"{frame}_{cm:g}" for frame in POSE_FRAMES for cm in TOLERANCES_CM)
-FITS = _counted("fits", (*_FITS, "n"), _fits)
+FITS = SampleCounts("fits", (*_FITS, "n"), record=_fits)
 COUNTS = (
-    _counted("poses", (*_RIGHT, "steps", "blocks"), _right),
+    SampleCounts("poses", (*_RIGHT, "steps", "blocks"), record=_right),
     FITS,
-    _counted("carried", (*STEP_ENDS, *POSE_ERRORS, *_WHOLE_COUNTS), _ends, alike=_ALIKE),
+    SampleCounts("carried", (*STEP_ENDS, *POSE_ERRORS, *_WHOLE_COUNTS), record=_ends, alike=_ALIKE),
     _plan("A"),
     _plan("B"),
 )

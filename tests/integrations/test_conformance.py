@@ -55,7 +55,7 @@ def expected(official_checkout: Path, known: phyblock.Tasks) -> Scores:
         scorer = scorers.setdefault(key, AssemblyScorer(item.scene, item.candidates, ("A",)))
         plan = parse_plan(text, len(item.candidates), "official").plan
         (score,) = scorer.score(plan, ("paper",), None)
-        found[model, key] = score.counts.f1 or 0.0
+        found[model, key] = score.f1 or 0.0
     assert len(found) == 3190
     return found
 

@@ -19,7 +19,7 @@ from phyblock.domain.question import CATEGORIES
 from phyblock.domain.scene import Plan
 from phyblock.parsing.plan import parse_plan
 from phyblock.results.paper import published_table
-from phyblock.scoring.plan import AssemblyScorer, Goal, chance, match_plan
+from phyblock.scoring.plan import AssemblyScorer, Counts, Goal, chance, match_plan
 from phyblock.types import MATCHERS, SETTINGS, PlanParser
 from tests.official_replies import reply_texts
 
@@ -41,7 +41,7 @@ def scored(
         plan = parse_plan(text, len(tasks[scene].candidates), "official").plan
         for score in scorers[scene].score(plan, ["paper"], "membership"):
             level = 1 if score.criterion == "membership" else tasks[scene].scene.level
-            counts = score.counts
+            counts = Counts(score.tp, score.fp, score.fn)
             row = (model, scene, score.setting, score.criterion)
             yield row, (level, counts.tp, counts.fp, counts.fn)
 

@@ -172,15 +172,19 @@ def test_the_scorer_says_what_its_parts_say(case: Case, level1: Level1Criterion 
         if level1 is not None and 1 in case.scene.levels:
             counts = level1_counts(goal, case.plan, level1)
             expected.append((level1, setting, None, counts, None))
-    assert [(s.criterion, s.setting, s.matcher, s.counts, s.vertices) for s in scores] == expected
+    found = [
+        (one.criterion, one.setting, one.matcher, Counts(one.tp, one.fp, one.fn), one.placed)
+        for one in scores
+    ]
+    assert found == expected
     for score in scores:
         if score.criterion == "aov":
             assert score.errors is not None
-            assert sum(score.errors.values()) == score.counts.fp
-            assert score.step_errors is not None
-            assert len(score.step_errors) == len(case.plan)
+            assert sum(score.errors.values()) == score.fp
+            assert score.why is not None
+            assert len(score.why) == len(case.plan)
         else:
-            assert (score.errors, score.step_errors) == (None, None)
+            assert (score.errors, score.why) == (None, None)
 
 
 @given(case=cases(), data=st.data())
