@@ -33,7 +33,7 @@ from phyblock.stable import drawn_bytes, hex_digest
 from phyblock.tracks.measures import SampleCounts, TrackReport, read_report
 from phyblock.tracks.picking import Picking
 from phyblock.tracks.pictures import Drawing, Workshop, scene_drawings
-from phyblock.tracks.prompts import Prompt, TemplatePrompt, form_facts
+from phyblock.tracks.prompts import Prompt, TemplatePrompt
 from phyblock.types import AnswerFormat, CandidateOrder
 
 ENGINE = "physics"
@@ -205,8 +205,14 @@ class Track(ABC):
 
     def facts(self, item: Any, pictures: Sequence[Image]) -> dict[str, object]:
         """Return what templates may use; nothing in it gives an answer away."""
-        labels = [picture.label for picture in pictures]
-        return {"pictures": labels, "is_blind": self.is_blind, **form_facts(self.form(item))}
+        form = self.form(item)
+        return {
+            "pictures": [picture.label for picture in pictures],
+            "is_blind": self.is_blind,
+            "answer_format": self.suite.answer_format,
+            "answer_schema": None if form is None else json.dumps(form.schema),
+            "answer_example": None if form is None else form.example,
+        }
 
     def json_form(self, item: Any) -> AnswerForm[Any]:
         """Return the form of an answer as JSON, where it has a prompt that asks for it."""

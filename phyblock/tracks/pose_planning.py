@@ -199,31 +199,6 @@ class PoseRecord(Record):
         return Course(tuple(zip(names, errors, strict=True)), blocks - self.pose.reached)
 
 
-def rests_of(
-    put: Sequence[Block | None], worlds: Sequence[Sequence[Block]]
-) -> tuple[tuple[RestingBlock, ...], ...]:
-    """Return for each step the blocks that lie elsewhere after it than before, its own than where
-    it was put, by more than 1 mm or 1 degree.
-
-    `worlds` are the blocks after each step, with the numbers of their steps as orders.
-    """
-    poses = {n: Pose.goal(block) for n, block in enumerate(put, 1) if block is not None}
-    rests = []
-    for world in worlds:
-        moved = []
-        for block in world:
-            before, after = poses[block.order], Pose.goal(block)
-            if before.distance_m(after) > _STILL_M or before.angle_deg(after) > _STILL_DEG:
-                poses[block.order] = after
-                x, y, z = (round(part, 2) + 0.0 for part in center_cm(block))
-                rest = RestingBlock(
-                    step=block.order, center_cm=(x, y, z), euler_deg=block.euler_deg
-                )
-                moved.append(rest)
-        rests.append(tuple(moved))
-    return tuple(rests)
-
-
 _END = ("end", "moved_cm", "turned_deg", "gap_cm", "overlap_cm", "knocked", "rests")
 _WHOLE = ("reached", "iou", "completed", "engine")
 
@@ -239,13 +214,10 @@ def judge_poses(
 
     A plan that an `earlier` record holds, executed with these tolerances, ended as it did.
     """
-    parsed, n = ParsedPoses((), None), len(item.candidates)
-    if text is not None:
-        parsed = parse_poses(text, n)
+    n, scorer = len(item.candidates), _scorer(item.scene, item.candidates)
+    parsed = ParsedPoses((), None) if text is None else parse_poses(text, n)
     given = parsed.steps
-    kept = [step for step in given if 1 <= step.candidate <= n]
     blocks = [put(step, item.candidates) for step in given]
-    scorer = _scorer(item.scene, item.candidates)
     laid = (
         Laid(step.candidate, block.position_m, block.euler_deg)
         for step, block in zip(given, blocks, strict=True)
@@ -258,7 +230,7 @@ def judge_poses(
     numbers, ends = [step.candidate for step in given], [step["end"] for step in ended]
     errors = pose_errors(scorer.goal, numbers, fits, ends)
     # The plan without its poses, under every setting and matcher.
-    plan = [step.candidate for step in kept]
+    plan = [number for number in numbers if 1 <= number <= n]
     plan_scorer = AssemblyScorer(item.scene, item.candidates, settings)
     scores = plan_scorer.score(Plan(tuple(plan)), matchers, None)
     motion = poses[-1].motion
@@ -287,7 +259,7 @@ def judge_poses(
     return Judgement(parsed.rule is not None, fields)
 
 
-Ended = tuple[tuple[Mapping[str, Any], ...], Mapping[str, Any]]
+Ended = tuple[Sequence[Mapping[str, Any]], Mapping[str, Any]]
 """Endings of the steps of a plan that was carried out, and the world in the end, as in records."""
 
 
@@ -307,12 +279,21 @@ def _carried(scene: Scene, blocks: Sequence[Block | None]) -> Ended:
     # An engine has no more than one plan at a time, whichever thread asks.
     with _ONE_AT_A_TIME:
         done = execute(blocks)
-    goal, rests = scene.blocks, rests_of(blocks, done.worlds)
-    reached = blocks_reached(goal, done.blocks, *_REACHED.values())
-    steps = tuple(
-        {**asdict(step), "rests": [rest.fields() for rest in moved]}
-        for step, moved in zip(done.steps, rests, strict=True)
-    )
+    goal, reached = scene.blocks, blocks_reached(scene.blocks, done.blocks, *_REACHED.values())
+    lies = {n: Pose.goal(block) for n, block in enumerate(blocks, 1) if block is not None}
+    steps = []
+    for step, world in zip(done.steps, done.worlds, strict=True):
+        rests = []
+        # Blocks of a world have the numbers of their steps as orders.
+        for block in world:
+            before, after = lies[block.order], Pose.goal(block)
+            if before.distance_m(after) > _STILL_M or before.angle_deg(after) > _STILL_DEG:
+                lies[block.order] = after
+                place = [round(part, 2) + 0.0 for part in center_cm(block)]
+                rests.append(
+                    {"step": block.order, "center_cm": place, "euler_deg": block.euler_deg}
+                )
+        steps.append({**asdict(step), "rests": rests})
     return steps, {
         "reached": reached,
         "iou": round(voxel_iou(goal, done.blocks), _DIGITS),

@@ -7,12 +7,10 @@ sent: an edit of an included file makes another prompt.
 from __future__ import annotations
 
 import hashlib
-import json
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 import jinja2
 import jinja2.meta
@@ -22,7 +20,6 @@ from jinja2.sandbox import ImmutableSandboxedEnvironment
 from phyblock.errors import Problem, PromptError, reason_of
 from phyblock.files import bundled, read_text
 from phyblock.models.request import Image, Message
-from phyblock.parsing.text import AnswerForm
 from phyblock.stable import hex_digest
 from phyblock.text import did_you_mean
 
@@ -30,14 +27,6 @@ _LARGEST_BYTES = 256 * 1024
 _COMMON_BLOCKS = ("system", "user", "caption")
 _ALL_BLOCKS = (*_COMMON_BLOCKS, "answer")
 """Blocks that bundled templates have; nothing would send another."""
-
-
-def form_facts(form: AnswerForm[Any] | None) -> dict[str, object]:
-    """Return what templates may use of the form of the answer; None is text."""
-    if form is None:
-        return {"answer_format": "text", "answer_schema": None, "answer_example": None}
-    schema = json.dumps(form.schema)
-    return {"answer_format": "json_schema", "answer_schema": schema, "answer_example": form.example}
 
 
 @dataclass(frozen=True)
@@ -75,7 +64,7 @@ class TemplatePrompt:
         self.name = name
         self._path = path
         text, self._tree = _read(path)
-        self._sources = {"": (path, text)}
+        self._sources = sources = {"": (path, text)}
         self._read_included(path, self._tree)
         self.included = tuple(file for inner, (file, _) in self._sources.items() if inner)
         digest = hashlib.sha256(text.encode())
@@ -83,7 +72,9 @@ class TemplatePrompt:
             digest.update(f"\0{inner}\0{hex_digest(part)}".encode())
         self.version = digest.hexdigest()
         self._environment = ImmutableSandboxedEnvironment(
-            loader=jinja2.FunctionLoader(self._load),
+            loader=jinja2.FunctionLoader(
+                lambda one: (source := sources.get(one)) and (source[1], str(source[0]), None)
+            ),
             undefined=jinja2.StrictUndefined,
             trim_blocks=True,
             lstrip_blocks=True,
@@ -141,7 +132,7 @@ class TemplatePrompt:
                 context = self._template.new_context(dict(facts))
                 blocks = context.blocks
                 # What stands outside of the blocks is run first, with nothing in their places.
-                context.blocks = {name: [_nothing] for name in blocks}
+                context.blocks = {name: [lambda _: iter(())] for name in blocks}
                 for _ in self._template.root_render_func(context):
                     pass
                 context.blocks = blocks
@@ -159,10 +150,6 @@ class TemplatePrompt:
             where = [f"{self._path}:1", *places][-1]
             message = f"cannot be rendered: {reason_of(error)}"
             raise PromptError(Problem(where, message, f"block {block}", "", known)) from error
-
-    def _load(self, name: str) -> tuple[str, str, None] | None:
-        found = self._sources.get(name)
-        return None if found is None else (found[1], str(found[0]), None)
 
     def _read_included(self, path: Path, tree: nodes.Template) -> None:
         """Read what a template includes or imports, at any depth, by the names it uses.
@@ -191,10 +178,6 @@ class TemplatePrompt:
 
 Prompt = OfficialPrompt | TemplatePrompt
 """Prompt: turns pictures and facts about a sample into chat messages."""
-
-
-def _nothing(_context: object) -> Iterator[str]:
-    return iter(())
 
 
 def _included(name: str, folders: Sequence[Path], where: str) -> Path | None:

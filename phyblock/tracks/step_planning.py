@@ -172,13 +172,10 @@ def _random_step(subject: StepSubject, rng: np.random.Generator) -> str:
     return step_text(int(rng.integers(1, len(subject.candidates) + 1)))
 
 
-_Choose = Callable[[StepSubject, int, np.random.Generator], int | None]
-
-
-def _right_move(choose: _Choose) -> Callable[[StepSubject, np.random.Generator], str]:
-    """Return a rule that draws a right move and names the candidate chosen instead, if there is
-    one; Done if no move is right.
-    """
+def _right_move(
+    choose: Callable[[StepSubject, int, np.random.Generator], int | None],
+) -> Callable[[StepSubject, np.random.Generator], str]:
+    """Return a rule that names what is chosen in place of a right move; Done if none is right."""
 
     def rule(subject: StepSubject, rng: np.random.Generator) -> str:
         moves = subject.exact or subject.valid
@@ -197,12 +194,6 @@ def _turned(subject: StepSubject, index: int, rng: np.random.Generator) -> int |
     listed = enumerate(subject.candidates.candidates, 1)
     wrong = [n for n, one in listed if one.kind == kind and one.look not in looks]
     return wrong[int(rng.integers(len(wrong)))] if wrong else None
-
-
-def _repeated_step(subject: StepSubject, rng: np.random.Generator) -> str:
-    """Any move at random until one fails, then that one for ever."""
-    failed = subject.last_failed
-    return _random_step(subject, rng) if failed is None else step_text(failed)
 
 
 def _in_turn(plan_of: Callable[[StepSubject], Sequence[int]]) -> Callable[..., str]:
@@ -224,7 +215,11 @@ STEP_RULES: Mapping[str, Callable[..., str]] = {
     "random": _random_step,
     "oracle": _right_move(lambda *_: None),
     "oracle-no-orientation": _right_move(_turned),
-    "repeat": _repeated_step,
+    "repeat": lambda subject, rng: (
+        _random_step(subject, rng)
+        if subject.last_failed is None
+        else step_text(subject.last_failed)
+    ),
     "all-candidates": _in_turn(lambda subject: range(1, len(subject.candidates) + 1)),
     "goal-blind": _in_turn(lambda subject: subject.guess().steps),
     "color-areas": _in_turn(lambda subject: subject.guess(sees_colors=True).steps),
@@ -474,7 +469,6 @@ class StepEpisode:
         self._shop = track.shop if with_messages else None
         self._assembly = Assembly(task.scene, task.candidates, track.accepts, self._spec.gating)
         self._past: list[PastStep] = []
-        self._failed: list[PastStep] = []
         self._turns: list[dict[str, Any]] = []
         self._is_settled = True
 
@@ -495,7 +489,7 @@ class StepEpisode:
             functools.partial(track.guess, task),
             assembly.right_moves(),
             assembly.exact_moves(),
-            self._failed[-1].move if self._failed else None,
+            next((step.move for step in self._failed()), None),
             len(self._past),
         )
         turn = len(self._past) + 1
@@ -523,16 +517,12 @@ class StepEpisode:
         self._turns.append({**turn, "world": list(self._assembly.vertices)})
         operation = "Done" if parsed.is_done else f"Move({parsed.move})"
         operation = "(no operation)" if parsed.problem else operation
-        step = PastStep(operation, outcome, parsed.move)
-        self._past.append(step)
-        self._failed = [] if outcome == "placed" else [*self._failed, step]
+        self._past.append(PastStep(operation, outcome, parsed.move))
         self._is_settled = outcome != "placed" or self._spec.physics == "off"
         if self._assembly.is_complete:
             self.ending = "completed"
-        elif outcome == "done":
-            self.ending = "done"
         else:
-            self.ending = self._limit()
+            self.ending = "done" if outcome == "done" else self._limit()
 
     def judgement(self) -> Judgement:
         """Return the record's fields about the episode; read where any operation could be read."""
@@ -552,9 +542,13 @@ class StepEpisode:
         }
         return Judgement(any(turn["parse"]["problem"] is None for turn in self._turns), fields)
 
+    def _failed(self) -> Iterator[PastStep]:
+        """Yield the steps since the last that placed a block, the newest first."""
+        return takewhile(lambda step: step.outcome != "placed", reversed(self._past))
+
     def _limit(self) -> Ending | None:
         """Return the first limit of the suite that is reached, or None."""
-        spec, moves = self._spec, [step.move for step in reversed(self._failed)]
+        spec, moves = self._spec, [step.move for step in self._failed()]
         same = takewhile(lambda move: move is not None and move == moves[0], moves)
         reached: tuple[tuple[Ending, int, int | None], ...] = (
             ("max_repeats", len(list(same)), spec.max_repeats),
