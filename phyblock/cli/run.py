@@ -47,10 +47,10 @@ from phyblock.run.estimate import Estimate, estimate, may_bill
 from phyblock.run.manifest import code_versions
 from phyblock.run.plan import (
     RunPlan,
-    asking_remarks,
     bundled_suites,
     find_models_file,
     make_plan,
+    prompt_remarks,
     read_suite,
 )
 from phyblock.run.runner import RunResult, Session, check_ready
@@ -119,7 +119,7 @@ def run(
     asks: dict[str, Any] = {"use_cache": not no_cache, "retry_failed": retry_failed}
     if dry_run:
         print_estimate(console, plan, estimate(plan, folder, **asks))
-    for remark in asking_remarks(loaded, plan):
+    for remark in prompt_remarks(loaded, plan):
         console.print(remark, style="dim")
     if dry_run:
         return 0

@@ -40,12 +40,12 @@ from phyblock.files import bundled, check_free, reply_cache_file, writing
 from phyblock.models.cache import ReplyCache
 from phyblock.registry import baseline_names
 from phyblock.run.plan import (
-    asking_remarks,
     bundled_suites,
     find_models_file,
     find_suite,
     make_plan,
     model_problems,
+    prompt_remarks,
     read_suite,
     to_config,
 )
@@ -149,7 +149,7 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[s
         plan = make_plan(suite, known)
         models = counted(len(plan.models), "model")
         samples = f"{counted(plan.samples_per_model, 'sample')} a model"
-        return [f"suite {suite.name}, {models}, {samples}", *asking_remarks(suite, plan)]
+        return [f"suite {suite.name}, {models}, {samples}", *prompt_remarks(suite, plan)]
     known = load_models(path)
     if problems := list(model_problems(path, known, known)):
         raise SpecError(problems)

@@ -8,11 +8,10 @@ import functools
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from PIL import Image
 
-from phyblock.api import Task, Tasks, tasks
+from phyblock.api import Task, tasks
 from phyblock.domain.question import LETTERS, is_picture_option
 from phyblock.files import OutFolder, writing
 from phyblock.integrations.huggingface import question_tasks
@@ -58,24 +57,20 @@ def write_vlmevalkit(
             for writer in writers:
                 writer.writerow((*_COLUMNS, "image", "image_path"))
             for task in question_tasks(questions, data, limit, size_px):
-                item: Any = task.item
-                writers[len(item.question.answer) > 1].writerow(_tsv_row(task, item.question))
+                asked, images = task.item.question, task.request().images
+                labels = [image.label for image in images]
+                coded = [base64.b64encode(image.data).decode() for image in images]
+                names = [f"{asked.id}-{label}.png" for label in labels]
+                # A picture is named by where it stands among those that are sent.
+                options = [
+                    f"Picture {labels.index(letter) + 1}" if is_picture_option(option) else option
+                    for letter, option in zip(LETTERS, asked.options, strict=True)
+                ]
+                about = (asked.subtask, asked.category, asked.scene.id)
+                sent = (repr(coded), repr(names)) if len(images) > 1 else (coded[0], names[0])
+                row = (asked.id, asked.text, *options, asked.answer_letters, *about, *sent)
+                writers[len(asked.answer) > 1].writerow(row)
     return tuple(folder / name for name in TSV_FILES)
-
-
-def _tsv_row(task: Task, question: Any) -> Sequence[str]:
-    images = task.request().images
-    labels = [image.label for image in images]
-    coded = [base64.b64encode(image.data).decode() for image in images]
-    names = [f"{question.id}-{label}.png" for label in labels]
-    # A picture is named by where it stands among those that are sent.
-    options = [
-        f"Picture {labels.index(LETTERS[at]) + 1}" if is_picture_option(option) else option
-        for at, option in enumerate(question.options)
-    ]
-    about = (question.subtask, question.category, question.scene.id)
-    sent = (repr(coded), repr(names)) if len(images) > 1 else (coded[0], names[0])
-    return question.id, question.text, *options, question.answer_letters, *about, *sent
 
 
 def write_lmms_eval(folder: Path, limit: int | None) -> tuple[Path, ...]:
@@ -94,13 +89,11 @@ def write_lmms_eval(folder: Path, limit: int | None) -> tuple[Path, ...]:
     return tuple(folder / name for name in texts)
 
 
-@functools.cache
-def _tasks(track: str) -> Tasks:
-    """Return the tasks of a track, read once, of which a row of lmms-eval names one."""
-    return tasks(track)
+_tasks = functools.cache(tasks)
 
 
 def _task(doc: Mapping[str, str]) -> Task:
+    """Return the task that a row of lmms-eval names; those of a track are read once."""
     return _tasks(doc["track"])[doc["key"]]
 
 

@@ -60,7 +60,7 @@ def write_scenes(folder: Path, data: str, limit: int | None, size_px: int) -> tu
     """
 
     def row(task: Task) -> dict[str, Any]:
-        given: Any = task.item
+        given = task.item
         style = goal_style(given.scene, PictureStyle(size_px))
         return {
             "id": task.key,
@@ -82,8 +82,7 @@ def write_questions(
     """Write a set of questions, or a folder's, with their pictures; raises as `write_scenes`."""
 
     def row(task: Task) -> dict[str, Any]:
-        item: Any = task.item
-        asked, images = item.question, task.request().images
+        asked, images = task.item.question, task.request().images
         return {
             **{name: getattr(asked, name) for name in ("id", "subtask", "category", "wording")},
             "scene": asked.scene.id,

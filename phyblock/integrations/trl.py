@@ -6,7 +6,7 @@ GRPOTrainer(model, reward_funcs=reward(tasks), train_dataset=dataset(tasks), ...
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from datasets import Dataset, Features, List, Value
@@ -30,38 +30,31 @@ def dataset(tasks: Tasks) -> Dataset:
     if tasks.is_endless or any(task.plays for task in tasks):
         raise ValueError(f"{tasks!r} cannot be rows: a finite set of what is asked once can")
 
-    def rows() -> Iterator[dict[str, Any]]:
-        for task in tasks:
-            prompt = [
-                {"role": one["role"], "content": _parts(one["content"])} for one in task.messages()
-            ]
-            yield {"key": task.key, "prompt": prompt, "images": list(task.pictures.values())}
+    def parts(content: str | Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+        if isinstance(content, str):
+            return [{"type": "text", "text": content}]
+        image = {"type": "image", "text": None}
+        return [one if one["type"] == "text" else image for one in content]
 
-    return Dataset.from_list(list(rows()), features=Features(_FEATURES))
-
-
-def _parts(content: str | Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    if isinstance(content, str):
-        return [{"type": "text", "text": content}]
-    return [one if one["type"] == "text" else {"type": "image", "text": None} for one in content]
+    rows = []
+    for task in tasks:
+        prompt = [{**one, "content": parts(one["content"])} for one in task.messages()]
+        rows.append({"key": task.key, "prompt": prompt, "images": list(task.pictures.values())})
+    return Dataset.from_list(rows, features=Features(_FEATURES))
 
 
 def reward(tasks: Tasks) -> Callable[..., list[float]]:
     """Return the reward function: the headline measure of each completion, by its row's key."""
 
+    def text(completion: Any) -> str:
+        content = completion if isinstance(completion, str) else completion[-1]["content"]
+        if isinstance(content, str):
+            return content
+        return "".join(one.get("text") or "" for one in content)
+
     def phyblock(completions: Sequence[Any], key: Sequence[str], **_: Any) -> list[float]:
         return [
-            tasks[name].score(_text(one)).value for one, name in zip(completions, key, strict=True)
+            tasks[name].score(text(one)).value for one, name in zip(completions, key, strict=True)
         ]
 
     return phyblock
-
-
-def _text(completion: Any) -> str:
-    """Return the text of a completion: a string, or the messages of a conversation."""
-    if isinstance(completion, str):
-        return completion
-    content = completion[-1]["content"]
-    return (
-        content if isinstance(content, str) else "".join(one.get("text") or "" for one in content)
-    )

@@ -358,7 +358,7 @@ def prompt_dirs(suite: Path) -> list[Path]:
     return [folder / "prompts" for folder in (Path(), suite.parent, suite.parent.parent)]
 
 
-def asking_remarks(suite: Suite, plan: RunPlan) -> list[str]:
+def prompt_remarks(suite: Suite, plan: RunPlan) -> list[str]:
     """Return a sentence on each custom prompt that is sent."""
     if all(model.kind != "litellm" for model in plan.models):
         return []
