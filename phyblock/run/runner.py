@@ -291,7 +291,8 @@ class Session:
         for planned in self.plan.models:
             queue = queues[planned.name]
             # What answers at once is asked a few at a time: it would keep calls waiting.
-            most = planned.max_concurrency if planned.kind == "litellm" else _LOCAL_AT_ONCE
+            is_local = planned.kind in ("baseline", "replay")
+            most = _LOCAL_AT_ONCE if is_local else planned.max_concurrency
             # What goes out in a batch is asked at once.
             count = len(queue) if planned.batch else min(most, len(queue))
             workers += [asyncio.create_task(self._work(planned, queue)) for _ in range(count)]
