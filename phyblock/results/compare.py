@@ -61,6 +61,8 @@ from phyblock.tracks.measures import SCORED_BY, Cell, Measure, in_unit
 
 _LEVEL = 1 - CONFIDENCE
 _KEYS = ["scene", "item", "seed", "variant"]
+_TOLD = ("p_holm", "verdict", "detectable", "detectable_holm")
+"""Columns of `Comparison.table` that all of its tests decide together."""
 
 
 def check_alike(run: Run, first: Run, cells: Sequence[str], track: str, measure: Measure) -> None:
@@ -217,7 +219,7 @@ class Comparable:
         pair: Sequence[int],
         part: Part,
         parents: Mapping[str, tuple[str, ...]],
-    ) -> dict[str, float]:
+    ) -> dict[str, Any]:
         """Return a row of `Comparison.table`, but for names, corrected p and verdicts.
 
         The difference of two sides on the samples that both have, from the sums of their counts by
@@ -250,7 +252,7 @@ class Comparable:
         ends = {name: scale * float(getattr(estimate, name)) for name in ("se", "lo", "hi")}
         return {
             **{"value_a": value_a, "value_b": value_b, "difference": scale * float(estimate.value)},
-            **{**ends, "p": float(estimate.p), "better": (sign > 0).sum()},
+            **{**ends, "p": float(estimate.p), **dict.fromkeys(_TOLD), "better": (sign > 0).sum()},
             **{"worse": (sign < 0).sum(), "same": (sign == 0).sum(), "n_samples": len(sign)},
             **{"n_scenes": len(scenes), "n_clusters": clusters.size},
         }
@@ -388,7 +390,13 @@ def compare(
             about = {"a": a.label, "b": b.label, "part": part.name}
             pair = [place[a.label], place[b.label]]
             rows.append({**about, **what.contrast(samples, pair, part, parents)})
-    table, measure = with_verdicts(pd.DataFrame(rows), what.measure), what.measure
+    table, measure = pd.DataFrame(rows), what.measure
+    n_tests = int(table["p"].notna().sum())
+    table["p_holm"] = holm(table["p"])
+    table["verdict"] = [_verdict(row, measure, n_tests) for row in table.to_dict("records")]
+    for name, level in (("detectable", _LEVEL), ("detectable_holm", _LEVEL / max(n_tests, 1))):
+        spread = table["se"], table["n_clusters"]
+        table[name] = detectable(*spread, level, measure.most_apart)
     how = " ".join([what.how, *_asked(runs, what.track)])
     ranks = _ranks(table, measure, ranked)
     return Comparison(table, ranks, measure.heading, measure.unit, how)
@@ -403,22 +411,6 @@ def _asked(runs: Sequence[Run], track: str) -> Iterator[str]:
     if len(set(readers.values())) > 1:
         names = ", ".join(f"{name} by readers {version}" for name, version in readers.items())
         yield f"Replies were read: {names}; phyblock score reads a run with those of this version."
-
-
-def with_verdicts(table: pd.DataFrame, measure: Measure) -> pd.DataFrame:
-    """Return a table of tests (a, b, difference, se, p, n_clusters, ...) with what they say.
-
-    Behind `p` stand p_holm, verdict, detectable and detectable_holm, as `Comparison` explains.
-    """
-    n_tests = int(table["p"].notna().sum())
-    judged = table.assign(p_holm=holm(table["p"]))
-    judged["verdict"] = [_verdict(row, measure, n_tests) for row in judged.to_dict("records")]
-    levels = {"detectable": _LEVEL, "detectable_holm": _LEVEL / max(n_tests, 1)}
-    for name, level in levels.items():
-        judged[name] = detectable(table["se"], table["n_clusters"], level, measure.most_apart)
-    columns = [str(name) for name in table]
-    after = columns.index("p") + 1
-    return judged[[*columns[:after], "p_holm", "verdict", *levels, *columns[after:]]]
 
 
 def _verdict(row: Mapping[Any, Any], measure: Measure, n_tests: int) -> str:
@@ -497,12 +489,13 @@ def compare_view(found: Comparison) -> TextTable:
     if found.table["part"].nunique() > 1:
         part = lambda row: level_name(row["part"].replace("_", " "))  # noqa: E731
         columns.append(Column("Part", "", True, part))
+    p_text = lambda row: "< 0.001" if row["p_holm"] < 0.001 else number(row["p_holm"], 3)  # noqa: E731
     columns += [
         *(values("value_a", "A", group), values("value_b", "B", group)),
         values("difference", "A - B", group, signed=True),
         intervals(group, signed=True),
         values("detectable_holm", "finds", group),
-        Column("p (Holm)", show=lambda row: p_text(row["p_holm"])),
+        Column("p (Holm)", show=p_text),
         texts("verdict", "Verdict"),
         wholes("better", "A better", "Samples"),
         wholes("worse", "B better", "Samples"),
@@ -546,11 +539,6 @@ def ranks_view(found: Comparison) -> TextTable:
         "Baselines have no rank, nor have models that are not complete."
     )
     return TextTable.of(found.ranks, "Ranks that each model may have", columns, [note])
-
-
-def p_text(p: float) -> str:
-    """Return a p value with three decimals; `< 0.001` where it is less."""
-    return "< 0.001" if p < 0.001 else number(p, 3)
 
 
 def write_comparison(found: Comparison, folder: Path) -> tuple[Path, ...]:

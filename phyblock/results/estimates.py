@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import jinja2
 import numpy as np
@@ -142,12 +141,6 @@ def track_estimates(run: Run, track: str) -> pd.DataFrame:
     return run.made[track]
 
 
-def _numbered(column: pd.Series[Any]) -> tuple[NDArray[np.intp], list[Any]]:
-    """Return numbers of values, and the values that they stand for, sorted."""
-    codes, values = pd.factorize(column, sort=True)
-    return codes.astype(np.intp), list(values)
-
-
 def _sums(
     counts: Floats,
     masks: Sequence[NDArray[np.bool_]],
@@ -204,7 +197,7 @@ def _estimates(
     ways = about.groupby(["model", *SCORED_BY], sort=True)
     group, groups = np.asarray(ways.ngroup(), dtype=np.intp), list(ways.size().index)
     (scene, scenes), (seed, seeds), (model, models) = (
-        _numbered(about[name]) for name in ("scene", "seed", "model")
+        pd.factorize(about[name], sort=True) for name in ("scene", "seed", "model")
     )
     # (scenes, groups, pooled, columns), and the same summed over scenes by seed.
     given, n_rows = _sums(rows.counts[used], masks, (scene, group), (len(scenes), len(groups)))
@@ -212,7 +205,7 @@ def _estimates(
     of_seeds[in_seed == 0] = np.nan
     replied = about["replied"].to_numpy(np.float64)[:, None]
     heard = _sums(replied, masks, (model,), (len(models),))[0][..., 0]
-    silent = heard[[models.index(one[0]) for one in groups]] == 0
+    silent = heard[[list(models).index(one[0]) for one in groups]] == 0
     clusters, present = Clusters.of([parents[name] for name in scenes]), n_rows > 0
     by_name = {cell.name: cell for cell in cells}
 

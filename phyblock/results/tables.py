@@ -252,7 +252,11 @@ def cost_table(run: Run) -> TextTable:
     """Return tokens, dollars and seconds of every model."""
 
     def dollars(key: str, heading: str) -> Column:
-        return Column(heading, "Cost (USD)", show=lambda row: _dollars(row[key]))
+        def show(row: Mapping[Hashable, Any]) -> str:
+            usd = row[key]
+            return NO_VALUE if pd.isna(usd) else f"{usd:,.{2 if usd >= 1 or not usd else 4}f}"
+
+        return Column(heading, "Cost (USD)", show=show)
 
     headings = zip(TOKENS, ("in", "out", "reasoning"), strict=True)
     fields = [
@@ -272,10 +276,6 @@ def cost_table(run: Run) -> TextTable:
     ]
     title = f"Tokens, cost and latency{run.design.of_suite}"
     return TextTable.of(coverage_frame(run)[_COST], title, fields, notes)
-
-
-def _dollars(amount: float) -> str:
-    return NO_VALUE if pd.isna(amount) else f"{amount:,.{2 if amount >= 1 or not amount else 4}f}"
 
 
 @dataclass(frozen=True, eq=False)

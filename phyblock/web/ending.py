@@ -22,7 +22,7 @@ from phyblock.sim.film import FilmStep
 from phyblock.sim.pictures import Lookout, PictureStyle, to_png
 from phyblock.text import counted, one_line
 from phyblock.tracks.base import as_recorded, kind_of
-from phyblock.web.card import card_png
+from phyblock.web.pack import card_png
 
 CARD = "card.png"
 _BUILT = re.compile(r"built/(\d{1,9})\.png")

@@ -20,8 +20,7 @@ from phyblock.results.load import Run, load_run
 from phyblock.sim.pictures import Lookout, PictureStyle
 from phyblock.tracks.base import CARRYING, kind_of
 from phyblock.web.board import SiteRun, board_of, entries_of, open_sources
-from phyblock.web.card import card_png
-from phyblock.web.pack import build_of, pack_samples, write_page
+from phyblock.web.pack import build_of, card_png, pack_samples, write_page
 
 INDEX = "index.html"
 _DATA = "data/"

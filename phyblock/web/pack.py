@@ -13,6 +13,7 @@ import itertools
 import json
 import os
 import re
+import textwrap
 import zlib
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
@@ -25,6 +26,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import jinja2
+from PIL import Image, ImageDraw, ImageFont
 
 from phyblock.data.base import AssemblyTask
 from phyblock.domain.blocks import BLOCK_TYPES
@@ -32,7 +34,7 @@ from phyblock.files import OutFolder, atomic_write, cache_dir, digest_of_file, w
 from phyblock.records.files import PromptLines, RecordLines
 from phyblock.records.record import Record, SentPrompt
 from phyblock.sim.geometry import solid_mesh
-from phyblock.sim.pictures import COLOR_RGB
+from phyblock.sim.pictures import COLOR_RGB, to_png
 from phyblock.stable import hex_digest
 from phyblock.web.board import Entry, SiteRun, Sources
 
@@ -58,6 +60,7 @@ _LEFT_OUT = frozenset(
 _OF_QUESTION = ("subtask", "text", "options", "answer_letters", "pictures", "evidence")
 _LONGEST = {"text": 6000, "reasoning": 2000}
 """Characters of a reply that a site shows; the bundle has all of it."""
+_CARD_PX = (1200, 630)
 _TELLING_BLOCKS = 6
 """A failure tells most where its goal has about so many blocks."""
 
@@ -374,6 +377,24 @@ class SentPictures:
             except OSError:
                 atomic_write(path, self._paths[digest].read_bytes())
         return f"{PICTURES}{name}"
+
+
+def card_png(title: str, text: str, picture: Image.Image | None) -> bytes:
+    """Return a PNG of 1200 x 630 pixels: a title, lines of text, and a picture beside or below."""
+    card = Image.new("RGB", _CARD_PX, "#ffffff")
+    is_wide = picture is not None and picture.width > picture.height
+    if picture is not None:
+        card.paste(picture, ((_CARD_PX[0] - picture.width) // 2, 300) if is_wide else (605, 35))
+    draw, top = ImageDraw.Draw(card), 40 if is_wide else 110
+    columns = (40, 66) if is_wide else (18, 30)
+    for said, size, color, width in zip(
+        (title, text), (58, 36), ("#16181d", "#3a4cc4"), columns, strict=True
+    ):
+        for line in (part for whole in said.splitlines() for part in textwrap.wrap(whole, width)):
+            draw.text((50, top), line, color, ImageFont.load_default(size))
+            top += round(1.25 * size)
+        top += 36 if not is_wide else 12
+    return to_png(card)
 
 
 def asset(name: str) -> bytes:

@@ -74,14 +74,6 @@ def plan_session(suite: Suite, person: Person, limit: int | None) -> RunPlan:
     return make_plan(once, {}, limit=limit, people=[planned])
 
 
-@dataclass(frozen=True)
-class Given:
-    """The picks of a person, and how long they took [s]."""
-
-    picks: tuple[Pick, ...]
-    took_s: float
-
-
 class PersonModel:
     """A model that answers a request with the reply that a person's picks make at a page.
 
@@ -123,12 +115,12 @@ class PersonModel:
         if self._plan.suite.images.source != "render":
             # Nothing tells how grids are cut in pictures that a data set brings.
             picking = picking.without_cells()
-        given = await self._session.ask(request, picking, is_warm_up=is_warm_up)
+        text, took_s = await self._session.ask(request, picking, is_warm_up=is_warm_up)
         return Reply(
-            text=picking.reply(given.picks),
+            text=text,
             usage=Usage(prompt_tokens=0, completion_tokens=0),
             cost_usd=0.0,
-            latency_s=given.took_s,
+            latency_s=took_s,
             provider_model=self.name,
         )
 
@@ -192,7 +184,7 @@ class _Asked:
     request: Request
     picking: Picking
     place: Mapping[str, int]
-    answer: Future[Given]
+    answer: Future[tuple[str, float]]
     before_s: float = 0.0
     since_s: float | None = None
 
@@ -254,9 +246,14 @@ class PlaySession:
             for one in signals:
                 loop.remove_signal_handler(one)
 
-    async def ask(self, request: Request, picking: Picking, *, is_warm_up: bool = False) -> Given:
-        """Return what the person picks; HaltedError where the session is closed first."""
-        answer: Future[Given] = Future()
+    async def ask(
+        self, request: Request, picking: Picking, *, is_warm_up: bool = False
+    ) -> tuple[str, float]:
+        """Return the reply that the person's picks make, and how long they took [s].
+
+        Raises HaltedError where the session is closed first.
+        """
+        answer: Future[tuple[str, float]] = Future()
         # From now on it can be settled, whoever has stopped waiting.
         answer.set_running_or_notify_cancel()
         with self._changed:
@@ -322,11 +319,10 @@ class PlaySession:
         """
         with self._changed:
             asked = self._on_show(change)
-            asked.picking.reply(picks)
+            text = asked.picking.reply(picks)
             self._asked = None
             self._go_to("waiting")
-            seen_s = round(asked.seen_s(self._clock()), 3)
-            asked.answer.set_result(Given(tuple(picks), seen_s))
+            asked.answer.set_result((text, round(asked.seen_s(self._clock()), 3)))
 
     def pause(self) -> None:
         """Hide the question and stop the clock."""
