@@ -296,7 +296,7 @@ class ModelConfig(Section):
                 at, allowed = (type(self).model_fields[key].alias or key,), ", ".join(with_replay)
                 yield Fault("has no meaning for a replay", allowed, at=at, key=True)
             return
-        if self.transport == "direct" and not self.has_address and provider != "openai":
+        if self.transport == "direct" and not self.addresses and provider != "openai":
             # A direct call would take the provider's key to OpenAI.
             message = f"needs api_base, the address of the server that speaks for {provider}"
             yield Fault(message, at=("transport",))
@@ -342,11 +342,6 @@ class ModelConfig(Section):
         """The address where there is one alone."""
         return self.addresses[0] if len(self.addresses) == 1 else None
 
-    @property
-    def has_address(self) -> bool:
-        """True if it is served elsewhere than at its provider's address."""
-        return bool(self.addresses)
-
     def at(self, address: str | None) -> Self:
         """Return the model as one server serves it; None is its provider's."""
         return self.model_copy(update={"addresses": () if address is None else (address,)})
@@ -361,7 +356,7 @@ class ModelConfig(Section):
         if self.transport != "auto":
             return self.transport == "direct"
         return (
-            self.has_address
+            bool(self.addresses)
             and self.provider in DIRECT_PROVIDERS
             and _RENAMES_PARAMETERS.match(self.provider_model) is None
         )
@@ -391,7 +386,7 @@ class ModelConfig(Section):
         identity: dict[str, object] = {
             "kind": self.kind,
             "id": self.id or self.name,
-            "api_base": OWN_SERVER if self.has_address else None,
+            "api_base": OWN_SERVER if self.addresses else None,
             "params": self.params,
             "sends_seed": self.seed != "never",
             "recording": self.replay,
@@ -415,7 +410,7 @@ def _entry_faults(config: ModelConfig) -> Iterator[Fault]:
     variable = f"{config.provider.upper()}_API_BASE"
     if not config.id and config.replay is None:
         yield Fault("needs an id, or a replay folder", hint="for example id: openai/gpt-4o")
-    elif config.provider in _SELF_HOSTED and not (config.has_address or os.environ.get(variable)):
+    elif config.provider in _SELF_HOSTED and not (config.addresses or os.environ.get(variable)):
         # litellm would send prompts to a public provider.
         message = "is behind a server of your own: it needs an address"
         hint = f"add api_base: http://localhost:8000/v1, or set {variable}"

@@ -410,7 +410,7 @@ class BatchModel:
 
     async def _last_status(self, batch: Batch) -> BatchStatus:
         """Look at a batch now and then; return its last state."""
-        pause_s, failures, told = min(_FIRST_PAUSE_S, self.files.poll_s), 0, ""
+        pause_s, failures, logged = min(_FIRST_PAUSE_S, self.files.poll_s), 0, ""
         while True:
             try:
                 status = await self._provider.status(batch.id)
@@ -423,10 +423,10 @@ class BatchModel:
                 if failures >= self.policy.max_connection_failures:
                     raise
                 said = f"cannot be looked at now ({error})"
-            if said != told:
+            if said != logged:
                 since = batch.created.astimezone().strftime("%d %b %H:%M")
                 self._tell(f"waiting for batch {batch.shown} since {since}: {said}")
-                told = said
+                logged = said
             await asyncio.sleep(pause_s)
             pause_s = min(self.files.poll_s, 1.5 * pause_s)
 

@@ -150,7 +150,7 @@ class BatchProvider(ABC):
         created: str | float | None = None,
     ) -> BatchStatus:
         """Return a status; `words` are a state, the number of answered requests, and errors. A
-        batch whose age is not told counts as new.
+        batch whose age is not known counts as new.
         """
         if not (isinstance(name, str) and name):
             raise ValueError("a batch without a name")
@@ -179,10 +179,10 @@ class BatchProvider(ABC):
                 raise UnavailableError(why, sent="no")
             key = api_key(self._config) or ""
             own = {name: value.replace("{key}", key) for name, value in self.headers.items()}
-            told = {"Content-Type": "application/json", **own, **(headers or {})}
+            sent = {"Content-Type": "application/json", **own, **(headers or {})}
             http = self._transfers if is_large or body is not None else self._looks
             method = "GET" if body is None else "POST"
-            answer = await http.send(url, body or b"", told, method=method)
+            answer = await http.send(url, body or b"", sent, method=method)
             if answer.fault or not answer.is_success:
                 raise error_of(answer)
             try:
@@ -326,8 +326,8 @@ class _Gemini(BatchProvider):
         }
         named = json.dumps({"file": {"display_name": token}}).encode()
         url = f"{self._base}/upload/v1beta/files"
-        told = await self._call(lambda answer: answer.headers, url, named, announced)
-        url = next((v for name, v in told.items() if name.lower() == "x-goog-upload-url"), "")
+        answered = await self._call(lambda answer: answer.headers, url, named, announced)
+        url = next((v for name, v in answered.items() if name.lower() == "x-goog-upload-url"), "")
         sent = {"X-Goog-Upload-Offset": "0", "X-Goog-Upload-Command": "upload, finalize"}
         file = await self._call(lambda answer: _object(answer)["file"]["name"], url, data, sent)
         batch = {"batch": {"display_name": token, "input_config": {"file_name": file}}}

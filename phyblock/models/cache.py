@@ -59,7 +59,7 @@ class ReplyCache:
     """Replies by key, in one SQLite file that several processes may have open.
 
     Two processes that ask the same at the same time may both pay for it: the later reply stays.
-    Within a process `asking` prevents that. Raises StoreError for a file that is broken, foreign or
+    Within a process `shared` prevents that. Raises StoreError for a file that is broken, foreign or
     cannot be used. With `tell`, which is for runs, what fails after the opening is reported, and
     the run goes on without the cache: replies are in its records too. A row that cannot be read is
     missing.
@@ -120,7 +120,7 @@ class ReplyCache:
         return False
 
     @contextlib.asynccontextmanager
-    async def asking(self, key: str) -> AsyncIterator[None]:
+    async def shared(self, key: str) -> AsyncIterator[None]:
         """Wait until nobody else of this process asks the same."""
         while (other := self._asked.get(key)) is not None:
             await asyncio.wait((other,))

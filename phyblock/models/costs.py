@@ -62,7 +62,7 @@ def tariff_of(config: ModelConfig) -> Tariff | None:
         return FREE
     tariff = config.price or _mapped_tariff(config)
     host, base = _HALVING_HOSTS.get(config.provider), config.api_base
-    is_halved = host is not None and (host_of(base) == host if base else not config.has_address)
+    is_halved = host is not None and (host_of(base) == host if base else not config.addresses)
     if tariff is None or not is_halved:
         return tariff
     return _halved(tariff).model_copy(update={"tiers": tuple(map(_halved, tariff.tiers))})
@@ -199,7 +199,7 @@ class Budget:
 
 
 class ModelBudget:
-    """The calls of one model within a run's budget, and what its replies have told of its costs.
+    """The calls of one model within a run's budget, and what its replies show of its costs.
 
     The largest ratios of real to estimated tokens are remembered, of prompts and of replies, so
     that a provider that counts higher is soon reserved for. Under a limit one call is sent first,
@@ -445,10 +445,10 @@ def _picture_rules() -> list[tuple[re.Pattern[str], dict[str, PictureRule]]]:
     """Read pictures.yaml: rules by detail, "" the usual one, each with the names that it is for."""
     rules = []
     for entry in read_own_yaml(Path(__file__).with_name("pictures.yaml")):
-        told = {"": entry["usual"], **entry.get("details", {})}.items()
+        by_name = {"": entry["usual"], **entry.get("details", {})}.items()
         by_detail = {
             name: PictureRule(**rule) if isinstance(rule, dict) else PictureRule(plus=rule)
-            for name, rule in told
+            for name, rule in by_name
         }
         rules.append((re.compile(rf"(^|\.){entry['model']}"), by_detail))
     return rules

@@ -79,7 +79,7 @@ def api_key_status(config: ModelConfig) -> KeyStatus:
         return KeyStatus((), is_set=False, is_needed=False)
     variables = _variables(config)
     is_needed = config.api_key_env is not None or not (
-        config.has_address or config.provider in KEYLESS + _OWN_CREDENTIALS
+        config.addresses or config.provider in KEYLESS + _OWN_CREDENTIALS
     )
     found = _found(variables)
     if found is None or all(" " <= character <= "~" for character in found[1]):

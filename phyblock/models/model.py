@@ -404,7 +404,7 @@ class ChatModel:
             return answered
         if self.cache is None:
             return await self._ask(request, key)
-        async with self.cache.asking(key):
+        async with self.cache.shared(key):
             kept = self.cache.get(key)
             if kept is not None:
                 return kept.model_copy(update={"cost_usd": self._cost_usd(kept)})
@@ -533,7 +533,7 @@ def takes_format(config: ModelConfig) -> bool:
     Self-hosted servers that speak the OpenAI protocol (vLLM, SGLang, llama.cpp, LM Studio, Ollama)
     do; of all others litellm's map of models is believed.
     """
-    is_own = config.provider in DIRECT_PROVIDERS and config.has_address
+    is_own = config.provider in DIRECT_PROVIDERS and bool(config.addresses)
     is_known = is_own or config.provider in _SCHEMA_PROVIDERS
     return is_known or bool(map_entry(config).get("supports_response_schema"))
 

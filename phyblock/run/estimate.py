@@ -75,8 +75,8 @@ class Estimate:
         tokens = usd = 0.0
         for (kind, usual, most, token_usd), calls in self._coming.items():
             known = self._known.get(kind, [])
-            is_told = len(known) >= _ENOUGH_REPLIES
-            length = min(sum(known) / len(known), most) if is_told else usual
+            is_enough = len(known) >= _ENOUGH_REPLIES
+            length = min(sum(known) / len(known), most) if is_enough else usual
             tokens += length * calls
             usd += length * token_usd * calls
         return tokens, usd
@@ -131,7 +131,7 @@ def estimate(
             for outline in outlines if row.model.kind == "litellm" else ():
                 is_known = has_all_pictures(outline)
                 asked = replace(outline, seed=sample.seed, params=row.model.params)
-                key = reply_key(row.model, sample.asking(asked)) if is_known else ""
+                key = reply_key(row.model, sample.as_sent(asked)) if is_known else ""
                 kept = cache.get(key) if cache is not None and is_known else None
                 if kept is not None:
                     row.cached += 1
@@ -162,7 +162,7 @@ def may_bill(
 def _samples(plan: RunPlan) -> Iterator[tuple[Sample, Sequence[Request]]]:
     """Yield all samples with their requests as far as they are known before any is answered.
 
-    What is shown alike is outlined once.
+    What is shown the same is outlined once.
     """
     for shown_in, tracks in plan.variants.items():
         repeats = [variant for variant in plan.variants if variant.shown == shown_in]

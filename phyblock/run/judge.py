@@ -75,8 +75,8 @@ def judged(track: Track, item: Item, fields: Mapping[str, Any], judgement: Judge
     `fields` are those of a record that was begun, or of one that was judged before.
     """
     outcome = _outcome(fields["reply"], fields["error"], judgement.is_read)
-    told = {**fields, "outcome": outcome, **judgement.fields}
-    record = track.record_type().model_validate(told)
+    found = {**fields, "outcome": outcome, **judgement.fields}
+    record = track.record_type().model_validate(found)
     if counts := track.counts(item, record):
         record = record.model_copy(update={"counts": {**record.counts, **counts}})
     return record

@@ -57,7 +57,7 @@ class Sample:
         whole = f"{self.track.name}/{self.model}/{self.item.key}/s{self.seed}"
         return f"{whole}/{self.variant.key}" if self.variant.key else whole
 
-    def asking(self, request: Request) -> Request:
+    def as_sent(self, request: Request) -> Request:
         """Return the request as it is sent: a repeat has another seed, and so is sent once more."""
         seed = request.seed
         if self.variant.levels and (repeat := self.variant.repeat) != 1:
@@ -268,7 +268,7 @@ def to_config(name: str, known: ModelConfig, suite: Suite) -> ModelConfig:
         return known
     limits = suite.limits.model_dump(include={"timeout_s", "max_concurrency"})
     config = known.with_defaults({"name": name, **suite.sampling.model_dump(), **limits})
-    if not config.has_address:
+    if not config.addresses:
         config = config.at(server_address(config.id))
     sends = suite.answer_format == "json_schema" and config.response_format != "never"
     sends = sends and (config.response_format == "always" or takes_format(config))
@@ -307,7 +307,7 @@ def provider_problem(config: ModelConfig, where: str) -> Problem | None:
     if config.provider in providers:
         return None
     message, hint = "is of no provider that is known", did_you_mean(config.provider, providers)
-    if config.has_address:
+    if config.addresses:
         hint = f"a server of your own that speaks OpenAI's chat protocol: hosted_vllm/{config.id}"
     allowed = "provider/model, as litellm names them"
     return Problem(where, message, f"{config.name}.id", config.id, allowed, hint)

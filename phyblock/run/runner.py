@@ -383,7 +383,7 @@ class Session:
         track, model = sample.track, self._models[sample.model]
         shows = model.needs_messages
         made = track.request(item, sample.seed, config.params, with_messages=shows)
-        request = sample.asking(await self._until_stopped(made))
+        request = sample.as_sent(await self._until_stopped(made))
         answer = await self._answer(model, request)
         fields = self._fields(sample, item, answer, request, config)
         record, is_cancelled = await to_its_end(judge_reply(track, item, fields))
@@ -399,7 +399,7 @@ class Session:
         replies: list[Reply] = []
         fields = self._fields(sample, item, None, None, config)
         while (wanted := await self._until_stopped(episode.request())) is not None:
-            request = sample.asking(wanted)
+            request = sample.as_sent(wanted)
             answer = await self._answer(model, request)
             fields = self._fields(sample, item, answer, request, config)
             if not isinstance(answer, Reply):
