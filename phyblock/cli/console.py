@@ -6,15 +6,17 @@ import os
 import re
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 from rich import box
 from rich.console import Console
 from rich.measure import Measurement
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -26,6 +28,10 @@ from phyblock.types import QUOTE_HINT
 if TYPE_CHECKING:
     from phyblock.workers import Shards
 
+T = TypeVar("T")
+
+LINE_EVERY_S = 10.0
+"""Where no bar is shown, a line says so often how far work is."""
 INTERRUPTED = 130
 """The exit code after Ctrl-C."""
 _PIPE_WIDTH = 160
@@ -104,6 +110,21 @@ def _piece(view: TextTable, columns: Sequence[int], text_width: int | None = Non
     for row in view.rows:
         table.add_row(*(Text(row[i]) for i in columns))
     return table
+
+
+def tracked(items: Iterable[T], total: int | None, doing: str, noun: str = "scenes") -> Iterator[T]:
+    """Yield the items; show a progress bar on a terminal, a line now and then elsewhere."""
+    console = make_console(stderr=True)
+    columns = (TextColumn(doing), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    shown_s, hidden = time.monotonic(), not console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=hidden) as progress:
+        bar = progress.add_task("", total=total)
+        for count, item in enumerate(items, 1):
+            progress.advance(bar)
+            if hidden and time.monotonic() - shown_s >= LINE_EVERY_S:
+                shown_s = time.monotonic()
+                console.print(f"{count:,}{'' if total is None else f' of {total:,}'} {noun}")
+            yield item
 
 
 def shown_path(path: Path) -> str:

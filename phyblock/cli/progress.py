@@ -20,6 +20,7 @@ from rich.progress import (
 )
 from rich.text import Text
 
+from phyblock.cli.console import LINE_EVERY_S
 from phyblock.models.model import ModelEvent
 from phyblock.run.runner import (
     ModelStopped,
@@ -34,7 +35,6 @@ from phyblock.scoring.plan import Counts
 from phyblock.text import counted, one_line
 from phyblock.types import FAILURES
 
-_LINE_EVERY_S = 10.0
 _SHOWN_EVERY_S = 0.1
 """Answers that come faster are shown together."""
 _SPEED_OVER_S = 600.0
@@ -159,7 +159,7 @@ class ProgressView:
         for tally in self._tallies.values():
             self._progress.update(tally.task.id, facts=preparing or tally.facts)
         self._log_retries(now_s)
-        if not self._is_terminal and now_s - self._last_line_s >= _LINE_EVERY_S:
+        if not self._is_terminal and now_s - self._last_line_s >= LINE_EVERY_S:
             self._last_line_s = now_s
             self._print(self._line(now_s))
 
@@ -184,7 +184,7 @@ class ProgressView:
         """Log repeated calls: the first at once, then at most a line a model every ten seconds."""
         for model, tally in list(self._tallies.items()):
             more = tally.retries - tally.logged
-            if more and now_s - tally.logged_s >= _LINE_EVERY_S:
+            if more and now_s - tally.logged_s >= LINE_EVERY_S:
                 tally.logged, tally.logged_s = tally.retries, now_s
                 again = counted(more, "call")
                 self._print(f"{model}: {again} sent again; last: {tally.last_retry}")

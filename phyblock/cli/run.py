@@ -6,8 +6,8 @@ import asyncio
 import contextlib
 import gc
 import signal
-import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,7 @@ from phyblock.cli.console import (
     run_out_option,
     sets_option,
     shown_path,
+    tracked,
     worker_options,
     yes_option,
 )
@@ -60,7 +61,6 @@ from phyblock.tracks.base import kind_of
 from phyblock.workers import open_workers
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
-_LINE_EVERY_S = 2.0
 
 
 @click.command(epilog=f"Bundled suites: {', '.join(bundled_suites())}.")
@@ -315,18 +315,11 @@ def score(
     """
     from phyblock.run.rescore import rescore
 
-    console, shown_s = make_console(stderr=True), time.monotonic()
-
-    def progress(done: int) -> None:
-        nonlocal shown_s
-        if time.monotonic() - shown_s > _LINE_EVERY_S:
-            shown_s = time.monotonic()
-            console.print(f"scored {done:,} samples")
-
     work = f"score {read_manifest(run).identity}: {code_versions()}\n"
     shards = open_shards(shard, run, work)
     with open_workers(jobs, ray_address, shards, size=64) as workers:
-        rescore(run, data, console.print, progress, workers)
+        watch = partial(tracked, total=None, doing="Scoring", noun="samples")
+        rescore(run, data, make_console(stderr=True).print, watch, workers)
     if left_to_first(shards, run):
         return
     print_path(make_console(), show_tables(run, data=data))

@@ -30,6 +30,8 @@ from phyblock.workers import Workers
 
 _CHANGED = "is not the data set that the run was made on, or it was changed since"
 _MOVED = "name the folder where it is now with --data"
+_Judged = tuple[Record, Record]
+"""A record as it is stored, and judged again."""
 _NO_DATA = ("prompt", "pictures", CARRYING, ENGINE)
 """Parts of a track's identity that are not the data that it asks about."""
 
@@ -38,15 +40,15 @@ def rescore(
     folder: Path,
     data: Path | None = None,
     tell: Callable[[str], object] = lambda _: None,
-    watch: Callable[[int], object] = lambda _: None,
+    watch: Callable[[Iterator[_Judged]], Iterator[_Judged]] = iter,
     workers: Workers | None = None,
 ) -> None:
     """Judge every stored reply of a run again and replace its records in one step.
 
     `data` is where the data set is now, if it has moved. An episode in which today's code would ask
-    something else stays as it was and is no longer final: `tell` is called with how many there are,
-    `watch` with the number of records that are done. `workers` do it, where they are given; of
-    their shards the first alone writes. Raises StoreError for a folder that is no run or cannot be
+    something else stays as it was and is no longer final: `tell` is called with how many there are;
+    `watch` sees each record as it is done. `workers` do it, where they are given; of their shards
+    the first alone writes. Raises StoreError for a folder that is no run or cannot be
     written, DataError when the data are not what the run was made on.
     """
     manifest = read_manifest(folder)
@@ -57,12 +59,11 @@ def rescore(
 
     def records() -> Iterator[Record]:
         share = map if workers is None else workers.map
-        work: Callable[[tuple[str, Record]], tuple[Record, Record]] = judge
+        work: Callable[[tuple[str, Record]], _Judged] = judge
         if workers is not None and not workers.is_here:
             work = partial(_judge_there, folder.resolve(), None if data is None else data.resolve())
         lines = run_records(folder, manifest, whole=True)
-        for done, (record, again) in enumerate(share(work, lines)):
-            watch(done)
+        for record, again in watch(iter(share(work, lines))):
             diverged[record.track] += again.error is not None and record.error is None
             yield again
 

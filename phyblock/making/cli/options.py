@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from phyblock.cli.console import UserPath, make_console, open_shards, shards_folder, worker_options
+from phyblock.cli.console import UserPath, open_shards, shards_folder, tracked, worker_options
 from phyblock.errors import Problem
 from phyblock.making.files import check_out
 from phyblock.making.season import code_digest
@@ -20,7 +19,6 @@ from phyblock.workers import Shards, open_workers
 T = TypeVar("T")
 R = TypeVar("R")
 Command = TypeVar("Command", bound=Callable[..., Any])
-_LINE_EVERY = 25
 
 
 class Several(click.ParamType[tuple[str, ...]]):
@@ -67,20 +65,6 @@ def begin_set(
     if shard is None or not shards_folder(out).exists():
         check_out(out, names)
     return open_shards(shard, out, f"{work}\n{described_engine()}\n{code_digest()}\n")
-
-
-def tracked(items: Iterable[T], total: int, doing: str, noun: str = "scenes") -> Iterator[T]:
-    """Yield the items; show a progress bar on a terminal, a line now and then elsewhere."""
-    console = make_console(stderr=True)
-    columns = (TextColumn(doing), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    hidden = not console.is_terminal
-    with Progress(*columns, console=console, transient=True, disable=hidden) as progress:
-        bar = progress.add_task("", total=total)
-        for count, item in enumerate(items, 1):
-            progress.advance(bar)
-            if hidden and count % _LINE_EVERY == 0:
-                console.print(f"{count} of {total} {noun}")
-            yield item
 
 
 def mapped(

@@ -19,6 +19,7 @@ from phyblock.cli.console import (
     make_console,
     print_rows,
     shown_path,
+    tracked,
 )
 from phyblock.data.base import QuestionSet
 from phyblock.data.lookup import find_questions, read_data_set
@@ -33,7 +34,6 @@ from phyblock.making.cli.options import (
     making_options,
     mapped,
     print_engine,
-    tracked,
 )
 from phyblock.making.files import (
     QUESTION_FILES,

@@ -24,6 +24,7 @@ from phyblock.cli.console import (
     open_shards,
     print_rows,
     shown_path,
+    tracked,
     worker_options,
 )
 from phyblock.data.base import AssemblyTask, read_data
@@ -58,7 +59,6 @@ from phyblock.making.cli.options import (
     making_options,
     mapped,
     print_engine,
-    tracked,
 )
 from phyblock.making.files import (
     SCENE_FILES,
