@@ -451,10 +451,7 @@ def _with_rank(sides: Sequence[Side], track: str) -> list[Side]:
 
 
 def _ranks(table: pd.DataFrame, measure: Measure, ranked: Sequence[Side]) -> pd.DataFrame:
-    """Return the ranks that models may have by the last part of a table, the best first.
-
-    Tests are corrected for the pairs of ranked models; a pair without a test is not told apart.
-    """
+    """Return the ranks by the last part of a table, tests corrected for ranked pairs alone."""
     names, columns = [side.label for side in ranked], ["model", "value", "best", "worst"]
     if not names:
         return pd.DataFrame(columns=columns)
@@ -587,10 +584,8 @@ def sensitivity_frame(run: Run) -> pd.DataFrame:
 
 
 def _scores(run: Run, what: Comparable) -> Iterator[tuple[str, Floats, Clusters]]:
-    """Yield each model with its scores by the main measure, (items, seeds, variants), and the base
-    scenes of these items: those that it answered under every condition. Models may have different
-    ones.
-    """
+    """Yield each model with its scores, (items, seeds, variants), and the items' base scenes."""
+    # Of the items that it answered under every condition; models may have different ones.
     suite, parents = run.design.suite, base_scenes(run)
     sides = [Side(name, name, run) for name in run.design.model_names]
     samples = what.samples(sides, what.parts[-1], run.design)
@@ -623,9 +618,7 @@ def _components(
 
 
 def _places(vary: VarySpec, factor: str) -> NDArray[np.intp]:
-    """Return numbers of the variants in which a factor has all its levels while all else stays,
-    (levels, blocks, repeats).
-    """
+    """Return numbers of the variants that differ in a factor alone, (levels, blocks, repeats)."""
     levels, repeats = vary.names(factor), vary.names(REPEAT) or ("1",)
     places: dict[Variant, dict[tuple[str, str], int]] = {}
     for place, variant in enumerate(vary.variants):

@@ -76,10 +76,7 @@ class Look:
 
 @contextmanager
 def _styled(look: Look) -> Iterator[None]:
-    """Within it, figures are made and saved in the project's style, whatever the user's is.
-
-    The list of fonts that matplotlib keeps goes into our cache folder, not into the home folder.
-    """
+    """Within it, figures have the project's style; matplotlib's list of fonts is in our cache."""
     os.environ.setdefault("MPLCONFIGDIR", str(cache_dir() / "matplotlib"))
     import matplotlib as mpl
 

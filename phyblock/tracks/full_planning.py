@@ -83,9 +83,7 @@ _RANDOM_STEPS = 4
 
 
 def _in_valid_order(choose: Callable[[PlanSubject, Block, np.random.Generator], int | None]) -> Any:
-    """Return the rule that takes a random valid order, and of each block the candidate that is
-    chosen, else the right one.
-    """
+    """Return the rule that takes a random valid order, and what is chosen for each block."""
 
     def rule(subject: PlanSubject, rng: np.random.Generator) -> str:
         blocks, order = subject.scene.blocks, subject.scene.graph.random_order(rng)
@@ -207,10 +205,7 @@ COUNTS = (
 
 
 def _film(record: PlanRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
-    """Yield each step by the first score that knows single steps, that of the headline.
-
-    A right step puts a block at its place in the goal; a wrong one puts none.
-    """
+    """Yield each step by the headline's score; a wrong one puts no block."""
     yield FilmStep(f"{record.model}, {record.scene}", "plain", None, ())
     score = next((score for score in record.scores if score.placed is not None), None)
     if score is None or score.placed is None or score.why is None or record.parse is None:
@@ -245,17 +240,10 @@ class FullPlanning(SceneTrack):
     varies = ("prompt", "background", "view", "candidate_order", "layout", "repeats")
 
     def open(self) -> None:
-        """Select scenes; DataError where the data set is to bring their pictures and lacks some."""
+        """Select scenes."""
         super().open()
-        suite, dataset = self.suite, self.dataset
-        self._guess = blind_guesses(suite, dataset.tasks, suite.settings[0])
+        self._guess = blind_guesses(self.suite, self.dataset.tasks, self.suite.settings[0])
         self._scorers: dict[object, AssemblyScorer] = {}
-        lacking = [task.key for task in self.items if task.composite is None]
-        if self.shop is not None and suite.images.source == "dataset" and lacking:
-            message = f"has no picture of {len(lacking)} of {len(self.items)} scenes"
-            found = ", ".join(lacking[:8]) + (", ..." if len(lacking) > 8 else "")
-            hint, where = "render them: --set images.source=render", str(dataset.root)
-            raise DataError(Problem(where, message, "images.source", found, hint=hint))
 
     def open_prompt(self) -> Prompt:
         """Return the official prompt or a template."""

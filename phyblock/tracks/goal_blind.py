@@ -181,9 +181,7 @@ def _left_out(
     values: Sequence[NDArray[Any]],
     kin: Sequence[Sequence[int]],
 ) -> Iterator[tuple[Floats, Floats]]:
-    """Yield for each scene sums over the unrelated ones: of the rows with each unit's key, shape
-    (units, 1 + columns), and of all rows, shape (1 + columns,); the first column counts rows.
-    """
+    """Yield for each scene sums over the unrelated ones, by unit and of all; rows are counted."""
     row_of = {key: row for row, key in enumerate(dict.fromkeys(chain.from_iterable(keys)))}
     rows = [[row_of[key] for key in of] for of in keys]
     table = np.zeros((len(keys), len(row_of), 1 + values[0].shape[1]))
@@ -198,9 +196,7 @@ def _left_out(
 def _plans(
     offered: Sequence[Unit], by_key: Sequence[Floats], heights: Floats, *, repeats: bool
 ) -> list[Plan]:
-    """Return the plans of every way: the candidates of units that are likely enough, or of the
-    likeliest, by height; or all of them once by height, then all a second time.
-    """
+    """Return the plans of every way: what is likely enough by height, once or again and again."""
     copies = by_key[0].shape[1]
     own = np.array([len(unit.numbers) for unit in offered])
     unit, copy = (of.ravel() for of in np.indices((len(offered), copies)))

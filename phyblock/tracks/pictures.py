@@ -193,14 +193,14 @@ class LocalShop(Workshop):
 
     async def images(self, drawings: Sequence[Drawing]) -> tuple[Image, ...]:
         """Return pictures from memory, from the cache, or drawn now; raises as a `Workshop`."""
-        return tuple(map(self._drawn, drawings))
-
-    def _drawn(self, drawing: Drawing) -> Image:
-        if (kept := self._kept(drawing)) is not None:
-            return kept
-        data = drawing.make()
-        self._keep(drawing, data)
-        return self._remembered(drawing, data)
+        images = []
+        for drawing in drawings:
+            if (image := self._kept(drawing)) is None:
+                data = drawing.make()
+                self._keep(drawing, data)
+                image = self._remembered(drawing, data)
+            images.append(image)
+        return tuple(images)
 
 
 def picture_style(images: ImagesSpec) -> PictureStyle:

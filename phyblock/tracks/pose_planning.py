@@ -349,11 +349,7 @@ def _built(
     rng: np.random.Generator,
     move: Callable[[Block, Center], Center] = lambda _, center: center,
 ) -> str:
-    """The goal's blocks in a random valid order, each moved from its true place.
-
-    Layer by layer where that is in balance, else as near to it as is: a balance of which one arm is
-    loaded to its top before the other topples, though the order is a valid one.
-    """
+    """The goal's blocks in a random valid order that is in balance, each moved from its place."""
     blocks, layers = subject.scene.blocks, subject.scene.graph.layers
     drawn = rng.random(len(blocks)).tolist()
     wanted = sorted(range(len(blocks)), key=lambda vertex: (layers[vertex], drawn[vertex]))

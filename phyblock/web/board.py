@@ -256,10 +256,7 @@ def _id(track: str, setting: str, heading: str) -> str:
 
 
 def _track(track: str, run: Run, models: Sequence[Value]) -> dict[str, Any]:
-    """Return a track of a page; `models` are the values of those that are no baselines.
-
-    The finding says how many of them are above the strongest blind baseline.
-    """
+    """Return a track of a page, and how many `models`, no baselines, are above the blind ones."""
     kind, headline, finding = kind_of(track), Headline(run, track), ""
     measure, floor, parts = headline.measure, headline.floor, kind.report().part_names
     names = (one.name for one in track_measures(track))

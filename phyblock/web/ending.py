@@ -80,9 +80,7 @@ class Ending:
         return pair
 
     def _track(self, track: str, records: Sequence[Record]) -> dict[str, Any]:
-        """Return a track: its measure, all means, and a row an item. Its `line` has the person, the
-        strongest rule that never sees the goal, and the best model.
-        """
+        """Return a track: measure, all means, rows, and the `line` of person, floor, best model."""
         kind, measure = kind_of(track), comparable(self._run, track).measure
         own, others = self._values(track)
         rows = [

@@ -108,11 +108,9 @@ def _write(folder: Path, name: str, build: str, text: str) -> None:
 
 
 def _write_three(folder: Path) -> None:
-    """Write three.js as the script `three.js`, which names it `THREE`.
-
-    Its published build is of two modules, which a page that was opened from disk may not load; what
-    they import and export becomes what functions take and return.
-    """
+    """Write three.js as the script `three.js`, which names it `THREE`."""
+    # Its published build is of two modules, which a page that was opened from disk may not load;
+    # what they import and export becomes what functions take and return.
     core, module = (asset(f"three/three.{name}.min.js").decode() for name in ("core", "module"))
     names, source = r"(\{[^}]*\})", r'from"\./three\.core\.min\.js";?'
     exported = partial(re.sub, r"([\w$]+) as ([\w$]+)", r"\2:\1")
@@ -329,11 +327,7 @@ def _plain(value: Any) -> Any:
 
 
 def _scene(task: AssemblyTask) -> dict[str, Any]:
-    """Return a scene with its candidates, as pages take it.
-
-    `depend` holds positions of blocks in the list, from 0; `candidate` is the number of the
-    candidate that stands for the block in setting A, None where there is none.
-    """
+    """Return a scene as pages take it; `depend` has places of blocks, `candidate` a number."""
     blocks = [
         {
             **_plain(block),
