@@ -235,15 +235,12 @@ class Track(ABC):
 
         They are empty where a measure does not count it.
         """
-        return {
-            counted.name: tuple(map(float, sample(item, record) or ()))
-            for counted, sample in self._sample_counts
-        }
-
-    @functools.cached_property
-    def _sample_counts(self) -> list[tuple[SampleCounts, Callable[..., Sequence[float] | None]]]:
         added = (measure.counted for measure in added_measures(self.name))
-        return [(one, one.sample) for one in (*self.counted, *added) if one.sample is not None]
+        return {
+            one.name: tuple(map(float, one.sample(item, record) or ()))
+            for one in (*self.counted, *added)
+            if one.sample is not None
+        }
 
     async def judge_apart(self, item: Any, text: str | None, _earlier: Record | None) -> Judgement:
         """Return what `judge` does; where that takes long, beside the calls of others.
