@@ -49,11 +49,10 @@ from phyblock.models.request import Request, wire_messages
 from phyblock.records.record import Record, Reply
 from phyblock.registry import added_measures, known_track, known_tracks
 from phyblock.results.load import Run, load_run
-from phyblock.run.drive import completed, remarks_on
 from phyblock.run.estimate import may_bill
 from phyblock.run.judge import begun, judge_episode, judge_reply
 from phyblock.run.plan import find_models_file, make_plan, read_suite
-from phyblock.run.runner import RunEvent, Session, Stopping, check_ready
+from phyblock.run.runner import RunEvent, Session, Stopping, check_ready, completed, remarks_on
 from phyblock.sim.pictures import PictureStyle, candidates_png, composite_png, goal_png, goal_style
 from phyblock.text import counted, did_you_mean, well_formed
 from phyblock.tracks.base import Track, open_tracks

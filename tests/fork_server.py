@@ -49,7 +49,7 @@ _CHANGING = {
 
 _PRELOADED = ("PIL.GifImagePlugin", "PIL.JpegPresets", "aiohttp", "matplotlib.backends.backend_agg",
               "matplotlib.backends.backend_svg", "matplotlib.pyplot", "pandas.core.methods.to_dict",
-              "pandas.io.formats.csvs", "phyblock.run.drive", "phyblock.results.tables",
+              "pandas.io.formats.csvs", "phyblock.run.runner", "phyblock.results.tables",
               "phyblock.sim.pybullet", "phyblock.web.report", "pyarrow.pandas_compat", "sqlite3",
               "yarl")  # fmt: skip
 

@@ -43,7 +43,6 @@ from phyblock.config.models import load_models
 from phyblock.files import OutFolder
 from phyblock.records.files import read_manifest
 from phyblock.results.text import NO_VALUE, REPORT_FILE, TABLES, Column, TextTable, kept_summary
-from phyblock.run.drive import completed, remarks_on
 from phyblock.run.estimate import Estimate, estimate, may_bill
 from phyblock.run.manifest import code_versions
 from phyblock.run.plan import (
@@ -54,7 +53,7 @@ from phyblock.run.plan import (
     prompt_remarks,
     read_suite,
 )
-from phyblock.run.runner import RunResult, Session, check_ready
+from phyblock.run.runner import RunResult, Session, check_ready, completed, remarks_on
 from phyblock.run.store import held_run
 from phyblock.text import counted, one_line
 from phyblock.tracks.base import kind_of
