@@ -235,12 +235,15 @@ class Track(ABC):
 
         They are empty where a measure does not count it.
         """
-        added = (measure.counted for measure in added_measures(self.name))
         return {
             one.name: tuple(map(float, one.sample(item, record) or ()))
-            for one in (*self.counted, *added)
+            for one in self._counted
             if one.sample is not None
         }
+
+    @functools.cached_property
+    def _counted(self) -> tuple[SampleCounts, ...]:
+        return (*self.counted, *(one.counted for one in added_measures(self.name)))
 
     async def judge_apart(self, item: Any, text: str | None, _earlier: Record | None) -> Judgement:
         """Return what `judge` does; where that takes long, beside the calls of others.
