@@ -19,7 +19,7 @@ from phyblock.data.official import read_official, recorded_models
 from phyblock.domain.scene import Plan
 from phyblock.models.client import read_raw_reply
 from phyblock.parsing.plan import parse_plan
-from phyblock.scoring.plan import Goal, match_plan, micro
+from phyblock.scoring.plan import Counts, Goal, match_plan
 from phyblock.types import MATCHERS, SETTINGS
 
 
@@ -65,7 +65,7 @@ def print_recordings(tasks: tuple[AssemblyTask, ...], checkout: Path) -> None:
                 goal = Goal(task.scene, task.candidates, setting)
                 for matcher in MATCHERS:
                     counts[matcher].append(match_plan(goal, plan, matcher).counts)
-            f1 = {matcher: 100 * (micro(counts[matcher]).f1 or 0.0) for matcher in MATCHERS}
+            f1 = {matcher: 100 * (sum(counts[matcher], Counts()).f1 or 0.0) for matcher in MATCHERS}
             gain = sum(
                 best.tp > first.tp
                 for first, best in zip(counts["paper"], counts["optimal"], strict=True)

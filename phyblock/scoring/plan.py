@@ -42,28 +42,10 @@ class Counts:
         return Counts(self.tp + other.tp, self.fp + other.fp, self.fn + other.fn)
 
     @property
-    def precision(self) -> float | None:
-        """TP / (TP + FP), None where no step was counted."""
-        return _ratio(self.tp, self.tp + self.fp)
-
-    @property
-    def recall(self) -> float | None:
-        """TP / (TP + FN), None where no block was wanted."""
-        return _ratio(self.tp, self.tp + self.fn)
-
-    @property
     def f1(self) -> float | None:
         """2 TP / (2 TP + FP + FN): the harmonic mean, None where nothing was counted."""
-        return _ratio(2 * self.tp, 2 * self.tp + self.fp + self.fn)
-
-
-def micro(counts: Iterable[Counts]) -> Counts:
-    """Sum of counts; its precision, recall and F1 are the micro averages."""
-    return sum(counts, Counts())
-
-
-def _ratio(part: int, whole: int) -> float | None:
-    return part / whole if whole else None
+        whole = 2 * self.tp + self.fp + self.fn
+        return 2 * self.tp / whole if whole else None
 
 
 def f1_of(sums: Floats) -> Floats:

@@ -17,7 +17,7 @@ from phyblock.errors import DataError
 from phyblock.making.scenes.candidates import NEEDED, make_candidates
 from phyblock.making.scenes.production import Request, draw, shares
 from phyblock.making.scenes.sketch import POSES
-from phyblock.scoring.plan import Goal, match_plan, micro
+from phyblock.scoring.plan import Counts, Goal, match_plan
 from phyblock.tracks.goal_blind import goal_blind_plans
 from phyblock.types import SETTINGS, Setting
 
@@ -121,9 +121,12 @@ def gain(tasks: Tasks, setting: Setting, repeats: bool) -> float:
     every = {name: Plan(tuple(range(1, len(one) + 1))) for name, one in sets.items()}
     plain = goal_blind_plans(goals, sets, setting, [lambda _: None]) if repeats else every
     best, least = (
-        micro(
-            match_plan(Goal(scene, offered, setting), plans[scene.id], "optimal").counts
-            for scene, offered in tasks
+        sum(
+            (
+                match_plan(Goal(scene, offered, setting), plans[scene.id], "optimal").counts
+                for scene, offered in tasks
+            ),
+            Counts(),
         )
         for plans in (learned, plain)
     )

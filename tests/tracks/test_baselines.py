@@ -19,7 +19,7 @@ from phyblock.parsing.answer import parse_answer
 from phyblock.parsing.move import parse_move
 from phyblock.parsing.plan import parse_plan
 from phyblock.parsing.poses import parse_poses
-from phyblock.scoring.plan import Goal, match_plan, micro
+from phyblock.scoring.plan import Counts, Goal, match_plan
 from phyblock.sim.pictures import joined_size_px
 from phyblock.tracks.baselines import FOLDS, Folds, Guesses, majority_rule
 from phyblock.tracks.full_planning import PlanSubject, pick_plan
@@ -154,7 +154,7 @@ def f1(scenes: list[Scene], sets: dict[str, CandidateSet], plans, setting: Setti
         match_plan(Goal(one, sets[one.id], setting), plans[one.id], "optimal").counts
         for one in scenes
     ]
-    return micro(counts).f1 or 0.0
+    return sum(counts, Counts()).f1 or 0.0
 
 
 @st.composite
