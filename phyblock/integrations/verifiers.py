@@ -96,9 +96,9 @@ class VerifiersTaskset(vf.Taskset[VerifiersTask, VerifiersConfig]):
 
 
 class VerifiersEnvConfig(vf.EnvConfig):
-    """One model, without tools."""
+    """One model, without tools: it runs no code, and needs no sandbox."""
 
-    agent: vf.AgentConfig = vf.AgentConfig(harness={"id": "null"})
+    agent: vf.AgentConfig = vf.AgentConfig(harness={"id": "null"}, runtime={"type": "subprocess"})
 
 
 class VerifiersEnv(vf.Env[VerifiersEnvConfig]):
