@@ -283,15 +283,10 @@ def _fault(detail: ErrorDetails, path: FieldPath, value: Any, model: type[BaseMo
     if kind == "missing":
         return Fault(message, found="", hint=f"add {name}: ...", key=True)
     if kind == "extra_forbidden":
-        section = _section(model, path[:-1])
-        known = _fields(section)
-        homes = [
-            f"it belongs at {at}.{name}"
-            for at, below in _parts(section)
-            for one in below
-            if name in _fields(one)
-        ]
-        hint = next(iter(homes), "") or did_you_mean(name, known)
+        known = _parts(_section(model, path[:-1]))
+        homes = (at for at, below in known.items() if any(name in _parts(one) for one in below))
+        home = next(homes, "")
+        hint = f"it belongs at {home}.{name}" if home else did_you_mean(name, known)
         return Fault(message, ", ".join(known), "", hint=hint, key=True)
     hint = ""
     if kind == "literal_error":
@@ -307,7 +302,7 @@ def _fault(detail: ErrorDetails, path: FieldPath, value: Any, model: type[BaseMo
     elif kind == "tuple_type" and (listed := _listed(name, value)):
         hint = f"write a list: {listed}"
     elif (
-        kind == "model_type" and isinstance(value, str) and "path" in _fields(_section(model, path))
+        kind == "model_type" and isinstance(value, str) and "path" in _parts(_section(model, path))
     ):
         hint = f"write {name}: {{path: {value}}}"
     else:
@@ -333,26 +328,22 @@ def _listed(name: str, value: Any) -> str:
 def _section(model: type[BaseModel], path: FieldPath) -> type[BaseModel]:
     """Return the model that describes what stands at `path`, or the nearest around it."""
     if issubclass(model, RootModel):
-        ((_, (model,)),), path = _parts(model), path[1:]
+        (((model,),), path) = _parts(model).values(), path[1:]
     for part in path:
-        model = next((below[0] for name, below in _parts(model) if name == part and below), model)
+        model = next(iter(_parts(model).get(str(part), ())), model)
     return model
 
 
-def _parts(model: type[BaseModel]) -> list[tuple[str, list[type[BaseModel]]]]:
-    """Return the fields of a model, each with the models that its type is made of."""
-    return [
-        (field.alias or name, models_in(field.annotation))
-        for name, field in model.model_fields.items()
-    ]
+def _parts(model: type[BaseModel]) -> dict[str, list[type[BaseModel]]]:
+    """Return the models in the types of a model's fields, by the names that people write."""
+    fields = {field.alias or name: field for name, field in model.model_fields.items()}
+    return {
+        name: _models_in(field.annotation) for name, field in fields.items() if not field.exclude
+    }
 
 
-def models_in(hint: Any) -> list[type[BaseModel]]:
+def _models_in(hint: Any) -> list[type[BaseModel]]:
     """Return the models that a type is made of."""
     if isinstance(hint, type) and issubclass(hint, BaseModel):
         return [hint]
-    return [part for argument in get_args(hint) for part in models_in(argument)]
-
-
-def _fields(section: type[BaseModel]) -> list[str]:
-    return [field.alias or key for key, field in section.model_fields.items() if not field.exclude]
+    return [part for argument in get_args(hint) for part in _models_in(argument)]
