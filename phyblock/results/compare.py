@@ -397,20 +397,16 @@ def compare(
     for name, level in (("detectable", _LEVEL), ("detectable_holm", _LEVEL / max(n_tests, 1))):
         spread = table["se"], table["n_clusters"]
         table[name] = detectable(*spread, level, measure.most_apart)
-    how = " ".join([what.how, *_asked(runs, what.track)])
-    ranks = _ranks(table, measure, ranked)
-    return Comparison(table, ranks, measure.heading, measure.unit, how)
-
-
-def _asked(runs: Sequence[Run], track: str) -> Iterator[str]:
-    """Yield what is unusual about how each run asked and read, where there is anything."""
+    how = [what.how]
     for run in runs:
-        if words := run.presentation(track):
-            yield f"Run {run.path.name}: {', '.join(words)}."
+        if words := run.presentation(what.track):
+            how.append(f"Run {run.path.name}: {', '.join(words)}.")
     readers = {run.path.name: run.manifest.versions.get("readers", "1") for run in runs}
     if len(set(readers.values())) > 1:
         names = ", ".join(f"{name} by readers {version}" for name, version in readers.items())
-        yield f"Replies were read: {names}; phyblock score reads a run with those of this version."
+        how.append(f"Replies were read: {names}; phyblock score reads a run with those of today.")
+    ranks = _ranks(table, measure, ranked)
+    return Comparison(table, ranks, measure.heading, measure.unit, " ".join(how))
 
 
 def _verdict(row: Mapping[Any, Any], measure: Measure, n_tests: int) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 
 from phyblock.config.suite import DifficultySpec
 from phyblock.data.base import AssemblyTask
@@ -29,13 +28,6 @@ def log_orders(graph: AOVGraph) -> float:
     return math.log10(math.factorial(len(graph))) + most
 
 
-def blind_f1(task: AssemblyTask) -> float:
-    """Return the F1 in setting A of the plan that names every candidate once, in its order."""
-    plan = Plan(tuple(range(1, len(task.candidates) + 1)))
-    goal = Goal(task.scene, task.candidates, "A")
-    return match_plan(goal, plan, "optimal").counts.f1 or 0.0
-
-
 def distractor_distance(task: AssemblyTask) -> float:
     """Return in how many of type, color and orientation the nearest distractor differs from a look
     that is needed, on average over these; 3 where there is no distractor.
@@ -51,15 +43,18 @@ def distractor_distance(task: AssemblyTask) -> float:
     return sum(nearest) / len(nearest)
 
 
-MEASURES: Mapping[str, Callable[[AssemblyTask], float]] = MappingProxyType(
-    {
-        "blocks": lambda task: len(task.scene),
-        "depth": lambda task: max(task.scene.graph.layers),
-        "orders": lambda task: log_orders(task.scene.graph),
-        "blind": blind_f1,
-        "distractor": distractor_distance,
-    }
-)
+def _blind_f1(task: AssemblyTask) -> float:
+    plan = Plan(tuple(range(1, len(task.candidates) + 1)))
+    return match_plan(Goal(task.scene, task.candidates, "A"), plan, "optimal").counts.f1 or 0.0
+
+
+MEASURES: Mapping[str, Callable[[AssemblyTask], float]] = {
+    "blocks": lambda task: len(task.scene),
+    "depth": lambda task: max(task.scene.graph.layers),
+    "orders": lambda task: log_orders(task.scene.graph),
+    "blind": _blind_f1,
+    "distractor": distractor_distance,
+}
 """The numbers of a scene, by the names of `DifficultySpec`."""
 
 
