@@ -29,7 +29,7 @@ SCENE_SET_VERSION = 3
 often as goals need them, and shows at least 3 % of every block's outline; 3 holds nothing that
 the built-in set has.
 """
-QUESTION_SET_VERSION = 7
+QUESTION_SET_VERSION = 8
 """Raised whenever questions of a name ask something else, so that no results are mixed."""
 _Tasks = Sequence[tuple[Scene, CandidateSet]]
 

@@ -66,9 +66,10 @@ _ROUNDS = 6
 _KEPT = 1 << 15
 
 
-def is_balanced(blocks: Sequence[Block]) -> bool:
-    """True if contacts can bear all weights as they are."""
-    return _pushes(_forces(blocks, FRICTION), _weights(blocks)[:, None]) is not None
+def is_balanced(blocks: Sequence[Block], lean: tuple[float, float] = (0.0, 0.0)) -> bool:
+    """True if contacts can bear all weights as they are, on a floor whose slope is `lean`."""
+    weights = _weights(blocks, up=np.array([*lean, 1.0]))
+    return _pushes(_forces(blocks, FRICTION), weights[:, None]) is not None
 
 
 def surely_stands(blocks: Sequence[Block]) -> bool:
@@ -233,7 +234,10 @@ def _least_residual(
 
 
 def _weights(
-    blocks: Sequence[Block], shift_m: Sequence[float] | Floats = (0.0, 0.0), long: float = 1.0
+    blocks: Sequence[Block],
+    shift_m: Sequence[float] | Floats = (0.0, 0.0),
+    long: float = 1.0,
+    up: Floats = _UP,
 ) -> Floats:
     """The force up that each block needs, and its moment, shape (6 n,); all plain ones weigh 1.
 
@@ -243,7 +247,7 @@ def _weights(
     factors = np.array([long if SHAPES[b.type].is_long else 1.0 for b in blocks])
     centers = _centers_m(blocks)
     centers[:, :2] += shift_m
-    return _wrenches(centers, np.outer(kg * factors / kg.sum(), _UP)).ravel()
+    return _wrenches(centers, np.outer(kg * factors / kg.sum(), up)).ravel()
 
 
 def _centers_m(blocks: Sequence[Block]) -> Floats:

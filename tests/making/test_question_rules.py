@@ -17,7 +17,7 @@ from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import SYMMETRIES, Symmetry, turned_form
 from phyblock.files import bundled
 from phyblock.making.questions.base import WORDINGS, Draft, UnfairError, four_alike, ranks_among
-from phyblock.making.questions.dynamics import is_on_face, resting_on, stays_at
+from phyblock.making.questions.dynamics import four_plans, is_on_face, resting_on, stays_at
 from phyblock.making.questions.production import BALANCE, even_letters, keeping_odds
 from phyblock.making.questions.properties import layers_of, sure_blocks
 from phyblock.making.questions.relations import (
@@ -34,7 +34,7 @@ from phyblock.making.questions.sight import (
     resolve,
     resolve_one,
 )
-from phyblock.making.questions.structures import is_sure, lowered, with_annex
+from phyblock.making.questions.structures import bench, is_sure, lowered, with_annex
 from phyblock.making.questions.views import ViewpointMaker
 from phyblock.making.scenes.sketch import POSES, transformed
 from phyblock.sim.contact import find_gaps, find_overlaps, support_graph
@@ -190,6 +190,25 @@ def test_an_annex_is_sound_and_its_balance_hangs_on_something() -> None:
             assert resting_on(blocks, order, only=True) <= resting
             broken += bool(resting) is is_sure(left, ())
     assert broken
+
+
+@pytest.mark.parametrize(("place", "rank"), [*itertools.product(range(4), range(4))])
+def test_of_four_next_steps_one_stays_wherever_it_leans_and_however_far_it_hangs_over(
+    place: int, rank: int
+) -> None:
+    """All lean by steps, with margins to either side of what the top bears."""
+    rng = np.random.default_rng([place, rank])
+    benches = [found for one in SCENES[:100] if (found := bench(one, 2, rng))]
+    planned = ((one, four_plans(one, place, rank, rng)) for one in benches)
+    on, plans = next((both for both in planned if both[1]), (benches[0], []))
+    assert plans or rank > 1
+    if not plans:
+        return
+    leans, over = on.leans_m(np.array(plans)), np.abs(plans)[:, 0]
+    near, far = on.limits_m
+    assert abs(leans[0]) <= near < far <= np.abs(leans[1:]).min()
+    assert (leans[1:] < leans[0]).sum() == place
+    assert (over[1:] < over[0]).sum() <= rank <= (over[1:] <= over[0]).sum()
 
 
 TOP_M = 0.075

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from phyblock.domain.question import LETTERS, SUBTASKS, Question, QuestionPicture, Subtask
 from phyblock.making.questions.base import Floats
@@ -26,12 +25,10 @@ from phyblock.making.questions.production import BALANCE
 from phyblock.making.questions.text_probe import text_rule
 from phyblock.tracks.baselines import FOLDS, Folds, Guesses, majority_rule
 
-Mask = NDArray[np.bool_]
 GUESSABLE = 0.35
 """Accuracy that no probe of a sound set exceeds, unless chance is within its interval."""
 _FEWEST = 12
 _RIDGE = 4.0
-_BELOW_PX, _BANDS = 3, 6
 
 
 class Probe(NamedTuple):

@@ -5,9 +5,9 @@ Questions are proposed by statics alone; simulations confirm those that are sele
 CF: the block that goes supports others of the scene. It is marked in the picture, so that no word
 of the question hints at the answer.
 
-PD: four pictures show the same blocks laid on an unfinished structure, of which one stays. By how
-far its weights lean to one side it is as often any of the four in order. The plank under the
-weights hangs over as far in each, so that what is below a picture's change tells nothing.
+PD: four pictures show the same blocks laid on an unfinished structure, of which one stays. It is as
+often any of the four in order of how far the weights lean to one side, and for each of these as far
+as found any in order of how far the plank hangs over: neither tells it by itself.
 
 AD: all places are on flat faces, and no more central where the block stays than elsewhere. Where it
 stays it comes down on the face that is marked. Elsewhere a plank tips under it, as far as such
@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -37,7 +38,9 @@ from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions import base, sight
 from phyblock.making.questions.base import Draft, Maker, UnfairError, View, pick, shuffled
 from phyblock.making.questions.structures import (
-    arrangements,
+    SPARE_M,
+    Bench,
+    bench,
     group_of,
     is_sure,
     lowered,
@@ -53,7 +56,7 @@ from phyblock.sim.camera import view_axes
 from phyblock.sim.contact import bounds_m, support_graph
 from phyblock.sim.dynamics import groups
 from phyblock.sim.geometry import drawn_mesh
-from phyblock.sim.outcomes import Outcome, after_removal
+from phyblock.sim.outcomes import LEAN_DEG, Outcome, after_removal
 from phyblock.sim.pictures import drawn_m
 from phyblock.sim.question_pictures import (
     BLOCK_LABEL,
@@ -257,8 +260,11 @@ def sure_removal(blocks: tuple[Block, ...], order: int) -> Outcome | None:
 # PD
 
 
-_STAGES_TRIED, _SHOWN, _ONE_STAYS = 8, 60, [True, False, False, False]
+_BENCHES_TRIED, _SHOWN, _ONE_STAYS = 80, 60, [True, False, False, False]
 _ELEVATIONS_DEG = (20, 38)
+_LEAN, _LEAST_ACROSS = 2.0, 0.5
+_SIDES_XY = ((1, 0), (-1, 0), (0, 1), (0, -1))
+_PLANS, _FOURS = 400, 4000
 
 
 class PredictiveMaker(Maker):
@@ -266,38 +272,86 @@ class PredictiveMaker(Maker):
 
     subtask: Subtask = "PD"
     count = 100
-    spare, doubtful = 10.0, 2.5
+    spare, doubtful = 4.7, 1.75
     drafts_a_scene = 3
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Propose stages of building and ways to go on, of which one stays.
 
-        The plank is off the middle as far in each, in all to one side or in two to either.
+        The kind is the place of that one by its lean, and its rank by how far the plank hangs over.
         """
-        for _ in range(_STAGES_TRIED):
-            stage, ways = arrangements(scene, rng, len(LETTERS) - 1, is_even=True)
-            side = pick(rng, (-1, 1))
-            falls = pick(rng, ((side, side, side), (side, -side, -side)))
-            every = [*ways[True, side][:1], *ways[False, side][: falls.count(side)]]
-            every += ways[False, -side][: falls.count(-side)]
-            if len(every) < len(LETTERS):
-                continue
-            view, framed = base.drawn_view(rng, _ELEVATIONS_DEG), _framed(every)
-            plain = QuestionPicture("scene", stage, view, framed=framed)
-            options = [replace(plain, blocks=blocks) for blocks in every]
-            if (
-                sight.are_told_apart(options)
-                and min(min(shown_pixels(one, seen(one)).values()) for one in options) >= _SHOWN
-                and [surely_stays(p.blocks, p.blocks[-1].order) for p in options] == _ONE_STAYS
-            ):
-                facts = {"placed": sight.orders_of(stage)}
-                yield Draft(scene, "pd-next", tuple(options), (plain,), facts=facts)
+        for _ in range(self.drafts_a_scene):
+            place, rank = (int(number) for number in rng.integers(len(LETTERS), size=2))
+            tried = (_next_steps(scene, place, rank, rng) for _ in range(_BENCHES_TRIED))
+            first = itertools.islice(itertools.chain.from_iterable(tried), 1)
+            yield from (draft for draft in first if _is_told(draft))
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Decide by statics and simulation."""
         base.slots_of(question)
         shown, options = sight.picture_of(question, "scene"), sight.option_pictures(question)
         return base.only_index([_can_follow(shown, one) for one in options])
+
+
+def _next_steps(scene: Scene, place: int, rank: int, rng: np.random.Generator) -> Iterator[Draft]:
+    """Yield a question about a bench drawn, as far as one has such plans for it."""
+    on = bench(scene, 2, rng)
+    plans = four_plans(on, place, rank, rng) if on else ()
+    every = [blocks for offs_m in plans if on and (blocks := on.laid(offs_m))]
+    if on is None or len(every) < len(LETTERS):
+        return
+    view, framed = base.drawn_view(rng, _ELEVATIONS_DEG), _framed(every)
+    plain = QuestionPicture("scene", on.base, view, framed=framed)
+    options = [replace(plain, blocks=blocks) for blocks in every]
+    if (
+        sight.are_told_apart(options)
+        and min(min(shown_pixels(one, seen(one)).values()) for one in options) >= _SHOWN
+        and [surely_stays(p.blocks, p.blocks[-1].order) for p in options] == _ONE_STAYS
+    ):
+        facts, kind = {"placed": sight.orders_of(on.base)}, f"place {place}, plank {rank}"
+        yield Draft(scene, "pd-next", tuple(options), (plain,), {}, facts, kind)
+
+
+def _is_told(draft: Draft) -> bool:
+    """True if the line of the plank runs across the view, and the right picture's blocks by statics
+    stay on a floor that leans twice as far as those of simulations, where they are let go at once.
+    """
+    shown, right = draft.pictures[0], draft.options[0]
+    if not isinstance(right, QuestionPicture):
+        return False
+    plank = right.blocks[len(shown.blocks)]
+    line = np.eye(3)[int(np.diff(bounds_m(plank), axis=0)[0, :2].argmax())]
+    group, slope = group_of(right.blocks, plank.order), _LEAN * math.tan(math.radians(LEAN_DEG))
+    return bool(abs(line @ view_axes(*shown.view_deg)[0]) >= _LEAST_ACROSS) and all(
+        is_balanced(group, (x * slope, y * slope)) for x, y in _SIDES_XY
+    )
+
+
+def four_plans(on: Bench, place: int, rank: int, rng: np.random.Generator) -> list[list[float]]:
+    """Return how far each loose block is off the middle of the top [m], in four ways: by a lever,
+    with margins, all stays in the first only; empty where none are found.
+
+    So many of the others lean less to one side, and in so many the plank hangs over less.
+    """
+    near, far = on.limits_m
+    plans = on.plans_m(_PLANS, rng)
+    is_free = np.abs(plans[:, 1] - plans[:, 2]) >= on.lengths_m[1:].mean() + SPARE_M
+    plans = plans[is_free]
+    leans = on.leans_m(plans)
+    (stays,), (falls,) = np.nonzero(np.abs(leans) <= near), np.nonzero(np.abs(leans) >= far)
+    if not len(stays) or not len(falls):
+        return []
+    wrong = rng.choice(falls, size=(_FOURS, len(LETTERS) - 1))
+    fours = np.column_stack([rng.choice(stays, size=_FOURS), wrong])
+    gaps = np.diff(np.sort(leans[fours], axis=1), axis=1)
+    # Of plans that hang over as far, one is drawn.
+    over = np.abs(plans[fours, 0]) + rng.uniform(0, SPARE_M, size=fours.shape)
+    fitting = (gaps.min(axis=1) >= far - near) & ((gaps[:, :-1] + gaps[:, 1:]).min(axis=1) >= far)
+    fitting &= (leans[fours] < leans[fours[:, :1]]).sum(axis=1) == place
+    fitting &= (over < over[:, :1]).sum(axis=1) == rank
+    chosen = fours[pick(rng, np.flatnonzero(fitting).tolist())] if fitting.any() else ()
+    found: list[list[float]] = plans[chosen].tolist() if len(chosen) else []
+    return found
 
 
 def _framed(every: Sequence[Sequence[Block]]) -> tuple[Block, ...]:

@@ -364,7 +364,7 @@ def _features(one: Draft) -> Iterator[Mapping[str, float]]:
     """Yield what a reader sees of each option, as it is and for its kind, beside the others."""
     if one.looks:
         for row in one.looks:
-            yield {f"{one.group}: {i}": x for i, x in enumerate(row)}
+            yield {f"{one.wording}: {i}": x for i, x in enumerate(row)}
         return
     options = _texts(one)
     together = " / ".join(sorted(options))

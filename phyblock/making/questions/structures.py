@@ -8,98 +8,141 @@ off its middle as likely as not, with weights on it: a balance, or a cantilever 
 from __future__ import annotations
 
 import math
-from collections import defaultdict
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from phyblock.domain.blocks import COLORS, SHAPES, BlockType, Euler
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.base import pick
+from phyblock.making.questions.base import Floats, pick
 from phyblock.sim.balance import MARGIN_M, is_balanced, surely_falls, surely_stands
 from phyblock.sim.contact import bounds_m, drop_height_m, find_gaps, find_overlaps
 from phyblock.sim.dynamics import groups
 from phyblock.sim.geometry import corners_m
 from phyblock.sim.outcomes import holds
 
+SPARE_M = 0.0005
+"""Further than the margin of statics a lever decides, as positions are rounded [m]."""
 _UNIT_M = 0.0125
-_TRIED, _PLANS_TRIED, _MOST_LEFT_OUT = 16, 60, 5
+_TRIED, _PLANS_TRIED, _MOST_LEFT_OUT, _THIN_M = 16, 20, 5, 0.03
 _FLAT_M, _LEAST_TOP_M, _HIGHEST_M = 0.0005, 0.045, 0.2
 _PLANKS: tuple[BlockType, ...] = ("cuboid3", "cuboid3", "cuboid2")
 _FLAT: Euler = (0.0, 0.0, 0.0)
 _WEIGHTS: tuple[tuple[BlockType, Euler], ...] = (
-    *(("cube", _FLAT), ("cube", _FLAT), ("cuboid1", _FLAT), ("cylinder", _FLAT)),
-    *(("cuboid2", (0.0, 90.0, 0.0)), ("cuboid2", (0.0, 0.0, 90.0))),
+    *(("cube", _FLAT), ("cylinder", _FLAT), ("cuboid2", (0.0, 90.0, 0.0))),
+    *(("cuboid2", (0.0, 0.0, 90.0)), ("cuboid3", (0.0, 90.0, 0.0))),
 )
+_ON_A_PILLAR, _PILLAR_OFF_M = 0.8, 0.0125
+_PILLARS: tuple[tuple[tuple[BlockType, Euler], ...], ...] = tuple(
+    tuple(
+        (block_type, euler)
+        for block_type in ("cuboid1", "cuboid2")
+        for euler in SHAPES[block_type].poses.values()
+        if np.ptp(corners_m(block_type, (0.0, 0.0, 0.0), euler)[:, along]) < _THIN_M
+    )
+    for along in (0, 1)
+)
+"""Blocks to lay a plank on, with their poses, thin along either axis."""
 _LIFT_M, _DIRECTIONS = 0.6, 8
 
 
-Ways = Mapping[tuple[bool, int], Sequence[tuple[Block, ...]]]
-"""Blocks, by whether all stays, and by the side to which the plank is off the middle, -1 or 1."""
+class Bench(NamedTuple):
+    """A structure nearly done, with loose blocks to lay along one line over a flat top of it.
+
+    The first loose block is the plank that lies on the top, the others lie on the plank. `reach_m`
+    is half the length of the top along the line; `lengths_m` are those of the loose blocks.
+    """
+
+    base: tuple[Block, ...]
+    top: Block
+    along: int
+    loose: tuple[Block, ...]
+    reach_m: float
+    lengths_m: Floats
+    masses_kg: Floats
+
+    def laid(self, offs_m: Sequence[float]) -> tuple[Block, ...] | None:
+        """Return all blocks, the loose ones so far off the middle of the top [m]; None where they
+        overlap or hang free.
+        """
+        middle, blocks = bounds_m(self.top).mean(axis=0), self.base
+        for block, off_m in zip(self.loose, offs_m, strict=True):
+            x, y = (float(middle[i]) + (off_m if i == self.along else 0.0) for i in (0, 1))
+            onto = blocks[len(self.base) :][:1] or [self.top]
+            blocks = (*blocks, lowered(block, onto, x, y))
+        return None if find_overlaps(blocks) or find_gaps(blocks) else blocks
+
+    @property
+    def limits_m(self) -> tuple[float, float]:
+        """So far off the middle [m] weights may lean and surely stay; from so far on they fall."""
+        return self.reach_m - MARGIN_M - SPARE_M, self.reach_m + MARGIN_M + SPARE_M
+
+    def plans_m(self, count: int, rng: np.random.Generator) -> Floats:
+        """Return places drawn for the loose blocks, off the middle of the top, (count, blocks) [m].
+
+        They may overlap.
+        """
+        half = int(self.lengths_m[0] / _UNIT_M / 2)
+        steps = rng.integers(1 - half, half, size=(count, len(self.loose)))
+        plans: Floats = steps.astype(np.float64) * _UNIT_M
+        plans[:, 1:] += plans[:, :1]
+        return plans
+
+    def leans_m(self, plans_m: Floats) -> Floats:
+        """Return how far off the middle of the top the weight is, by the plan [m]."""
+        leans: Floats = plans_m @ self.masses_kg / self.masses_kg.sum()
+        return leans
 
 
 def with_annex(scene: Scene, rng: np.random.Generator) -> tuple[Block, ...] | None:
     """Return a structure nearly done with a plank and weights on one of its tops, or None.
 
-    Nothing overlaps or hangs free, and all is in balance. Blocks that are not of the scene have
-    orders above its own.
+    Nothing overlaps or hangs free, and all is in balance.
     """
     for _ in range(_TRIED):
-        ways = arrangements(scene, rng, 1)[1]
-        for blocks in ways.get((True, 0), ()):
-            if is_balanced(blocks):
-                return blocks
+        on = bench(scene, 2, rng)
+        plans = on.plans_m(_PLANS_TRIED, rng) if on else ()
+        for plan in plans if on else ():
+            if on and abs(float(on.leans_m(plan))) <= on.limits_m[0]:
+                blocks = on.laid(plan.tolist())
+                if blocks and is_balanced(blocks):
+                    return blocks
     return None
 
 
-def arrangements(
-    scene: Scene, rng: np.random.Generator, most: int, *, is_even: bool = False
-) -> tuple[tuple[Block, ...], Ways]:
-    """Return a structure nearly done, and ways of laying a plank with two weights on one of its
-    tops: at most so many of each sort.
+def bench(scene: Scene, weights: int, rng: np.random.Generator) -> Bench | None:
+    """Return a bench with a plank and so many weights; None where no top is free.
 
-    All ways are of the same blocks along the same line; a lever decides, with a margin. Where they
-    shall be even, the plank is off the middle as far in each; else its side is not told (0).
+    Blocks that are not of the scene have orders above its own.
     """
     order = scene.graph.random_order(rng)
     kept = len(order) - int(rng.integers(min(_MOST_LEFT_OUT, max(len(order) - 2, 0)) + 1))
     base = tuple(scene.blocks[vertex] for vertex in sorted(order[:kept]))
+    first = max(block.order for block in scene.blocks) + 1
     carrying = {order for block in base for order in block.depend}
     tops = [block for block in base if block.order not in carrying and _is_flat(block)]
-    found: dict[tuple[bool, int], list[tuple[Block, ...]]] = defaultdict(list)
     if not tops:
-        return base, found
-    top, along, first = pick(rng, tops), int(rng.integers(2)), max(b.order for b in scene.blocks)
+        return None
+    top, along = pick(rng, tops), int(rng.integers(2))
+    if rng.random() < _ON_A_PILLAR:
+        block_type, turned = pick(rng, _PILLARS[along])
+        pillar = Block(first, block_type, pick(rng, COLORS), (0.0, 0.0, 0.0), turned, (), 1)
+        at = bounds_m(top).mean(axis=0)[:2]
+        at[along] += int(rng.integers(-1, 2)) * _PILLAR_OFF_M
+        top, first = lowered(pillar, base, *at.tolist()), first + 1
+        base = (*base, top)
     low, high = bounds_m(top)
-    middle, reach_m = (low + high) / 2, float(high[along] - low[along]) / 2
-    kinds = [(pick(rng, _PLANKS), _FLAT), pick(rng, _WEIGHTS), pick(rng, _WEIGHTS)]
-    masses = [SHAPES[block_type].mass_kg for block_type, _ in kinds]
-    half = round(SHAPES[kinds[0][0]].sides_m[0] / _UNIT_M / 2)
-    loose = [
+    kinds = [(pick(rng, _PLANKS), _FLAT), *(pick(rng, _WEIGHTS) for _ in range(weights))]
+    loose = tuple(
         Block(first + i, block_type, pick(rng, COLORS), (0.0, 0.0, float(high[2])), turned, (), 1)
-        for i, (block_type, (roll, pitch, yaw)) in enumerate(kinds, 1)
+        for i, (block_type, (roll, pitch, yaw)) in enumerate(kinds)
         for turned in [(roll, pitch, (yaw + 90.0 * along) % 180.0)]
-    ]
-    over = 0
-    for _ in range(_PLANS_TRIED):
-        off, *steps = rng.integers(1 - half, half, size=len(loose)).tolist()
-        if is_even:
-            over = over or abs(off)
-            off = over if off > 0 else -over
-        offs_m = _UNIT_M * np.array([off, *(off + step for step in steps)])
-        lean_m = abs(float(np.average(offs_m, weights=masses)))
-        stays = lean_m <= reach_m - MARGIN_M
-        sort = (stays, int(np.sign(off)) if is_even else 0)
-        if (not stays and lean_m <= reach_m + MARGIN_M) or len(found[sort]) == most:
-            continue
-        blocks = base
-        for block, off_m in zip(loose, offs_m.tolist(), strict=True):
-            x, y = (float(middle[i]) + (off_m if i == along else 0.0) for i in (0, 1))
-            blocks = (*blocks, lowered(block, blocks[len(base) :][:1] or [top], x, y))
-        if not find_overlaps(blocks) and not find_gaps(blocks):
-            found[sort].append(blocks)
-    return base, found
+    )
+    lengths = np.array([float(np.diff(bounds_m(block), axis=0)[0, along]) for block in loose])
+    masses = np.array([SHAPES[block.type].mass_kg for block in loose])
+    return Bench(base, top, along, loose, float(high[along] - low[along]) / 2, lengths, masses)
 
 
 def _is_flat(block: Block) -> bool:
