@@ -6,8 +6,9 @@ CF: the block that goes supports others of the scene. It is marked in the pictur
 of the question hints at the answer.
 
 PD: four pictures show the same blocks laid on an unfinished structure, of which one stays. It is as
-often any of the four in order of how far the weights lean to one side, and for each of these as far
-as found any in order of how far the plank hangs over: neither tells it by itself.
+often any of the four in order of how far the weights lean to one side, so that where a picture's
+change is tells nothing. Of these, drafts vary in how far its plank hangs over beside the others,
+where planks that hang over as far count in an order drawn.
 
 AD: all places are on flat faces, and no more central where the block stays than elsewhere. Where it
 stays it comes down on the face that is marked. Elsewhere a plank tips under it, as far as such
