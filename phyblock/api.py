@@ -37,9 +37,10 @@ from pydantic import (
 from phyblock.config.models import load_models
 from phyblock.config.suite import Suite
 from phyblock.config.validation import problems_of
-from phyblock.data.base import AssemblyTask, Dataset
+from phyblock.data.base import Dataset
 from phyblock.data.lookup import find_data_set, open_dataset
 from phyblock.data.scenes import SCENES_FILE
+from phyblock.domain.scene import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.making.checks import Finding, verify_scene
 from phyblock.making.scenes.candidates import make_candidates

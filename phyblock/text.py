@@ -1,10 +1,18 @@
-"""Text that others wrote (names, replies, paths), made harmless before it is shown or stored."""
+"""Text that others wrote (names, replies, paths), made harmless before it is shown or stored;
+digests, draws and sums that are the same on every machine and every Python.
+"""
 
 from __future__ import annotations
 
 import difflib
+import functools
+import hashlib
+import operator
 import re
 from collections.abc import Iterable, Sequence
+from typing import TypeVar
+
+_N = TypeVar("_N", int, float)
 
 _SOME = 5
 _HALF = re.compile("[\ud800-\udfff]")
@@ -61,3 +69,23 @@ def csv_cell(value: object) -> object:
     if isinstance(value, str) and _FORMULA.match(value) and not _NUMBER.fullmatch(value):
         return f"'{value}"
     return value
+
+
+def hex_digest(content: bytes | str) -> str:
+    """Return the SHA-256 of bytes, or of a text as UTF-8, in hexadecimal digits."""
+    data = content.encode() if isinstance(content, str) else content
+    return hashlib.sha256(data).hexdigest()
+
+
+def drawn_bytes(*words: object) -> bytes:
+    """Return evenly spread bytes that depend on the words alone, to sort by or to draw from."""
+    return hashlib.sha256("|".join(map(str, words)).encode()).digest()
+
+
+def plain_sum(values: Iterable[_N]) -> _N:
+    """Add one after another to 0, each sum rounded.
+
+    From Python 3.12 on `sum` makes up for what rounding loses, so that its last digits may differ.
+    What enters data, records or tables is summed up here.
+    """
+    return functools.reduce(operator.add, values, 0)

@@ -31,8 +31,7 @@ from phyblock.files import bundled
 from phyblock.making.questions.text_probe import text_features
 from phyblock.scoring.pose import Piece, PoseFit, overlap_volume, placed
 from phyblock.sim.geometry import collision_pieces
-from phyblock.stable import plain_sum
-from phyblock.text import csv_cell, one_line
+from phyblock.text import csv_cell, one_line, plain_sum
 from phyblock.tracks.pose_planning import FITS
 from phyblock.workers import Shards, WorkerDiedError, WorkerPool, open_workers
 

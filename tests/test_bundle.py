@@ -34,7 +34,7 @@ from phyblock.bundle import (
 from phyblock.errors import DataError, StoreError
 from phyblock.records.files import MANIFEST, RECORDS, Manifest, known_records
 from phyblock.run.manifest import portable_manifest
-from phyblock.stable import hex_digest
+from phyblock.text import hex_digest
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.vqa_set import questions, write_questions

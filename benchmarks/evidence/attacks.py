@@ -19,7 +19,7 @@ import phyblock
 from phyblock.domain.scene import PoseStep
 from phyblock.registry import track_baselines
 from phyblock.sim.geometry import box_height_cm
-from phyblock.stable import drawn_bytes
+from phyblock.text import drawn_bytes
 from phyblock.tracks.full_planning import plan_text
 from phyblock.tracks.pose_planning import written
 

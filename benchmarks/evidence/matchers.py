@@ -14,9 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from phyblock.data.base import AssemblyTask
 from phyblock.data.official import read_official, recorded_models
-from phyblock.domain.scene import Plan
+from phyblock.domain.scene import AssemblyTask, Plan
 from phyblock.models.client import read_raw_reply
 from phyblock.parsing.plan import parse_plan
 from phyblock.scoring.plan import Counts, Goal, match_plan

@@ -18,11 +18,10 @@ from typing import TypeVar
 from phyblock.config.validation import Fault
 from phyblock.config.yaml import dotted
 from phyblock.domain.question import Question
-from phyblock.domain.scene import CandidateSet, Scene
+from phyblock.domain.scene import AssemblyTask, Scene
 from phyblock.errors import DataError, Problem, reason_of
 from phyblock.files import LARGEST_PICTURE_BYTES, read_bytes
-from phyblock.stable import hex_digest
-from phyblock.text import did_you_mean, some_of
+from phyblock.text import did_you_mean, hex_digest, some_of
 
 VERSION_FILE = "VERSION"
 UNNUMBERED = 1
@@ -31,29 +30,6 @@ _LARGEST_BYTES = 1024**3
 _MOST_OF_ALL = 1000
 """Faults of a data set that are reported."""
 _T = TypeVar("_T")
-
-
-@dataclass(frozen=True)
-class AssemblyTask:
-    """A goal structure with its candidate set; `composite` is the data set's own picture of
-    both, where it has one.
-
-    One that is shown in another form than the file's has an `order`: the number in the file of each
-    candidate as it is shown, which `seed` drew. Its `candidates` are in that order, and the goal is
-    not shown where it `is_blind`.
-    """
-
-    scene: Scene
-    candidates: CandidateSet
-    composite: Path | None = None
-    order: tuple[int, ...] = ()
-    is_blind: bool = False
-    seed: int = 0
-
-    @property
-    def key(self) -> str:
-        """The scene's id, by which samples name the task."""
-        return self.scene.id
 
 
 @dataclass(frozen=True)

@@ -24,15 +24,7 @@ from pydantic import Field, TypeAdapter
 
 from phyblock.config.validation import Fault, checked, form
 from phyblock.config.yaml import shown
-from phyblock.data.base import (
-    AssemblyTask,
-    Dataset,
-    QuestionSet,
-    QuestionTask,
-    read_data,
-    read_each,
-    report,
-)
+from phyblock.data.base import Dataset, QuestionSet, QuestionTask, read_data, read_each, report
 from phyblock.data.questions import Options, scene_of
 from phyblock.data.scenes import (
     NAME,
@@ -57,7 +49,7 @@ from phyblock.domain.question import (
     Subtask,
     is_picture_option,
 )
-from phyblock.domain.scene import MAX_CANDIDATES, CandidateSet, Scene
+from phyblock.domain.scene import MAX_CANDIDATES, AssemblyTask, CandidateSet, Scene
 from phyblock.errors import DataError, Problem
 from phyblock.files import load_json
 from phyblock.records.record import Line, decode

@@ -16,11 +16,12 @@ from pydantic import AfterValidator, AliasChoices, Field, StrictInt, TypeAdapter
 
 from phyblock.config.validation import Fault, OneOf, ShapeName, checked, form
 from phyblock.config.yaml import shown
-from phyblock.data.base import AssemblyTask, Dataset, read_lines, read_set, report
+from phyblock.data.base import Dataset, read_lines, read_set, report
 from phyblock.domain.blocks import Color
 from phyblock.domain.scene import (
     MAX_CANDIDATES,
     AOVGraph,
+    AssemblyTask,
     Block,
     Candidate,
     CandidateSet,

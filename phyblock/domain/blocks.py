@@ -19,7 +19,7 @@ from typing import Literal, cast, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.stable import plain_sum
+from phyblock.text import plain_sum
 
 BlockType = Literal[
     "arch", "cube", "cuboid1", "cuboid2", "cuboid3", "cylinder", "semi_cylinder", "triangle"

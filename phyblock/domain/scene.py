@@ -1,4 +1,4 @@
-"""Scenes: goal structures, their blocks, the graph that orders them, candidates, and plans."""
+"""Scenes: goal structures, their blocks, the graph that orders them, candidates, plans, tasks."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import functools
 import graphlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -225,3 +226,26 @@ class PoseStep:
 
     candidate: int
     center_cm: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class AssemblyTask:
+    """A goal structure with its candidate set; `composite` is the data set's own picture of
+    both, where it has one.
+
+    One that is shown in another form than the file's has an `order`: the number in the file of each
+    candidate as it is shown, which `seed` drew. Its `candidates` are in that order, and the goal is
+    not shown where it `is_blind`.
+    """
+
+    scene: Scene
+    candidates: CandidateSet
+    composite: Path | None = None
+    order: tuple[int, ...] = ()
+    is_blind: bool = False
+    seed: int = 0
+
+    @property
+    def key(self) -> str:
+        """The scene's id, by which samples name the task."""
+        return self.scene.id

@@ -26,10 +26,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from phyblock.config.suite import load_suite
-from phyblock.data.base import AssemblyTask, Dataset
+from phyblock.data.base import Dataset
 from phyblock.data.lookup import read_data_set
 from phyblock.domain.blocks import BLOCK_TYPES, COLORS
-from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, PoseStep
+from phyblock.domain.scene import MAX_CANDIDATES, AssemblyTask, Block, Candidate, PoseStep
 from phyblock.files import bundled
 from phyblock.models.request import Image as SentImage
 from phyblock.scoring.pose import blocks_reached

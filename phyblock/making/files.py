@@ -18,7 +18,7 @@ from phyblock.files import atomic_write, check_free, make_folder, read_text, wri
 from phyblock.making.checks import LEVEL_LIMITS
 from phyblock.making.scenes.sketch import PALETTES, Palette
 from phyblock.sim.engine import other_engine
-from phyblock.stable import hex_digest
+from phyblock.text import hex_digest
 
 SUMS_FILE = "SHA256SUMS"
 SCENE_FILES = ("README.md", "scenes.jsonl", VERSION_FILE)

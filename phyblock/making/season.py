@@ -18,7 +18,7 @@ from phyblock.errors import DataError, Problem
 from phyblock.files import bundled_sets
 from phyblock.records.record import Line
 from phyblock.sim.engine import described_engine
-from phyblock.stable import hex_digest
+from phyblock.text import hex_digest
 
 _Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 

@@ -19,7 +19,7 @@ from phyblock.config.models import ModelConfig
 from phyblock.errors import Problem, StoreError, reason_of
 from phyblock.models.request import Image, Request, wire_params
 from phyblock.records.record import Reply
-from phyblock.stable import hex_digest
+from phyblock.text import hex_digest
 
 SCHEMA = 1
 """Version of the file's layout and of what enters a key."""

@@ -16,7 +16,7 @@ from phyblock.models.request import Request
 from phyblock.records.files import RECORDS, RecordLines
 from phyblock.records.record import Record, Reply, Usage
 from phyblock.registry import baseline_names, baseline_rules
-from phyblock.stable import drawn_bytes
+from phyblock.text import drawn_bytes
 
 _NO_TOKENS = Usage(prompt_tokens=0, completion_tokens=0)
 _FREE = {"cost_usd": 0.0, "attempts": 0, "cached": False}

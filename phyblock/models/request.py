@@ -20,7 +20,7 @@ from typing import Any, Protocol
 from phyblock.config.models import ModelConfig
 from phyblock.errors import DataError, PhyblockError, Problem
 from phyblock.records.record import Call, Reply
-from phyblock.stable import hex_digest
+from phyblock.text import hex_digest
 from phyblock.types import ImageDetail, Role
 
 _MARK = secrets.token_hex(16)

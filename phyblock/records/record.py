@@ -18,8 +18,7 @@ from phyblock.config.validation import problems_of
 from phyblock.config.yaml import FieldPath, YamlSource
 from phyblock.errors import DataError, InputError, Problem, StoreError
 from phyblock.files import load_json
-from phyblock.stable import plain_sum
-from phyblock.text import well_formed
+from phyblock.text import plain_sum, well_formed
 from phyblock.types import AskedAs, Finish, Outcome, Role
 
 LARGEST_WHOLE = 2**53

@@ -18,7 +18,7 @@ from phyblock.records.files import RECORDS
 from phyblock.results.load import Design, Run, track_measures
 from phyblock.scoring.plan import Floats
 from phyblock.scoring.statistics import Clusters, in_range, jackknife
-from phyblock.stable import plain_sum
+from phyblock.text import plain_sum
 from phyblock.tracks.base import kind_of
 from phyblock.tracks.measures import (
     CELL,

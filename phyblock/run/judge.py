@@ -23,7 +23,7 @@ from phyblock.records.record import (
     StoredError,
     Usage,
 )
-from phyblock.stable import plain_sum
+from phyblock.text import plain_sum
 from phyblock.tracks.base import Episode, Item, Judgement, Track
 from phyblock.types import Outcome
 

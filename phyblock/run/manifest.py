@@ -19,7 +19,7 @@ from phyblock.data.base import UNNUMBERED, Dataset, read_version
 from phyblock.parsing.text import READER_VERSION
 from phyblock.records.files import FORMAT, Manifest
 from phyblock.sim.engine import ENGINES, described_engine
-from phyblock.stable import hex_digest
+from phyblock.text import hex_digest
 from phyblock.tracks.base import Track, kind_of, simulating
 
 _ENGINES = (engine.distribution for engine in ENGINES.values())

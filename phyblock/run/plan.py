@@ -24,8 +24,7 @@ from phyblock.models.request import Request
 from phyblock.records.files import MANIFEST, Manifest, read_manifest, suite_of
 from phyblock.registry import track_baselines
 from phyblock.run.manifest import make_manifest
-from phyblock.stable import drawn_bytes
-from phyblock.text import did_you_mean
+from phyblock.text import did_you_mean, drawn_bytes
 from phyblock.tracks.base import (
     Item,
     Track,

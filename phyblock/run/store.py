@@ -54,8 +54,7 @@ from phyblock.records.record import (
 )
 from phyblock.run.manifest import code_versions, differences
 from phyblock.scoring.plan import Counts
-from phyblock.stable import hex_digest
-from phyblock.text import counted, well_formed
+from phyblock.text import counted, hex_digest, well_formed
 
 LineT = TypeVar("LineT", bound=Line)
 

@@ -33,7 +33,7 @@ from phyblock.scoring.pose_matching import (
     cheapest,
     matched,
 )
-from phyblock.stable import plain_sum
+from phyblock.text import plain_sum
 from phyblock.types import StepEnd
 
 PoseFrame = Literal["absolute", "aligned"]

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from phyblock.domain.scene import Plan
 from phyblock.scoring.plan import Floats, Goal, most_placed, steps_back
-from phyblock.stable import plain_sum
+from phyblock.text import plain_sum
 
 
 def cheapest(cost: Floats) -> list[tuple[int, int]]:

@@ -28,7 +28,7 @@ from phyblock.sim.camera import VIEWS, Camera, Window, frame, view_axes
 from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import dot, drawn_mesh, rounded, turned
 from phyblock.sim.raster import RASTER_VERSION, Light, Prop, Raster, Rgb, draw
-from phyblock.stable import hex_digest
+from phyblock.text import hex_digest
 from phyblock.types import BACKGROUNDS, Background, View
 
 RENDER_VERSION = 2

@@ -37,7 +37,7 @@ from phyblock.sim.pictures import (
     shoot,
     to_png,
 )
-from phyblock.stable import hex_digest
+from phyblock.text import hex_digest
 
 QUESTION_RENDER_VERSION = 2
 """Raised whenever the same recipe gives other pixels, so that stored pictures are made again."""

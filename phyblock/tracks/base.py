@@ -21,15 +21,15 @@ from pydantic import BaseModel, create_model
 
 from phyblock.config.suite import Suite
 from phyblock.config.validation import PictureControls
-from phyblock.data.base import AssemblyTask, Dataset
-from phyblock.domain.scene import CandidateSet, Scene
+from phyblock.data.base import Dataset
+from phyblock.domain.scene import AssemblyTask, CandidateSet, Scene
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.models.request import Image, Message, Request
 from phyblock.parsing.text import AnswerForm
 from phyblock.records.record import Record, Reply, SentPrompt
 from phyblock.registry import added_measures, known_track, known_tracks
 from phyblock.sim.engine import REFERENCE_ENGINE, engine_version, physics_engine
-from phyblock.stable import drawn_bytes, hex_digest
+from phyblock.text import drawn_bytes, hex_digest
 from phyblock.tracks.measures import SampleCounts, TrackReport, read_report
 from phyblock.tracks.picking import Picking
 from phyblock.tracks.pictures import Drawing, Workshop, scene_drawings

@@ -6,8 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 
 from phyblock.config.suite import DifficultySpec
-from phyblock.data.base import AssemblyTask
-from phyblock.domain.scene import AOVGraph, Oriented, Plan
+from phyblock.domain.scene import AOVGraph, AssemblyTask, Oriented, Plan
 from phyblock.scoring.plan import Goal, match_plan
 
 

@@ -11,9 +11,8 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from phyblock.config.validation import PictureControls
-from phyblock.data.base import AssemblyTask
 from phyblock.data.official import official_prompt
-from phyblock.domain.scene import Block, CandidateSet, Plan, Scene
+from phyblock.domain.scene import AssemblyTask, Block, CandidateSet, Plan, Scene
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.files import bundled
 from phyblock.parsing.plan import ParsedPlan, parse_plan, plan_form

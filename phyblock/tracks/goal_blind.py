@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.config.suite import Suite
-from phyblock.data.base import AssemblyTask
-from phyblock.domain.scene import Candidate, CandidateSet, Plan, Scene
+from phyblock.domain.scene import AssemblyTask, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring.plan import Goal, most_placed
 from phyblock.sim.pictures import PictureStyle, goal_camera, segments
 from phyblock.tracks.base import presented

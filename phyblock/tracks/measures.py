@@ -19,7 +19,8 @@ from phyblock.scoring.plan import mean_of, ratio_of
 
 if TYPE_CHECKING:
     from phyblock.config.suite import Suite
-    from phyblock.data.base import AssemblyTask, Dataset
+    from phyblock.data.base import Dataset
+    from phyblock.domain.scene import AssemblyTask
     from phyblock.records.files import Manifest
     from phyblock.records.record import Record
     from phyblock.scoring.plan import Metric

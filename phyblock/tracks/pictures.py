@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from phyblock.config.suite import ImagesSpec
-from phyblock.data.base import AssemblyTask
+from phyblock.domain.scene import AssemblyTask
 from phyblock.errors import DataError, Problem, SimulationError
 from phyblock.files import (
     LARGEST_PICTURE_BYTES,
@@ -38,7 +38,7 @@ from phyblock.sim.pictures import (
     joined_size_px,
     to_png,
 )
-from phyblock.stable import hex_digest
+from phyblock.text import hex_digest
 from phyblock.types import BACKGROUNDS
 
 _Result = TypeVar("_Result")

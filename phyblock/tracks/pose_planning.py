@@ -14,9 +14,8 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 
 from phyblock.config.validation import Fault, PictureControls, TemplateName, UniqueSome, checked
-from phyblock.data.base import AssemblyTask
 from phyblock.domain.blocks import BlockType
-from phyblock.domain.scene import Block, CandidateSet, Plan, PoseStep, Scene
+from phyblock.domain.scene import AssemblyTask, Block, CandidateSet, Plan, PoseStep, Scene
 from phyblock.files import bundled
 from phyblock.parsing.poses import (
     FARTHEST_PLACE_CM,
@@ -48,7 +47,7 @@ from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.geometry import box_height_cm, center_cm, collision_pieces, origin_m, put
 from phyblock.sim.pictures import goal_style
 from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
-from phyblock.stable import plain_sum
+from phyblock.text import plain_sum
 from phyblock.tracks.base import CARRYING, ENGINE, Judgement, SceneTrack, file_plan
 from phyblock.tracks.full_planning import PlanParse, PlanSubject, needed_candidate
 from phyblock.tracks.measures import SampleCounts, level_cells

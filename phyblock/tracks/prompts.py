@@ -20,8 +20,7 @@ from jinja2.sandbox import ImmutableSandboxedEnvironment
 from phyblock.errors import Problem, PromptError, reason_of
 from phyblock.files import bundled, read_text
 from phyblock.models.request import Image, Message
-from phyblock.stable import hex_digest
-from phyblock.text import did_you_mean
+from phyblock.text import did_you_mean, hex_digest
 
 _LARGEST_BYTES = 256 * 1024
 _COMMON_BLOCKS = ("system", "user", "caption")

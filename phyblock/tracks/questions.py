@@ -51,7 +51,7 @@ from phyblock.sim.question_pictures import (
     question_key,
     question_png,
 )
-from phyblock.stable import hex_digest
+from phyblock.text import hex_digest
 from phyblock.tracks.base import Judgement, Track, select_tasks, spread, stratified
 from phyblock.tracks.baselines import Guesses, majority_rule
 from phyblock.tracks.measures import OVERALL, WHOLE, Cell, SampleCounts

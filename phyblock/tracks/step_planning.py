@@ -12,8 +12,7 @@ from typing import Any, ClassVar, Literal, get_args
 import numpy as np
 
 from phyblock.config.validation import Count, Flag, PictureControls, TemplateName
-from phyblock.data.base import AssemblyTask
-from phyblock.domain.scene import Block
+from phyblock.domain.scene import AssemblyTask, Block
 from phyblock.files import bundled
 from phyblock.models.request import Image, Message, Request
 from phyblock.parsing.move import MoveProblem, ParsedMove, move_form, parse_move

@@ -12,7 +12,7 @@ from typing import Any
 
 import pandas as pd
 
-from phyblock.data.base import AssemblyTask
+from phyblock.domain.scene import AssemblyTask
 from phyblock.errors import DataError
 from phyblock.records.files import ManifestModel, read_stopped
 from phyblock.records.record import Record

@@ -10,7 +10,7 @@ from typing import Any
 
 from PIL import Image
 
-from phyblock.data.base import AssemblyTask
+from phyblock.domain.scene import AssemblyTask
 from phyblock.errors import SpecError
 from phyblock.records.files import read_records
 from phyblock.records.record import Record

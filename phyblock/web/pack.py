@@ -28,14 +28,14 @@ from typing import Any, NamedTuple
 import jinja2
 from PIL import Image, ImageDraw, ImageFont
 
-from phyblock.data.base import AssemblyTask
 from phyblock.domain.blocks import BLOCK_TYPES
+from phyblock.domain.scene import AssemblyTask
 from phyblock.files import OutFolder, atomic_write, cache_dir, digest_of_file, writing
 from phyblock.records.files import PromptLines, RecordLines
 from phyblock.records.record import Record, SentPrompt
 from phyblock.sim.geometry import solid_mesh
 from phyblock.sim.pictures import COLOR_RGB, to_png
-from phyblock.stable import hex_digest
+from phyblock.text import hex_digest
 from phyblock.web.board import Entry, SiteRun, Sources
 
 _LAYOUT = 7

@@ -22,7 +22,7 @@ from pydantic import JsonValue
 
 from phyblock.config.models import HUMAN, ModelConfig
 from phyblock.config.suite import Suite
-from phyblock.data.base import AssemblyTask
+from phyblock.domain.scene import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.models.request import HaltedError, Image, Request
 from phyblock.records.record import Reply, Usage

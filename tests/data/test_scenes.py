@@ -11,11 +11,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.data.base import AssemblyTask
 from phyblock.data.official import read_candidates
 from phyblock.data.scenes import StoredScene, read_builtin
 from phyblock.domain.blocks import BLOCK_TYPES, COLORS
-from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, CandidateSet, Scene
+from phyblock.domain.scene import (
+    MAX_CANDIDATES,
+    AssemblyTask,
+    Block,
+    Candidate,
+    CandidateSet,
+    Scene,
+)
 from phyblock.errors import DataError, Problem
 from tests.data.broken import Raw, sound_scene, with_value, without, write_scenes
 from tests.fuzz.strategies import CANDIDATES, SCENES

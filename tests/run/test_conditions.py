@@ -7,8 +7,8 @@ from typing import Any
 
 import yaml
 
-from phyblock.data.base import AssemblyTask
 from phyblock.data.scenes import read_builtin
+from phyblock.domain.scene import AssemblyTask
 from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png
 from phyblock.tracks.base import presented, shown_order
 from tests.servers.chassis import Running, Seen

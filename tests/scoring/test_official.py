@@ -12,11 +12,10 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from phyblock.data.base import AssemblyTask
 from phyblock.data.official import read_official
 from phyblock.data.scenes import read_builtin
 from phyblock.domain.question import CATEGORIES
-from phyblock.domain.scene import Plan
+from phyblock.domain.scene import AssemblyTask, Plan
 from phyblock.parsing.plan import parse_plan
 from phyblock.results.paper import published_table
 from phyblock.scoring.plan import AssemblyScorer, Counts, Goal, chance, match_plan

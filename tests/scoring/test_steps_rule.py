@@ -9,10 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.data.base import AssemblyTask
 from phyblock.data.official import read_official
 from phyblock.data.scenes import read_builtin
-from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
+from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring.plan import ERROR_TYPES, Goal, match_plan
 from phyblock.scoring.steps import MOVE_OUTCOMES, Assembly, attempted_counts, gated, placed_counts
 from phyblock.types import GATINGS, SETTINGS, Gating, Setting

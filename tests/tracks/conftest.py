@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from phyblock.data.base import AssemblyTask
 from phyblock.data.scenes import read_builtin
+from phyblock.domain.scene import AssemblyTask
 from phyblock.tracks.pictures import Workshop
 from tests.data.broken import write_scenes
 from tests.workspace import SCENES

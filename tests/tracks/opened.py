@@ -10,9 +10,9 @@ from typing import Any
 import yaml
 
 from phyblock.config.suite import Suite, load_suite
-from phyblock.data.base import AssemblyTask, Dataset
+from phyblock.data.base import Dataset
 from phyblock.data.scenes import read_builtin
-from phyblock.domain.scene import Block, Candidate, CandidateSet, Scene
+from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Scene
 from phyblock.files import bundled
 from phyblock.tracks.base import open_tracks
 from phyblock.tracks.pictures import Workshop

@@ -19,7 +19,7 @@ import pytest
 
 from phyblock import registry
 from phyblock.cli.main import phyblock
-from phyblock.data.base import AssemblyTask
+from phyblock.domain.scene import AssemblyTask
 from phyblock.errors import SpecError
 from phyblock.records.record import Record
 from phyblock.results.compare import comparable, compare_models

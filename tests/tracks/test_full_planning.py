@@ -12,8 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import phyblock
-from phyblock.data.base import AssemblyTask
-from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
+from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.tracks.base import presented
 from phyblock.tracks.full_planning import pose_choices, pose_counts
 from phyblock.tracks.goal_blind import goal_blind_plans

@@ -13,8 +13,8 @@ import pytest
 from PIL import Image as PillowImage
 
 from phyblock.config.suite import ImagesSpec
-from phyblock.data.base import AssemblyTask
 from phyblock.data.official import read_official
+from phyblock.domain.scene import AssemblyTask
 from phyblock.errors import DataError, StoreError
 from phyblock.models.request import Image
 from phyblock.sim.pictures import candidates_png

@@ -17,8 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.cli.main import phyblock
-from phyblock.data.base import AssemblyTask
-from phyblock.domain.scene import Block, Candidate, CandidateSet, PoseStep
+from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, PoseStep
 from phyblock.errors import SpecError, StoreError
 from phyblock.parsing.poses import parse_poses
 from phyblock.records.files import known_records

@@ -16,9 +16,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.data.base import AssemblyTask
 from phyblock.data.official import read_official
-from phyblock.domain.scene import Block, Candidate, CandidateSet, Scene
+from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Scene
 from phyblock.models.request import Image, Message, Request
 from phyblock.parsing.move import MOVE_PROBLEMS
 from phyblock.records.record import Reply

@@ -27,10 +27,10 @@ from phyblock.cli.console import (
     tracked,
     worker_options,
 )
-from phyblock.data.base import AssemblyTask, read_data
+from phyblock.data.base import read_data
 from phyblock.data.lookup import find_data_set, read_data_set
 from phyblock.data.scenes import SCENES_FILE, read_builtin
-from phyblock.domain.scene import Scene
+from phyblock.domain.scene import AssemblyTask, Scene
 from phyblock.domain.symmetry import fingerprint
 from phyblock.errors import DataError, Problem
 from phyblock.files import (
@@ -85,8 +85,7 @@ from phyblock.sim.pictures import (
     goal_png,
     visible_shares,
 )
-from phyblock.stable import hex_digest
-from phyblock.text import counted
+from phyblock.text import counted, hex_digest
 from phyblock.tracks.difficulty import MEASURES
 from phyblock.types import BACKGROUNDS
 from phyblock.workers import open_workers

@@ -14,7 +14,7 @@ from phyblock.domain.blocks import KIT_PALETTE, BlockType
 from phyblock.domain.scene import MAX_CANDIDATES, Candidate, CandidateSet, Kind, Look, Scene
 from phyblock.errors import DataError, Problem
 from phyblock.making.scenes.sketch import POSES
-from phyblock.stable import drawn_bytes
+from phyblock.text import drawn_bytes
 
 NEEDED: dict[BlockType, dict[str, float]] = {
     "arch": {"gate": 0.196, "gate-turned": 0.081, "cradle": 0.05, "cradle-turned": 0.032},

@@ -17,10 +17,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from phyblock.data.base import AssemblyTask
 from phyblock.data.scenes import read_builtin
 from phyblock.domain.blocks import COLORS
-from phyblock.domain.scene import Block, CycleError, Kind, Scene
+from phyblock.domain.scene import AssemblyTask, Block, CycleError, Kind, Scene
 from phyblock.domain.symmetry import SYMMETRIES, fingerprint
 from phyblock.errors import DataError, Problem
 from phyblock.files import bundled
@@ -37,7 +36,7 @@ from phyblock.making.scenes.sketch import (
     transformed,
 )
 from phyblock.sim.contact import find_gaps
-from phyblock.stable import drawn_bytes
+from phyblock.text import drawn_bytes
 from phyblock.workers import Workers
 
 Group = Literal["1", "1+2", "2", "3", "4", "5"]
