@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import signal
 from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,6 +30,10 @@ settings.register_profile("phyblock", deadline=None, max_examples=EXAMPLES)
 settings.load_profile("phyblock")
 
 os.environ.update(ONE_THREAD)
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    # A shell has the commands that it starts in the background ignore it, and their children too.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.hookimpl(wrapper=True)
