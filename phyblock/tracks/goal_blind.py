@@ -236,10 +236,12 @@ def blind_guesses(
     """
     order, view = suite.candidates.order, suite.images.view
 
+    @functools.cache  # A key of `_learned` holds all scenes: to hash it takes milliseconds.
+    def learned(seed: int, sees_colors: bool) -> dict[str, Plan]:
+        return _learned(tuple(pool), order, seed, setting, view if sees_colors else None)
+
     def plan(task: AssemblyTask, *, sees_colors: bool = False) -> Plan:
-        return _learned(tuple(pool), order, task.seed, setting, view if sees_colors else None)[
-            task.key
-        ]
+        return learned(task.seed, sees_colors)[task.key]
 
     return plan
 
