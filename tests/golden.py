@@ -40,6 +40,8 @@ RUNS: dict[str, tuple[str, ...]] = {
     "quick": ("quick",),
     "steps": ("steps", "--models", "random", "--limit", "60"),
     "pose": ("pose", "--limit", "16"),
+    "quick-60": ("quick", "--limit", "60"),
+    "pose-low": ("pose", "--limit", "6", "--set", "levels=[1,2,3]"),
     "vqa": ("vqa", "--models", "random,majority"),
     "paper-table1": ("paper-table1", "--set", "dataset.path={official}"),
 }

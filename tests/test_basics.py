@@ -23,17 +23,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.data.questions import read_questions
-from phyblock.data.scenes import read_builtin
 from phyblock.domain.blocks import euler_deg_to_matrix
 from phyblock.errors import DataError, ModelError, Problem, StoreError
-from phyblock.files import bundled
 from phyblock.making.questions.text_probe import text_features
 from phyblock.scoring.pose import Piece, PoseFit, overlap_volume, placed
 from phyblock.sim.geometry import collision_pieces
 from phyblock.text import csv_cell, one_line, plain_sum
 from phyblock.tracks.pose_planning import FITS
 from phyblock.workers import Shards, WorkerDiedError, WorkerPool, open_workers
+from tests.shipped import built_in_questions
 
 STARTS = tuple("=+-@\t\r\n")
 risky = st.text(alphabet="'=+-@\t\r\n1.a") | st.text()
@@ -96,8 +94,7 @@ def test_values_are_added_one_after_another(values: list[float]) -> None:
 
 def texts() -> list[Any]:
     """Features of options' texts, by which drafts are kept and the text probe answers."""
-    scenes = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
-    tasks = read_questions(bundled("benchmarks", "data", "phyblock-vqa"), scenes).tasks[::5]
+    tasks = built_in_questions().tasks[::5]
     return [text_features(task.question.text, task.question.options) for task in tasks]
 
 

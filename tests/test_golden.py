@@ -13,7 +13,13 @@ from tests.conftest import OFFICIAL_MISSING, official_root
 GOLDEN = json.loads(golden.GOLDEN.read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("name", golden.RUNS)
+# A part of the longest runs is made each time.
+WHOLE = ("quick", "pose")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow if n in WHOLE else ()) for n in golden.RUNS]
+)
 def test_numbers_are_what_they_were(name: str, tmp_path: Path, pictures_dir: Path) -> None:
     if name == "paper-table1" and official_root() is None:
         pytest.skip(OFFICIAL_MISSING)

@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from phyblock.data.official import read_official
 from phyblock.domain.blocks import (
     BLOCK_TYPES,
     SHAPES,
@@ -26,6 +25,7 @@ from phyblock.domain.blocks import (
     quat_xyzw_to_matrix,
 )
 from phyblock.domain.scene import Block, Candidate, CandidateSet, Scene
+from tests.shipped import official_tasks
 
 ANGLES = st.floats(-720, 720)
 EULERS = st.tuples(ANGLES, ANGLES, ANGLES)
@@ -146,7 +146,7 @@ def test_on_the_official_data_classes_and_euler_angles_tell_the_same_apart(
     official_checkout: Path,
 ) -> None:
     used: dict[BlockType, set[Euler]] = {}
-    for task in read_official(official_checkout).tasks:
+    for task in official_tasks(official_checkout):
         for block in (*task.scene.blocks, *task.candidates.candidates):
             used.setdefault(block.type, set()).add(block.euler_deg)
     for block_type, eulers in used.items():

@@ -24,9 +24,9 @@ import phyblock
 from phyblock.errors import SpecError
 from phyblock.parsing.plan import parse_plan
 from phyblock.scoring.plan import AssemblyScorer
-from tests.official_replies import reply_texts
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
+from tests.shipped import reply_texts
 
 Scores = dict[tuple[str, str], float]
 OVERRIDES = ("parser=official", "scoring.matchers=[paper]", "images.size_px=128")

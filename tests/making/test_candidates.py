@@ -4,13 +4,11 @@ import functools
 from collections import Counter
 from dataclasses import replace
 from itertools import islice
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.data.scenes import read_builtin
 from phyblock.domain.blocks import KIT_PALETTE
 from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.errors import DataError
@@ -20,8 +18,8 @@ from phyblock.making.scenes.sketch import POSES
 from phyblock.scoring.plan import Counts, Goal, match_plan
 from phyblock.tracks.goal_blind import goal_blind_plans
 from phyblock.types import SETTINGS, Setting
+from tests.shipped import TASKS
 
-BUILT_IN = Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400"
 EVERY_LOOK = [(kind, euler) for kind in KIT_PALETTE for euler in POSES[kind[0]].values()]
 GAIN = 0.02
 """What a learner may win without seeing the goal: what is left is chance."""
@@ -43,7 +41,7 @@ scenes = st.lists(st.sampled_from(EVERY_LOOK), min_size=1, max_size=16).map(scen
 
 @functools.cache
 def built_in() -> Tasks:
-    return [(task.scene, task.candidates) for task in read_builtin(BUILT_IN).tasks]
+    return [(task.scene, task.candidates) for task in TASKS]
 
 
 def fresh(count: int, seed: int) -> Tasks:

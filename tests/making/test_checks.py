@@ -8,8 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from phyblock.data.official import read_official
-from phyblock.data.scenes import read_builtin
 from phyblock.domain.scene import Block, CandidateSet, Scene
 from phyblock.domain.symmetry import Symmetry
 from phyblock.making.checks import (
@@ -33,10 +31,10 @@ from phyblock.sim.dynamics import Trial
 from phyblock.sim.engine import Physics
 from phyblock.workers import open_workers
 from tests.designs import built, designed_scene, designed_scenes
+from tests.shipped import DATA, TASKS, official_tasks
 from tests.sim.test_geometry import FLOATING, OVERLAPPING
 
-BUILT_IN = Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400"
-TASKS = read_builtin(BUILT_IN).tasks
+BUILT_IN = DATA / "phyblock-400"
 SHORT = Trial(duration_s=1.0, physics=(Physics(),))
 QUICK = replace(OURS, trial=SHORT)
 QUICK_FOREIGN = replace(FOREIGN, trial=SHORT)
@@ -166,7 +164,7 @@ def checks_of(findings: tuple[Finding, ...]) -> set[str]:
 
 
 def test_official_annotation_errors_are_reported(official_checkout: Path) -> None:
-    tasks = {task.scene.id: task for task in read_official(official_checkout).tasks}
+    tasks = {task.scene.id: task for task in official_tasks(official_checkout)}
     for name in ("000", "001", "040", "069", "187"):
         found = checks_of(audit_scene((tasks[name].scene, tasks[name].candidates), QUICK_FOREIGN))
         assert ("overlap" in found) == (name in OVERLAPPING)
@@ -176,7 +174,7 @@ def test_official_annotation_errors_are_reported(official_checkout: Path) -> Non
 
 @pytest.mark.slow
 def test_the_whole_official_data(official_checkout: Path) -> None:
-    tasks = [(task.scene, task.candidates) for task in read_official(official_checkout).tasks]
+    tasks = [(task.scene, task.candidates) for task in official_tasks(official_checkout)]
     with open_workers(2) as workers:
         audits = dict(zip((s.id for s, _ in tasks), workers.map(audit_scene, tasks), strict=True))
 

@@ -14,13 +14,12 @@ from hypothesis import strategies as st
 from phyblock.data.scenes import read_builtin
 from phyblock.domain.scene import Scene
 from phyblock.errors import DataError
-from phyblock.files import bundled
 from phyblock.making.checks import verify_scene
 from phyblock.making.files import check_sums
 from phyblock.making.scenes.completing import GivenScene, ReadScene, complete, derived, read_given
+from tests.shipped import TASKS
 from tests.workspace import SCENES, Workspace
 
-DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
 GABLES = [
     {"type": "cube", "color": "red", "position": [0, -0.05, 0.025]},
     {"type": "cube", "color": "red", "position": [0, 0.05, 0.025]},
@@ -54,7 +53,7 @@ def same(scene: Scene) -> bool:
     return derived(scene.id, stripped(scene), scene.id) == scene
 
 
-@given(st.sampled_from(DATA.tasks))
+@given(st.sampled_from(TASKS))
 @settings(max_examples=5, deadline=None)
 def test_a_scene_that_is_stripped_comes_back(task: Any) -> None:
     assert same(task.scene)
@@ -62,7 +61,7 @@ def test_a_scene_that_is_stripped_comes_back(task: Any) -> None:
 
 @pytest.mark.slow
 def test_all_scenes_that_are_stripped_come_back() -> None:
-    assert [task.key for task in DATA.tasks if not same(task.scene)] == []
+    assert [task.key for task in TASKS if not same(task.scene)] == []
 
 
 @given(order=st.permutations(range(5)))

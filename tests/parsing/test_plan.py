@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.parsing.plan import parse_plan
-from tests.official_replies import reply_texts
+from tests.shipped import reply_texts
 
 N = 16
 COUNTS = Path(__file__).with_name("recordings.csv")

@@ -9,47 +9,29 @@ from typing import Any
 import jsonschema
 import pytest
 
-from phyblock.data.base import Dataset, QuestionSet
-from phyblock.data.questions import StoredQuestion, read_questions
-from phyblock.data.scenes import StoredScene, read_builtin
+from phyblock.data.questions import StoredQuestion
+from phyblock.data.scenes import StoredScene
 from phyblock.errors import DataError
-from phyblock.files import bundled
 from phyblock.records.record import Line, validated
 from tests.data.broken import Raw, sound_scene, with_value
 from tests.documents import ROOT
 from tests.fuzz.strategies import sound_question
+from tests.shipped import DATA, TASKS, built_in_questions
 
 SCENES = Path("phyblock-400", "scenes.jsonl")
 QUESTIONS = Path("phyblock-vqa", "questions.jsonl")
 
 
 def lines_of(path: Path) -> list[str]:
-    return (bundled("benchmarks", "data") / path).read_text(encoding="utf-8").splitlines()
+    return (DATA / path).read_text(encoding="utf-8").splitlines()
 
 
-@pytest.fixture(scope="module")
-def scenes() -> Dataset:
-    return read_builtin(bundled("benchmarks", "data") / SCENES.parent)
-
-
-@pytest.fixture(scope="module")
-def questions(scenes: Dataset) -> QuestionSet:
-    return read_questions(bundled("benchmarks", "data") / QUESTIONS.parent, scenes)
-
-
-def test_the_shipped_scenes_are_written_byte_for_byte(scenes: Dataset) -> None:
-    written = [StoredScene.of(task.scene, task.candidates).as_json() for task in scenes.tasks]
+def test_shipped_scenes_and_questions_are_written_byte_for_byte() -> None:
+    written = [StoredScene.of(task.scene, task.candidates).as_json() for task in TASKS]
     assert written == lines_of(SCENES)
-
-
-def test_the_shipped_questions_are_written_byte_for_byte(
-    scenes: Dataset, questions: QuestionSet
-) -> None:
-    originals = {task.key: task.scene for task in scenes.tasks}
-    written = [
-        StoredQuestion.of(task.question, originals[task.scene.id]).as_json()
-        for task in questions.tasks
-    ]
+    originals = {task.key: task.scene for task in TASKS}
+    asked = (task.question for task in built_in_questions().tasks)
+    written = [StoredQuestion.of(one, originals[one.scene.id]).as_json() for one in asked]
     assert written == lines_of(QUESTIONS)
 
 

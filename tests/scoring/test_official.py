@@ -12,7 +12,6 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from phyblock.data.official import read_official
 from phyblock.data.scenes import read_builtin
 from phyblock.domain.question import CATEGORIES
 from phyblock.domain.scene import AssemblyTask, Plan
@@ -20,14 +19,14 @@ from phyblock.parsing.plan import parse_plan
 from phyblock.results.paper import published_table
 from phyblock.scoring.plan import AssemblyScorer, Counts, Goal, chance, match_plan
 from phyblock.types import MATCHERS, SETTINGS, PlanParser
-from tests.official_replies import reply_texts
+from tests.shipped import DATA, official_tasks, reply_texts
 
 Row = tuple[str, str, str, str]
 
 
 @pytest.fixture(scope="module")
 def tasks(official_checkout: Path) -> dict[str, AssemblyTask]:
-    return {task.scene.id: task for task in read_official(official_checkout).tasks}
+    return {task.scene.id: task for task in official_tasks(official_checkout)}
 
 
 def scored(
@@ -63,7 +62,7 @@ def test_known_counts_match_row_for_row(
 
 
 ORDERS = 200
-BUNDLED = sorted((Path(__file__).parents[2] / "benchmarks" / "data").glob("*/scenes.jsonl"))
+BUNDLED = sorted(DATA.glob("*/scenes.jsonl"))
 EVERY = pytest.mark.parametrize("every", [5, pytest.param(1, marks=pytest.mark.slow)])
 """Each fifth scene, of all levels; all scenes when there is time."""
 
@@ -83,7 +82,7 @@ def assert_every_order_scores_1(task: AssemblyTask, rng: np.random.Generator) ->
 @EVERY
 def test_valid_orders_of_the_official_scenes_score_1(official_checkout: Path, every: int) -> None:
     rng = np.random.default_rng(0)
-    for task in read_official(official_checkout).tasks[::every]:
+    for task in official_tasks(official_checkout)[::every]:
         assert_every_order_scores_1(task, rng)
 
 

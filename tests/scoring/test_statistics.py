@@ -15,7 +15,6 @@ from hypothesis.extra import numpy as hnp
 from scipy import stats
 from scipy.special import gammaincinv  # type: ignore[import-untyped]
 
-from phyblock.data.official import read_official
 from phyblock.scoring.plan import Floats, f1_of, ratio_of
 from phyblock.scoring.statistics import (
     POWER,
@@ -33,6 +32,7 @@ from phyblock.scoring.statistics import (
 )
 from tests.scoring.cases import precision_of, recall_of
 from tests.scoring.worlds import World
+from tests.shipped import official_tasks
 
 NAMES = st.lists(st.sampled_from("abcdefg"), min_size=1, max_size=3)
 MEMBERS = st.lists(NAMES, min_size=2, max_size=12)
@@ -265,7 +265,7 @@ def in_common(clusters: Clusters) -> np.ndarray:
 @pytest.fixture(scope="module")
 def official(official_dir: Path) -> tuple[dict[str, Floats], Clusters, Clusters]:
     """Counts of setting A by model, clusters by base scene, and every scene a cluster."""
-    scenes = [task.scene for task in read_official(official_dir / "PhyBlock").tasks]
+    scenes = [task.scene for task in official_tasks(official_dir / "PhyBlock")]
     place = {scene.id: n for n, scene in enumerate(scenes)}
     counts: dict[str, Floats] = defaultdict(lambda: np.zeros((len(scenes), 3)))
     with (official_dir / "expected" / "assembly_counts.csv").open(newline="") as file:

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.data.official import read_official
-from phyblock.data.scenes import read_builtin
 from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring.plan import ERROR_TYPES, Goal, match_plan
 from phyblock.scoring.steps import MOVE_OUTCOMES, Assembly, attempted_counts, gated, placed_counts
 from phyblock.types import GATINGS, SETTINGS, Gating, Setting
 from tests.scoring.cases import Case, cases
+from tests.shipped import TASKS, official_tasks
 
 ORDERS = 20
-BUILT_IN = Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400"
 
 any_setting = st.sampled_from(SETTINGS)
 any_gating = st.sampled_from(GATINGS)
@@ -58,9 +54,9 @@ def test_no_valid_order_fails(
     source: str, setting: Setting, gating: Gating, orders: int, request: pytest.FixtureRequest
 ) -> None:
     if source == "official":
-        tasks = read_official(request.getfixturevalue("official_checkout")).tasks
+        tasks = official_tasks(request.getfixturevalue("official_checkout"))
     else:
-        tasks = read_builtin(BUILT_IN).tasks
+        tasks = TASKS
     rng = np.random.default_rng(0)
     for task in tasks:
         assert_no_valid_order_fails(task, orders, rng, setting, gating)

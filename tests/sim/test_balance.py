@@ -13,10 +13,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from phyblock.data.scenes import read_builtin
 from phyblock.domain.blocks import SHAPES, BlockType
 from phyblock.domain.scene import Block
-from phyblock.files import bundled
 from phyblock.sim import balance
 from phyblock.sim.balance import (
     FRICTIONS,
@@ -30,10 +28,10 @@ from phyblock.sim.balance import (
 from phyblock.sim.contact import drop_height_m
 from phyblock.sim.dynamics import ONE_SETTING, Site, groups
 from phyblock.sim.engine import installed_engines, physics_engine
+from tests.shipped import TASKS
 from tests.sim.structures import block, tower, turned
 
-DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
-SCENES = {task.scene.id: task.scene.blocks for task in DATA.tasks}
+SCENES = {task.scene.id: task.scene.blocks for task in TASKS}
 SMALL = [blocks for blocks in SCENES.values() if len(blocks) <= 6]
 HALF_CUBE_M = 0.025
 offsets_m = st.floats(-0.045, 0.045)

@@ -13,8 +13,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from phyblock.data.official import read_official
-from phyblock.data.scenes import read_builtin
 from phyblock.domain.blocks import BlockType
 from phyblock.domain.scene import Block
 from phyblock.making.scenes.sketch import POSES
@@ -31,10 +29,10 @@ from phyblock.sim.dynamics import (
 from phyblock.sim.engine import ENGINES, Physics, Pose, World
 from phyblock.sim.outcomes import after_removal, holds
 from tests.designs import built, designed_scenes
+from tests.shipped import TASKS, official_tasks
 from tests.sim.structures import block, counterweighted_beam, tower
 from tests.sim.test_geometry import FLOATING
 
-BUILT_IN = read_builtin(Path(__file__).parents[2] / "benchmarks" / "data" / "phyblock-400").tasks
 SCENES = {scene.id: scene.blocks for scene in designed_scenes()}
 FIRST = replace(DEFAULT_TRIAL, physics=DEFAULT_TRIAL.physics[:1])
 LINE_BALANCED = {"bowl", "bowl-turned"}
@@ -90,9 +88,9 @@ SHAKEN = """
 from dataclasses import replace
 import numpy as np
 from phyblock.sim.dynamics import execute
-from tests.sim.test_dynamics import BUILT_IN
+from tests.shipped import TASKS
 rng = np.random.default_rng(0)
-(blocks,) = (task.scene.blocks for task in BUILT_IN if task.scene.id == "l4-001-avenue")
+(blocks,) = (task.scene.blocks for task in TASKS if task.scene.id == "l4-001-avenue")
 print(execute([
     replace(block, position_m=tuple((block.position_m + rng.normal(0, 0.003, 3)).tolist()))
     for block in blocks
@@ -117,7 +115,7 @@ def test_execution_depends_on_no_processor() -> None:
 @pytest.mark.slow
 def test_of_all_official_scenes_only_the_floating_fall(official_checkout: Path) -> None:
     trial = Trial(physics=(Physics(),))
-    tasks = read_official(official_checkout).tasks
+    tasks = official_tasks(official_checkout)
     assert {t.scene.id for t in tasks if not check(t.scene.blocks, trial).stable} == FLOATING
 
 
@@ -140,7 +138,7 @@ def test_what_falls_midway_or_slowly_is_named_at_its_step() -> None:
 
 @pytest.mark.parametrize("trial", [ONE_SETTING, DEFAULT_TRIAL], ids=["one", "default"])
 def test_a_site_gives_the_same_verdict_whatever_was_tried_on_it_before(trial: Trial) -> None:
-    structures = [task.scene.blocks for task in BUILT_IN[::150]]
+    structures = [task.scene.blocks for task in TASKS[::150]]
     structures += [SEESAW[:2], structures[0][:1], SEESAW, ()]
     with closing(Site(trial)) as site:
         first = [site.settle(blocks) for blocks in structures]

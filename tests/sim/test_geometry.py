@@ -14,7 +14,6 @@ from numpy.testing import assert_allclose
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
-from phyblock.data.official import read_official
 from phyblock.domain.blocks import (
     BLOCK_TYPES,
     KIT_PALETTE,
@@ -35,6 +34,7 @@ from phyblock.sim.contact import (
     support_graph,
 )
 from phyblock.sim.geometry import ConvexPiece, Mesh, collision_pieces, drawn_mesh, solid_mesh
+from tests.shipped import official_tasks
 from tests.sim.structures import angles_deg, block, block_types, eulers, tower, turned
 
 every_type = pytest.mark.parametrize("block_type", BLOCK_TYPES)
@@ -200,7 +200,7 @@ def test_a_plank_rests_on_both_its_posts_and_nothing_under_the_arch() -> None:
 
 @pytest.mark.slow
 def test_all_official_scenes(official_checkout: Path) -> None:
-    tasks = read_official(official_checkout).tasks
+    tasks = official_tasks(official_checkout)
     blocks = {task.scene.id: task.scene.blocks for task in tasks}
     assert {i for i, of in blocks.items() if find_overlaps(of, ANNOTATION_ERROR_M)} == OVERLAPPING
     assert {i for i, of in blocks.items() if find_gaps(of, ANNOTATION_ERROR_M)} == FLOATING

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,8 +19,6 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
-from phyblock.data.questions import read_questions
-from phyblock.data.scenes import read_builtin
 from phyblock.domain.blocks import BLOCK_TYPES, KIT_PALETTE, Color
 from phyblock.domain.question import Mark, QuestionPicture
 from phyblock.domain.scene import Block, Candidate, CandidateSet, Scene
@@ -66,11 +63,10 @@ from phyblock.sim.question_pictures import (
 from phyblock.sim.ruled import kit_key, ruled_key
 from phyblock.types import BACKGROUNDS, Background
 from tests.designs import designed_scene
+from tests.shipped import TASKS, built_in_questions
 from tests.sim.structures import block, clouds, scene_of, tower
 
-DATA = Path(__file__).parents[2] / "benchmarks" / "data"
-BUILT_IN = read_builtin(DATA / "phyblock-400")
-TASK = BUILT_IN.tasks[0]
+TASK = TASKS[0]
 STYLE, SMALL = PictureStyle(), PictureStyle(size_px=128)
 MARGIN, LEAST_CONTRAST = 0.16, 3.0
 EVERY_LOOK = [
@@ -147,14 +143,14 @@ def lies_between_planes(blocks: Sequence[Block], camera: Camera) -> bool:
 
 @pytest.mark.parametrize("every", [16, pytest.param(1, marks=pytest.mark.slow)])
 def test_no_built_in_picture_is_cut_open_and_blocks_of_wide_goals_are_large(every: int) -> None:
-    for task in BUILT_IN.tasks[::every]:
+    for task in TASKS[::every]:
         style = goal_style(task.scene, STYLE)
         camera = goal_camera(task.scene, style)
         assert lies_between_planes(task.scene.blocks, camera)
         places = np.array([one.position_m for one in task.scene.blocks])
         farthest_m = ((places - camera.eye_m) @ camera.axes[2]).max()
         assert 0.05 / camera.width_m(farthest_m) * style.size_px >= 0.08 * STYLE.size_px
-    for task in read_questions(DATA / "phyblock-vqa", BUILT_IN).tasks[::every]:
+    for task in built_in_questions().tasks[::every]:
         for recipe in task.question.pictures:
             assert lies_between_planes(drawn_blocks(recipe), question_camera(recipe, STYLE)), recipe
 

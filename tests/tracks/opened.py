@@ -11,14 +11,10 @@ import yaml
 
 from phyblock.config.suite import Suite, load_suite
 from phyblock.data.base import Dataset
-from phyblock.data.scenes import read_builtin
 from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Scene
-from phyblock.files import bundled
 from phyblock.tracks.base import open_tracks
 from phyblock.tracks.pictures import Workshop
-
-DATA = bundled("benchmarks", "data")
-BUILT_IN = read_builtin(DATA / "phyblock-400")
+from tests.shipped import TASKS
 
 
 def suite_of(**fields: Any) -> Suite:
@@ -33,7 +29,7 @@ def suite_of(**fields: Any) -> Suite:
 
 def track_of(
     name: str,
-    tasks: Sequence[AssemblyTask] = BUILT_IN.tasks,
+    tasks: Sequence[AssemblyTask] = TASKS,
     shop: Workshop | None = None,
     limit: int | None = None,
     **fields: Any,

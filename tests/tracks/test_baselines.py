@@ -37,7 +37,7 @@ from phyblock.tracks.pose_planning import pick_poses
 from phyblock.tracks.questions import ChoiceSubject, pick_answer
 from phyblock.tracks.step_planning import StepSubject, pick_step
 from phyblock.types import Setting
-from tests.tracks.opened import BUILT_IN
+from tests.shipped import TASKS
 
 WORDS = ("cube", "arch", "cylinder", "cuboid", "cone", "prism")
 
@@ -239,7 +239,7 @@ def test_areas_of_colors_tell_which_colors_are_needed(setting: Setting) -> None:
     assert f1(scenes, sets, goal_blind_plans(scenes, sets, setting), setting) < 0.6
 
 
-TASK = BUILT_IN.tasks[0]
+TASK = TASKS[0]
 N = len(TASK.candidates)
 TEXTS = ("a red cube", "place B", "Done", "the arch")
 PICTURES = tuple(f"<img{n}>" for n in range(1, 5))

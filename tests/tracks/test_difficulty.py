@@ -9,13 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.data.scenes import read_builtin
 from phyblock.domain.scene import AOVGraph, Candidate, CandidateSet
-from phyblock.files import bundled
 from phyblock.tracks.difficulty import MEASURES, distractor_distance, log_orders
+from tests.shipped import TASKS
 from tests.workspace import Workspace, call
-
-TASKS = read_builtin(bundled("benchmarks", "data", "phyblock-400")).tasks
 
 
 @st.composite

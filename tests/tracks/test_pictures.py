@@ -13,7 +13,6 @@ import pytest
 from PIL import Image as PillowImage
 
 from phyblock.config.suite import ImagesSpec
-from phyblock.data.official import read_official
 from phyblock.domain.scene import AssemblyTask
 from phyblock.errors import DataError, StoreError
 from phyblock.models.request import Image
@@ -21,6 +20,7 @@ from phyblock.sim.pictures import candidates_png
 from phyblock.tracks.base import presented
 from phyblock.tracks.pictures import Workshop, picture_style, scene_drawings
 from tests.fuzz.strategies import png_header
+from tests.shipped import official_tasks
 
 COMPOSITE = ImagesSpec(size_px=128)
 GOAL_FIRST = ImagesSpec(size_px=128, layout="separate")
@@ -147,7 +147,7 @@ def test_the_data_sets_picture_is_sent_byte_for_byte_or_parted_in_two_halves(
 def test_pictures_of_the_data_set_can_leave_out_the_goal(
     official_checkout: Path,
 ) -> None:
-    pool = [one for one in read_official(official_checkout).tasks if one.composite is not None]
+    pool = [one for one in official_tasks(official_checkout) if one.composite is not None]
     task = pool[0]
     blind = presented(task, 0, "file", is_blind=True)
     separate = ImagesSpec(source="dataset", layout="separate")

@@ -38,8 +38,9 @@ from phyblock.tracks.pose_planning import (
     written,
 )
 from phyblock.types import REFUSED_ENDS, STEP_ENDS, StepEnd
+from tests.shipped import TASKS
 from tests.sim.structures import block_types, eulers
-from tests.tracks.opened import BUILT_IN, track_of
+from tests.tracks.opened import track_of
 from tests.workspace import Workspace
 
 STANDS = "Step1: block 1 at (0, 0, 2.5)\nStep2: block 3 at (0, 0, 7.5)"
@@ -48,7 +49,7 @@ STANDS = "Step1: block 1 at (0, 0, 2.5)\nStep2: block 3 at (0, 0, 7.5)"
 @functools.cache
 def poses() -> PosePlanning:
     """The track, judging in this process."""
-    track: PosePlanning = track_of("pose_planning", BUILT_IN.tasks[:1])
+    track: PosePlanning = track_of("pose_planning", TASKS[:1])
     return track
 
 
@@ -61,7 +62,7 @@ def task(tasks: tuple[AssemblyTask, ...]) -> AssemblyTask:
 def built_in() -> list[AssemblyTask]:
     """Three scenes with arches, triangles and cylinders that are turned."""
     wanted = ("l1-001-animal", "l2-020", "l3-028-arcade")
-    return [task for task in BUILT_IN.tasks if task.key.startswith(wanted)]
+    return [task for task in TASKS if task.key.startswith(wanted)]
 
 
 @given(block_types, eulers, st.tuples(*[st.floats(-1, 1)] * 3))
@@ -185,7 +186,7 @@ def test_without_poses_a_plan_is_scored_as_full_planning_scores_it(
     """Far from one another, so that nothing falls on anything."""
     steps = [PoseStep(n, (20.0 * place, 0.0, 2.5)) for place, n in enumerate(numbers)]
     plain = "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(numbers, 1))
-    full = track_of("full_planning", BUILT_IN.tasks[:1])
+    full = track_of("full_planning", TASKS[:1])
     found = full.judge(task, plain if numbers else None).fields["scores"]
     wanted = [score for score in found if score["criterion"] == "aov"]
     assert poses().judge(task, written(steps)).fields["scores"] == wanted

@@ -16,7 +16,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.data.official import read_official
 from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Scene
 from phyblock.models.request import Image, Message, Request
 from phyblock.parsing.move import MOVE_PROBLEMS
@@ -27,7 +26,8 @@ from phyblock.tracks.pictures import Workshop
 from phyblock.tracks.step_planning import ENDINGS, STEP_RULES, Feedback, PastStep, StepPlanning
 from phyblock.types import SETTINGS, Setting
 from tests.parsing.test_move import REPLIES
-from tests.tracks.opened import BUILT_IN, seesaw, track_of
+from tests.shipped import TASKS, official_tasks
+from tests.tracks.opened import seesaw, track_of
 
 OPEN = {"max_failures": None, "max_repeats": None}
 
@@ -42,7 +42,7 @@ def made(form: str = "text", shop: Workshop | None = None, **steps: Any) -> Step
 @functools.cache
 def _made(form: str, shop: Workshop | None, steps: str) -> Any:
     fields = {"answer_format": form, "steps": json.loads(steps)}
-    return track_of("step_planning", BUILT_IN.tasks[:1], shop, **fields)
+    return track_of("step_planning", TASKS[:1], shop, **fields)
 
 
 def tower(*colors: str) -> AssemblyTask:
@@ -192,7 +192,7 @@ def test_whatever_is_said_the_default_limits_end_it_the_same_way(texts: list[str
 @pytest.mark.parametrize("accepts", SETTINGS)
 def test_the_oracle_completes_every_built_in_scene(accepts: Setting) -> None:
     """Also where orientations do not matter to the simulator, it makes no mistake in them."""
-    for task in BUILT_IN.tasks:
+    for task in TASKS:
         fields, _ = play(task, baseline("oracle"), made(setting=accepts))
         assert fields["ending"] == "completed"
         for setting in SETTINGS:
@@ -200,7 +200,7 @@ def test_the_oracle_completes_every_built_in_scene(accepts: Setting) -> None:
 
 
 def test_the_oracle_completes_every_official_scene(official_checkout: Path) -> None:
-    for task in read_official(official_checkout).tasks:
+    for task in official_tasks(official_checkout):
         fields, _ = play(task, baseline("oracle"), made())
         assert fields["ending"] == "completed", task.scene.id
         assert scores(fields, "attempted") == (len(task.scene), 0, 0)
@@ -320,7 +320,7 @@ def test_pictures_of_states_are_drawn_and_kept(tmp_path: Path) -> None:
             episode.take(Reply(text=f"Move({move})"))
         return seen
 
-    found, task = [], BUILT_IN.tasks[0]
+    found, task = [], TASKS[0]
     for expected in (2 + len(task.scene), 0):
         shop = Workshop(1, tmp_path)
         images = {"layout": "separate"}
