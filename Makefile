@@ -13,7 +13,7 @@ FAULTS ?= 510
 KILLS ?= 36
 
 # `make test-pythons`: a part of the tests on the oldest and the newest other Python that is here.
-.PHONY: run test test-all test-pythons fuzz check docs tutorials lock clean
+.PHONY: run test test-golden test-all test-pythons fuzz check docs tutorials lock clean
 
 $(RUNS): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; \
@@ -32,6 +32,10 @@ run: $(RUNS)
 
 test: $(TESTS)
 	$(BIN)/python -m pytest -n 2 --dist worksteal
+
+# The whole of the golden runs of which `make test` makes a part.
+test-golden: $(TESTS)
+	$(BIN)/python -m pytest -n 2 -m slow tests/test_golden.py
 
 test-all: $(TESTS)
 	PHYBLOCK_EXAMPLES=200 PHYBLOCK_FUZZ_KILLS=$(KILLS) $(BIN)/python -m pytest -n 2 --dist worksteal -m ''
