@@ -124,7 +124,7 @@ def checked(find: Callable[[Any], Iterable[Fault]]) -> AfterValidator:
 class Section(BaseModel):
     """Base of all that is written in YAML: no unknown keys, no changes after reading."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
     def faults(self) -> Iterator[Fault]:
         """Yield what is wrong between fields, each of which is valid."""
