@@ -123,15 +123,17 @@ def test_it_is_refused_until_it_is_scored_and_then_ends_as_if_today_had_begun_it
 
 
 @pytest.mark.usefixtures("begun")
-def test_killed_before_either_file_is_replaced_it_is_scored_again(
+def test_a_kill_before_either_file_is_replaced_processes_and_shards_end_in_the_same_records(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in ("whole", "1", "2"):
+    def records(name: str) -> bytes:
+        return (workspace.root / name / "records.jsonl").read_bytes()
+
+    for name in ("whole", "1", "2", "processes", "shards"):
         shutil.copytree(workspace.out, workspace.root / name)
     assert call("score", "whole") == 0
     for writes in (1, 2):
         folder = workspace.root / str(writes)
-        before = (folder / "records.jsonl").read_bytes()
         left, write = writes, store.atomic_write
 
         def dying(*args: Any, **options: Any) -> None:
@@ -145,22 +147,13 @@ def test_killed_before_either_file_is_replaced_it_is_scored_again(
             dies.setattr(store, "atomic_write", dying)
             with pytest.raises(KeyboardInterrupt):
                 rescore.rescore(folder)
-        assert ((folder / "records.jsonl").read_bytes() == before) == (writes == 1)
+        assert (records(folder.name) == records("out")) == (writes == 1)
         with pytest.raises(StoreError, match="by another version"):
             run(folder.name)
         assert call("score", folder.name) == 0
         assert newest(workspace, folder.name) == newest(workspace, "whole")
-        assert run(folder.name) == 0
-
-
-@pytest.mark.usefixtures("begun")
-def test_processes_and_shards_score_alike(workspace: Workspace) -> None:
-    for name in ("alone", "two", "shards"):
-        shutil.copytree(workspace.out, workspace.root / name)
-    assert call("score", "alone") == 0
-    assert call("score", "two", "--jobs", "2") == 0
+    assert run("2") == 0
+    assert call("score", "processes", "--jobs", "2") == 0
     for shard in ("2/3", "1/3", "3/3"):
         assert call("score", "shards", "--shard", shard) == 0
-    folders = ("alone", "two", "shards")
-    alone, *others = ((workspace.root / one / "records.jsonl").read_bytes() for one in folders)
-    assert others == [alone, alone]
+    assert records("processes") == records("shards") == records("whole")

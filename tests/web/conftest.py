@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, urlencode
 
 import pytest
@@ -18,7 +18,7 @@ from tests.vqa_set import questions, write_questions
 from tests.workspace import Workspace
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Browser, BrowserContext, Page
 
 HOSTILE = (
     "<script>window.hacked = 1</script><img src=x onerror='window.hacked = 2'>"
@@ -29,7 +29,11 @@ PLAN = "1. Move block with index 9. It is green.\n2. Move block with index 3"
 NAME = "<img src=x onerror='window.hacked=1'>\"&"
 """What a model and a scene of the site are called."""
 SUBTASKS = ("SH", "OR", "AD")
-VIEWPORT = {"width": 1400, "height": 1000}
+LIGHT: Any = {"viewport": {"width": 1400, "height": 1000}, "color_scheme": "light"}
+WITHOUT_WEBGL = """HTMLCanvasElement.prototype.getContext = new Proxy(
+    HTMLCanvasElement.prototype.getContext,
+    { apply: (get, canvas, [kind, ...more]) =>
+        kind.startsWith("webgl") ? null : get.call(canvas, kind, ...more) })"""
 
 
 class PageVisit(Visit):
@@ -169,13 +173,24 @@ def site(runs: Workspace) -> Path:
     return runs.root / "site" / "index.html"
 
 
+@pytest.fixture(scope="module")
+def context(browser: Browser) -> Iterator[BrowserContext]:
+    """Pages that are read: drawing takes longest."""
+    made = browser.new_context(**LIGHT)
+    made.add_init_script(WITHOUT_WEBGL)
+    yield made
+    made.close()
+
+
 @pytest.fixture
-def visiting(browser: Browser) -> Iterator[Callable[[Path], PageVisit]]:
-    """Visits to pages by their paths, which may complain of nothing and ask for nothing else."""
+def visiting(browser: Browser, context: BrowserContext) -> Iterator[Callable[..., PageVisit]]:
+    """Visits to pages by their paths, which may complain of nothing and ask for nothing else; one
+    that draws has WebGL and a clock of its own.
+    """
     visits: list[PageVisit] = []
 
-    def visit(path: Path) -> PageVisit:
-        page = browser.new_page(viewport=VIEWPORT, color_scheme="light")  # type: ignore[arg-type]
+    def visit(path: Path, *, draws: bool = False) -> PageVisit:
+        page = browser.new_page(**LIGHT) if draws else context.new_page()
         visits.append(PageVisit(page, path))
         return visits[-1]
 
@@ -188,15 +203,15 @@ def visiting(browser: Browser) -> Iterator[Callable[[Path], PageVisit]]:
 
 
 @pytest.fixture
-def visit(visiting: Callable[[Path], PageVisit], made: Workspace) -> PageVisit:
+def visit(visiting: Callable[..., PageVisit], made: Workspace) -> PageVisit:
     return visiting(made.out / "report.html")
 
 
 @pytest.fixture
-def trouble(visiting: Callable[[Path], PageVisit], troubled: Workspace) -> PageVisit:
+def trouble(visiting: Callable[..., PageVisit], troubled: Workspace) -> PageVisit:
     return visiting(troubled.out / "report.html")
 
 
 @pytest.fixture
-def site_visit(visiting: Callable[[Path], PageVisit], site: Path) -> PageVisit:
+def site_visit(visiting: Callable[..., PageVisit], site: Path) -> PageVisit:
     return visiting(site)

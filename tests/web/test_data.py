@@ -22,7 +22,7 @@ from phyblock.records.files import known_records
 from phyblock.records.record import Record
 from phyblock.results.estimates import Headline
 from phyblock.results.load import load_run
-from phyblock.results.tables import write_tables
+from phyblock.results.tables import TablesWritten, write_tables
 from phyblock.web.board import SiteRun, Sources, board_of, entries_of
 from phyblock.web.leaderboard import check_runs_alike, write_site
 from phyblock.web.pack import Pack, pack_samples
@@ -53,8 +53,8 @@ def entries_in(folder: Path, starts: Sequence[int], kind: str = "records") -> li
 class Report:
     """A page's reading of a folder of scripts."""
 
-    def __init__(self, run: Path, data: Path | None = None) -> None:
-        path = write_report(write_tables(run), data)
+    def __init__(self, run: Path, data: Path | None = None, made: TablesWritten | None = None):
+        path = write_report(made or write_tables(run), data)
         self.page = path.read_text(encoding="utf-8")
         self.folder = run / self.page.partition('data-folder="')[2].partition('"')[0]
         self.index = unpacked(self.folder / "samples.js")
@@ -143,22 +143,23 @@ def test_scenes_are_drawn_from_where_they_are_and_from_no_other_data(
     workspace.write_suite(models=["oracle"])
     assert workspace.run().code == 0
     out, data = workspace.out, workspace.root / "data"
-    report = Report(out)
+    made = write_tables(out)
+    report = Report(out, made=made)
     scene = report.entry("scenes", report.index["scenes"].index("t5"))
     assert [block["candidate"] for block in scene["blocks"]] == [3, 3, 1, 2]
     assert [block["depend"] for block in scene["blocks"]] == [[], [0], [1], [2]]
     assert report.index["lacking"] == ""
     moved = data.rename(tmp_path / "elsewhere")
-    report = Report(out)
+    report = Report(out, made=made)
     assert report.index["starts"]["scenes"] == []
     assert "the data set of the run is not there" in report.index["lacking"]
     assert report.entry("records", 0)["reply"]["text"]
-    assert Report(out, moved).index["starts"]["scenes"] == [0]
+    assert Report(out, moved, made).index["starts"]["scenes"] == [0]
     path = moved.rename(data) / "scenes.jsonl"
     path.write_text(path.read_text().replace('"levels": [3]', '"levels": [4]', 1))
     with pytest.raises(DataError, match="is not the data set that the run was made on"):
-        Report(out, data)
-    assert "or it was changed since" in Report(out).index["lacking"]
+        Report(out, data, made)
+    assert "or it was changed since" in Report(out, made=made).index["lacking"]
 
 
 def test_boards_say_what_tables_say(made: Workspace) -> None:

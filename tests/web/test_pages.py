@@ -22,7 +22,7 @@ from tests.workspace import Workspace
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-Visiting = Callable[[Path], PageVisit]
+Visiting = Callable[..., PageVisit]
 PHONE = {"width": 390, "height": 844}
 WIDE = "document.documentElement.scrollWidth <= innerWidth"
 
@@ -71,10 +71,6 @@ SOUND: dict[str, Any] = {
     **{"nameless": [], "h1": 1, "jumps": [], "twice": [], "lost": []},
     "unreached": [],
 }
-WITHOUT_WEBGL = """HTMLCanvasElement.prototype.getContext = new Proxy(
-    HTMLCanvasElement.prototype.getContext,
-    { apply: (get, canvas, [kind, ...more]) =>
-        kind.startsWith("webgl") ? null : get.call(canvas, kind, ...more) })"""
 CONTRAST = """() => {
   const parse = (text) => text.match(/[\\d.]+/g).map(Number);
   const over = (top, below) => {
@@ -194,7 +190,8 @@ def test_keys_go_through_the_list_and_back_through_what_was_seen(visit: PageVisi
     assert "There is no sample" in page.inner_text(".detail")
 
 
-def test_a_sample_is_drawn_played_and_turned(visit: PageVisit) -> None:
+def test_a_sample_is_drawn_played_and_turned(visiting: Visiting, made: Workspace) -> None:
+    visit = visiting(made.out / "report.html", draws=True)
     page = visit.page
     page.clock.install()
     visit.show("full_planning/oracle/t5/s0")
@@ -243,8 +240,9 @@ def test_a_sample_is_drawn_played_and_turned(visit: PageVisit) -> None:
 
 
 def test_a_stage_opens_at_the_first_wrong_step_and_moves_but_for_those_who_want_it_still(
-    visit: PageVisit,
+    visiting: Visiting, made: Workspace
 ) -> None:
+    visit = visiting(made.out / "report.html", draws=True)
     page = visit.page
     page.clock.install()
     visit.show("full_planning/oracle/t5/s1")
@@ -280,7 +278,6 @@ def test_a_stage_opens_at_the_first_wrong_step_and_moves_but_for_those_who_want_
 
 
 def test_without_webgl_blocks_are_painted_and_turned(visit: PageVisit) -> None:
-    visit.page.add_init_script(WITHOUT_WEBGL)
     page = visit.show("full_planning/oracle/t5/s0")
     stage = "canvas.stage"
     expect(page.locator(stage)).to_have_attribute("data-drawn", "painted")
@@ -291,7 +288,8 @@ def test_without_webgl_blocks_are_painted_and_turned(visit: PageVisit) -> None:
     assert page.eval_on_selector(stage, "canvas => canvas.toDataURL()") != before
 
 
-def test_questions_and_episodes_are_shown(visit: PageVisit) -> None:
+def test_questions_and_episodes_are_shown(visiting: Visiting, made: Workspace) -> None:
+    visit = visiting(made.out / "report.html", draws=True)
     page = visit.open("samples", track="vqa")
     visit.count("24 samples")
     page.select_option("#filter-part", label="SH shape")
@@ -426,13 +424,12 @@ OF_SITE = {
 
 @pytest.mark.parametrize("name", [*VIEWS, *OF_SITE])
 def test_every_view_can_be_read_and_reached_and_hostile_names_do_nothing(
-    visit: PageVisit, site_visit: PageVisit, name: str
+    visiting: Visiting, made: Workspace, site: Path, name: str
 ) -> None:
     view, words = (VIEWS | OF_SITE)[name]
-    one = site_visit if name in OF_SITE or name in ("results", "scenes") else visit
-    if name not in ("plan", "poses"):
-        # Texts are looked at, not pictures, which take longest to draw.
-        one.page.add_init_script(WITHOUT_WEBGL)
+    is_of_site = name in OF_SITE or name in ("results", "scenes")
+    path = site if is_of_site else made.out / "report.html"
+    one = visiting(path, draws=name in ("plan", "poses"))
     page = one.open(view, **words)
     assert page.evaluate(STRUCTURE) == SOUND
     for scheme in ("light", "dark"):
@@ -458,11 +455,11 @@ def test_a_leaderboard_says_what_was_found_and_shows_how_models_fail(
     made = Workspace(tmp_path_factory.mktemp("paper"), pictures_dir)
     path = f"dataset.path={official_checkout}"
     made.phyblock(
-        "run", "paper-table1", "--set", path, "--limit", "24", "--out", "out", "--no-report"
+        "run", "paper-table1", "--set", path, "--limit", "8", "--out", "out", "--no-report"
     )
     done = made.phyblock("site", "out", "--data", official_checkout, "--out", "site")
     assert done.code == 0, done.err
-    visit = visiting(made.root / "site" / "index.html")
+    visit = visiting(made.root / "site" / "index.html", draws=True)
     page = visit.open()
     assert re.fullmatch(
         r"(No model is shown to beat|\d+ of \d+ models beats?) a rule that never sees the goal "
