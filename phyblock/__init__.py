@@ -1,10 +1,10 @@
 """phyblock: PhyBlock, 3D block assembly for vision-language models, as tasks, scenes and runs.
 
-`tasks(track)` gives what a track asks, and the score of a reply. `generate(n)` makes scenes,
+`tasks(track)` returns the tasks of a track, which score replies. `generate(n)` makes scenes,
 `verify(scene)` checks one, `render(scene)` draws one. `load_suite(name)` reads a suite,
-`run_suite(suite)` runs it. `load_run(path)` opens a run folder: `.records` is a DataFrame, a row a
-sample, `.estimates` every value with its interval, `.tables` maps names to DataFrames, `.summary()`
-and `.compare(other)` say what came out.
+`run_suite(suite)` runs it. `load_run(path)` opens a run folder: `.records` is a DataFrame with one
+row per sample, `.estimates` has every value with its interval, `.tables` maps names to DataFrames,
+`.summary()` and `.compare(other)` return the results.
 """
 
 from __future__ import annotations
@@ -58,13 +58,13 @@ _HOMES = {
 }
 """The modules of names that are not in `api`."""
 if find_spec("verifiers"):
-    # It finds a taskset and its environment among the names that a package exports.
+    # verifiers looks for a taskset and its environment among the names that a package exports.
     __all__ += ["VerifiersEnv", "VerifiersTaskset"]
     _HOMES |= dict.fromkeys(("VerifiersEnv", "VerifiersTaskset"), "integrations.verifiers")
 
 
 def __getattr__(name: str) -> object:
-    # What these need takes up to a second to import: only those who ask for it pay.
+    # Imported on first use: what these names need takes up to a second.
     if name == "__version__":
         from importlib.metadata import version
 

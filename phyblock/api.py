@@ -1,8 +1,8 @@
 """Public names of `phyblock`: tasks and their scores, scenes, suites and runs.
 
-A task asks and judges through the functions that runs use, so its scores are those of a run to the
-last bit. Pictures are drawn in the calling process and kept in the cache on disk. Tasks may be used
-from several threads; each process opens its own. Nothing is spent without consent.
+Tasks make requests and score replies with the functions of runs, so scores equal those of a run to
+the last bit. Pictures are drawn in the calling process and kept in the cache on disk. Tasks may be
+used from several threads; each process opens its own. Nothing is spent without consent.
 """
 
 from __future__ import annotations
@@ -68,14 +68,14 @@ _Text = Annotated[str, Field(min_length=1)]
 Place = _Text | Path
 Split = Literal["test", "train", "dev"]
 _SUITES = {"step_planning": "steps", "vqa": "vqa", "pose_planning": "pose"}
-"""Bundled suites that say how a track asks; others ask as `full` does."""
+"""Bundled suites with the settings of a track; all other tracks use `full`."""
 _LEVELS = (1, 2, 3, 4)
 _MOST_REPEATS = 50
-"""Scenes in a row that a set holds already, after which a split has no others."""
+"""Repeated scenes in a row after which a split is taken to be exhausted."""
 
 
 def checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
-    """Raise SpecError for all arguments that are not of the types that the function declares."""
+    """Decorate a function to raise SpecError for arguments that do not have the declared types."""
     check: Callable[..., _T] = validate_call(config=ConfigDict(strict=True))(function)
     names = list(inspect.signature(function).parameters)
 
@@ -98,7 +98,7 @@ def checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
 
 
 def _result(work: Coroutine[Any, Any, _T]) -> _T:
-    """Return the result of a coroutine that never waits, as those of tracks with a local shop."""
+    """Return the result of a coroutine that never waits, as in tracks with a LocalShop."""
     try:
         work.send(None)
     except StopIteration as end:
@@ -110,7 +110,7 @@ def _result(work: Coroutine[Any, Any, _T]) -> _T:
 
 @dataclass(frozen=True, repr=False)
 class Score:
-    """The worth of a reply: its record as a run would keep it, read by one setting and matcher."""
+    """The score of a reply: its record, as a run would keep it, under one setting and matcher."""
 
     record: Record
     setting: str
@@ -126,19 +126,21 @@ class Score:
 
     @property
     def value(self) -> float:
-        """The headline measure, in [0, 1]: F1 of a plan, in setting C of one with poses, of all
-        attempts of an episode; 1 or 0 for an answer. 0 where it is not defined.
+        """The headline measure, in [0, 1]: 1 or 0 for an answer, F1 for all other tracks.
+
+        F1 is in setting C for a plan with poses, and over all attempts for an episode. The value
+        is 0 where F1 is not defined.
         """
         return self._value(self.measure) or 0.0
 
     @property
     def f1(self) -> float | None:
-        """The headline F1; None where that is no F1."""
+        """The headline measure if it is an F1, else None."""
         return self.value if self.measure.startswith("f1") else None
 
     @property
     def success(self) -> bool:
-        """True if all is right."""
+        """True if everything is right."""
         name = known_track(self.record.track).report().success or self.measure
         return self._value(name) == 1.0
 
@@ -149,7 +151,7 @@ class Score:
 
     @property
     def problem(self) -> str | None:
-        """The reason why nothing could be read or carried out."""
+        """The reason why the reply could not be parsed, or None."""
         if self.record.error is not None:
             return self.record.error.message
         missing = "there is no reply" if self.outcome == "missing" else None
@@ -157,7 +159,7 @@ class Score:
 
     @property
     def counts(self) -> dict[str, float]:
-        """The counts that `value` is made of, by name."""
+        """The counts that `value` is computed from, by name."""
         counted = self._measures[self.measure].counted
         return dict(zip(counted.columns, self._numbers(counted) or (), strict=False))
 
@@ -174,7 +176,7 @@ class Score:
         return {name: value for name, value in values.items() if value is not None}
 
     def as_json(self) -> dict[str, Any]:
-        """Return its numbers and words, for the logs of other tools."""
+        """Return the score as JSON data, for the logs of other tools."""
         names = ("value", "measure", "success", "outcome", "problem", "counts", "errors")
         return {name: getattr(self, name) for name in names}
 
@@ -206,7 +208,7 @@ def _headline(track: str) -> LayoutColumn:
 
 @dataclass(frozen=True, repr=False)
 class Task:
-    """One item of a track, as a seed shows it."""
+    """One item of a track, as presented under a seed."""
 
     track: Track
     item: Any
@@ -215,7 +217,7 @@ class Task:
 
     @property
     def key(self) -> str:
-        """Its name in the track: the scene, or the question."""
+        """Its name in the track: that of the scene, or of the question."""
         return str(self.item.key)
 
     @property
@@ -225,18 +227,18 @@ class Task:
 
     @property
     def level(self) -> int:
-        """The lowest level that its scene counts in."""
+        """The highest level that its scene counts in."""
         return int(self.item.scene.level)
 
     @property
     def part(self) -> str:
-        """The part of the track that it is filed under: the level, or the subtask of a question."""
+        """Its part of the track: the level, or the subtask of a question."""
         question = self.track.about(self.item).get("question")
         return question["subtask"] if question else f"level {self.level}"
 
     @property
     def base_scene(self) -> str:
-        """The first scene that its scene was made from, by which errors cluster."""
+        """The first base scene of its scene, by which standard errors cluster."""
         return str((self.item.scene.parents or (self.item.scene.id,))[0])
 
     @property
@@ -245,7 +247,7 @@ class Task:
         return self.track.plays
 
     def request(self) -> Request:
-        """Return the request as a run makes it; of an episode its first."""
+        """Return the request as a run makes it; for an episode, the first one."""
         if self.plays:
             request: Request = _result(self._start(shows=True).request())
             return request
@@ -262,12 +264,12 @@ class Task:
 
     @property
     def answer_schema(self) -> Mapping[str, Any] | None:
-        """The JSON schema of an answer; None where it is asked for as text."""
+        """The JSON schema of an answer, or None for answers as text."""
         form = self.track.form(self.item)
         return None if form is None else form.schema
 
     def score(self, reply: str | Sequence[str] | None) -> Score:
-        """Return the score of a reply, of an episode's replies in order, or of none.
+        """Return the score of a reply, of an episode's replies in order, or of no reply (None).
 
         Raises SpecError for anything else.
         """
@@ -284,7 +286,7 @@ class Task:
         return self._scored(record)
 
     def episode(self) -> Episode:
-        """Return a new episode; SpecError where the track asks once."""
+        """Return a new episode. Raises SpecError for a track without episodes."""
         return Episode(self)
 
     def _begun(self, reply: str | None) -> dict[str, Any]:
@@ -308,7 +310,7 @@ class Task:
 
 
 class Turn(NamedTuple):
-    """A step of an episode: the next messages, what it added to the score, and how it went."""
+    """A step of an episode: the next messages, what it added to the score, and its outcome."""
 
     messages: list[dict[str, Any]]
     reward: float
@@ -317,16 +319,16 @@ class Turn(NamedTuple):
 
 
 class Episode:
-    """A task of several turns, played by replies. One thread plays it.
+    """A task of several turns, driven by replies. Use it from one thread.
 
     Rewards are differences of `Score.value`, so that they sum to that of the whole episode.
-    `request` is the one that waits for a reply, None at the end.
+    `request` is the pending one, None at the end.
     """
 
     def __init__(self, task: Task, *, shows: bool = True) -> None:
         """Begin; without `shows`, no pictures are drawn and messages are empty.
 
-        Raises SpecError for a task that is asked once.
+        Raises SpecError for a task without episodes.
         """
         if not task.plays:
             raise SpecError(Problem(task.id, "is asked once and has no episode"))
@@ -334,7 +336,7 @@ class Episode:
         self.reset()
 
     def reset(self) -> list[dict[str, Any]]:
-        """Begin again; return the first messages."""
+        """Start again; return the first messages."""
         self._episode = self.task._start(shows=self._shows)
         self._replies: list[Reply] = []
         self._value = 0.0
@@ -343,7 +345,7 @@ class Episode:
 
     @property
     def messages(self) -> list[dict[str, Any]]:
-        """The messages of the turn that waits for a reply; none at the end."""
+        """The messages of the pending turn; empty at the end."""
         return [] if self.request is None else wire_messages(self.request.messages, None)
 
     @property
@@ -352,7 +354,7 @@ class Episode:
         return self.request is None
 
     def step(self, reply: str) -> Turn:
-        """Take a step with a reply; SpecError where the episode has ended, or for no text."""
+        """Take a step with a reply. Raises SpecError after the end, or if it is not a text."""
         if self.request is None:
             raise SpecError(Problem(self.task.id, "has ended", hint="call reset() before step()"))
         if not isinstance(reply, str):
@@ -366,7 +368,7 @@ class Episode:
         return Turn(self.messages, self._value - before, self.done, str(outcomes[-1]))
 
     def score(self) -> Score:
-        """Return the score as far as it has come."""
+        """Return the score of the episode so far."""
         fields = self.task._begun(None)
         track, item = self.task.track, self.task.item
         record = judge_episode(track, item, fields, self._episode, self._replies)
@@ -375,10 +377,10 @@ class Episode:
 
 @dataclass(frozen=True, repr=False)
 class Tasks:
-    """The tasks of a track in one split: a finite set, by place or key, or a stream without end.
+    """The tasks of a track in one split: a finite set, by place or key, or an endless stream.
 
-    A stream begins again with each iteration, and makes a task by its place; each has a track of
-    its own, so that nothing is kept of those that are done.
+    Each iteration of a stream starts at its beginning. Tasks of a stream are made on demand, each
+    with its own track, so that nothing is kept of finished ones.
     """
 
     suite: Suite
@@ -413,7 +415,7 @@ class Tasks:
     def __getitem__(self, key: int | str | slice) -> Task | Tasks:
         """Return a task by its place or its key, or a finite set's tasks by a slice.
 
-        Raises SpecError for what is not there, IndexError for a place behind the last.
+        Raises SpecError for an unknown key, IndexError for a place past the end.
         """
         if isinstance(key, slice) and not self.is_endless:
             return replace(self, found=dict(list(self.found.items())[key]))
@@ -455,10 +457,10 @@ def tasks(
 
     The split `test` is the built-in set, or `data`: a data set's name or folder, or scenes. `train`
     and `dev` are made from the seed and share no structure with the test set or with one another;
-    they have no end and begin at place `first`, unless a `limit` makes them a finite set of so many
-    scenes. `overrides` are `KEY=VALUE` texts for the track's bundled suite, as for `--set`. Of the
-    test set, `limit` keeps so many, spread over levels or subtasks. Raises SpecError, DataError or
-    PromptError with what is wrong.
+    they are endless and begin at place `first`, unless `limit` makes them a finite set of that many
+    scenes. `overrides` are `KEY=VALUE` texts for the track's bundled suite, as for `--set`. In the
+    test set, `limit` keeps that many items, spread over levels or subtasks. Raises SpecError,
+    DataError or PromptError with all problems.
     """
     if track not in known_tracks():
         allowed, hint = ", ".join(known_tracks()), did_you_mean(track, known_tracks())
@@ -495,7 +497,7 @@ def tasks(
 
 
 def _distinct(scenes: Iterator[AssemblyTask], limit: int) -> tuple[AssemblyTask, ...]:
-    """Return the first scenes, each once; SpecError where no others come."""
+    """Return the first `limit` distinct scenes. Raises SpecError if there are fewer."""
     found: dict[str, AssemblyTask] = {}
     repeats = 0
     while len(found) < limit:
@@ -509,7 +511,7 @@ def _distinct(scenes: Iterator[AssemblyTask], limit: int) -> tuple[AssemblyTask,
 
 
 def _given(data: Any) -> Dataset:
-    """Return a caller's scenes as a data set; SpecError for other things, and for repeats."""
+    """Return a caller's scenes as a data set. Raises SpecError for anything else, and repeats."""
     allowed = "the name or folder of a data set, a Dataset, or scenes"
     if not isinstance(data, Dataset | Iterable):
         raise SpecError(Problem("tasks", "is no data", "data", repr(data), allowed))
@@ -533,8 +535,10 @@ def generate(
     seed: Annotated[int, Field(ge=0)] = 0,
     palette: Palette = "kit",
 ) -> dict[str, AssemblyTask]:
-    """Make scenes with their candidates, those of `phyblock scenes generate`, by id; each stands,
-    and none has the structure of a built-in one. DataError where the rules give no more.
+    """Return new scenes with candidates, by id, made as by `phyblock scenes generate`.
+
+    Each stands, and none has the structure of a built-in one. Raises DataError where the rules give
+    too few.
     """
     kinds = PALETTES[palette]
     with open_workers() as workers:
@@ -546,7 +550,7 @@ def generate(
 
 @checked
 def verify(scene: InstanceOf[AssemblyTask]) -> tuple[Finding, ...]:
-    """Return all that is wrong with a scene and its candidates, by geometry and physics."""
+    """Return the findings about a scene and its candidates, by geometry and physics."""
     return verify_scene((scene.scene, scene.candidates))
 
 
@@ -582,7 +586,7 @@ def load_suite(suite: Place, *overrides: str) -> Suite:
     """Read a suite: a YAML file, or the name of a bundled one; `overrides` are `KEY=VALUE` texts,
     as for `--set`.
 
-    Raises SpecError with all that is wrong, each with its file, line and field.
+    Raises SpecError with all problems, each with its file, line and field.
     """
     return read_suite(str(suite), overrides)
 
@@ -601,14 +605,14 @@ def run_suite(
 ) -> Run:
     """Run a suite, or continue its run where it stopped, and load the run.
 
-    The arguments are the options of `phyblock run`: `models` replaces the suite's, `limit` keeps so
-    many scenes, `out` is the run's folder (`results/SUITE-DIGEST`). A model that bills is asked
-    with `yes` alone, or under a limit of the suite (`limits.max_cost_usd`). Warns of models that
-    were stopped, and of samples that are left, rejected or not judged.
+    The arguments are the options of `phyblock run`: `models` replaces the suite's, `limit` keeps
+    that many scenes, `out` is the run's folder (`results/SUITE-DIGEST`). A model that may bill is
+    called only with `yes`, or under a limit of the suite (`limits.max_cost_usd`). Warns of models
+    that were stopped, and of samples that are left, rejected or not judged.
 
-    Raises InputError for what is wrong with the input, before anything is asked. Interrupted, the
-    run sends nothing more, waits for calls under way (not after a second interrupt), and raises
-    KeyboardInterrupt once what was answered is on disk.
+    Raises InputError for invalid input, before any call. When interrupted, the run sends nothing
+    more, waits for calls in progress (not after a second interrupt), and raises KeyboardInterrupt
+    once all replies are on disk.
     """
     loaded = suite if isinstance(suite, Suite) else load_suite(suite)
     named = None if models_file is None else str(models_file)

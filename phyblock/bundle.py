@@ -59,7 +59,7 @@ _LARGEST_BYTES = 128 * _MB
 _BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, RuntimeError)
 _HINT = "ask for the bundle again, or make it again with phyblock bundle"
 _NEVER_VERIFIED = (
-    "What was sent: a bundle holds the digests of prompts and pictures, not what they are of.",
+    "What was sent: a bundle holds the digests of prompts and pictures, not the originals.",
     "That the models gave these replies, when, how fast and at what cost: no bundle can show it.",
 )
 
@@ -68,9 +68,9 @@ _NEVER_VERIFIED = (
 class Verified:
     """A bundle that was scored again.
 
-    `folder` is its run, with the data of this machine, while it is open; `records` came out as the
-    same bytes, `expected` is how many samples a whole run has, `unverified` are sentences on what
-    was taken as the bundle says it.
+    `folder` is its run, with the data of this machine, while it is open; `records` is the number of
+    records, `expected` the number of samples of a complete run; `unverified` are sentences on what
+    was not checked.
     """
 
     phyblock: str
@@ -89,7 +89,7 @@ def bundle_run(folder: Path, out: Path | None = None) -> Path:
     manifest = read_manifest(folder)
     records = record_lines(map(portable, read_records(folder, manifest)))
     members = {MANIFEST: [manifest_text(portable_manifest(manifest))], RECORDS: records}
-    # A file without a name: a kill leaves nothing behind.
+    # The temporary file has no name: a kill leaves nothing behind.
     with tempfile.TemporaryFile() as file:
         with zipfile.ZipFile(file, "w", allowZip64=False) as archive:
             digests = {name: add(archive, name, each) for name, each in members.items()}
@@ -104,9 +104,9 @@ def bundle_run(folder: Path, out: Path | None = None) -> Path:
 
 
 def add(archive: zipfile.ZipFile, name: str, lines: Iterable[str]) -> str:
-    """Write a member, whose bytes depend on the lines and zlib alone; return its SHA-256.
+    """Write a member, whose bytes depend only on the lines and zlib; return its SHA-256.
 
-    Raises StoreError for one that is too large to be read again.
+    Raises StoreError if it is too large to be read back.
     """
     info, digest = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), hashlib.sha256()
     info.compress_type, info.create_system = zipfile.ZIP_DEFLATED, 3
@@ -124,11 +124,11 @@ def add(archive: zipfile.ZipFile, name: str, lines: Iterable[str]) -> str:
 
 @contextmanager
 def opened_bundle(path: Path, data: Sequence[Path] = ()) -> Iterator[Verified]:
-    """Unpack a bundle, score its replies again, and compare its records with what comes out.
+    """Unpack a bundle, score its replies again, and compare its records with the result.
 
-    `data` are folders in which its data may be, beside the sets that come with phyblock. Raises
-    StoreError for what is no bundle, was changed, or comes out otherwise than it says, and
-    DataError where its data are not at hand. Errors name files as if the bundle were a folder.
+    `data` are folders to look for its data in, besides the bundled sets. Raises StoreError if it is
+    not a bundle, was changed, or is scored differently, and DataError if its data are not found.
+    Errors name files as if the bundle were a folder.
     """
     with tempfile.TemporaryDirectory(prefix="phyblock-") as scratch:
         folder = Path(scratch, path.name)
@@ -164,10 +164,10 @@ def _differs(where: object, field: str, made_by: str) -> StoreError:
 
 
 def _localized(folder: Path, manifest: Manifest, data: Sequence[Path]) -> Manifest:
-    """Return the manifest of the run in `folder` with the places of its data on this machine.
+    """Return the manifest of the run in `folder` with the paths of its data on this machine.
 
-    The first of the folders `data`, or of the sets that come with phyblock, that holds what was
-    asked is taken. Raises DataError that names what is missing, StoreError for no plan.
+    Takes the first of the folders `data` and the bundled sets that has the data of the run. Raises
+    DataError naming what is missing, StoreError for a broken manifest.
     """
     suite = suite_of(manifest, str(folder / MANIFEST))
     for part, noun in (("dataset", "data set"), ("questions", "questions")):
@@ -204,9 +204,9 @@ def portable(record: Record) -> Record:
 
 
 def unpack(path: Path, folder: Path) -> str:
-    """Write the members of the bundle at `path` into `folder`; return the phyblock that made it.
+    """Unpack the bundle at `path` into `folder`; return the version of phyblock that made it.
 
-    Raises StoreError if it is no bundle, or was changed after it was made.
+    Raises StoreError if it is not a bundle, or was changed after it was made.
     """
     try:
         with open_regular(path) as file:
@@ -215,17 +215,17 @@ def unpack(path: Path, folder: Path) -> str:
             with zipfile.ZipFile(file) as archive:
                 infos = archive.infolist()
                 if sorted(info.filename for info in infos) != sorted(MEMBERS):
-                    raise ValueError("has members of other names")
+                    raise ValueError("has members with other names")
                 for info in infos:
                     is_plain = info.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
                     if info.file_size > MEMBERS[info.filename] or not is_plain:
-                        raise ValueError(f"{info.filename} is too large, or packed in another way")
+                        raise ValueError(f"{info.filename} is too large, or its packing unknown")
                     with archive.open(info) as packed, (folder / info.filename).open("xb") as out:
                         shutil.copyfileobj(packed, out)
         about = load_json(read_bytes(folder / ABOUT))
         digests = {name: digest_of_file(folder / name) for name in (MANIFEST, RECORDS)}
         if not isinstance(about, dict) or (about.get("format"), about.get("files")) != (1, digests):
-            raise ValueError(f"{ABOUT} says otherwise of the other members")
+            raise ValueError(f"the digests in {ABOUT} do not match the other members")
         return str(about.get("phyblock"))
     except FileNotFoundError as error:
         raise StoreError(Problem(str(path), "is not there")) from error

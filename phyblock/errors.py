@@ -5,14 +5,14 @@ PhyblockError
 │   ├── SpecError           a suite, a models file or a --set override
 │   ├── DataError           a data set, a scene, a candidate set, a recorded reply
 │   ├── PromptError         a prompt template, or an official prompt that cannot be read
-│   └── StoreError          a run folder, a record, the reply cache, a disk that refuses
+│   └── StoreError          a run folder, a record, the reply cache, the disk
 ├── ModelError              a call to a model failed
 │   ├── RetryableError      429, 5xx, connection, timeout, malformed body: ask again
 │   │   └── UnreachableError    no connection could be made, so that nothing was sent
-│   ├── SampleError         this request will never succeed (400): go on with the next
+│   ├── SampleError         this request will never succeed (400): continue with the next
 │   │   └── RefusedError    the provider's content policy refused it
 │   └── UnavailableError    this model will never answer (401, 403, unknown): stop the model
-├── BudgetReachedError      the next call could pass the cost limit; it was not made
+├── BudgetReachedError      the next call could exceed the cost limit; it was not made
 └── SimulationError         the physics engine could not do what was asked
 """
 
@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 _LONGEST_PART = 2000
-"""Characters of a problem's part that are shown; what is longer holds garbage."""
+"""Characters that are shown of each part of a problem."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class InputError(PhyblockError):
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
     def __reduce__(self) -> tuple[type[InputError], tuple[tuple[Problem, ...]]]:
-        # The message, which pickling would pass on, is no list of problems.
+        # Pickling would pass on the message, which is not a list of problems.
         return type(self), (self.problems,)
 
 
@@ -105,16 +105,16 @@ class StoreError(InputError):
 
 
 Sent = Literal["no", "lost", "maybe", "answered"]
-"""Progress of a call that failed: nothing was sent; the connection was lost; it was sent and not
-answered in time, or that is unknown; the server answered.
+"""Progress of a failed call: nothing was sent; the connection was lost; it was sent, or may have
+been, but not answered in time; the server answered.
 """
 
 
 class ModelError(PhyblockError):
     """A call to a model failed; the message is safe to store (it holds no key).
 
-    `status` is the HTTP status that the server answered with, if it did; `sent` is how far the call
-    came: breaker, retries and cost limit go by it.
+    `status` is the HTTP status of the server's answer, if any; `sent` is the progress of the call,
+    which decides about retries and cost.
 
     `billed_usd` is what a run's cost limit counts for it [US dollars], all attempts included; None
     where there is no limit.
@@ -126,12 +126,12 @@ class ModelError(PhyblockError):
         self.status = status
         self.sent: Sent = sent or ("maybe" if status is None else "answered")
         self.billed_usd: float | None = None
-        # A server's words end up in terminals: no escape codes, no right-to-left marks.
+        # A server's text ends up in terminals: no escape codes, no right-to-left marks.
         super().__init__("".join(c if c.isprintable() else " " for c in message))
 
 
 class RetryableError(ModelError):
-    """The call may succeed when it is sent again; `retry_after_s` is the server's wish."""
+    """The call may succeed when it is sent again, after the `retry_after_s` of the server."""
 
     def __init__(
         self,
@@ -169,4 +169,4 @@ class BudgetReachedError(PhyblockError):
 
 
 class SimulationError(PhyblockError):
-    """The physics engine could not do what was asked of it."""
+    """The physics engine could not do what was asked."""

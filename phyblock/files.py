@@ -1,13 +1,13 @@
-"""Read files within bounds; write them whole, never over the user's; find what is bundled.
+"""Read files within bounds; write them atomically, never over the user's; find bundled files.
 
-What a user can rely on:
+Guarantees:
 
-* No input hangs, exhausts memory or ends the process: readers take regular files alone, within
-  limits far above what an honest file needs. They raise OSError for what the disk refuses and
-  ValueError, with a text that can be shown as it is, for contents that are refused.
+* No input hangs, exhausts memory or ends the process: readers accept only regular files, within
+  limits far above what a legitimate file needs. They raise OSError for failures of the disk, and
+  ValueError for refused contents, with a text that can be shown to users.
 * A kill at any moment leaves the old file or the new one, whole (`atomic_write`).
-* In a folder that may hold files of the user (`OutFolder`), only what phyblock wrote is written
-  again or removed, and links are never followed.
+* In a folder that may hold files of the user (`OutFolder`), only files that phyblock wrote are
+  overwritten or removed, and links are never followed.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ LARGEST_FILE_BYTES = 64 * 1024 * 1024
 LARGEST_PICTURE_BYTES = 32 * 1024 * 1024
 """Limit of a picture file [bytes]."""
 LONGEST_INTEGER = 300
-"""Digits of an integer; what is longer fits no float."""
+"""Digits of an integer; a longer one fits no float."""
 _DEEPEST_JSON = 64
 
 _PICTURE_FORMATS = ("PNG", "JPEG", "GIF", "WEBP")
@@ -54,11 +54,11 @@ _DECODED: set[bytes] = set()
 
 
 class NotRegularError(ValueError):
-    """A pipe, a device, a socket: what an ordinary open would wait for, or read without end."""
+    """The file is a pipe, a device or a socket, which could block or be read without end."""
 
 
 def open_regular(path: Path) -> BinaryIO:
-    """Open a regular file for reading; NotRegularError for another, OSError as `open`."""
+    """Open a regular file for reading. Raises NotRegularError for any other, OSError as `open`."""
     # A pipe without a writer would block an ordinary open.
     number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     mode = os.fstat(number).st_mode
@@ -71,7 +71,7 @@ def open_regular(path: Path) -> BinaryIO:
 
 
 def read_bytes(path: Path, most_bytes: int = LARGEST_FILE_BYTES) -> bytes:
-    """Return the content of a regular file; ValueError where it is larger than `most_bytes`."""
+    """Return the content of a regular file. Raises ValueError for more than `most_bytes`."""
     with open_regular(path) as file:
         data = file.read(most_bytes + 1)
     if len(data) > most_bytes:
@@ -98,7 +98,7 @@ def read_own_yaml(path: Path) -> Any:
 
 
 def digest_of_file(path: Path) -> str:
-    """Return the SHA-256 of a file; empty where there is none. Raises OSError, NotRegularError."""
+    """Return the SHA-256 of a file, "" if there is none. Raises OSError, NotRegularError."""
     digest = hashlib.sha256()
     try:
         with open_regular(path) as file:
@@ -144,7 +144,7 @@ def load_json(data: bytes | str) -> Any:
 
 
 def read_picture(path: Path) -> bytes:
-    """Return the bytes of a picture file that can be decoded; DataError for any other."""
+    """Return the bytes of a picture file. Raises DataError if it cannot be decoded."""
     try:
         data = read_bytes(path, LARGEST_PICTURE_BYTES)
     except OSError as error:
@@ -159,19 +159,19 @@ def read_picture(path: Path) -> bytes:
 
 
 def decode_picture(data: bytes, where: str) -> Image:
-    """Decode the first frame of an encoded picture; DataError, at `where`, for a bad one."""
+    """Decode the first frame of an encoded picture. Raises DataError, at `where`, for a bad one."""
     picture = _open_picture(data, where)
     try:
         picture.load()
     except Exception as error:
-        # The bytes steer the decoder, which can fail in any way.
+        # Hostile bytes can make the decoder fail in any way.
         picture.close()
         raise DataError(_damaged(where, reason_of(error))) from error
     return picture
 
 
 def picture_size(data: bytes, where: str) -> tuple[int, int]:
-    """Return width and height [pixels] by a picture's header; DataError for a bad header."""
+    """Return width and height [pixels] from a picture's header. Raises DataError for a bad one."""
     with _open_picture(data, where) as picture:
         return picture.width, picture.height
 
@@ -194,7 +194,7 @@ def _open_picture(data: bytes, where: str) -> Image:
     small, large = min(width, height), max(width, height)
     if small < _LEAST_SIDE_PX or large > _MOST_SIDE_PX or small * large > _MOST_PIXELS:
         picture.close()
-        found, too_large = f"{width:,} x {height:,} pixels", "is a picture of a size not allowed"
+        found, too_large = f"{width:,} x {height:,} pixels", "is a picture of a bad size"
         raise DataError(Problem(where, too_large, "", found, _SIZES_ALLOWED))
     return picture
 
@@ -212,33 +212,33 @@ def writing(path: Path, hint: str = "") -> Iterator[None]:
     try:
         yield
     except (OSError, UnicodeEncodeError) as error:
-        # A name that the file system cannot spell is an encoding error, no OSError.
+        # A name that the file system cannot encode raises UnicodeEncodeError, not OSError.
         message = f"cannot be written: {reason_of(error)}"
         raise StoreError(Problem(str(path), message, hint=hint)) from error
 
 
 def check_free(paths: Iterable[Path], hint: str) -> None:
-    """Raise StoreError naming all of `paths` where something is, a link that leads nowhere too."""
+    """Raise StoreError naming all of `paths` that exist, broken links included."""
     taken = [path for path in paths if os.path.lexists(path)]
     if taken:
         raise StoreError([Problem(str(path), "is already there", hint=hint) for path in taken])
 
 
 def make_folder(path: Path, hint: str = "") -> None:
-    """Make a folder and those above it where they are not there; StoreError if it cannot be."""
+    """Create a folder and its parents if they are missing. Raises StoreError if that fails."""
     with writing(path, hint):
         path.mkdir(parents=True, exist_ok=True)
 
 
 def atomic_write(path: Path, data: bytes | str | Iterable[bytes], *, sync: bool = False) -> None:
-    """Write a whole file, or leave what was there and nothing beside it.
+    """Write a whole file, or leave the old one and no other file.
 
     Pieces of data are written as they come. Text is written as UTF-8, with question marks for
-    halves of characters. Where `path` is a link, the link is replaced and its target stays as it
-    is. With `sync` the file survives the death of the machine. Raises OSError where the disk
-    refuses: see `writing`.
+    lone surrogates. If `path` is a link, the link is replaced and its target is unchanged. With
+    `sync` the file survives a crash of the machine. Raises OSError if the disk fails: see
+    `writing`.
     """
-    # A name of its own: two processes may write the same file at the same time.
+    # A unique name: two processes may write the same file at the same time.
     partial = path.with_name(f".{uuid4().hex}.part")
     try:
         with partial.open("xb") as file:
@@ -270,11 +270,11 @@ def sync_folder(path: Path) -> None:
 
 
 def append_whole(number: int, data: bytes, *, sync: bool = False) -> None:
-    """Append to the file that is open for appending as `number`: all of the data, or nothing.
+    """Append all of the data, or nothing, to the file that is open for appending as `number`.
 
-    With `sync` it is on disk at the end. Raises OSError where the disk refuses: see `writing`.
+    With `sync` it is on disk at the end. Raises OSError if the disk fails: see `writing`.
     """
-    # Read before anything is written: a size that is not known must never be cut back to.
+    # Read before anything is written: the file must never be cut back to an unknown size.
     size = os.fstat(number).st_size
     try:
         left = memoryview(data)
@@ -283,17 +283,17 @@ def append_whole(number: int, data: bytes, *, sync: bool = False) -> None:
         if sync:
             os.fsync(number)
     except OSError:
-        # Where even this fails, what is left is an unfinished line at the end.
+        # If even this fails, an unfinished line is left at the end.
         with contextlib.suppress(OSError):
             os.ftruncate(number, size)
         raise
 
 
 def write_named(path: Path, data: bytes | str | Iterable[bytes]) -> None:
-    """Write the file that a person named, replacing one that is there, and the folders above it.
+    """Write a file that the user named, replacing an existing one, and create its folders.
 
-    A link is followed, as they made it. Raises StoreError where the disk refuses, and for what is
-    there and no regular file: to replace a device would take it from the whole machine.
+    Links are followed, since the user made them. Raises StoreError if the disk fails, and if a file
+    that is not regular is there: to replace a device would take it from the whole machine.
     """
     with writing(path):
         target = Path(os.path.realpath(path))
@@ -305,37 +305,37 @@ def write_named(path: Path, data: bytes | str | Iterable[bytes]) -> None:
 
 
 LIST = ".generated"
-"""The file that names what phyblock wrote into a folder."""
+"""The file that lists what phyblock wrote into a folder."""
 _HEAD = "# What phyblock wrote here and may write again; all else is never touched."
 _LINK = "cannot be written: it is a link, and links are never followed or replaced"
 _MOVE = "move it away; phyblock writes over nothing that it did not make"
 
 
 class OutFolder:
-    """A folder that phyblock writes into beside files of the user.
+    """A folder that phyblock writes into, which may also hold files of the user.
 
-    The names that phyblock wrote stand in `.generated`, a line each, written before the file is.
-    Whatever else is there is the user's: it is never written over or removed, and a link is never
-    followed. Names are of files, relative, with slashes; one that ends in a slash is of a folder.
+    `.generated` lists the names that phyblock wrote, one per line, each before its file is written.
+    Everything else is the user's and is never overwritten or removed; links are never followed.
+    Names are relative paths with slashes; a name that ends in a slash is a folder's.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     def check(self, names: Iterable[str]) -> None:
-        """Raise StoreError naming all that is in the way of writing `names`; nothing is written.
+        """Raise StoreError if links, or files that phyblock did not write, prevent writing `names`.
 
-        In the way are files that phyblock never wrote, and links.
+        Nothing is written.
         """
         names = list(names)
-        # What is there is looked at first: another process lists a name before it writes the file.
+        # Existing files are checked first: another process lists a name before it writes the file.
         there = [n for n in names if not n.endswith("/") and os.path.lexists(self.path / n)]
         known = self._known()
         problems: dict[Path, str] = {}
         for name in names:
             if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
                 problems[self.path / name] = "cannot be written: its name leads out of the folder"
-        # The folder itself may be a link: a person named it.
+        # The folder itself may be a link: the user named it.
         for folder in (self.path / below for below in _folders(names)):
             if folder.is_symlink():
                 problems[folder] = _LINK
@@ -364,11 +364,11 @@ class OutFolder:
             listed = self._listed()
             known = set(listed.split("\n"))
             lines = [n for n in dict.fromkeys(names) if not n.endswith("/") and n not in known]
-            # The death of the machine may have cut the last line short.
+            # A crash of the machine may have cut the last line short.
             start = "\n" if listed and not listed.endswith("\n") else ""
             text = start + "".join(f"{line}\n" for line in ([] if listed else [_HEAD]) + lines)
             with path.open("ab", buffering=0) as file:
-                # In one piece, so that lines of two processes never mix.
+                # In one write, so that lines of two processes never mix.
                 append_whole(file.fileno(), text.encode("utf-8", "surrogateescape"))
         for folder in _folders(names):
             make_folder(self.path / folder, _MOVE)
@@ -386,9 +386,9 @@ class OutFolder:
         return sorted(name for name in self._known() if name.startswith(below))
 
     def remove(self, names: Iterable[str]) -> None:
-        """Remove those of `names` that are phyblock's, and folders that are empty then.
+        """Remove those of `names` that phyblock wrote, and folders that are empty then.
 
-        Nothing else in an output folder is ever removed. Raises StoreError where the disk refuses.
+        Nothing else in an output folder is ever removed. Raises StoreError if the disk fails.
         """
         known = self._known()
         folders: set[str] = set()
@@ -407,10 +407,10 @@ class OutFolder:
 
     @contextlib.contextmanager
     def making(self, below: str = "") -> Iterator[Path]:
-        """Give a new folder to write any files into; at the end they are moved to `below` in here.
+        """Yield a temporary folder, whose files are moved to `below` in this folder at the end.
 
-        `below` is empty or a folder's name with its slash. Where the work fails, nothing is left of
-        it. Raises as `write`.
+        `below` is empty or a folder's name with its slash. If the body fails, nothing is left of
+        its files. Raises as `write`.
         """
         self.claim([below] if below else [])
         part = self.path / f".{uuid4().hex}.part"
@@ -429,7 +429,7 @@ class OutFolder:
 
     @contextlib.contextmanager
     def alone(self) -> Iterator[None]:
-        """Wait until no other process is in here, and keep others out."""
+        """Hold the folder's lock, after waiting for other processes."""
         self.claim([])
         with contextlib.ExitStack() as stack:
             with writing(self.path / LIST):
@@ -441,7 +441,7 @@ class OutFolder:
         return set(self._listed().split("\n"))
 
     def _listed(self) -> str:
-        """Return the text of the list, empty where there is none."""
+        """Return the text of the list, "" if there is none."""
         path = self.path / LIST
         with writing(path):
             if path.is_symlink():
@@ -455,7 +455,7 @@ class OutFolder:
 
 
 def _folders(names: Iterable[str]) -> list[str]:
-    """Return the folders that are named or hold what is named, those above first."""
+    """Return all folders in the paths of `names`, parents first."""
     folders: set[str] = set()
     for name in names:
         path = PurePosixPath(f"{name}_" if name.endswith("/") else name)
@@ -467,9 +467,9 @@ _PACKAGE = Path(__file__).parent
 
 
 def bundled(*parts: str) -> Path:
-    """Return a path inside what comes with the project: `benchmarks/`, `prompts/` or `models.yaml`.
+    """Return the path of a bundled file or folder, in `benchmarks/`, `prompts/` or `models.yaml`.
 
-    In an installed wheel they lie in the package, in a checkout beside it.
+    They are in the package in an installed wheel, and beside it in a checkout.
     """
     inside = _PACKAGE / "bundled"
     return (inside if inside.is_dir() else _PACKAGE.parent).joinpath(*parts)
@@ -494,7 +494,7 @@ def reply_cache_file() -> Path:
 
 
 def needs(package: str, extra: str, form: str) -> None:
-    """Raise SpecError that names the extra to install where a format's package is not there."""
+    """Raise SpecError naming the extra to install if a format's package is missing."""
     try:
         importlib.import_module(package)
     except ImportError as error:

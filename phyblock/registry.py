@@ -1,7 +1,7 @@
-"""The tracks that there are, and the baselines that they bring: the one place that names them.
+"""The registry of tracks and their baselines, the only place that names them.
 
-Layers below the tracks ask here for the words that tracks add (sections of a suite, names of
-baselines) without importing them: a track's package is loaded when it is first asked for.
+Lower layers look up here what tracks add (sections of a suite, names of baselines) without
+importing them: a track's module is loaded on first use.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _MODULES = (
 """Modules that hold a `TRACK`, in the order in which tracks are listed."""
 
 PLUGINS: list[str] = []
-"""Modules that every worker process imports first: what they add is known there as well."""
+"""Modules that every worker process imports first, so that their additions are known there too."""
 
 _registered: dict[str, type[Track]] = {}
 _measures: dict[str, tuple[Any, ...]] = {}
@@ -42,12 +42,12 @@ def known_tracks() -> Mapping[str, type[Track]]:
 
 
 def known_track(name: str) -> type[Track]:
-    """The track of a name; KeyError for one that there is not."""
+    """Return the track with this name. Raises KeyError if there is none."""
     return known_tracks()[name]
 
 
 def register_track(kind: type[Track]) -> None:
-    """Add a track. Raises ValueError for a name or section that is taken."""
+    """Add a track. Raises ValueError if its name or section is taken."""
     taken = {name for other in known_tracks().values() for name in _names_of(other)}
     if clash := sorted(_names_of(kind) & taken):
         raise ValueError(f"a track or section has this name: {', '.join(clash)}")
@@ -55,33 +55,33 @@ def register_track(kind: type[Track]) -> None:
 
 
 def _names_of(kind: type[Track]) -> set[str]:
-    """Names that a suite says for a track."""
+    """Return the names that stand for a track in a suite."""
     return {kind.name, kind.section} - {""}
 
 
 def unregister_track(name: str) -> None:
-    """Take an added track away again; KeyError for one that was not added."""
+    """Remove an added track. Raises KeyError for any other."""
     del _registered[name]
 
 
 def add_measure(track: str, measure: Any) -> None:
-    """Add a `tracks.measures.Measure` to a track; KeyError for a track that there is not."""
+    """Add a `tracks.measures.Measure` to a track. Raises KeyError for an unknown track."""
     _measures[known_track(track).name] = (*added_measures(track), measure)
 
 
 def remove_measure(track: str, name: str) -> None:
-    """Take an added measure away again."""
+    """Remove an added measure."""
     _measures[track] = tuple(one for one in added_measures(track) if one.name != name)
 
 
 def added_measures(track: str) -> tuple[Any, ...]:
-    """Measures that were added to a track, in the order in which they came."""
+    """Return the measures that were added to a track, in their order."""
     return _measures.get(track, ())
 
 
 def add_baseline(track: str, name: str, rule: Callable[..., str]) -> None:
-    """Add a rule that answers in place of a model: a function of what a request of the track is
-    about and a random generator. Raises ValueError for a name that is taken.
+    """Add a rule that answers instead of a model, from the subject of a request and a random
+    generator. Raises ValueError if the name is taken.
     """
     if name in track_baselines(known_track(track)):
         raise ValueError(f"the track {track} has a baseline of this name: {name}")
@@ -99,12 +99,12 @@ def has_additions() -> bool:
 
 
 def baseline_names() -> tuple[str, ...]:
-    """Names of all baselines, in the order of the tracks that bring them."""
+    """Return the names of all baselines, in the order of their tracks."""
     tracks = known_tracks().values()
     return tuple(dict.fromkeys(name for kind in tracks for name in track_baselines(kind)))
 
 
 def baseline_rules(name: str) -> Mapping[str, Callable[..., str]]:
-    """The rules of one baseline by track; empty for a name that is none."""
+    """Return the rules of one baseline by track; empty if there is no such baseline."""
     rules = {track: track_baselines(kind) for track, kind in known_tracks().items()}
     return {track: known[name] for track, known in rules.items() if name in known}

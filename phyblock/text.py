@@ -1,5 +1,5 @@
-"""Text that others wrote (names, replies, paths), made harmless before it is shown or stored;
-digests, draws and sums that are the same on every machine and every Python.
+"""Foreign text (names, replies, paths), made safe to show and store; digests, draws and sums that
+are the same on every machine and every Python.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def one_line(text: str) -> str:
     """Return the text on one line: a space for each newline and control character.
 
     A lone surrogate, which stands for a byte of a file name that is not UTF-8, becomes U+FFFD.
-    Marks that turn the direction of writing go, too: they would change what stands beside them.
+    Marks that change the writing direction are removed: they would affect the text beside them.
     """
     if text.isprintable():
         return text
@@ -53,7 +53,7 @@ def some_of(names: Sequence[str]) -> str:
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """Return a hint at the known word that is most like `word`, case aside; "" if none is close."""
+    """Return a hint at the known word most like `word`, ignoring case; "" if none is close."""
     folded = {name.casefold(): name for name in known}
     matches = difflib.get_close_matches(word.casefold(), folded, n=1)
     return f"did you mean {folded[matches[0]]}?" if matches else ""
@@ -78,14 +78,14 @@ def hex_digest(content: bytes | str) -> str:
 
 
 def drawn_bytes(*words: object) -> bytes:
-    """Return evenly spread bytes that depend on the words alone, to sort by or to draw from."""
+    """Return evenly spread bytes that depend only on the words, to sort by or to draw from."""
     return hashlib.sha256("|".join(map(str, words)).encode()).digest()
 
 
 def plain_sum(values: Iterable[_N]) -> _N:
-    """Add one after another to 0, each sum rounded.
+    """Return the sum of values, added one after another and rounded each time.
 
-    From Python 3.12 on `sum` makes up for what rounding loses, so that its last digits may differ.
-    What enters data, records or tables is summed up here.
+    From Python 3.12 on, `sum` compensates for rounding, so that its last digits may differ. Values
+    that enter data, records or tables are summed here.
     """
     return functools.reduce(operator.add, values, 0)

@@ -1,6 +1,6 @@
-"""The words that suites, records, rules and the command line share, each spelled once.
+"""Literal types that suites, records, rules and the command line share.
 
-Words that only one track uses are in its module, those of blocks and questions in the domain.
+Types that only one track uses are in its module, those of blocks and questions in the domain.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ Physics = Literal["off", "settle", "strict"]
 """Simulation of every new state, and the effect of a collapse."""
 
 StepEnd = Literal["stands", "falls", "knocks_over", "overlaps", "under_floor", "no_block"]
-"""Ending of a step that is carried out. `stands`: the block is where it was put, and so are the
-others. `falls`: it is not. `knocks_over`: others are not where they were. `overlaps`,
-`under_floor`: it was refused. `no_block`: there is no candidate of its number.
+"""Ending of an executed step. `stands`: the block and all others stay where they were. `falls`:
+the block does not. `knocks_over`: others do not. `overlaps`, `under_floor`: the block was refused.
+`no_block`: no candidate has this number.
 """
 STEP_ENDS: tuple[StepEnd, ...] = get_args(StepEnd)
 REFUSED_ENDS: tuple[StepEnd, ...] = ("overlaps", "under_floor", "no_block")
@@ -84,4 +84,4 @@ ImageDetail = Literal["auto", "low", "medium", "high", "ultra_high", "original"]
 """Detail in which a provider looks at pictures; each knows some of these."""
 
 QUOTE_HINT = "quote values with spaces, or write none: --set 'seeds=[0, 1]', --models a,b"
-"""Hint for a value that the shell took apart."""
+"""Hint for a value that the shell split."""

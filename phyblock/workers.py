@@ -37,17 +37,19 @@ R = TypeVar("R")
 _RAY_RETRIES = 5
 _BATCH = 16
 _WAITING = 4
-"""So many times the batches under way may wait for an earlier one."""
+"""Batches that may wait for an earlier one, as a multiple of those in progress."""
 _BEAT_S, _GONE_S, _LOOK_S = 2.0, 30.0, 0.1
-"""A shard says so often that it is at work; it is not, when it did not for so long."""
+"""Intervals at which a shard signals that it runs, after which a silent one counts as stopped, and
+at which others look for its results.
+"""
 
 
 class WorkerDiedError(RuntimeError):
-    """The process that did a job was killed, or crashed."""
+    """The process of a job was killed, or crashed."""
 
 
 class WorkerPool(Executor):
-    """Runs functions of modules in processes, which start with the first jobs that there are."""
+    """Runs module-level functions in processes, which start with the first jobs."""
 
     def __init__(self, workers: int) -> None:
         self._threads = ThreadPoolExecutor(workers, "worker")
@@ -55,18 +57,18 @@ class WorkerPool(Executor):
         self._idle: list[_Worker] = []
 
     def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
-        """Return the job's future; it fails with WorkerDiedError where its process was killed."""
+        """Return the job's future, which fails with WorkerDiedError if its process is killed."""
         return self._threads.submit(self._run, (fn, args, kwargs))
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Take no more jobs; end the processes after those that were taken (if it waits)."""
+        """Accept no more jobs; with `wait`, end the processes after the accepted ones."""
         self._threads.shutdown(wait, cancel_futures=cancel_futures)
         if wait:
             for worker in self._workers:
                 worker.end()
 
     def kill(self) -> None:
-        """End the processes at once, whatever they do; jobs under way fail."""
+        """End the processes at once; jobs in progress fail."""
         self._threads.shutdown(wait=False, cancel_futures=True)
         for worker in list(self._workers):
             worker.process.kill()
@@ -115,7 +117,7 @@ class _Worker:
 
 
 def _serve(number: int, plugins: list[str]) -> None:
-    """Do the jobs that come through a pipe, until it is closed."""
+    """Run the jobs that come through a pipe until it is closed."""
     for plugin in plugins:
         importlib.import_module(plugin)
     connection = Connection(number)
@@ -126,7 +128,7 @@ def _serve(number: int, plugins: list[str]) -> None:
             while True:
                 jobs.put(connection.recv_bytes())
         except (EOFError, OSError):
-            # The one who asked is gone: nobody wants the answer.
+            # The parent is gone: nobody reads the answer.
             os._exit(0)
 
     threading.Thread(target=receive, daemon=True).start()
@@ -143,8 +145,8 @@ def _serve(number: int, plugins: list[str]) -> None:
 class Workers:
     """Runs pure functions over tasks in batches of `size`: here, in processes, or on a cluster.
 
-    `submit` starts a job. At most `ahead` are under way, and few more wait for an earlier one. With
-    `shards`, batches are kept in files, and other programs do their part of them.
+    `submit` starts a job. At most `ahead` are in progress, and a few more wait for an earlier one.
+    With `shards`, batches are kept in files and shared with other programs.
     """
 
     submit: Callable[..., Future[Any]]
@@ -208,17 +210,17 @@ class Workers:
 
 
 class Shards:
-    """Batches of one work in a folder that several programs share, each as one of its shards.
+    """Batches in a folder that several programs share, each as one shard.
 
-    A shard computes every so many-th batch and reads the others'. It computes itself those of a
-    shard that is not at work. So shards end whether they run at once or one after another, and go
-    on where they were cut short.
+    Of `count` shards, each computes every `count`-th batch and reads the others. It also computes
+    the batches of a shard that is not running. So shards end whether they run at once or one after
+    another, and continue where they were interrupted.
     """
 
     def __init__(self, folder: Path, number: int, count: int, work: str) -> None:
-        """Begin, or go on; `work` says what is done, and has to be the same in all shards.
+        """Start or continue; `work` describes the job, and must be the same in all shards.
 
-        Raises StoreError for the folder of other work.
+        Raises StoreError if the folder belongs to another job.
         """
         self.number, self.count, self._folder = number, count, folder
         make_folder(folder)
@@ -244,7 +246,7 @@ class Shards:
 
     @property
     def writes(self) -> bool:
-        """True for the shard that writes what all made: the first."""
+        """True for the first shard, which writes the results of all."""
         return self.number == 1
 
     def is_mine(self, call: int, number: int) -> bool:
@@ -256,7 +258,7 @@ class Shards:
         return self._file(call, number).exists()
 
     def is_left(self, call: int, number: int) -> bool:
-        """True if a batch is another shard's that is not at work."""
+        """True if a batch belongs to another shard that is not running."""
         try:
             seen_s = self._mark(self._owner(call, number)).stat().st_mtime
         except FileNotFoundError:
@@ -283,7 +285,7 @@ class Shards:
         return self._folder / f"shard-{number}"
 
     def _beat(self) -> None:
-        # A shard that cannot say so is taken for gone: others make its batches too, the same.
+        # A shard that cannot signal counts as stopped: others compute its batches too, the same.
         while not self._stop.wait(_BEAT_S):
             with contextlib.suppress(OSError):
                 self._mark(self.number).touch()
@@ -308,7 +310,7 @@ def open_workers(
     shards: Shards | None = None,
     size: int = 1,
 ) -> Iterator[Workers]:
-    """Open workers for the time of a with statement: `jobs` processes, or this one alone.
+    """Open workers for the duration of a with statement: `jobs` processes, or only this one.
 
     With `ray_address` they are those of a Ray cluster (HOST:PORT or `auto`), or `jobs` of one on
     this machine (`local`). Batches on a cluster, and those that `shards` share, hold 16 tasks or
@@ -319,7 +321,7 @@ def open_workers(
         if ray_address is not None:
             ray = _connected_ray(jobs, ray_address)
             try:
-                # A batch whose worker dies is done again, which changes nothing: it is pure.
+                # A batch whose worker dies is computed again, with the same result: it is pure.
                 remote = ray.remote(max_retries=_RAY_RETRIES)(_each).remote
                 ahead = 2 * max(1, int(ray.cluster_resources().get("CPU", 1)))
                 yield Workers(lambda *job: remote(*job).future(), ahead, size, shards)
@@ -334,7 +336,7 @@ def open_workers(
                 except WorkerDiedError as error:
                     raise PhyblockError("a worker process was killed") from error
                 except KeyboardInterrupt:
-                    # Of what is under way nothing is wanted, and a worker hears no Ctrl-C.
+                    # Nobody needs the jobs in progress, and workers ignore Ctrl-C.
                     pool.kill()
                     raise
 
