@@ -41,7 +41,7 @@ from tests.models.factory import (
     run,
     with_fields,
 )
-from tests.servers.chassis import Faults, Running, Seen
+from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 
 
@@ -283,17 +283,6 @@ def test_what_is_learned_stays_within_bounds(counts: list[tuple[int, int | None]
         last = most
 
 
-class Counting(OpenAIChat):
-    """Says what it is told to say of tokens."""
-
-    def __init__(self, usage: object) -> None:
-        super().__init__()
-        self.usage = usage
-
-    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
-        return {**super().reply(seen, ending), "usage": self.usage}
-
-
 @pytest.mark.parametrize("route", ["direct", "openai"])
 @pytest.mark.parametrize(
     "usage",
@@ -306,7 +295,7 @@ class Counting(OpenAIChat):
     ids=["none", "zero", "negative", "absurd"],
 )
 def test_a_server_that_does_not_count_stops_within_the_limit(route: str, usage: object) -> None:
-    server = Counting(usage)
+    server = OpenAIChat(usage=usage)
     budget = Budget(0.1)
     with Running(server) as running:
         config = ROUTES[route].config(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shutil
 from collections import Counter
-from typing import Any
 
 import pytest
 
@@ -26,20 +25,14 @@ def schema_of(seen: Seen) -> Raw:
     return schema
 
 
-class Obedient(OpenAIChat):
-    """Answers in the schema of the prompt: alpha that alone, beta in a sentence."""
-
-    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
-        body = super().reply(seen, ending)
-        schema = schema_of(seen)
-        *_, key = schema["properties"]
-        told = schema["properties"][key]
-        many = told["type"] == "array"
-        value = told["items"]["enum"][:4] if many else told["enum"][0]
-        text = json.dumps({"reasoning": "Step1: Move block with index 9", key: value})
-        text = text if seen.model == "alpha" else f"Here it is: {text}"
-        body["choices"][0]["message"]["content"] = text
-        return body
+def obedient(seen: Seen) -> str:
+    """Answer in the schema of the prompt: alpha that alone, beta in a sentence."""
+    schema = schema_of(seen)
+    *_, key = schema["properties"]
+    told = schema["properties"][key]
+    value = told["items"]["enum"][:4] if told["type"] == "array" else told["enum"][0]
+    text = json.dumps({"reasoning": "Step1: Move block with index 9", key: value})
+    return text if seen.model == "alpha" else f"Here it is: {text}"
 
 
 @pytest.fixture
@@ -54,7 +47,7 @@ def asked(inside: Workspace) -> tuple[Workspace, list[Seen]]:
         steps={"physics": "off", "max_steps": 2},
         **FORMAT,
     )
-    server = Obedient()
+    server = OpenAIChat(say=obedient)
     with Running(server) as running:
         base = {"api_base": f"{running.url}/v1"}
         entries = {name: {"id": f"hosted_vllm/{name}", **base} for name in ("alpha", "beta")}

@@ -20,17 +20,9 @@ SEEDS = (0, 1)
 APART = {"size_px": 128, "layout": "separate"}
 
 
-class Sighted(OpenAIChat):
+def sighted(answers: dict[tuple[str, ...], str]) -> OpenAIChat:
     """Plans rightly what it is shown: it knows goals and grids by the digests of their pictures."""
-
-    def __init__(self, answers: dict[tuple[str, ...], str]) -> None:
-        super().__init__()
-        self._answers = answers
-
-    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
-        body = super().reply(seen, ending)
-        body["choices"][0]["message"]["content"] = self._answers[pictures(seen)]
-        return body
+    return OpenAIChat(say=lambda seen: answers[pictures(seen)])
 
 
 def pictures(seen: Seen) -> tuple[str, ...]:
@@ -76,7 +68,7 @@ def test_a_model_that_looks_is_right_in_every_order(workspace: Workspace) -> Non
         seeds=list(SEEDS),
         candidates={"order": "shuffled"},
     )
-    with Running(Sighted(answers)) as running:
+    with Running(sighted(answers)) as running:
         workspace.write_models(running.url, "alpha", "beta", transport="direct")
         done = workspace.run()
         assert (done.code, done.err) == (0, "")
@@ -112,7 +104,7 @@ def check_scored_again(workspace: Workspace) -> None:
 
 def test_blind_leaves_out_the_goal_and_leaves_the_candidates(workspace: Workspace) -> None:
     grid = digest(candidates_png(tasks_of(workspace)["t1"].candidates, STYLE))
-    with Running(Sighted({(grid,): "Step1: Move block with index 1"})) as running:
+    with Running(sighted({(grid,): "Step1: Move block with index 1"})) as running:
         workspace.write_models(running.url, "alpha", transport="direct")
         workspace.write_suite(
             models=["alpha"], images=APART, levels=[2, 3], full_planning={"blind": True}
@@ -193,17 +185,11 @@ WAYS, SCENES = 16, 3
 BRIEF = "{% block user %}Build it. End with lines: Step1: Move block with index N{% endblock %}"
 
 
-class Moody(OpenAIChat):
-    """Answers by the seed as well, as a model that draws."""
-
-    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
-        body = super().reply(seen, ending)
-        draw = hashlib.sha256(seen.sample.encode()).digest()
-        steps = [
-            f"Step{n}: Move block with index {byte % 5 + 1}" for n, byte in enumerate(draw[:3], 1)
-        ]
-        body["choices"][0]["message"]["content"] = "\n".join(steps)
-        return body
+def moody(seen: Seen) -> str:
+    """Answer by the seed as well, as a model that draws."""
+    draw = hashlib.sha256(seen.sample.encode()).digest()
+    steps = enumerate(draw[:3], 1)
+    return "\n".join(f"Step{n}: Move block with index {byte % 5 + 1}" for n, byte in steps)
 
 
 def prepare(workspace: Workspace, url: str, **fields: Any) -> None:
@@ -219,7 +205,7 @@ def asked(server: OpenAIChat) -> list[str]:
 def test_every_way_is_asked_once_and_the_reference_is_what_a_plain_suite_asks(
     workspace: Workspace,
 ) -> None:
-    with Running(Moody()) as running:
+    with Running(OpenAIChat(say=moody)) as running:
         server = running.server
         assert isinstance(server, OpenAIChat)
         prepare(workspace, running.url, vary=VARY)

@@ -7,7 +7,6 @@ import io
 import json
 import re
 from contextlib import ExitStack
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -31,7 +30,7 @@ from tests.servers.billing import (
     o200k_tokens,
     tile_tokens,
 )
-from tests.servers.chassis import Faults, Running, Seen
+from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.servers.step_agent import said
 from tests.vqa_set import questions, write_questions
@@ -44,13 +43,6 @@ MOST_USD = 0.505
 """Room for 35 calls, and for no 36th, be it as estimated at first or as the run learns to."""
 TWICE = {"max_attempts": 2, "retry_for_s": 0.0}
 """Limits of a run that gives up soon, however little time it took."""
-
-
-class Silent(OpenAIChat):
-    """Does not say how many tokens it counted."""
-
-    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
-        return {**super().reply(seen, ending), "usage": None}
 
 
 def spent(workspace: Workspace) -> float:
@@ -82,23 +74,13 @@ def test_the_limit_is_not_passed_and_a_higher_one_goes_on(workspace: Workspace) 
         assert server.requests == 60
 
 
-class Counting(OpenAIChat):
-    """Counts as many tokens as it likes."""
-
-    def __init__(self, prompt: int, completion: int) -> None:
-        super().__init__()
-        self.usage = {"prompt_tokens": prompt, "completion_tokens": completion}
-
-    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
-        return {**super().reply(seen, ending), "usage": self.usage}
-
-
 @pytest.mark.parametrize(("prompt", "completion"), [(40_000, 40), (1000, 2500)])
 def test_a_server_that_counts_more_than_is_expected_does_not_pass_the_limit_at_once(
     workspace: Workspace, prompt: int, completion: int
 ) -> None:
     usd = (prompt * PRICE["input"] + completion * PRICE["output"]) / 1e6
-    with Running(Counting(prompt, completion)) as running:
+    usage = {"prompt_tokens": prompt, "completion_tokens": completion}
+    with Running(OpenAIChat(usage=usage)) as running:
         workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=100)
         workspace.write_suite(models=["alpha"], seeds=list(range(12)))
         done = workspace.run("--set", f"limits.max_cost_usd={5 * usd}")
@@ -146,7 +128,7 @@ def test_a_dry_run_says_what_it_would_cost_and_asks_nothing(workspace: Workspace
 
 @pytest.mark.parametrize(
     "server",
-    [Silent(), OpenAIChat(Faults(mode="html")), OpenAIChat(Faults(mode="reset"))],
+    [OpenAIChat(usage=None), OpenAIChat(Faults(mode="html")), OpenAIChat(Faults(mode="reset"))],
     ids=["no usage", "no reply", "no answer"],
 )
 def test_what_an_earlier_run_may_have_paid_counts_in_the_next(
@@ -293,17 +275,8 @@ def test_texts_count_as_the_public_vocabulary_does(workspace: Workspace, track: 
     assert counted == pytest.approx(sum(map(o200k_tokens, texts)), rel=0.02)
 
 
-class BillingAgent(BillingOpenAI):
-    """Plays episodes, and bills each turn."""
-
-    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
-        body = super().reply(seen, ending)
-        body["choices"][0]["message"]["content"] = said(seen)
-        return body
-
-
 def test_episodes_are_billed_no_more_than_a_dry_run_expects(workspace: Workspace) -> None:
-    server = BillingAgent(o200k_tokens, tile_tokens, 3)
+    server = BillingOpenAI(o200k_tokens, tile_tokens, 3, say=said)
     with Running(server) as running:
         entry = {"id": "openai/gpt-4o-2024-08-06", "api_base": f"{running.url}/v1", "price": TARIFF}
         entry["api_key_env"] = "PHYBLOCK_TEST_KEY"

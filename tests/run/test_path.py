@@ -7,10 +7,9 @@ import sys
 import threading
 from pathlib import Path
 from types import FrameType
-from typing import Any
 
 import phyblock as package
-from tests.servers.chassis import Running, Seen
+from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace, call
 
@@ -28,16 +27,6 @@ IMPORTED = (
 )
 
 
-class Counting(OpenAIChat):
-    """Counts the requests that have arrived."""
-
-    arrived = 0
-
-    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
-        self.arrived += 1
-        return super().reply(seen, ending)
-
-
 def test_one_sample_goes_through_few_modules(inside: Workspace) -> None:
     """From the arrival of the second request to that of the third: the end of one sample and the
     beginning of the next, in every thread.
@@ -47,10 +36,10 @@ def test_one_sample_goes_through_few_modules(inside: Workspace) -> None:
     entered: set[str] = set()
 
     def profile(frame: FrameType, event: str, _: object) -> None:
-        if event == "call" and server.arrived == 2:
+        if event == "call" and len(server.seen) == 2:
             entered.add(frame.f_code.co_filename)
 
-    with Running(server := Counting()) as running:
+    with Running(server := OpenAIChat()) as running:
         workspace.write_models(running.url, "alpha", max_concurrency=1)
         threading.setprofile(profile)
         sys.setprofile(profile)
@@ -59,7 +48,7 @@ def test_one_sample_goes_through_few_modules(inside: Workspace) -> None:
         finally:
             sys.setprofile(None)
             threading.setprofile(None)
-    assert server.arrived == 4
+    assert server.requests == 4
     modules = {Path(name).relative_to(ROOT) for name in entered if name.startswith(str(ROOT))}
     assert Path("models/model.py") in modules
     assert len(modules) <= MOST_ENTERED, " ".join(sorted(map(str, modules)))

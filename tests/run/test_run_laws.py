@@ -272,14 +272,8 @@ def test_answers_to_two_versions_of_questions_are_not_mixed() -> None:
 
 
 def test_a_record_is_one_line_of_json_whatever_the_reply_holds(workspace: Workspace) -> None:
-    class Strange(OpenAIChat):
-        def reply(self, seen: object, ending: str) -> Raw:
-            body = super().reply(seen, ending)  # type: ignore[arg-type]
-            text = "Step1: Move block with index 1\n\u2028\x85\r\0\ud800 ￿ 😀"
-            body["choices"][0]["message"]["content"] = text
-            return body
-
-    with Running(Strange()) as running:
+    text = "Step1: Move block with index 1\n\u2028\x85\r\0\ud800 ￿ 😀"
+    with Running(OpenAIChat(say=lambda _: text)) as running:
         workspace.write_models(running.url, "alpha")
         workspace.write_suite(models=["alpha"])
         done = workspace.run()

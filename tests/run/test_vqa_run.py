@@ -6,7 +6,6 @@ import hashlib
 import json
 import re
 from collections import Counter
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -24,19 +23,6 @@ from tests.vqa_set import questions, vqa_suite, write_questions
 from tests.workspace import Raw, Workspace
 
 FEW = ["SH", "VP", "OR", "AD"]
-
-
-class Answering(OpenAIChat):
-    """Answers as a function of what it was shown says."""
-
-    def __init__(self, answer: Callable[[Seen], str]) -> None:
-        super().__init__()
-        self._answer = answer
-
-    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
-        body = super().reply(seen, ending)
-        body["choices"][0]["message"]["content"] = self._answer(seen)
-        return body
 
 
 def a_cube(seen: Seen) -> str:
@@ -91,7 +77,7 @@ def shown(seen: Seen) -> list[tuple[str, str]]:
 
 
 def test_pictures_arrive_in_order_each_with_its_caption(workspace: Workspace) -> None:
-    server = Answering(a_cube)
+    server = OpenAIChat(say=a_cube)
     done = run_with(workspace, server, subtasks=FEW, per_subtask=2)
     assert (done.code, done.err) == (0, "")
     drawn = pictures_of(workspace)
@@ -134,7 +120,7 @@ def test_pictures_of_official_files_are_sent_byte_for_byte(workspace: Workspace)
         path.parent.mkdir(parents=True, exist_ok=True)
         PillowImage.new("RGB", (40, 30), (8 * len(digests), 90, 120)).save(path)
         digests[name] = hashlib.sha256(path.read_bytes()).hexdigest()
-    server = Answering(lambda _: "D")
+    server = OpenAIChat(say=lambda _: "D")
     with Running(server) as running:
         workspace.write_models(running.url, "alpha", transport="direct")
         fields = vqa_suite(format="official", circular=True)
@@ -153,7 +139,7 @@ def test_pictures_of_official_files_are_sent_byte_for_byte(workspace: Workspace)
 def test_circular_and_blind_a_question_counts_once_and_only_if_all_rotations_are_right(
     workspace: Workspace,
 ) -> None:
-    server = Answering(a_cube)
+    server = OpenAIChat(say=a_cube)
     done = run_with(
         workspace, server, circular=True, blind=True, subtasks=["SH", "CO"], per_subtask=3
     )

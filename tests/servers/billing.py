@@ -106,8 +106,9 @@ class Billing(LocalServer):
         text_tokens: Callable[[str], float],
         picture_tokens: Callable[[int, int], int],
         a_message: int = 0,
+        **options: Any,
     ) -> None:
-        super().__init__()
+        super().__init__(**options)
         # Vocabularies are read here, not by the thread that serves: while it imports what reads
         # them, litellm finds that half imported.
         text_tokens("")

@@ -4,17 +4,30 @@ from __future__ import annotations
 
 import base64
 import hashlib
+from collections.abc import Callable
 from typing import Any
 
 from aiohttp import web
 
-from tests.servers.chassis import LocalServer, Seen, main
+from tests.servers.chassis import Faults, LocalServer, Seen, main
 
+USAGE = {"prompt_tokens": 1000, "completion_tokens": 40, "total_tokens": 1040}
 _CODES = {"policy": "content_policy_violation", "quota": "insufficient_quota"}
 
 
 class OpenAIChat(LocalServer):
-    """POST /v1/chat/completions."""
+    """POST /v1/chat/completions; a reply says what `say` gives, and `usage` is told of each."""
+
+    def __init__(
+        self,
+        faults: Faults | None = None,
+        *,
+        say: Callable[[Seen], str] = lambda seen: seen.reply_text,
+        usage: object = USAGE,
+        **options: Any,
+    ) -> None:
+        super().__init__(faults, **options)
+        self.say, self.usage = say, usage
 
     def add_routes(self, app: web.Application) -> None:
         app.router.add_post("/v1/chat/completions", self.handle)
@@ -33,7 +46,7 @@ class OpenAIChat(LocalServer):
 
     def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
         finish = {"length": "length", "filtered": "content_filter"}.get(ending, "stop")
-        text = "" if ending in ("length", "filtered", "blank") else seen.reply_text
+        text = "" if ending in ("length", "filtered", "blank") else self.say(seen)
         message = {"role": "assistant", "content": text, "reasoning_content": "Let me see."}
         choice = {"index": 0, "message": message, "finish_reason": finish}
         return {
@@ -42,7 +55,7 @@ class OpenAIChat(LocalServer):
             "created": 1_700_000_000,
             "model": f"{seen.model}-served",
             "choices": [] if ending == "empty" else [choice],
-            "usage": {"prompt_tokens": 1000, "completion_tokens": 40, "total_tokens": 1040},
+            "usage": self.usage,
         }
 
     def error(self, status: int, ending: str, message: str) -> dict[str, Any]:

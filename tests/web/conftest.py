@@ -116,12 +116,7 @@ def troubled(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Wo
         description="The 400 scenes.",
     )
     with Running(OpenAIChat()) as good, Running(OpenAIChat(Faults(mode="401"))) as bad:
-        ways = {"alpha": good.url, "locked": bad.url}
-        entries = {
-            name: {"id": f"hosted_vllm/{name}", "api_base": f"{url}/v1"}
-            for name, url in ways.items()
-        }
-        troubled.write_yaml("models.yaml", entries)
+        troubled.write_served({"alpha": good.url, "locked": bad.url})
         troubled.run()
     troubled.phyblock("report", troubled.out)
     return troubled
