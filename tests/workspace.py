@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from click.testing import CliRunner, Result
 
 from tests.fork_server import ONE_THREAD, Done, Forked, fork_server
 
@@ -31,6 +32,16 @@ def call(*words: object) -> int:
     from phyblock.cli.main import phyblock
 
     return phyblock.main([str(word) for word in words], standalone_mode=False) or 0
+
+
+def invoked(*words: object, **env: str) -> Result:
+    """Give a command in this process; its output, and what it raises."""
+    from phyblock.cli.main import phyblock
+
+    runner = CliRunner(env={"COLUMNS": "160", **env})
+    return runner.invoke(
+        phyblock, [*map(str, words)], standalone_mode=False, catch_exceptions=False
+    )
 
 
 def candidates() -> list[Raw]:

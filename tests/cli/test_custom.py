@@ -44,8 +44,6 @@ def test_a_prompt_beside_the_suite_is_used_and_said(asked: Workspace) -> None:
     ("text", "said"),
     [
         ("{% block user %}{{ wrong }}{% endblock %}", "'wrong' is undefined"),
-        ("{% block user %} {% endblock %}", "says nothing"),
-        ("{% block usr %}a{% endblock %}", "has no user block"),
         ("{% block user %}a{% endblock %}{% block sytem %}b{% endblock %}", "mean system?"),
         # Of another track, which has turns.
         ("{% block user %}a{% endblock %}{% block turn %}b{% endblock %}", "that nothing uses"),

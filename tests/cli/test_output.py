@@ -12,9 +12,7 @@ from pathlib import Path
 
 import click
 import pytest
-from click.testing import CliRunner
 
-from phyblock.cli.main import phyblock
 from phyblock.errors import StoreError
 from phyblock.files import LIST
 from phyblock.results.tables import write_tables
@@ -22,7 +20,7 @@ from phyblock.web.report import write_report
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.web.factory import LEVELS, manifest, record, score, write_run
-from tests.workspace import COMMAND, Workspace
+from tests.workspace import COMMAND, Workspace, invoked
 
 Prepare = Callable[[Path], None]
 
@@ -141,16 +139,6 @@ def test_the_folder_of_a_run_is_found_again_without_naming_it(suite: Workspace) 
     assert suite.files() == before
 
 
-def call(*words: str | Path, home: Path | None = None) -> str:
-    env = {"HOME": str(home)} if home else {}
-    done = CliRunner().invoke(
-        phyblock, [str(word) for word in words], standalone_mode=False, env=env
-    )
-    if done.exception is not None:
-        raise done.exception
-    return done.output
-
-
 def files(folder: Path) -> dict[str, bytes]:
     return {
         str(path.relative_to(folder)): b"-> " + bytes(path.readlink())
@@ -191,7 +179,7 @@ def test_a_run_begins_in_no_folder_of_another(
     put(suite.out / name)
     before = files(suite.root)
     with pytest.raises(StoreError, match="is not empty and holds no run"):
-        call("run", suite.root / "suite.yaml", "--out", suite.out, *options)
+        invoked("run", suite.root / "suite.yaml", "--out", suite.out, *options)
     assert files(suite.root) == before
 
 
@@ -211,16 +199,16 @@ def test_a_run_begins_in_no_folder_of_another(
 )
 def test_an_empty_path_is_a_slip_and_not_this_folder(words: tuple[str, ...]) -> None:
     with pytest.raises(click.UsageError, match="empty"):
-        call(*words)
+        invoked(*words)
 
 
 def test_a_tilde_is_the_home_folder(suite: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
-    home = suite.root / "home"
+    home = str(suite.root / "home")
     monkeypatch.chdir(suite.root)
-    call("init", "~/bench", home=home)
-    call("run", suite.root / "suite.yaml", "--out", "~/run", "--no-report", home=home)
-    assert (home / "bench" / "models.yaml").is_file()
-    assert "Assembly planning" in call("report", "~/run", "--print", home=home)
+    invoked("init", "~/bench", HOME=home)
+    invoked("run", suite.root / "suite.yaml", "--out", "~/run", "--no-report", HOME=home)
+    assert (suite.root / "home" / "bench" / "models.yaml").is_file()
+    assert "Assembly planning" in invoked("report", "~/run", "--print", HOME=home).output
     assert not (suite.root / "~").exists()
 
 
@@ -239,7 +227,7 @@ def test_what_is_in_the_way_is_named_and_stays(finished: Path, name: str) -> Non
     prepare(finished)
     before = files(finished.parent)
     with pytest.raises(StoreError, match=said):
-        call("report", finished)
+        invoked("report", finished)
     after = files(finished.parent)
     assert {path: after[path] for path in before if not path.endswith(LIST)} == {
         path: before[path] for path in before if not path.endswith(LIST)
@@ -250,10 +238,10 @@ def test_what_is_in_the_way_is_named_and_stays(finished: Path, name: str) -> Non
 def test_a_run_writes_through_no_link(suite: Workspace) -> None:
     put(suite.root / "theirs")
     words = ("run", suite.root / "suite.yaml", "--out", suite.out)
-    call(*words, "--no-report")
+    invoked(*words, "--no-report")
     (suite.out / "calls.jsonl").symlink_to(suite.root / "theirs")
     with pytest.raises(StoreError, match=r"calls\.jsonl: is a link"):
-        call(*words)
+        invoked(*words)
     assert (suite.root / "theirs").read_text() == "mine"
 
 
@@ -283,10 +271,10 @@ def test_a_verb_writes_over_its_own_files_and_no_others(tmp_path: Path, verb: st
     called = [word.format(run=run) for word in words]
     if "generate" not in words:
         for _ in range(2):
-            call(*called, "--out", tmp_path / "ours")
+            invoked(*called, "--out", tmp_path / "ours")
     put(tmp_path / "theirs" / name)
     with pytest.raises(StoreError, match=f"{re.escape(name)}: .*{said}"):
-        call(*called, "--out", tmp_path / "theirs")
+        invoked(*called, "--out", tmp_path / "theirs")
     assert (tmp_path / "theirs" / name).read_text() == "mine"
     assert set(files(tmp_path / "theirs")) <= {name, LIST}
 
@@ -329,38 +317,23 @@ def test_init_writes_through_no_link(tmp_path: Path) -> None:
     (tmp_path / "new").mkdir()
     (tmp_path / "new" / "models.yaml").symlink_to(tmp_path / "elsewhere.yaml")
     with pytest.raises(StoreError, match=r"models\.yaml: is already there"):
-        call("init", tmp_path / "new")
+        invoked("init", tmp_path / "new")
     assert not (tmp_path / "elsewhere.yaml").exists()
-
-
-def test_a_price_is_asked_about_and_none_at_a_local_server_is_not(suite: Workspace) -> None:
-    free, dear = ({"input": n, "output": n} for n in (0.0, 1.0))
-    with Running(OpenAIChat()) as running:
-        base = f"{running.url}/v1"
-        entries = {
-            name: {"id": f"hosted_vllm/{name}", "api_base": base, "price": price}
-            for name, price in {"dear": dear, "free": free, "unknown": None}.items()
-        }
-        suite.write_yaml("models.yaml", entries)
-        refused = suite.run("--models", "free,dear,unknown")
-        assert (refused.code, running.server.requests) == (2, 0)
-        assert "found: dear\n" in refused.err
-        assert suite.run("--models", "free,unknown").code == 0
 
 
 def test_a_run_goes_on_only_where_its_report_can_be_written(suite: Workspace) -> None:
     words = ("run", suite.root / "suite.yaml", "--out", suite.out)
-    call(*words, "--no-report")
+    invoked(*words, "--no-report")
     put(suite.out / "tables" / "mine.md")
     before = files(suite.root)
     for prepare, said in IN_THE_WAY.values():
         if "tables" not in said and "table1" not in said:
             prepare(suite.out)
             with pytest.raises(StoreError, match=said):
-                call(*words)
+                invoked(*words)
             for path in (suite.out / "report", suite.out / "report.html"):
                 path.unlink(missing_ok=True)
     left = files(suite.root)
     assert {path: left[path] for path in before} == before
-    call(*words, "--no-report")
+    invoked(*words, "--no-report")
     assert (suite.out / "tables" / "mine.md").read_text() == "mine"

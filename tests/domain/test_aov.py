@@ -104,13 +104,6 @@ def test_a_dependency_outside_the_graph_is_refused(other: int) -> None:
         AOVGraph((frozenset(), frozenset({other})))
 
 
-def test_an_empty_graph_has_one_order() -> None:
-    graph = AOVGraph(())
-    assert (len(graph), graph.layers, graph.ready()) == (0, (), ())
-    assert graph.is_valid(())
-    assert not graph.is_valid((0,))
-
-
 def test_a_long_chain_needs_no_deep_recursion() -> None:
     n = 3000
     chain = AOVGraph(tuple(frozenset({v + 1}) if v + 1 < n else frozenset() for v in range(n)))

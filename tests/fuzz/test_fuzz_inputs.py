@@ -272,7 +272,7 @@ def run_cases(root: Path) -> Cases:
 def _manifests(path: Path) -> st.SearchStrategy[bytes]:
     manifest = yaml.safe_load(path.read_text(encoding="utf-8"))
     whole = path.read_bytes()
-    texts = st.sampled_from([*map(str.encode, YAML_TEXTS.values()), b'"\\ud800"'])
+    texts = st.sampled_from([*map(str.encode, YAML_TEXTS.values())])
     # A field that is not known may hold anything; one that is written already is there twice.
     added = st.builds(
         lambda field, text: whole + field + b": " + text + b"\n",

@@ -17,7 +17,7 @@ from typing import Any
 
 import click
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import CliRunner
 from PIL import Image
 
 from phyblock.cli.main import phyblock
@@ -26,21 +26,14 @@ from phyblock.files import LIST, bundled
 from phyblock.making.scenes.production import Production, Share
 from phyblock.sim.engine import other_engine
 from phyblock.workers import open_workers
-from tests.workspace import SCENES, tower
+from tests.workspace import SCENES, invoked, tower
 
 ALONE = ("--jobs", 1)
 SMALL = ("--subtasks", "CO,OC", "--per-subtask", 4, *ALONE)
 QUESTION_LINES = "questions.jsonl"
 
 
-def called(*args: object) -> Result:
-    """The command as it ends."""
-    return CliRunner(env={"COLUMNS": "160"}).invoke(
-        phyblock, [*map(str, args)], standalone_mode=False, catch_exceptions=False
-    )
-
-
-scenes, vqa = partial(called, "scenes"), partial(called, "questions")
+scenes, vqa = partial(invoked, "scenes"), partial(invoked, "questions")
 
 
 @pytest.fixture(scope="module")

@@ -76,6 +76,7 @@ YAML_TEXTS: dict[str, str] = {
     "digits": "9" * 6000,
     "no-number": "!!int x",
     "no-truth": "!!bool x",
+    "half-a-character": '"\\ud800"',
     "list-as-key": "{[1]: 2}",
 }
 """YAML that `phyblock run` never writes, by what is bad about it."""

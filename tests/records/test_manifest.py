@@ -29,12 +29,6 @@ def test_what_no_run_writes_is_refused_in_words(tmp_path: Path, name: str, field
         read_manifest(tmp_path)
 
 
-def test_half_a_character_is_refused(tmp_path: Path) -> None:
-    (tmp_path / MANIFEST).write_text('identity: x\nsuite: {name: "x\\ud800"}\n')
-    with pytest.raises(StoreError, match=r"run\.yaml:2:15: suite.name: (.|\n)*half of a char"):
-        read_manifest(tmp_path)
-
-
 def facts(**changes: Any) -> Manifest:
     """The manifest of the run that `plan_record` is of."""
     return Manifest.model_validate({"identity": IDENTITY, **changes})

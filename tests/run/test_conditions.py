@@ -22,11 +22,7 @@ APART = {"size_px": 128, "layout": "separate"}
 
 def sighted(answers: dict[tuple[str, ...], str]) -> OpenAIChat:
     """Plans rightly what it is shown: it knows goals and grids by the digests of their pictures."""
-    return OpenAIChat(say=lambda seen: answers[pictures(seen)])
-
-
-def pictures(seen: Seen) -> tuple[str, ...]:
-    return tuple(part[1] for part in seen.parts if not isinstance(part, str))
+    return OpenAIChat(say=lambda seen: answers[seen.pictures])
 
 
 def digest(png: bytes) -> str:
@@ -112,7 +108,7 @@ def test_blind_leaves_out_the_goal_and_leaves_the_candidates(workspace: Workspac
         done = workspace.run()
         assert (done.code, done.err) == (0, "")
         texts = {str(seen.parts[-1]) for seen in running.server.seen}
-        sent = [pictures(seen) for seen in running.server.seen]
+        sent = [seen.pictures for seen in running.server.seen]
     assert "[blind]" in " ".join(done.out.split())
     shown = {"order": list(range(1, 17)), "blind": True}
     assert all(record["shown"] == shown for record in workspace.records())

@@ -292,28 +292,6 @@ def test_episodes_are_billed_no_more_than_a_dry_run_expects(workspace: Workspace
     assert a_call == pytest.approx(expected, rel=WITHIN)
 
 
-def test_nothing_is_asked_where_not_even_one_call_fits(workspace: Workspace) -> None:
-    with Running(OpenAIChat()) as running:
-        workspace.write_models(running.url, "alpha", price=PRICE)
-        workspace.write_suite(models=["alpha", "random"])
-        done = workspace.run("--set", "limits.max_cost_usd=0")
-        assert done.code == 1
-        assert "max_cost_usd 0 is reached" in done.out
-        assert running.server.requests == 0
-
-
-def test_an_attempt_that_was_billed_counts_though_the_next_does_not_fit(
-    workspace: Workspace,
-) -> None:
-    with Running(OpenAIChat(Faults(mode="html"))) as running:
-        server = running.server
-        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=1000)
-        workspace.write_suite(models=["alpha"], limits={"max_concurrency": 1})
-        for _ in range(2):
-            assert workspace.run("--set", "limits.max_cost_usd=0.15").code == 1
-    assert server.requests == 1
-
-
 def test_a_run_without_a_limit_counts_once_there_is_one(workspace: Workspace) -> None:
     with Running(OpenAIChat(Faults(server_error=0.5))) as running:
         workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=100)

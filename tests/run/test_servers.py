@@ -71,23 +71,6 @@ def test_calls_go_to_the_address_and_keys_say_that_there_is_one(
     assert len(keys) == 2
 
 
-def test_a_server_that_moved_is_asked_nothing_again(workspace: Workspace) -> None:
-    with Running(OpenAIChat()) as first:
-        workspace.write_models(first.url, "alpha")
-        workspace.write_suite(models=["alpha"], seeds=[0])
-        assert workspace.run().code == 0
-        assert first.server.ended["ok"] > 0
-    with Running(OpenAIChat()) as second:
-        several = [f"{url}/v1" for url in (first.url, second.url)]
-        served = {"id": "hosted_vllm/alpha", "api_base": several}
-        workspace.write_yaml("models.yaml", {"alpha": served})
-        again = workspace.run()
-        assert (again.code, second.server.ended) == (0, {}), again.err
-        workspace.write_models(second.url, "alpha")
-        moved = workspace.run()
-        assert (moved.code, second.server.ended) == (0, {}), moved.err
-
-
 KEYS = {
     "HOSTED_VLLM_API_KEY": "hv-5ecret-0123456789abcdef",
     "OPENAI_API_KEY": "sk-proj-5ecret0123456789abcdefghij",
@@ -176,19 +159,3 @@ def test_a_check_asks_every_server(workspace: Workspace) -> None:
     assert checked.code == 1
     assert f"m at 127.0.0.1:{server.port} answers: " in checked.out
     assert "m at 127.0.0.1:9 failed the check: " in checked.out
-
-
-def test_one_model_at_two_addresses_is_named_before_anything_is_asked(workspace: Workspace) -> None:
-    entries = {
-        name: {"id": "hosted_vllm/m", "api_base": f"http://127.0.0.1:{port}/v1"}
-        for name, port in (("alpha", 9), ("beta", 10))
-    }
-    workspace.write_yaml("models.yaml", entries)
-    workspace.write_suite(models=["alpha", "beta"], seeds=[0])
-    refused = workspace.run()
-    assert refused.code == 2
-    assert "model beta: api_base: is alpha at another address" in refused.err
-    assert not workspace.out.exists()
-    entries["beta"]["revision"] = "step 2000"
-    workspace.write_yaml("models.yaml", entries)
-    assert workspace.run("--dry-run").code == 0

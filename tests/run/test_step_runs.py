@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,7 +13,7 @@ from phyblock.results.compare import compare_runs
 from phyblock.results.load import load_run
 from phyblock.run.rescore import rescore
 from phyblock.sim.engine import ENGINES, described_engine, installed_engines
-from tests.servers.chassis import ISSUE_MIX, Faults, Running, Seen
+from tests.servers.chassis import ISSUE_MIX, Faults, Running
 from tests.servers.step_agent import StepAgent, said, told_history
 from tests.workspace import Raw, Workspace, call, candidates
 
@@ -47,10 +46,6 @@ def by_sample(records: list[dict[str, Any]]) -> dict[str, Any]:
     return {record["sample"]: stable(record) for record in records}
 
 
-def pictures(seen: Seen) -> list[str]:
-    return [part[1] for part in seen.parts if not isinstance(part, str)]
-
-
 def test_the_server_sees_goal_candidates_current_picture_and_history(workspace: Workspace) -> None:
     with Running(StepAgent()) as running:
         prepare(workspace, running.url)
@@ -64,7 +59,7 @@ def test_the_server_sees_goal_candidates_current_picture_and_history(workspace: 
         assert all(isinstance(part, tuple) for one in mine for part in one.parts[:3])
         assert all(isinstance(one.parts[3], str) for one in mine)
         assert {len(one.parts) for one in mine} == {4}
-        goals = {tuple(pictures(one)[:2]) for one in mine}
+        goals = {one.pictures[:2] for one in mine}
         assert len(goals) == 1
         operations: list[str] = []
         world: list[int] = []
@@ -72,9 +67,9 @@ def test_the_server_sees_goal_candidates_current_picture_and_history(workspace: 
         for one, turn in zip(mine, record["turns"], strict=True):
             labels = [image["label"] for image in turn["prompt"]["images"]]
             assert labels == ["goal", "candidates", "current"]
-            assert [image["sha256"] for image in turn["prompt"]["images"]] == pictures(one)
+            assert [image["sha256"] for image in turn["prompt"]["images"]] == [*one.pictures]
             assert told_history(one) == operations
-            assert current.setdefault(tuple(world), pictures(one)[2]) == pictures(one)[2]
+            assert current.setdefault(tuple(world), one.pictures[2]) == one.pictures[2]
             assert turn["reply"]["text"] == said(one)
             move = turn["parse"]["move"]
             operations.append(f"Move({move})" if move else "(no operation)")
@@ -157,14 +152,3 @@ def test_an_episode_of_which_no_reply_is_whole_is_no_parse_failure(
         prepare(workspace, running.url)
         assert workspace.run(*FEW).code == 0
     assert {record["outcome"] for record in workspace.records()} == {outcome}
-
-
-def test_a_goal_that_is_not_drawn_is_no_match_for_states_that_are(
-    workspace: Workspace, official_checkout: Path
-) -> None:
-    official = {"format": "official", "path": str(official_checkout)}
-    prepare(workspace, "http://nowhere", dataset=official, images={"source": "dataset"})
-    done = workspace.run("--dry-run")
-    assert (done.code, len(done.errors)) == (2, 1)
-    assert "step_planning draws its own pictures" in done.errors[0]
-    assert "images.source=render" in done.errors[0]

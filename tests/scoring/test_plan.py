@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
+from phyblock.domain.scene import CandidateSet, Plan
 from phyblock.scoring.plan import (
     AssemblyScorer,
     Counts,
@@ -79,26 +79,6 @@ def test_every_valid_order_scores_1(setting: Setting, case: Case, seed: int) -> 
     plan = Plan(tuple(step for step in steps if step is not None))
     counts = match_plan(Goal(scene, candidates, setting), plan, "optimal").counts
     assert (counts.fp, counts.fn, counts.f1) == (0, 0, 1)
-
-
-def test_the_greedy_choice_can_punish_a_valid_order() -> None:
-    # Two equal arches stand on the ground; the second in the file carries the cuboid.
-    case = _two_arches(carrier=2)
-    assert case.scene.graph.is_valid((1, 2, 0))
-    assert counted(case, "A", "paper") == Counts(2, 1, 1)
-    assert counted(case, "A", "optimal") == Counts(3, 0, 0)
-    assert counted(_two_arches(carrier=1), "A", "paper") == Counts(3, 0, 0)
-
-
-def _two_arches(carrier: int) -> Case:
-    ground, flat = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    blocks = (
-        Block(1, "arch", "red", ground, flat, (), 1),
-        Block(2, "arch", "red", ground, flat, (), 1),
-        Block(3, "cuboid3", "blue", ground, flat, (carrier,), 2),
-    )
-    candidates = CandidateSet((Candidate("arch", "red", flat), Candidate("cuboid3", "blue", flat)))
-    return Case(Scene("s", (3,), blocks, ("s",)), candidates, Plan((1, 2, 1)))
 
 
 COUNTS = st.builds(Counts, *[st.integers(0, 1000)] * 3)

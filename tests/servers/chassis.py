@@ -95,6 +95,11 @@ class Seen:
         return hashlib.sha256(content.encode()).hexdigest()[:16]
 
     @property
+    def pictures(self) -> tuple[str, ...]:
+        """The digests of its pictures."""
+        return tuple(part[1] for part in self.parts if not isinstance(part, str))
+
+    @property
     def reply_text(self) -> str:
         """Four steps that depend on the messages alone."""
         digest = hashlib.sha256(json.dumps([self.system, self.parts]).encode()).digest()

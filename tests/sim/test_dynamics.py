@@ -28,12 +28,11 @@ from phyblock.sim.dynamics import (
 )
 from phyblock.sim.engine import ENGINES, Physics, Pose, World
 from phyblock.sim.outcomes import after_removal, holds
-from tests.designs import built, designed_scenes
+from tests.designs import built, designed_scene
 from tests.shipped import TASKS, official_tasks
 from tests.sim.structures import block, counterweighted_beam, tower
 from tests.sim.test_geometry import FLOATING
 
-SCENES = {scene.id: scene.blocks for scene in designed_scenes()}
 FIRST = replace(DEFAULT_TRIAL, physics=DEFAULT_TRIAL.physics[:1])
 LINE_BALANCED = {"bowl", "bowl-turned"}
 SEESAW = (
@@ -121,7 +120,7 @@ def test_of_all_official_scenes_only_the_floating_fall(official_checkout: Path) 
 
 @pytest.mark.parametrize("name", ["l1-dolmen", "l2-rocket", "l4-playground"])
 def test_steps_stand_as_the_long_trial_says(name: str) -> None:
-    blocks = SCENES[name]
+    blocks = designed_scene(name).blocks
     assert [step.fallen for step in check_steps(blocks, FIRST)] == [()] * len(blocks)
     assert all(check(blocks[:count], FIRST).stable for count in range(1, 5))
 

@@ -7,7 +7,6 @@ import json
 import math
 import re
 import shutil
-import sys
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
@@ -18,7 +17,6 @@ import numpy as np
 import pytest
 
 from phyblock import registry
-from phyblock.cli.main import phyblock
 from phyblock.domain.scene import AssemblyTask
 from phyblock.errors import SpecError
 from phyblock.records.record import Record
@@ -33,7 +31,7 @@ from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts, TrackReport
 from phyblock.web.board import SiteRun, Sources, board_of, entries_of, values_of
 from tests.vqa_set import write_questions
-from tests.workspace import Workspace
+from tests.workspace import Workspace, call
 
 
 def needless_steps(task: Any, record: Any) -> tuple[float, float]:
@@ -66,24 +64,16 @@ def added() -> Iterator[None]:
     registry.remove_measure("full_planning", NEEDLESS.name)
 
 
-def command(*args: object) -> int | None:
-    code: int | None = phyblock.main([*map(str, args)], standalone_mode=False)
-    return code
-
-
 @pytest.fixture
-def here(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> Workspace:
-    monkeypatch.chdir(workspace.root)
-    monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
-    monkeypatch.setattr(sys, "argv", ["phyblock"])
-    workspace.write_suite(models=["oracle", "all-candidates"])
-    return workspace
+def here(inside: Workspace) -> Workspace:
+    inside.write_suite(models=["oracle", "all-candidates"])
+    return inside
 
 
 def test_scoring_again_fills_in_what_older_records_lack(
     here: Workspace, request: pytest.FixtureRequest
 ) -> None:
-    assert not command("run", "suite.yaml", "--out", here.out, "--no-report")
+    assert not call("run", "suite.yaml", "--out", here.out, "--no-report")
     stored = here.records()
     assert not any("needless_steps" in record["counts"] for record in stored)
     for line in stored:
@@ -98,7 +88,7 @@ def test_scoring_again_fills_in_what_older_records_lack(
     assert known.isdisjoint({"needless", "distance", "blocks_order"})
     assert {"success", "macro_f1"} <= known
     scored = Path(shutil.copytree(here.out, here.root / "scored"))
-    command("score", scored)
+    call("score", scored)
     write_tables(scored)
     with (scored / "tables" / "estimates.csv").open(newline="") as file:
         rows = [row for row in csv.DictReader(file) if row["measure"] == "needless"]
@@ -107,7 +97,7 @@ def test_scoring_again_fills_in_what_older_records_lack(
     assert float(whole["oracle"]["value"]) == float(whole["oracle"]["lo"]) == 0
     row = whole["all-candidates"]
     assert 0.5 < float(row["lo"]) <= float(row["value"]) <= float(row["hi"]) < 1
-    command("compare", scored, "--measure", "needless", "--out", scored / "compared")
+    call("compare", scored, "--measure", "needless", "--out", scored / "compared")
     with (scored / "compared" / "comparison.csv").open(newline="") as file:
         compared = {row["part"]: row for row in csv.DictReader(file)}["overall"]
     assert float(compared["value_b"]) == pytest.approx(100 * float(row["value"]), abs=1e-3)
@@ -197,7 +187,7 @@ def led_by(leading: Measure, *measures: Measure) -> type[Counting]:
 def run(here: Workspace) -> Iterator[Run]:
     registry.register_track(Counting)
     here.write_suite(tracks=["counting"], models=["oracle", "random"])
-    assert not command("run", "suite.yaml", "--out", "out", "--no-report")
+    assert not call("run", "suite.yaml", "--out", "out", "--no-report")
     yield load_run(here.out)
     registry.unregister_track(Counting.name)
 
@@ -222,9 +212,9 @@ def test_the_leading_measure_leads_everywhere(run: Run) -> None:
 @pytest.mark.usefixtures("run")
 def test_what_a_track_has_not_is_refused() -> None:
     with pytest.raises(SpecError, match="cannot be asked for as JSON"):
-        command("run", "suite.yaml", "--set", "answer_format=json_schema", "--out", "json")
+        call("run", "suite.yaml", "--set", "answer_format=json_schema", "--out", "json")
     with pytest.raises(SpecError, match="is a person, who cannot answer in counting"):
-        command("play", "suite.yaml", "--name", "ada")
+        call("play", "suite.yaml", "--name", "ada")
 
 
 def first_is_placed(_: Any, record: Any) -> tuple[float, float]:
@@ -239,7 +229,7 @@ def test_an_episode_that_would_have_asked_otherwise_is_no_longer_final(
     here: Workspace, request: pytest.FixtureRequest
 ) -> None:
     here.write_suite(tracks=["step_planning"], steps={"physics": "off"}, levels=[3])
-    assert not command("run", "suite.yaml", "--out", here.out, "--no-report")
+    assert not call("run", "suite.yaml", "--out", here.out, "--no-report")
     counted = SampleCounts("first_steps", ("placed", "n"), sample=first_is_placed)
     registry.add_measure("step_planning", Measure("first", "First", counted, ratio_of))
     request.addfinalizer(lambda: registry.remove_measure("step_planning", "first"))
@@ -270,14 +260,14 @@ def test_scoring_again_counts_in_every_track(
     here.write_suite(tracks=[track], models=["oracle", "random"], **more)
     folders = [here.root / name for name in ("out", "same", "new", "scored")]
     old, same, new, scored = folders
-    assert not command("run", "suite.yaml", "--out", old, "--no-report")
+    assert not call("run", "suite.yaml", "--out", old, "--no-report")
     for copy in (same, scored):
         shutil.copytree(old, copy)
     rescore(same)
     counted = SampleCounts("sampled", ("part", "whole"), sample=counts)
     registry.add_measure(track, Measure("part", "Part", counted, ratio_of, "a part"))
     request.addfinalizer(lambda: registry.remove_measure(track, "part"))
-    assert not command("run", "suite.yaml", "--out", new, "--no-report")
+    assert not call("run", "suite.yaml", "--out", new, "--no-report")
     rescore(scored)
     before, unchanged, fresh, again = map(here.records, folders)
     assert unchanged == before

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import functools
 import shutil
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -16,7 +15,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.cli.main import phyblock
 from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, PoseStep
 from phyblock.errors import SpecError, StoreError
 from phyblock.parsing.poses import parse_poses
@@ -41,7 +39,7 @@ from phyblock.types import REFUSED_ENDS, STEP_ENDS, StepEnd
 from tests.shipped import TASKS
 from tests.sim.structures import block_types, eulers
 from tests.tracks.opened import track_of
-from tests.workspace import Workspace
+from tests.workspace import Workspace, call
 
 STANDS = "Step1: block 1 at (0, 0, 2.5)\nStep2: block 3 at (0, 0, 7.5)"
 
@@ -220,15 +218,13 @@ def test_a_step_has_one_error_the_first_in_time(
 
 
 def test_a_run_that_was_cut_goes_on_and_is_scored_again_without_an_engine(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    inside: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.chdir(workspace.root)
-    monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
-    monkeypatch.setattr(sys, "argv", ["phyblock"])
+    workspace = inside
     section, models = {"views": ["oblique"]}, ["oracle", "oracle-2d"]
     workspace.write_suite(tracks=["pose_planning"], models=models, pose=section)
     run = ["run", "suite.yaml", "--out", "out", "--no-report"]
-    assert not phyblock.main(run, standalone_mode=False)
+    assert not call(*run)
     assert "Pose planning" in capsys.readouterr().out
 
     def by_sample(records: list[dict[str, Any]]) -> dict[str, Any]:
@@ -238,7 +234,7 @@ def test_a_run_that_was_cut_goes_on_and_is_scored_again_without_an_engine(
     whole = by_sample(workspace.records())
     text = (workspace.out / "records.jsonl").read_text()
     (workspace.out / "records.jsonl").write_text(text[: len(text) // 2])
-    assert not phyblock.main(run, standalone_mode=False)
+    assert not call(*run)
     assert by_sample(workspace.records()) == whole
     # What fell when it was asked is what fell: nothing is carried out again.
     monkeypatch.setattr(pose_track, "execute", None)
@@ -247,7 +243,7 @@ def test_a_run_that_was_cut_goes_on_and_is_scored_again_without_an_engine(
     shutil.copytree(workspace.out, again)
     rescore(again)
     with pytest.raises(StoreError, match=r"pose_planning\.carrying"):
-        phyblock.main(run, standalone_mode=False)
+        call(*run)
     assert by_sample(workspace.records(again)) == whole
     table = pd.read_csv(workspace.out / "tables" / "table_c.csv").set_index("model")
     shown = ["f1_a", "f1_b", "f1_c", "stands", "completed"]
