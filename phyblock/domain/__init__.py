@@ -1,1 +1,1 @@
-"""The field's nouns as frozen dataclasses and pure functions: no files, clock or network."""
+"""Frozen dataclasses of the domain and pure functions on them: no files, clock or network."""

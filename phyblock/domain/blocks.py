@@ -1,8 +1,8 @@
-"""The block library: one row a shape, colors, material, symmetries, and the one Euler conversion.
+"""The block library: one row per shape, colors, material, symmetries, and the Euler conversion.
 
 Eight types in five colors (paper, appendix A.1), base unit 5 cm. A block is a prism: a flat profile
-pushed along an axis of its body frame. Meshes and convex pieces (`phyblock.sim.geometry`), mass,
-symmetries, poses of designs and words of questions follow from the row of its shape in `SHAPES`.
+extruded along an axis of its body frame. Meshes and convex pieces (`phyblock.sim.geometry`), mass,
+symmetries, poses of designs and names in questions follow from the row of its shape in `SHAPES`.
 Boxes and the cylinder are centered in their frames, the semi-cylinder and the triangle have their
 origin at the center of the flat (hypotenuse) face, the arch at the center of its bounding box.
 """
@@ -38,9 +38,9 @@ DENSITY_KG_M3 = 1040.0
 FRICTION = 0.35
 """Coulomb coefficient of a pair of blocks, paper appendix A.1."""
 _LONG = 1.5
-"""The longest side of a long block is more than so many times the second."""
+"""A block is long if its longest side is more than this many times the second longest."""
 _MOST_SEEN_TURNS = 8
-"""Of a prism with more sides, a turn by one side can hardly be seen."""
+"""In a prism with more sides, a turn by one side can hardly be seen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +102,7 @@ def _right_triangle(leg_m: float) -> Profile:
 
 
 def _gate(width_m: float, height_m: float, radius_m: float, segments: int) -> Profile:
-    """A rectangle with half a disc taken out of its foot.
+    """A rectangle with half a disc cut out of its base.
 
     Its parts are two legs, each with an end segment of the arc, and a slice for each other one.
     """
@@ -132,7 +132,7 @@ def _gate(width_m: float, height_m: float, radius_m: float, segments: int) -> Pr
 class Shape:
     """A type of block.
 
-    `profile` is pushed by half of `length_m` to both sides along the body axis `axis`: for x it
+    `profile` is extruded by half of `length_m` to both sides along the body axis `axis`: for x it
     lies in the y-z plane, for z in the x-y plane. `fold` is the order of the rotational symmetry
     about the body z axis, and `flips` is true where half turns about axes in the x-y plane map the
     block to itself; every block is its own mirror image in x = 0. `kit_colors` are its colors in
@@ -159,7 +159,7 @@ class Shape:
         if not self.kit_colors:
             raise ValueError("a shape needs a color of the kit, which designs use")
         low, high = self.profile.outline.min(axis=0), self.profile.outline.max(axis=0)
-        # The ends of a disc mirror one another but for rounding.
+        # The ends of a disc mirror one another up to rounding.
         low = np.where(np.isclose(-low, high, rtol=1e-12), -high, low)
         half_m = self.length_m / 2
         object.__setattr__(self, "low_m", self._in_body(low.tolist(), -half_m))
@@ -213,7 +213,7 @@ class Shape:
 
 
 def _turns(*names: str, roll: float = 0.0, pitch: float = 0.0) -> dict[str, Euler]:
-    """One pose and its quarter turns about the vertical, as many as there are names."""
+    """One pose and its quarter turns about the vertical, one for each name."""
     return {name: (roll, pitch, 90.0 * turn) for turn, name in enumerate(names)}
 
 
@@ -325,14 +325,14 @@ SHAPES: dict[BlockType, Shape] = {
         },
     ),
 }
-"""The shapes by type. A `ramp+y` slopes down towards +y, a `round+x` shows its round side to +x, an
-arch that is `open+y` stands on one end with its hole to +y. `x` and `y` name the direction of the
-long side, and for `upright` slabs the one that the slab is thin in.
+"""The shapes by type. A `ramp+y` slopes down towards +y, a `round+x` has its round side towards +x,
+an arch that is `open+y` stands on one end with its hole towards +y. `x` and `y` name the direction
+of the long side, and for `upright` slabs that of the thin side.
 """
 
 
 def add_shape(name: str, shape: Shape) -> None:
-    """Add a type of block. Raises ValueError for a name that is taken."""
+    """Add a type of block. Raises ValueError if the name is taken."""
     if name in SHAPES:
         raise ValueError(f"there is a shape of this name: {name}")
     SHAPES[cast(BlockType, name)] = shape
@@ -391,7 +391,8 @@ def symmetries(block_type: BlockType) -> NDArray[np.float64]:
         return _cube_rotations()
     turns = [euler_deg_to_matrix((0.0, 0.0, 360.0 * i / shape.fold)) for i in range(shape.fold)]
     if shape.flips:
-        # Every block mirrors in x = 0: where half a turn about z is none, that is one about y.
+        # Every block is its own mirror image in x = 0: without the half turn about z, the one about
+        # y is a symmetry.
         half_turn = [1.0, -1.0, -1.0] if shape.fold % 2 == 0 else [-1.0, 1.0, -1.0]
         turns += [turn @ np.diag(half_turn) for turn in turns]
     return np.stack(turns)
@@ -410,7 +411,7 @@ def _cube_rotations() -> NDArray[np.float64]:
 
 @functools.cache
 def orientation_class(block_type: BlockType, euler_deg: Euler) -> tuple[float, ...]:
-    """Canonical name of an orientation up to the block's own symmetry: equal if they look equal.
+    """Canonical name of an orientation: equal for two orientations in which the block looks equal.
 
     The least, in lexicographic order, of the nine matrix entries (rounded to 1e-4) over all
     rotations that are indistinguishable from the given one.

@@ -48,7 +48,7 @@ LETTERS = "ABCD"
 
 
 def add_subtask(code: str, name: str, category: Category) -> None:
-    """Add a kind of question to a category. Raises ValueError for a code that is taken."""
+    """Add a kind of question to a category. Raises ValueError if the code is taken."""
     if code in SUBTASK_NAMES:
         raise ValueError(f"there is a subtask of this code: {code}")
     subtask = cast(Subtask, code)
@@ -77,13 +77,13 @@ class Mark:
 
 @dataclass(frozen=True)
 class QuestionPicture:
-    """A picture as a recipe: what is drawn, from where.
+    """The recipe of a picture: its blocks, camera and background.
 
-    `label` says what it is: `scene`, the letter of the option it is (`A` to `D`), or the block
-    asked about (`block`). `blocks` are drawn at the poses they have here, which need not be goal
-    poses; `view_deg` is the camera's azimuth and elevation [degrees]; the camera is framed on
-    `framed`, or on `blocks` where that is empty, so that pictures that are compared share a camera.
-    `background` is None where the picture is drawn on whatever ground a run draws on.
+    `label` is `scene`, the letter of the option that it is (`A` to `D`), or `block` for the block
+    asked about. `blocks` are drawn at the poses they have here, which need not be goal poses;
+    `view_deg` is the camera's azimuth and elevation [degrees]; the camera is framed on `framed`, or
+    on `blocks` where that is empty, so that pictures to be compared share a camera. `background` is
+    None for the background of the run.
     """
 
     label: str
@@ -126,10 +126,10 @@ class Question:
 
 
 def rotated(question: Question, by: int) -> Question:
-    """The same question with option `by` as A, the next as B, and so on round.
+    """The same question with option `by` as A, the next as B, and so on cyclically.
 
-    What belongs to an option keeps its place in the world and takes the option's new letter: a
-    picture that is an option, a lettered place that the options name.
+    Pictures that are options, and lettered places that the options name, keep their place in the
+    world and take the new letter of their option.
     """
     n = len(question.options)
     moved = tuple(question.options[(i + by) % n] for i in range(n))
@@ -144,7 +144,7 @@ def rotated(question: Question, by: int) -> Question:
 
 
 def rotated_label(label: str, by: int, n: int) -> str:
-    """Return the new label of a picture; those that are no option's stay."""
+    """Return the new label of a picture; only labels of options change."""
     if label not in LETTERS[:n]:
         return label
     return LETTERS[(LETTERS.index(label) - by) % n]

@@ -40,7 +40,7 @@ class AOVGraph:
         try:
             graphlib.TopologicalSorter(dict(enumerate(self.depends_on))).prepare()
         except graphlib.CycleError as error:
-            # Each vertex is needed by the next, and the first stands at both ends.
+            # Each vertex is needed by the next, and the first is at both ends.
             vertices = error.args[1][:0:-1]
             start = vertices.index(min(vertices))
             raise CycleError((*vertices[start:], *vertices[:start])) from None
@@ -98,7 +98,7 @@ Look = tuple[BlockType, Color, tuple[float, ...]]
 
 
 class Oriented:
-    """The look, to settings B and A, of anything that has a type, a color and an orientation."""
+    """The keys under settings B and A of anything with a type, a color and an orientation."""
 
     type: BlockType
     color: Color
@@ -121,7 +121,7 @@ class Block(Oriented):
 
     `order` is its 1-based number in the scene; `position_m` the origin of its body frame in the
     world [m], z up; `euler_deg` extrinsic x-y-z angles [degrees]; `depend` the orders of the
-    blocks it rests on, empty when it rests on the ground alone; `layer` as declared in the file.
+    blocks it rests on, empty when it rests only on the ground; `layer` as declared in the file.
     """
 
     order: int
@@ -218,10 +218,10 @@ class Plan:
 
 @dataclass(frozen=True)
 class PoseStep:
-    """A candidate, by its 1-based number, and where it is to be put.
+    """A candidate, by its 1-based number, and the place to put it.
 
-    `center_cm` is the center of the smallest box with sides along the axes that holds the block,
-    which is turned as its candidate is [cm].
+    `center_cm` is the center of the smallest box with sides along the axes that holds the block in
+    the orientation of its candidate [cm].
     """
 
     candidate: int
@@ -230,12 +230,11 @@ class PoseStep:
 
 @dataclass(frozen=True)
 class AssemblyTask:
-    """A goal structure with its candidate set; `composite` is the data set's own picture of
-    both, where it has one.
+    """A goal structure with its candidate set.
 
-    One that is shown in another form than the file's has an `order`: the number in the file of each
-    candidate as it is shown, which `seed` drew. Its `candidates` are in that order, and the goal is
-    not shown where it `is_blind`.
+    `composite` is the data set's own picture of both, if it has one. If `seed` shuffled the
+    candidates, `candidates` are in the order shown, and `order` has the number of each in the file.
+    The goal is not shown if the task `is_blind`.
     """
 
     scene: Scene

@@ -1,7 +1,7 @@
-"""Telling whether two structures are the same but for turning, mirroring and shifting them.
+"""Equality of structures up to turning, mirroring and shifting them.
 
-A mirror image of a block is again a block: every type has a mirror plane of its own, so that the
-image of a pose is the mirrored frame times the block's own mirror, a proper rotation.
+The mirror image of a block is again a block: every type has its own mirror plane, so that the image
+of a pose is the mirrored frame times the block's own mirror, a proper rotation.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _MIRROR = np.diag([-1.0, 1.0, 1.0])
 """Every block type is its own mirror image across the plane x = 0 of its body frame."""
 _STEP_M = 0.001
 _PHASE = 0.37
-"""Keeps multiples of a quarter of a millimeter, which designs are made of, off the borders."""
+"""Keeps multiples of a quarter of a millimeter, which designs use, off the borders of cells."""
 
 
 @dataclass(frozen=True)
@@ -52,16 +52,16 @@ SYMMETRIES = tuple(Symmetry(turns, mirrored) for mirrored in (False, True) for t
 
 
 def canonical_form(blocks: Sequence[Block]) -> tuple[tuple[object, ...], ...]:
-    """A name of the structure that turning, mirroring and shifting it along the floor keeps.
+    """A name of the structure that does not change when it is turned, mirrored or shifted.
 
     The least, over the eight symmetries, of the sorted (type, color, pose class, place) of all
-    blocks, places counted in millimeters from the low corner of the block origins.
+    blocks, with places in millimeters from the low corner of the block origins.
     """
     return min(_form(blocks, symmetry) for symmetry in SYMMETRIES)
 
 
 def turned_form(blocks: Sequence[Block]) -> tuple[tuple[object, ...], ...]:
-    """A name of the structure that turning and shifting it keeps, and mirroring does not."""
+    """A name of the structure that changes when it is mirrored, but not when turned or shifted."""
     return min(_form(blocks, Symmetry(turns)) for turns in range(4))
 
 
@@ -85,7 +85,7 @@ def image_deg(euler_deg: Euler, symmetry: Symmetry) -> Euler:
 
 @functools.cache
 def pose_class(block_type: BlockType, euler_deg: Euler) -> tuple[float, ...]:
-    """The orientation class; of an upright round block, whose facets no one counts, its axis."""
+    """The orientation class; for an upright round block, whose facets hardly show, its axis."""
     rotation = euler_deg_to_matrix(euler_deg)
     if SHAPES[block_type].is_round and abs(rotation[2, 2]) > 1 - 1e-6:
         return (0.0, 0.0, 1.0)

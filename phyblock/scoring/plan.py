@@ -1,7 +1,7 @@
 """Counts of steps, and the score of a plan by a scene's AOV graph: matchers, criteria, errors.
 
-Settings A and B say which blocks are equal; the `paper` and `optimal` matchers say which goal block
-a step places. Sets of goal vertices are bit masks throughout.
+Settings A and B define which blocks are equal; the `paper` and `optimal` matchers define which goal
+block a step places. Sets of goal vertices are bit masks throughout.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from phyblock.types import Criterion, Level1Criterion, Matcher, Setting
 
 Floats = NDArray[np.float64]
 Metric = Callable[[Floats], Floats]
-"""From summed counts, shape (..., counts), to a measured value, shape (...); NaN: undefined."""
+"""A function from summed counts (..., counts) to values (...), NaN where undefined."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Counts:
 
     @property
     def f1(self) -> float | None:
-        """2 TP / (2 TP + FP + FN): the harmonic mean, None where nothing was counted."""
+        """2 TP / (2 TP + FP + FN), or None if nothing was counted."""
         whole = 2 * self.tp + self.fp + self.fn
         return 2 * self.tp / whole if whole else None
 
@@ -55,11 +55,11 @@ def f1_of(sums: Floats) -> Floats:
 
 
 def ratio_of(sums: Floats) -> Floats:
-    """Part / whole of counts (..., [part, whole]), as right answers of answers.
+    """Part / whole of counts (..., [part, whole]), such as right answers / answers.
 
-    NaN for no whole, and for a part that is more than the whole and so no share of it: the
-    paper's criterion `membership` counts repeated steps again. The mean of such ratios over the
-    axis before the last is a macro average.
+    NaN where the whole is 0, or the part is larger and so no share of it: the paper's criterion
+    `membership` counts repeated steps again. The mean of such ratios over the axis before the last
+    is a macro average.
     """
     part, whole = sums[..., 0], sums[..., 1]
     out = np.full(part.shape, np.nan)
@@ -76,14 +76,14 @@ def mean_of(sums: Floats) -> Floats:
 
 
 def chance(subtask: Subtask, n_options: int = 4) -> float:
-    """Expected accuracy of a uniform guess: 1 / n, for an order of n pictures 1 / n!."""
+    """Expected accuracy of a uniform guess: 1 / n, or 1 / n! for an order of n pictures."""
     return 1 / (math.factorial(n_options) if subtask == "OR" else n_options)
 
 
 ErrorType = Literal["shape_not_in_gt", "overflow", "incorrect_orientation", "dependency_not_met"]
 ERROR_TYPES: tuple[ErrorType, ...] = get_args(ErrorType)
-"""The four types of wrong step (paper appendix B.3), exhaustive and exclusive: the first that holds
-when the step comes. No goal block has this type and color; every such block is already placed; an
+"""The four types of wrong steps (paper appendix B.3), exhaustive and exclusive: the first that
+holds at the step. No goal block has this type and color; every such block is already placed; an
 unplaced one exists, but none that equals the candidate under the setting (A only); an unplaced
 equal one exists but is not ready.
 """
@@ -99,22 +99,22 @@ BlockOutcome = Literal[
     "order",
 ]
 BLOCK_OUTCOMES: tuple[BlockOutcome, ...] = get_args(BlockOutcome)
-"""Outcomes of a goal block. `left_out`: the plan has no step left for it. `wrong_kind`: it has, and
-the step names a kind that is not needed, or not so often. `wrong_orientation`: its kind is named,
-in another pose (setting A only). Named as it is, but in no order of the plan's steps ready, as what
-it rests on, directly or not, was never named (`support_not_named`), named in another pose
-(`support_turned`), or partly the one and partly the other (`support_both`). `order`: another order
-would place it.
+"""Outcomes of a goal block. `left_out`: the plan has no step left for it. `wrong_kind`: it has one,
+which names a kind that is not needed, or not so often. `wrong_orientation`: its kind is named, but
+in another pose (setting A only). `order`: another order of the plan's steps would place it. Else it
+is named as it is, but no order of the steps makes it ready, because blocks that it rests on,
+directly or not, are never named (`support_not_named`), named in another pose (`support_turned`), or
+some the one and some the other (`support_both`).
 """
 
 
 class Goal:
     """A scene and its candidate set prepared for matching under one setting.
 
-    `equal_to[i]` holds the goal vertices, in file order, that equal candidate i (1-based). All else
-    are bit masks of vertices: `equal[i]` the same, `of_kind[i]` those of its type and color,
-    `kinds` all blocks by type and color, `kind_of_look` the kind of each group that the setting
-    takes for equal. `unlocks[v]` are the vertices that directly depend on v: equal blocks that
+    `equal_to[i]` holds the goal vertices, in file order, that equal candidate i (1-based). The
+    others are bit masks of vertices: `equal[i]` the same, `of_kind[i]` those of its type and color,
+    `kinds` all blocks by type and color, `kind_of_look` the kind of each group of blocks that are
+    equal under the setting. `unlocks[v]` are the vertices that directly depend on v: blocks that
     unlock the same ones are interchangeable when both are ready. `ways[i]` holds, for each vertex
     of `equal_to[i]`, the vertex, its mask, and the mask of it and what it directly depends on.
     """
@@ -182,7 +182,7 @@ class Goal:
 
 
 def _groups(values: Iterable[Hashable]) -> dict[Hashable, int]:
-    """Bit mask of the places that have a value, by value."""
+    """Return, for each value, the bit mask of the places that have it."""
     groups: dict[Hashable, int] = {}
     for place, value in enumerate(values):
         groups[value] = groups.get(value, 0) | 1 << place
@@ -203,19 +203,19 @@ class Match:
 
     @property
     def counts(self) -> Counts:
-        """TP: steps that placed a block; FP: the other steps; FN: blocks that were left."""
+        """TP: steps that placed a block; FP: the other steps; FN: blocks that were not placed."""
         tp = sum(vertex is not None for vertex in self.vertices)
         return Counts(tp, len(self.vertices) - tp, self.n_blocks - tp)
 
 
 def match_plan(goal: Goal, plan: Plan, matcher: Matcher) -> Match:
-    """Match `plan` step by step; raises KeyError for a step that is no candidate.
+    """Match `plan` step by step. Raises KeyError for a step that names no candidate.
 
-    `paper` is Algorithm 1 of the paper: each step takes the first ready equal block in file
-    order. `optimal` takes the same steps but chooses among interchangeable ready blocks so that
-    the number of true positives over the whole plan is greatest, so every valid order scores 1.
-    Of the choices with as many, it takes those under which the fewest steps are `overflow`, and of
-    these the fewest `incorrect_orientation`: the file order of blocks changes no count.
+    `paper` is Algorithm 1 of the paper: each step takes the first ready equal block in file order.
+    `optimal` chooses among interchangeable ready blocks so that the whole plan has the most true
+    positives, so every valid order scores 1. Among equally good choices, it takes the one with the
+    fewest `overflow` steps, then the fewest `incorrect_orientation`: so the file order of blocks
+    changes no count.
     """
     vertices: list[int | None] = []
     if matcher == "optimal":
@@ -231,10 +231,10 @@ def match_plan(goal: Goal, plan: Plan, matcher: Matcher) -> Match:
 
 
 def _best_choices(goal: Goal, plan: Plan) -> list[int | None]:
-    """Search over the frontier of sets of placed vertices that some choice can reach.
+    """Search the frontier of sets of placed vertices that some choice can reach.
 
-    A step with a ready match never gains by being skipped, and a set's size is its number of true
-    positives, so the way into each distinct set that costs least is enough.
+    Skipping a step with a ready match never helps, and a set's size is its number of true
+    positives, so the cheapest path to each distinct set is enough.
     """
     cost_of: dict[ErrorType, int] = {
         "shape_not_in_gt": 0,
@@ -264,7 +264,7 @@ def _best_choices(goal: Goal, plan: Plan) -> list[int | None]:
 
 
 def steps_back(history: Sequence[Mapping[int, int | None]], reached: int) -> list[int | None]:
-    """The vertex of each step of a search by which it came to the set `reached`, read backwards."""
+    """Return the vertex of each step on the search's path to the set `reached`, backtracking."""
     vertices: list[int | None] = []
     for taken in reversed(history):
         chosen = taken[reached]
@@ -274,9 +274,9 @@ def steps_back(history: Sequence[Mapping[int, int | None]], reached: int) -> lis
 
 
 def most_placed(goal: Goal, plan: Plan) -> int:
-    """The number of true positives under the `optimal` matcher, without which steps they are.
+    """Return only the number of true positives under the `optimal` matcher.
 
-    Quicker than `match_plan`; raises KeyError for a step that is no candidate.
+    Faster than `match_plan`. Raises KeyError for a step that names no candidate.
     """
     frontier = {0}
     for ways in map(goal.ways.__getitem__, plan.steps):
@@ -312,8 +312,8 @@ def count_errors(errors: Iterable[ErrorType | None]) -> dict[ErrorType, int]:
 def level1_counts(goal: Goal, plan: Plan, criterion: Level1Criterion) -> Counts:
     """Counts of `plan` without order, under the goal's setting.
 
-    `membership` is the paper's: a step counts when any goal block equals it, however often it is
-    repeated. `selection` is one to one. Raises KeyError for a step that is no candidate.
+    `membership` is the paper's: a step counts when any goal block equals it, even if repeated.
+    `selection` is one-to-one. Raises KeyError for a step that names no candidate.
     """
     if criterion == "membership":
         tp = sum(bool(goal.equal_to[index]) for index in plan.steps)
@@ -326,9 +326,9 @@ def level1_counts(goal: Goal, plan: Plan, criterion: Level1Criterion) -> Counts:
 def block_outcomes(
     goal: Goal, plan: Plan, placed: Sequence[int]
 ) -> tuple[dict[BlockOutcome, int], ...]:
-    """Number of goal blocks of each outcome, for each number of blocks that the plan `placed`.
+    """Number of goal blocks of each outcome, for each number of blocks in `placed`.
 
-    Matchers find different numbers. Raises KeyError for a step that is no candidate.
+    Each matcher places a different number. Raises KeyError for a step that names no candidate.
     """
     n = len(goal.graph)
     kinds = Counter(mask for index in plan.steps if (mask := goal.of_kind[index]))
@@ -347,7 +347,7 @@ def block_outcomes(
         absent = {kind: kind.bit_count() - of_kind.get(kind, 0) for kind in goal.kinds}
         by_turned = _most_standing(goal, exact, turned, stand) - stand
         by_absent = _most_standing(goal, exact, absent, stand) - stand
-        # Where either alone would do, one of several equal blocks being meant, it is the pose.
+        # If either one explains it, with several equal blocks to choose from, the pose counts.
         by_absent = min(by_absent, both - by_turned)
     shared: dict[BlockOutcome, int] = {
         "left_out": max(0, n - len(plan)),
@@ -363,12 +363,12 @@ def block_outcomes(
 def _most_standing(
     goal: Goal, exact: Mapping[int, int], spare: Mapping[int, int], at_least: int
 ) -> int:
-    """The most blocks named as they are that can stand together, each on what it depends on.
+    """The most correctly named blocks that can stand together, each on what it depends on.
 
-    `exact` says how many blocks of a look (a bit mask of vertices) are named as they are, `spare`
-    how many others of a kind may support them, uncounted; `at_least` so many are known to stand.
-    Where there are too many blocks of a kind, some are taken away with all that rests on them, in
-    every way that may be best: of the topmost, as what a lower one takes along includes those.
+    `exact` is how many blocks of a look (a bit mask of vertices) are named as they are, `spare` how
+    many others of a kind may support them, uncounted; `at_least` is a known lower bound. If too few
+    blocks of a kind are named, some are removed with all that rests on them, in every way that may
+    be best. Only topmost ones are tried, since removing a lower one removes those above as well.
     """
     best = at_least
     seen: set[int] = set()
@@ -400,9 +400,9 @@ def _most_standing(
 def _too_many(
     goal: Goal, standing: int, exact: Mapping[int, int], spare: Mapping[int, int]
 ) -> tuple[int, int]:
-    """Blocks of a kind of which too few are named for all to stand, and how many must go.
+    """Return the blocks of a kind of which too few are named, and how many must be removed.
 
-    (0, 0) where all can stand. A kind of which all must go comes first.
+    (0, 0) if all can stand. A kind of which all must be removed comes first.
     """
     surplus: dict[int, int] = {}
     blocks: dict[int, int] = {}
@@ -421,16 +421,16 @@ def _too_many(
 
 
 def steps_kept(goal: Goal, plan: Plan, at_least: int = 0) -> int:
-    """The most steps of a plan that occur, in its order, in one valid order of the goal.
+    """Return the most steps of a plan that occur, in its order, in one valid order of the goal.
 
-    That order is the plan with the other steps left out and the other blocks put in, and no valid
+    That order is the plan with the other steps removed and the other blocks inserted, and no valid
     order needs fewer such edits. Steps may stand for any equal blocks as long as none comes after
-    one that rests on it. At least `at_least` steps are known to be kept. Raises KeyError for a
-    step that is no candidate.
+    one that rests on it. `at_least` is a known lower bound. Raises KeyError for a step that names
+    no candidate.
     """
     steps = [goal.equal[index] for index in plan.steps]
-    # For each place in the plan, how many steps from there on equal each set of blocks, at most as
-    # many as there are such blocks.
+    # For each place in the plan, the number of steps from there on that equal each set of blocks,
+    # capped at the number of such blocks.
     ahead: list[dict[int, int]] = [{}]
     for equal in reversed(steps):
         known = ahead[-1].get(equal, 0)
@@ -439,14 +439,14 @@ def steps_kept(goal: Goal, plan: Plan, at_least: int = 0) -> int:
     ahead.reverse()
 
     def bound(at: int, kept: int, closed: int) -> int:
-        """At least the number of steps that can be kept in all."""
+        """Upper bound of the number of steps that can be kept in all."""
         most = kept.bit_count()
         for equal, times in ahead[at].items():
             most += min(times, (equal & ~closed).bit_count())
         return most
 
-    # The way that may still keep most comes first, so the first way that comes to the end is a
-    # best one. A kept block and those that it rests on are closed.
+    # Best first: the path with the highest bound is continued, so the first to reach the end is
+    # optimal. A kept block and those that it rests on are closed.
     open_ways = [(-bound(0, 0, 0), 0, 0, 0)]
     seen = {(0, 0)}
     while True:
@@ -461,7 +461,7 @@ def steps_kept(goal: Goal, plan: Plan, at_least: int = 0) -> int:
 
 
 def _kept_after(goal: Goal, equal: int, kept: int, closed: int) -> Iterator[tuple[int, int]]:
-    """Sets of kept and closed blocks after a step that is left out or is one of `equal`."""
+    """Yield sets of kept and closed blocks after a step that is dropped or is one of `equal`."""
     yield kept, closed
     roles = set()
     free = equal & ~closed
@@ -477,7 +477,7 @@ def _kept_after(goal: Goal, equal: int, kept: int, closed: int) -> Iterator[tupl
 
 @dataclass(frozen=True, kw_only=True)
 class Score(Counts):
-    """Counts of one plan under one criterion and setting, in the fields of records.
+    """Counts of one plan under one criterion and setting, with the field names of records.
 
     `matcher`, `errors` (wrong steps by type), `placed` (the goal vertex of each step), `why` (the
     error of each), `blocks` (goal blocks by outcome) and `kept` (steps that the nearest valid order
@@ -503,15 +503,15 @@ class AssemblyScorer:
     def __init__(self, scene: Scene, candidates: CandidateSet, settings: Sequence[Setting]) -> None:
         self._scene = scene
         self._goals = {setting: Goal(scene, candidates, setting) for setting in settings}
-        # Several models, and a model at several seeds, often give the same plan.
+        # Models and seeds often give the same plan.
         self._kept = functools.lru_cache(_PLANS_KEPT)(self._scores)
 
     def score(
         self, plan: Plan, matchers: Sequence[Matcher], level1: Level1Criterion | None
     ) -> tuple[Score, ...]:
-        """Scores by setting, then matcher; the Level-1 criterion only for scenes of level 1.
+        """Return scores by setting, then matcher; Level-1 criteria only for scenes of level 1.
 
-        Raises KeyError for a step that is no candidate.
+        Raises KeyError for a step that names no candidate.
         """
         return self._kept(plan, tuple(matchers), level1)
 

@@ -1,7 +1,7 @@
-"""Setting C: the score of a plan with poses by geometry, as it stands and after the best motion.
+"""Setting C: the score of a plan with poses by geometry, as given and after the best motion.
 
-With it the error type of each step, the blocks of a finished structure that lie where they should,
-and exact volumes of intersections of convex pieces.
+Also the error type of each step, the goal blocks that a finished structure reaches, and exact
+volumes of intersections of convex pieces.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ from phyblock.types import StepEnd
 
 PoseFrame = Literal["absolute", "aligned"]
 POSE_FRAMES: tuple[PoseFrame, ...] = get_args(PoseFrame)
-"""`absolute`: as the plan stands. `aligned`: after the best shift over the floor and turn about the
-vertical of the whole plan, which is none where none counts more.
+"""`absolute`: the plan as given. `aligned`: after the best shift along the floor and turn about the
+vertical of the whole plan, or as given if no motion scores higher.
 """
 _CM = 100.0
 _DIGITS = 4
@@ -58,7 +58,7 @@ class Laid:
 
 @dataclass(frozen=True)
 class PoseFit:
-    """Distance of a step from its goal block: in all, sideways and up [cm], turned [degrees].
+    """Distance of a step from its goal block: total, sideways and up [cm], and angle [degrees].
 
     `iou` is the intersection over union of the two volumes, None where it was not computed.
     """
@@ -75,8 +75,8 @@ class PoseFit:
 class PoseScore:
     """One plan in one frame.
 
-    `fits` has the fit of each step, None for one that is matched to no block; `right` the number of
-    right steps at each of `TOLERANCES_CM`.
+    `fits` has the fit of each step, None for an unmatched one; `right` the number of right steps at
+    each of `TOLERANCES_CM`.
     """
 
     frame: PoseFrame
@@ -89,8 +89,8 @@ class PoseScore:
 class PoseScorer:
     """Scores plans with poses for one scene; build once, use for every model and seed.
 
-    Steps are turned as their candidates are. `pieces_of` gives the convex pieces of a block in its
-    body frame.
+    Steps have the orientation of their candidates. `pieces_of` returns the convex pieces of a block
+    in its body frame.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class PoseScorer:
         self._poses = _poses([(b.type, b.position_m, b.euler_deg) for b in scene.blocks])
 
     def score(self, steps: Sequence[Laid]) -> tuple[PoseScore, ...]:
-        """The score in each of `POSE_FRAMES`; raises KeyError for a step that is no candidate."""
+        """Return the score in each frame. Raises KeyError for a step that names no candidate."""
         types = [self._types[step.candidate] for step in steps]
         if not steps:
             none = (0,) * len(TOLERANCES_CM)
@@ -123,7 +123,7 @@ class PoseScorer:
         absolute = self._scored("absolute", numbers, types, alignment, Motion())
         aligned: PoseScore | None = None
         for most, motion in alignment.likely_motions()[:_MOST_COUNTED]:
-            # In a valid order no more is within a tolerance than in any.
+            # A valid order has no more steps within a tolerance than an arbitrary one.
             if aligned is not None and sum(aligned.right) >= most:
                 break
             score = self._scored("aligned", numbers, types, alignment, motion)
@@ -152,7 +152,7 @@ class PoseScorer:
         )
         within = [int(near.within[s, v]) for s, v in enumerate(vertices) if v is not None]
         n = len(TOLERANCES_CM)
-        # The widest tolerance comes last, and who is within one is within all wider ones.
+        # The widest tolerance comes last; a step within one is within all wider ones.
         right = tuple(sum(count >= n - place for count in within) for place in range(n))
         return PoseScore(frame, fits, right, len(self._blocks), motion)
 
@@ -201,12 +201,12 @@ PoseError = Literal[
     "toppling",
 ]
 POSE_ERRORS: tuple[PoseError, ...] = get_args(PoseError)
-"""In the order in which a step meets them, of which the first counts: a block is chosen, of a kind
-that the goal does not need, or not so often (`wrong_kind`); it is turned as no such block of the
-goal is (`wrong_rotation`); what it rests on is not there (`too_early`); its place is farther than
-`ERROR_TOLERANCE_CM` from that of its goal block, more to a side or more up or down (`off_sideways`,
-`off_height`); put there, it shares space with others or the floor (`interpenetrating`); let go, it
-does not stay (`floating`), or others do not (`toppling`).
+"""Errors of a step, of which the first that applies counts. The goal does not need a block of its
+kind, or not so often (`wrong_kind`); no such goal block has its orientation (`wrong_rotation`); a
+block that it rests on is missing (`too_early`); its place is farther than `ERROR_TOLERANCE_CM` from
+that of its goal block, mainly sideways or mainly in height (`off_sideways`, `off_height`); it
+overlaps others or the floor (`interpenetrating`); when released, it does not stay (`floating`), or
+others do not (`toppling`).
 """
 ERROR_TOLERANCE_CM = 1.0
 
@@ -226,10 +226,10 @@ def pose_errors(
     fits: Sequence[PoseFit | None],
     ends: Sequence[StepEnd],
 ) -> tuple[PoseError | None, ...]:
-    """The error of each step, None for one that is right and stands.
+    """Return the error of each step, None for one that is right and stands.
 
     `numbers` are those of all steps, including numbers that no candidate has; `fits` are those of
-    the plan as it stands, `ends` those of its execution.
+    the plan as given, `ends` those of its execution.
     """
     placed = 0
     found: list[PoseError | None] = []
@@ -254,7 +254,7 @@ def _unmatched(goal: Goal, number: int, placed: int) -> PoseError:
     error = goal.error(number, placed)
     if error == "incorrect_orientation":
         return "wrong_rotation"
-    # One of several steps for a block, of which another lies nearer, is one too many.
+    # Of several steps for one block, all but the nearest are superfluous.
     is_ready = bool(goal.choices(number, placed))
     return "too_early" if error == "dependency_not_met" and not is_ready else "wrong_kind"
 
@@ -262,7 +262,7 @@ def _unmatched(goal: Goal, number: int, placed: int) -> PoseError:
 def blocks_reached(
     goal: Sequence[Block], blocks: Sequence[Block], within_cm: float, within_deg: float
 ) -> int:
-    """The most goal blocks that can each be given a block of its kind that lies near enough."""
+    """Return how many goal blocks can each be matched to a near enough block of its kind."""
 
     def is_near(one: Block, other: Block) -> bool:
         if one.kind != other.kind:
@@ -321,19 +321,19 @@ def _shared(one: Piece, other: Piece) -> float:
 
 
 def _faces(piece: Piece) -> list[Floats]:
-    """The faces of a polytope, each a polygon (n, 3) in order round it."""
+    """The faces of a polytope, each a polygon (n, 3) in order around it."""
     faces = []
     for normal in (*piece.normals, *-piece.normals):
         heights = piece.corners @ normal
         face = piece.corners[heights > heights.max() - _FLAT]
-        # A semi-cylinder has a face on one side of a pair alone.
+        # A semi-cylinder has a face on only one side of a pair.
         if len(face) > 2:
             faces.append(_round(face, normal))
     return faces
 
 
 def _round(points: Floats, normal: Floats) -> Floats:
-    """Corners of a convex polygon in order round its middle."""
+    """Corners of a convex polygon in order around its center."""
     if len(points) == 3:
         return points
     helper = _AXES[int(np.argmin(np.abs(normal)))]
@@ -344,7 +344,7 @@ def _round(points: Floats, normal: Floats) -> Floats:
 
 
 def _cross(one: Floats, other: Floats) -> Floats:
-    """Vector products along the last axis; `np.cross` takes several times as long on few."""
+    """Vector products along the last axis; `np.cross` is several times slower on a few."""
     a, b, c = one[..., 0], one[..., 1], one[..., 2]
     x, y, z = other[..., 0], other[..., 1], other[..., 2]
     return np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=-1)

@@ -1,12 +1,12 @@
 """Matching the steps of a plan with poses to goal blocks, and moving the whole plan to fit best.
 
-A step is matched to an unplaced, ready block that equals its candidate: as many steps as setting A
-lets place a block. Of all such matchings it is one under which steps are within the most tolerances
-together, and of those one under which they lie nearest.
+Each step is matched to an unplaced, ready block that equals its candidate, for as many steps as
+place a block in setting A. Among such matchings, the one whose steps meet the most tolerances in
+total is used, and among equals the one with the smallest distances.
 
-For the motion, every pair of steps laid upon a pair of equal goal blocks is a hypothesis; the best
-are drawn nearer by weighted least squares over the blocks that they match. The result does not
-depend on where the plan was or how it was turned.
+For the motion, every pair of steps laid on a pair of equal goal blocks is a hypothesis; the best
+are refined by weighted least squares over the blocks that they match. The result does not depend on
+the position and direction of the plan.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ from phyblock.text import plain_sum
 
 
 def cheapest(cost: Floats) -> list[tuple[int, int]]:
-    """Pairs of row and column of the least total cost, as many as the shorter side has, by row.
+    """Pairs of row and column with the least total cost, one for each row or column of the shorter
+    side, by row.
 
     Shortest augmenting paths with potentials (Jonker and Volgenant, *A shortest augmenting path
-    algorithm*, Computing 38, 1987). Of equal totals it takes the same one on every machine.
+    algorithm*, Computing 38, 1987). Among equal totals it takes the same one on every machine.
     """
     rows, columns = cost.shape
     if rows > columns:
@@ -61,17 +62,17 @@ def cheapest(cost: Floats) -> list[tuple[int, int]]:
 
 
 TOLERANCES_CM = (0.5, 1.0, 2.0, 4.0)
-"""The farthest that a right step may be from its place [cm]; the headline is the mean over them."""
+"""The distances within which a step is right [cm]; the headline is the mean over them."""
 TURN_TOLERANCE_DEG = 15.0
-"""The most that a right step may be turned, up to the symmetry of the block [degrees]."""
+"""The angle within which a step is right, up to the symmetry of the block [degrees]."""
 FARTHEST_CM = 20.0
-"""Steps that are farther off cost no more, so that one far away moves no other [cm]."""
+"""Cap of the distance in costs, so that one step far away does not affect the others [cm]."""
 _SLACK = 1e-6
 _DISTANCE_COST = 1e-3
 _IMPOSSIBLE = 1e3
 _MOST_SETS = 4000
-"""Sets of placed blocks that are kept after a step, those that cost least; plans that follow the
-order need no search at all.
+"""Sets of placed blocks that are kept after a step, the cheapest ones; plans in a valid order need
+no search at all.
 """
 
 
@@ -97,14 +98,14 @@ class Nearness:
 
     @property
     def cost(self) -> Floats:
-        """Cost of each pair: the share of tolerances that it misses, and a little by distance."""
+        """Cost of each pair: the share of tolerances that it misses, plus a little for distance."""
         missed = 1 - self.within / len(TOLERANCES_CM)
         far = np.round(np.minimum(self.distance_cm / FARTHEST_CM, 1.0), 9)
         return np.where(self.equal, missed + _DISTANCE_COST * far, _IMPOSSIBLE)
 
 
 def assigned(near: Nearness) -> list[int | None]:
-    """The goal block of each step at the least total cost, in whatever order they are placed."""
+    """The goal block of each step at the least total cost, in any order of placing."""
     vertices: list[int | None] = [None] * len(near.equal)
     for step, vertex in cheapest(near.cost):
         if near.equal[step, vertex]:
@@ -113,7 +114,7 @@ def assigned(near: Nearness) -> list[int | None]:
 
 
 def matched(goal: Goal, numbers: Sequence[int], near: Nearness) -> tuple[int | None, ...]:
-    """The goal block of each step; KeyError for a number that is no candidate."""
+    """The goal block of each step. Raises KeyError for a number that no candidate has."""
     most = most_placed(goal, Plan(tuple(numbers)))
     vertices = assigned(near)
     placed = 0
@@ -127,9 +128,9 @@ def matched(goal: Goal, numbers: Sequence[int], near: Nearness) -> tuple[int | N
 
 
 def _searched(goal: Goal, numbers: Sequence[int], cost: Floats, most: int) -> list[int | None]:
-    """Step by step over the sets of placed blocks, each with the way into it that costs least.
+    """Search step by step over sets of placed blocks, each with the cheapest path to it.
 
-    So many steps as cannot be matched at all may be passed over, where a later one fits better.
+    As many steps as cannot be matched at all may be skipped if a later one fits better.
     """
     spare = len(numbers) - most
     frontier: dict[int, float] = {0: 0.0}
@@ -145,7 +146,7 @@ def _searched(goal: Goal, numbers: Sequence[int], cost: Floats, most: int) -> li
                 if more < costs.get(reached, np.inf):
                     costs[reached], taken[reached] = more, vertex
         if len(costs) > _MOST_SETS:
-            # Passing a step over counts as if it had missed every tolerance.
+            # A skipped step costs as much as one that misses every tolerance.
             ranked = sorted(costs, key=lambda mask: (costs[mask] - mask.bit_count(), mask))
             costs = {mask: costs[mask] for mask in ranked[:_MOST_SETS]}
         frontier = costs
@@ -156,7 +157,7 @@ def _searched(goal: Goal, numbers: Sequence[int], cost: Floats, most: int) -> li
 
 _WIDEST_CM = TOLERANCES_CM[-1]
 _APART_CM = 1.0
-"""Two steps that are nearer to one another give no direction."""
+"""Least distance of two steps from which a direction is computed."""
 _MOST_PAIRS = 6000
 _MOST_TURNED = 240
 _MOST_TRIED = 12
@@ -167,13 +168,13 @@ _PLACE_DIGITS = 3
 
 @dataclass(frozen=True)
 class Motion:
-    """A turn about the vertical through the origin, then a shift over the floor [cm]."""
+    """A turn about the vertical through the origin, then a shift along the floor [cm]."""
 
     turn_rad: float = 0.0
     shift_cm: tuple[float, float] = (0.0, 0.0)
 
     def place(self) -> tuple[float, ...]:
-        """Return numbers that tell motions apart, the same for turns by a full circle more."""
+        """Return numbers that identify a motion, equal for turns that differ by full circles."""
         parts = (math.cos(self.turn_rad), math.sin(self.turn_rad), *self.shift_cm)
         return tuple(round(part, _PLACE_DIGITS) + 0.0 for part in parts)
 
@@ -222,10 +223,10 @@ class Alignment:
         return turn
 
     def likely_motions(self) -> list[tuple[int, Motion]]:
-        """Motions, each with the number of tolerances its steps are within in any order.
+        """Return motions, each with the number of tolerances its steps meet in any order.
 
-        Those with most come first, then those that bring steps nearest. A goal that looks the same
-        after a turn has motions of equal rank, of which the order of steps may allow but one.
+        The highest numbers come first, then the smallest distances. A goal that looks the same
+        after a turn has motions of equal rank, of which the order of steps may allow only one.
         """
         if not self.equal.any():
             return [(0, Motion())]
@@ -251,9 +252,8 @@ class Alignment:
     def _fitted(self, pairs: list[tuple[int, int]], near: Nearness, before: Motion) -> Motion:
         """The motion of weighted least squares over pairs, in the plane of the floor (Kabsch).
 
-        Weights are those under which its fixed points are the peaks of a smooth count of
-        tolerances, a bell for each: pairs that are far off give way to those that can be brought
-        within one more.
+        With these weights, its fixed points are the peaks of a smooth count of tolerances, with a
+        bell curve for each: distant pairs give way to those that can come within one more.
         """
         one = self.steps.centers_cm[[s for s, _ in pairs], :2]
         other = self.goal.centers_cm[[v for _, v in pairs], :2]
@@ -275,7 +275,7 @@ class Alignment:
         )
 
     def _hypotheses(self) -> tuple[Floats, Floats]:
-        """Turns (h,) [rad] and shifts (h, 2) [cm] that lay steps upon equal blocks."""
+        """Turns (h,) [rad] and shifts (h, 2) [cm] that lay steps on equal blocks."""
         p, q = self.steps.centers_cm[:, :2], self.goal.centers_cm[:, :2]
         step, vertex = np.nonzero(self.equal)
         # Pairs of pairs, each once.
@@ -296,15 +296,15 @@ class Alignment:
         shift = target - _turned(middle, turn)
         if len(turn):
             return turn, shift
-        # One step alone tells no turn.
+        # A single step determines no turn.
         return np.zeros(len(step)), q[vertex] - p[step]
 
     def _likeliest(self, turns_rad: Floats, shifts_cm: Floats) -> tuple[Floats, Floats]:
-        """The hypotheses under which most steps have an equal block near, each by itself."""
+        """The hypotheses under which the most steps have an equal block nearby."""
         limits = np.array(TOLERANCES_CM)
 
         def ranked(distance: Floats) -> NDArray[np.int64]:
-            """Places of hypotheses, the best first; of equal ones the same, however numbered."""
+            """Places of hypotheses, best first; ties do not depend on how they are numbered."""
             nearest = distance.min(axis=2)
             within = (nearest[..., None] <= limits + 10**-_DIGITS).sum(axis=(1, 2))
             far = np.round(np.minimum(nearest, FARTHEST_CM).sum(axis=1), _DIGITS)

@@ -6,20 +6,20 @@ sums over all pairs of units that have a base scene in common: the dyadic cluste
 (Aronow, Samii and Assenova, *Cluster-robust variance estimation for dyadic data*, Political
 Analysis 23, 2015), written by inclusion and exclusion (Cameron, Gelbach and Miller, *Robust
 inference with multiway clustering*, Journal of Business & Economic Statistics 29, 2011). Each of
-its terms is taken by leaving units out and measuring again, which needs no derivative of the
-statistic and is less optimistic than one with few clusters (MacKinnon, Nielsen and Webb, *Fast and
+its terms is computed by leaving units out and measuring again, which needs no derivative of the
+statistic and is less optimistic with few clusters (MacKinnon, Nielsen and Webb, *Fast and
 reliable jackknife and bootstrap methods for cluster-robust inference*, Journal of Applied
 Econometrics 38, 2023). docs/statistics.md has the simulation.
 
-Variance components tell how much a varied factor (seed, prompt, background) moves scores. Items are
-crossed with the levels of the factor, and both with *blocks*: the combinations of everything else
-that was varied. The *shift* is the effect of a level on all items alike: the standard deviation of
-the levels' means. The *interaction* is its effect on single items beyond that: the standard
-deviation of an item's scores over levels, without the shift and without what differs from block to
-block. Both are method-of-moments estimates of a crossed design with items as a random facet
+Variance components describe how much a varied factor (seed, prompt, background) moves scores. Items
+are crossed with the levels of the factor, and both with *blocks*: the combinations of everything
+else that was varied. The *shift* is the effect of a level on all items in common: the standard
+deviation of the levels' means. The *interaction* is its effect on single items beyond that: the
+standard deviation of an item's scores over levels, without the shift and the differences between
+blocks. Both are method-of-moments estimates of a crossed design with items as a random facet
 (Cornfield and Tukey, *Average values of mean squares in factorials*, Annals of Mathematical
-Statistics 27, 1956; Brennan, *Generalizability Theory*, 2001). Items of common origin are no
-independent sample, so the error of the levels' means is taken from the jackknife.
+Statistics 27, 1956; Brennan, *Generalizability Theory*, 2001). Items of common origin are not an
+independent sample, so the error of the levels' means comes from the jackknife.
 
 Item analysis is that of classical test theory (Lord and Novick, *Statistical Theories of Mental
 Test Scores*, 1968).
@@ -39,9 +39,9 @@ from phyblock.scoring.plan import Floats, Metric
 
 CONFIDENCE = 0.95
 POWER = 0.8
-"""Share of cases in which the difference that `detectable` names is found."""
+"""Share of cases in which the difference that `detectable` returns is found."""
 _NOTHING = 1e-9
-"""Share of a value that its standard error has by rounding alone."""
+"""Standard error, as a share of the value, that may come from rounding alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class Clusters:
 
     @classmethod
     def of(cls, parents: Sequence[Sequence[str]]) -> Clusters:
-        """Clusters from the names of the base scenes of each unit; a name twice counts once.
+        """Clusters from the names of the base scenes of each unit; duplicate names count once.
 
         Raises ValueError for a unit without a base scene.
         """
@@ -83,9 +83,9 @@ class Clusters:
 class Estimate:
     """A measured value, or an array of them, with its uncertainty.
 
-    `value` is of all units, `se` its standard error, `lo` and `hi` bound the interval, `p` is
-    two-sided against zero, by Student's t with one degree of freedom less than `n_clusters`, which
-    are behind each value. All are of one shape; NaN where there is no value, and in all but `value`
+    `value` is over all units, `se` its standard error, `lo` and `hi` bound the interval, `p` is
+    two-sided against zero, by Student's t with `n_clusters` - 1 degrees of freedom; `n_clusters`
+    are behind each value. All have one shape; NaN where there is no value, and in all but `value`
     with fewer than two clusters.
     """
 
@@ -107,13 +107,13 @@ def jackknife(
     """Estimate `metric` of the summed `counts`, with a t test against zero and its interval.
 
     `counts` has shape (units, *cells, counts of a cell); the result has that of `metric` of the
-    sums, (*cells,) as a rule. A metric that subtracts one cell from another is a paired comparison.
-    `n_clusters`, of the result's shape, says how many clusters are behind each value where some
+    sums, usually (*cells,). A metric that subtracts one cell from another is a paired comparison.
+    `n_clusters`, of the result's shape, is the number of clusters behind each value where some
     cells lack units. Without units there is no value.
 
     For units of one cluster each, the interval of a mean is Student's. The variance is never less
-    than that of units taken as independent, which keeps it above zero where units of common origin
-    go opposite ways. `p` is never less than `least_p`. There is no standard error where leaving
+    than that of independent units, which keeps it above zero where units of common origin differ in
+    opposite directions. `p` is never less than `least_p`. There is no standard error where leaving
     out a cluster leaves nothing to measure.
     """
     from scipy.special import stdtr, stdtrit  # type: ignore[import-untyped]
@@ -138,17 +138,17 @@ def jackknife(
 
 
 def in_range(estimate: Estimate, most: ArrayLike = 1.0) -> Estimate:
-    """The same estimates, with Wilson's interval in the place of Student's where a range is known.
+    """The same estimates, with Wilson's interval instead of Student's where a range is known.
 
-    Values are from 0 to `most`: 1 for shares, infinity for what is never below zero; NaN for no
-    range, which keeps Student's. Of a share p with standard error s, the effective number of
-    samples is p (1 - p) / s^2 (Kish), and where every unit agrees, so that s says nothing, the
-    number of clusters; the interval is that of Wilson (Journal of the American Statistical
+    Values are from 0 to `most`: 1 for shares, infinity for values that are only never below zero,
+    NaN for no range, which keeps Student's. For a share p with standard error s, the effective
+    number of samples is p (1 - p) / s^2 (Kish), or the number of clusters where every unit agrees
+    and s is uninformative; the interval is that of Wilson (Journal of the American Statistical
     Association 22, 1927) with Student's quantile (Dean and Pagano, *Evaluating confidence interval
     methods for binomial proportions in clustered surveys*, Journal of Survey Statistics and
-    Methodology 3, 2015). Any other mean is taken as a share of the end of its range, in the limit
-    where that is infinite. The interval stays in the range and has a width even where nothing
-    varies, unless the range has no end, which leaves no scale for one.
+    Methodology 3, 2015). Any other mean is treated as a share of the end of its range, in the limit
+    if that is infinite. The interval stays in the range and has a width even where nothing varies,
+    unless the range has no end and so no scale.
     """
     from scipy.special import stdtrit
 
@@ -162,13 +162,13 @@ def in_range(estimate: Estimate, most: ArrayLike = 1.0) -> Estimate:
         inverse = 1 / end
         spread = value * (1 - value * inverse)
         is_still = (spread <= 0) | (estimate.se <= _NOTHING * value)
-        # What one cluster that fell at either end would vary by, over `spread`.
+        # The variance of one cluster at either end of the range, over `spread`.
         still = np.where(inverse > 0, 1 / (behind * inverse), 0.0)
         per_spread = np.where(is_still, still, estimate.se**2 / spread)
     scale = 1 + t**2 * per_spread * inverse
     centre = (value + t**2 * per_spread / 2) / scale
     half = t * np.sqrt(per_spread * (spread + t**2 * per_spread / 4)) / scale
-    # Rounding leaves no value outside of its interval.
+    # Rounding must not leave a value outside of its interval.
     lo, hi = np.minimum(centre - half, value), np.maximum(centre + half, value)
     lo, hi = np.maximum(lo, 0.0), np.minimum(hi, end)
     return replace(
@@ -183,9 +183,9 @@ def bounded(estimate: Estimate, most: float) -> Estimate:
 
 
 def least_p(n_clusters: ArrayLike) -> Floats:
-    """The least p value that so many clusters can give: all signs alike, in a sign test.
+    """The least p value that this many clusters can give: that of equal signs in a sign test.
 
-    Without it a few clusters that happen to agree exactly would leave no doubt at all.
+    Without it, a few clusters that happen to agree exactly would give a p value of 0.
     """
     return np.asarray(np.minimum(1.0, 2.0 ** (1.0 - np.asarray(n_clusters, dtype=np.float64))))
 
@@ -196,7 +196,7 @@ def detectable(
     """The difference that a test at `level` finds in `POWER` of cases, in the unit of `se`.
 
     Bloom, *Minimum detectable effects*, Evaluation Review 19, 1995: the sum of the two quantiles
-    of Student's t, times the standard error. NaN with fewer than two clusters, where it is beyond
+    of Student's t, times the standard error. NaN with fewer than two clusters, where it exceeds
     the `most` that values can differ by, and where no sample differs: a standard error of 0 says
     nothing about what could be found.
     """
@@ -212,9 +212,9 @@ def detectable(
 def _in_common(
     clusters: Clusters,
 ) -> Iterator[tuple[int, NDArray[np.intp], NDArray[np.intp]]]:
-    """For one, two, ... base scenes in common: the sign, the units, and the group of each.
+    """Yield, for one, two, ... base scenes in common, the sign, the units, and the group of each.
 
-    A unit of two base scenes is in two groups of one, and in one group of two.
+    A unit with two base scenes is in two groups of one, and in one group of two.
     """
     members = np.sort(clusters.members, axis=1)
     for size in range(1, members.shape[1] + 1):
@@ -229,7 +229,7 @@ def _in_common(
 def _squares(
     counts: Floats, groups: NDArray[np.intp], total: Floats, metric: Metric, value: Floats
 ) -> Floats:
-    """The squared changes of the metric as each group is left out, summed over groups."""
+    """The squared changes of the metric when each group is left out, summed over groups."""
     if not len(groups):
         return np.zeros(value.shape)
     dropped = np.zeros((int(groups.max()) + 1, *total.shape))
@@ -244,7 +244,7 @@ def _measured(metric: Metric, sums: Floats) -> Floats:
 
 
 def holm(p: ArrayLike) -> Floats:
-    """P values corrected for their number (Holm, Scandinavian Journal of Statistics 6, 1979).
+    """P values corrected for multiple tests (Holm, Scandinavian Journal of Statistics 6, 1979).
 
     NaN stays NaN and is not counted.
     """
@@ -260,8 +260,8 @@ def holm(p: ArrayLike) -> Floats:
 def rank_ranges(is_better: ArrayLike) -> NDArray[np.intp]:
     """The best and the worst rank that each of n models may have, shape (n, 2), from 1.
 
-    `is_better` (n, n) says of which pairs it was found that the first is better than the second.
-    With pairs tested together at a level, all ranges hold at once at that level (Mogstad, Romano,
+    `is_better` (n, n) is true for pairs in which the first was found better than the second. With
+    pairs tested together at a level, all ranges hold jointly at that level (Mogstad, Romano,
     Shaikh and Wilhelm, *Inference for ranks*, Review of Economic Studies 91, 2024).
     """
     known = np.asarray(is_better, dtype=bool)
@@ -273,7 +273,7 @@ _TAIL = (1 - CONFIDENCE) / 2
 
 @dataclass(frozen=True)
 class Component:
-    """A standard deviation with its 95 % interval; NaN where it cannot be told."""
+    """A standard deviation with its 95 % interval; NaN where it cannot be estimated."""
 
     sd: float
     lo: float
@@ -287,8 +287,8 @@ def shift(scores: Floats, clusters: Clusters) -> Component:
     """Standard deviation by which levels move the mean over items; (items, levels, blocks).
 
     The interval is that of the noncentrality of an F test of equal levels (Steiger, *Beyond the F
-    test*, Psychological Methods 9, 2004), with the jackknife's error and one degree of freedom less
-    than base scenes; it begins at 0 where the test finds nothing.
+    test*, Psychological Methods 9, 2004), with the jackknife's error and its degrees of freedom; it
+    begins at 0 where the test finds nothing.
     """
     from scipy.special import ncfdtr, ncfdtrinc
 
@@ -309,7 +309,7 @@ def shift(scores: Floats, clusters: Clusters) -> Component:
     f = total / error
 
     def end(p: float) -> float:
-        """From the noncentrality at which F is at most `f` with probability `p`."""
+        """The end from the noncentrality at which F is at most `f` with probability `p`."""
         is_none = ncfdtr(df, df_error, 0.0, f) <= p
         noncentrality = 0.0 if is_none else float(ncfdtrinc(df, df_error, p, f))
         return float(np.sqrt(noncentrality * error) / df)
@@ -320,7 +320,7 @@ def shift(scores: Floats, clusters: Clusters) -> Component:
 def interaction(scores: Floats, clusters: Clusters) -> Component:
     """Standard deviation by which levels move items beyond the shift; (items, levels, blocks).
 
-    With one block it cannot be told from noise.
+    With one block it cannot be separated from noise.
     """
     items, levels, blocks = scores.shape
     if items < 2 or levels < 2 or blocks < 2 or clusters.size < 2:
@@ -374,7 +374,7 @@ def spread_of_items(scores: Floats, clusters: Clusters) -> Component:
     if items < 3 or clusters.size < 3:
         return NO_COMPONENT
     means = scores.reshape(items, -1).mean(axis=1)
-    # Centered first: what is left of large squares would be noise.
+    # Centered first: the difference of large squares would be noise.
     means = means - means.mean()
     counts = np.stack([np.ones(items), means, means**2], axis=1)
     estimate = jackknife(
@@ -386,13 +386,13 @@ def spread_of_items(scores: Floats, clusters: Clusters) -> Component:
 
 
 def _of_variance(variance: float, se: float, noise: float = 0.0, *, most: float) -> Component:
-    """The component of `variance`, which is a mean square less `noise`.
+    """The component of `variance`, which is a mean square minus `noise`.
 
-    The mean square has the interval of chi-square with the degrees of freedom that its error stands
-    for (Satterthwaite, *An approximate distribution of estimates of variance components*,
-    Biometrics Bulletin 2, 1946), less `noise` too, and not below zero. An error that was estimated
-    is at times far too small, even 0: there are at `most` as many degrees of freedom as independent
-    base scenes have.
+    The mean square has the interval of chi-square with the degrees of freedom that its error
+    implies (Satterthwaite, *An approximate distribution of estimates of variance components*,
+    Biometrics Bulletin 2, 1946), also minus `noise`, and not below zero. An estimated error is
+    sometimes far too small, even 0, so the degrees of freedom are at `most` those of independent
+    base scenes.
     """
     from scipy.special import chdtri
 

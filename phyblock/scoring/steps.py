@@ -1,10 +1,10 @@
 """Building one block at a time: the effect of a move, under a setting and a gating.
 
-A move names a candidate, not a block, so several goal blocks can be what it placed. An assembly
+A move names a candidate, not a block, so it may have placed any of several goal blocks. An assembly
 keeps every set of placed blocks that explains the moves that succeeded (as the `optimal` matcher
-does for whole plans) and lets a move succeed when one of them allows it: then no valid order can
-fail. One of these sets is the world that is shown; where only another one allows a move, blocks
-that look alike change places.
+does for whole plans), and a move succeeds when one of them allows it: so no valid order can fail.
+One of these sets is the world that is shown; if only another one allows a move, blocks that look
+the same change places.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ MOVE_OUTCOMES: tuple[MoveOutcome, ...] = ("placed", *ERROR_TYPES, "invalid")
 
 @dataclass(frozen=True)
 class Move:
-    """The effect of one move: `vertex` is the goal block that it put into the world, or None.
+    """The effect of one move: `vertex` is the goal block that it placed, or None.
 
-    `swapped` are the pairs (from, to) of vertices by which earlier blocks changed places, so that
+    `swapped` are pairs (from, to) of vertices between which earlier blocks changed places so that
     this move could succeed.
     """
 
@@ -36,11 +36,11 @@ class Move:
 
 
 def gated(scene: Scene, gating: Gating) -> Scene:
-    """Return the scene with the dependencies that the gating asks for.
+    """Return the scene with the dependencies of the gating.
 
-    `aov` is the scene itself: a block waits for those it depends on. Under `layer` it waits for
-    all blocks of the layers below, as in the official code; layers are longest paths of
-    dependencies, with which some official files disagree.
+    `aov` is the scene itself: a block waits for those it depends on. Under `layer` it waits for all
+    blocks of lower layers, as in the official code; layers are longest paths of dependencies, with
+    which some official files disagree.
     """
     if gating == "aov":
         return scene
@@ -87,7 +87,7 @@ class Assembly:
         return tuple(n for n in numbers if any(self._goal.choices(n, m) for m in self._frontier))
 
     def exact_moves(self) -> tuple[int, ...]:
-        """The right moves that look just like a block that can be placed in the world as shown."""
+        """The right moves that look like a block that can be placed in the world as shown."""
         ready = self._goal.graph.ready(self.placed)
         looks = {self.scene.blocks[vertex].look for vertex in ready}
         return tuple(n for n in self.right_moves() if self.candidates[n].look in looks)
@@ -144,9 +144,9 @@ def placed_counts(
 ) -> Counts:
     """Counts over the blocks in the world, made of the candidates `chosen` (Table 3's layout).
 
-    The world has seen to the order, so a block is a true positive when the goal has one that is
-    equal under the setting, one-to-one. The vertices `fallen` no longer stand where they belong:
-    the candidates that were placed there are false positives, whatever they are.
+    The world enforces the order, so a block is a true positive when the goal has one that is equal
+    under the setting, one-to-one. The vertices `fallen` have collapsed: all candidates placed there
+    are false positives.
     """
     attribute = "look" if setting == "A" else "kind"
     standing = list(chosen)
@@ -160,7 +160,7 @@ def placed_counts(
 
 
 def attempted_counts(placed: Counts, attempts: int) -> Counts:
-    """Counts over every attempted move, those that placed nothing being false positives too."""
+    """Counts over every attempted move, where moves that placed nothing are false positives too."""
     return Counts(placed.tp, attempts - placed.tp, placed.fn)
 
 
