@@ -14,7 +14,15 @@ from phyblock.domain.scene import MAX_CANDIDATES, CandidateSet, Kind, Scene
 from phyblock.errors import Problem
 from phyblock.making.scenes.sketch import POSES, find_twins
 from phyblock.sim.contact import FIT_TOLERANCE_M, GROUND, find_gaps, find_overlaps, support_graph
-from phyblock.sim.dynamics import DEFAULT_TRIAL, Stability, Trial, check, check_steps
+from phyblock.sim.dynamics import (
+    DEFAULT_TRIAL,
+    Stability,
+    Trial,
+    check,
+    check_steps,
+    groups,
+    is_proven,
+)
 from phyblock.sim.pictures import LEAST_SHOWN, PictureStyle, hidden_blocks, visible_shares
 from phyblock.text import csv_cell
 
@@ -296,12 +304,12 @@ def findings_of(facts: SceneFacts, names: Iterable[str]) -> Iterator[Finding]:
 
 
 def is_acceptable(scene: Scene, palette: tuple[Kind, ...]) -> bool:
-    """True if a scene could enter a data set, each of its blocks to be seen in the goal picture.
-
-    It ends at the first fault.
+    """True if a scene could enter a data set: proven to stand, so that no engine lets it fall, and
+    each of its blocks to be seen in the goal picture. It ends at the first fault.
     """
     facts = SceneFacts(scene, palette=palette)
-    return next(findings_of(facts, (*FORM, "hidden", *PHYSICS)), None) is None
+    found = findings_of(facts, (*FORM, "hidden", *PHYSICS))
+    return all(map(is_proven, groups(scene.blocks))) and next(found, None) is None
 
 
 Task = tuple[Scene, CandidateSet | None]

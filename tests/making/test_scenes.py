@@ -28,9 +28,11 @@ from phyblock.making.scenes.production import (
     split_tasks,
 )
 from phyblock.making.scenes.sketch import PALETTES, POSES, Draft, colorless, scene_of, transformed
+from phyblock.sim import dynamics
 from phyblock.sim.balance import is_balanced, surely_falls, surely_stands
 from phyblock.sim.contact import bounds_m, find_gaps, find_overlaps, support_graph
-from phyblock.sim.dynamics import groups
+from phyblock.sim.dynamics import groups, is_proven
+from phyblock.sim.engine import installed_engines
 from phyblock.sim.pictures import drawn_m, hidden_blocks
 from phyblock.workers import open_workers
 from tests.shipped import TASKS
@@ -164,9 +166,14 @@ def test_shares_add_up(count: int, levels: set[int]) -> None:
     assert {level for share in found for level in map(int, share.group.split("+"))} <= levels
 
 
-@pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.slow)])
-def test_every_scene_is_accepted_again_with_the_long_trial(scenes: list[Scene], every: int) -> None:
-    for scene in scenes[::every]:
+@pytest.mark.parametrize("engine", installed_engines())
+def test_every_scene_is_accepted_again_in_every_engine_without_its_proof(
+    scenes: list[Scene], engine: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert all(is_proven(group) for scene in scenes for group in groups(scene.blocks))
+    monkeypatch.setenv("PHYBLOCK_PHYSICS", engine)
+    monkeypatch.setattr(dynamics, "is_proven", lambda _: False)
+    for scene in scenes[::3]:
         assert list(findings_of(SceneFacts(scene), (*FORM, *PHYSICS))) == []
         assert hidden_blocks(scene) == ()
 

@@ -63,6 +63,8 @@ _THEMES: dict[Group, tuple[str, ...]] = {
 }
 _LEAST: dict[Group, int] = {"1": 2, "1+2": 3, "2": 4, "3": 6, "4": 13, "5": 23}
 _TRIES = 25
+_KEPT = 2048
+"""Base scenes that are remembered, as many variations are drawn from each."""
 _MAX_LOOKS = 14
 
 
@@ -92,6 +94,11 @@ def draw(request: Request) -> Scene | None:
     if request.parents:
         name, blocks = _variation(request)
         return _fitting(name, request.group, blocks)
+    return _drawn_base(request)
+
+
+@functools.lru_cache(maxsize=_KEPT)
+def _drawn_base(request: Request) -> Scene | None:
     names = _THEMES[request.group]
     name, rng = names[request.number % len(names)], request.rng()
     for _ in range(_TRIES):
