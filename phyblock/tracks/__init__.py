@@ -1,4 +1,4 @@
-"""One module a track: what it asks, how replies are read and scored, its baselines and records.
+"""One module per track: its requests, the parsing and scoring of replies, baselines and records.
 
-`phyblock.registry` lists the tracks. Outside this package only verbs that belong to one name it.
+`phyblock.registry` lists the tracks. Outside this package, only commands of a track name it.
 """

@@ -1,8 +1,8 @@
-"""Tracks: what each declares, and how it asks and judges in a suite.
+"""Tracks: what each declares, and its requests and judgements in a suite.
 
-A track is one class. Its class attributes declare it; an instance is the track as a suite opens
-it. Most ask once a sample (`request`, `judge`); one that `plays` starts an episode of several turns
-instead (`start`). What those about scenes share is in `SceneTrack`.
+A track is one class. Its class attributes declare it; an instance is the track opened for a suite.
+Most tracks send one request per sample (`request`, `judge`); one that `plays` starts an episode of
+several turns instead (`start`). `SceneTrack` holds what tracks about scenes share.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ from phyblock.tracks.prompts import Prompt, TemplatePrompt
 from phyblock.types import AnswerFormat, CandidateOrder
 
 ENGINE = "physics"
-"""Key in a track's identity of the physics engine that decides its results, where that is not the
-engine of reference. Its results stand in the records.
+"""Key in a track's identity of the physics engine that affects its results, unless it is the
+reference engine. Results of the engine are in the records.
 """
 CARRYING = "carrying"
-"""The same of the version of how plans are carried out and what stands is measured."""
+"""Key of the version of plan execution and its measurements."""
 
 
 class Item(Protocol):
@@ -61,70 +61,70 @@ ItemT = TypeVar("ItemT", bound=Item)
 
 @dataclass(frozen=True)
 class Judgement:
-    """A reply as it was read and scored: `fields` of its record, as `parse` and `scores`."""
+    """A parsed and scored reply: `fields` of its record, such as `parse` and `scores`."""
 
     is_read: bool
     fields: Mapping[str, Any]
 
 
 class Episode(Protocol):
-    """One sample of several turns, as a state machine that replies alone drive.
+    """One sample of several turns, as a state machine driven only by replies.
 
-    The same replies lead to the same requests, so that a killed run goes on in the middle of it.
+    The same replies lead to the same requests, so that a killed run continues within an episode.
     """
 
     async def request(self) -> Request | None:
         """Return the next request, or None when the episode has ended."""
 
     def take(self, reply: Reply, prompt: SentPrompt | None = None) -> None:
-        """Go on with the reply to the last request, which was sent with this prompt."""
+        """Advance by the reply to the last request, which was sent with this prompt."""
 
     def judgement(self) -> Judgement:
-        """Return what the replies came to; its fields hold `turns`, a mapping for each of them."""
+        """Return the judgement of the replies; its fields hold `turns`, one mapping per reply."""
 
 
 class Track(ABC):
-    """A track: its declaration, and its items in one suite, all of which every seed repeats."""
+    """A track: its declaration, and its items in one suite, which every seed repeats."""
 
     name: ClassVar[str]
     """Its name in suites and records."""
     title: ClassVar[str]
     """Its name for people."""
     item: ClassVar[str] = "scene"
-    """The noun for what it asks about."""
+    """The noun for its items."""
     section: ClassVar[str] = ""
-    """The key of its own section of a suite, where it has one."""
+    """The key of its own section of a suite, if it has one."""
     options: ClassVar[type[BaseModel] | None] = None
     """The model of that section."""
     template: ClassVar[Path]
-    """The bundled prompt; one that asks for JSON lies beside it, and its name ends in _json.j2."""
+    """The bundled prompt; the one that asks for JSON is beside it and ends in _json.j2."""
     baselines: ClassVar[Mapping[str, Callable[..., str]]] = {}
-    """Rules that answer, given the subject of a request and a random generator, by name."""
+    """Rules by name, which answer from the subject of a request and a random generator."""
     by_hand: ClassVar[Callable[..., Picking] | None] = None
-    """Choices of a person who answers about a subject; None where nothing can be picked."""
+    """The choices of a person who answers about a subject; None if people cannot answer."""
     record: ClassVar[type[Record] | None] = None
-    """The model of its records; None for one that adds nothing to them."""
+    """The model of its records; None if it adds no fields."""
     counted: ClassVar[tuple[SampleCounts, ...]] = ()
-    """The counts that its measures are made of; some are taken as a sample is judged."""
+    """The counts that its measures are computed from; some are taken when a sample is judged."""
     results: ClassVar[Mapping[str, Any]] = {}
-    """Further arguments of `read_report`, beside its YAML file."""
+    """Further arguments of `read_report`, besides its YAML file."""
     varies: ClassVar[tuple[str, ...]] = ("repeats",)
-    """Factors of a suite's section `vary` that change what it asks."""
+    """Factors of a suite's section `vary` that change its requests."""
     plays: ClassVar[bool] = False
     """True if a sample is an episode of several turns."""
     simulates: ClassVar[bool] = False
-    """True if blocks are let go in a physics engine, where its section does not say otherwise."""
+    """True if blocks are released in a physics engine, unless its section says otherwise."""
 
     items: Sequence[Any]
     drawn_seeds: Sequence[int]
-    """The seeds of the suite, of those that show the same only the first."""
+    """The seeds of the suite; of seeds with the same presentation only the first."""
 
     def __init__(
         self, suite: Suite, dataset: Dataset, limit: int | None = None, shop: Workshop | None = None
     ) -> None:
         """Open the track on at most `limit` items; without a shop it makes no requests.
 
-        Raises SpecError, DataError or PromptError with what is wrong.
+        Raises SpecError, DataError or PromptError for invalid input.
         """
         self.suite, self.dataset, self.limit, self.shop = suite, dataset, limit, shop
         self.spec: Any = None if self.options is None else suite.section(self.options)
@@ -141,7 +141,7 @@ class Track(ABC):
     @classmethod
     @functools.cache
     def report(cls) -> TrackReport:
-        """Return what tables and figures are made by: the YAML file of its name, and `results`."""
+        """Return the layout of tables and figures, from the YAML file of its name and `results`."""
         return read_report(cls.name, cls.counted, **cls.results)
 
     @classmethod
@@ -153,23 +153,23 @@ class Track(ABC):
 
     @classmethod
     def prompt_field(cls) -> tuple[str, ...]:
-        """Return the path of keys to its prompt in a suite."""
+        """Return the keys that lead to its prompt in a suite."""
         is_own = cls.options is not None and "prompt" in cls.options.model_fields
         return (cls.section, "prompt") if is_own else ("prompt",)
 
     @classmethod
     def lets_go(cls, suite: Mapping[str, Any]) -> bool:
-        """True if a suite, as a manifest holds it, lets blocks go in a physics engine."""
+        """True if a suite in a manifest releases blocks in a physics engine."""
         return cls.simulates and (suite.get(cls.section) or {}).get("physics") != "off"
 
     @classmethod
     def has_own_data(cls) -> bool:
-        """True if its section names data of its own, by `path` and `format`."""
+        """True if its section names its own data, by `path` and `format`."""
         return cls.options is not None and {"path", "format"} <= cls.options.model_fields.keys()
 
     @classmethod
     def template_for(cls, form: AnswerFormat) -> Path | None:
-        """Return the bundled prompt that asks for answers in a form, None where there is none."""
+        """Return the bundled prompt for an answer format, or None."""
         path = cls.template
         if form != "text":
             path = path.with_name(f"{path.stem}_json.j2")
@@ -177,34 +177,34 @@ class Track(ABC):
 
     @property
     def prompt_name(self) -> str:
-        """Name of the prompt; "" where every model is a recording."""
+        """Name of the prompt; "" if every model is a recording."""
         return "" if self.prompt is None else self.prompt.name
 
     def open_prompt(self) -> Prompt:
-        """Return the prompt of the suite; PromptError for a broken one."""
+        """Return the prompt of the suite. Raises PromptError for a broken one."""
         return template_prompt(self.suite, self.name)
 
     def shown(self, item: Any, _seed: int) -> Any:
-        """Return the item as a seed shows it, by which it is asked, judged and counted."""
+        """Return the item as presented under a seed, used for requests, judgements and counts."""
         return item
 
     def about(self, _item: Any) -> dict[str, Any]:
-        """Return the fields of records about an item besides its scene."""
+        """Return the fields of records about an item, besides its scene."""
         return {}
 
     @abstractmethod
     def draw(self, item: Any) -> tuple[Drawing, ...]:
-        """Return the pictures of an item as it is shown, in the order sent."""
+        """Return the pictures of a presented item, in the order sent."""
 
     def drawings(self, item: Any) -> tuple[Drawing, ...]:
-        """Return what `draw` does, computed once for each form in which an item is shown."""
+        """Return the result of `draw`, computed once for each presentation of an item."""
         name = item.key, getattr(item, "order", ())
         if name not in self._drawings:
             self._drawings[name] = self.draw(item)
         return self._drawings[name]
 
     def facts(self, item: Any, pictures: Sequence[Image]) -> dict[str, object]:
-        """Return what templates may use; nothing in it gives an answer away."""
+        """Return the variables of templates; none of them reveals the answer."""
         form = self.form(item)
         return {
             "pictures": [picture.label for picture in pictures],
@@ -215,11 +215,11 @@ class Track(ABC):
         }
 
     def json_form(self, item: Any) -> AnswerForm[Any]:
-        """Return the form of an answer as JSON, where it has a prompt that asks for it."""
+        """Return the JSON form of an answer, if a prompt asks for it."""
         raise NotImplementedError
 
     def form(self, item: Any) -> AnswerForm[Any] | None:
-        """Return the form in which an answer is asked for; None where that is text."""
+        """Return the requested form of an answer; None for text."""
         return None if self.suite.answer_format == "text" else self.json_form(item)
 
     def subject_of(self, item: Any) -> object:
@@ -227,13 +227,13 @@ class Track(ABC):
         return item
 
     def judge(self, item: Any, text: str | None) -> Judgement:
-        """Read and score a reply; None, where there is no reply, is scored as nothing said."""
+        """Parse and score a reply; a missing reply (None) is scored as an empty one."""
         raise NotImplementedError
 
     def counts(self, item: Any, record: Record) -> dict[str, tuple[float, ...]]:
         """Return the counts of a sample that measures need besides its scores, by name.
 
-        They are empty where a measure does not count it.
+        Counts are empty if their measures do not count the sample.
         """
         return {
             one.name: tuple(map(float, one.sample(item, record) or ()))
@@ -246,9 +246,9 @@ class Track(ABC):
         return (*self.counted, *(one.counted for one in added_measures(self.name)))
 
     async def judge_apart(self, item: Any, text: str | None, _earlier: Record | None) -> Judgement:
-        """Return what `judge` does; where that takes long, beside the calls of others.
+        """Return the result of `judge`, computed in another process if it takes long.
 
-        Of an earlier record of the same sample it may take what replies alone do not decide.
+        Results that replies alone do not determine may come from an earlier record of the sample.
         """
         return self.judge(item, text)
 
@@ -261,12 +261,12 @@ class Track(ABC):
     def again(self, item: Any, record: Record) -> Episode:
         """Return the episode of a record before its first reply, to be judged again.
 
-        What replies alone do not decide, as what fell, is taken from the record.
+        Results that replies alone do not determine, such as falls, come from the record.
         """
         raise NotImplementedError
 
     def identity(self) -> dict[str, Any]:
-        """Return what decides its results as JSON: prompt, pictures, physics engine."""
+        """Return everything that determines its results as JSON: prompt, pictures, engine."""
         identity: dict[str, Any] = {"prompt": None, "pictures": None}
         if self.prompt is not None:
             shown = [self.shown(item, s) for s in self.drawn_seeds for item in self.items]
@@ -290,10 +290,10 @@ class Track(ABC):
         return self.asked(item, seed, params, self.messages(item, pictures))
 
     def outlines(self, item: Any) -> Iterator[Request]:
-        """Yield the requests of an item as far as they are known before any is answered.
+        """Yield the requests of an item as far as they are known before any reply.
 
-        With seed 0 and no parameters, made without rendering: a picture that is not at hand is
-        empty, and so is one that cannot be known.
+        They have seed 0 and no parameters. Nothing is rendered: a picture that is not in the cache,
+        or not known yet, is empty.
         """
         pictures = () if self.shop is None else self.shop.outlines(self.drawings(item))
         yield self.asked(item, 0, {}, () if self.shop is None else self.messages(item, pictures))
@@ -312,7 +312,7 @@ class Track(ABC):
         subject: object = None,
         turn: int = 0,
     ) -> Request:
-        """Return the request with these messages; of an episode that of a turn, from 1."""
+        """Return the request with these messages; in an episode, for a turn counted from 1."""
         key, form = f"{item.key}/{turn}" if turn else item.key, self.form(item)
         version = self.prompt.version if messages and self.prompt is not None else ""
         about = subject or self.subject_of(item)
@@ -320,7 +320,9 @@ class Track(ABC):
         return Request(key, seed, messages, params, version, about, wanted)
 
     async def work_out(self, work: Callable[[], Any]) -> Any:
-        """Return what `work`, a `partial`, gives in another process; without a shop in a thread."""
+        """Return the result of `work`, a `partial`, from another process, or without a shop from a
+        thread.
+        """
         if self.shop is None:
             return await asyncio.to_thread(work)
         return await self.shop.work_out(work)
@@ -332,10 +334,10 @@ class Track(ABC):
 
 
 class SceneTrack(Track):
-    """A track about scenes, as a seed shows them; its section may hold `PictureControls`."""
+    """A track about scenes; its section may hold `PictureControls`."""
 
     draws: ClassVar[bool] = False
-    """True if its pictures are drawn here, so that those of a data set will not do."""
+    """True if it draws its own pictures and cannot use those of a data set."""
 
     def open(self) -> None:
         """Select scenes evenly over levels."""
@@ -349,21 +351,21 @@ class SceneTrack(Track):
             raise SpecError(Problem(where, message, "images.source", "dataset", hint=hint))
 
     def draw(self, item: AssemblyTask) -> tuple[Drawing, ...]:
-        """Return the pictures of goal and candidates as a suite wants them."""
+        """Return the pictures of goal and candidates in the style of the suite."""
         return scene_drawings(item, self.suite.images)
 
     def shown(self, item: AssemblyTask, seed: int) -> AssemblyTask:
-        """Return the scene as a seed shows it."""
+        """Return the scene as presented under a seed."""
         return presented(item, seed, self.suite.candidates.order, is_blind=self.is_blind)
 
     def about(self, item: AssemblyTask) -> dict[str, Any]:
-        """Return how the scene is shown, where not as the file has it."""
+        """Return the presentation of the scene, if it differs from the file's."""
         if not item.order:
             return {}
         return {"shown": {"order": list(item.order), "blind": item.is_blind}}
 
     def facts(self, item: AssemblyTask, pictures: Sequence[Image]) -> dict[str, object]:
-        """Return what templates may use; nothing in it gives an answer away."""
+        """Return the variables of templates; none of them reveals the answer."""
         images = self.suite.images
         return {
             **super().facts(item, pictures),
@@ -377,12 +379,12 @@ def select_tasks(
 ) -> tuple[AssemblyTask, ...]:
     """Return the tasks of a suite's levels and difficulty, at most `limit`, in their order.
 
-    They are evenly spread, and a higher limit keeps all that a lower one keeps.
+    They are evenly spread, and a higher limit keeps all tasks of a lower one.
     """
     levels, difficulty = set(suite.levels), suite.dataset.difficulty
     chosen = [task for task in tasks if levels & set(task.scene.levels)]
     if difficulty.ranges:
-        from phyblock.tracks.difficulty import is_within  # Few suites ask for it.
+        from phyblock.tracks.difficulty import is_within  # Few suites need it.
 
         chosen = [task for task in chosen if is_within(task, difficulty)]
     kept = set(_fair_order([task.scene.level for task in chosen])[:limit])
@@ -390,21 +392,23 @@ def select_tasks(
 
 
 def interleaved(items: Sequence[ItemT]) -> list[ItemT]:
-    """Return items in an order in which any first few are a fair sample of levels and scenes."""
+    """Return items in an order in which the first few are always a fair sample of levels and
+    scenes.
+    """
     return [items[position] for position in _fair_order([item.scene.level for item in items])]
 
 
 def stratified(sizes: Sequence[int], limit: int) -> list[int]:
-    """Return `limit` places shared among groups of the given sizes, as `_fair_order` shares."""
+    """Return how many of `limit` places each group of the given sizes gets, as by `_fair_order`."""
     groups = [group for group, size in enumerate(sizes) for _ in range(size)]
     chosen = [groups[position] for position in _fair_order(groups)[:limit]]
     return [chosen.count(group) for group in range(len(sizes))]
 
 
 def spread(size: int) -> list[int]:
-    """Return the positions 0 to `size` - 1, of which any first few are evenly spread.
+    """Return the positions 0 to `size` - 1 in an order whose first few are always evenly spread.
 
-    They are taken at 0, 1/2, 1/4, 3/4, 1/8, ... of the size: the sequence of van der Corput (1935).
+    They are at 0, 1/2, 1/4, 3/4, 1/8, ... of the size: the sequence of van der Corput (1935).
     """
     digits = max(1, (size - 1).bit_length())
     parts = (int(f"{i:0{digits}b}"[::-1], 2) for i in range(2**digits))
@@ -412,10 +416,10 @@ def spread(size: int) -> list[int]:
 
 
 def _fair_order(strata: Sequence[int]) -> list[int]:
-    """Return all positions: strata in turn by their sizes, positions of each evenly spread.
+    """Return all positions, alternating between strata by size and evenly spread in each.
 
-    Every stratum gets one place before any gets two; then each place goes to the stratum that has
-    least for its size (Webster's method, which is monotone in the number of places).
+    Every stratum gets one place before any gets two; then each place goes to the stratum with the
+    fewest for its size (Webster's method, which is monotone in the number of places).
     """
     members: dict[int, list[int]] = {}
     for position, stratum in enumerate(strata):
@@ -431,7 +435,7 @@ def _fair_order(strata: Sequence[int]) -> list[int]:
 def presented(
     task: AssemblyTask, seed: int, order: CandidateOrder, *, is_blind: bool = False
 ) -> AssemblyTask:
-    """Return the task as a seed shows it; itself where that is as the file has it."""
+    """Return the task as presented under a seed; the task itself if nothing differs."""
     if order == "shuffled":
         return in_order(task, shown_order(task, seed), seed, is_blind=is_blind)
     numbers = range(1, len(task.candidates) + 1)
@@ -439,9 +443,9 @@ def presented(
 
 
 def shown_order(task: AssemblyTask, seed: int) -> tuple[int, ...]:
-    """Return the candidates' numbers in the file, in the order that a seed draws for the scene.
+    """Return the candidates' numbers in the file, in the order that the seed gives the scene.
 
-    It is sorted by digests, so that it is the same on every machine and with every library.
+    The order is a sort by digests, so that it is the same on every machine.
     """
     numbers = range(1, len(task.candidates) + 1)
     place = functools.partial(drawn_bytes, "candidate order", seed, task.scene.id)
@@ -453,7 +457,7 @@ def in_order(
 ) -> AssemblyTask:
     """Return the task with the candidates of these numbers in the file, in this order.
 
-    Raises DataError for a number that no candidate has, and for one that is there twice.
+    Raises DataError for a number that no candidate has, and for a repeated one.
     """
     n = len(task.candidates)
     if len(set(numbers)) < len(numbers) or not set(numbers) <= set(range(1, n + 1)):
@@ -470,20 +474,20 @@ def as_recorded(task: AssemblyTask, record: Record) -> AssemblyTask:
 
 
 def file_plan(task: AssemblyTask, steps: Sequence[int]) -> tuple[int, ...] | None:
-    """Return steps in the numbers of the file, None where those are the ones shown.
+    """Return steps in the numbers of the file, or None if the file's numbers were shown.
 
-    A number that no candidate has stays as it is: no candidate has it in the file either.
+    A number that no candidate has is kept: no candidate has it in the file either.
     """
     order = task.order
     return tuple(order[n - 1] if 1 <= n <= len(order) else n for n in steps) if order else None
 
 
 kinds, kind_of = known_tracks, known_track
-"""All tracks by name, and the one of a name."""
+"""Lookups of all tracks by name, and of one."""
 
 
 def simulating(suite: Mapping[str, Any]) -> tuple[type[Track], ...]:
-    """Return the tracks of a suite, as a manifest holds it, that use a physics engine."""
+    """Return the tracks of a suite in a manifest that use a physics engine."""
     asked = [kind for name, kind in kinds().items() if name in (suite.get("tracks") or ())]
     return tuple(kind for kind in asked if kind.lets_go(suite))
 
@@ -491,7 +495,7 @@ def simulating(suite: Mapping[str, Any]) -> tuple[type[Track], ...]:
 def open_tracks(
     suite: Suite, dataset: Dataset, limit: int | None = None, shop: Workshop | None = None
 ) -> tuple[Track, ...]:
-    """Return the tracks of a suite, in its order, as `Track` opens them."""
+    """Return the tracks of a suite, in its order; raises as `Track`."""
     for name in suite.tracks:
         kind, field = kind_of(name), "answer_format"
         if kind.template_for(suite.answer_format) is None:

@@ -1,10 +1,10 @@
 """Guesses at questions from other questions of their set.
 
-Guesses are told the answers of other questions only: questions are split into folds by the base
-scene they are about, and those of a fold are answered by rules learned from questions whose scenes
-have no base scene of that fold. Where answers are balanced over the whole set, such a probe comes
-out below chance: what is right more often than its share in the known questions is right less often
-in those held out. Only what lies above chance tells of a shortcut.
+Guesses use only the answers of other questions: questions are split into folds by base scene, and
+those of a fold are answered by rules learned from questions whose scenes have no base scene of that
+fold. If answers are balanced over the whole set, such a probe scores below chance: an option that
+is right more often than its share in the known questions is right less often in the held-out ones.
+Only a score above chance indicates a shortcut.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from collections.abc import Callable, Sequence
 from phyblock.domain.question import Question, Subtask, is_picture_option
 
 Rule = Callable[[Question], tuple[int, ...]]
-"""A guess: the indices that `Question.answer` would hold."""
+"""A guess at `Question.answer`: the indices of options."""
 FOLDS = 5
-"""Parts that a set is learned in: each is answered by what the other four teach."""
+"""Number of folds: each is answered by rules learned from the others."""
 
 
 class Folds:
-    """Questions dealt into five folds by the base scene that they are filed under, in turn."""
+    """Questions dealt into five folds in turn, by their first base scene."""
 
     def __init__(self, questions: Sequence[Question]) -> None:
         self._questions = questions
@@ -29,21 +29,21 @@ class Folds:
         self._fold = {base: place % FOLDS for place, base in enumerate(bases)}
 
     def of(self, question: Question) -> int:
-        """Return the fold of a question; KeyError where its base scene was not dealt."""
+        """Return the fold of a question. Raises KeyError if its base scene was not dealt."""
         return self._fold[_bases(question)[0]]
 
     def is_known(self, fold: int, question: Question) -> bool:
-        """True if a question shares no base scene with those of a fold."""
+        """True if a question shares no base scene with the questions of a fold."""
         return all(self._fold.get(base) != fold for base in _bases(question))
 
     def known(self, fold: int, subtask: Subtask) -> list[Question]:
-        """Return the questions of a subtask that share no base scene with those of a fold."""
+        """Return the questions of a subtask that share no base scene with a fold."""
         mine = (question for question in self._questions if question.subtask == subtask)
         return [question for question in mine if self.is_known(fold, question)]
 
 
 class Guesses:
-    """Guesses at questions of a set, or at rotations of them, by rules that `learn` makes."""
+    """Guesses at questions of a set, or at rotations of them, by rules that `learn` returns."""
 
     def __init__(
         self, questions: Sequence[Question], learn: Callable[[Sequence[Question]], Rule]
@@ -60,10 +60,10 @@ class Guesses:
 
 
 def majority_rule(known: Sequence[Question]) -> Rule:
-    """Learn to pick the option whose words are right most often where they are shown.
+    """Learn to pick the option whose text is most often right when it is offered.
 
-    Words that were never seen count as right one time in four. Options that are pictures or
-    lettered places go by the letter that is right most often; an order is the most frequent one.
+    An unseen text counts as right one time in four. For options that are pictures or lettered
+    places, the letter counts instead of the text; for orders, the most frequent one is picked.
     """
     letters = Counter(question.answer for question in known)
     right = Counter(question.options[question.answer[0]] for question in known)

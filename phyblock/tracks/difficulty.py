@@ -1,4 +1,4 @@
-"""Difficulty of scenes as measured numbers, by which a suite may choose."""
+"""Measured difficulty of scenes, by which a suite may select them."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from phyblock.scoring.plan import Goal, match_plan
 
 
 def log_orders(graph: AOVGraph) -> float:
-    """Return the decimal logarithm of how many orders of placing there are, at the least.
+    """Return the decimal logarithm of a lower bound on the number of valid orders.
 
-    It is n! over the numbers of blocks that need each, or that each needs, itself among them:
-    exact where no block rests on two others, or no two on one.
+    The bound is n! divided, for each block, by the number of blocks that need it (or that it
+    needs), itself included: exact if no block rests on two others, or no two rest on one.
     """
     needed = [0] * len(graph)
     for vertex in sorted(range(len(graph)), key=graph.layers.__getitem__):
@@ -28,8 +28,8 @@ def log_orders(graph: AOVGraph) -> float:
 
 
 def distractor_distance(task: AssemblyTask) -> float:
-    """Return in how many of type, color and orientation the nearest distractor differs from a look
-    that is needed, on average over these; 3 where there is no distractor.
+    """Return in how many of type, color and orientation the nearest distractor differs from a
+    needed look, averaged over needed looks; 3 without distractors.
     """
     needed = {block.look: block for block in task.scene.blocks}
     others = [one for one in task.candidates.candidates if one.look not in needed]
@@ -54,9 +54,9 @@ MEASURES: Mapping[str, Callable[[AssemblyTask], float]] = {
     "blind": _blind_f1,
     "distractor": distractor_distance,
 }
-"""The numbers of a scene, by the names of `DifficultySpec`."""
+"""The measures of a scene, by the names in `DifficultySpec`."""
 
 
 def is_within(task: AssemblyTask, spec: DifficultySpec) -> bool:
-    """True if all numbers of a scene are within the ranges that a suite asks for."""
+    """True if all measures of a scene are within the ranges of a suite."""
     return all(low <= MEASURES[name](task) <= high for name, (low, high) in spec.ranges.items())

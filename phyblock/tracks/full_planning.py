@@ -28,20 +28,20 @@ from phyblock.tracks.prompts import OfficialPrompt, Prompt
 
 
 class PlanningSpec(PictureControls):
-    """Presentation of scenes in the full_planning track, beside `images` and `candidates`."""
+    """Presentation of scenes in the full_planning track, besides `images` and `candidates`."""
 
 
 class PlanParse(Line):
-    """The plan that was read in a reply."""
+    """The plan that was parsed from a reply."""
 
     parser: str
     """Parser of replies."""
     rule: str | None
     """The rule that matched; null: nothing could be parsed."""
     plan: tuple[int, ...]
-    """Candidate numbers in order, as they were shown."""
+    """Candidate numbers in order, as shown to the model."""
     file_plan: tuple[int, ...] | None = None
-    """The same in the numbers of the file; null: they are the numbers that were shown."""
+    """The same in the numbers of the file; null: they are the numbers shown."""
     dropped: tuple[int, ...] = ()
     """Numbers that no candidate has."""
     version: int = 1
@@ -49,7 +49,7 @@ class PlanParse(Line):
     problem: str | None = None
     """Reason why nothing could be parsed."""
     truncated: bool = False
-    """True where the text breaks off within the plan."""
+    """True if the text breaks off within the plan."""
 
 
 class PlanRecord(Record):
@@ -58,13 +58,13 @@ class PlanRecord(Record):
     track: Literal["full_planning"]
     """`full_planning`."""
     parse: PlanParse | None = None
-    """The plan that was read."""
+    """The parsed plan."""
 
 
 @dataclass(frozen=True)
 class PlanSubject:
-    """The scene that baselines and people answer about; `guess` gives a plan that was learned
-    without the goal, or with the areas of its colors alone where that `sees_colors`.
+    """The scene that baselines and people answer about; `guess` returns a plan learned without
+    the goal, or with only the areas of its colors if it `sees_colors`.
     """
 
     scene: Scene
@@ -78,11 +78,11 @@ def plan_text(steps: Iterable[int]) -> str:
 
 
 _RANDOM_STEPS = 4
-"""As in the paper's Random row."""
+"""The number of steps in the paper's Random row."""
 
 
 def _in_valid_order(choose: Callable[[PlanSubject, Block, np.random.Generator], int | None]) -> Any:
-    """Return the rule that takes a random valid order, and what is chosen for each block."""
+    """Return the rule that takes a random valid order, and chooses a candidate for each block."""
 
     def rule(subject: PlanSubject, rng: np.random.Generator) -> str:
         blocks, order = subject.scene.blocks, subject.scene.graph.random_order(rng)
@@ -94,14 +94,14 @@ def _in_valid_order(choose: Callable[[PlanSubject, Block, np.random.Generator], 
 
 
 def _turned(subject: PlanSubject, block: Block, rng: np.random.Generator) -> int | None:
-    """Return a candidate of the block's kind that looks otherwise, or None."""
+    """Return a candidate of the block's kind that looks different, or None."""
     listed = enumerate(subject.candidates.candidates, 1)
     wrong = [n for n, one in listed if one.kind == block.kind and one.look != block.look]
     return wrong[int(rng.integers(len(wrong)))] if wrong else None
 
 
 def needed_candidate(subject: Any, block: Block) -> int:
-    """Return the number of the candidate that looks like a block; DataError for none."""
+    """Return the number of the candidate that looks like a block. Raises DataError for none."""
     index: int | None = subject.candidates.index_of(block.look)
     if index is None:
         found = f"{block.color} {block.type} turned {block.euler_deg}"
@@ -130,7 +130,7 @@ def pick_plan(subject: PlanSubject) -> Picking:
     return Picking(
         candidate_choices(len(subject.candidates)),
         least=1,
-        most=99,  # Far above what any goal has.
+        most=99,  # Far more than any goal has.
         repeats=True,
         noun="step",
         write=lambda picks: plan_text(pick.place + 1 for pick in picks),
@@ -141,11 +141,11 @@ def pick_plan(subject: PlanSubject) -> Picking:
 def pose_choices(
     scene: Scene, candidates: CandidateSet, steps: Sequence[int]
 ) -> Iterator[tuple[bool, bool]]:
-    """Yield, for each kind that could be chosen wrongly and was named, True if the pose that is
+    """Yield two booleans for each named kind whose pose could be wrong: True if the pose that is
     listed first is right, and True if the pose that was named first is.
 
-    Such a kind is needed in one pose or several, and offered in a pose in which it is not. Numbers
-    that no candidate has name nothing.
+    Such a kind is needed in one or more poses, and also offered in others. Numbers that no
+    candidate has are ignored.
     """
     needed = {block.look for block in scene.blocks}
     offered = [(one.kind, one.look in needed) for one in candidates.candidates]
@@ -160,7 +160,7 @@ def pose_choices(
 
 
 def pose_counts(item: Any, record: Any) -> tuple[int, ...]:
-    """Return the numbers of `POSE_COUNTS` of a plan or an episode."""
+    """Return the counts of `POSE_COUNTS` for a plan or an episode."""
     choices = Counter(pose_choices(item.scene, item.candidates, record.parse.plan))
     of = {first: choices[first, True] for first in (True, False)}
     return of[True], of[True] + choices[True, False], of[False], of[False] + choices[False, False]
@@ -172,7 +172,7 @@ POSE_COUNTS = SampleCounts(
 
 
 def _steps(score: Score) -> tuple[float, ...]:
-    """Count steps; under `membership` they count over again, so no plan has a value of its own."""
+    """Count steps; under `membership` repeated ones count again, so no single plan has a value."""
     alone = score.criterion != "membership"
     f1 = Counts(score.tp, score.fp, score.fn).f1 or 0.0
     whole = alone and score.fp == score.fn == 0
@@ -185,7 +185,7 @@ def _wrong_steps(score: Score) -> list[int] | None:
 
 
 def _blocks(score: Score) -> tuple[float, ...] | None:
-    """Count plans whose order counts."""
+    """Count plans under criteria that require an order."""
     if score.criterion != "aov" or score.kept is None:
         return None
     blocks, outcomes = score.tp + score.fn, score.blocks or {}
@@ -204,7 +204,7 @@ COUNTS = (
 
 
 def _film(record: PlanRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
-    """Yield each step by the headline's score; a wrong one puts no block."""
+    """Yield each step by the headline score; a wrong step places no block."""
     yield FilmStep(f"{record.model}, {record.scene}", "plain", None, ())
     score = next((score for score in record.scores if score.placed is not None), None)
     if score is None or score.placed is None or score.why is None or record.parse is None:
@@ -239,7 +239,7 @@ class FullPlanning(SceneTrack):
     varies = ("prompt", "background", "view", "candidate_order", "layout", "repeats")
 
     def open(self) -> None:
-        """Select scenes; DataError where the data set is to bring their pictures and lacks some."""
+        """Select scenes. Raises DataError if the data set lacks pictures that it must provide."""
         super().open()
         suite, dataset = self.suite, self.dataset
         self._guess = blind_guesses(suite, dataset.tasks, suite.settings[0])
@@ -252,7 +252,7 @@ class FullPlanning(SceneTrack):
             raise DataError(Problem(where, message, "images.source", found, hint=hint))
 
     def open_prompt(self) -> Prompt:
-        """Return the official prompt or a template."""
+        """Return the official prompt, or a template."""
         if self.suite.prompt != "official":
             return super().open_prompt()
         if self.suite.dataset.format != "official":
@@ -263,15 +263,15 @@ class FullPlanning(SceneTrack):
         return OfficialPrompt(official_prompt(self.suite.files.dataset))
 
     def json_form(self, item: AssemblyTask) -> AnswerForm[list[int]]:
-        """Return the form of a plan as JSON."""
+        """Return the JSON form of a plan."""
         return plan_form(len(item.candidates))
 
     def subject_of(self, item: AssemblyTask) -> PlanSubject:
-        """Return what baselines answer about."""
+        """Return the subject of baselines."""
         return PlanSubject(item.scene, item.candidates, functools.partial(self._guess, item))
 
     def judge(self, item: AssemblyTask, text: str | None) -> Judgement:
-        """Read and score a reply; None, where there is no reply, is scored as an empty plan."""
+        """Parse and score a reply; a missing reply (None) is scored as an empty plan."""
         suite, parsed, key = self.suite, ParsedPlan(Plan(), None), (item.key, item.candidates)
         if text is not None:
             parsed = parse_plan(text, len(item.candidates), suite.parser)

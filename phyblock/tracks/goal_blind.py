@@ -1,7 +1,7 @@
-"""Plans made without seeing the goal: by how often blocks like each candidate are needed.
+"""Plans made without seeing the goal, from how often blocks like each candidate are needed.
 
-They may also go by how much of each color the picture of the goal shows, and by nothing else in it.
-A scene is never answered by what is known of a scene that shares a base scene with it.
+They may also use how much of each color the picture of the goal shows, and nothing else in it. The
+plan of a scene never uses scenes that share a base scene with it.
 """
 
 from __future__ import annotations
@@ -27,24 +27,24 @@ from phyblock.types import CandidateOrder, Setting, View
 
 Floats = NDArray[np.float64]
 _MOST_COPIES = 6
-"""More of one unit are never named."""
+"""The most times that one unit is named."""
 _PRIOR = 4.0
-"""So many units of the overall frequency are mixed into every row of a table."""
+"""Weight of the overall frequency in every row of a table, in units."""
 _THRESHOLDS = (0.0, 0.1, 0.14, 0.18, 0.23, 0.3, 0.4)
 _SIDE_PX = 128
 """Side of the pictures in which colors are measured [pixels]."""
 Areas = Mapping[str, float]
-"""Share of each color in what a picture shows of blocks; colors that it does not show are absent.
+"""Share of each color in the area of blocks in a picture; colors that it does not show are absent.
 """
 
 
 @dataclass(frozen=True)
 class Unit:
-    """One thing under a setting: a candidate in A, all candidates of a kind in B.
+    """A group of candidates that are equal under a setting: one in A, all of a kind in B.
 
     `numbers` are those of its candidates, `candidate` is the first of them. `poses` is how many
     candidates its kind has, `rank` its place among them from 0. `area` is the share of its color in
-    the picture of the goal, where that is known.
+    the picture of the goal, if known.
     """
 
     numbers: tuple[int, ...]
@@ -80,7 +80,7 @@ def units(candidates: CandidateSet, setting: Setting, areas: Areas | None = None
 
 
 def related(scenes: Sequence[Scene]) -> list[list[int]]:
-    """Return for each scene the places of those that share a base scene with it, its own too."""
+    """Return for each scene the places of scenes that share a base scene with it, its own too."""
     bases = [{scene.id, *scene.parents} for scene in scenes]
     by_base: dict[str, set[int]] = defaultdict(set)
     for place, names in enumerate(bases):
@@ -97,11 +97,11 @@ def goal_blind_plans(
     repeats: bool = True,
     areas: Mapping[str, Areas] | None = None,
 ) -> dict[str, Plan]:
-    """Return for each scene a plan that was learned from the scenes unrelated to it.
+    """Return for each scene a plan learned from unrelated scenes.
 
-    Every key, threshold and order is a way to make plans; of each scene the way is taken that
-    scores best on the unrelated ones. Without `repeats` no candidate is named twice. `areas` are
-    those of the colors of each goal, by scene.
+    Every combination of key, threshold and order is a way to make plans; each scene uses the way
+    that scores best on the unrelated scenes. Without `repeats` no candidate is named twice. `areas`
+    are those of the colors of each goal, by scene.
     """
     if not scenes:
         return {}
@@ -137,9 +137,9 @@ def goal_blind_plans(
 def chances(
     offered: Sequence[Sequence[Unit]], goals: Sequence[Goal], kin: Sequence[Sequence[int]], key: Key
 ) -> list[Floats]:
-    """Return by scene, unit and number of copies how likely the goal has at least so many.
+    """Return, for each scene, the probability that the goal has at least n copies of a unit.
 
-    Shape (units, copies); rows of the table that were rarely seen are drawn towards the whole.
+    Shape (units, copies); rare rows of the table are shrunk towards the overall frequency.
     """
     copies = np.arange(1, _MOST_COPIES + 1)
     needed = [
@@ -158,7 +158,7 @@ def _heights(
     goals: Sequence[Goal],
     kin: Sequence[Sequence[int]],
 ) -> list[Floats]:
-    """Return for each unit the mean height, 0..1, of blocks of its type and pose elsewhere."""
+    """Return for each unit the mean height, 0..1, of its type and pose in unrelated scenes."""
     values = []
     for scene, of, goal in zip(scenes, offered, goals, strict=True):
         layers, rows = scene.graph.layers, []
@@ -168,7 +168,7 @@ def _heights(
             rows.append((bool(equal), height))
         values.append(np.array(rows))
     keys = [[(unit.candidate.type, unit.candidate.look[2]) for unit in of] for of in offered]
-    # Sums of which a part was taken away again are known to nine digits.
+    # Sums from which a part was subtracted are accurate to nine digits.
     return [
         ((part[:, 2] + whole[2] / max(whole[1], 1.0)) / (part[:, 1] + 1.0)).round(9)
         for part, whole in _left_out(keys, values, kin)
@@ -180,7 +180,7 @@ def _left_out(
     values: Sequence[NDArray[Any]],
     kin: Sequence[Sequence[int]],
 ) -> Iterator[tuple[Floats, Floats]]:
-    """Yield for each scene sums over the unrelated ones, by unit and of all; rows are counted."""
+    """Yield for each scene the sums over unrelated ones, by unit and in total; rows are counted."""
     row_of = {key: row for row, key in enumerate(dict.fromkeys(chain.from_iterable(keys)))}
     rows = [[row_of[key] for key in of] for of in keys]
     table = np.zeros((len(keys), len(row_of), 1 + values[0].shape[1]))
@@ -195,7 +195,7 @@ def _left_out(
 def _plans(
     offered: Sequence[Unit], by_key: Sequence[Floats], heights: Floats, *, repeats: bool
 ) -> list[Plan]:
-    """Return the plans of every way: what is likely enough by height, once or again and again."""
+    """Return the plans of every way: all likely units by height, once or repeatedly."""
     copies = by_key[0].shape[1]
     own = np.array([len(unit.numbers) for unit in offered])
     unit, copy = (of.ravel() for of in np.indices((len(offered), copies)))
@@ -208,7 +208,7 @@ def _plans(
         least = np.minimum(_THRESHOLDS, likely[:, 0].max())
         any_copy = likely.ravel() >= least[:, None]
         first = any_copy & is_first
-        # Where every unit is likely enough, none is named again.
+        # If every unit is likely enough, none is named again.
         any_copy[0] = first[0]
         sorted_by = [(number[by], any_copy[:, by], first[:, by]) for by in orders]
         for n, (numbers, *named), again in product(range(len(least)), sorted_by, {False, repeats}):
@@ -218,7 +218,7 @@ def _plans(
 
 @functools.lru_cache(maxsize=4096)
 def color_areas(scene: Scene, view: View) -> Areas:
-    """Return the share of each color in what the picture of a goal shows of its blocks."""
+    """Return the share of each color in the area of blocks in the picture of a goal."""
     camera = goal_camera(scene, PictureStyle.from_view(view, _SIDE_PX))
     seen = segments(scene.blocks, camera, _SIDE_PX)
     shown = [scene.blocks[vertex].color for vertex in seen[seen >= 0].tolist()]
@@ -228,15 +228,15 @@ def color_areas(scene: Scene, view: View) -> Areas:
 def blind_guesses(
     suite: Suite, pool: Sequence[AssemblyTask], setting: Setting
 ) -> Callable[..., Plan]:
-    """Return what gives the plan for a task of a pool, in the numbers that are shown.
+    """Return a function from a task of a pool to its plan, in the numbers that are shown.
 
-    Where it is asked for one that `sees_colors`, their areas in the picture of the goal have a part
-    in it. A place in the list tells something only where the order is the file's, so plans are
-    learned anew for every order. A goal is not learned from, whichever is shown.
+    A plan that `sees_colors` also uses their areas in the picture of the goal. A place in the list
+    is informative only in the file's order, so plans are learned separately for every order. The
+    task's own goal is never used, in whatever order it is shown.
     """
     order, view = suite.candidates.order, suite.images.view
 
-    @functools.cache  # A key of `_learned` holds all scenes: to hash it takes milliseconds.
+    @functools.cache  # A key of `_learned` holds all scenes, and hashing it takes milliseconds.
     def learned(seed: int, sees_colors: bool) -> dict[str, Plan]:
         return _learned(tuple(pool), order, seed, setting, view if sees_colors else None)
 

@@ -1,7 +1,7 @@
 """Measures of a track: counts of samples, the cells that they are summed in, values of the sums.
 
-Beside a track's module stands a YAML file of its name with its headline, notes, measures and
-tables, which are data: `read_report` joins it with the counts.
+A YAML file beside a track's module, with its name, declares its headline, notes, measures and
+tables; `read_report` joins it with the counts.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from phyblock.sim.film import FilmStep
 
 Way = tuple[str, str, str]
-"""Setting, matcher and criterion that a sample was scored by; "" where there is no choice."""
+"""Setting, matcher and criterion of a score; "" where there is no choice."""
 SCORED_BY = ("setting", "matcher", "criterion")
 """Columns of the parts of a `Way`."""
 CELL = "cell"
-"""Column of the cell that samples are summed in."""
+"""Column of the cell in which samples are summed."""
 OVERALL = "overall"
 """The name of the cell of all samples."""
 Better = Literal["higher", "lower"]
@@ -40,11 +40,10 @@ Unit = Literal["%", "cm", "degrees", "steps", "blocks", ""]
 
 @dataclass(frozen=True)
 class Cell:
-    """A part of what a track asks about, as a level or a subtask: a column of its tables.
+    """A part of a track, such as a level or a subtask: a column of its tables.
 
-    Samples of a cell are summed, where they are scored by several criteria those of its own. Where
-    `of` names other cells, it is the unweighted mean of these instead, and has no value where one
-    of them has none.
+    Its value comes from the sum of its samples, under its own criterion if there are several. If
+    `of` names other cells, it is their unweighted mean instead, without a value if one has none.
     """
 
     name: str
@@ -71,16 +70,15 @@ def level_cells(suite: Suite, _: Manifest) -> tuple[Cell, ...]:
 
 @dataclass(frozen=True)
 class SampleCounts:
-    """Counts of samples, one for each of the `columns`, from which measures are made.
+    """Counts of samples, one for each of the `columns`, from which measures are computed.
 
-    `sample` counts when a reply is judged: it is given the item that was asked about and the
-    record, in which its numbers are kept. Instead of it, `record` counts a record as it is read, or
-    `score` each of its scores. None: it is not counted. `cells` are its own where they are not the
-    track's.
+    `sample` counts when a reply is judged: it gets the item and the record, which stores its
+    numbers. Instead, `record` counts a record when it is read, or `score` each of its scores. None
+    means that the sample is not counted. `cells` replace those of the track.
 
-    With `parts`, the samples of one group, as the rotations of a question, count as one, right only
-    if all of so many are. `alike` names fields of `run.yaml` that decide the counts: runs that
-    differ in one cannot be compared.
+    With `parts`, the samples of one group, such as the rotations of a question, count as one, which
+    is right only if all `parts` are. `alike` names fields of `run.yaml` that affect the counts:
+    runs that differ in one cannot be compared.
     """
 
     name: str
@@ -93,7 +91,7 @@ class SampleCounts:
     alike: tuple[str, ...] = ()
 
     def of(self, record: Record) -> Iterator[tuple[Way, Sequence[float]]]:
-        """Yield what is counted as a record is read, with the way in which that was scored."""
+        """Yield the counts of a record with the way in which each was scored."""
         if self.record is not None and (numbers := self.record(record)):
             yield ("", "", ""), numbers
         if (count := self.score) is None:
@@ -107,11 +105,11 @@ class SampleCounts:
 class Measure:
     """One number about a model.
 
-    `value` makes it of summed counts, shape (..., columns of `counted`), NaN where it is not
-    defined. `heading`, `meaning` and `over` (what is counted) are for people; `unit` "%" stands for
-    values in [0, 1] that tables show times 100. `chance` says what guessing gives in a cell that is
-    no mean. One that `is_difference` of two shares may be below zero. Values in another unit are
-    from 0 to `most` where that is given, infinity for none.
+    `value` computes it from summed counts, shape (..., columns of `counted`), NaN where it is not
+    defined. `heading`, `meaning` and `over` (the noun of what is counted) are for people; `unit`
+    "%" means values in [0, 1] that tables show times 100. `chance` is the value of guessing in a
+    cell that is not a mean. A measure that `is_difference` of two shares may be below zero. Values
+    in another unit are from 0 to `most` if that is given, infinity for no limit.
     """
 
     name: str
@@ -128,7 +126,7 @@ class Measure:
 
     @property
     def heading_in_unit(self) -> str:
-        """The heading with the unit of values in brackets, where they have one."""
+        """The heading, with the unit of values in brackets if they have one."""
         return in_unit(self.heading, self.unit)
 
     @property
@@ -140,37 +138,37 @@ class Measure:
 
     @property
     def best(self) -> float:
-        """The value of a perfect sample, as it is shown; NaN where no value is the best."""
+        """The value of a perfect sample, as shown; NaN if no value is the best."""
         if self.better == "lower":
             return math.nan if math.isnan(self.end_of_range) else 0.0
         return self.scale * self.end_of_range if math.isfinite(self.end_of_range) else math.nan
 
     @property
     def scale(self) -> float:
-        """The factor of a value where it is shown."""
+        """The factor by which values are multiplied when shown."""
         return 100.0 if self.unit == "%" else 1.0
 
     @property
     def most_apart(self) -> float:
-        """The most that two values can differ by, as they are shown; infinite without a bound."""
+        """The most that two values can differ by, as shown; infinite without a bound."""
         return self.scale * (2 if self.is_difference else 1) if self.unit == "%" else math.inf
 
 
 def in_unit(heading: str, unit: str) -> str:
-    """Return a heading with the unit of the values below it in brackets, where they have one."""
+    """Return a heading, with the unit of the values below it in brackets if they have one."""
     return f"{heading} ({unit})" if unit else heading
 
 
 @dataclass(frozen=True)
 class LayoutColumn:
-    """Columns of a table: a measure each, in one cell or in several.
+    """Columns of a table: one per measure, in one cell or in several.
 
-    `measures` are names, with headings where a column is not headed as its measure. `cells` are
-    `one` (`cell`, the last of the track where it is left out), `each`, `parts` (each but the last)
-    or `means` (parts that are means of others). `show` gives the value, the ends of the interval,
-    or both. `group` heads neighbors; in it, in headings and in `key`, the name in CSV files,
-    `{cell}`, `{group}`, `{level}`, `{measure}` and `{criterion}` stand for what a column is of. In
-    a headline, models are ranked by the column that is `main`, else by the last.
+    `measures` are names, with headings where they differ from the measure's own. `cells` are `one`
+    (`cell`, by default the last of the track), `each`, `parts` (each but the last) or `means`
+    (parts that are means of others). `show` selects the value, the ends of the interval, or both.
+    `group` is a heading over neighbors; in it, in headings and in `key`, the name in CSV files, the
+    placeholders `{cell}`, `{group}`, `{level}`, `{measure}` and `{criterion}` are filled in. In a
+    headline, models are ranked by the column that is `main`, else by the last.
     """
 
     measures: Mapping[str, str] | Sequence[str] = ()
@@ -185,13 +183,13 @@ class LayoutColumn:
 
     @property
     def headings(self) -> dict[str, str]:
-        """The measures with their headings, "" for those headed by their own."""
+        """The measures with their headings, "" for the measure's own."""
         if isinstance(self.measures, Mapping):
             return dict(self.measures)
         return dict.fromkeys(self.measures, "")
 
     def places(self, cells: Sequence[Cell]) -> list[Cell]:
-        """Return the cells that it has columns for, of those of a track."""
+        """Return the cells of a track that it has columns for."""
         if self.cells == "one":
             return [cell for cell in cells if cell.name == self.cell] or [cells[-1]]
         parts = cells if self.cells == "each" else cells[:-1]
@@ -200,9 +198,9 @@ class LayoutColumn:
 
 @dataclass(frozen=True)
 class Layout:
-    """A table: a row a model; by `rows`, a row a model and cell, or one a model and measure.
+    """A table with a row per model or, by `rows`, per model and cell or per model and measure.
 
-    `drawn` says that its shares are a figure as well.
+    If `drawn`, its shares are also drawn as a figure.
     """
 
     caption: str
@@ -214,20 +212,19 @@ class Layout:
 
 @dataclass(frozen=True)
 class TrackReport:
-    """The measures of a track, and what is shown of them.
+    """The measures of a track and their presentation.
 
-    `cells` are those of a suite and its run, the last of which stands for all. `headline` are the
-    columns that models are ranked by, where it is empty the first measure in every cell. `notes`
-    say how its values are counted: Jinja templates that are given the `suite`, the `spec` (the
-    track's section of it) and the `manifest`; those that come out empty are left out. `floors`
-    names baselines that never see the goal, `short` the column of `Run.summary`, `success` the
-    measure that is 1 where a sample is wholly right.
+    `cells` are those of a suite and its run; the last is the whole. `headline` are the columns that
+    models are ranked by; if it is empty, the first measure in every cell. `notes` explain how
+    values are counted: Jinja templates with the variables `suite`, `spec` (the track's section of
+    it) and `manifest`; empty results are dropped. `floors` names baselines that never see the goal,
+    `short` the column of `Run.summary`, `success` the measure that is 1 if a sample is wholly
+    right.
 
-    `part_names` say what `Record.part` stands for. `items` opens, for the page of a run in a
-    folder, what was asked about where that is more than scenes, and gives of a record what has a
-    `question` as it was shown; it raises DataError where that is not what the run was made on.
-    `film` shows a record step by step: a frame for the start, one a step, and one for the end,
-    without blocks where no task is given.
+    `part_names` explain `Record.part`. `items`, for tracks about more than scenes, opens the items
+    of a run in a folder for its page, and returns the item of a record, with its `question` as
+    shown; it raises DataError for other data than the run's. `film` shows a record step by step: a
+    frame for the start, one per step, and one for the end, without blocks if no task is given.
     """
 
     measures: tuple[Measure, ...]
@@ -243,7 +240,7 @@ class TrackReport:
     film: Callable[[Any, AssemblyTask | None], Iterator[FilmStep]] | None = None
 
     def heading(self, kind: str, name: str) -> str:
-        """Return the heading of the measure `<kind>_<name>`, of none the name in plain words."""
+        """Return the heading of the measure `<kind>_<name>`, or the name itself as words."""
         plain = name.replace("_", " ").capitalize()
         return next((m.heading for m in self.measures if m.name == f"{kind}_{name}"), plain)
 
@@ -256,9 +253,9 @@ def read_report(
 ) -> TrackReport:
     """Return the report of a track: its YAML file, joined with what is code.
 
-    Measures stand in groups that share fields. Each is the sum of the columns in `part` (by default
-    the column of its name) over that of `whole`, a mean where its unit is not "%" or it says so; or
-    the `mean_of` others of its counts, or the `difference_of` two. `code` has the fields of
+    Measures are in groups that share fields. Each is the sum of the columns in `part` (by default
+    the column of its name) over that of `whole`, a mean if its unit is not "%" or it says so; or
+    the `mean_of` others of its counts, or the `difference_of` two. `code` has those fields of
     measures, by name, that are functions.
     """
     told = read_own_yaml(Path(__file__).with_name(f"{track}.yaml"))
@@ -298,5 +295,5 @@ def _divided(by: Metric, columns: Sequence[str], *named: Sequence[str]) -> Metri
 def _combined(
     measures: Mapping[str, Measure], names: Sequence[str], join: Callable[[list[Any]], Any]
 ) -> Metric:
-    """Return the metric that joins the values of measures, which need not be there yet."""
+    """Return the metric that joins the values of measures, which may be declared later."""
     return lambda sums: np.asarray(join([measures[name].value(sums) for name in names]))

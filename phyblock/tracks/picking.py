@@ -1,4 +1,4 @@
-"""Answers that people put together by hand: choices that are picked, with numbers beside them."""
+"""Answers that people make by hand: picked choices, with numbers."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from phyblock.sim.pictures import GRID_COLUMNS
 
 @dataclass(frozen=True)
 class Choice:
-    """One thing to pick: its name as the prompt says it, and what it says where that is a text.
+    """One thing to pick: its name in the prompt, and its text if it has one.
 
-    It is seen in the last picture of each label: whole, or in the `cell`, from 0, of the grid that
-    fills the square at the right end.
+    It is in the last picture of each label: the whole picture, or `cell`, from 0, of the grid in
+    the square at the right end.
     """
 
     name: str
@@ -33,8 +33,8 @@ class Choice:
 
 @dataclass(frozen=True)
 class NumberField:
-    """A number that goes with every pick: its name and unit, from `-most` to `most` with so many
-    `decimals`. Keys change it by `step`, or by `leap`.
+    """A number that goes with every pick: its name and unit, from `-most` to `most` with at most
+    `decimals` decimals. Keys change it by `step`, or by `leap`.
     """
 
     name: str
@@ -61,9 +61,9 @@ class Pick:
 class Picking:
     """An answer made of choices that are picked one after another.
 
-    From `least` to `most` of them, each as often as one likes where `repeats`; `noun` is what one
-    pick is called. `fields` are the numbers that go with each. `write` makes the reply, in the form
-    that the prompt asks for. `task` says in one line what to do.
+    `least` to `most` are picked, with `repeats` any of them repeatedly; `noun` is the name of one
+    pick. `fields` are the numbers that go with each. `write` makes the reply in the form that the
+    prompt asks for. `task` says in one line what to do.
     """
 
     choices: tuple[Choice, ...]
@@ -76,15 +76,15 @@ class Picking:
     task: str = ""
 
     def without_cells(self) -> Picking:
-        """Return the same with choices that are not looked for in grids."""
+        """Return the same with choices that are whole pictures."""
         plain = (one if one.cell is None else Choice(one.name, one.text) for one in self.choices)
         return replace(self, choices=tuple(plain))
 
     def reply(self, picks: Sequence[Pick]) -> str:
-        """Return the reply that picks make.
+        """Return the reply made of picks.
 
-        Raises ValueError for too few or many, places that there are not, repeats where none may
-        be, and numbers that are lacking or not allowed.
+        Raises ValueError for too few or too many, unknown places, repeats that are not allowed,
+        and numbers that are missing or not allowed.
         """
         places, n_fields = [pick.place for pick in picks], len(self.fields)
         if (
@@ -111,5 +111,5 @@ class Picking:
 def candidate_choices(
     n_candidates: int, labels: tuple[str, ...] = ("composite", "candidates")
 ) -> tuple[Choice, ...]:
-    """Return the numbered candidates of a scene, wherever a picture with a label shows them."""
+    """Return the numbered candidates of a scene as choices in the pictures with these labels."""
     return tuple(Choice(str(n + 1), "", labels, n) for n in range(n_candidates))

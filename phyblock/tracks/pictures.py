@@ -44,16 +44,16 @@ from phyblock.types import BACKGROUNDS
 _Result = TypeVar("_Result")
 _WORKERS = 4
 _KEPT = 256
-"""Pictures that stay in memory: more than are under way at once."""
+"""Pictures kept in memory: more than are in use at once."""
 _PNG_START, _PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """A picture to be made: what it shows, the digest of what decides it, and how to make it.
+    """A picture to be made: its label, the digest of everything that determines it, and `make`.
 
-    `make` runs in a worker process: a `partial` of a function of a module. `size_px` are width and
-    height of the picture. One that `is_file` is read, and not kept in the cache.
+    `make` runs in a worker process: a `partial` of a module-level function. `size_px` are width and
+    height of the picture. A drawing that `is_file` is read, and not kept in the cache.
     """
 
     label: str
@@ -64,10 +64,10 @@ class Drawing:
 
 
 class Workshop:
-    """Draws pictures and does other long work in processes, which start with the first of it.
+    """Draws pictures and does other long work in processes, which start on first use.
 
-    Pictures are kept in `folder` by content, and the last ones in memory. `rendered` counts those
-    made in this object's lifetime.
+    Pictures are kept in `folder` by content, and the last ones in memory. `rendered` counts the
+    pictures drawn by this object.
     """
 
     def __init__(self, workers: int = 0, folder: Path | None = None) -> None:
@@ -82,9 +82,10 @@ class Workshop:
         self._recent_lock = threading.Lock()
 
     async def work_out(self, work: Callable[[], _Result]) -> _Result:
-        """Return what `work`, a `partial` of a function of a module, gives in a worker process.
+        """Return the result of `work`, a `partial` of a module-level function, in a worker process.
 
-        Where one was killed it is done once more, alone; SimulationError where it is killed again.
+        If the process is killed, the work is repeated alone. Raises SimulationError if it is killed
+        again.
         """
         from phyblock.workers import WorkerDiedError, WorkerPool
 
@@ -92,7 +93,7 @@ class Workshop:
         loop = asyncio.get_running_loop()
         with contextlib.suppress(WorkerDiedError):
             return await loop.run_in_executor(self._pool, work)
-        # Alone, so that what is killed for memory finds as much as there is.
+        # Alone, so that work that was killed for memory gets all there is.
         async with self._alone:
             try:
                 return await loop.run_in_executor(self._pool, work)
@@ -101,10 +102,10 @@ class Workshop:
                 raise SimulationError(message) from error
 
     async def images(self, drawings: Sequence[Drawing]) -> tuple[Image, ...]:
-        """Return pictures from memory, from the cache, or made now, all at the same time.
+        """Return pictures from memory, from the cache, or drawn now, all in parallel.
 
-        Raises DataError for a file that is no picture, StoreError when the cache folder cannot be
-        written, SimulationError when a worker was killed.
+        Raises DataError for a file that is not a picture, StoreError when the cache folder cannot
+        be written, SimulationError when a worker was killed.
         """
         kept = [image for one in drawings if (image := self._kept(one)) is not None]
         if len(kept) < len(drawings):
@@ -112,9 +113,10 @@ class Workshop:
         return tuple(kept)
 
     def outlines(self, drawings: Sequence[Drawing]) -> tuple[Image, ...]:
-        """Return pictures as far as they are at hand, of others empty ones of their sizes.
+        """Return the pictures that are in memory or the cache, and for others empty ones of their
+        sizes.
 
-        Raises DataError for a file that is no picture.
+        Raises DataError for a file that is not a picture.
         """
         return tuple(self._kept(one) or Image(b"", one.label, *one.size_px) for one in drawings)
 
@@ -130,19 +132,19 @@ class Workshop:
         key = drawing.key
         if key not in self._making:
             self._making[key] = asyncio.create_task(self._draw(drawing))
-            # Where all who waited were cancelled, nobody asks for the failure: asyncio prints it.
+            # If all waiters were cancelled, nobody retrieves the exception, and asyncio prints it.
             self._making[key].add_done_callback(lambda done: done.cancelled() or done.exception())
         # Shielded: others may wait for the same picture when one waiter is cancelled.
         data = await asyncio.shield(self._making[key])
         return self._remembered(drawing, data)
 
     def _kept(self, drawing: Drawing) -> Image | None:
-        """Return a picture at hand; None where it is not there, not whole, or no picture."""
+        """Return a picture from memory or the cache; None if it is missing or damaged."""
         if (image := self._recent.get((drawing.key, drawing.label))) is not None:
             return image
         if drawing.is_file:
             return self._remembered(drawing, drawing.make())
-        # One that is not whole, or no picture, is drawn again.
+        # A damaged file is drawn again.
         with contextlib.suppress(OSError, ValueError, DataError):
             data = read_bytes(self._path(drawing.key), LARGEST_PICTURE_BYTES)
             if data.startswith(_PNG_START) and data.endswith(_PNG_END):
@@ -177,9 +179,9 @@ class Workshop:
 
 
 class LocalShop(Workshop):
-    """Draws and works in the process and thread that asks; what it returns never waits.
+    """Draws and works in the calling process and thread; its coroutines never wait.
 
-    So a coroutine of a track can be run to its end without an event loop, in any thread.
+    So a coroutine of a track can run to its end without an event loop, in any thread.
     """
 
     def __init__(self, folder: Path | None = None) -> None:
@@ -187,7 +189,7 @@ class LocalShop(Workshop):
         self._engine_lock = threading.Lock()
 
     async def work_out(self, work: Callable[[], _Result]) -> _Result:
-        """Return what `work` gives; one at a time, as a physics engine wants it."""
+        """Return the result of `work`; one at a time, as a physics engine requires."""
         with self._engine_lock:
             return work()
 
@@ -204,16 +206,16 @@ class LocalShop(Workshop):
 
 
 def picture_style(images: ImagesSpec) -> PictureStyle:
-    """Return the style in which a suite wants pictures drawn."""
+    """Return the style of pictures in a suite."""
     ground = images.background or BACKGROUNDS[0]
     return PictureStyle.from_view(images.view, images.size_px, ground)
 
 
 def scene_drawings(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, ...]:
-    """Return the goal and the candidates of a scene: one composite, or two pictures apart.
+    """Return the goal and the candidates of a scene: one composite, or two pictures.
 
-    They are drawn, or cut out of the data set's own composites. A goal that is not shown has no
-    part in the size of what is. DataError where the data set is to bring a picture and has none.
+    They are drawn, or cut out of the data set's own composites. A goal that is not shown does not
+    affect the size. Raises DataError if the data set lacks a picture that it must provide.
     """
     is_blind, style = task.is_blind, picture_style(images)
     is_drawn = images.source == "render"
@@ -242,7 +244,7 @@ def scene_drawings(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, ...
 
 
 def _cut_out(task: AssemblyTask, label: str) -> Drawing:
-    """Return a half of the data set's own composite of a scene, its key that of the whole."""
+    """Return half of the data set's own composite of a scene, with the key of the whole."""
     path = _composite(task)
     half = partial(_half, path, is_goal=label == "goal")
     return Drawing(label, hex_digest(read_picture(path)), half, is_file=True)
@@ -261,9 +263,9 @@ def _joined(make_goal: Callable[[], bytes], make_grid: Callable[[], bytes]) -> b
 
 
 def _half(composite: Path, *, is_goal: bool) -> bytes:
-    """Return goal or candidates cut out of a 2:1 composite: two squares but for the gap between."""
+    """Return goal or candidates cut out of a 2:1 composite: two squares, with a gap between."""
     with decode_picture(read_picture(composite), str(composite)) as picture:
-        # PNG knows no CMYK, in which JPEG files may come.
+        # PNG has no CMYK, which JPEG files may use.
         picture = picture.convert("RGB") if picture.mode == "CMYK" else picture
         width, height = picture.size
         side = width // 2 - width // 256

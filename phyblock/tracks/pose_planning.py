@@ -1,4 +1,4 @@
-"""Pose planning: blocks, order and positions in one reply, carried out in a physics engine."""
+"""Pose planning: blocks, order and positions in one reply, executed in a physics engine."""
 
 from __future__ import annotations
 
@@ -56,9 +56,7 @@ from phyblock.tracks.pictures import Drawing, picture_style
 from phyblock.types import STEP_ENDS, Matcher, Setting, StepEnd, View
 
 CARRY_VERSION = 3
-"""Version of the execution of plans and of how its end is measured; it goes up where some plan may
-end differently.
-"""
+"""Version of plan execution and its measurements; increased when the end of a plan may change."""
 KIT_LABEL = "blocks"
 """The label of the sheet of candidates."""
 Center = tuple[float, float, float]
@@ -71,13 +69,13 @@ _DIGITS = 4
 _RANDOM_STEPS = 4
 _RANDOM_REACH_CM = 15.0
 _STILL_M, _STILL_DEG = 0.001, 1.0
-"""A block that moved by no more lies where it did before."""
+"""A block that moved by no more than this counts as unmoved."""
 _ONE_AT_A_TIME = threading.Lock()
 
 
 def _oblique_first(views: tuple[View, ...]) -> Iterator[Fault]:
     if views[0] != "oblique":
-        # Blocks of the sheet, seen as the goal is first, look alike from any other side.
+        # The sheet has the first view; in any but oblique, different blocks look the same.
         order = ["oblique", *(view for view in views if view != "oblique")]
         yield Fault("must begin with oblique", f"[{', '.join(order)}]")
 
@@ -93,66 +91,65 @@ class PoseSpec(PictureControls):
 
 
 class GivenStep(Line):
-    """A step as it was read."""
+    """A parsed step."""
 
     block: int
-    """Number of the candidate, as it was shown."""
+    """Number of the candidate, as shown to the model."""
     center_cm: tuple[Amount, Amount, Amount]
-    """x, y and z of the middle of the block's box [cm]."""
+    """x, y and z of the center of the block's box [cm]."""
 
 
 class PoseParse(PlanParse):
-    """The plan with poses that was read in a reply; `plan` leaves out numbers that no candidate
+    """The plan with poses that was parsed from a reply; `plan` omits numbers that no candidate
     has.
     """
 
     steps: tuple[GivenStep, ...] = ()
-    """The steps with their poses, those included that name no candidate."""
+    """The steps with their poses, including those that name no candidate."""
 
 
 class RestingBlock(Line):
-    """The place where a block came to lie."""
+    """The pose in which a block came to rest."""
 
     step: Whole
-    """Number of the step, from 1, that put it."""
+    """Number of the step, from 1, that placed it."""
     center_cm: tuple[Amount, Amount, Amount]
-    """x, y and z of the middle of its box [cm]."""
+    """x, y and z of the center of its box [cm]."""
     euler_deg: tuple[Amount, Amount, Amount]
     """Its rotation, extrinsic x-y-z angles [degrees]."""
 
 
 class StepOutcome(Line):
-    """The score of a step by geometry, and how it ended when it was carried out."""
+    """The score of a step by geometry, and the result of its execution."""
 
     vertex: Whole | None
-    """The goal block, from 0, that it stands for; null: none."""
+    """The goal block, from 0, that it is matched to; null: none."""
     position_cm: Amount | None = None
     """Distance of its center of mass from that block's [cm]."""
     sideways_cm: Amount | None = None
-    """The same over the floor [cm]."""
+    """Its horizontal part [cm]."""
     up_cm: Amount | None = None
-    """The same in height, above zero where it is too high [cm]."""
+    """Its vertical part, positive if the block is too high [cm]."""
     turn_deg: Amount | None = None
-    """Angle by which it is turned against that block, up to symmetry [degrees]."""
+    """Angle between the orientations, up to symmetry [degrees]."""
     iou: Amount | None = None
-    """Volume that both share, divided by the volume of both together."""
+    """Intersection over union of the two volumes."""
     end: StepEnd
     """The ending."""
     moved_cm: Amount = 0.0
-    """Distance from where the block was put to where it came to rest [cm]."""
+    """Distance from the place of the block to its place at rest [cm]."""
     turned_deg: Amount = 0.0
-    """Angle by which it turned on the way [degrees]."""
+    """Angle by which it turned before it came to rest [degrees]."""
     gap_cm: Amount = 0.0
-    """Height above what is below it when it was released [cm]."""
+    """Height above its support when it was released [cm]."""
     overlap_cm: Amount = 0.0
-    """Distance that it was moved out of others, or depth at which it was refused [cm]."""
+    """Distance by which it was moved out of others, or depth at which it was refused [cm]."""
     knocked: tuple[Whole, ...] = ()
     """Numbers of the steps, from 1, whose blocks it moved."""
     error: PoseError | None = None
     """Type of error; null: none."""
     rests: tuple[RestingBlock, ...]
-    """Blocks that moved by more than 1 mm or 1 degree in this step; its own block counts from where
-    it was put."""
+    """Blocks that moved by more than 1 mm or 1 degree in this step; its own from its place."""
 
 
 class PoseOutcome(Line):
@@ -167,13 +164,13 @@ class PoseOutcome(Line):
     steps: tuple[StepOutcome, ...]
     """Outcome of each step."""
     reached: Whole
-    """Goal blocks that stand in their place in the end."""
+    """Goal blocks that are reached in the end."""
     iou: Amount
-    """Intersection over union of all that stands and the goal, in voxels of 5 mm by 64 points."""
+    """Intersection over union of final structure and goal, in voxels of 5 mm by 64 points."""
     completed: bool
     """True if the whole goal was reached and no other block is left."""
     limits: dict[str, Amount]
-    """The tolerances with which the plan was carried out [cm, degrees]."""
+    """The tolerances of the execution [cm, degrees]."""
     engine: str
     """The physics engine, with its version."""
 
@@ -184,12 +181,12 @@ class PoseRecord(Record):
     track: Literal["pose_planning"]
     """`pose_planning`."""
     parse: PoseParse | None = None
-    """The plan that was read."""
+    """The parsed plan."""
     pose: PoseOutcome | None = None
     """Its score."""
 
     def course(self, matcher: str) -> Course | None:
-        """Return what was wrong with each step, and how many goal blocks were not reached."""
+        """Return the error of each step, and how many goal blocks were not reached."""
         if self.pose is None or self.parse is None:
             return super().course(matcher)
         names = (str(step.block) for step in self.parse.steps)
@@ -209,9 +206,9 @@ def judge_poses(
     matchers: tuple[Matcher, ...],
     earlier: PoseRecord | None = None,
 ) -> Judgement:
-    """Read, score and carry out a reply; None, where there is no reply, is an empty plan.
+    """Parse, score and execute a reply; a missing reply (None) is an empty plan.
 
-    A plan that an `earlier` record holds, executed with these tolerances, ended as it did.
+    If an `earlier` record holds the same plan and tolerances, its result is used.
     """
     n, scorer = len(item.candidates), _scorer(item.scene, item.candidates)
     parsed = ParsedPoses((), None) if text is None else parse_poses(text, n)
@@ -259,11 +256,11 @@ def judge_poses(
 
 
 Ended = tuple[Sequence[Mapping[str, Any]], Mapping[str, Any]]
-"""Endings of the steps of a plan that was carried out, and the world in the end, as in records."""
+"""Endings of the steps of an executed plan, and the final world, as in records."""
 
 
 def _ended_before(record: PoseRecord | None, given: Sequence[PoseStep]) -> Ended | None:
-    """Return the result that a record holds of the same steps by these tolerances, or None."""
+    """Return the result in a record of the same steps with these tolerances, or None."""
     if record is None or record.pose is None or record.parse is None:
         return None
     pose = record.pose
@@ -275,7 +272,7 @@ def _ended_before(record: PoseRecord | None, given: Sequence[PoseStep]) -> Ended
 
 
 def _carried(scene: Scene, blocks: Sequence[Block | None]) -> Ended:
-    # An engine has no more than one plan at a time, whichever thread asks.
+    # An engine executes one plan at a time, for all threads.
     with _ONE_AT_A_TIME:
         done = execute(blocks)
     goal, reached = scene.blocks, blocks_reached(scene.blocks, done.blocks, *_REACHED.values())
@@ -313,11 +310,10 @@ def _scorer(scene: Scene, candidates: CandidateSet) -> PoseScorer:
 
 
 def buildable_order(scene: Scene, wanted: Sequence[int]) -> list[int]:
-    """Return the vertices of a scene in a valid order, as near to the `wanted` one, which is valid
-    too, as balance lets it be.
+    """Return the vertices of a scene in a valid order that keeps balance, near the `wanted` one.
 
-    Each step takes the first block with which all surely stands, else the first with which it is
-    in balance at all, else the first.
+    Each step takes the first block with which the structure surely stands, else the first with
+    which it is in balance at all, else the first. `wanted` is valid, too.
     """
     order: list[int] = []
 
@@ -335,7 +331,7 @@ def buildable_order(scene: Scene, wanted: Sequence[int]) -> list[int]:
 
 
 def written(steps: Iterable[PoseStep]) -> str:
-    """Steps in the form that the prompt asks for."""
+    """Return steps in the form that the prompt asks for."""
     lines = []
     for n, step in enumerate(steps, 1):
         center = ", ".join(f"{round(value, 4) + 0.0:g}" for value in step.center_cm)
@@ -348,7 +344,7 @@ def _built(
     rng: np.random.Generator,
     move: Callable[[Block, Center], Center] = lambda _, center: center,
 ) -> str:
-    """The goal's blocks in a random valid order that is in balance, each moved from its place."""
+    """Answer with the goal's blocks in a random valid order that keeps balance, each moved."""
     blocks, layers = subject.scene.blocks, subject.scene.graph.layers
     drawn = rng.random(len(blocks)).tolist()
     wanted = sorted(range(len(blocks)), key=lambda vertex: (layers[vertex], drawn[vertex]))
@@ -360,7 +356,7 @@ def _built(
 
 
 def _noisy(sigma_cm: float) -> Callable[[PlanSubject, np.random.Generator], str]:
-    """The oracle, every coordinate off by a Gaussian of so many centimeters."""
+    """Return the oracle with Gaussian noise on every coordinate [cm]."""
 
     def rule(subject: PlanSubject, rng: np.random.Generator) -> str:
         noise = np.random.default_rng(rng.integers(2**32))
@@ -375,7 +371,7 @@ def _noisy(sigma_cm: float) -> Callable[[PlanSubject, np.random.Generator], str]
 
 
 def _stack(subject: PlanSubject, rng: np.random.Generator) -> str:
-    """All at the origin, one on another."""
+    """Answer with the right blocks at the origin, one on another."""
     top = 0.0
 
     def stacked(block: Block, _: Center) -> Center:
@@ -388,13 +384,13 @@ def _stack(subject: PlanSubject, rng: np.random.Generator) -> str:
 
 
 def _random(subject: PlanSubject, rng: np.random.Generator) -> str:
-    """Any blocks anywhere, which sees nothing of the goal."""
+    """Answer with any blocks anywhere, without seeing the goal."""
     steps = []
     for _ in range(_RANDOM_STEPS):
         number = int(rng.integers(1, len(subject.candidates) + 1))
         x, y = rng.uniform(-_RANDOM_REACH_CM, _RANDOM_REACH_CM, 2)
         z = rng.uniform(0.0, _RANDOM_REACH_CM)
-        # Drawn and not used, so that answers stay those that were drawn with turns.
+        # Drawn but not used, so that answers stay the same as when turns were drawn.
         rng.integers(0, 4, 3)
         steps.append(PoseStep(number, (float(x), float(y), float(z))))
     return written(steps)
@@ -455,7 +451,7 @@ def _ends(record: PoseRecord) -> tuple[float, ...] | None:
 
 
 def _plan(setting: Setting) -> SampleCounts:
-    """Return what counts the plan without its poses, by the headline matcher."""
+    """Return the counts of the plan without its poses, by the headline matcher."""
 
     def of(record: PoseRecord) -> tuple[float, ...] | None:
         score = next((one for one in record.scores if one.setting == setting), None)
@@ -502,7 +498,7 @@ def _film(record: PoseRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
 
 
 class PosePlanning(SceneTrack):
-    """Asks for a whole plan with the place of every block, and carries it out."""
+    """Asks for a whole plan with the place of every block, and executes it."""
 
     name = "pose_planning"
     title = "Pose planning"
@@ -520,7 +516,7 @@ class PosePlanning(SceneTrack):
     spec: PoseSpec
 
     def draw(self, item: AssemblyTask) -> tuple[Drawing, ...]:
-        """Return the goal, where it is shown, from every view, and the sheet from the first."""
+        """Return the goal from every view, unless blind, and the sheet from the first view."""
         style = picture_style(self.suite.images)
         seen = {
             view: replace(style, azimuth_deg=VIEWS[view][0], elevation_deg=VIEWS[view][1])
@@ -537,28 +533,28 @@ class PosePlanning(SceneTrack):
         return (*drawings, Drawing(KIT_LABEL, key, make, (style.size_px, style.size_px)))
 
     def identity(self) -> dict[str, Any]:
-        """Return what decides its results, with the version of how plans are carried out."""
+        """Return what determines its results, with the version of plan execution."""
         return {**super().identity(), CARRYING: CARRY_VERSION}
 
     def json_form(self, item: AssemblyTask) -> AnswerForm[Any]:
-        """Return the form of a plan as JSON."""
+        """Return the JSON form of a plan."""
         return pose_form(len(item.candidates))
 
     def subject_of(self, item: AssemblyTask) -> PlanSubject:
-        """Return what baselines answer about."""
+        """Return the subject of baselines."""
         return PlanSubject(item.scene, item.candidates)
 
     def judge(self, item: AssemblyTask, text: str | None) -> Judgement:
-        """Read, score and carry out a reply; None, where there is none, is an empty plan."""
+        """Parse, score and execute a reply; a missing reply (None) is an empty plan."""
         suite = self.suite
         return judge_poses(item, text, suite.settings, suite.scoring.matchers)
 
     async def judge_apart(
         self, item: AssemblyTask, text: str | None, earlier: Record | None
     ) -> Judgement:
-        """Return what `judge` does, computed in another process, or in a thread without one.
+        """Return the result of `judge`, computed in another process, or without one in a thread.
 
-        A plan that an earlier record holds is not carried out again.
+        A plan that an earlier record holds is not executed again.
         """
         known = earlier if isinstance(earlier, PoseRecord) else None
         rules = (self.suite.settings, self.suite.scoring.matchers, known)

@@ -1,7 +1,7 @@
 """Prompts: Jinja templates with the files that they include, and the official prompt.
 
-Files are read once, before anything is rendered, so that the digest of a prompt is that of what is
-sent: an edit of an included file makes another prompt.
+Files are read once, before anything is rendered, so that the digest of a prompt covers everything
+that is sent: an edit of an included file makes another prompt.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from phyblock.text import did_you_mean, hex_digest
 _LARGEST_BYTES = 256 * 1024
 _COMMON_BLOCKS = ("system", "user", "caption")
 _ALL_BLOCKS = (*_COMMON_BLOCKS, "answer")
-"""Blocks that bundled templates have; nothing would send another."""
+"""Blocks that templates may have; no other would be sent."""
 
 
 @dataclass(frozen=True)
 class OfficialPrompt:
-    """The official prompt, read out of the user's own checkout; it has no system part."""
+    """The official prompt, read from the user's own checkout; it has no system part."""
 
     text: str
     name: str = "official"
@@ -50,16 +50,15 @@ class TemplatePrompt:
 
     Text outside of the blocks is not sent, but they can use its macros, values and imports. Files
     beside the template, and bundled ones, can be included and imported. It runs in Jinja's
-    sandbox. `caption` is rendered for each picture, with its `label` and its `number` from 1, and
-    stands before it. `included` are the files that it includes or imports.
+    sandbox. `caption` is rendered before each picture, with its `label` and its `number` from 1.
+    `included` are the files that it includes or imports.
 
-    Raises PromptError, naming file and line, when the template cannot be read, is not valid,
-    has no user block or one that says nothing, has a block that nothing uses, or uses a name that
-    is not there.
+    Raises PromptError, naming file and line, when the template cannot be read, is not valid, has no
+    user block or an empty one, has a block that is not used, or uses an unknown name.
     """
 
     def __init__(self, path: Path, name: str, like: TemplatePrompt | None = None) -> None:
-        """`like` is the template in whose place it stands: it may have the blocks of that one."""
+        """`like` is the template that this one replaces, whose blocks it may have."""
         self.name = name
         self._path = path
         text, self._tree = _read(path)
@@ -78,12 +77,12 @@ class TemplatePrompt:
             trim_blocks=True,
             lstrip_blocks=True,
         )
-        # It draws words at random: a prompt is the same whenever it is made.
+        # It draws random words, but a prompt must always be the same.
         del self._environment.globals["lipsum"]
         try:
             self._template = self._environment.get_template("")
         except Exception as error:
-            # Python compiles what Jinja makes of it, and has bounds of its own.
+            # Python compiles Jinja's output, and has its own limits.
             raise PromptError(_invalid(path, error)) from error
         self.blocks = tuple(self._template.blocks)
         if "user" not in self.blocks:
@@ -110,7 +109,7 @@ class TemplatePrompt:
     def messages(
         self, pictures: Sequence[Image], facts: Mapping[str, object]
     ) -> tuple[Message, ...]:
-        """Return a system message, where that block gives text, and one of the user."""
+        """Return a system message, if that block gives text, and a user message."""
         system, user = self.text("system", facts), self.text("user", facts)
         if not user:
             raise PromptError(Problem(str(self._path), "says nothing", "block user"))
@@ -123,24 +122,24 @@ class TemplatePrompt:
         return (*first, Message("user", (*parts, user)))
 
     def text(self, block: str, facts: Mapping[str, object]) -> str:
-        """Render a block of the template, "" for one that it lacks; raises PromptError."""
+        """Render a block of the template, "" if it has no such block. Raises PromptError."""
         if block not in self.blocks:
             return ""
         try:
             try:
                 context = self._template.new_context(dict(facts))
                 blocks = context.blocks
-                # What stands outside of the blocks is run first, with nothing in their places.
+                # Text outside of the blocks is run first, with the blocks empty.
                 context.blocks = {name: [lambda _: iter(())] for name in blocks}
                 for _ in self._template.root_render_func(context):
                     pass
                 context.blocks = blocks
                 return "".join(self._template.blocks[block](context)).strip()
             except Exception:
-                # Jinja puts the lines of templates in the place of those that it compiled.
+                # Jinja rewrites tracebacks to the lines of templates.
                 self._environment.handle_exception()
         except Exception as error:
-            # A template is a program: what it computes can fail in any way.
+            # A template is a program, which can fail in any way.
             is_unknown = isinstance(error, jinja2.UndefinedError)
             known = f"names that are there: {', '.join(sorted(facts))}" if is_unknown else ""
             files = {str(path) for path, _ in self._sources.values()}
@@ -153,8 +152,8 @@ class TemplatePrompt:
     def _read_included(self, path: Path, tree: nodes.Template) -> None:
         """Read what a template includes or imports, at any depth, by the names it uses.
 
-        Beside templates lie other files, which may hold keys: only files that end in .j2 may be
-        sent, and what is sent must be known from the text.
+        Other files beside templates may hold keys: only files that end in .j2 may be sent, and
+        their names must be known from the text.
         """
         for node in tree.find_all((nodes.Extends, nodes.Include, nodes.Import, nodes.FromImport)):
             where = f"{path}:{node.lineno}"
@@ -176,11 +175,13 @@ class TemplatePrompt:
 
 
 Prompt = OfficialPrompt | TemplatePrompt
-"""Prompt: turns pictures and facts about a sample into chat messages."""
+"""A prompt, which turns pictures and facts about a sample into chat messages."""
 
 
 def _included(name: str, folders: Sequence[Path], where: str) -> Path | None:
-    """Return the file of a name below the first folder that has it; PromptError for no template."""
+    """Return the file of a name in the first folder that has it. Raises PromptError if it is not a
+    template.
+    """
     inside = PurePosixPath(name)
     path = next((folder / inside for folder in folders if (folder / inside).is_file()), None)
     parts = inside.parts if path is None else (*inside.parts, path.resolve().name)
@@ -200,7 +201,7 @@ def _read(path: Path) -> tuple[str, nodes.Template]:
         raise PromptError(Problem(str(path), f"cannot be read: {why}")) from error
     try:
         tree = jinja2.Environment().parse(text)
-        # A text may be nested so deep that its tree is parsed and cannot be walked.
+        # A text may be nested so deeply that its tree can be parsed but not walked.
         list(tree.find_all(nodes.Include))
     except Exception as error:
         raise PromptError(_invalid(path, error)) from error

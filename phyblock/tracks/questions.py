@@ -60,11 +60,11 @@ from phyblock.tracks.pictures import Drawing, picture_style
 from phyblock.types import Background, DataFormat
 
 BUILTIN_QUESTIONS = "phyblock-vqa"
-"""The bundled question set that is used when a suite names none."""
+"""The question set of suites that name none."""
 
 
 class VqaSpec(PictureControls):
-    """The questions of the vqa track and how they are shown."""
+    """The questions of the vqa track and their presentation."""
 
     format: DataFormat = "builtin"
     """builtin: a folder with questions.jsonl. official: a folder with question files in the
@@ -75,7 +75,7 @@ class VqaSpec(PictureControls):
     subtasks: UniqueSome[SubtaskName] = (*SUBTASKS,)
     """Subtasks to ask about."""
     per_subtask: Count | None = None
-    """Most questions of each subtask; null: all."""
+    """Maximum number of questions per subtask; null: all."""
     circular: Flag = False
     """Ask every rotation of the options; a question is right only if all are."""
     prompt: TemplateName = "default"
@@ -83,23 +83,23 @@ class VqaSpec(PictureControls):
 
     @property
     def rotations(self) -> int:
-        """The number of times that each question is asked with one seed."""
+        """How often each question is asked with one seed."""
         return len(LETTERS) if self.circular else 1
 
 
 class ChoiceParse(Line):
-    """The answer that was read in a reply."""
+    """The answer that was parsed from a reply."""
 
     rule: str | None
-    """The rule that matched; null: nothing could be read."""
+    """The rule that matched; null: nothing could be parsed."""
     letters: str | None = None
-    """One letter, or for ordering all in order."""
+    """One letter, or for ordering all four in order."""
     problem: str | None = None
-    """Reason why no answer could be read in the requested JSON."""
+    """Reason why no answer could be parsed from the requested JSON."""
 
 
 class QuestionShown(Line):
-    """A question and how it was shown."""
+    """A question and its presentation."""
 
     id: str
     """Its name in the question set."""
@@ -108,7 +108,7 @@ class QuestionShown(Line):
     category: str = ""
     """The category of the subtask."""
     rotation: Whole = 0
-    """Number of places by which its options were rotated."""
+    """Places by which its options were rotated."""
     blind: bool = False
     """True if no picture was sent."""
 
@@ -130,9 +130,9 @@ class ChoiceRecord(Record):
     track: Literal["vqa"]
     """`vqa`."""
     parse: ChoiceParse | None = None
-    """The answer that was read."""
+    """The parsed answer."""
     question: QuestionShown
-    """The question and how it was shown."""
+    """The question and its presentation."""
     answer: GivenAnswer | None = None
     """The given answer and the right one."""
 
@@ -153,7 +153,7 @@ class ChoiceRecord(Record):
 
     @property
     def group(self) -> str:
-        """The question, of which every rotation is a sample."""
+        """The question, each rotation of which is a sample."""
         return self.question.id
 
     @property
@@ -209,7 +209,7 @@ def _answer(record: ChoiceRecord) -> tuple[int, ...]:
 
 
 def _letters(record: ChoiceRecord) -> tuple[int, ...] | None:
-    """Count answers with one right letter, which ordering has not."""
+    """Count answers with one right letter, which excludes ordering."""
     answer = record.answer
     if answer is None or len(answer.right) != 1:
         return None
@@ -239,9 +239,9 @@ def _guessing(suite: Suite, cell: str) -> float:
 
 @dataclass(frozen=True)
 class ChoiceSubject:
-    """One of several options is asked for, of a question as it is shown.
+    """A presented question that baselines and people answer.
 
-    `guess` returns what `majority_rule` answers: 0-based indices as in `question.answer`.
+    `guess` returns the answer of `majority_rule`: 0-based indices as in `question.answer`.
     """
 
     question: Question
@@ -256,7 +256,7 @@ def _random_choice(subject: ChoiceSubject, rng: np.random.Generator) -> str:
 
 
 def choice_text(indices: Iterable[int]) -> str:
-    """Return an answer in the benchmark's own reply form."""
+    """Return an answer in the reply form of the benchmark."""
     return "Answer: " + ", ".join(LETTERS[index] for index in indices)
 
 
@@ -268,7 +268,7 @@ CHOICE_RULES: Mapping[str, Callable[..., str]] = {
 
 
 def pick_answer(subject: ChoiceSubject) -> Picking:
-    """Return the choices of a person: the options, by their texts or the pictures that they are."""
+    """Return the choices of a person: the options, as texts or pictures."""
     options = subject.question.options
     is_ordering = subject.question.subtask == "OR"
     picked = len(options) if is_ordering else 1
@@ -297,12 +297,12 @@ class AskedQuestion:
 
     @functools.cached_property
     def question(self) -> Question:
-        """The question as it is shown."""
+        """The question as shown."""
         return rotated(self.task.question, self.rotation)
 
     @property
     def key(self) -> str:
-        """The question's id, with the rotation where all are asked."""
+        """The question's id, with the rotation if all are asked."""
         return f"{self.task.key}-r{self.rotation}" if self.is_one_of_many else self.task.key
 
     @property
@@ -314,10 +314,10 @@ class AskedQuestion:
 def question_drawings(
     item: AskedQuestion, style: PictureStyle, background: Background | None = None
 ) -> tuple[Drawing, ...]:
-    """Return the pictures of a question: scene, one block alone where there is one, options.
+    """Return the pictures of a question: scene, the block by itself if there is one, options.
 
-    Questions bring backgrounds of their own, which `background` overrides; those that bring none
-    have the style's. DataError for a picture that is not there.
+    `background` overrides the backgrounds of questions; questions without one have the style's.
+    Raises DataError for a missing picture.
     """
     recipes = {recipe.label: recipe for recipe in item.question.pictures}
     n, files = len(item.question.options), item.task.files
@@ -338,7 +338,7 @@ def question_drawings(
 def question_items(
     folder: Path, manifest: Manifest, dataset: Dataset
 ) -> Callable[[Record], AskedQuestion | None]:
-    """Return the questions of a run; DataError where they are not what it was made on."""
+    """Return the questions of a run. Raises DataError if they are not the ones it was made on."""
     recorded = manifest.questions
     if recorded is None:
         raise DataError(Problem(str(folder / MANIFEST), "names no questions", "questions"))
@@ -379,7 +379,7 @@ class Vqa(Track):
     spec: VqaSpec
 
     def open(self) -> None:
-        """Select questions; SpecError where there is none."""
+        """Select questions. Raises SpecError if there are none."""
         suite, spec = self.suite, self.spec
         self.questions = known = open_questions(
             spec.format, suite.files.folders[self.name], self.dataset
@@ -402,19 +402,19 @@ class Vqa(Track):
         self._guesses = Guesses([task.question for task in known.tasks], majority_rule)
 
     def draw(self, item: AskedQuestion) -> tuple[Drawing, ...]:
-        """Return the pictures of a question as a suite wants them."""
+        """Return the pictures of a question in the style of the suite."""
         if self.is_blind:
             return ()
         images = self.suite.images
         return question_drawings(item, picture_style(images), images.background)
 
     def about(self, item: AskedQuestion) -> dict[str, Any]:
-        """Return the question and how it is shown."""
+        """Return the question and its presentation."""
         asked = {name: getattr(item.question, name) for name in ("id", "subtask", "category")}
         return {"question": {**asked, "rotation": item.rotation, "blind": self.is_blind}}
 
     def identity(self) -> dict[str, Any]:
-        """Return digests of all questions, of those asked, the prompt and the pictures."""
+        """Return digests of all questions, of the selected ones, the prompt and the pictures."""
         return {
             "questions": self.questions.sha256,
             "asked": hex_digest(json.dumps([item.key for item in self.items])),
@@ -423,11 +423,11 @@ class Vqa(Track):
         }
 
     def json_form(self, item: AskedQuestion) -> AnswerForm[str]:
-        """Return the form of an answer as JSON."""
+        """Return the JSON form of an answer."""
         return choice_form(item.question.options, item.question.subtask == "OR")
 
     def facts(self, item: AskedQuestion, pictures: Sequence[Image]) -> dict[str, object]:
-        """Return the variables of templates; nothing in it gives the answer away."""
+        """Return the variables of templates; none of them reveals the answer."""
         question = item.question
         return {
             **super().facts(item, pictures),
@@ -441,12 +441,12 @@ class Vqa(Track):
         }
 
     def subject_of(self, item: AskedQuestion) -> ChoiceSubject:
-        """Return what baselines answer about."""
+        """Return the subject of baselines."""
         question = item.question
         return ChoiceSubject(question, lambda: self._guesses.guess(question))
 
     def judge(self, item: AskedQuestion, text: str | None) -> Judgement:
-        """Read and score a reply; None, where there is no reply, is no answer."""
+        """Parse and score a reply; a missing reply (None) is no answer."""
         question, parsed = item.question, ParsedAnswer(None, None)
         if text is not None:
             parsed = parse_answer(text, question.options, question.subtask == "OR")
@@ -461,7 +461,7 @@ class Vqa(Track):
 
 
 def open_questions(format_name: str, path: Path, dataset: Dataset) -> QuestionSet:
-    """Read a question set about the scenes of a data set; DataError when it is not there."""
+    """Read a question set about the scenes of a data set. Raises DataError if it is missing."""
     if format_name == "official":
         return read_official_questions(path, dataset)
     if (path / QUESTIONS_FILE).is_file():
@@ -480,8 +480,8 @@ def select_questions(
 ) -> tuple[QuestionTask, ...]:
     """Return the questions of these subtasks about scenes of these levels, in the set's order.
 
-    Of each subtask at most `per_subtask` are kept, and `limit` in all, shared over the subtasks;
-    those kept are spread evenly over the set, and a higher limit keeps them.
+    At most `per_subtask` of each subtask are kept, and `limit` in all, shared over the subtasks.
+    The kept questions are spread evenly over the set, and a higher limit keeps them.
     """
     groups: dict[str, list[QuestionTask]] = {name: [] for name in SUBTASKS if name in subtasks}
     for task in tasks:

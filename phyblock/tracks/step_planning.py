@@ -37,7 +37,7 @@ from phyblock.types import Gating, Physics, Setting
 
 Feedback = Literal["none", "success", "error_type"]
 StepOutcome = MoveOutcome | Literal["done"] | MoveProblem
-"""Outcome of a step; a problem is a reply in which no single operation could be parsed."""
+"""Outcome of a step; a MoveProblem is a reply without a single parsed operation."""
 Ending = Literal[
     "completed",
     "done",
@@ -51,23 +51,23 @@ ENDINGS: tuple[Ending, ...] = get_args(Ending)
 
 
 class StepsSpec(PictureControls):
-    """The rules of the step_planning track: the simulator, what is shown, when it ends."""
+    """The rules of the step_planning track: simulator, feedback, endings."""
 
     setting: Setting | None = None
     """Setting under which the simulator accepts a step; null: the first of settings. With B,
-    wrongly turned blocks are placed, and count as wrong in A."""
+    blocks in a wrong orientation are placed, and count as wrong in A."""
     gating: Gating = "aov"
-    """aov: a block can be placed when all it rests on is. layer: when all lower layers are
-    complete, as in the official code."""
+    """aov: a block can be placed when all blocks it rests on are placed. layer: when all lower
+    layers are complete, as in the official code."""
     physics: Physics = "settle"
-    """off: placed blocks stay where they are. settle: every new state is simulated; what would fall
-    is recorded and held. strict: a structure that collapses ends the episode."""
+    """off: placed blocks stay where they are. settle: every new state is simulated; blocks that
+    would fall are recorded and held. strict: a collapse ends the episode."""
     feedback: Feedback = "success"
     """Feedback on each step: none, success or failure, or the type of error."""
     cot: Flag = True
     """Ask for reasoning before the step."""
     max_steps: Count | None = None
-    """Most steps; null: twice the number of blocks."""
+    """Maximum number of steps; null: twice the number of blocks."""
     max_failures: Count | None = 5
     """Failed steps in a row that end an episode; null: no limit."""
     max_repeats: Count | None = 3
@@ -76,12 +76,12 @@ class StepsSpec(PictureControls):
     """default, or the path of a .j2 template."""
 
     def most_steps(self, n_blocks: int) -> int:
-        """Return the most steps for a goal of so many blocks: by default twice as many."""
+        """Return the maximum number of steps for a goal: by default twice its number of blocks."""
         return 2 * n_blocks if self.max_steps is None else self.max_steps
 
 
 class MoveParse(Line):
-    """The operation that was read in a turn's reply."""
+    """The operation that was parsed from a turn's reply."""
 
     rule: str | None
     """The rule that matched."""
@@ -95,7 +95,7 @@ class EpisodeTurn(AskedTurn):
     """One request of an episode, with its reply and its outcome."""
 
     parse: MoveParse
-    """The operation that was read."""
+    """The parsed operation."""
     outcome: StepOutcome
     """Outcome of the step."""
     placed: Whole | None = None
@@ -103,24 +103,24 @@ class EpisodeTurn(AskedTurn):
     swapped: tuple[tuple[Whole, ...], ...] = ()
     """Goal blocks whose candidates were exchanged."""
     world: tuple[Whole, ...] = ()
-    """The goal blocks that stand after the step."""
+    """The goal blocks in the world after the step."""
     fallen: tuple[Whole, ...] = ()
     """Orders of the blocks that fell when the assembly was released."""
 
 
 class EpisodeRecord(Record):
-    """An episode of one operation a step."""
+    """An episode with one operation per step."""
 
     track: Literal["step_planning"]
     """`step_planning`."""
     parse: PlanParse | None = None
     """`plan` holds the moves that were attempted."""
     max_steps: Whole = 0
-    """The most steps that the episode can take."""
+    """Maximum number of steps of the episode."""
     setting: str = ""
     """The setting under which a move succeeds."""
     engine: str | None = None
-    """The physics engine, with its version; null where nothing was simulated."""
+    """The physics engine, with its version; null: nothing was simulated."""
     ending: Ending = "unanswered"
     """The ending."""
     outcomes: tuple[StepOutcome, ...] = ()
@@ -133,7 +133,7 @@ class EpisodeRecord(Record):
     exported: ClassVar[Mapping[str, tuple[str, str]]] = {"ending": ("string", "ending")}
 
     def course(self, matcher: str) -> Course:
-        """The outcome of every step; no matcher has a part in it."""
+        """The outcome of every step, which does not depend on the matcher."""
         del matcher
         steps = (
             (str(turn.parse.move), None if turn.outcome in ("placed", "done") else turn.outcome)
@@ -148,17 +148,17 @@ class EpisodeRecord(Record):
 
     @property
     def replies(self) -> tuple[Reply, ...]:
-        """Those of all turns."""
+        """The replies of all turns."""
         return tuple(turn.reply for turn in self.turns) or super().replies
 
 
 @dataclass(frozen=True)
 class StepSubject(PlanSubject):
-    """The next step is asked for.
+    """The state in which baselines and people choose the next step.
 
-    `valid` are the candidates that would be placed now, in ascending order; empty when the goal
-    is complete. `exact` are those of them that are also turned as the goal is. `last_failed` is
-    the candidate whose move failed last, if the last move did; `step` is how many steps were taken.
+    `valid` are the candidates that would be placed now, in ascending order; empty when the goal is
+    complete. `exact` are those of them in the goal's orientation. `last_failed` is the candidate of
+    the last move, if it failed; `step` is the number of steps taken.
     """
 
     valid: tuple[int, ...] = ()
@@ -174,7 +174,7 @@ def _random_step(subject: StepSubject, rng: np.random.Generator) -> str:
 def _right_move(
     choose: Callable[[StepSubject, int, np.random.Generator], int | None],
 ) -> Callable[[StepSubject, np.random.Generator], str]:
-    """Return a rule that names what is chosen in place of a right move; Done if none is right."""
+    """Return a rule that names the choice for a right move, or Done if no move is right."""
 
     def rule(subject: StepSubject, rng: np.random.Generator) -> str:
         moves = subject.exact or subject.valid
@@ -188,7 +188,7 @@ def _right_move(
 
 
 def _turned(subject: StepSubject, index: int, rng: np.random.Generator) -> int | None:
-    """Return a candidate of the same kind that is turned as no block of the goal is, or None."""
+    """Return a candidate of the same kind in an orientation that the goal lacks, or None."""
     kind, looks = subject.candidates[index].kind, {block.look for block in subject.scene.blocks}
     listed = enumerate(subject.candidates.candidates, 1)
     wrong = [n for n, one in listed if one.kind == kind and one.look not in looks]
@@ -196,7 +196,7 @@ def _turned(subject: StepSubject, index: int, rng: np.random.Generator) -> int |
 
 
 def _in_turn(plan_of: Callable[[StepSubject], Sequence[int]]) -> Callable[..., str]:
-    """Return the rule that takes the steps of a plan one after another, then says Done."""
+    """Return the rule that takes the steps of a plan in turn, then says Done."""
 
     def rule(subject: StepSubject, _: np.random.Generator) -> str:
         plan = plan_of(subject)
@@ -206,7 +206,7 @@ def _in_turn(plan_of: Callable[[StepSubject], Sequence[int]]) -> Callable[..., s
 
 
 def step_text(index: int | None) -> str:
-    """One operation in the benchmark's own reply form; None is the end."""
+    """Return one operation in the reply form of the benchmark; None is Done."""
     return "Next plan: Done" if index is None else f"Next plan: Move({index})"
 
 
@@ -229,7 +229,7 @@ STEP_RULES: Mapping[str, Callable[..., str]] = {
 
 
 def pick_step(subject: StepSubject) -> Picking:
-    """Return the choices of a person: the candidates, and after them the end."""
+    """Return the choices of a person: the candidates, then Done."""
     n = len(subject.candidates)
     return Picking(
         (*candidate_choices(n), Choice("Done", "the goal is complete")),
@@ -259,14 +259,14 @@ _REASONS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class PastStep:
-    """A step that was taken: the operation, its outcome, and the candidate that was named."""
+    """A past step: the operation, its outcome, and the named candidate."""
 
     operation: str
     outcome: StepOutcome
     move: int | None = None
 
     def report(self, feedback: Feedback) -> str:
-        """Return the message to the model about it."""
+        """Return the message to the model about the step."""
         if feedback == "none":
             return ""
         if self.outcome == "placed":
@@ -280,12 +280,12 @@ class PastStep:
 _LIKELY = PastStep("Move(1)", "placed", 1)
 
 STEP_OUTCOMES = ("placed", *ERROR_TYPES, "invalid", "unread", "done")
-"""Outcome of a step; `unread` are replies in which no single operation could be parsed."""
+"""Outcomes of steps in tables; `unread` are replies without a single parsed operation."""
 _ALIKE = (f"tracks.step_planning.{ENGINE}",)
 
 
 def _episodes(record: EpisodeRecord) -> tuple[int, ...]:
-    """Count an episode: its ending, its steps by outcome, and what it took to complete a goal."""
+    """Count an episode: its ending, its steps by outcome, and the steps to complete the goal."""
     taken = Counter(one if one in STEP_OUTCOMES else "unread" for one in record.outcomes)
     steps, whole = len(record.outcomes), record.ending == "completed"
     numbers = (whole, 1, steps, whole * steps, whole * record.n_blocks)
@@ -315,7 +315,7 @@ COUNTS = (
 
 
 def _film(record: EpisodeRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
-    """Yield the empty ground, every step, wrong ones too, and how the episode ended."""
+    """Yield the empty ground, every step, including wrong ones, and the ending of the episode."""
     yield FilmStep(f"{record.model}, {record.scene}", "plain", None, ())
     blocks, heading = tuple[Block, ...](), StepPlanning.report().heading
     tones: dict[str, Tone] = {"placed": "good", "done": "plain"}
@@ -369,14 +369,14 @@ class StepPlanning(SceneTrack):
         self._fallen: dict[tuple[Block, ...], tuple[int, ...]] = {}
 
     def about(self, item: AssemblyTask) -> dict[str, Any]:
-        """Return the most steps that an episode of it can take, the physics engine, where there is
-        one, and how the scene is shown.
+        """Return the maximum number of steps, the physics engine, if any, and the presentation of
+        the scene.
         """
         engine = {} if self.spec.physics == "off" else {"engine": described_engine()}
         return {"max_steps": self.spec.most_steps(len(item.scene)), **engine, **super().about(item)}
 
     def json_form(self, item: AssemblyTask) -> AnswerForm[ParsedMove]:
-        """Return the form of an operation as JSON."""
+        """Return the JSON form of an operation."""
         return move_form(len(item.candidates), reasons=self.spec.cot)
 
     def start(
@@ -386,7 +386,7 @@ class StepPlanning(SceneTrack):
         return StepEpisode(self, item, seed, params, with_messages=with_messages)
 
     def again(self, item: AssemblyTask, record: Record) -> StepEpisode:
-        """Return the episode of a record before its first reply; what falls is what fell then."""
+        """Return the episode of a record before its first reply; the same blocks fall as then."""
         turns = record.turns if isinstance(record, EpisodeRecord) else ()
         fell = {turn.world: turn.fallen for turn in turns if turn.outcome == "placed"}
         return StepEpisode(self, item, record.seed, {}, with_messages=False, fell=fell)
@@ -394,7 +394,7 @@ class StepPlanning(SceneTrack):
     def outlines(self, item: AssemblyTask) -> Iterator[Request]:
         """Yield as many requests as an episode can have, made without rendering.
 
-        Each step is taken to have placed a block. Only the first request can be a real one.
+        They assume that each step places a block, so only the first is a real request.
         """
         for step in range(self.spec.most_steps(len(item.scene))):
             messages: tuple[Message, ...] = ()
@@ -408,7 +408,7 @@ class StepPlanning(SceneTrack):
     def messages(
         self, item: AssemblyTask, pictures: Sequence[Image], past: Sequence[PastStep] = ()
     ) -> tuple[Message, ...]:
-        """Return the messages of the step after `past`, which they tell as a text."""
+        """Return the messages of the step after `past`, whose history they contain as text."""
         assert isinstance(self.prompt, TemplatePrompt)
         spec, told = self.spec, [one.report(self.spec.feedback) for one in past]
         facts: dict[str, object] = {
@@ -429,7 +429,7 @@ class StepPlanning(SceneTrack):
         )
 
     async def fallen(self, blocks: tuple[Block, ...]) -> tuple[int, ...]:
-        """Return the orders of blocks that fall when all are let go at their goal poses."""
+        """Return the orders of blocks that fall when all are released at their goal poses."""
         if blocks not in self._fallen:
             trial = DEFAULT_TRIAL if self.spec.physics == "strict" else ONE_SETTING
             self._fallen[blocks] = (
@@ -438,7 +438,7 @@ class StepPlanning(SceneTrack):
         return self._fallen[blocks]
 
     def draw_state(self, item: AssemblyTask, blocks: Sequence[Block]) -> Drawing:
-        """Return the picture of blocks, seen as the goal is."""
+        """Return the picture of blocks from the goal's camera."""
         style = goal_style(item.scene, picture_style(self.suite.images))
         recipe = state_picture(item.scene, blocks, style)
         key, make = question_key(recipe, style), functools.partial(question_png, recipe, style)
@@ -446,10 +446,9 @@ class StepPlanning(SceneTrack):
 
 
 class StepEpisode:
-    """Asks for one operation after another until the goal stands or a limit is reached.
+    """Asks for one operation after another until the goal is complete or a limit is reached.
 
-    What falls is simulated, or told by `fell`, the orders of blocks that fell by the vertices that
-    stood.
+    Falls are simulated, or given by `fell`: the orders of fallen blocks by the placed vertices.
     """
 
     def __init__(
@@ -495,7 +494,7 @@ class StepEpisode:
         return track.asked(task, self._seed, self._params, messages, subject, turn)
 
     def take(self, reply: Reply, prompt: SentPrompt | None = None) -> None:
-        """Take the step that the reply to the last request names."""
+        """Take the step named in the reply to the last request."""
         parsed = parse_move(reply.text)
         move = None if parsed.move is None else self._assembly.move(parsed.move)
         outcome: StepOutcome = parsed.problem or ("done" if move is None else move.outcome)
@@ -524,7 +523,7 @@ class StepEpisode:
             self.ending = "done" if outcome == "done" else self._limit()
 
     def judgement(self) -> Judgement:
-        """Return the record's fields about the episode; read where any operation could be read."""
+        """Return the fields of the episode; it is parsed if any operation was."""
         outcomes = [step.outcome for step in self._past]
         progress = accumulate(outcome == "placed" for outcome in outcomes)
         plan = [step.move for step in self._past if step.move is not None]
@@ -542,7 +541,7 @@ class StepEpisode:
         return Judgement(any(turn["parse"]["problem"] is None for turn in self._turns), fields)
 
     def _failed(self) -> Iterator[PastStep]:
-        """Yield the steps since the last that placed a block, the newest first."""
+        """Yield the steps since the last one that placed a block, newest first."""
         return takewhile(lambda step: step.outcome != "placed", reversed(self._past))
 
     def _limit(self) -> Ending | None:
@@ -557,7 +556,7 @@ class StepEpisode:
         return next((name for name, n, most in reached if most is not None and n >= most), None)
 
     async def _settle(self) -> None:
-        """Let the assembly go; what falls is put back, or ends the episode."""
+        """Release the assembly; blocks that fall are put back, or end the episode."""
         if self._fell is None:
             fallen = await self._track.fallen(self._blocks())
         else:
@@ -571,7 +570,7 @@ class StepEpisode:
         return tuple(self._task.scene.blocks[vertex] for vertex in self._assembly.vertices)
 
     def _scores(self, setting: Setting, n_tried: int) -> Iterator[dict[str, Any]]:
-        """Yield counts over the blocks in the world, and over every move that was attempted."""
+        """Yield counts over the blocks in the world, and over every attempted move."""
         scene, assembly = self._task.scene, self._assembly
         on_ground: list[int] = []
         if self.ending == "collapsed":
