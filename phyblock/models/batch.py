@@ -340,7 +340,7 @@ class BatchModel:
             return
         await self._note(batch, "created", id=status.id)
         batch.lines.clear()
-        self._tell(f"sent batch {batch.shown} of {len(batch.most_usd):,}")
+        self._report(f"sent batch {batch.shown} of {len(batch.most_usd):,}")
 
     async def _find(self, batch: Batch, until_s: float) -> BatchStatus | None:
         """Return the batch that was being sent, None where there is none; raises UnsureError."""
@@ -416,7 +416,7 @@ class BatchModel:
                 status = await self._provider.status(batch.id)
                 failures, said = 0, status.words
                 if status.state != "running":
-                    self._tell(f"batch {batch.shown} has ended: {said}")
+                    self._report(f"batch {batch.shown} has ended: {said}")
                     return status
             except RetryableError as error:
                 failures += 1
@@ -425,7 +425,7 @@ class BatchModel:
                 said = f"cannot be looked at now ({error})"
             if said != logged:
                 since = batch.created.astimezone().strftime("%d %b %H:%M")
-                self._tell(f"waiting for batch {batch.shown} since {since}: {said}")
+                self._report(f"waiting for batch {batch.shown} since {since}: {said}")
                 logged = said
             await asyncio.sleep(pause_s)
             pause_s = min(self.files.poll_s, 1.5 * pause_s)
@@ -445,7 +445,7 @@ class BatchModel:
         reply = reply.model_copy(update={"latency_s": 0.0, "batched": True})
         return reply.model_copy(update={"cost_usd": cost_usd(self.budget.tariff, reply)})
 
-    def _tell(self, text: str) -> None:
+    def _report(self, text: str) -> None:
         self.observer(ModelEvent(self.name, "batch", text))
 
 

@@ -60,14 +60,14 @@ class ReplyCache:
 
     Two processes that ask the same at the same time may both pay for it: the later reply stays.
     Within a process `shared` prevents that. Raises StoreError for a file that is broken, foreign or
-    cannot be used. With `tell`, which is for runs, what fails after the opening is reported, and
+    cannot be used. With `report`, which is for runs, what fails after the opening is reported, and
     the run goes on without the cache: replies are in its records too. A row that cannot be read is
     missing.
     """
 
-    def __init__(self, path: Path, tell: Callable[[str], None] | None = None) -> None:
+    def __init__(self, path: Path, report: Callable[[str], None] | None = None) -> None:
         self.path = path
-        self._tell = tell
+        self._report = report
         self._is_off = False
         self._asked: dict[str, asyncio.Future[None]] = {}
         try:
@@ -103,8 +103,8 @@ class ReplyCache:
             found = {**json.loads(row[0].decode()), "cached": True, "attempts": 0}
             return Reply.model_validate(found, strict=True)
         except (ValueError, TypeError, RecursionError) as error:
-            if self._tell is not None:
-                self._tell(f"reply cache {self.path}: a broken reply is asked for again ({error})")
+            if self._report is not None:
+                self._report(f"reply cache {self.path}: broken reply, requested again ({error})")
             return None
 
     def put(self, key: str, model_id: str, reply: Reply) -> bool:
@@ -179,10 +179,10 @@ class ReplyCache:
         try:
             yield
         except sqlite3.Error as error:
-            if self._tell is None:
+            if self._report is None:
                 raise self._unusable(error) from error
             self._is_off = True
-            self._tell(f"reply cache {self.path}: cannot be used: {error}; going on without it")
+            self._report(f"reply cache {self.path}: cannot be used: {error}; going on without it")
 
     def _unusable(self, error: sqlite3.Error) -> StoreError:
         # An operational error is of the disk, the place or another process, not of the content.

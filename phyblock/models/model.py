@@ -149,7 +149,7 @@ class ModelEvent:
 
 Observer = Callable[[ModelEvent], None]
 
-Tell = Callable[[str], None]
+Report = Callable[[str], None]
 """Called with what concerns no single model: a server that is gone, a cache that fails."""
 
 
@@ -257,16 +257,16 @@ class Servers:
 
     What a server says itself, an error 500 or a 429 too, shows that it is there. No connection, a
     lost one, or a gateway that finds nothing behind it (502, 503, 504) shows that it is not. An
-    answer that does not come in time shows neither: some requests are slow. `tell` is called with
+    answer that does not come in time shows neither: some requests are slow. `report` is called with
     what happens to them.
     """
 
     def __init__(
-        self, servers: Sequence[Server], policy: RetryPolicy, tell: Callable[[str], None]
+        self, servers: Sequence[Server], policy: RetryPolicy, report: Callable[[str], None]
     ) -> None:
         self.all = tuple(servers)
         self._policy = policy
-        self._tell = tell
+        self._report = report
 
     def usable(self) -> list[Server]:
         """List the servers that are not given up; raises UnavailableError when there is none."""
@@ -298,7 +298,7 @@ class Servers:
         """Note that a server answered."""
         if server.rests:
             lasted_s = self._policy.clock.now() - server.away_since_s
-            self._tell(f"{server.name} answers again after {lasted_s:.0f} s")
+            self._report(f"{server.name} answers again after {lasted_s:.0f} s")
             server.rests_until_s = float("-inf")
         server.was_heard, server.failures, server.rests = True, 0, 0
         server.failed.clear()
@@ -338,7 +338,7 @@ class Servers:
             why = f"{name} never answered, {tries} times in a row: {error}"
             self._refuse(server, UnavailableError(why, sent="no"))
         elif server.rests == 1:
-            self._tell(f"{name} cannot be reached, trying now and then: {error}")
+            self._report(f"{name} cannot be reached, trying now and then: {error}")
         return True
 
     def pause(self, server: Server, error: RetryableError, wait_s: float) -> None:
@@ -350,7 +350,7 @@ class Servers:
     def _refuse(self, server: Server, error: UnavailableError) -> None:
         is_first, server.refusal = server.refusal is None, error
         if is_first and any(other.refusal is None for other in self.all):
-            self._tell(f"{server.name} is asked no more: {error}")
+            self._report(f"{server.name} is asked no more: {error}")
 
     def _rest_of(self, server: Server) -> float:
         doubled_s = self._policy.base_s * 2.0 ** min(server.rests, 60)
@@ -546,14 +546,14 @@ def build_model(
     budget: Budget | None = None,
     journal: Journal | None = None,
     observer: Observer = lambda _: None,
-    tell: Tell = lambda _: None,
+    report: Report = lambda _: None,
     policy: RetryPolicy | None = None,
     batches: BatchFiles | None = None,
 ) -> Model:
     """Return the model that a configuration describes; nothing is imported or sent before it asks.
 
     `overall` bounds what all models of a run have under way together; `observer` hears of the
-    model, `tell` of its servers. `batches` is where a model that is asked so keeps them. Raises
+    model, `report` of its servers. `batches` is where a model that is asked so keeps them. Raises
     SpecError for an unknown baseline, a model without a price under a limit or a provider without
     batches, DataError for missing recordings.
     """
@@ -594,7 +594,7 @@ def build_model(
         )
         for address in config.addresses or (None,)
     ]
-    servers = Servers(each, policy, tell)
+    servers = Servers(each, policy, report)
     limits = Limits(
         config.max_concurrency,
         overall or asyncio.Semaphore(config.max_concurrency),

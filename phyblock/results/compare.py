@@ -1,4 +1,4 @@
-"""Models compared on the same samples: differences, ranks, and what varied presentation changes."""
+"""Comparisons of models on the same samples: differences, ranks, effects of the presentation."""
 
 from __future__ import annotations
 
@@ -62,14 +62,14 @@ from phyblock.tracks.measures import SCORED_BY, Cell, Measure, in_unit
 _LEVEL = 1 - CONFIDENCE
 _KEYS = ["scene", "item", "seed", "variant"]
 _TOLD = ("p_holm", "verdict", "detectable", "detectable_holm")
-"""Columns of `Comparison.table` that all of its tests decide together."""
+"""Columns of `Comparison.table` that depend on all of its tests."""
 
 
 def check_alike(run: Run, first: Run, cells: Sequence[str], track: str, measure: Measure) -> None:
-    """Raise SpecError where `run` cannot be compared with `first` by a measure in these cells.
+    """Raise SpecError if `run` cannot be compared with `first` by a measure in these cells.
 
-    They must be of one version of a data set, scored by the same rules, asked in the same ways and
-    alike in the fields that the counts name; scenes of a name must have the same blocks.
+    They must have the same version of the data set, scoring rules, conditions, and values of the
+    fields that the counts name; scenes with the same name must have the same blocks.
     """
 
     def need(field: str, found: object, wanted: object, hint: str = "") -> None:
@@ -105,7 +105,7 @@ def check_alike(run: Run, first: Run, cells: Sequence[str], track: str, measure:
 
 
 def _field(run: Run, path: str) -> Any:
-    """Return the value at a path of keys in `run.yaml`, None where there is none or it is false."""
+    """Return the value at a path of keys in `run.yaml`, None if it is missing or false."""
     name, *keys = path.split(".")
     value: Any = getattr(run.manifest, name)
     for key in keys:
@@ -115,7 +115,7 @@ def _field(run: Run, path: str) -> Any:
 
 @dataclass(frozen=True)
 class Part:
-    """The subject of one row of a pair: a cell, and the way of counting where there are several."""
+    """The subject of one row of a pair: a cell, and the criterion if there are several."""
 
     name: str
     cell: str
@@ -124,7 +124,7 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """A model of a run, under the name that a comparison gives it."""
+    """A model of a run, with its name in a comparison."""
 
     label: str
     model: str
@@ -136,7 +136,7 @@ class Samples:
     """Counts of the samples that several sides have in a part of a track.
 
     `keys` has a row for each scene, item, seed and variant, ascending; `cell` is the place of its
-    cell among those pooled, and `counts`, (sides, keys, columns), NaN where a side has no such
+    cell among the pooled ones; `counts` (sides, keys, columns) are NaN where a side has no such
     sample.
     """
 
@@ -152,10 +152,9 @@ class Samples:
 
 @dataclass(frozen=True)
 class Comparable:
-    """A measure of a track, as two models are compared by it.
+    """A measure of a track, prepared for comparisons.
 
-    `parts` are the rows of one pair, of which the last stands for all; `how` says what the values
-    are.
+    `parts` are the rows of one pair, the last of which is the whole; `how` describes the values.
     """
 
     track: str
@@ -165,7 +164,7 @@ class Comparable:
     how: str
 
     def pooled(self, part: Part) -> list[str]:
-        """Return the cells that are no means of which a part is made."""
+        """Return the cells that a part is made of, without means."""
         members = pooled_in(self._cells[part.cell], self.cells)
         return [cell.name for cell in self.cells if cell.name in members]
 
@@ -176,7 +175,7 @@ class Comparable:
     def samples(self, sides: Sequence[Side], part: Part, design: Design) -> Samples:
         """Return the samples of sides in the headline setting and matcher of a design.
 
-        Those of models that said nothing at all in a cell are left out.
+        Samples of a model without any reply in a cell are excluded.
         """
         runs = {id(side.run): side.run for side in sides}
         wanted = dict(zip(SCORED_BY, (design.setting, design.matcher, part.criterion), strict=True))
@@ -202,8 +201,8 @@ class Comparable:
         return Samples(keys, table["cell"].to_numpy(np.intp)[first], every)
 
     def values(self, run: Run, part: Part, design: Design) -> Iterator[tuple[str, pd.Series]]:
-        """Return the value of each sample in the measure's unit, by model; by scene, item, seed and
-        variant, without samples that have no value.
+        """Yield each model with the values of its samples in the measure's unit, by scene, item,
+        seed and variant, without samples that have no value.
         """
         sides = [Side(name, name, run) for name in run.design.model_names]
         samples = self.samples(sides, part, design)
@@ -220,10 +219,10 @@ class Comparable:
         part: Part,
         parents: Mapping[str, tuple[str, ...]],
     ) -> dict[str, Any]:
-        """Return a row of `Comparison.table`, but for names, corrected p and verdicts.
+        """Return a row of `Comparison.table`, except for names, corrected p and verdicts.
 
-        The difference of two sides on the samples that both have, from the sums of their counts by
-        scene and cell; means are over the cells of which there are samples.
+        It is the difference of two sides on the samples that both have, from the sums of their
+        counts by scene and cell; means are over the cells that have samples.
         """
         measure, both = self.measure, samples.has[list(pair)].all(axis=0)
         scene, scenes = pd.factorize(samples.keys["scene"].to_numpy()[both], sort=True)
@@ -246,7 +245,7 @@ class Comparable:
             measure.most_apart / scale,
         )
         value_a, value_b = scale * worth(sums.sum(axis=0))
-        # A plan without a step for a goal without a block would have no F1; there is none.
+        # Only a plan without steps for a goal without blocks would have no F1.
         a, b = measure.value(counts)
         sign = np.sign(np.nan_to_num(a - b)) * (1 if measure.better == "higher" else -1)
         ends = {name: scale * float(getattr(estimate, name)) for name in ("se", "lo", "hi")}
@@ -259,9 +258,9 @@ class Comparable:
 
 
 def comparable(run: Run, track: str, measure: str = "") -> Comparable:
-    """Return a measure of a track of a run, the main one where none is named, to compare by.
+    """Return a measure of a track of a run, by default the main one, prepared for comparisons.
 
-    Raises SpecError for a measure that the track has not.
+    Raises SpecError for a measure that the track does not have.
     """
     known = {one.name: one for one in track_measures(track)}
     if measure and measure not in known:
@@ -271,7 +270,7 @@ def comparable(run: Run, track: str, measure: str = "") -> Comparable:
     chosen = known[measure] if measure else headline.measure
     columns, cells = headline.columns, chosen.counted.cells or run.cells(track)
     criteria = [s.criterion for s in columns if s.measure == chosen.name and s.criterion]
-    # A part of a mean that is pooled itself is too small to be compared alone.
+    # A pooled part of a mean is too small to be compared alone.
     names = [
         cell.name for cell in cells if cell.of or not any(cell.name in other.of for other in cells)
     ]
@@ -288,14 +287,14 @@ def comparable(run: Run, track: str, measure: str = "") -> Comparable:
 class Comparison:
     """The result of `compare`.
 
-    `table` has one row a pair and part of the track (levels, categories of questions): a, b, part,
+    `table` has one row per pair and part of the track (level, category of questions): a, b, part,
     value_a, value_b, difference (a minus b), se, lo, hi [all in `unit`], p, p_holm (corrected for
     all rows), verdict, detectable (the difference that a single test finds in four of five cases)
     and detectable_holm (the same at the first step of Holm's correction) [in `unit`; NaN where that
-    is more than values can differ by], better, worse and same (samples on which a has the better,
-    worse, same value), n_samples, n_scenes, n_clusters. `ranks` has one row for each model that has
-    a rank where all pairs of a run were compared: model, value, best and worst rank that it may
-    have. `name` is what the values are called, `unit` theirs, `how` says what they are.
+    exceeds the most that values can differ by], better, worse and same (samples on which a has the
+    better, worse, same value), n_samples, n_scenes, n_clusters. `ranks`, if all pairs of a run were
+    compared, has one row per ranked model: model, value, best and worst rank. `name` and `unit` are
+    those of the values, `how` describes them.
     """
 
     table: pd.DataFrame
@@ -308,11 +307,10 @@ class Comparison:
 def compare_models(
     run: Run, models: Sequence[str] = (), track: str = "", measure: str = ""
 ) -> Comparison:
-    """Compare every pair of models of a run as a whole; in every part where there are but two.
+    """Compare every pair of models of a run overall, or two models in every part.
 
-    `models` limits it to those named; `track` is the first that the run has and `measure` the first
-    of the track, if they are not named. Raises SpecError for a name that the run has not, or when
-    fewer than two are left.
+    `models` limits the comparison to these; `track` is by default the first of the run, `measure`
+    the main one of the track. Raises SpecError for an unknown name, or for fewer than two models.
     """
     sides = [Side(name, name, run) for name in checked_models(run, models)]
     if len(sides) < 2:
@@ -326,10 +324,10 @@ def compare_models(
 def compare_runs(
     first: Run, second: Run, models: Sequence[str] = (), track: str = "", measure: str = ""
 ) -> Comparison:
-    """Compare each model that both runs have; of two `models`, one of each run.
+    """Compare each model that both runs have, or two `models`, one of each run.
 
-    In every part where that is one pair, else as a whole; `track` and `measure` as for
-    `compare_models`. Raises SpecError for names that are not there.
+    A single pair is compared in every part, several overall; `track` and `measure` are as for
+    `compare_models`. Raises SpecError for unknown names.
     """
     if len(models) == 2:
         names = [(*checked_models(first, models[:1]), *checked_models(second, models[1:]))]
@@ -356,7 +354,7 @@ def compare_runs(
 
 
 def _shared_track(runs: Sequence[Run], wanted: str) -> str:
-    """Return the track that is compared: `wanted`, else the first one that all runs have."""
+    """Return the track to compare: `wanted`, else the first one that all runs have."""
     shared = [name for name in kinds() if all(name in run.design.suite.tracks for run in runs)]
     if not shared or (wanted and wanted not in shared):
         where, allowed = ", ".join(str(run.path) for run in runs), ", ".join(shared) or "none"
@@ -372,10 +370,10 @@ def compare(
 ) -> Comparison:
     """Compare the sides of each pair in each part of a track on the samples that both have.
 
-    Sides that are `ranked`, of which every pair is among them, have ranks by the last part.
-    Setting, matcher, criteria and what becomes of missing replies are those of the first run.
-    Raises SpecError when a run was not scored so, asked other questions, or has other blocks in a
-    scene of the same name.
+    `ranked` sides, every pair of which is among `pairs`, get ranks by the last part. Setting,
+    matcher, criteria and the policy on missing replies are those of the first run. Raises SpecError
+    if a run was scored differently, asked other questions, or has other blocks in a scene of the
+    same name.
     """
     sides = list({side.label: side for pair in pairs for side in pair}.values())
     place = {side.label: n for n, side in enumerate(sides)}
@@ -415,7 +413,7 @@ def _verdict(row: Mapping[Any, Any], measure: Measure, n_tests: int) -> str:
     if np.isnan(row["p_holm"]):
         return "cannot tell: a single base scene"
     if row["p_holm"] >= _LEVEL:
-        # So few base scenes give no p value that the correction leaves below the level.
+        # With so few base scenes, no corrected p value can be below the level.
         too_few = n_tests * least_p(row["n_clusters"]) >= _LEVEL
         return "too few base scenes to tell" if too_few else "cannot tell"
     a_is_better = (row["difference"] > 0) == (measure.better == "higher")
@@ -423,7 +421,7 @@ def _verdict(row: Mapping[Any, Any], measure: Measure, n_tests: int) -> str:
 
 
 def rank_ranges_of(sides: Sequence[Side], track: str) -> dict[str, tuple[int, int]]:
-    """Return the best and the worst rank in a track of those sides that have one, by label.
+    """Return the best and the worst rank in a track of all ranked sides, by label.
 
     Raises SpecError for runs that cannot be compared.
     """
@@ -437,7 +435,7 @@ def rank_ranges_of(sides: Sequence[Side], track: str) -> dict[str, tuple[int, in
 
 
 def _with_rank(sides: Sequence[Side], track: str) -> list[Side]:
-    """Return the sides that are models, no baselines, with a value and a record of every sample."""
+    """Return the sides that are models, not baselines, with a value and all their records."""
     able = {}
     for run in {id(side.run): side.run for side in sides}.values():
         recorded = run.records.loc[run.records["track"] == track, "model"].value_counts()
@@ -447,14 +445,14 @@ def _with_rank(sides: Sequence[Side], track: str) -> list[Side]:
 
 
 def _ranks(table: pd.DataFrame, measure: Measure, ranked: Sequence[Side]) -> pd.DataFrame:
-    """Return the ranks by the last part of a table, tests corrected for ranked pairs alone."""
+    """Return the ranks by the last part of a table, with tests corrected only for ranked pairs."""
     names, columns = [side.label for side in ranked], ["model", "value", "best", "worst"]
     if not names:
         return pd.DataFrame(columns=columns)
     whole = table[table["part"] == table["part"].iloc[-1]]
     pairs = whole[whole["a"].isin(names) & whole["b"].isin(names)]
     known = dict[str, float]()
-    # A single ranked model has its value from a pair with another side.
+    # The value of a single ranked model is in its pair with another side.
     for row in (pairs if len(pairs) else whole).to_dict("records"):
         known |= {row["a"]: row["value_a"], row["b"]: row["value_b"]}
     is_better = np.zeros((len(names), len(names)), dtype=bool)
@@ -471,12 +469,12 @@ def _ranks(table: pd.DataFrame, measure: Measure, ranked: Sequence[Side]) -> pd.
 
 
 def rank_text(best: int, worst: int) -> str:
-    """Return a range of ranks as tables show it."""
+    """Return the text of a range of ranks."""
     return str(best) if best == worst else f"{best}\N{EN DASH}{worst}"
 
 
 def compare_view(found: Comparison) -> TextTable:
-    """Show a row a pair and part; the part is left out where there is but one."""
+    """Return a table with a row per pair and part, without the part if there is only one."""
     group = in_unit(found.name, found.unit)
     columns = [texts("a", "A", once=True), texts("b", "B", once=True)]
     if found.table["part"].nunique() > 1:
@@ -521,7 +519,7 @@ def _notes(found: Comparison) -> Iterator[str]:
 
 
 def ranks_view(found: Comparison) -> TextTable:
-    """Show the rank that each model may have, out of `Comparison.ranks`, the best first."""
+    """Return a table of `Comparison.ranks`, the best model first."""
     columns = [
         texts("model", "Model"),
         values("value", in_unit(found.name, found.unit)),
@@ -537,7 +535,7 @@ def ranks_view(found: Comparison) -> TextTable:
 def write_comparison(found: Comparison, folder: Path) -> tuple[Path, ...]:
     """Write comparison (.csv, .md, .tex) and ranks.csv into `folder`.
 
-    Raises StoreError where they cannot be written.
+    Raises StoreError if they cannot be written.
     """
     files = compare_view(found).files("comparison", "comparison")
     files |= {"ranks.csv": to_csv(found.ranks, "%.6f")}
@@ -545,7 +543,7 @@ def write_comparison(found: Comparison, folder: Path) -> tuple[Path, ...]:
 
 
 ITEMS = "items"
-"""The row of what differs from item to item, to hold factors against."""
+"""The row of the spread between items, to compare factors with."""
 _COLUMNS = (
     *("track", "model", "factor", "levels"),
     *(f"{name}{end}" for name in ("shift", "single") for end in ("", "_lo", "_hi")),
@@ -554,13 +552,13 @@ _COLUMNS = (
 
 
 def sensitivity_frame(run: Run) -> pd.DataFrame:
-    """Return one row a track, model and factor: how far it moves scores, in the measure's unit.
+    """Return one row per track, model and factor: how far it moves scores, in the measure's unit.
 
     `shift` is the standard deviation of the means of the `levels` of a factor, `single` that of the
-    scores of single items over levels beyond the shift; of repeats, that of one question asked
-    again; in the row `items`, that between items. `*_lo` and `*_hi` bound 95 % intervals over the
+    scores of single items over levels beyond the shift; for repeats, that of a repeated question;
+    in the row `items`, that between items. `*_lo` and `*_hi` bound 95 % intervals over the
     `n_clusters` base scenes of the `n_items` items that the model answered under every condition.
-    See `phyblock.scoring.statistics`. Empty where the run varies nothing.
+    See `phyblock.scoring.statistics`. Empty if the run varies nothing.
     """
     rows: list[dict[str, Any]] = []
     vary = run.design.suite.vary
@@ -581,7 +579,7 @@ def sensitivity_frame(run: Run) -> pd.DataFrame:
 
 def _scores(run: Run, what: Comparable) -> Iterator[tuple[str, Floats, Clusters]]:
     """Yield each model with its scores, (items, seeds, variants), and the items' base scenes."""
-    # Of the items that it answered under every condition; models may have different ones.
+    # Only items answered under every condition, which may differ between models.
     suite, parents = run.design.suite, base_scenes(run)
     sides = [Side(name, name, run) for name in run.design.model_names]
     samples = what.samples(sides, what.parts[-1], run.design)
@@ -600,7 +598,7 @@ def _scores(run: Run, what: Comparable) -> Iterator[tuple[str, Floats, Clusters]
 def _components(
     vary: VarySpec, factor: str, scores: Floats, clusters: Clusters
 ) -> tuple[Component, Component]:
-    """Return the shift of a factor, and what it does to single items."""
+    """Return the shift of a factor, and its effect on single items."""
     if factor == ITEMS:
         return NO_COMPONENT, spread_of_items(scores, clusters)
     # (items, levels, blocks with each seed, repeats)
@@ -608,13 +606,13 @@ def _components(
     of_levels = of_levels.reshape(*of_levels.shape[:2], -1, of_levels.shape[-1])
     if factor == REPEAT:
         return NO_COMPONENT, within(np.moveaxis(of_levels[..., 0], 1, 2), clusters)
-    # Repeats tell noise apart where nothing else was varied.
+    # Repeats separate noise if nothing else was varied.
     cells = of_levels.mean(axis=3) if of_levels.shape[2] > 1 else of_levels[:, :, 0]
     return shift(cells, clusters), interaction(cells, clusters)
 
 
 def _places(vary: VarySpec, factor: str) -> NDArray[np.intp]:
-    """Return numbers of the variants that differ in a factor alone, (levels, blocks, repeats)."""
+    """Return numbers of the variants by factor level, (levels, blocks, repeats)."""
     levels, repeats = vary.names(factor), vary.names(REPEAT) or ("1",)
     places: dict[Variant, dict[tuple[str, str], int]] = {}
     for place, variant in enumerate(vary.variants):
@@ -622,7 +620,7 @@ def _places(vary: VarySpec, factor: str) -> NDArray[np.intp]:
         level = here.pop(factor, levels[0])
         again = level if factor == REPEAT else here.pop(REPEAT, "1")
         places.setdefault(Variant(tuple(here.items())), {})[level, again] = place
-    # Of repeats each level is one: all others stand beside it as blocks.
+    # Each repeat is a level of its own: all other factors are blocks.
     pairs = [[(n, again) for again in ((n,) if factor == REPEAT else repeats)] for n in levels]
     every = {pair for row in pairs for pair in row}
     whole = [found for found in places.values() if every <= set(found)]
@@ -637,7 +635,7 @@ def factor_name(factor: str) -> str:
 
 
 def sensitivity_table(run: Run) -> TextTable | None:
-    """Return standard deviations with intervals, a row a model and factor; None where none is."""
+    """Return a table of standard deviations with intervals, a row per model and factor, or None."""
     table, tracks = sensitivity_frame(run), run.design.suite.tracks
     if table.empty:
         return None
@@ -659,8 +657,8 @@ def sensitivity_table(run: Run) -> TextTable | None:
 
 
 def sizes_text(table: pd.DataFrame) -> str:
-    """Return how many items, of how many base scenes, are behind rows of `sensitivity_frame`: from
-    the model that has fewest to the one that has most.
+    """Return the numbers of items and base scenes behind rows of `sensitivity_frame`, from the
+    model with the fewest to the one with the most.
     """
     ends = [(int(table[name].min()), int(table[name].max())) for name in ("n_items", "n_clusters")]
     items, scenes = (f"{a}" if a == b else f"{a} to {b}" for a, b in ends)

@@ -41,11 +41,11 @@ _ABOUT = ["model", "scene", "item", "seed", "variant"]
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Counts of samples, a row a sample and way of scoring it.
+    """Counts of samples, with a row per sample and way of scoring it.
 
-    `about` has by row its model, scene, item, seed, variant, the columns of `SCORED_BY`, and
-    `replied`: if the model said anything; a refusal does. `counts` has shape (rows, columns).
-    `cells` says by cell that is no mean which rows are in it; a row may be in several.
+    `about` has for each row its model, scene, item, seed, variant, the columns of `SCORED_BY`, and
+    `replied`, true if the model replied at all; a refusal is a reply. `counts` has shape (rows,
+    columns). `cells` has for each cell that is not a mean the mask of its rows, which may overlap.
     """
 
     about: pd.DataFrame
@@ -56,11 +56,11 @@ class Rows:
 def counted_rows(
     run: Run, track: str, counted: SampleCounts, cells: Sequence[Cell], design: Design | None = None
 ) -> Rows:
-    """Return the counts of a track's samples that measures are made from, in these cells.
+    """Return the counts of a track's samples in these cells.
 
-    Samples that the policy of the design (that of the run) on missing replies leaves out are not
-    among them, nor is any other of their group. Raises StoreError for stored counts of another
-    number than the measure has now.
+    Samples that the design's policy on missing replies excludes (by default that of the run) are
+    not among them, nor is any other sample of their group. Raises StoreError if the number of
+    stored counts is not that of the measure.
     """
     design = design or run.design
     records = run.records[run.records["track"] == track]
@@ -74,7 +74,7 @@ def counted_rows(
     held = held[held["row"].isin(records.index)]
     numbers = held.iloc[:, 1 + len(SCORED_BY) :].to_numpy(np.float64)
     if len(held) and (set(widths := (~np.isnan(numbers)).sum(axis=1)) != {width}):
-        message, hint = "was counted in another way", "phyblock score counts anew"
+        message, hint = "was counted in another way", "phyblock score counts again"
         found = f"{', '.join(map(str, sorted({*widths.tolist()} - {width})))} numbers"
         where, allowed = str(run.path / RECORDS), ", ".join(counted.columns)
         raise StoreError(Problem(where, message, f"counts.{counted.name}", found, allowed, hint))
@@ -93,7 +93,7 @@ def counted_rows(
 
 
 def _masks(about: pd.DataFrame, cells: Sequence[Cell]) -> Iterator[tuple[str, NDArray[np.bool_]]]:
-    """Yield the cells that are no means, and which rows are in them, by level, part or all."""
+    """Yield the cells that are not means with the masks of their rows, by level, part or all."""
     code, held = pd.factorize(about["levels"].to_numpy())
     for cell in cells:
         if cell.of:
@@ -107,7 +107,7 @@ def _masks(about: pd.DataFrame, cells: Sequence[Cell]) -> Iterator[tuple[str, ND
 
 
 def base_scenes(run: Run) -> dict[str, tuple[str, ...]]:
-    """Return the base scenes of each scene, itself where it has no others."""
+    """Return the base scenes of each scene, which may be the scene itself."""
     first = run.records.drop_duplicates("scene")
     return {
         scene: tuple(parents) or (scene,)
@@ -116,14 +116,14 @@ def base_scenes(run: Run) -> dict[str, tuple[str, ...]]:
 
 
 def track_estimates(run: Run, track: str) -> pd.DataFrame:
-    """Return one row a measure, model, way of counting and cell, in `ESTIMATE_COLUMNS`.
+    """Return one row per measure, model, way of counting and cell, in `ESTIMATE_COLUMNS`.
 
-    `value` is of the counts of all `n` samples, summed over scenes and seeds, in the measure's own
-    unit; `mean`, `sd` (ddof = 1), `least` and `most` are over the values of the `seeds` single
+    `value` is from the counts of all `n` samples, summed over scenes and seeds, in the measure's
+    own unit; `mean`, `sd` (ddof = 1), `least` and `most` are over the values of the `seeds` single
     seeds. `lo` and `hi` bound a 95 % interval and `se` is the standard error, from leaving out the
     `n_clusters` base scenes that the `n_scenes` scenes were made from; a scene's seeds stay
-    together. Where a model said nothing at all in a cell, nothing was measured: NaN. The same frame
-    whenever it is asked for, not to be changed.
+    together. If a model gave no reply at all in a cell, its values are NaN. The frame is cached and
+    must not be changed.
     """
     if track in run.made:
         return run.made[track]
@@ -134,7 +134,7 @@ def track_estimates(run: Run, track: str) -> pd.DataFrame:
     parents, cells = base_scenes(run), run.cells(track)
     for counted, family in families.items():
         rows, own = counted_rows(run, track, counted, cells), counted.cells or cells
-        # Cells that means join are estimated together.
+        # Cells that share a mean are estimated together.
         for together in [own] if any(cell.of for cell in own) else [[cell] for cell in own]:
             found += _estimates(rows, parents, family, together)
     run.made[track] = pd.DataFrame(found, columns=list(ESTIMATE_COLUMNS))
@@ -147,7 +147,7 @@ def _sums(
     codes: Sequence[NDArray[np.intp]],
     shape: tuple[int, ...],
 ) -> tuple[Floats, NDArray[np.intp]]:
-    """Return sums of counts by codes and masks, (*shape, masks, columns), and of how many rows."""
+    """Return sums of counts by codes and masks, (*shape, masks, columns), and numbers of rows."""
     size, flat = int(np.prod(shape)), np.ravel_multi_index(tuple(codes), shape)
     sums = np.zeros((size, len(masks), counts.shape[1]))
     rows = np.zeros((size, len(masks)), dtype=np.intp)
@@ -161,9 +161,9 @@ def _sums(
 def cell_value(
     cell: Cell, cells: Mapping[str, Cell], single: Mapping[str, tuple[Floats, NDArray[np.bool_]]]
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Return the value of a cell, and where it has one, of those of cells that are no means.
+    """Return the values of a cell from those of cells that are not means, and where it has one.
 
-    A mean is over the parts that are there, as `single` says beside their values.
+    A mean is over the parts that exist, as given in `single` with their values.
     """
     if not cell.of:
         return single[cell.name]
@@ -175,7 +175,7 @@ def cell_value(
 
 
 def pooled_in(cell: Cell, cells: Sequence[Cell]) -> frozenset[str]:
-    """Return the cells that are no means of which a cell is made."""
+    """Return the cells that a cell is made of, without means."""
     if not cell.of:
         return frozenset([cell.name])
     by_name = {other.name: other for other in cells}
@@ -188,7 +188,7 @@ def _estimates(
     measures: Sequence[Measure],
     cells: Sequence[Cell],
 ) -> Iterator[tuple[object, ...]]:
-    """Yield estimates of measures with the same counts, in cells that are estimated together."""
+    """Yield estimates of measures with the same counts, in jointly estimated cells."""
     pooled = [cell.name for cell in cells if not cell.of]
     used = np.flatnonzero(np.logical_or.reduce([rows.cells[name] for name in pooled]))
     if not len(used):
@@ -210,7 +210,7 @@ def _estimates(
     by_name = {cell.name: cell for cell in cells}
 
     def all_values(sums: Floats) -> Floats:
-        # Where a model said nothing, empty plans have counts, and nothing was measured.
+        # Without any reply, empty plans have counts, but nothing was measured.
         spoken = np.where(silent[..., None], np.nan, sums)
         values = []
         for measure in measures:
@@ -225,7 +225,7 @@ def _estimates(
     each = [np.any(present[:, :, own], axis=-1) for own in members]
     behind = np.stack([clusters.behind(one) for one in each], axis=-1)
     fewest = np.stack([by_cell[:, own].min(axis=-1) for own in members], axis=-1)
-    # A part of a single base scene leaves a mean without an interval.
+    # A part with a single base scene leaves a mean without an interval.
     usable = np.repeat(np.where(fewest < 2, fewest, behind)[:, :, None], len(measures), axis=-1)
     estimate = jackknife(given, clusters, all_values, n_clusters=usable)
     within = in_range(estimate, [measure.end_of_range for measure in measures])
@@ -243,7 +243,7 @@ def _estimates(
 
 
 def _over_seeds(each: Floats) -> tuple[NDArray[np.intp], Floats, Floats, Floats, Floats]:
-    """Return the seeds with a value; mean, sample standard deviation, least and most over them."""
+    """Return the number of seeds with a value, and their mean, sample sd, least and most."""
     known = ~np.isnan(each)
     count = known.sum(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -254,7 +254,7 @@ def _over_seeds(each: Floats) -> tuple[NDArray[np.intp], Floats, Floats, Floats,
 
 
 def all_estimates(run: Run) -> pd.DataFrame:
-    """Return one long frame: every track of the run, measure, way of counting, model and cell."""
+    """Return one long frame of every track, measure, way of counting, model and cell of the run."""
     parts = [track_estimates(run, track).assign(track=track) for track in run.design.suite.tracks]
     known = [part for part in parts if len(part)]
     columns = ["track", *ESTIMATE_COLUMNS]
@@ -262,7 +262,7 @@ def all_estimates(run: Run) -> pd.DataFrame:
 
 
 def track_notes(run: Run, track: str) -> tuple[str, ...]:
-    """Return the sentences that say how the values of a track are counted."""
+    """Return sentences that explain how the values of a track are counted."""
     kind, suite = kind_of(track), run.design.suite
     spec = suite.section(kind.options) if kind.options else None
     facts = {"suite": suite, "spec": spec, "manifest": run.manifest}
@@ -272,7 +272,7 @@ def track_notes(run: Run, track: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class HeadlineColumn:
-    """A measure in a cell, as a column of a headline; `criterion` where there are several."""
+    """A measure in a cell as a column of a headline, with its `criterion` if there are several."""
 
     measure: str
     cell: str
@@ -283,9 +283,9 @@ class HeadlineColumn:
 
 @dataclass(frozen=True)
 class Value:
-    """An estimate as tables show it, in the unit of its measure (percent for shares).
+    """An estimate as shown in tables, in the unit of its measure (percent for shares).
 
-    `value` is of all samples, pooled over seeds; `lo` and `hi` are NaN where there is no interval.
+    `value` is over all samples, pooled over seeds; `lo` and `hi` are NaN without an interval.
     """
 
     value: float
@@ -295,7 +295,7 @@ class Value:
 
 @dataclass(frozen=True)
 class Floor:
-    """The strongest baseline that never sees the goal, and its value as tables show it."""
+    """The strongest baseline that never sees the goal, and its value as shown in tables."""
 
     name: str
     value: float
@@ -315,9 +315,9 @@ def headline_rows(estimates: pd.DataFrame, design: Design) -> pd.DataFrame:
 
 @dataclass(frozen=True, eq=False)
 class Headline:
-    """The headline of a track of a run: what the terminal, tables, figures and pages show first.
+    """The headline of a track of a run, which terminal, tables, figures and pages show first.
 
-    In the headline setting of the run, or of another `design`.
+    It is in the headline setting of the run, or of another `design`.
     """
 
     run: Run
@@ -339,18 +339,18 @@ class Headline:
 
     @property
     def main(self) -> HeadlineColumn:
-        """The column that models are ranked by: the one that says so, else the last."""
+        """The column that models are ranked by: the one marked as main, else the last."""
         return next((column for column in self.columns if column.main), self.columns[-1])
 
     @property
     def parts(self) -> list[HeadlineColumn]:
-        """The columns that have its measure in other cells, as by level."""
+        """The columns with its measure in other cells, such as levels."""
         main = self.main
         return [c for c in self.columns if c.measure == main.measure and c.cell != main.cell]
 
     @property
     def measure(self) -> Measure:
-        """The measure of the main column: the one that is drawn, compared and ranked by."""
+        """The measure of the main column, used for figures, comparisons and ranks."""
         return next(one for one in track_measures(self.track) if one.name == self.main.measure)
 
     @cached_property
@@ -371,7 +371,7 @@ class Headline:
 
     @cached_property
     def ranked(self) -> dict[str, Value]:
-        """The main value of each model that has one, the best first."""
+        """The main value of each model that has one, best first."""
         main, sign = self.main.heading, -1 if self.measure.better == "higher" else 1
         values = [(model, value) for (model, heading), value in self.values.items()
                   if heading == main and not math.isnan(value.value)]  # fmt: skip

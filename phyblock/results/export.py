@@ -26,16 +26,16 @@ _TYPES = {
     **dict.fromkeys(("attempts", *TOKENS), "Int64"),
     "cached": "boolean",
 }
-"""Columns that frames of records have as well."""
+"""Columns that frames of records also have."""
 _TEXTS = ("prompt", "reply", "reasoning", "provider_model", "error", "asked")
 
 
 def export_frame(run: Run) -> pd.DataFrame:
-    """Return one row a sample: what was asked, of whom, the reply, what was read, and the counts.
+    """Return one row per sample: prompt, model, reply, parsed answer and counts.
 
-    Counts are `tp_<setting>`, `fp_<setting>`, `fn_<setting>` of the headline matcher, all levels
-    by the `aov` criterion (of episodes: over placed blocks); `count_<name>_<column>` are those that
-    records keep. Columns have the same types whatever the rows are; what a track does not have is
+    Counts are `tp_<setting>`, `fp_<setting>`, `fn_<setting>` of the headline matcher, all levels by
+    the `aov` criterion (for episodes over placed blocks); `count_<name>_<column>` are those stored
+    in records. Columns have the same types for any rows; values that a track does not have are
     missing. `levels`, `parents` and `plan` are lists.
     """
     types = {**dict.fromkeys(_TEXTS, "string"), "plan": "object"}
@@ -66,12 +66,12 @@ def export_frame(run: Run) -> pd.DataFrame:
 def _row(
     run: Run, record: Record, prompts: Mapping[str, Sequence[PromptMessage]]
 ) -> dict[str, Any]:
-    """Return what a frame of records does not hold of one."""
+    """Return the values of a record that a frame of records does not have."""
     reply, plan = record.reply, getattr(record.parse, "plan", None)
     messages = None if record.prompt is None else prompts.get(record.prompt.messages)
     parts = [part for message in messages or () for part in message.parts]
     found: dict[str, Any] = {
-        # As it was sent, pictures by their labels; None where none was stored.
+        # As it was sent, pictures by their labels; None if none was stored.
         "prompt": None if messages is None else "\n".join(
             f"[picture: {part.image}]" if isinstance(part, PictureMark) else part for part in parts
         ),
@@ -94,8 +94,8 @@ def _row(
 def export_run(run: Run, form: str, folder: Path | None = None) -> tuple[Path, ...]:
     """Write a run as `csv` or `parquet` into `folder` (export/FORMAT in the run's).
 
-    Lists are JSON in CSV. Raises StoreError where the folder cannot be written or a file is in the
-    way that we never wrote, SpecError where pyarrow is missing.
+    Lists are JSON in CSV. Raises StoreError if the folder cannot be written or holds a file of that
+    name that phyblock did not write, SpecError if pyarrow is missing.
     """
     out = OutFolder(folder or run.path)
     below = "" if folder else f"export/{form}/"

@@ -41,33 +41,33 @@ _MUTED, _PALE, _ACCENT = "#5c6670", "#c3cad2", "#0b62a4"
 _COLORS = (
     *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195", "#1b1f24"),
 )
-"""Okabe and Ito's colors, the yellow replaced: it does not print on white."""
+"""Okabe and Ito's colors, with the yellow replaced, which does not print on white."""
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "h")
 _NAMED = len(_COLORS)
-"""Models that have a color and a name; the others are pale."""
+"""Number of models with a color and a name; the others are pale."""
 WIDTH_IN = 7.0
 """Width of the text of a two-column paper."""
 COLUMN_IN = 3.35
 """Width of one of its columns."""
 PAPER = "paper"
-"""The folder in a run's folder where figures for papers are, unless another is named."""
+"""Default folder of figures for papers, in a run's folder."""
 Font = Literal["sans", "serif"]
 _FONTS = {"sans": ("sans-serif", "DejaVu Sans"), "serif": ("serif", "STIXGeneral")}
-"""Generic family and the font that stands for it; matplotlib brings both."""
+"""Generic family and its font; matplotlib includes both."""
 _ROW_IN, _TITLE_IN, _LEGEND_IN = 0.19, 0.22, 0.2
 _LETTER_IN = 0.062
-"""Width of a letter of a legend, as wide ones have it."""
+"""Width of a wide letter in a legend."""
 _FORMATS: dict[str, tuple[int, dict[str, Any]]] = {
     "pdf": (300, {"Creator": "phyblock", "CreationDate": None, "ModDate": None}),
     "svg": (72, {"Creator": "phyblock", "Date": None}),
     "png": (200, {"Software": "phyblock"}),
 }
-"""Dots per inch and metadata: without a date, the same numbers give the same bytes."""
+"""Dots per inch and metadata; without a date, the same numbers give the same bytes."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """Width [inches], font, and whether figures have their title inside."""
+    """Width [inches], font, and a flag for titles inside figures."""
 
     width_in: float = WIDTH_IN
     font: Font = "sans"
@@ -76,7 +76,7 @@ class Look:
 
 @contextmanager
 def _styled(look: Look) -> Iterator[None]:
-    """Within it, figures have the project's style; matplotlib's list of fonts is in our cache."""
+    """Apply the project's style to figures, with matplotlib's font list in phyblock's cache."""
     os.environ.setdefault("MPLCONFIGDIR", str(cache_dir() / "matplotlib"))
     import matplotlib as mpl
 
@@ -108,7 +108,7 @@ def _is_wide(figure: Figure) -> bool:
 def _finished(
     figure: Figure, run: Run, title: str, how: str, *, grid: str = "x", reverse: bool = False
 ) -> Figure:
-    """Return a figure with a light grid, a legend below of what is labeled, and its caption."""
+    """Return a figure with a light grid, a legend below, and its caption."""
     for ax in figure.axes:
         ax.spines[["top", "right", "left"]].set_visible(False)
         ax.tick_params(axis="y", length=0)
@@ -128,21 +128,21 @@ def _finished(
 
 
 def _named_rows(ax: Axes, names: Sequence[str]) -> None:
-    """Name the rows of a plot from its top."""
+    """Label the rows of a plot from the top."""
     ax.set_yticks(range(len(names)), list(names))
     ax.set_ylim(len(names) - 0.4, -0.6)
 
 
 _MOST_MODELS = 6
-"""Most models of which all pairs are shown; with more, each is compared with the best one."""
+"""Maximum number of models for all pairs; with more, each is compared with the best one."""
 
 
 def forest(run: Run, *, track: str) -> Figure | None:
-    """A row a pair of models under the better one's name, the difference with its 95 % interval.
+    """Draw the differences of pairs of models, one row each under the better one's name.
 
-    All pairs of up to six models; of more, the best one and each of the others; of two, a row a
-    part of the track. Wide figures say the numbers beside. Of the same samples, as `phyblock
-    compare` has them; None for fewer than two models that answered.
+    Up to six models give all pairs; more give the best one and each of the others; two give a row
+    per part of the track. Wide figures also print the numbers. Values are those of `phyblock
+    compare`, with 95 % intervals. None for fewer than two models that answered.
     """
     models = list(Headline(run, track).ranked)
     if len(models) < 2:
@@ -156,7 +156,7 @@ def forest(run: Run, *, track: str) -> Figure | None:
         labels = [level_name(part.replace("_", " ")) for part in table["part"]]
         title = f"{table.iloc[0]['a']} minus {table.iloc[0]['b']}"
     elif len(models) > _MOST_MODELS:
-        # Pairs come in the order of the models that were given.
+        # Pairs are in the order of the given models.
         table = table[table["a"] == models[0]]
         labels = list(table["b"])
         title = f"{kind_of(track).title}: {found.name} of {models[0]} minus that of each other"
@@ -189,7 +189,7 @@ def forest(run: Run, *, track: str) -> Figure | None:
 
 
 def levels(run: Run, *, track: str) -> Figure | None:
-    """A line a model over the cells of the headline; None for fewer than two cells."""
+    """Draw one line per model over the cells of the headline; None for fewer than two cells."""
     headline = Headline(run, track)
     columns, measure, values = headline.parts, headline.measure, headline.values
     models = list(headline.ranked)
@@ -213,7 +213,7 @@ def levels(run: Run, *, track: str) -> Figure | None:
 
 
 def shares(run: Run, *, track: str, table: str) -> Figure | None:
-    """Stacked shares of a table, a row a model, of all cells together; None without a share."""
+    """Draw stacked shares of a table over all cells, one row per model; None without shares."""
     report = kind_of(track).report()
     layout = report.tables[table]
     frame, whole = filled(run, track, layout).frame, run.cells(track)[-1].name
@@ -252,7 +252,7 @@ _CALLOUTS = 4
 
 
 def cost(run: Run, *, track: str) -> Figure | None:
-    """The main value against dollars for 100 replies; None where no cost is known."""
+    """Draw the main value against dollars per 100 replies; None if no cost is known."""
     from matplotlib.patheffects import withStroke
     from matplotlib.ticker import NullFormatter
 
@@ -276,7 +276,7 @@ def cost(run: Run, *, track: str) -> Figure | None:
         name = ax.annotate(model, at, xytext=(5, 3), textcoords="offset points", fontsize=6.5)
         name.set_path_effects([withStroke(linewidth=2, foreground="white")])
     ax.set_xscale("log")
-    # As plain numbers: the style prints no mathematics, and so no powers of ten.
+    # Plain numbers: the style prints no mathematics, and so no powers of ten.
     ax.xaxis.set_major_formatter("{x:g}")
     ax.xaxis.set_minor_formatter(NullFormatter())
     ax.set(xlabel="Cost of 100 replies (USD, log scale)", ylabel=measure.heading_in_unit)
@@ -288,9 +288,9 @@ def cost(run: Run, *, track: str) -> Figure | None:
 
 
 def sensitivity(run: Run, *, track: str) -> Figure | None:
-    """A panel a factor, a row a model, dots for shift and single items; None where nothing varies.
+    """Draw shift and single items as dots, a panel per factor and a row per model, or None.
 
-    The spread between items is left out: it is an order of magnitude larger, and no factor.
+    The spread between items is not drawn: it is an order of magnitude larger, and not a factor.
     """
     table = sensitivity_frame(run)
     table = table[(table["track"] == track) & (table["factor"] != ITEMS)]
@@ -318,7 +318,7 @@ def sensitivity(run: Run, *, track: str) -> Figure | None:
 
 
 def figures_of(run: Run) -> dict[str, Callable[[Run], Figure | None]]:
-    """Return what draws each figure that a run may have, by name."""
+    """Return the functions that draw the figures that a run may have, by name."""
     found: dict[str, Callable[[Run], Figure | None]] = {}
     for track in run.design.suite.tracks:
         dashed = track.replace("_", "-")
@@ -336,10 +336,10 @@ def write_paper_figures(
 ) -> tuple[Path, ...]:
     """Draw figures for a paper into `out`, else into `paper/` of the run's folder.
 
-    Each is NAME.pdf, NAME.svg and NAME.png, its caption NAME.txt, and NAME.tex a float that
-    includes it. All figures where no names are given; those without numbers are left out. The
-    same records give the same bytes. Raises StoreError for a folder that cannot be written, and,
-    before anything is drawn, naming every file in the way that we never wrote.
+    Each is NAME.pdf, NAME.svg and NAME.png, with its caption NAME.txt, and NAME.tex, a float that
+    includes it. Without names, all figures that have numbers are drawn. The same records give the
+    same bytes. Raises StoreError for a folder that cannot be written and, before anything is drawn,
+    naming every file that would be overwritten and that phyblock did not write.
     """
     makers = figures_of(run)
     wanted = list(names) or list(makers)
@@ -363,7 +363,7 @@ def write_paper_figures(
                 drawn = io.BytesIO()
                 figure.savefig(drawn, format=ending, dpi=dpi, metadata=metadata)
                 made[f"{name}.{ending}"] = drawn.getvalue()
-                # Laid out once: the next format takes what the first has found.
+                # Laid out once: the next formats use the layout of the first.
                 figure.set_layout_engine("none")
             made |= _captions(run, name, figure)
             files += folder.write({f"{below}{file}": data for file, data in made.items()})

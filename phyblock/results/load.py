@@ -1,4 +1,4 @@
-"""A run as data frames: its design, one row a sample, and the counts that measures are made of."""
+"""A run as data frames: its design, one row per sample, and the counts behind measures."""
 
 from __future__ import annotations
 
@@ -51,14 +51,14 @@ _TYPES = {
     **{f"error_{name}": kind for name, kind in _OF_ERROR.items()},
     **{"rule": "object", "start": "int64"},
 }
-"""Columns of `Run.records` with their types. `start` is where the record begins in
+"""Columns of `Run.records` with their types. `start` is the offset of the record in
 `records.jsonl` [bytes]."""
 
 
 def track_measures(track: str) -> tuple[Measure, ...]:
-    """Return the measures of a track, those that were added behind its own.
+    """Return the measures of a track, then those that plugins added.
 
-    Raises ValueError where two measures, or two sorts of counts, have one name.
+    Raises ValueError if two measures, or two kinds of counts, have the same name.
     """
     measures = (*kind_of(track).report().measures, *added_measures(track))
     for named in (measures, {measure.counted for measure in measures}):
@@ -71,9 +71,9 @@ def track_measures(track: str) -> tuple[Measure, ...]:
 def frames_of(
     records: Iterable[tuple[Record, int]], design: Design
 ) -> tuple[pd.DataFrame, dict[tuple[str, str], pd.DataFrame]]:
-    """Return `Run.records` and `Run.counts` of records and where they begin [bytes].
+    """Return `Run.records` and `Run.counts` from records with their offsets [bytes].
 
-    The newest record of a sample stands for it. Order and types do not depend on the file.
+    Only the newest record of a sample counts. Order and types do not depend on the file.
     """
     import pandas as pd
 
@@ -97,7 +97,7 @@ def frames_of(
     frame = frame.drop_duplicates("sample", keep="last")
     frame["place"] = [place.get(name, len(place)) for name in frame["model"]]
     frame = frame.sort_values(["track", "place", "model", "scene", "seed", "sample"])
-    # Records that a newer one replaced have no row.
+    # Replaced records have no row.
     row_of = pd.Series(range(len(frame)), index=frame.index)
     counts = {}
     for key, rows in ((key, rows) for key, rows in numbers.items() if rows):
@@ -126,10 +126,10 @@ def _row(record: Record, start: int) -> tuple[Any, ...]:
 
 @dataclass(frozen=True)
 class Design:
-    """The plan of a run as its `run.yaml` states it: the rows and columns of every table.
+    """The plan of a run from its `run.yaml`, which determines the rows and columns of tables.
 
-    `items` counts what each track asks about. The first matcher and the first setting of the suite
-    are the headline.
+    `items` is the number of items of each track. The first matcher and the first setting of the
+    suite are those of the headline.
     """
 
     suite: Suite
@@ -149,16 +149,16 @@ class Design:
 
     @property
     def of_suite(self) -> str:
-        """The suite as captions of tables end in it, `, suite NAME`; "" where it has no name."""
+        """The end of captions, `, suite NAME`; "" if the suite has no name."""
         return f", suite {self.suite.name}" if self.suite.name else ""
 
     def samples(self, track: str) -> int:
-        """Samples that a complete run holds of one model in a track."""
+        """Number of samples of one model in a track of a complete run."""
         return self.items.get(track, 0) * len(self.suite.seeds) * len(self.suite.vary.variants)
 
     @property
     def all_samples(self) -> int:
-        """Samples that a complete run holds."""
+        """Number of samples of a complete run."""
         return len(self.models) * sum(self.samples(track) for track in self.suite.tracks)
 
     @property
@@ -173,28 +173,27 @@ class Design:
 
     @property
     def outcomes_left_out(self) -> frozenset[str]:
-        """Outcomes whose samples enter no score under the policy on missing replies."""
+        """Outcomes that the policy on missing replies excludes from scores."""
         return frozenset(WITHOUT_REPLY) if self.suite.scoring.missing == "skip" else frozenset()
 
 
 def design_of(manifest: Manifest, where: str = MANIFEST) -> Design:
-    """Return the design of a run; StoreError naming `where` and every field that is wrong."""
+    """Return the design of a run. Raises StoreError naming `where` and every wrong field."""
     return Design(suite_of(manifest, where), manifest.models, manifest.items, manifest.scenes)
 
 
 _SHOWN_AS = ("circular", "blind")
-"""Options of a track's section of a suite, in words for captions."""
+"""Options of a track's section of a suite that captions name."""
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A run folder, read: `manifest` is its `run.yaml`, `design` the plan in it.
+    """A loaded run folder: `manifest` is its `run.yaml`, `design` the plan in it.
 
-    `records` has one row a sample: track, model, scene, levels, parents, n_blocks, seed, outcome,
+    `records` has one row per sample: track, model, scene, levels, parents, n_blocks, seed, outcome,
     tokens, cost_usd, latency_s and so on, and the error. `counts` are those of its measures, by
-    track and name: the row in `records`, the columns of `SCORED_BY`, and the numbers. `is_cut` says
-    that the last line was cut off by a kill and therefore ignored. `made` keeps frames that are
-    made once.
+    track and name: the row in `records`, the columns of `SCORED_BY`, and the numbers. `is_cut` is
+    true if a kill cut off the last line, which is then ignored. `made` caches frames.
     """
 
     path: Path
@@ -207,18 +206,18 @@ class Run:
 
     @property
     def estimates(self) -> pd.DataFrame:
-        """Every value with its 95 % interval: a row a track, measure, way of counting, model, cell.
+        """Every value with its 95 % interval, by track, measure, way of counting, model and cell.
 
-        Shares are in [0, 1]. A copy, to be changed freely.
+        Shares are in [0, 1]. The frame is a copy.
         """
         from phyblock.results.estimates import all_estimates
 
         return all_estimates(self)
 
     def summary(self) -> pd.DataFrame:
-        """Return one row a model: the headline of each track with the ends of its interval.
+        """Return one row per model: the headline of each track with the ends of its interval.
 
-        Columns have the short name of a track, or its name, and then `_lo` and `_hi`.
+        Columns are the short name of a track, or its name, and the same with `_lo` and `_hi`.
         """
         import pandas as pd
 
@@ -236,7 +235,7 @@ class Run:
         return str(self.summary().to_html(float_format="{:.1f}".format))
 
     def table(self, name: str) -> pd.DataFrame:
-        """Return the numbers of a table by its name; KeyError for one that the run has not."""
+        """Return the numbers of a table by name. Raises KeyError if the run has no such table."""
         from phyblock.results.tables import make_tables
 
         frame: pd.DataFrame = make_tables(self, [name])[name].frame
@@ -251,7 +250,7 @@ class Run:
     ) -> Comparison:
         """Compare the models of this run with one another, or with those of `other`.
 
-        Raises SpecError for names that are not there or runs that cannot be compared.
+        Raises SpecError for unknown names or runs that cannot be compared.
         """
         from phyblock.results.compare import compare_models, compare_runs
 
@@ -260,11 +259,11 @@ class Run:
         return compare_runs(self, other, models, track, measure)
 
     def cells(self, track: str) -> tuple[Cell, ...]:
-        """Return the cells of a track, of which the last stands for all."""
+        """Return the cells of a track, the last of which is the whole."""
         return kind_of(track).report().cells(self.design.suite, self.manifest)
 
     def presentation(self, track: str) -> tuple[str, ...]:
-        """Return, in words for captions, what is unusual about how items were shown and asked."""
+        """Return the unusual features of a track's presentation, as words for captions."""
         suite, kind = self.design.suite, kind_of(track)
         held = self.manifest.suite.get(kind.section) or {}
         is_shuffled = "candidate_order" in kind.varies and suite.candidates.order == "shuffled"
@@ -280,8 +279,8 @@ class Run:
 def load_run(path: str | Path) -> Run:
     """Read a run folder.
 
-    Raises StoreError for a folder that is no run, a broken `run.yaml`, or a line of `records.jsonl`
-    that is corrupt, other than an unfinished last one, or of another run.
+    Raises StoreError for a folder that is not a run, a broken `run.yaml`, or a line of
+    `records.jsonl` that is corrupt, other than an unfinished last one, or belongs to another run.
     """
     folder = Path(path)
     manifest = read_manifest(folder)
@@ -292,10 +291,10 @@ def load_run(path: str | Path) -> Run:
 
 
 def of_models(run: Run, models: Sequence[str]) -> Run:
-    """Return the run as if it had these models alone, in its own order; all where none are named.
+    """Return the run with only these models, in its own order; all if none are named.
 
-    Values and intervals of a model stay what they are. Raises SpecError for a model that the run
-    has not, or that is named twice.
+    Values and intervals of a model do not change. Raises SpecError for a model that the run does
+    not have, or that is named twice.
     """
     if not models:
         return run
@@ -306,9 +305,9 @@ def of_models(run: Run, models: Sequence[str]) -> Run:
 
 
 def checked_models(run: Run, models: Sequence[str]) -> Sequence[str]:
-    """Return the models that are named, all of the run where none are.
+    """Return the named models, or all of the run.
 
-    Raises SpecError for one that the run has not, or that is named twice.
+    Raises SpecError for one that the run does not have, or that is named twice.
     """
     known = run.design.model_names
     if unknown := [name for name in models if name not in known]:

@@ -1,4 +1,4 @@
-"""The numbers that the paper prints, and ours beside them."""
+"""The published numbers of the paper, and ours beside them."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ _TABLES = {
     for n, told in yaml.safe_load((_FOLDER / "tables.yaml").read_text(encoding="utf-8")).items()
 }
 PAPER_TABLES = tuple(_TABLES)
-"""Numbers of the paper's tables of results."""
+"""Numbers of the paper's results tables."""
 
 
 def published_table(table: int) -> pd.DataFrame:
-    """Return a results table of the paper (1, 2, 3 or 5), one printed value [%] a row.
+    """Return a results table of the paper (1, 2, 3 or 5), with one printed value [%] per row.
 
-    `published/README.md` says what the columns are and where the numbers come from.
+    `published/README.md` explains the columns and the sources of the numbers.
     """
     with (_FOLDER / f"table{table}.csv").open("rb") as file:
         return pd.read_csv(file, dtype={"level": "object"})
@@ -54,9 +54,9 @@ def published_table(table: int) -> pd.DataFrame:
 def published_frame(run: Run, table: int) -> pd.DataFrame:
     """Return one row for each printed value of a model of the run, with ours [%].
 
-    Columns are model, published_name, cell, metric, published, ours, difference (ours less
-    published) and n, the samples behind ours. Ours is not rounded, and NaN for what the run does
-    not measure. Table 1 is compared in setting A by the `paper` matcher where the run has it.
+    Columns are model, published_name, cell, metric, published, ours, difference (ours minus
+    published) and n, the samples behind ours. Ours is not rounded, and NaN if the run does not
+    measure it. Table 1 is compared in setting A by the `paper` matcher if the run has it.
     """
     paper, design = _TABLES[table], run.design
     if paper.track not in design.suite.tracks or (table == 5 and len(design.suite.seeds) < 2):
@@ -81,7 +81,7 @@ def published_frame(run: Run, table: int) -> pd.DataFrame:
 
 
 def is_as_published(run: Run) -> bool:
-    """True if a run counts as the paper's Table 1 does."""
+    """True if a run is scored as in the paper's Table 1."""
     suite = run.design.suite
     return (
         "paper" in suite.scoring.matchers
@@ -110,7 +110,7 @@ def _ours(run: Run, table: int) -> pd.DataFrame:
         parts.append(mine[["model", CELL, "n"]].assign(metric=metric, ours=ours))
     rows = pd.concat(parts)
     if table == 2:
-        # A mean over a part of what the paper averages is not the same number.
+        # A mean over fewer parts than in the paper is not the same number.
         from phyblock.tracks.questions import ALL_CELLS
 
         asked, whole = (
@@ -122,8 +122,8 @@ def _ours(run: Run, table: int) -> pd.DataFrame:
 
 
 def beside_paper(run: Run, table: int) -> TextTable | None:
-    """Return our numbers beside a table of the paper; None where it has no model of the run, and
-    for a run on other scenes than the official ones.
+    """Return our numbers beside a table of the paper; None if it has no model of the run, or the
+    run is not on the official scenes.
     """
     frame, paper = published_frame(run, table), _TABLES[table]
     if frame.empty or run.design.suite.dataset.format != "official":

@@ -45,12 +45,12 @@ from phyblock.tracks.measures import CELL, Cell, Layout, LayoutColumn, Measure
 from phyblock.types import OUTCOMES
 
 _FURTHER = ("published", "sensitivity", "coverage", "cost")
-"""Tables that are no layouts of tracks."""
+"""Tables that are not layouts of tracks."""
 _NONE = Value(math.nan, math.nan, math.nan)
 
 
 def _layouts(run: Run, track: str) -> Mapping[str, Layout]:
-    """Return the layouts of a track, of one that has none its headline under the track's name."""
+    """Return the layouts of a track, by default its headline under the track's name."""
     kind, added = kind_of(track), added_measures(track)
     columns = [
         LayoutColumn({one.measure: one.heading}, cell=one.cell, criterion=one.criterion,
@@ -75,7 +75,7 @@ def filled(run: Run, track: str, layout: Layout) -> TextTable:
         known[*key, str(row["criterion"])] = known[*key, ""] = row
     there = {(measure, cell) for _, measure, cell, _ in known}
     shown = list(_shown(layout, measures, cells, there))
-    # What a row is of beside its model: a measure, a cell, or nothing.
+    # The subject of a row besides its model: a measure, a cell, or nothing.
     parts = {"": ""}
     if layout.rows == "cell":
         with_values = {cell for measure, cell in there if measure in {one.measure for one in shown}}
@@ -104,9 +104,9 @@ def filled(run: Run, track: str, layout: Layout) -> TextTable:
 
 @dataclass(frozen=True)
 class _Shown:
-    """A column of numbers: what it is of ("" for what the row says), and how it is shown.
+    """A column of numbers: its measure and cell ("" for those of the row), and its format.
 
-    `ends` are the columns of the frame with those of the estimates that they hold.
+    `ends` maps columns of the frame to columns of the estimates.
     """
 
     column: Column
@@ -122,7 +122,7 @@ def _shown(
     cells: Sequence[Cell],
     there: set[tuple[str, str]],
 ) -> Iterator[_Shown]:
-    """Yield the columns of a layout; of each cell, those that have an estimate."""
+    """Yield the columns of a layout that have an estimate."""
     of_rows = [] if isinstance(layout.rows, str) else list(layout.rows)
     for spec in layout.columns:
         asked = list(spec.headings) or of_rows
@@ -149,7 +149,7 @@ def _shown(
 
 
 def _sample_notes(run: Run, track: str) -> Iterator[str]:
-    """Say how many samples are behind values, where that is not as many as were planned."""
+    """Yield sentences on the samples behind values, if they are not as many as planned."""
     design, table = run.design, coverage_frame(run)
     table = table[table["track"] == track]
     if len(design.suite.seeds) > 1:
@@ -187,16 +187,16 @@ _MADE = "coverage and cost"
 
 
 def coverage_frame(run: Run) -> pd.DataFrame:
-    """Return one row a model and track: what was asked of it, and what that took.
+    """Return one row per model and track: its samples, tokens, cost and latency.
 
-    `expected` samples are `recorded` + `not_run`; the outcomes split `recorded`. Of the `replies`
-    (samples that hold one; of step planning, a whole episode together): mean tokens of those that
-    tell, with `tokens_unknown` that do not; `cost_usd` what the run paid, the sum of the known
-    prices, NaN where none is, with `cost_unknown` without one; `cached` ones were paid for by
-    another run and cost nothing here; `cost_per_100_usd` what 100 cost at the price of those with a
-    known one, cached ones included; median and 90th percentile of the latency [s] of those for
-    which a request was sent; `attempts` the sum of requests sent for them. NaN where nothing is
-    known. The same frame whenever it is asked for, not to be changed.
+    `expected` samples are `recorded` + `not_run`; the outcomes split `recorded`. The rest is about
+    the `replies` (samples that hold one; in step planning, whole episodes): mean tokens of those
+    with known counts, and `tokens_unknown`, the number of others; `cost_usd`, the sum of known
+    costs of this run, and `cost_unknown`, the number of others; `cached` ones, paid for by another
+    run and free here; `cost_per_100_usd`, the cost of 100 at the price of those with a known one,
+    including cached ones; median and 90th percentile of the latency [s] of those that were sent;
+    `attempts`, the number of requests sent for them. NaN if nothing is known. The frame is cached
+    and must not be changed.
     """
     if _MADE in run.made:
         return run.made[_MADE]
@@ -221,7 +221,7 @@ def coverage_frame(run: Run) -> pd.DataFrame:
     planned = [(m, t, design.samples(t)) for m in design.model_names for t in design.suite.tracks]
     table = pd.DataFrame(planned, columns=[*_ROW, "expected"])
     table = table.join(groups[_SUMS].sum(), on=_ROW)
-    # Out of an empty frame columns of any type come, and pandas fills these with a warning.
+    # Columns of an empty frame may have any type, which pandas fills with a warning.
     table[_SUMS] = table[_SUMS].astype("float64").fillna(0).astype("int64")
     costs = groups[list(TOKENS)].mean().astype("float64")
     costs["cost_usd"] = groups["cost_usd"].sum(min_count=1)
@@ -236,7 +236,7 @@ def coverage_frame(run: Run) -> pd.DataFrame:
 
 
 def coverage_table(run: Run) -> TextTable:
-    """Return the outcomes of every model's samples."""
+    """Return a table of the outcomes of every model's samples."""
     table = coverage_frame(run)
     fields = [texts("model", "Model"), *track_name(run.design.suite.tracks)]
     for name in ("expected", "not_run", *OUTCOMES):
@@ -249,7 +249,7 @@ _HEADINGS = {"ok": "OK", "parse_failure": "Unparsed", "api_error": "API error"}
 
 
 def cost_table(run: Run) -> TextTable:
-    """Return tokens, dollars and seconds of every model."""
+    """Return a table of tokens, dollars and seconds of every model."""
 
     def dollars(key: str, heading: str) -> Column:
         def show(row: Mapping[Hashable, Any]) -> str:
@@ -280,7 +280,7 @@ def cost_table(run: Run) -> TextTable:
 
 @dataclass(frozen=True, eq=False)
 class TablesWritten:
-    """The `files` of `tables`, by name, of a `run`, in a `folder`."""
+    """The `tables` of a `run` by name, and their `files` in a `folder`."""
 
     folder: Path
     files: tuple[Path, ...]
@@ -291,8 +291,8 @@ class TablesWritten:
 def write_tables(path: str | Path) -> TablesWritten:
     """Rebuild `tables/` of a run folder from its records; each file appears whole or not at all.
 
-    Raises StoreError for a broken run (see `load_run`) or a folder that cannot be written, and,
-    before anything is, naming every file in the way that we never wrote.
+    Raises StoreError for a broken run (see `load_run`) or a folder that cannot be written and,
+    before anything is written, naming every file that would be overwritten and is not phyblock's.
     """
     run = load_run(path)
     made = make_tables(run)
@@ -301,14 +301,14 @@ def write_tables(path: str | Path) -> TablesWritten:
         texts |= table.files(f"{TABLES}/{name}", name)
     folder = OutFolder(run.path)
     written = folder.write(texts)
-    # Coverage that was not complete before may be so now.
+    # Coverage may be complete now, and an earlier table obsolete.
     known = set(table_files()) - set(texts)
     folder.remove(name for name in folder.names(f"{TABLES}/") if name in known)
     return TablesWritten(run.path / TABLES, written, made, run)
 
 
 def table_files() -> tuple[str, ...]:
-    """Return every file of tables that a run folder may hold, by its name in it."""
+    """Return the names of all files of tables that a run folder may hold."""
     names = [name for track, kind in kinds().items() for name in kind.report().tables or (track,)]
     names += [*(f"{track}_measures" for track in kinds()), *_FURTHER]
     made = (f"{TABLES}/{name}.{form}" for form in ("csv", "md", "tex") for name in names)
@@ -322,10 +322,10 @@ def table_names(run: Run) -> tuple[str, ...]:
 
 
 def make_tables(run: Run, names: Sequence[str] | None = None) -> dict[str, TextTable]:
-    """Make the tables of these names that the run has values for; of None, those that it writes.
+    """Return the tables of these names that the run has values for; by default those it writes.
 
     A run writes the tables of its tracks, the effect of varied presentation, coverage if it is not
-    complete, cost, and the paper's numbers if it counts as the paper does.
+    complete, cost, and the paper's numbers if it is scored as in the paper.
     """
     wanted, made = set(table_names(run) if names is None else names), dict[str, TextTable | None]()
     for track in run.design.suite.tracks if run.design.models else ():
@@ -346,7 +346,7 @@ def make_tables(run: Run, names: Sequence[str] | None = None) -> dict[str, TextT
 
 
 def summary_of(run: Run) -> Summary:
-    """Sum up a run."""
+    """Return the summary of a run for the terminal."""
     coverage, tracks = coverage_frame(run), run.design.suite.tracks
     tables = [headline_table(run, track, coverage) for track in tracks]
     lacking = (coverage["ok"] < coverage["recorded"]).to_numpy()
@@ -364,11 +364,10 @@ def summary_of(run: Run) -> Summary:
 
 
 def headline_table(run: Run, track: str, coverage: pd.DataFrame) -> TextTable:
-    """Show models by the main column of a track, the best first, and the columns beside it: where
-    its measure stands in several cells, as by level, these alone.
+    """Return a table of models by the main column of a track, best first, and its other columns:
+    only those of the same measure if it is in several cells, such as levels.
 
-    A rank is a range, as in `compare` and on the page. Baselines have none, nor have models with
-    samples that were not asked.
+    A rank is a range, as in `compare` and on the page. Baselines and incomplete models have none.
     """
     kind, headline = kind_of(track), Headline(run, track)
     others = headline.parts or [one for one in headline.columns if one != headline.main]
@@ -395,7 +394,7 @@ def headline_table(run: Run, track: str, coverage: pd.DataFrame) -> TextTable:
 
 
 def blind_sentence(run: Run, track: str) -> str:
-    """Say how many models are above the strongest blind baseline; "" where there is none."""
+    """Return a sentence on how many models are above the strongest blind baseline, or ""."""
     headline = Headline(run, track)
     if (floor := headline.floor) is None:
         return ""

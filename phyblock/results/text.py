@@ -1,4 +1,4 @@
-"""Tables as text, CSV, Markdown and LaTeX; the end of a run as the terminal shows it."""
+"""Tables as text, CSV, Markdown and LaTeX; the summary of a run for the terminal."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 NO_VALUE = "–"  # noqa: RUF001
-"""Content of a cell without a value, which is not a zero."""
+"""Content of a cell without a value, as opposed to zero."""
 Row = Mapping[Hashable, Any]
 
 
@@ -34,8 +34,8 @@ Row = Mapping[Hashable, Any]
 class Column:
     """A column; neighbors of one `group` share a heading. Numbers are aligned to the right.
 
-    `show` gives its text of a row of a frame. Columns that are shown `once` are empty where all of
-    them are as in the row above.
+    `show` returns its text for a row of a frame. Columns that are shown `once` are empty if all of
+    them are the same as in the row above.
     """
 
     name: str
@@ -47,10 +47,10 @@ class Column:
 
 @dataclass(frozen=True)
 class TextTable:
-    """Cells as they are shown, row by row, with a caption and notes, each on one line; `frame` has
-    the numbers, where they are kept.
+    """Cells as text, row by row, with a caption and notes, each on one line; `frame` has the
+    numbers, if they are kept.
 
-    Names that models and people gave stand in them: newlines and control characters become spaces.
+    Cells hold names that models and people chose: newlines and control characters become spaces.
     """
 
     caption: str
@@ -82,7 +82,7 @@ class TextTable:
         return cls(caption, tuple(columns), tuple(rows), tuple(notes), frame)
 
     def files(self, name: str, label: str, float_format: str = "%.6f") -> dict[str, str | bytes]:
-        """Return the table as CSV, Markdown and LaTeX, by name of the file."""
+        """Return the table as CSV, Markdown and LaTeX, by file name."""
         return {
             f"{name}.csv": to_csv(self.frame, float_format),
             f"{name}.md": to_markdown(self),
@@ -90,7 +90,7 @@ class TextTable:
         }
 
     def plain(self) -> dict[str, Any]:
-        """Return the table as plain values, as JSON holds it."""
+        """Return the table as plain values for JSON."""
         columns = [[column.name, column.group, column.is_text] for column in self.columns]
         return {
             "caption": self.caption,
@@ -106,7 +106,7 @@ class TextTable:
         return cls(table["caption"], columns, tuple(map(tuple, table["rows"])), table["notes"])
 
     def without(self, names: Collection[str]) -> TextTable:
-        """Return the table but for the columns of these names."""
+        """Return the table without the columns of these names."""
         kept = [place for place, column in enumerate(self.columns) if column.name not in names]
         return replace(
             self,
@@ -138,7 +138,7 @@ def intervals(group: str = "", lo: str = "lo", hi: str = "hi", *, signed: bool =
 
 
 def track_name(tracks: Sequence[str]) -> list[Column]:
-    """Return the column that names the track of a row; none if there is only one track."""
+    """Return the column with the track of a row, or none if there is only one track."""
     show = Column("Track", "", True, lambda row: str(row["track"]).replace("_", " "))
     return [show] if len(tracks) > 1 else []
 
@@ -153,7 +153,7 @@ def number(value: float, digits: int = 1, *, signed: bool = False) -> str:
 
 
 def between(lo: float, hi: float, *, signed: bool = False) -> str:
-    """Return `[44.0, 50.3]`; `NO_VALUE` where there is no interval."""
+    """Return `[44.0, 50.3]`, or `NO_VALUE` without an interval."""
     if math.isnan(lo) or math.isnan(hi):
         return NO_VALUE
     return f"[{number(lo, signed=signed)}, {number(hi, signed=signed)}]"
@@ -170,7 +170,7 @@ def level_name(level: str) -> str:
 
 
 def to_csv(frame: pd.DataFrame, float_format: str | None = None) -> str:
-    """Return a frame as CSV without its index; no text in it is a formula (see `csv_cell`)."""
+    """Return a frame as CSV without its index; formulas are escaped (see `csv_cell`)."""
     import pandas as pd
 
     safe = frame.rename(columns=csv_cell)
@@ -236,7 +236,7 @@ def escape(text: str) -> str:
 
 
 def latex(template: str, **facts: Any) -> str:
-    """Return a float of a template of this package that compiles by `\\input`; `tex` escapes."""
+    """Return a float from a template of this package, for `\\input`; its filter `tex` escapes."""
     return latex_template(template).render(facts)
 
 
@@ -252,7 +252,7 @@ def latex_template(name: str) -> jinja2.Template:
 
 
 def to_latex(table: TextTable, label: str) -> str:
-    """Return a `table*` float, made smaller only where it is too large; `label` follows `tab:`."""
+    """Return a `table*` float, scaled down only if it is too large; `label` follows `tab:`."""
     groups, first = [], 1
     for name, members in itertools.groupby(table.columns, key=lambda column: column.group):
         size = len(list(members))
@@ -265,15 +265,15 @@ TABLES = "tables"
 """The folder of tables in the folder of a run."""
 REPORT_FILE = "report.html"
 SUMMARY = ".summary.json"
-"""The file in the folder of a run that keeps its end."""
+"""The file in the folder of a run that keeps its summary."""
 
 
 @dataclass(frozen=True)
 class Summary:
     """The text that the terminal shows at the end of a run.
 
-    Headline tables, the coverage where it is not complete, one sentence a track on the strongest
-    blind baseline, and failed calls by model and message, the most frequent first.
+    Headline tables, the coverage if it is not complete, one sentence per track on the strongest
+    blind baseline, and failed calls by model and message, most frequent first.
     """
 
     tables: tuple[TextTable, ...] = ()
@@ -281,7 +281,7 @@ class Summary:
     failures: tuple[tuple[str, str, int], ...] = ()
 
     def keep(self, folder: Path, made_of: list[str], files: Iterable[Path]) -> None:
-        """Write the summary with the `sources` of a run and the files that were made of them."""
+        """Write the summary with the `sources` of a run and the files made from them."""
         kept = {
             "made_of": made_of,
             "files": [path.relative_to(folder).as_posix() for path in files],
@@ -293,8 +293,8 @@ class Summary:
 
 
 def sources(folder: Path) -> list[str]:
-    """Return what tables and page are made of: version and last change of phyblock, digests of the
-    files of the run; nothing where one cannot be read.
+    """Return the sources of tables and page: version and last change of phyblock, digests of the
+    files of the run; empty if one cannot be read.
     """
     names = (MANIFEST, RECORDS, PROMPTS, STOPPED)
     with suppress(OSError, ValueError):
@@ -306,8 +306,8 @@ def sources(folder: Path) -> list[str]:
 
 
 def kept_summary(folder: Path, needed: str) -> Summary | None:
-    """Return the kept summary; None if the run or phyblock has changed, phyblock was extended, a
-    file that was made is missing, or `needed` was not made.
+    """Return the kept summary; None if the run or phyblock has changed, plugins are active, a file
+    is missing, or `needed` was not made.
     """
     try:
         if has_additions():

@@ -1,1 +1,1 @@
-"""Running a suite: plan it, execute it, keep every record, read and score it again."""
+"""Running a suite: plan it, execute it, keep every record, rescore it."""

@@ -22,7 +22,7 @@ from phyblock.run.plan import RunPlan, Sample
 from phyblock.run.store import held_run
 
 _ENOUGH_REPLIES = 20
-"""Replies whose mean length stands for those to come."""
+"""Number of replies from which their mean length is the estimate."""
 
 
 @dataclass
@@ -30,8 +30,8 @@ class Estimate:
     """The estimate of one model; dollars are None where no price is known.
 
     `done` samples have a record in the folder, `cached` ones a reply in the cache, `waiting` ones
-    went out in batches, `calls` are left to make: none for recordings and baselines, which answer
-    here.
+    are in batches, `calls` are still to be made: none for recordings and baselines, which answer
+    locally.
     """
 
     model: ModelConfig
@@ -45,12 +45,12 @@ class Estimate:
     prompt_usd: float = 0.0
     _most_usd: float = 0.0
     _known: defaultdict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
-    """Tokens of the replies that are there, by kind of question."""
+    """Tokens of existing replies, by kind of question."""
     _coming: Counter[tuple[str, int, int, float]] = field(default_factory=Counter)
-    """Calls by kind, tokens of a usual reply and of the longest, and dollars a token."""
+    """Calls by kind, tokens of a typical and of the longest reply, and dollars per token."""
 
     def add_call(self, expected: CallEstimate, kind: str) -> None:
-        """Count one call that is left to make, of a kind of question."""
+        """Count one call to be made, for a kind of question."""
         self.calls += 1
         self.prompt_tokens += expected.prompt_tokens
         usual, most, reply_usd = expected.completion_tokens, expected.most_completion_tokens, 0.0
@@ -63,14 +63,14 @@ class Estimate:
         self._coming[kind, usual, most, reply_usd] += 1
 
     def add_reply(self, completion_tokens: int | None, kind: str) -> None:
-        """Learn from a reply that is there, to a kind of question."""
+        """Learn from an existing reply to a kind of question."""
         if completion_tokens is not None:
             self._known[kind].append(completion_tokens)
 
     @property
     def replies(self) -> tuple[float, float]:
-        """Tokens and dollars of the replies to come: as long as those of their kind that are there,
-        where these are enough, but none longer than it can be; else of usual length.
+        """Tokens and dollars of future replies: with the mean length of existing replies of their
+        kind, if there are enough, up to the longest possible; else with the typical length.
         """
         tokens = usd = 0.0
         for (kind, usual, most, token_usd), calls in self._coming.items():
@@ -83,17 +83,17 @@ class Estimate:
 
     @property
     def cost_usd(self) -> float | None:
-        """Dollars of the calls."""
+        """Dollars for the calls."""
         return None if self.tariff is None else self.prompt_usd + self.replies[1]
 
     @property
     def most_usd(self) -> float | None:
-        """Dollars if every reply were as long as it can be and no call had to be repeated."""
+        """Dollars if every reply had the maximum length and no call had to be repeated."""
         return None if self.tariff is None else self._most_usd
 
     @property
     def may_cost(self) -> bool:
-        """True if somebody may be billed: calls are left, and not known to be free."""
+        """True if there are calls to make that are not known to be free."""
         is_priced = self.tariff is None or not is_free(self.tariff)
         return self.calls > 0 and is_priced and is_billed(self.model)
 
@@ -101,10 +101,10 @@ class Estimate:
 def estimate(
     plan: RunPlan, folder: Path, *, use_cache: bool, retry_failed: bool = False
 ) -> list[Estimate]:
-    """Return estimates in the order of the plan's models; with `retry_failed` samples whose request
-    was rejected are asked again.
+    """Return estimates in the order of the plan's models.
 
-    Raises StoreError for the folder of another run.
+    With `retry_failed`, rejected requests count as calls. Raises StoreError for the folder of
+    another run.
     """
     rows = {m.name: Estimate(m, plan.samples_per_model, tariff_of(m)) for m in plan.models}
     settled: dict[str, bool] = {}
@@ -144,7 +144,7 @@ def estimate(
 
 
 def has_all_pictures(outline: Request) -> bool:
-    """True if an outline is what will be sent: one whose pictures are not known has empty ones."""
+    """True if an outline equals the request to be sent, which has no empty pictures."""
     parts = (part for message in outline.messages for part in message.parts)
     return all(part.data for part in parts if isinstance(part, Image))
 
@@ -152,7 +152,7 @@ def has_all_pictures(outline: Request) -> bool:
 def may_bill(
     plan: RunPlan, folder: Path, *, use_cache: bool, retry_failed: bool = False
 ) -> list[Estimate]:
-    """Return the estimates of a plan where any of its models may cost money, else none."""
+    """Return the estimates of a plan if any of its models may cost money, else none."""
     if not any(is_billed(model) for model in plan.models):
         return []
     rows = estimate(plan, folder, use_cache=use_cache, retry_failed=retry_failed)
@@ -160,9 +160,9 @@ def may_bill(
 
 
 def _samples(plan: RunPlan) -> Iterator[tuple[Sample, Sequence[Request]]]:
-    """Yield all samples with their requests as far as they are known before any is answered.
+    """Yield all samples with their requests as far as they are known before any reply.
 
-    What is shown the same is outlined once.
+    Requests that are presented identically are outlined once.
     """
     for shown_in, tracks in plan.variants.items():
         repeats = [variant for variant in plan.variants if variant.shown == shown_in]
@@ -180,5 +180,5 @@ def _samples(plan: RunPlan) -> Iterator[tuple[Sample, Sequence[Request]]]:
 
 
 def _kind(track: str, variant: Variant) -> str:
-    """Return a name for questions whose replies are of one length."""
+    """Return a name for questions whose replies have similar lengths."""
     return f"{track} {variant.shown.key}"

@@ -33,7 +33,7 @@ _N = TypeVar("_N", int, float)
 def begun(
     sample: str, track: str, model: str, item: Item, seed: int, answer: Reply | ModelError | None
 ) -> dict[str, Any]:
-    """Return the fields of a record before it is judged; None is a reply that a recording lacks."""
+    """Return the fields of a record before judgement; None is a reply missing in a recording."""
     return {
         "sample": sample,
         "track": track,
@@ -70,9 +70,9 @@ def about_prompt(request: Request, template: str, digest: str) -> SentPrompt:
 
 
 def judged(track: Track, item: Item, fields: Mapping[str, Any], judgement: Judgement) -> Record:
-    """Return the record with its outcome and what the track says and counts of it.
+    """Return the record with its outcome, and the judgement and counts of the track.
 
-    `fields` are those of a record that was begun, or of one that was judged before.
+    `fields` are those of a record before judgement, or of an earlier record.
     """
     outcome = _outcome(fields["reply"], fields["error"], judgement.is_read)
     found = {**fields, "outcome": outcome, **judgement.fields}
@@ -85,7 +85,7 @@ def judged(track: Track, item: Item, fields: Mapping[str, Any], judgement: Judge
 def judge_episode(
     track: Track, item: Item, fields: Mapping[str, Any], episode: Episode, replies: Sequence[Reply]
 ) -> Record:
-    """Return the record of an episode as far as it has come with these replies."""
+    """Return the record of an episode so far, with these replies."""
     judgement = episode.judgement()
     if replies:
         first = judgement.fields["turns"][0]["prompt"]
@@ -99,10 +99,10 @@ async def judge_reply(
     fields: Mapping[str, Any],
     earlier: Record | None = None,
 ) -> Record:
-    """Return the record of a sample that is asked once, judged by its reply, for the first time or
-    again after an `earlier` one.
+    """Return the record of a sample with one request, judged for the first time or again after an
+    `earlier` record.
 
-    Where no engine could carry the reply out, the record says so and can be judged again.
+    If no engine could execute the reply, the record says so and can be judged again.
     """
     reply = fields["reply"]
     text = None if reply is None else reply.text
@@ -141,7 +141,7 @@ def _error(error: ModelError) -> StoredError:
 def pooled(replies: Sequence[Reply]) -> Reply:
     """Return the sum of an episode's replies, with the text of the last one.
 
-    It counts as cut off or refused only if all of them are.
+    It counts as truncated or refused only if all of them are.
     """
     counts = {
         name: _sum(getattr(reply.usage, name) for reply in replies) for name in Usage.model_fields
@@ -163,7 +163,7 @@ def pooled(replies: Sequence[Reply]) -> Reply:
 
 
 def _sum(values: Iterable[_N | None]) -> _N | None:
-    """Return the sum, or None where one is not known."""
+    """Return the sum, or None if any value is unknown."""
     found = list(values)
     known = [value for value in found if value is not None]
     return plain_sum(known) if known and len(known) == len(found) else None

@@ -1,4 +1,4 @@
-"""`run.yaml`: what a run is, written before anything is asked; and what makes two runs of it."""
+"""`run.yaml`: the manifest of a run, written before any request, and its identity."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from phyblock.tracks.base import Track, kind_of, simulating
 
 _ENGINES = (engine.distribution for engine in ENGINES.values())
 _LIBRARIES = ("litellm", *_ENGINES, "numpy", "pillow", "jinja2")
-"""Libraries whose versions a run names; one or both physics engines may be installed."""
+"""Libraries whose versions a run records; one or both physics engines may be installed."""
 _LABELS = ("published", "served_at", "size_b", "pictures")
 _NOT_IDENTITY = {
     *("dataset.root", "suite.name", "suite.description", "suite.limit", "suite.limits"),
     *("suite.models", "suite.baselines", "suite.seeds", "suite.dataset"),
 }
-"""Parts of a manifest that may change while the run stays the same, or that others repeat."""
+"""Parts of a manifest that may change while the run stays the same, or that repeat others."""
 _LONGEST_SHOWN = 60
 _SENT = frozenset({"params", "sampling"})
-"""Keys of values that are sent to a model unchanged, where `/no_think` is a word and no path."""
+"""Keys of values that are sent to a model unchanged, where `/no_think` is not a path."""
 _PATH = re.compile(
     r"^([\w.-]+/(?=/|~/|[A-Za-z]:[\\/]))?(?:~/|/.*/|[A-Za-z]:[\\/])(?:.*[\\/])?([^\\/\n]+)[\\/]*$"
 )
-"""A path from the root or the home folder, after a provider where it names a model."""
+"""A path from the root or the home folder, after a provider if it names a model."""
 
 
 def make_manifest(
@@ -49,9 +49,9 @@ def make_manifest(
 ) -> Manifest:
     """Return the manifest of a run.
 
-    `identity` digests what decides the results, so that only the same run goes on in a folder.
-    Limits, prices, labels, paths, and where and in which order models are named and served
-    are no part of it. `variants` has the tracks of every condition.
+    `identity` is a digest of everything that determines the results, so that only the same run can
+    continue in a folder. It excludes limits, prices, labels, paths, and the order and addresses of
+    models. `variants` has the tracks of every condition.
     """
     data_version = read_version(dataset.root)
     known: dict[str, object] = {"name": dataset.name, "sha256": dataset.sha256}
@@ -61,7 +61,7 @@ def make_manifest(
     inputs: dict[str, Any] = {
         "format": FORMAT,
         "suite": suite.identity(),
-        # Whoever is asked, the run is the same; but every person has a run alone.
+        # Models are not part of the identity, but every person has a separate run.
         "models": [model for model in decisive if str(model["name"]).startswith(HUMAN)],
         "dataset": known,
         "tracks": {track.name: track.identity() for track in variants[Variant()]},
@@ -113,7 +113,7 @@ def make_manifest(
 
 
 def asked_counts(suite: Suite, dataset: Dataset, tracks: Iterable[Track]) -> dict[str, Any]:
-    """Return how many items and scenes a run asks about, of what is selected of its data."""
+    """Return how many items and scenes a run asks about."""
     levels = [task.scene.levels for task in dataset.tasks]
     return {
         "items": {track.name: len(track.items) for track in tracks},
@@ -123,12 +123,12 @@ def asked_counts(suite: Suite, dataset: Dataset, tracks: Iterable[Track]) -> dic
 
 
 def code_versions() -> dict[str, str]:
-    """Return the versions of what judges replies."""
+    """Return the versions of the code that judges replies."""
     return {"phyblock": version("phyblock"), "readers": str(READER_VERSION)}
 
 
 def _model(model: ModelConfig) -> dict[str, object]:
-    """Return what decides a model's replies; a recording by what is in it, not by where it is."""
+    """Return what determines a model's replies; for a recording its content, not its path."""
     folder = model.recording
     if folder is None:
         return model.identity()
@@ -139,7 +139,7 @@ def _model(model: ModelConfig) -> dict[str, object]:
 
 
 def differences(found: Manifest, wanted: Manifest) -> list[str]:
-    """Return what makes two manifests two runs, by dotted names; none where they are of one."""
+    """Return the differences that make two manifests different runs, by dotted names."""
     old, new = _parts(found), _parts(wanted)
     differ = [
         (
@@ -154,7 +154,7 @@ def differences(found: Manifest, wanted: Manifest) -> list[str]:
     if found.identity == wanted.identity:
         differ = [one for one in differ if one[0].startswith("models.")]
     elif {"suite.levels", "limit"} & {name for name, *_ in differ}:
-        # Other scenes of the same data have other digests, too.
+        # Other scenes of the same data also have other digests.
         differ = [one for one in differ if not one[0].endswith("sha256")]
     names = sorted(
         f"{name} ({was}, now {now})" if len(was + now) < _LONGEST_SHOWN else name
@@ -165,7 +165,7 @@ def differences(found: Manifest, wanted: Manifest) -> list[str]:
 
 
 def _parts(manifest: Manifest) -> dict[str, dict[str, Any]]:
-    """Return what decides the results of a run by part and name, without digests of pictures."""
+    """Return what determines a run's results, by part and name, without digests of pictures."""
     fields = manifest.fields()
     models = {f"models.{one.name}": one.fields() for one in (*manifest.models, *manifest.others)}
     parts = {"": {"limit": manifest.limit}, "suite": fields["suite"], **models}
@@ -181,9 +181,9 @@ def _parts(manifest: Manifest) -> dict[str, dict[str, Any]]:
 
 
 def portable_manifest(manifest: Manifest) -> Manifest:
-    """Return the manifest with the last part of every path, and without addresses of servers.
+    """Return the manifest with only the last part of every path, and without server addresses.
 
-    What is sent to models stays as it is, and so does the identity, made of what the run was.
+    Values that are sent to models are kept, and so is the identity of the original.
     """
     fields = without_paths(manifest.fields())
     for model in fields.get("models", ()):
@@ -196,7 +196,7 @@ def portable_manifest(manifest: Manifest) -> Manifest:
 
 
 def without_paths(value: Any) -> Any:
-    """Return a value with the last part of every path in it, but for what is sent to models."""
+    """Return a value with only the last part of every path, except in values sent to models."""
     if isinstance(value, str):
         return _PATH.sub(r"\1\2", value)
     if isinstance(value, Mapping):

@@ -1,4 +1,4 @@
-"""The plan of a run: its files found, its suite with its data read, models and tracks resolved."""
+"""The plan of a run: files found, suite and data read, models and tracks resolved."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ from phyblock.tracks.base import (
 from phyblock.tracks.pictures import Workshop
 
 _SEEDS = 2**31
-"""Providers take no larger ones."""
+"""Providers accept no larger seeds."""
 
 
 @dataclass(frozen=True)
 class Sample:
-    """One item of a track, asked of one model with one seed; `track` asks as the variant does."""
+    """One item of a track, asked of one model with one seed; `track` is that of the variant."""
 
     track: Track
     model: str
@@ -57,7 +57,7 @@ class Sample:
         return f"{whole}/{self.variant.key}" if self.variant.key else whole
 
     def as_sent(self, request: Request) -> Request:
-        """Return the request as it is sent: a repeat has another seed, and so is sent once more."""
+        """Return the request as sent: a repeat has another seed, so that it is not cached."""
         seed = request.seed
         if self.variant.levels and (repeat := self.variant.repeat) != 1:
             digest = drawn_bytes("repeat", request.seed, repeat)
@@ -69,8 +69,8 @@ class Sample:
 class RunPlan:
     """Everything a run needs.
 
-    `manifest` is what `run.yaml` holds; `tracks` are those of the reference, `variants` all
-    conditions with the tracks of each.
+    `manifest` is the content of `run.yaml`; `tracks` are those of the reference condition,
+    `variants` all conditions with the tracks of each.
     """
 
     suite: Suite
@@ -81,7 +81,7 @@ class RunPlan:
 
     @property
     def tracks(self) -> tuple[Track, ...]:
-        """The tracks as the reference asks."""
+        """The tracks under the reference condition."""
         return next(iter(self.variants.values()))
 
     @property
@@ -91,7 +91,7 @@ class RunPlan:
         return sum(len(track.items) for track in self.tracks) * repeats
 
     def folder_in(self, root: Path) -> Path:
-        """Return the run's folder below `root` when none is named: the same command finds it."""
+        """Return the run's default folder below `root`, which the same command finds again."""
         return root / f"{self.suite.name}-{self.manifest.identity[:8]}"
 
     def sample_ids(self) -> frozenset[str]:
@@ -99,8 +99,8 @@ class RunPlan:
         return frozenset(sample.id for m in self.models for sample in self.samples(m.name))
 
     def samples(self, model: str) -> Iterator[Sample]:
-        """Yield all samples of a model: seed by seed, in each the conditions, in each of these the
-        tracks in the suite's order, of each its items interleaved over levels and scenes.
+        """Yield all samples of a model, by seed, condition, track in the suite's order, and item,
+        interleaved over levels and scenes.
         """
         asked = [
             (variant, track, interleaved(track.items))
@@ -129,10 +129,10 @@ def make_plan(
 ) -> RunPlan:
     """Resolve a suite against the known models.
 
-    `only` names models to run in place of the suite's, `people` are asked instead of models.
+    `only` names models to run instead of the suite's, `people` are asked instead of models.
     `limit`, else that of the suite, keeps that many items of each track: scenes spread over levels,
-    questions over subtasks. Raises SpecError, DataError, StoreError or PromptError with all that is
-    wrong.
+    questions over subtasks. Raises SpecError, DataError, StoreError or PromptError with all
+    problems.
     """
     dataset = open_dataset(suite.dataset.format, suite.files.dataset)
     models = _planned_models(suite, known, only, people)
@@ -164,8 +164,9 @@ def make_plan(
 
 
 def _check_models(models: Sequence[ModelConfig], tracks: Sequence[Track], suite: Suite) -> None:
-    """Every model can answer what every track asks, means the numbers that are shown, and is not
-    taken for another; a recording was asked in the form in which it is read.
+    """Raise SpecError unless every model can answer every track and is unambiguous.
+
+    A recording must match the parser and the candidate numbers of the suite.
     """
     problems: list[Problem] = []
 
@@ -208,7 +209,7 @@ def _check_models(models: Sequence[ModelConfig], tracks: Sequence[Track], suite:
 
 
 def _recorded_as(folder: Path) -> dict[str, str]:
-    """Return the fields of a suite with which a recording was made: raw replies as in the paper."""
+    """Return the suite fields that a recording was made with: the paper's for raw replies."""
     made = {"candidates.order": "file", "answer_format": "text"}
     if not (folder / MANIFEST).is_file():
         return made
@@ -222,12 +223,11 @@ def _planned_models(
     only: Sequence[str],
     people: Sequence[ModelConfig],
 ) -> tuple[ModelConfig, ...]:
-    """Return the suite's models in its order, or those that `only` names, in its order, or people,
-    and where any is no rule, the suite's `baselines` that all its tracks know: what rules reach
-    that never see the goal is what a score has to be held against.
+    """Return the suite's models in its order, or those of `only` in its order, or people.
 
-    `only` may name any known model or group, in the suite or not; of recordings, any that is there.
-    Raises SpecError for a name that is not known, DataError where no recordings are found.
+    If any of them is not a baseline, the suite's `baselines` that all its tracks know are added, to
+    compare scores with. `only` may name any known model, group or recording, in the suite or not.
+    Raises SpecError for an unknown name, DataError if no recordings are found.
     """
     if people:
         found = {one.name: one for one in people}
@@ -260,8 +260,8 @@ def _planned_models(
 
 
 def to_config(name: str, known: ModelConfig, suite: Suite) -> ModelConfig:
-    """Return a model as a suite asks it; SpecError for one that says a response format of its own
-    where the suite asks for JSON.
+    """Return a model with the settings of a suite. Raises SpecError if it sets its own response
+    format and the suite asks for JSON.
     """
     if known.kind != "litellm":
         return known
@@ -282,8 +282,8 @@ def to_config(name: str, known: ModelConfig, suite: Suite) -> ModelConfig:
 def model_problems(
     path: Path, known: Mapping[str, ModelConfig], names: Iterable[str]
 ) -> Iterator[Problem]:
-    """Return what is wrong with the models and groups of these names in a models file: recordings
-    that are not there, providers that nobody knows.
+    """Yield the problems of these models and groups in a models file: missing recordings, unknown
+    providers.
     """
     source = read_yaml(path)
     for name in (name for name in with_members(tuple(names), known) if name in known):
@@ -297,7 +297,7 @@ def model_problems(
 
 
 def provider_problem(config: ModelConfig, where: str) -> Problem | None:
-    """That a model is asked through litellm, which does not know its provider, or None."""
+    """Return the problem that litellm does not know a model's provider, or None."""
     if config.kind != "litellm" or config.is_direct:
         return None
     from phyblock.models.litellm_client import known_providers
@@ -313,14 +313,14 @@ def provider_problem(config: ModelConfig, where: str) -> Problem | None:
 
 
 def bundled_suites() -> list[str]:
-    """Names of the suites that come with the project, sorted."""
+    """Return the names of the bundled suites, sorted."""
     return sorted(path.stem for path in bundled("benchmarks").glob("*.yaml"))
 
 
 def find_suite(name: str) -> Path:
     """Return the suite file that `name` means: a path, or the name of a bundled suite.
 
-    Raises SpecError that lists the bundled suites when there is no such file, or for a prompt.
+    Raises SpecError, listing the bundled suites, if there is no such file, or it is a prompt.
     """
     path, suites = Path(name), bundled_suites()
     is_prompt = path.suffix == ".j2"
@@ -341,9 +341,9 @@ def read_suite(name: str, overrides: Sequence[str] = ()) -> Suite:
 
 
 def find_models_file(named: str | None, suite: Path | None) -> Path:
-    """Return the models file: the one named, else models.yaml here, near the suite, or the bundled.
+    """Return the models file: the named one, else models.yaml here, near the suite, or bundled.
 
-    Raises SpecError when the one named is not there.
+    Raises SpecError if the named one does not exist.
     """
     if named is not None and not os.path.isfile(named):
         raise SpecError(Problem(named, "there is no such models file"))
@@ -353,7 +353,7 @@ def find_models_file(named: str | None, suite: Path | None) -> Path:
 
 
 def prompt_dirs(suite: Path) -> list[Path]:
-    """Folders of custom prompts, here and near the suite; a models file may stand beside each."""
+    """Folders of custom prompts, here and near the suite; a models file may be beside each."""
     return [folder / "prompts" for folder in (Path(), suite.parent, suite.parent.parent)]
 
 

@@ -1,4 +1,4 @@
-"""Scores of stored replies by today's code; no model is called."""
+"""Rescoring: judge stored replies with today's code; no model is called."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from phyblock.workers import Workers
 _CHANGED = "is not the data set that the run was made on, or it was changed since"
 _MOVED = "name the folder where it is now with --data"
 _Judged = tuple[Record, Record]
-"""A record as it is stored, and judged again."""
+"""A stored record, and its new judgement."""
 _NO_DATA = ("prompt", "pictures", CARRYING, ENGINE)
 """Parts of a track's identity that are not the data that it asks about."""
 
@@ -39,17 +39,17 @@ _NO_DATA = ("prompt", "pictures", CARRYING, ENGINE)
 def rescore(
     folder: Path,
     data: Path | None = None,
-    tell: Callable[[str], object] = lambda _: None,
+    report: Callable[[str], object] = lambda _: None,
     watch: Callable[[Iterator[_Judged]], Iterator[_Judged]] = iter,
     workers: Workers | None = None,
 ) -> None:
     """Judge every stored reply of a run again and replace its records in one step.
 
-    `data` is where the data set is now, if it has moved. An episode in which today's code would ask
-    something else stays as it was and is no longer final: `tell` is called with how many there are;
-    `watch` sees each record as it is done. `workers` do it, where they are given; of their shards
-    the first alone writes. Raises StoreError for a folder that is no run or cannot be
-    written, DataError when the data are not what the run was made on.
+    `data` is the new place of the data set, if it has moved. An episode in which today's code would
+    ask something else is kept and no longer final: `report` is called with a sentence on how many
+    there are; `watch` is called with each record. `workers` do the work, if given, and only the
+    first of their shards writes. Raises StoreError for a folder that is not a run or cannot be
+    written, DataError for other data than the run's.
     """
     manifest = read_manifest(folder)
     suite = suite_of(manifest, str(folder / MANIFEST))
@@ -75,18 +75,18 @@ def rescore(
         with locked(folder):
             write_run(folder, manifest.model_copy(update={"versions": versions}), records())
     for name, count in (+diverged).items():
-        tell(
+        report(
             f"{kind_of(name).title}: in {counted(count, 'episode')} this version would have asked "
             "something else; phyblock run asks on from there"
         )
 
 
 def judged_again(folder: Path) -> tuple[Manifest, Iterator[Record]]:
-    """Return the manifest of a run and the record of each line, made of its replies and its data.
+    """Return the manifest of a run and a new record for each line, from its replies and its data.
 
-    What records say of their items is taken from the data, as is how much was to be asked. Physics
-    is not carried out: what became of blocks that were let go is taken from the records. Nothing is
-    written. Raises as `rescore`, and StoreError for an episode that would go otherwise.
+    Facts about items, and the numbers of items, come from the data. Nothing is simulated: falls and
+    final poses come from the records. Nothing is written. Raises as `rescore`, and StoreError for
+    an episode that would take another course.
     """
     manifest = read_manifest(folder)
     suite = suite_of(manifest, str(folder / MANIFEST))
@@ -103,10 +103,9 @@ def judged_again(folder: Path) -> tuple[Manifest, Iterator[Record]]:
 
 
 def recorded_dataset(folder: Path, manifest: Manifest, data: Path | None = None) -> Dataset:
-    """Return the whole data set of the run in `folder`, from `data` or from where the run found it.
+    """Return the whole data set of the run in `folder`, from `data` or the path in the manifest.
 
-    Raises DataError where the manifest names none, or where what it was asked about is not what
-    is there.
+    Raises DataError if the manifest names none, or the data that the run asked about have changed.
     """
     recorded = manifest.dataset
     if recorded is None:
@@ -132,7 +131,7 @@ def reopen_tracks(
 ) -> tuple[Track, ...]:
     """Return the tracks of the run in `folder`, without prompts, on the run's `dataset`.
 
-    Raises DataError for other data of a track than those that the run was made on.
+    Raises DataError for other data of a track than the run's.
     """
     path = folder / MANIFEST
     folders: dict[str, Path] = {}
@@ -144,7 +143,7 @@ def reopen_tracks(
     for track in tracks:
         stored = manifest.tracks.get(track.name, {})
         for key, value in track.identity().items():
-            # Prompts and pictures are no data; engines and readers ask nothing.
+            # Prompts and pictures are not data, and are not needed.
             if key not in _NO_DATA and value not in (None, stored.get(key)):
                 root, field = folders.get(track.name, dataset.root), f"tracks.{track.name}.{key}"
                 was = str(stored.get(key))
@@ -155,7 +154,7 @@ def reopen_tracks(
 class _Judge:
     """Judges records of the run in `folder` again, on tracks that are opened once.
 
-    With `strict`, an episode that would go otherwise is a StoreError.
+    With `strict`, an episode that would take another course is a StoreError.
     """
 
     def __init__(
@@ -173,10 +172,10 @@ class _Judge:
             (name, item.key): item for name, one in self.tracks[""].items() for item in one.items
         }
         self._strict = strict
-        self._thread = ThreadPoolExecutor(1)  # The thread of a notebook has a loop already.
+        self._thread = ThreadPoolExecutor(1)  # The thread of a notebook already has a loop.
 
     def __call__(self, line: tuple[str, Record]) -> tuple[Record, Record]:
-        """Return the record of a line as it is stored and judged again."""
+        """Return the record of a line, as stored and judged again."""
         where, record = line
         track = self.tracks.get(record.way.shown.key, {}).get(record.track)
         item = self._items.get((record.track, record.item))
@@ -198,7 +197,7 @@ class _Judge:
 
 @functools.lru_cache(maxsize=1)
 def _judge_of(folder: Path, data: Path | None) -> _Judge:
-    """The judge of a worker, as long as it lives."""
+    """Return the judge of a worker process, opened once."""
     manifest = read_manifest(folder)
     suite = suite_of(manifest, str(folder / MANIFEST))
     return _Judge(folder, manifest, suite, recorded_dataset(folder, manifest, data), strict=False)
@@ -218,7 +217,7 @@ async def _again(track: Track, item: Item, record: Record, where: str, *, strict
     if not track.plays:
         if record.is_judged:
             return await judge_reply(track, item, given, record)
-        # No plan was carried out of which the record could tell.
+        # The record holds no executed plan.
         return await judge_reply(track, item, {**given, "error": None})
     episode, asked = track.again(item, record), record.asked_turns
     for turn in asked:
@@ -242,14 +241,14 @@ async def _again(track: Track, item: Item, record: Record, where: str, *, strict
 
 
 def _led_on(was: AskedTurn, now: Mapping[str, Any]) -> bool:
-    """True if a stored turn came to what it comes to now, by whichever rule it was read."""
+    """True if a stored turn has the same result now, even if parsed by another rule."""
     stored = was.fields()
     decided = {name: value for name, value in now.items() if name not in ("reply", "prompt")}
     return all(_plain(stored.get(name)) == _plain(value) for name, value in decided.items())
 
 
 def _plain(value: object) -> object:
-    """A value as JSON holds it, without what is null and the rule by which it was read."""
+    """A value as JSON, without nulls and the rule of the parser."""
     if isinstance(value, Mapping):
         held = {name: below for name, below in value.items() if below is not None}
         return {name: _plain(below) for name, below in held.items() if name != "rule"}

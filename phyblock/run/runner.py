@@ -1,8 +1,8 @@
 """A run from its folder to its last record: request, model, judgement, record on disk.
 
-A session emits events and prints nothing. It stops cleanly: nothing more is sent, calls that are
-under way are waited for, because they are paid for. What was answered is written whatever ends it,
-an error of our own or a cancellation.
+A session emits events and prints nothing. It stops cleanly: it sends nothing more and waits for
+calls in progress, because they are paid for. Replies that have arrived are written whatever ends
+it, even an internal error or a cancellation.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RunStarted:
-    """Samples in all, and the final records already on disk summed up, by model."""
+    """Number of samples, and by model the summary of final records already on disk."""
 
     expected: Mapping[str, int]
     earlier: Mapping[str, Sequence[Summary]]
@@ -65,14 +65,14 @@ class SampleDone:
 
 @dataclass(frozen=True)
 class RunNotice:
-    """Something that concerns no single model: a server that is gone, a cache set aside."""
+    """A notice about the whole run, such as an unreachable server or a disabled cache."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class ModelStopped:
-    """A model is asked no more: it is not available."""
+    """A model was stopped, because it is not available."""
 
     model: str
     reason: str
@@ -80,8 +80,8 @@ class ModelStopped:
 
 @dataclass(frozen=True)
 class Stopping:
-    """The run takes no new samples: it was interrupted, its cost limit is reached, or an error of
-    our own ends it; `in_flight` calls are waited for.
+    """The run starts no new samples: it was interrupted, its cost limit is reached, or an internal
+    error ends it; it waits for `in_flight` calls.
     """
 
     cause: Literal["interrupted", "cost", "error"]
@@ -90,7 +90,7 @@ class Stopping:
 
     @property
     def text(self) -> str:
-        """Message to a person who stopped it: what it waits for, and how to give that up."""
+        """Message to the person who stopped it: what it waits for, and how to cancel that."""
         if not self.in_flight:
             return f"Stopping: {self.reason}."
         calls = f"{counted(self.in_flight, 'call')} under way"
@@ -107,9 +107,9 @@ _LOCAL_AT_ONCE = max(8, os.cpu_count() or 1)
 
 @dataclass
 class RunResult:
-    """The result of a run: how many of its samples have a final record, how many of those are
-    requests that were rejected for good, and how many are replies that could not be judged;
-    `stopped` models and why; `unanswered` says what may have been billed without a reply.
+    """The result of a run: numbers of samples with a final record, of requests rejected for good
+    and of replies that could not be judged among them; `stopped` models with the reason;
+    `unanswered`, a sentence on calls that may have been billed without a reply.
     """
 
     samples: int
@@ -122,7 +122,7 @@ class RunResult:
 
     @property
     def left(self) -> int:
-        """Samples that have no final record."""
+        """Number of samples without a final record."""
         return self.samples - self.settled
 
     def add(self, sample: Record | Summary) -> None:
@@ -154,9 +154,9 @@ def check_ready(plan: RunPlan) -> None:
 class Session:
     """Runs one plan in one folder, once.
 
-    It asks every model about every sample that has no final record yet; with `retry_failed` also
-    where a request was rejected for good. `present` are models that answer here, by name; others
-    are built. `interrupt` may be called at any time, before `run` too.
+    It asks every model about every sample without a final record; with `retry_failed` also samples
+    whose request was rejected for good. `present` are models in this process, by name; others are
+    built. `interrupt` may be called at any time, even before `run`.
     """
 
     plan: RunPlan
@@ -179,24 +179,24 @@ class Session:
         return self.result.stop is not None
 
     def interrupt(self) -> None:
-        """Send nothing more; safe to call from a signal handler in the loop's thread."""
+        """Stop sending requests; safe to call from a signal handler in the loop's thread."""
         self._stop(Stopping("interrupted", "interrupted"))
 
     async def run(self) -> RunResult:
-        """Open the folder, ask what earlier records have not settled, and close it.
+        """Open the folder, ask all samples without a final record, and close it.
 
-        Raises what the folder or the models meet, and the first error that a sample met and that is
-        neither its own nor its model's, once calls under way have ended. Where this is cancelled,
-        they are given up.
+        Raises errors of the folder or of building models, and, once calls in progress have ended,
+        the first error of a sample that concerns neither the sample nor its model. A cancellation
+        gives up calls in progress.
         """
         async with AsyncExitStack() as stack:
             queues = self._open(stack)
-            # An interrupt that came meanwhile is heard before anything is asked.
+            # An interrupt that came meanwhile is handled before any request.
             await asyncio.sleep(0)
             try:
                 await self._ask_all(queues)
             except BaseException:
-                # Where the disk is full, what ended the run comes first.
+                # If the disk is full, the error that ended the run comes first.
                 with contextlib.suppress(StoreError):
                     self._note_stopped()
                 raise
@@ -204,8 +204,8 @@ class Session:
         return self.result
 
     def _open(self, stack: AsyncExitStack) -> dict[str, deque[Sample]]:
-        """Open store, cache and models until the stack is closed, and tell how far the run is;
-        return what is left to ask of each model.
+        """Open store, cache and models until the stack is closed, emit the progress of the run,
+        and return the remaining samples of each model.
         """
         plan, result = self.plan, self.result
         stack.callback(plan.close)
@@ -230,18 +230,18 @@ class Session:
         return queues
 
     def _open_models(self, stack: AsyncExitStack, queues: Mapping[str, deque[Sample]]) -> None:
-        """Build the models that are not present."""
+        """Build the models that are not given as `present`."""
         plan, store, limits = self.plan, self._store, self.plan.suite.limits
         batches: BatchFiles | None = None
         if store.progress.batches or any(model.batch for model in plan.models):
             batches = self._batch_files()
 
-        def tell(text: str) -> None:
+        def report(text: str) -> None:
             self.watch(RunNotice(text))
 
         cache: ReplyCache | None = None
         if self.use_cache and any(model.kind == "litellm" for model in plan.models):
-            cache = ReplyCache(reply_cache_file(), tell)
+            cache = ReplyCache(reply_cache_file(), report)
             stack.callback(cache.close)
         for file in (store.batches, store.calls):
             stack.push_async_callback(file.drain)
@@ -252,7 +252,7 @@ class Session:
             budget=Budget(limits.max_cost_usd, store.progress.limit_usd),
             journal=store,
             observer=self.watch,
-            tell=tell,
+            report=report,
             policy=RetryPolicy(
                 limits.max_attempts, limits.retry_for_s, limits.max_connection_failures
             ),
@@ -267,8 +267,8 @@ class Session:
             stack.push_async_callback(model.aclose)
 
     def _batch_files(self) -> BatchFiles:
-        """Return how the run keeps batches; SpecError for a model with one under way that is asked
-        singly now.
+        """Return the files of batches. Raises SpecError for a model that has a batch in progress
+        but no longer sets `batch`.
         """
         from phyblock.models.batch import BatchFiles, under_way
 
@@ -293,14 +293,14 @@ class Session:
         workers: list[asyncio.Task[None]] = []
         for planned in self.plan.models:
             queue = queues[planned.name]
-            # What answers at once is asked a few at a time: it would keep calls waiting.
+            # Models that answer at once are asked a few at a time, or they would delay calls.
             is_local = planned.kind in ("baseline", "replay")
             most = _LOCAL_AT_ONCE if is_local else planned.max_concurrency
-            # What goes out in a batch is asked at once.
+            # All requests of a batch are asked at once.
             count = len(queue) if planned.batch else min(most, len(queue))
             workers += [asyncio.create_task(self._work(planned, queue)) for _ in range(count)]
         try:
-            # One worker's error must not end the others: they wait for what is paid for.
+            # One worker's error must not end the others, whose calls are paid for.
             ended = await asyncio.gather(*workers, return_exceptions=True)
         finally:
             _, is_cancelled = await to_its_end(self._end(workers))
@@ -312,10 +312,10 @@ class Session:
         self._store.records.check()
 
     async def _end(self, workers: list[asyncio.Task[None]]) -> None:
-        """Give up what is still under way, and wait until what was answered is on disk."""
+        """Give up calls in progress, and wait until all replies are on disk."""
         self._is_over = True
         for _ in range(2):
-            # Once, and a call that is under way still returns its answer.
+            # Only once, so that a call that has its answer still returns it.
             for worker in workers:
                 worker.cancel()
             await asyncio.sleep(0)
@@ -323,7 +323,7 @@ class Session:
         await self._store.records.drain()
 
     async def _work(self, planned: ModelConfig, queue: deque[Sample]) -> None:
-        """Ask until the queue is empty, the model is stopped, or the run."""
+        """Ask until the queue is empty, or the model or the run is stopped."""
         while queue and not (self.stopping or self._is_over or planned.name in self.result.stopped):
             try:
                 await self._one(queue.popleft(), planned)
@@ -336,13 +336,13 @@ class Session:
             except HaltedError:
                 return
             except Exception as error:
-                # A mistake of our own is no reason to lose what others have paid for.
+                # An internal error must not lose calls that are paid for.
                 self._failure = self._failure or error
                 self._stop(Stopping("error", "an error that the run cannot go on with"))
 
     @property
     def under_way(self) -> int:
-        """Calls that were sent and have not ended."""
+        """Number of calls that were sent and have not ended."""
         return sum(getattr(model, "under_way", 0) for model in self._models.values())
 
     def _stop(self, stop: Stopping) -> None:
@@ -353,8 +353,8 @@ class Session:
             self.watch(stop)
 
     async def _until_stopped(self, work: Coroutine[Any, Any, _Result]) -> _Result:
-        """Return what work gives, which is cancelled once the run stops; then HaltedError is raised
-        unless it comes to its end all the same, as a request that is under way does.
+        """Return the result of work, which is cancelled when the run stops. Raises HaltedError
+        then, unless the work completes, as a request in progress does.
         """
         task, message = asyncio.current_task(), "the run was ended before this request was sent"
         assert task is not None
@@ -372,7 +372,7 @@ class Session:
             self._waiting.discard(task)
 
     async def _one(self, sample: Sample, config: ModelConfig) -> None:
-        """Ask one sample, judge what came, and wait until its record is on disk."""
+        """Ask one sample, judge the reply, and wait until its record is on disk."""
         item = sample.track.shown(sample.item, sample.seed)
         if sample.track.plays:
             record = await self._play(sample, item, config)
@@ -412,7 +412,7 @@ class Session:
         return judge_episode(track, item, fields, episode, replies)
 
     async def _answer(self, model: Model, request: Request) -> Reply | ModelError | None:
-        """Return the reply, or the error that is this sample's alone."""
+        """Return the reply, or an error that concerns only this sample."""
         try:
             return await self._until_stopped(model.ask(request))
         except (UnavailableError, BudgetReachedError):
@@ -443,7 +443,7 @@ class Session:
 
 
 class _Journaled:
-    """A model that answers here and cannot be asked again: its answers are written as they come."""
+    """A model in this process that cannot be asked again; its answers are written at once."""
 
     needs_messages = True
 
@@ -454,7 +454,7 @@ class _Journaled:
         self._journal = journal
 
     async def ask(self, request: Request) -> Reply | None:
-        """Return the answer of the model, or that which it gave to an earlier command."""
+        """Return the model's answer, or its answer to an earlier command."""
         key = reply_key(self._config, request)
         if (kept := self._journal.kept(key)) is not None:
             return kept
@@ -470,8 +470,8 @@ class _Journaled:
 
 
 async def to_its_end(work: Coroutine[Any, Any, _Result]) -> tuple[_Result, bool]:
-    """Return the result of work that is done whoever stops waiting for it, and whether the waiting
-    task was cancelled meanwhile; raises what it raises.
+    """Return the result of work, which a cancellation does not stop, and whether the waiting task
+    was cancelled meanwhile; raises what the work raises.
     """
     task = asyncio.create_task(work)
     is_cancelled = False
@@ -484,7 +484,7 @@ async def to_its_end(work: Coroutine[Any, Any, _Result]) -> tuple[_Result, bool]
 
 
 _NAP_S = 0.1
-"""Longest delay until a signal that the system gives to another thread is noticed [s]."""
+"""Longest delay until a signal that the system delivers to another thread is noticed [s]."""
 
 
 def completed(
@@ -492,11 +492,11 @@ def completed(
     signals: Collection[signal.Signals] = (signal.SIGINT,),
     tick: Callable[[bool], object] = lambda _: None,
 ) -> RunResult:
-    """Run a session to its end in a thread of its own, since a notebook's has a loop already.
+    """Run a session to its end in a separate thread, since a notebook's thread already has a loop.
 
-    The first signal lets it send nothing more, the second gives up calls under way; what was
-    answered is on disk when this returns. `tick` is called several times a second, with True while
-    calls are under way.
+    After the first signal it sends nothing more, the second gives up calls in progress; all replies
+    are on disk when this returns. `tick` is called several times a second, with True while calls
+    are in progress.
     """
     loop, stops = asyncio.new_event_loop(), 0
     whole: asyncio.Task[RunResult] | None = None
@@ -516,7 +516,7 @@ def completed(
     def stop(*_: object) -> None:
         nonlocal stops
         stops += 1
-        # Once, as what is answered must be written; a loop that is closed has nothing to stop.
+        # Only once, since replies must be written; a closed loop has nothing to stop.
         give_up = whole.cancel if stops == 2 and whole is not None else session.interrupt
         with contextlib.suppress(RuntimeError):
             loop.call_soon_threadsafe(give_up)
@@ -533,7 +533,7 @@ def completed(
                 while not wait((running,), _NAP_S).done:
                     tick(session.under_way > 0)
             except BaseException:
-                # A program's handlers of other signals may raise what they like.
+                # A program's handlers of other signals may raise anything.
                 stop()
                 raise
         return running.result()
@@ -543,7 +543,7 @@ def completed(
 
 
 def remarks_on(result: RunResult, folder: Path | str) -> list[str]:
-    """Return a sentence on each model that was stopped, and on samples that need a person."""
+    """Return a sentence on each stopped model, and on samples that need attention."""
     remarks = [f"{model} was stopped: {reason}" for model, reason in result.stopped.items()]
     if result.failed:
         rejected = f"{counted(result.failed, 'request')} rejected for good"

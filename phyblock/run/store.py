@@ -66,11 +66,11 @@ _APPENDING = "free some space and give the same command again: it goes on from h
 class AppendFile:
     """Lines that are on disk when `append` or `put` returns; safe to call from several threads.
 
-    The file is made with the first line.
+    The file is created with the first line.
     """
 
     def __init__(self, path: Path, *, sync: bool = True) -> None:
-        """Without `sync` lines survive the death of the process, not that of the machine."""
+        """Without `sync`, lines survive a crash of the process, but not of the machine."""
         self._path = path
         self._sync = sync
         self._writing = threading.Lock()
@@ -80,15 +80,15 @@ class AppendFile:
         self._flusher: asyncio.Task[None] | None = None
 
     def append(self, lines: Iterable[Mapping[str, Any]]) -> None:
-        """Write objects, a line each, and wait until they are on disk.
+        """Write objects, one per line, and wait until they are on disk.
 
-        Raises StoreError when the disk refuses, or when somebody else removed, replaced or changed
-        the file meanwhile; what was written before stays whole.
+        Raises StoreError if the disk fails, or if somebody else removed, replaced or changed the
+        file meanwhile; earlier lines stay whole.
         """
         data = "".join(f"{_json_line(line)}\n" for line in lines).encode("utf-8", "replace")
         with self._writing, writing(self._path, _APPENDING):
             if self._file is None:
-                # Unbuffered: a write that failed must not be tried again behind our back.
+                # Unbuffered: a failed write must not be repeated implicitly.
                 self._file = FileIO(self._path, "a")
                 self._size_bytes = os.fstat(self._file.fileno()).st_size
                 if self._sync:
@@ -98,7 +98,8 @@ class AppendFile:
             self._size_bytes += len(data)
 
     async def put(self, line: Line) -> None:
-        """Append a line off the event loop, together with others that wait, until it is on disk.
+        """Append a line outside of the event loop, together with other waiting ones, and wait until
+        it is on disk.
 
         Raises StoreError as `append`.
         """
@@ -109,7 +110,7 @@ class AppendFile:
         await written
 
     async def drain(self) -> None:
-        """Wait until everything that was put is on disk or refused."""
+        """Wait until everything that was put is on disk or has failed."""
         if self._flusher is not None:
             await self._flusher
 
@@ -120,7 +121,7 @@ class AppendFile:
                 self._check(self._file.fileno())
 
     def close(self) -> None:
-        """Close the file, once what is being written is written."""
+        """Close the file after pending writes."""
         with self._writing:
             if self._file is not None:
                 self._file.close()
@@ -133,9 +134,9 @@ class AppendFile:
             try:
                 await asyncio.to_thread(self.append, [line.fields() for line, _ in batch])
             except Exception as error:
-                # Whatever it is, those who wait must hear of it, or they wait for ever.
+                # Waiters must get every exception, or they wait forever.
                 failure = error
-            # A waiter that was cancelled has a future that is already done.
+            # The future of a cancelled waiter is already done.
             for written in (future for _, future in batch if not future.done()):
                 if failure is None:
                     written.set_result(None)
@@ -157,10 +158,10 @@ class AppendFile:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """The part of a record that running figures need; `counts` are of the headline matcher and
+    """The part of a record that live progress needs; `counts` are of the headline matcher and
     setting.
 
-    `paid_usd` is None where a price is not known, `cached` None where there is no reply.
+    `paid_usd` is None if a price is unknown, `cached` None without a reply.
     """
 
     model: str
@@ -174,7 +175,7 @@ class Summary:
 
     @classmethod
     def of(cls, record: Record) -> Summary:
-        """Sum up a record."""
+        """Return the summary of a record."""
         headline = next((s for s in record.scores if s.criterion == _HEADLINE), None)
         reply = record.reply
         return cls(
@@ -191,11 +192,11 @@ class Summary:
 
 @dataclass
 class Progress:
-    """The newest record of every sample that counts, summed up, and what the run cost so far.
+    """The summary of the newest record of every sample, and the cost of the run so far.
 
-    `batches` are all lines about batches, oldest first; `calls` is how many calls were made,
-    `replies` are those that no final record holds, by key, and `unanswered` the calls whose end is
-    not known, by number: each may have been billed.
+    `batches` are all lines about batches, oldest first; `calls` is the number of calls made,
+    `replies` are those without a final record, by key, and `unanswered` the calls without a known
+    end, by number: each may have been billed.
     """
 
     samples: dict[str, Summary] = field(default_factory=dict)
@@ -207,14 +208,14 @@ class Progress:
     _records_usd: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
 
     def add(self, record: Record) -> None:
-        """Take in a record as it was read, oldest first."""
+        """Add a record; records come oldest first."""
         self.samples[record.sample] = Summary.of(record)
         self._records_usd[record.sample] += record.limit_usd
 
     def add_call(self, call: Call) -> None:
-        """Take in a line about a call, oldest first, when all records are."""
+        """Add a line about a call, oldest first, after all records."""
         self.calls = max(self.calls, call.call + 1)
-        # The cost of a sample that went out alone is counted here, of one in a batch by its record.
+        # The cost of a single call is counted here, that of one in a batch by its record.
         self._records_usd.pop(call.sample, None)
         if not call.ended:
             self.unanswered[call.call] = call
@@ -227,7 +228,7 @@ class Progress:
 
     @property
     def limit_usd(self) -> dict[str, float]:
-        """Return the cost that a limit counts, by model [US dollars]: unknown ends in full."""
+        """Return the cost that a limit counts, by model [US dollars]; unknown ones in full."""
         usd = self._calls_usd.copy()
         for call in self.unanswered.values():
             usd[call.model] += call.most_usd or 0.0
@@ -237,7 +238,7 @@ class Progress:
 
     @property
     def unanswered_text(self) -> str:
-        """Return a sentence on calls whose end is not known, or ""."""
+        """Return a sentence on calls without a known end, or ""."""
         if not self.unanswered:
             return ""
         usd = [call.most_usd for call in self.unanswered.values()]
@@ -249,9 +250,9 @@ class Progress:
 class RunStore:
     """A run folder opened for writing, and the journal of the run's calls; one process at a time.
 
-    `records` and `batches` are synced line by line. `progress` is how far the run was when the
-    folder was opened; a reply in it that no record holds is not asked for again. `run` is the
-    digest by which records show that they are of this run.
+    `records` and `batches` are synced line by line. `progress` is the progress of the run when the
+    folder was opened; replies in it without a record are not requested again. `run` is the digest
+    that records of this run carry.
     """
 
     def __init__(self, folder: Path, manifest: Manifest, samples: Collection[str]) -> None:
@@ -292,15 +293,15 @@ class RunStore:
         self.close()
 
     def close(self) -> None:
-        """Release the files and the lock, once what is being written is written."""
+        """Release the files and the lock after pending writes."""
         self._open.close()
 
     def kept(self, key: str) -> Reply | None:
-        """Return the reply to a request that an earlier command was answered, or None."""
+        """Return the reply to a request of an earlier command, or None."""
         return self.progress.replies.get(key)
 
     async def sent(self, model: str, sample: str, key: str, most_usd: float | None) -> Call:
-        """Write a call that is about to be sent; StoreError where the disk refuses."""
+        """Write a call that is about to be sent. Raises StoreError if the disk fails."""
         number = self.progress.calls
         self.progress.calls += 1
         names = {"call": number, "model": model, "sample": sample, "key": key, "run": self.run}
@@ -309,13 +310,13 @@ class RunStore:
         return call
 
     async def ended(self, call: Call, billed_usd: float | None, reply: Reply | None) -> None:
-        """Write what became of a call; StoreError where the disk refuses."""
+        """Write the end of a call. Raises StoreError if the disk fails."""
         stored = None if reply is None else reply.storable()
         known = {"ended": True, "billed_usd": billed_usd, "reply": stored}
         await self.calls.put(call.model_copy(update=known))
 
     def keep_prompt(self, messages: Sequence[Message]) -> str:
-        """Write a prompt unless it is there, and return its digest; StoreError as `append`."""
+        """Write a prompt unless it is stored, and return its digest; raises as `append`."""
         prompt = prompt_fields(messages)
         digest: str = prompt["sha256"]
         if digest not in self._prompts_known:
@@ -324,9 +325,9 @@ class RunStore:
         return digest
 
     def note_stopped(self, models: Mapping[str, str], run: str, asked: Collection[str]) -> None:
-        """Keep why the models `asked` about, or the whole run, were stopped, for whoever reads it.
+        """Write why the models among `asked`, or the whole run, were stopped.
 
-        What an earlier session says of other models stays. Raises StoreError where the folder
+        Entries of earlier sessions about other models are kept. Raises StoreError if the folder
         cannot be written.
         """
         earlier = read_stopped(self._folder).models
@@ -341,7 +342,7 @@ class RunStore:
     def _file(
         self, lines: Lines[LineT], take: Callable[[LineT], object], *, sync: bool = True
     ) -> AppendFile:
-        """Open a file for appending, rid of a line that a kill cut short; `take` sees the rest."""
+        """Open a file for appending, without an unfinished last line; `take` gets the others."""
         file = AppendFile(lines.path, sync=sync)
         self._open.callback(file.close)
         for _, line in lines:
@@ -354,7 +355,7 @@ class RunStore:
         return file
 
     def _claim(self, manifest: Manifest) -> None:
-        """Write the manifest where the folder has none that selects the same."""
+        """Write the manifest unless the folder has one with the same selection."""
         found = held_run(self._folder, manifest)
         if found is not None:
             if _selection(found) == _selection(manifest):
@@ -367,17 +368,17 @@ class RunStore:
 
 
 def _selection(manifest: Manifest) -> tuple[list[str], object]:
-    """The models and seeds of a run; each command may name others than the last."""
+    """Return the models and seeds of a run, which may differ between commands."""
     return [model.name for model in manifest.models], manifest.suite.get("seeds")
 
 
 def held_run(folder: Path, manifest: Manifest) -> Manifest | None:
-    """Return the manifest in `folder`, which holds the run that `manifest` describes; None where it
-    holds no run. Nothing is written.
+    """Return the manifest in `folder` if it holds the run of `manifest`, or None if it holds no
+    run. Nothing is written.
 
-    Raises StoreError when it holds records or calls of another run, of a run that another version
-    of phyblock began, or what is no run. A manifest without any is no run yet: one that failed at
-    once leaves it behind, and nothing would be lost with it.
+    Raises StoreError if it holds records or calls of another run or another version of phyblock, or
+    anything else. A manifest without records or calls does not count as a run: it is left by a run
+    that failed at once, and nothing would be lost with it.
     """
     check_place(folder)
     if not (folder / MANIFEST).exists():
@@ -404,12 +405,12 @@ def held_run(folder: Path, manifest: Manifest) -> Manifest | None:
 LOCK = ".lock"
 _OWN = (MANIFEST, RECORDS, CALLS, PROMPTS, BATCHES, "batches", LOCK, LIST)
 _BEGUN = re.compile(rf"{re.escape(LOCK)}|{re.escape(LIST)}|\.[0-9a-f]{{32}}\.part")
-"""Names of files that a run leaves behind if it is killed before it has a manifest."""
+"""Names of files that a run leaves if it is killed before it has a manifest."""
 
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold the lock of a run folder, which one process writes; StoreError where another does."""
+    """Hold the lock of a run folder. Raises StoreError if another process holds it."""
     with (folder / LOCK).open("w") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -423,8 +424,8 @@ def locked(folder: Path) -> Iterator[None]:
 def check_place(folder: Path) -> None:
     """Raise StoreError unless `folder` is new, empty or a run's; nothing is written.
 
-    A folder without our manifest that holds anything is somebody's: a run makes names of its own
-    in it. What a run grows must be files of the folder itself, no links to others.
+    A folder that holds anything but no manifest belongs to somebody else. The files that a run
+    appends to must be in the folder itself, not links.
     """
     with writing(folder, _OTHER_FOLDER):
         try:
@@ -444,10 +445,10 @@ def check_place(folder: Path) -> None:
 
 
 def write_run(folder: Path, manifest: Manifest, records: Iterable[Record]) -> None:
-    """Write manifest and records of a run; raises StoreError where the disk refuses."""
+    """Write manifest and records of a run. Raises StoreError if the disk fails."""
     lines = (line.encode("utf-8", "replace") for line in record_lines(records))
     files: dict[str, str | Iterator[bytes]] = {RECORDS: lines, MANIFEST: manifest_text(manifest)}
-    # Where a run is replaced, a kill between the two leaves one that has to be scored again.
+    # A kill between the two writes leaves a run that has to be rescored.
     names = (RECORDS, MANIFEST) if (folder / MANIFEST).exists() else (MANIFEST, RECORDS)
     OutFolder(folder).claim([])
     for name in names:
@@ -456,12 +457,12 @@ def write_run(folder: Path, manifest: Manifest, records: Iterable[Record]) -> No
 
 
 def manifest_text(manifest: Manifest) -> str:
-    """`run.yaml`."""
+    """Return the text of `run.yaml`."""
     return dump_yaml(manifest.fields())
 
 
 def record_lines(records: Iterable[Record]) -> Iterator[str]:
-    """`records.jsonl`, line by line: the same text for the same records."""
+    """Yield the lines of `records.jsonl`: the same text for the same records."""
     for record in records:
         yield f"{_json_line(record.fields())}\n"
 
@@ -471,7 +472,7 @@ def _json_line(fields: Mapping[str, Any]) -> str:
 
 
 def prompt_fields(messages: Sequence[Message]) -> dict[str, Any]:
-    """Return the fields of a `Prompt` of messages, with the labels of pictures in their place."""
+    """Return the fields of a `Prompt` of messages, with labels in place of pictures."""
     fields = [
         {
             "role": message.role,

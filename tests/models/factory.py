@@ -129,7 +129,7 @@ def make_model(
         budget=budget,
         observer=(events if events is not None else []).append,
         policy=policy,
-        tell=(told if told is not None else []).append,
+        report=(told if told is not None else []).append,
     )
 
 

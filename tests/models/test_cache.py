@@ -177,13 +177,13 @@ def test_a_row_that_is_no_reply_is_missing_and_is_overwritten(
         sql = "UPDATE replies SET reply = CAST(? AS TEXT) WHERE key = 'k'"
         db.execute(sql, (content,))
     db.close()
-    with ReplyCache(path, tell=said.append) as cache:
+    with ReplyCache(path, report=said.append) as cache:
         assert cache.get("k") is None
         assert cache.get("whole") is not None
         cache.put("k", "openai/m", REPLY)
         assert cache.get("k") is not None
     (text,) = said
-    assert "a broken reply is asked for again" in text
+    assert "broken reply, requested again" in text
 
 
 WRITER = """

@@ -238,7 +238,7 @@ def test_an_episode_that_would_have_asked_otherwise_is_no_longer_final(
     lines[0]["turns"][0]["reply"]["text"] = "Done"
     path.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
     told: list[str] = []
-    rescore(here.out, tell=told.append)
+    rescore(here.out, report=told.append)
     first, *others = here.records()
     assert [text.partition(" this")[0] for text in told] == ["Step planning: in 1 episode"]
     assert (first["outcome"], first["error"]["kind"]) == ("api_error", "retryable")
