@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 from phyblock.domain.blocks import KIT_PALETTE, orientation_class
 from phyblock.domain.scene import MAX_CANDIDATES, CandidateSet, Kind, Scene
+from phyblock.domain.symmetry import fingerprint
 from phyblock.errors import Problem
-from phyblock.making.scenes.sketch import POSES, find_twins
+from phyblock.making.scenes.sketch import POSES
 from phyblock.sim.contact import FIT_TOLERANCE_M, GROUND, find_gaps, find_overlaps, support_graph
 from phyblock.sim.dynamics import (
     DEFAULT_TRIAL,
@@ -60,20 +61,17 @@ class Tolerances:
     """Limits: overlaps and gaps up to `fit_m` [m], movement within the limits of a trial.
 
     The finished structure is watched to the end of the `trial`, or until it is at rest for
-    `quiet_s` [s]. Each step is tried at the first of its time steps, the last one if `last_step`.
+    `quiet_s` [s]. Each step before is tried at the first of its time steps.
     """
 
     fit_m: float = FIT_TOLERANCE_M
     trial: Trial = DEFAULT_TRIAL
     quiet_s: float | None = None
-    last_step: bool = True
 
 
 OURS = Tolerances()
 """For scenes made here."""
-# The last step of a foreign scene is left to the trial of the finished structure: what falls there
-# shall be told once. 2 mm cannot be seen in a picture.
-FOREIGN = Tolerances(fit_m=0.002, last_step=False, quiet_s=0.5)
+FOREIGN = Tolerances(fit_m=0.002, quiet_s=0.5)  # 2 mm cannot be seen in a picture.
 """For scenes made elsewhere, whose positions are written by hand in rounded millimeters."""
 
 
@@ -217,11 +215,10 @@ def _dependencies(facts: SceneFacts, check: str) -> Iterator[Finding]:
 
 
 def _unstable_step(facts: SceneFacts) -> Iterator[Finding]:
-    """Steps of the stored order after which something falls."""
-    limits = facts.tolerances
-    blocks = facts.scene.blocks if limits.last_step else facts.scene.blocks[:-1]
-    trial = replace(limits.trial, physics=limits.trial.physics[:1])
-    for count, step in enumerate(check_steps(blocks, trial), 1):
+    """Steps of the stored order, before the last one, after which something falls."""
+    trial, blocks = facts.tolerances.trial, facts.scene.blocks
+    first = replace(trial, physics=trial.physics[:1])
+    for count, step in enumerate(check_steps(blocks[:-1], first), 1):
         if not step.stable:
             when = f"at step {count}, once block {blocks[count - 1].order} is placed"
             yield _fall(facts, "unstable step", when, step)
@@ -329,13 +326,13 @@ def check_set(scenes: Sequence[Scene]) -> tuple[Finding, ...]:
     """Return scenes that equal an earlier one up to quarter turns, mirroring and shifting, and
     those whose parents are not base scenes of the set.
     """
-    message = "is scene {}, turned, mirrored or shifted at most"
-    found = [
-        Finding(name, "duplicate", message.format(twin))
-        for name, twin in find_twins(scenes).items()
-    ]
+    found: list[Finding] = []
+    first: dict[bytes, str] = {}
     bases = {scene.id for scene in scenes if scene.parents == (scene.id,)}
     for scene in scenes:
+        if (twin := first.setdefault(fingerprint(scene.blocks), scene.id)) != scene.id:
+            message = f"is scene {twin}, turned, mirrored or shifted at most"
+            found.append(Finding(scene.id, "duplicate", message))
         strange = [parent for parent in scene.parents if parent not in bases]
         if strange or not scene.parents:
             message = "name no base scene of the set"

@@ -69,7 +69,8 @@ _KEPT = 1 << 15
 def is_balanced(blocks: Sequence[Block], lean: tuple[float, float] = (0.0, 0.0)) -> bool:
     """True if contacts can bear all weights as they are, on a floor whose slope is `lean`."""
     weights = _weights(blocks, up=np.array([*lean, 1.0]))
-    return _pushes(_forces(blocks, FRICTION), weights[:, None]) is not None
+    forces = _matrix(_contacts(blocks), len(blocks), FRICTION)
+    return _pushes(forces, weights[:, None]) is not None
 
 
 def surely_stands(blocks: Sequence[Block]) -> bool:
@@ -79,7 +80,7 @@ def surely_stands(blocks: Sequence[Block]) -> bool:
 
 def surely_falls(blocks: Sequence[Block]) -> bool:
     """True if blocks fall with weights off by up to `MARGIN_M`, much friction, any masses."""
-    forces = _forces(blocks, FRICTIONS[1])
+    forces = _matrix(_contacts(blocks), len(blocks), FRICTIONS[1])
     if not forces.size:
         return bool(blocks)
     return bool(_least_imbalance(blocks, forces).fun >= _TOLERANCE)
@@ -308,13 +309,10 @@ def _contacts(blocks: Sequence[Block], margin_m: float = 0.0) -> _Contacts:
     return _Contacts(below, above, np.concatenate(corners_m), np.concatenate(axes), is_wide)
 
 
-def _forces(blocks: Sequence[Block], friction: float, margin_m: float = 0.0) -> Floats:
-    """Effect of a unit of force along each edge of each cone on each block, shape (6 n, k)."""
-    return _matrix(_contacts(blocks, margin_m), len(blocks), friction)
-
-
 def _matrix(met: _Contacts, count: int, friction: float) -> Floats:
-    """As `_forces`, of the contacts of so many blocks."""
+    """Effect of a unit of force along each edge of each cone on each of so many blocks, shape
+    (6 n, k).
+    """
     edges = met.edges(friction)
     wrenches = _wrenches(met.places_m[:, None], edges)
     columns = np.zeros((len(edges), edges.shape[1], count, 6))

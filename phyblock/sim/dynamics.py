@@ -93,11 +93,7 @@ def check(
     """
     is_large = len(blocks) > _MOST_PROVEN
     parts = [group for group in groups(blocks) if is_large or not is_proven(group)]
-    settings = []
-    for physics in trial.physics if parts else ():
-        with World(physics) as world:
-            settings.append(Stability.of([_tried(world, one, trial, quiet_s) for one in parts]))
-    return Stability.of(settings)
+    return _try_groups(parts, trial, quiet_s)
 
 
 def check_steps(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> tuple[Stability, ...]:
@@ -105,14 +101,16 @@ def check_steps(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> tuple[
     near = [
         next(g for g in groups(blocks[:n]) if blocks[n - 1] in g) for n in range(1, len(blocks) + 1)
     ]
-    found = [Stability() for _ in near]
-    open_ones = [number for number, group in enumerate(near) if not is_proven(group)]
-    for physics in trial.physics if open_ones else ():
+    return tuple(_try_groups([] if is_proven(group) else [group], trial, QUIET_S) for group in near)
+
+
+def _try_groups(parts: Sequence[Sequence[Block]], trial: Trial, quiet_s: float | None) -> Stability:
+    """Let groups go one after another, under each setting in a world of its own."""
+    settings = []
+    for physics in trial.physics if parts else ():
         with World(physics) as world:
-            for number in open_ones:
-                tried = _tried(world, near[number], trial, QUIET_S)
-                found[number] = Stability.of([found[number], tried])
-    return tuple(found)
+            settings.append(Stability.of([_tried(world, one, trial, quiet_s) for one in parts]))
+    return Stability.of(settings)
 
 
 def is_proven(group: Sequence[Block]) -> bool:

@@ -230,11 +230,6 @@ def seen(recipe: QuestionPicture) -> Shot:
     return shoot(drawn_blocks(recipe), question_camera(recipe, _STYLE), SEEN_PX)
 
 
-def differing_pixels(one: Shot, other: Shot) -> int:
-    """Number of pixels that differ by more than a tenth of the scale in some channel."""
-    return int(changed_pixels(one, other).sum())
-
-
 def changed_pixels(one: Shot, other: Shot) -> NDArray[np.bool_]:
     """The pixels that differ by more than a tenth of the scale in some channel, shape of both."""
     step = np.abs(_colors(one) - _colors(other)) > _VISIBLE_STEP
@@ -251,7 +246,7 @@ def _colors(shot: Shot) -> NDArray[np.int16]:
 
 def least_difference(shots: Sequence[Shot]) -> int:
     """The fewest pixels in which any two pictures differ; two at least must be given."""
-    return min(differing_pixels(one, other) for one, other in combinations(shots, 2))
+    return min(int(changed_pixels(*pair).sum()) for pair in combinations(shots, 2))
 
 
 def shown_pixels(recipe: QuestionPicture, shot: Shot) -> dict[int, int]:

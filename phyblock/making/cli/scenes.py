@@ -134,11 +134,8 @@ def generate(
     mirroring and shifting. The same N, seed, levels and palette give the same files with the same
     physics engine, on any Python, any number of processes or a cluster.
     """
-    chosen = ",".join(sorted(levels))
-    command = f"phyblock scenes generate --count {count} --seed {seed} --levels {chosen}"
-    command += f" --palette {palette}"
-    command += "".join(f" --exclude {shlex.quote(name)}" for name in exclude)
-    command += f" --out {out.name}"
+    settled = _settled(count, levels, palette, exclude)
+    command = f"phyblock scenes generate {settled} --seed {seed} --out {out.name}"
     kind = cast(Palette, palette)
     others = (task.scene for name in exclude for task in read_data_set(name).tasks)
     excluded = builtin_forms().union(colorless(scene.blocks) for scene in others)
@@ -158,6 +155,12 @@ def generate(
     known = "the built-in set or an excluded one" if exclude else "the built-in set"
     click.echo(f"{counted(production.rejected, 'draft')} rejected: a scene of {known}")
     print_engine()
+
+
+def _settled(count: int, levels: Sequence[str], palette: str, exclude: Sequence[str]) -> str:
+    """Return arguments of generate in one form."""
+    text = f"--count {count} --levels {','.join(sorted(levels))} --palette {palette}"
+    return text + "".join(f" --exclude {shlex.quote(name)}" for name in exclude)
 
 
 @scenes.command("commit")
@@ -221,9 +224,7 @@ def season_arguments(words: Sequence[str]) -> str:
     if others := [name for name in given["exclude"] if name not in bundled]:
         message = f"{others[0]} can change before the season: exclude a bundled set"
         raise click.UsageError(f"{message} ({', '.join(bundled)}).")
-    levels = ",".join(sorted(given["levels"]))
-    settled = f"--count {given['count']} --levels {levels} --palette {given['palette']}"
-    return settled + "".join(f" --exclude {name}" for name in given["exclude"])
+    return _settled(given["count"], given["levels"], given["palette"], given["exclude"])
 
 
 @scenes.command("compare")

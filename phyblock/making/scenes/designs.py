@@ -54,37 +54,36 @@ def storey(d: Draft, width: int, tone: int = 0) -> None:
 def crown(d: Draft, width: int, tone: int = 1) -> None:
     """The end of a structure, on a deck `width` wide (4, 6 or 8)."""
     y, is_wide = width / 2 - 1, width > 4
+    cradle = f"arch:cradle; 2 semi_cylinder {max(3.0, y)}" if is_wide else "arch:cradle"
+    temple = "arch; 2 semi_cylinder 3; top" if is_wide else "arch; top"
+    lantern = "cuboid1; cylinder; top"
     kind = d.pick(
-        ("gable", "middle", "turret", "pair", "lantern", "cradle", "battlement", "temple")
+        (_GABLES[width], "top", "cube; top", "pair", lantern, cradle, "battlement", temple)
     )
     if kind == "pair":
-        d.build(f"2 cube {y}", tone)
-        d.any_of(f"2 triangle {y}", f"2 semi_cylinder {y}")
+        _turrets(d, y, tone)
         d.build("top" if is_wide else "")
     elif kind == "battlement":
         d.build(f"2 semi_cylinder {y}" if d.maybe() else f"2 cuboid1 {y}")
         d.build("cube; top" if is_wide else "", tone)
     else:
-        texts = {
-            "gable": _GABLES[width],
-            "middle": "top",
-            "turret": "cube; top",
-            "lantern": "cuboid1; cylinder; top",
-            "cradle": f"arch:cradle; 2 semi_cylinder {max(3.0, y)}" if is_wide else "arch:cradle",
-            "temple": "arch; 2 semi_cylinder 3; top" if is_wide else "arch; top",
-        }
-        d.build(texts[kind], tone)
+        d.build(kind, tone)
+
+
+def _turrets(d: Draft, y: float, tone: int) -> None:
+    d.build(f"2 cube {y}", tone)
+    d.any_of(f"2 triangle {y}", f"2 semi_cylinder {y}")
 
 
 def flank(d: Draft, width: int, tone: int = 0) -> None:
     """Blocks that lean on both ends of a row that stands on the ground."""
-    kind, y = d.pick(("ramp", "ramp", "turret", "apse", "fence")), width / 2 + 1
-    if kind == "turret":
-        d.build(f"2 cube {y}", tone)
-        d.any_of(f"2 triangle {y}", f"2 semi_cylinder {y}")
+    y = width / 2 + 1
+    ramps, apses = f"2 triangle:ramp {y}", f"2 semi_cylinder:round {y - 0.5}"
+    kind = d.pick((ramps, ramps, "turrets", apses, f"2 cuboid1 {y}"))
+    if kind == "turrets":
+        _turrets(d, y, tone)
     else:
-        apse = f"2 semi_cylinder:round {width / 2 + 0.5}"
-        d.build({"ramp": f"2 triangle:ramp {y}", "apse": apse, "fence": f"2 cuboid1 {y}"}[kind])
+        d.build(kind)
 
 
 def _tower(d: Draft) -> None:
@@ -211,31 +210,20 @@ def _court(d: Draft) -> None:
     half = d.pick((1, 2))
     beam = "cuboid3:flat-y" if half == 2 else "cuboid2:flat-y"
     d.build(f"2 {post} {half},-1; 2 {post} {half},1; {beam} 0,-1; {beam} 0,1")
-    kind = d.pick(("hall", "nave", "across", "tower"))
-    if kind == "hall":
-        d.build("2 cuboid2:flat-x 1")
+    hall, nave = "2 cuboid2:flat-x 1", "2 triangle:ramp 1,-1; 2 triangle:ramp 1,1"
+    across = f"2 cuboid2:flat-x {half}; top {-half}; top {half}"
+    if d.any_of(hall, nave, across, "cuboid2:flat-x; cylinder; top") == hall:
         column(d, 1)
-    texts = {
-        "hall": "top",
-        "nave": "2 triangle:ramp 1,-1; 2 triangle:ramp 1,1",
-        "across": f"2 cuboid2:flat-x {half}; top {-half}; top {half}",
-        "tower": "cuboid2:flat-x; cylinder; top",
-    }
-    d.build(texts[kind])
+        d.build("top")
 
 
 def _monument(d: Draft) -> None:
-    bases = {
-        "plate": "cuboid2:flat-y 0,-1; cuboid2:flat-y 0,1",
-        "cross": "cuboid3:flat-y; cuboid2:flat-x",
-        "step": "cuboid3:flat-y; cuboid2:flat-y",
-        "block": "2 cube 1,-1; 2 cube 1,1; cuboid2:flat-y",
-    }
-    base = d.pick(tuple(bases))
-    d.build(bases[base])
+    plates, block = "cuboid2:flat-y 0,-1; cuboid2:flat-y 0,1", "2 cube 1,-1; 2 cube 1,1"
+    cross, step = "cuboid3:flat-y; cuboid2:flat-x", "cuboid3:flat-y; cuboid2:flat-y"
+    base = d.any_of(plates, cross, step, f"{block}; cuboid2:flat-y")
     column(d, d.pick((1, 2, 2)))
-    d.build("cuboid2:flat-y; 2 semi_cylinder 1" if base != "cross" and d.maybe(0.4) else "top")
-    if base == "step":
+    d.build("cuboid2:flat-y; 2 semi_cylinder 1" if base != cross and d.maybe(0.4) else "top")
+    if base == step:
         side = "semi_cylinder" if d.maybe() else "triangle"
         d.build(f"2 {side} {3 if d.maybe() else 4}")
 
@@ -281,14 +269,9 @@ def _animal(d: Draft) -> None:
     if legs == "arches":
         width, back = 4, "2 cuboid2:flat-x 1"
     end = width / 2 - 1
-    texts = {
-        "arch": "arch",
-        "arches": "arch 0,-1; arch 0,1",
-        "cubes": f"2 cube {end}",
-        "posts": f"2 cylinder {end}",
-        "feet": f"2 cuboid1:edge-x {end}",
-    }
-    d.build(texts[legs])
+    blocks = {"cubes": "cube", "posts": "cylinder", "feet": "cuboid1:edge-x"}
+    pairs = {name: f"2 {block} {end}" for name, block in blocks.items()}
+    d.build({"arch": "arch", "arches": "arch 0,-1; arch 0,1", **pairs}[legs])
     if legs != "arch" or d.maybe():
         d.build(back)
     cube = f"cube {end} +1"
@@ -343,17 +326,9 @@ def _ship(d: Draft) -> None:
         "cuboid2:flat-y; cuboid3:flat-y",
     )
     is_twin = hull.startswith("2")
-    cabin = d.pick(("house", "mast", "bridge", "funnel"))
-    if cabin == "mast":
-        d.build("cylinder")
+    bridge, funnel = "cuboid2:flat-y; cube; semi_cylinder", "cube -1; cuboid1 1; semi_cylinder -1"
+    if d.any_of("cube; top", "cylinder", bridge, funnel) == "cylinder":
         d.any_of("triangle:roof", "triangle:ramp+y")
-    else:
-        texts = {
-            "house": "cube; top",
-            "bridge": "cuboid2:flat-y; cube; semi_cylinder",
-            "funnel": "cube -1; cuboid1 1; semi_cylinder -1",
-        }
-        d.build(texts[cabin])
     if is_twin or d.maybe(0.4):
         side = "semi_cylinder" if d.maybe() else "triangle"
         d.build(f"2 {side} {3 if is_twin else 2}")
@@ -375,20 +350,16 @@ def _table(d: Draft) -> None:
     end, board = width / 2 - 1, _DECKS[width].partition(":")[0]
     d.any_of(f"2 cube {end}", f"2 cuboid1 {end}", f"2 cylinder {end}")
     d.build(_DECKS[width])
-    kind = d.pick(("vase", "meal", "bed", "back", "lamp", "bowl"))
+    bed = f"semi_cylinder:dome {-end}; cuboid1 {-end + 2 if width == 6 else end}"
+    back, lamp = f"{board}:edge-x 0,-0.5", f"cuboid1 {end}; triangle {end}"
+    kind = d.pick(("vase", "meal", bed, back, lamp, "arch:cradle"))
     if kind == "vase":
         d.build(f"cylinder {d.pick((0.0, end))}")
     elif kind == "meal":
         d.build(f"2 semi_cylinder {end}")
         d.build("cuboid1" if d.maybe() else "")
     else:
-        texts = {
-            "bed": f"semi_cylinder:dome {-end}; cuboid1 {-end + 2 if width == 6 else end}",
-            "back": f"{board}:edge-x 0,-0.5",
-            "lamp": f"cuboid1 {end}; triangle {end}",
-            "bowl": "arch:cradle",
-        }
-        d.build(texts[kind])
+        d.build(kind)
 
 
 def _chair(d: Draft) -> None:

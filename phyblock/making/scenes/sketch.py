@@ -39,13 +39,6 @@ def transformed(blocks: Sequence[Block], symmetry: Symmetry) -> tuple[Block, ...
     )
 
 
-def find_twins(scenes: Iterable[Scene]) -> dict[str, str]:
-    """Scenes, by id, that equal an earlier one but for turning, mirroring and shifting: its id."""
-    first: dict[bytes, str] = {}
-    earlier = {scene.id: first.setdefault(fingerprint(scene.blocks), scene.id) for scene in scenes}
-    return {name: twin for name, twin in earlier.items() if twin != name}
-
-
 def colorless(blocks: Iterable[Block]) -> bytes:
     """Return the fingerprint that structures share which are equal but for their colors."""
     return fingerprint([replace(block, color=COLORS[0]) for block in blocks])
